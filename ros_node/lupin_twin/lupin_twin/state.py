@@ -1,0 +1,280 @@
+"""Per-tag store: the latest of what the robot has seen at each AprilTag.
+
+Pure: standard library only, no clock, no ROS, no lock. Time is an argument everywhere, as
+nanoseconds of ROS time (`get_clock().now()` on hardware, `/clock` in simulation). Positions are
+metres in the map frame (x right, y up, z above the floor), orientations are unit quaternions.
+
+Every value handed out is immutable, so a snapshot can cross to another thread as it is. The store
+itself belongs to one thread.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+NANOSECONDS_PER_SECOND = 1_000_000_000
+
+# Bounds on what one robot may make us keep. A greenhouse compartment has hundreds of tags and a
+# tag carries a handful of sensors; the bounds are far above that and keep memory finite when a
+# producer is broken or hostile.
+MAX_TAGS = 20_000
+MAX_SENSORS_PER_TAG = 64
+MAX_TEXT_LENGTH = 256
+MAX_BLOOMS_PER_TAG = 2_000
+MAX_FOOTPRINT_POINTS = 64
+
+
+class Rejected(ValueError):
+    """A write that the store refuses; the message names the field, the value and the limit."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Position (m) and orientation (unit quaternion) in the map frame; `qw` is never 0."""
+
+    x: float
+    y: float
+    z: float
+    qx: float
+    qy: float
+    qz: float
+    qw: float
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether all seven numbers are finite; a pose that is not counts as no pose."""
+        return all(
+            math.isfinite(value)
+            for value in (self.x, self.y, self.z, self.qx, self.qy, self.qz, self.qw)
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One sensor's value, in the sensor's own unit (°C, %, ppm, lx); may be NaN or infinite."""
+
+    name: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Bloom:
+    """One flower: position (m, map frame), height above the pot (m), confidence 0 to 1."""
+
+    x: float
+    y: float
+    z: float
+    height_m: float
+    species: str
+    confidence: float
+    anomaly: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Flower:
+    """What the camera made of the plants at a tag; `footprint` is (x, y, z) in m, map frame."""
+
+    species: str = ""
+    confidence: float = 0.0
+    anomaly: bool = False
+    flower_count: int = 0
+    bug_count: int = 0
+    blooms: tuple[Bloom, ...] = ()
+    footprint: tuple[tuple[float, float, float], ...] = ()
+
+
+NO_FLOWER = Flower()
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """One scan of a tag's sensors.
+
+    `stamp_ns` is ROS time. `succeeded` is false for a scan that was tried and failed; such a scan
+    carries no pose, and readings only as far as they were taken.
+    """
+
+    tag_id: str
+    stamp_ns: int
+    readings: tuple[Reading, ...] = ()
+    pose: Pose | None = None
+    succeeded: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class FlowerObservation:
+    """One look at a tag's flowers; `stamp_ns` is ROS time."""
+
+    tag_id: str
+    stamp_ns: int
+    flower: Flower
+    pose: Pose | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TagState:
+    """Everything known about one tag. Replaced as a whole on every write, never changed.
+
+    `pose` is None until the tag is pinned. `last_observed_ns` is None for a tag that was
+    discovered and never scanned.
+    """
+
+    tag_id: str
+    pose: Pose | None = None
+    readings: tuple[Reading, ...] = ()
+    last_observed_ns: int | None = None
+    flower: Flower = NO_FLOWER
+
+    def stale_seconds(self, now_ns: int) -> float:
+        """Seconds since the last observation: never negative, infinite for a tag never observed.
+
+        A clock that jumps back (a restarted simulation, a looped bag) leaves observations in the
+        future; their age is 0, not a negative number.
+        """
+        if self.last_observed_ns is None:
+            return math.inf
+        return max(0, now_ns - self.last_observed_ns) / NANOSECONDS_PER_SECOND
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """Every tag at one moment, in the order in which the tags were first heard of."""
+
+    stamp_ns: int
+    frame_id: str
+    tags: tuple[TagState, ...]
+
+
+@dataclass(slots=True)
+class TwinStore:
+    """The latest of everything, per tag, and a short history of readings.
+
+    `buffer_len` bounds the history: that many scans per tag.
+    """
+
+    buffer_len: int = 32
+    observation_count: int = field(default=0, init=False)
+    _tags: dict[str, TagState] = field(default_factory=dict, init=False)
+    _history: dict[str, deque[Observation]] = field(default_factory=dict, init=False)
+
+    def record(self, observation: Observation) -> None:
+        """Keep a scan: its readings (latest per name), its time, its pose if the tag has none.
+
+        A scan that failed and brought nothing does not make what is known look younger: its time
+        counts only where the tag was never observed.
+
+        Raises:
+            Rejected: a text or a list past its bound; nothing is kept then.
+        """
+        check_texts(observation.tag_id, *(reading.name for reading in observation.readings))
+        tag = self._tag(observation.tag_id)
+        readings = {reading.name: reading for reading in tag.readings}
+        readings.update((reading.name, reading) for reading in observation.readings)
+        check_length("readings of a tag", len(readings), MAX_SENSORS_PER_TAG)
+        brought_something = observation.succeeded or bool(observation.readings)
+        if brought_something or tag.last_observed_ns is None:
+            tag = replace(tag, last_observed_ns=observation.stamp_ns)
+        self._tags[tag.tag_id] = replace(
+            tag, readings=tuple(readings.values()), pose=tag.pose or observation.pose
+        )
+        if observation.readings:
+            history = self._history.setdefault(tag.tag_id, deque(maxlen=self.buffer_len))
+            history.append(observation)
+        self.observation_count += 1
+
+    def record_flower(self, observation: FlowerObservation) -> None:
+        """Keep a look at the flowers: all of it replaces what was known; readings stay.
+
+        Raises:
+            Rejected: a text or a list past its bound; nothing is kept then.
+        """
+        flower = observation.flower
+        check_texts(observation.tag_id, flower.species, *(b.species for b in flower.blooms))
+        check_length("flowers of a tag", len(flower.blooms), MAX_BLOOMS_PER_TAG)
+        check_length("box_footprint points", len(flower.footprint), MAX_FOOTPRINT_POINTS)
+        tag = self._tag(observation.tag_id)
+        self._tags[tag.tag_id] = replace(
+            tag,
+            flower=flower,
+            last_observed_ns=observation.stamp_ns,
+            pose=tag.pose or observation.pose,
+        )
+        self.observation_count += 1
+
+    def pin(self, tag_id: str, pose: Pose) -> bool:
+        """Give a discovered tag its place; False, and nothing changed, if it has one already.
+
+        The count grows here too: a tag that was scanned before it was discovered enters the field
+        by this write alone, and the count is what the field's cache is keyed by.
+
+        Raises:
+            Rejected: a text past its bound, or one tag too many.
+        """
+        check_texts(tag_id)
+        tag = self._tag(tag_id)
+        if tag.pose is not None:
+            return False
+        self._tags[tag_id] = replace(tag, pose=pose)
+        self.observation_count += 1
+        return True
+
+    def is_pinned(self, tag_id: str) -> bool:
+        """Whether the tag is known and has a pose."""
+        tag = self._tags.get(tag_id)
+        return tag is not None and tag.pose is not None
+
+    def snapshot(self, now_ns: int, frame_id: str) -> Snapshot:
+        """Every tag at `now_ns` (ROS time, ns), poses in `frame_id`. O(tags), nothing is copied."""
+        return Snapshot(stamp_ns=now_ns, frame_id=frame_id, tags=tuple(self._tags.values()))
+
+    def samples_for_sensor(self, sensor_type: str) -> tuple[tuple[float, float, float], ...]:
+        """(x, y, value) of every tag with a pose and a finite reading of this sensor.
+
+        Metres in the map frame and the sensor's unit, in the order the tags were first heard of.
+        One NaN must not poison a neighbourhood, so readings that are not finite are left out.
+        """
+        return samples_of(self._tags.values(), sensor_type)
+
+    def history(self, tag_id: str) -> tuple[Observation, ...] | None:
+        """The last `buffer_len` scans that brought readings, oldest first; None: unknown tag."""
+        if tag_id not in self._tags:
+            return None
+        return tuple(self._history.get(tag_id, ()))
+
+    def _tag(self, tag_id: str) -> TagState:
+        known = self._tags.get(tag_id)
+        if known is not None:
+            return known
+        check_length("tags", len(self._tags) + 1, MAX_TAGS)
+        return TagState(tag_id=tag_id)
+
+
+def samples_of(
+    tags: Iterable[TagState], sensor_type: str
+) -> tuple[tuple[float, float, float], ...]:
+    """(x, y, value) of the tags with a pose and a finite reading of `sensor_type`, in order."""
+    return tuple(
+        (tag.pose.x, tag.pose.y, reading.value)
+        for tag in tags
+        if tag.pose is not None
+        for reading in tag.readings
+        if reading.name == sensor_type and math.isfinite(reading.value)
+    )
+
+
+def check_texts(*texts: str) -> None:
+    """Raise `Rejected` for a text longer than `MAX_TEXT_LENGTH` characters."""
+    for text in texts:
+        if len(text) > MAX_TEXT_LENGTH:
+            raise Rejected(
+                f"text {text[:24]!r}… has {len(text)} characters, the limit is {MAX_TEXT_LENGTH}"
+            )
+
+
+def check_length(what: str, length: int, limit: int) -> None:
+    """Raise `Rejected` where `length` of `what` is past `limit`."""
+    if length > limit:
+        raise Rejected(f"{what}: {length}, the limit is {limit}")

@@ -1,0 +1,199 @@
+"""The web contract as types: what each route and each WebSocket frame carries.
+
+Names are those of the ROS messages (`lupin_msgs`), field by field, so that a consumer of the topic
+and a consumer of the web read the same thing. The OpenAPI document and the browser's TypeScript
+types are generated from here; the bytes themselves are written by `state_json` and
+`field_formats`, and a test holds them against these models.
+
+Positions are metres in the map frame; numbers that ROS carries as NaN or infinity are null.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class Contract(BaseModel):
+    """Base of all: frozen, and a field that the contract does not name is an error."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Time(Contract):
+    """ROS time; seconds since the epoch on hardware, since the start in simulation."""
+
+    sec: int
+    nanosec: int
+
+
+class Header(Contract):
+    """When, and in which frame the positions are."""
+
+    stamp: Time
+    frame_id: str
+
+
+class Point(Contract):
+    """Metres in the map frame: x right, y up, z above the floor."""
+
+    x: float | None
+    y: float | None
+    z: float | None
+
+
+class Quaternion(Contract):
+    """Orientation; `w == 0` in a tag's pose means that the tag has no pose."""
+
+    x: float | None
+    y: float | None
+    z: float | None
+    w: float | None
+
+
+class Pose(Contract):
+    """Position and orientation in the map frame."""
+
+    position: Point
+    orientation: Quaternion
+
+
+class SensorReading(Contract):
+    """Latest value of one sensor, in its unit; null: the sensor gave NaN or infinity."""
+
+    name: str
+    value: float | None
+
+
+class FlowerPoint(Contract):
+    """One flower of the latest look."""
+
+    position: Point
+    height_m: float | None
+    species: str
+    confidence: float | None
+    anomaly: bool
+
+
+class Polygon(Contract):
+    """Outline in the map frame, metres."""
+
+    points: list[Point]
+
+
+class TwinTagState(Contract):
+    """Everything that the twin knows about one tag."""
+
+    tag_id: str
+    pose: Pose = Field(description="orientation.w == 0: the tag has no pose, place no pin")
+    readings: list[SensorReading]
+    last_observed: Time = Field(description="ROS time; 0: discovered and never observed")
+    stale_seconds: float | None = Field(
+        description="s since last_observed at header.stamp, never negative; null: never observed"
+    )
+    species: str
+    species_confidence: float | None
+    anomaly: bool
+    flower_count: int
+    bug_count: int
+    flowers: list[FlowerPoint]
+    box_footprint: Polygon
+
+
+class TwinState(Contract):
+    """The whole greenhouse at one moment."""
+
+    header: Header
+    tags: list[TwinTagState]
+
+
+class StateFrame(Contract):
+    """WebSocket frame: the state. `seq` grows by one a frame; a gap tells what was skipped."""
+
+    type: Literal["state"]
+    seq: int
+    revision: str = Field(description="opaque; changes exactly when a field could")
+    state: TwinState
+
+
+class StatusFrame(Contract):
+    """WebSocket frame, and the body of `/readyz`: whether the twin behind the bridge is alive."""
+
+    type: Literal["status"]
+    twin: Literal["live", "offline"]
+    reason: Literal["live", "never_seen", "stale", "thread_dead", "shutting_down"]
+    message: str = Field(description="for a person to read")
+    state_age_seconds: float | None = Field(
+        description="s since the bridge got its last state, by its own clock; null: never"
+    )
+
+
+class GetFieldResponse(Contract):
+    """GetField's response. A refusal has `ok` false, the reason, and everything else zero."""
+
+    ok: bool
+    error_message: str
+    values: list[float | None] = Field(
+        description="sensor's unit, row-major, row 0 at bbox_min_y; null: not known"
+    )
+    width: int
+    height: int
+    origin_x: float
+    origin_y: float
+    resolution_used: float
+    value_min: float
+    value_max: float
+    sample_count: int
+
+
+class MapMetaData(Contract):
+    """Size and place of the occupancy grid; resolution in m a cell."""
+
+    map_load_time: Time
+    resolution: float
+    width: int
+    height: int
+    origin: Pose
+
+
+class OccupancyGrid(Contract):
+    """The map without its cells (those are the picture at `/api/map.png`)."""
+
+    header: Header
+    info: MapMetaData
+
+
+class HistoryReading(Contract):
+    """One past value of a sensor."""
+
+    stamp: Time
+    value: float | None
+
+
+class SensorHistory(Contract):
+    """The past values of one sensor at one tag, oldest first."""
+
+    name: str
+    values: list[HistoryReading]
+
+
+class TagHistory(Contract):
+    """The last scans of one tag (as many as the twin's `buffer_len`)."""
+
+    tag_id: str
+    sensors: list[SensorHistory]
+
+
+class Health(Contract):
+    """`/healthz`: whether the ROS thread lives, and what its callbacks went through."""
+
+    ok: bool
+    message: str
+    callback_errors: int
+
+
+class ErrorMessage(Contract):
+    """Body of a refusal outside the field routes."""
+
+    detail: str

@@ -1,0 +1,218 @@
+"""GetField without ROS: its checks, the clipping to explored ground, and the cache.
+
+Pure. `FieldEngine` belongs to the store's thread; a `FieldJob` it hands out is immutable, and any
+thread may compute it. Metres in the map frame throughout.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from lupin_twin.explored import OccupancyMap, explored_mask
+from lupin_twin.field_cache import FieldCache, FieldKey
+from lupin_twin.idw import FieldGrid, compute_idw_field, grid_dimensions
+from lupin_twin.state import MAX_TEXT_LENGTH, TwinStore
+
+# The revision of a map that has not come yet; a real one is never negative.
+_NO_MAP_REVISION = -1
+
+
+class FieldRefused(ValueError):
+    """A request that gets no field; the message names the field, the value and the limit."""
+
+
+@dataclass(frozen=True, slots=True)
+class FieldRequest:
+    """What to reconstruct: a sensor over a box (m, map frame) in cells of `resolution` (m).
+
+    The numbers are rounded to float32, GetField's wire type: a request over HTTP and the same one
+    over ROS are the same request then, with the same field. A number past float32 becomes
+    infinite, which `check_request` refuses.
+    """
+
+    sensor_type: str
+    resolution: float
+    bbox_min_x: float
+    bbox_min_y: float
+    bbox_max_x: float
+    bbox_max_y: float
+
+    def __post_init__(self) -> None:
+        with np.errstate(over="ignore", under="ignore"):
+            for name in ("resolution", "bbox_min_x", "bbox_min_y", "bbox_max_x", "bbox_max_y"):
+                object.__setattr__(self, name, float(np.float32(getattr(self, name))))
+
+
+@dataclass(frozen=True, slots=True)
+class FieldRules:
+    """The node's parameters for fields; distances in metres.
+
+    Raises:
+        ValueError: a rule out of its range, named with its value and the limit.
+    """
+
+    idw_power: float
+    falloff_radius_m: float
+    max_distance_m: float
+    clip_to_explored: bool
+    max_grid_cells: int
+
+    def __post_init__(self) -> None:
+        for name in ("idw_power", "falloff_radius_m", "max_distance_m"):
+            number = getattr(self, name)
+            if not (math.isfinite(number) and number >= 0.0):
+                raise ValueError(f"{name} is {number}, must be finite and not less than 0")
+        if self.max_grid_cells < 1:
+            raise ValueError(f"max_grid_cells is {self.max_grid_cells}, must not be less than 1")
+
+
+def check_request(request: FieldRequest, max_grid_cells: int) -> tuple[int, int]:
+    """(width, height) of the grid that `request` asks for; nothing is allocated.
+
+    Raises:
+        FieldRefused: the request names no sensor, its numbers make no grid, or a grid of more than
+            `max_grid_cells` cells.
+    """
+    if not request.sensor_type:
+        raise FieldRefused("sensor_type is empty, must name a sensor")
+    if len(request.sensor_type) > MAX_TEXT_LENGTH:
+        raise FieldRefused(
+            f"sensor_type {request.sensor_type[:24]!r}… has {len(request.sensor_type)} characters, "
+            f"the limit is {MAX_TEXT_LENGTH}"
+        )
+    try:
+        width, height = grid_dimensions(
+            request.bbox_min_x,
+            request.bbox_min_y,
+            request.bbox_max_x,
+            request.bbox_max_y,
+            request.resolution,
+        )
+    except ValueError as error:
+        raise FieldRefused(str(error)) from error
+    if width * height > max_grid_cells:
+        # As floats: a hostile request has sides of dozens of digits.
+        raise FieldRefused(
+            f"resolution {request.resolution:g} m makes {float(width):.10g} x {float(height):.10g} "
+            f"cells, the limit is {max_grid_cells} in all (max_grid_cells)"
+        )
+    return width, height
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FieldJob:
+    """A field to be computed: all it depends on, immutable, so that any thread may do it.
+
+    `occupancy` is the map to clip to, and None where the rules do not clip or no map has come.
+    """
+
+    request: FieldRequest
+    key: FieldKey
+    samples: tuple[tuple[float, float, float], ...]
+    occupancy: OccupancyMap | None
+    rules: FieldRules
+
+    def compute(self) -> FieldGrid:
+        """The field; unexplored cells are NaN where the rules clip (all, where no map has come)."""
+        request = self.request
+        mask = None
+        if self.rules.clip_to_explored:
+            width, height = check_request(request, self.rules.max_grid_cells)
+            if self.occupancy is None:
+                mask = np.zeros((height, width), dtype=np.bool_)
+            else:
+                mask = explored_mask(
+                    self.occupancy,
+                    width=width,
+                    height=height,
+                    origin_x=request.bbox_min_x,
+                    origin_y=request.bbox_min_y,
+                    resolution=request.resolution,
+                )
+        return compute_idw_field(
+            self.samples,
+            bbox_min_x=request.bbox_min_x,
+            bbox_min_y=request.bbox_min_y,
+            bbox_max_x=request.bbox_max_x,
+            bbox_max_y=request.bbox_max_y,
+            resolution=request.resolution,
+            falloff_radius_m=self.rules.falloff_radius_m,
+            max_distance_m=self.rules.max_distance_m,
+            power=self.rules.idw_power,
+            explored_mask=mask,
+        )
+
+
+class FieldEngine:
+    """Answers a request from the cache, or with the job that computes it.
+
+    Belongs to the thread of the store. The computing does not: hand the job to any thread, bring
+    the grid back and `keep` it here.
+    """
+
+    def __init__(self, rules: FieldRules, cache: FieldCache) -> None:
+        self.rules = rules
+        self.cache = cache
+
+    def lookup(
+        self, request: FieldRequest, store: TwinStore, occupancy: OccupancyMap | None
+    ) -> FieldGrid | FieldJob:
+        """The field as it was computed before, or a job; `occupancy` is the latest map, if any.
+
+        Raises:
+            FieldRefused: see `check_request`.
+        """
+        check_request(request, self.rules.max_grid_cells)
+        key = self._key(request, store.observation_count, occupancy)
+        grid = self.cache.get(key)
+        if grid is not None:
+            return grid
+        return FieldJob(
+            request=request,
+            key=key,
+            samples=store.samples_for_sensor(request.sensor_type),
+            occupancy=occupancy if self.rules.clip_to_explored else None,
+            rules=self.rules,
+        )
+
+    def keep(self, job: FieldJob, grid: FieldGrid) -> None:
+        """Remember what `job` computed."""
+        self.cache.put(job.key, grid)
+
+    def _key(
+        self, request: FieldRequest, observation_count: int, occupancy: OccupancyMap | None
+    ) -> FieldKey:
+        map_revision = None
+        if self.rules.clip_to_explored:
+            map_revision = _NO_MAP_REVISION if occupancy is None else occupancy.revision
+        return FieldKey(
+            sensor_type=request.sensor_type,
+            observation_count=observation_count,
+            resolution=request.resolution,
+            bbox_min_x=request.bbox_min_x,
+            bbox_min_y=request.bbox_min_y,
+            bbox_max_x=request.bbox_max_x,
+            bbox_max_y=request.bbox_max_y,
+            map_revision=map_revision,
+        )
+
+
+def default_box(
+    positions: Iterable[tuple[float, float]], max_distance_m: float
+) -> tuple[float, float, float, float]:
+    """(min_x, min_y, max_x, max_y) for a request without a box: all that can be painted.
+
+    The box of the tags' `positions` (x, y), wider by `max_distance_m` on every side; without a tag
+    the same around the origin.
+    """
+    xs, ys = zip(*positions, strict=True) if (positions := list(positions)) else ((0.0,), (0.0,))
+    return (
+        min(xs) - max_distance_m,
+        min(ys) - max_distance_m,
+        max(xs) + max_distance_m,
+        max(ys) + max_distance_m,
+    )

@@ -1,0 +1,427 @@
+"""Field reconstruction: inverse distance weighting of the tags' readings onto a regular grid.
+
+Pure: numpy and the standard library only, no ROS, no clock, no state; any thread may call it.
+
+Positions, distances and the resolution are metres in the map frame, values are in the sensor's
+own unit. Cell `(i, j)` is column `i` (along x) and row `j` (along y), its centre lies at
+`bbox_min + (index + 0.5) * resolution`. Row 0 is at `bbox_min_y`; `values` is row-major. NaN is
+"unknown" and never a reading.
+
+The definition (Shepard, "A two-dimensional interpolation function for irregularly-spaced data",
+1968, with a gate and a radius), per cell and in this order:
+
+1. unexplored (mask given and false): NaN;
+2. nearest sample farther than `max_distance_m`: NaN, the honesty gate;
+3. nearest sample closer than `COINCIDENT_EPS_M`: exactly its value;
+4. samples within `falloff_radius_m`: sum(v / d**p) / sum(1 / d**p);
+5. none within: the nearest sample's value.
+
+A distance is the float64 `sqrt(dx * dx + dy * dy)`; of equally near samples the first one counts.
+
+How it is computed: the grid is halved, again and again, and each part keeps only the samples that
+reach it, until the cell-sample pairs of a part fit the processor's cache; there the definition is
+evaluated for all pairs at once. A part that nothing reaches is dropped on the way, so the cost
+follows the painted cells, and memory beyond the grid itself is bounded by one part's pairs.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import chain
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+COINCIDENT_EPS_M: Final = 1e-3
+
+# Pairs of a part are evaluated at once up to here: two float64 arrays of this size stay in the
+# second-level cache, and the numpy calls on them cost several times their own overhead.
+_MAX_PAIRS: Final = 40_960
+_MIN_PAIRS: Final = 2_048
+
+# 1/d² is used as it is up to here; past it (and for any power but 2) the weights are scaled by
+# the nearest distance of the cell, so that none overflows and the largest is exactly 1.
+_MAX_PLAIN_REACH_M: Final = 1e6
+_MAX_PLAIN_VALUE: Final = 1e100
+
+_FLOAT32_MANTISSA_BITS: Final = 24
+_FLOAT64_NOISE_ULPS: Final = 4
+
+FloatArray = npt.NDArray[np.float64]
+IndexArray = npt.NDArray[np.intp]
+BoolArray = npt.NDArray[np.bool_]
+
+
+class FieldSample(NamedTuple):
+    """One reading at its place: x and y in metres (map frame), the value in the sensor's unit."""
+
+    x: float
+    y: float
+    value: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FieldGrid:
+    """A reconstructed field.
+
+    `origin_x`, `origin_y` (m, map frame) is the corner of cell (0, 0), not its centre. `values` is
+    flat, row-major, float32 and read-only, NaN where nothing is known. `value_min` and `value_max`
+    range over the finite cells and are both 0 where there are none. `sample_count` is the number
+    of samples the field was made from: all that were given, those out of reach of the box too.
+    """
+
+    width: int
+    height: int
+    origin_x: float
+    origin_y: float
+    resolution: float
+    values: npt.NDArray[np.float32]
+    value_min: float
+    value_max: float
+    sample_count: int
+
+
+def grid_dimensions(
+    bbox_min_x: float,
+    bbox_min_y: float,
+    bbox_max_x: float,
+    bbox_max_y: float,
+    resolution: float,
+) -> tuple[int, int]:
+    """(width, height) in cells: each `max(1, ceil(extent / resolution))`, float noise apart.
+
+    Box and resolution are metres. An exact multiple stays one although its numbers were rounded:
+    1.1 m at 0.1 m is 11 cells, not 12, whether the numbers are float64 or went through float32 (as
+    GetField's do), near the origin or far from it. The result may be too large to allocate, which
+    is for the caller to refuse; it never overflows.
+
+    Raises:
+        ValueError: a number that is not finite, a resolution that is not positive, or an inverted
+            box.
+    """
+    _check_finite("resolution", resolution)
+    if resolution <= 0.0:
+        raise ValueError(f"resolution is {resolution} m, must be greater than 0")
+    return (
+        _cells_along("x", bbox_min_x, bbox_max_x, resolution),
+        _cells_along("y", bbox_min_y, bbox_max_y, resolution),
+    )
+
+
+def _cells_along(axis: str, low: float, high: float, resolution: float) -> int:
+    _check_finite(f"bbox_min_{axis}", low)
+    _check_finite(f"bbox_max_{axis}", high)
+    if high < low:
+        raise ValueError(
+            f"bbox_max_{axis} is {high} m, must not be less than bbox_min_{axis} ({low} m)"
+        )
+    quotient = (high - low) / resolution
+    if math.isinf(quotient):
+        # Past float64: exact arithmetic still names the size, so that a limit can be held to it.
+        return math.ceil((Fraction(high) - Fraction(low)) / Fraction(resolution))
+    noise = (_noise(low) + _noise(high) + quotient * _noise(resolution)) / resolution
+    nearest = round(quotient)
+    if abs(quotient - nearest) <= noise:
+        return max(1, nearest)
+    return max(1, math.ceil(quotient))
+
+
+def _noise(number: float) -> float:
+    """How far rounding can have moved `number`.
+
+    A number with no more digits than float32 holds may have been rounded to it, by one unit in
+    its last place; any other never was, and carries float64's noise of a few operations.
+    """
+    mantissa, exponent = math.frexp(number)
+    if math.ldexp(mantissa, _FLOAT32_MANTISSA_BITS).is_integer():
+        return math.ldexp(1.0, exponent - _FLOAT32_MANTISSA_BITS)
+    return _FLOAT64_NOISE_ULPS * math.ulp(number)
+
+
+def cell_centres(low: float, count: int, resolution: float) -> FloatArray:
+    """The centres (m) of `count` cells along one axis of a box that begins at `low` (m)."""
+    centres: FloatArray = low + (np.arange(count, dtype=np.float64) + 0.5) * resolution
+    return centres
+
+
+def compute_idw_field(
+    samples: Sequence[tuple[float, float, float]],
+    *,
+    bbox_min_x: float,
+    bbox_min_y: float,
+    bbox_max_x: float,
+    bbox_max_y: float,
+    resolution: float,
+    falloff_radius_m: float,
+    max_distance_m: float,
+    power: float,
+    explored_mask: BoolArray | None = None,
+) -> FieldGrid:
+    """The field of `samples` over the box, by the module's definition.
+
+    `samples` are (x, y, value) in the order they were recorded; `FieldSample` is one. No samples
+    make a field without a value, which is no error. `explored_mask` has the grid's shape,
+    (height, width). Memory beyond the grid's own is a few arrays of `_MAX_PAIRS` and the samples.
+
+    Raises:
+        ValueError: an argument out of its range, named with its value and the limit.
+    """
+    width, height = grid_dimensions(bbox_min_x, bbox_min_y, bbox_max_x, bbox_max_y, resolution)
+    for name, number in (
+        ("falloff_radius_m", falloff_radius_m),
+        ("max_distance_m", max_distance_m),
+        ("power", power),
+    ):
+        _check_finite(name, number)
+        if number < 0.0:
+            raise ValueError(f"{name} is {number}, must not be less than 0")
+    if explored_mask is not None and (
+        explored_mask.shape != (height, width) or explored_mask.dtype != np.bool_
+    ):
+        raise ValueError(
+            f"explored_mask is {explored_mask.dtype} of shape {explored_mask.shape}, must be bool "
+            f"of shape {(height, width)} (height, width)"
+        )
+    x, y, value = _columns(samples)
+    values = np.full((height, width), np.nan, dtype=np.float32)
+    painter = _Painter(
+        x=x,
+        y=y,
+        value=value,
+        cell_x=cell_centres(bbox_min_x, width, resolution),
+        cell_y=cell_centres(bbox_min_y, height, resolution),
+        falloff_radius_m=falloff_radius_m,
+        max_distance_m=max_distance_m,
+        power=power,
+        explored=explored_mask,
+        values=values,
+    )
+    # 0/0 is a cell that nothing reaches, 1/0 a sample on a cell's centre, an overflow a reading
+    # past float32: all of them are meant, and none is worth a warning.
+    with np.errstate(all="ignore"):
+        painter.paint()
+        value_min, value_max = _finite_range(values)
+    values.setflags(write=False)
+    return FieldGrid(
+        width=width,
+        height=height,
+        origin_x=bbox_min_x,
+        origin_y=bbox_min_y,
+        resolution=resolution,
+        values=values.reshape(-1),
+        value_min=value_min,
+        value_max=value_max,
+        sample_count=len(samples),
+    )
+
+
+def _check_finite(name: str, number: float) -> None:
+    if not math.isfinite(number):
+        raise ValueError(f"{name} is {number}, must be finite")
+
+
+def _columns(
+    samples: Sequence[tuple[float, float, float]],
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The samples' x, y and values, each contiguous."""
+    flat = np.fromiter(chain.from_iterable(samples), dtype=np.float64)
+    if flat.size != 3 * len(samples):
+        raise ValueError(f"samples hold {flat.size} numbers, must be 3 each of {len(samples)}")
+    finite = np.isfinite(flat)
+    if not finite.all():
+        index = int(np.argmin(finite))
+        raise ValueError(
+            f"samples[{index // 3}].{FieldSample._fields[index % 3]} is {flat[index]}, "
+            "must be finite"
+        )
+    x, y, value = np.ascontiguousarray(flat.reshape(-1, 3).T)
+    return x, y, value
+
+
+def _finite_range(values: npt.NDArray[np.float32]) -> tuple[float, float]:
+    low, high = np.fmin.reduce(values, axis=None), np.fmax.reduce(values, axis=None)
+    if np.isinf(low) or np.isinf(high):
+        finite = values[np.isfinite(values)]
+        low, high = finite.min(initial=np.inf), finite.max(initial=-np.inf)
+    if not np.isfinite(low):
+        return 0.0, 0.0
+    return float(low), float(high)
+
+
+def _largest_square_within(radius: float) -> float:
+    """The largest float64 whose square root is not greater than `radius`.
+
+    `sqrt(d2) <= radius` and `d2 <= _largest_square_within(radius)` are the same then, to the bit,
+    and the root need not be taken for every pair.
+    """
+    square = min(radius * radius, sys.float_info.max)
+    while math.sqrt(square) > radius:
+        square = math.nextafter(square, 0.0)
+    while math.sqrt(following := math.nextafter(square, math.inf)) <= radius:
+        square = following
+    return square
+
+
+class _Part(NamedTuple):
+    """Rows `top` to `bottom` and columns `left` to `right` (exclusive) and who may reach them."""
+
+    top: int
+    bottom: int
+    left: int
+    right: int
+    reaching: IndexArray
+
+    @property
+    def cells(self) -> int:
+        return (self.bottom - self.top) * (self.right - self.left)
+
+    def halves(self) -> tuple[_Part, _Part]:
+        """Both halves along the longer side."""
+        if self.bottom - self.top > self.right - self.left:
+            middle = (self.top + self.bottom) // 2
+            return self._replace(bottom=middle), self._replace(top=middle)
+        middle = (self.left + self.right) // 2
+        return self._replace(right=middle), self._replace(left=middle)
+
+
+class _Painter:
+    """Evaluates the definition part by part; `values` (height, width) is NaN at the start."""
+
+    def __init__(
+        self,
+        *,
+        x: FloatArray,
+        y: FloatArray,
+        value: FloatArray,
+        cell_x: FloatArray,
+        cell_y: FloatArray,
+        falloff_radius_m: float,
+        max_distance_m: float,
+        power: float,
+        explored: BoolArray | None,
+        values: npt.NDArray[np.float32],
+    ) -> None:
+        self.x, self.y, self.value = x, y, value
+        self.cell_x, self.cell_y = cell_x, cell_y
+        self.falloff, self.max_distance, self.power = falloff_radius_m, max_distance_m, power
+        self.falloff_square = _largest_square_within(falloff_radius_m)
+        self.max_square = _largest_square_within(max_distance_m)
+        self.reach_square = max(self.falloff_square, self.max_square)
+        self.explored = explored
+        self.values = values
+        # Σ(v/dᵖ) must not overflow either; a power of two scales without rounding.
+        largest = float(np.abs(value).max(initial=0.0))
+        self.scale = 2.0 ** math.frexp(largest)[1] if largest > _MAX_PLAIN_VALUE else 1.0
+        self.scaled_value = value / self.scale
+        self.plain_weights = power == 2.0 and falloff_radius_m <= _MAX_PLAIN_REACH_M
+        self.max_pairs = min(max(values.size, _MIN_PAIRS), _MAX_PAIRS)
+        pairs = max(self.max_pairs, value.size)
+        self.squares = np.empty(pairs)
+        self.weights = np.empty(pairs)
+        self.within = np.empty(pairs, dtype=np.bool_)
+
+    def paint(self) -> None:
+        height, width = self.values.shape
+        parts = [_Part(0, height, 0, width, np.arange(self.value.size))]
+        while parts:
+            part = parts.pop()
+            if self.explored is not None and not self._explored(part).any():
+                continue
+            part = part._replace(reaching=self._reaching(part))
+            if part.reaching.size == 0:
+                continue
+            if part.cells > 1 and part.cells * part.reaching.size > self.max_pairs:
+                parts.extend(part.halves())
+            else:
+                self._evaluate(part)
+
+    def _explored(self, part: _Part) -> BoolArray:
+        assert self.explored is not None
+        return self.explored[part.top : part.bottom, part.left : part.right]
+
+    def _reaching(self, part: _Part) -> IndexArray:
+        """Those of the part's samples that reach at least the nearest point of its cells.
+
+        Rounding is monotonic, so no cell's own squared distance is below this one, and no sample
+        is lost to float noise.
+        """
+        x, y = self.x[part.reaching], self.y[part.reaching]
+        dx = np.maximum(self.cell_x[part.left] - x, x - self.cell_x[part.right - 1])
+        dy = np.maximum(self.cell_y[part.top] - y, y - self.cell_y[part.bottom - 1])
+        np.maximum(dx, 0.0, out=dx)
+        np.maximum(dy, 0.0, out=dy)
+        square = dx * dx + dy * dy
+        if square.min(initial=np.inf) > self.max_square:
+            return part.reaching[:0]
+        reaching: IndexArray = part.reaching[square <= self.reach_square]
+        return reaching
+
+    def _evaluate(self, part: _Part) -> None:
+        near = part.reaching
+        dx = self.x[near, None] - self.cell_x[part.left : part.right]
+        dy = self.y[near, None] - self.cell_y[part.top : part.bottom]
+        rows, columns = part.bottom - part.top, part.right - part.left
+        pairs = near.size * part.cells
+        square = self.squares[:pairs].reshape(near.size, part.cells)
+        np.add(
+            (dy * dy)[:, :, None],
+            (dx * dx)[:, None, :],
+            out=square.reshape(near.size, rows, columns),
+        )
+        weight = self.weights[:pairs].reshape(square.shape)
+        within = self.within[:pairs].reshape(square.shape)
+        mean = self._plain if self.plain_weights else self._normalised
+        cells = mean(near, square, weight, within).reshape(rows, columns)
+        if self.explored is not None:
+            cells[~self._explored(part)] = np.nan
+        self.values[part.top : part.bottom, part.left : part.right] = cells
+
+    def _plain(
+        self, near: IndexArray, square: FloatArray, weight: FloatArray, within: BoolArray
+    ) -> FloatArray:
+        """Rules 2 to 5 for power 2, where 1/d² needs no root and the nearest is seldom needed."""
+        np.less_equal(square, self.falloff_square, out=within)
+        weight.fill(0.0)
+        np.divide(1.0, square, out=weight, where=within)
+        total = weight.sum(axis=0)
+        cells: FloatArray = (self.scaled_value[near] @ weight) / total
+        if self.scale != 1.0:
+            cells *= self.scale
+        # A sample closer than COINCIDENT_EPS_M alone weighs this much.
+        special = ~(total < 0.999 / COINCIDENT_EPS_M**2)
+        if self.falloff_square < self.max_square:
+            special |= total == 0.0
+        if special.any():
+            chosen = np.flatnonzero(special)
+            distance = np.sqrt(square[:, chosen])
+            nearest = distance.argmin(axis=0)
+            shortest = distance.min(axis=0)
+            takes = (shortest < COINCIDENT_EPS_M) | (total[chosen] == 0.0)
+            cells[chosen[takes]] = self.value[near[nearest[takes]]]
+        if self.falloff_square != self.max_square:
+            cells[square.min(axis=0) > self.max_square] = np.nan
+        return cells
+
+    def _normalised(
+        self, near: IndexArray, square: FloatArray, weight: FloatArray, within: BoolArray
+    ) -> FloatArray:
+        """Rules 2 to 5 for any power: weights are (nearest/d)ᵖ, so the largest is exactly 1."""
+        distance = np.sqrt(square, out=square)
+        shortest = distance.min(axis=0)
+        np.less_equal(distance, self.falloff, out=within)
+        weight.fill(0.0)
+        np.divide(shortest, distance, out=weight, where=within)
+        np.power(weight, self.power, out=weight, where=within)
+        cells: FloatArray = (self.scaled_value[near] @ weight) / weight.sum(axis=0)
+        if self.scale != 1.0:
+            cells *= self.scale
+        chosen = np.flatnonzero((shortest < COINCIDENT_EPS_M) | (shortest > self.falloff))
+        if chosen.size:
+            cells[chosen] = self.value[near[distance[:, chosen].argmin(axis=0)]]
+        cells[shortest > self.max_distance] = np.nan
+        return cells

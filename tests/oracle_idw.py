@@ -1,0 +1,73 @@
+"""The field by DESIGN.md's definition, as the plainest double loop: what the tests compare to.
+
+Nothing here is fast and nothing is shared with `lupin_twin.idw`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+COINCIDENT_M = 0.001
+
+
+def field_by_loop(
+    samples: Sequence[tuple[float, float, float]],
+    *,
+    width: int,
+    height: int,
+    bbox_min_x: float,
+    bbox_min_y: float,
+    resolution: float,
+    falloff_radius_m: float,
+    max_distance_m: float,
+    power: float,
+    explored: Sequence[Sequence[bool]] | None = None,
+) -> list[float]:
+    """The cells' values, row by row from `bbox_min_y` up."""
+    values = []
+    for row in range(height):
+        cell_y = bbox_min_y + (row + 0.5) * resolution
+        for column in range(width):
+            cell_x = bbox_min_x + (column + 0.5) * resolution
+            if explored is not None and not explored[row][column]:
+                values.append(math.nan)
+            else:
+                values.append(
+                    value_at(cell_x, cell_y, samples, falloff_radius_m, max_distance_m, power)
+                )
+    return values
+
+
+def value_at(
+    cell_x: float,
+    cell_y: float,
+    samples: Sequence[tuple[float, float, float]],
+    falloff_radius_m: float,
+    max_distance_m: float,
+    power: float,
+) -> float:
+    """Rules 2 to 5 of the definition at one point."""
+    nearest_distance = math.inf
+    nearest_value = math.nan
+    for x, y, value in samples:
+        distance = math.sqrt((x - cell_x) ** 2 + (y - cell_y) ** 2)
+        if distance < nearest_distance:
+            nearest_distance = distance
+            nearest_value = value
+    if nearest_distance > max_distance_m:
+        return math.nan
+    if nearest_distance < COINCIDENT_M:
+        return nearest_value
+    weighted_sum = 0.0
+    weight_sum = 0.0
+    for x, y, value in samples:
+        distance = math.sqrt((x - cell_x) ** 2 + (y - cell_y) ** 2)
+        if distance <= falloff_radius_m:
+            # 1/dᵖ times a constant of the cell: the quotient is the same, and it cannot overflow.
+            weight = (nearest_distance / distance) ** power
+            weighted_sum += weight * value
+            weight_sum += weight
+    if weight_sum == 0.0:
+        return nearest_value
+    return weighted_sum / weight_sum

@@ -1,0 +1,1 @@
+"""A simulated robot on patrol: stands in for the mission orchestrator and for perception."""

@@ -1,0 +1,97 @@
+"""The command `patrol_node`: options, then the node. `--ros-args` is passed through to ROS."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from typing import NoReturn
+
+SPEED_LIMITS = (0.1, 50.0)
+DAY_SPEED_LIMITS = (0.0, 3600.0)
+SEED_LIMITS = (0, 2**32 - 1)
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong in one line, without the usage."""
+        self.exit(2, f"{self.prog}: error: {message}\n")
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Parse the options, ROS arguments already removed; exits with 2 on a bad one."""
+    parser = _Parser(
+        prog="patrol_node",
+        description="A robot on patrol in the simulated greenhouse, as the twin sees it.",
+        epilog="ROS arguments follow --ros-args.",
+        allow_abbrev=False,
+    )
+    parser.add_argument(
+        "--speed",
+        type=_number(float, "a number", *SPEED_LIMITS),
+        default=1.0,
+        help="patrol seconds per second (default 1: the whole greenhouse within a minute)",
+    )
+    parser.add_argument(
+        "--day-speed",
+        type=_number(float, "a number", *DAY_SPEED_LIMITS),
+        default=60.0,
+        help="simulated seconds per patrol second (default 60: a day takes 24 minutes)",
+    )
+    parser.add_argument(
+        "--seed",
+        type=_number(int, "a whole number", *SEED_LIMITS),
+        default=0,
+        help="the same seed gives the same patrol (default 0)",
+    )
+    parser.add_argument(
+        "--once", action="store_true", help="end after one pass, its retries included"
+    )
+    return parser.parse_args(arguments)
+
+
+def main() -> int:
+    """Run the node until it is stopped or done; returns the exit code."""
+    # First of all, before anything slow is imported and before ROS starts its threads: Ctrl-C
+    # and SIGTERM wait until the node asks for them, so neither can end in a traceback.
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    from greenhouse_sim.simulator import GreenhouseSimulator  # noqa: PLC0415  # see above
+    from rclpy.utilities import remove_ros_args  # noqa: PLC0415
+
+    from lupin_patrol.mission import Mission  # noqa: PLC0415
+    from lupin_patrol.node import ParameterError, play  # noqa: PLC0415
+
+    try:
+        options = parse(remove_ros_args(sys.argv)[1:])
+    except RuntimeError as error:  # what rclpy raises for ROS arguments that it cannot parse
+        return _refuse(error)
+    mission = Mission(GreenhouseSimulator(), options.seed, options.day_speed)
+    try:
+        play(mission.events(), speed=options.speed, once=options.once, ros_arguments=sys.argv)
+    except ParameterError as error:
+        return _refuse(error)
+    return 0
+
+
+def _refuse(error: Exception) -> int:
+    sys.stderr.write(f"patrol_node: error: {' '.join(str(error).split())}\n")
+    return 2
+
+
+def _number(
+    convert: Callable[[str], float], kind: str, lowest: float, highest: float
+) -> Callable[[str], float]:
+    """Make an argparse type for numbers within closed limits (NaN is in none)."""
+    limits = f"expected {kind} from {lowest:g} to {highest:.12g}"
+
+    def read(text: str) -> float:
+        try:
+            value = convert(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{text!r} is no number, {limits}") from None
+        if not lowest <= value <= highest:
+            raise argparse.ArgumentTypeError(f"{text!r} is out of range, {limits}")
+        return value
+
+    return read

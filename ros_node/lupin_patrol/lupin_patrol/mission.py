@@ -1,0 +1,177 @@
+"""The patrol itself: an endless, repeatable sequence of events.
+
+Patrol time is the mission's own: the node plays it faster or slower. The robot is brisker than
+hardware, so that a demo shows the whole greenhouse within a minute.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import count
+from typing import Any
+
+from lupin_patrol.chance import stream
+from lupin_patrol.climate import SECONDS_PER_DAY, Climate
+from lupin_patrol.events import (
+    Event,
+    FlowersSeen,
+    MapGrown,
+    PassCompleted,
+    ScanStatus,
+    TagPose,
+    TagScanned,
+    TagsDiscovered,
+)
+from lupin_patrol.exploration import Exploration
+from lupin_patrol.geometry import Point, length_of, walk
+from lupin_patrol.house import Tag, read_house
+from lupin_patrol.perception import TagDetector
+from lupin_patrol.plants import Plants
+from lupin_patrol.route import Roadmap, tour
+
+DOCK: Point = (0.4, 0.4)
+START_OF_DAY_S = 9 * 3600.0
+
+_ROBOT_SPEED_M_S = 1.2
+_LOOK_PERIOD_S = 0.2
+_MAP_PERIOD_S = 1.0
+_READ_S = 0.3
+_PICTURE_S = 0.2
+_BLOCKED_SHORT_M = 0.1
+
+_POSE_NOISE_M = 0.01
+_YAW_NOISE_RAD = 0.02
+
+_FAILURES_A_PASS = 2
+_RETRY_FAILS = 0.3
+_DETAILS = {
+    ScanStatus.OK: "",
+    ScanStatus.UNREACHABLE: "the way to the tag is blocked",
+    ScanStatus.SCAN_FAILED: "the tag was not decoded in 3 pictures",
+}
+
+
+class Mission:
+    """One robot on patrol in the simulator's greenhouse.
+
+    `day_speed` is how many simulated seconds pass in one second of patrol time.
+    """
+
+    def __init__(self, simulator: Any, seed: int, day_speed: float) -> None:
+        self.house = read_house(simulator)
+        self._climate = Climate(simulator)
+        self._plants = Plants(self.house, seed)
+        self._roadmap = Roadmap(self.house)
+        self._exploration = Exploration(self.house)
+        self._detector = TagDetector(self.house, self._plants, seed)
+        self._seed = seed
+        self._day_speed = day_speed
+        self._position = DOCK
+        self._now_s = 0.0
+        self._map_due_s = 0.0
+        self._map_is_new = False
+        order = tour(self._roadmap, DOCK, [tag.stop for tag in self.house.tags])
+        self._tour = [self.house.tags[index] for index in order]
+
+    def events(self) -> Iterator[Event]:
+        """Patrol for ever. To be called once: a mission is one robot's life."""
+        yield from self._look(0)
+        for pass_index in count():
+            yield from self._patrol(pass_index)
+            yield from self._drive(DOCK, pass_index)
+
+    def _patrol(self, pass_index: int) -> Iterator[Event]:
+        """Visit every tag once, then the failed ones again, the nearest first."""
+        planned = self._planned_failures(pass_index)
+        failed: list[Tag] = []
+        for tag in self._tour:
+            status = planned.get(tag.tag_id, ScanStatus.OK)
+            yield from self._visit(tag, pass_index, 0, status)
+            if status is not ScanStatus.OK:
+                failed.append(tag)
+        lost = []
+        while failed:
+            tag = min(failed, key=lambda tag: self._way_length(tag.stop))
+            failed.remove(tag)
+            status = self._retry_status(tag, pass_index)
+            yield from self._visit(tag, pass_index, 1, status)
+            if status is not ScanStatus.OK:
+                lost.append(tag.tag_id)
+        if self._map_is_new:
+            yield self._map()
+        yield TagsDiscovered(self._now_s, self._detector.sightings())
+        yield PassCompleted(self._now_s, pass_index, tuple(lost))
+
+    def _planned_failures(self, pass_index: int) -> dict[str, ScanStatus]:
+        """Choose the tags whose first try fails: in every pass some do, in both ways."""
+        chance = stream(self._seed, "failures", pass_index)
+        tags = chance.sample([tag.tag_id for tag in self.house.tags], _FAILURES_A_PASS)
+        return dict(zip(tags, (ScanStatus.UNREACHABLE, ScanStatus.SCAN_FAILED), strict=True))
+
+    def _retry_status(self, tag: Tag, pass_index: int) -> ScanStatus:
+        """Decide a retry. It succeeds in the first pass, so that a demo shows every tag."""
+        chance = stream(self._seed, "retry", tag.tag_id, pass_index)
+        fails = pass_index > 0 and chance.random() < _RETRY_FAILS
+        return ScanStatus.SCAN_FAILED if fails else ScanStatus.OK
+
+    def _visit(
+        self, tag: Tag, pass_index: int, attempt: int, status: ScanStatus
+    ) -> Iterator[Event]:
+        blocked = status is ScanStatus.UNREACHABLE
+        yield from self._drive(tag.stop, pass_index, _BLOCKED_SHORT_M if blocked else 0.0)
+        self._now_s += _READ_S
+        chance = stream(self._seed, "scan", tag.tag_id, pass_index, attempt)
+        time_of_day_s = (START_OF_DAY_S + self._now_s * self._day_speed) % SECONDS_PER_DAY
+        if status is not ScanStatus.OK:
+            yield TagScanned(
+                self._now_s,
+                pass_index,
+                tag.tag_id,
+                status,
+                _DETAILS[status],
+                time_of_day_s,
+                (),
+                None,
+            )
+            return
+        # The first pass builds the map and so defines where the tags are; later ones localise
+        # themselves in it.
+        noise = 0.0 if pass_index == 0 else 1.0
+        pose = TagPose(
+            (
+                tag.position[0] + noise * chance.gauss(0.0, _POSE_NOISE_M),
+                tag.position[1] + noise * chance.gauss(0.0, _POSE_NOISE_M),
+            ),
+            tag.yaw + noise * chance.gauss(0.0, _YAW_NOISE_RAD),
+        )
+        readings = self._climate.read(tag.sensors, tag.position, time_of_day_s, chance)
+        yield TagScanned(
+            self._now_s, pass_index, tag.tag_id, status, "", time_of_day_s, readings, pose
+        )
+        self._now_s += _PICTURE_S
+        look = self._plants.look(tag.tag_id, pass_index, attempt)
+        yield FlowersSeen(self._now_s, pass_index, tag.tag_id, pose, look, tag.table.rect)
+
+    def _drive(self, goal: Point, pass_index: int, short_m: float = 0.0) -> Iterator[Event]:
+        """Drive to a goal, or stop a little before it, and look around on the way."""
+        way = self._roadmap.way(self._position, goal)
+        step_m = _ROBOT_SPEED_M_S * _LOOK_PERIOD_S
+        for position, driven_m in walk(way, step_m, max(0.0, length_of(way) - short_m)):
+            self._position = position
+            self._now_s += driven_m / _ROBOT_SPEED_M_S
+            yield from self._look(pass_index)
+
+    def _look(self, pass_index: int) -> Iterator[Event]:
+        if self._detector.look_from(self._position, pass_index):
+            yield TagsDiscovered(self._now_s, self._detector.sightings())
+        self._map_is_new |= self._exploration.look_from(self._position)
+        if self._map_is_new and self._now_s >= self._map_due_s:
+            yield self._map()
+
+    def _map(self) -> MapGrown:
+        self._map_is_new = False
+        self._map_due_s = self._now_s + _MAP_PERIOD_S
+        return MapGrown(self._now_s, self._exploration.snapshot())
+
+    def _way_length(self, goal: Point) -> float:
+        return length_of(self._roadmap.way(self._position, goal))

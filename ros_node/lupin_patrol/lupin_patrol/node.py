@@ -1,0 +1,187 @@
+"""The ROS node: plays a mission's events on the topics of DESIGN.md.
+
+Stamps are ROS time (`use_sim_time` included); the pace is the process's steady clock. Signals are
+waited for, never handled asynchronously: whoever calls `play` has blocked STOP_SIGNALS in this
+thread before the first other thread was started.
+"""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from threading import Thread
+from time import monotonic
+from typing import Any
+
+import rclpy
+from lupin_msgs.msg import DiscoveredTags, Observation
+from nav_msgs.msg import OccupancyGrid
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.duration import Duration
+from rclpy.exceptions import (
+    InvalidParameterTypeException,
+    InvalidTopicNameException,
+)
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+
+from lupin_patrol.events import (
+    Event,
+    FlowersSeen,
+    MapGrown,
+    PassCompleted,
+    ScanStatus,
+    TagScanned,
+    TagsDiscovered,
+)
+from lupin_patrol.messages import discovered_tags, flower, occupancy_grid, tag_reading
+
+STOP_SIGNALS = {signal.SIGINT, signal.SIGTERM}
+
+# The contract's depth. One pass makes more observations than that (two for each of 29 tags), so a
+# twin that starts late misses the oldest ones; the next pass brings them.
+OBSERVATIONS_DEPTH = 50
+
+# A twin that already runs is discovered within this time. Without the wait the first observations
+# of a fast patrol would have left the latch before anyone could hear them.
+_LISTENERS_S = 3.0
+# How long a finished patrol waits until its last messages are acknowledged.
+_DELIVERY_S = 5.0
+_POLL_S = 0.05
+
+
+class ParameterError(ValueError):
+    """A ROS parameter that stops the node at start; the message names it, its value, its limit."""
+
+
+class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
+    """Publishes observations, discovered tags and the map, all of them latched."""
+
+    def __init__(self) -> None:
+        super().__init__("lupin_patrol")
+        self._frame_id = self._name("frame_id", "map")
+        self.observations = self._latched(
+            Observation, "observations_topic", "/floranova/observations", OBSERVATIONS_DEPTH
+        )
+        # Each message holds all that came before, so the newest alone is worth keeping.
+        self._discovered_tags = self._latched(
+            DiscoveredTags, "discovered_tags_topic", "/perception/discovered_tags", 1
+        )
+        self._map = self._latched(OccupancyGrid, "map_topic", "/map", 1)
+
+    def publish(self, event: Event) -> None:
+        """Tell the world what happened, now."""
+        stamp = self.get_clock().now().to_msg()
+        match event:
+            case MapGrown():
+                self._map.publish(occupancy_grid(event, stamp, self._frame_id))
+            case TagsDiscovered():
+                self._discovered_tags.publish(discovered_tags(event, stamp, self._frame_id))
+            case TagScanned():
+                self.observations.publish(tag_reading(event, stamp, self._frame_id))
+                if event.status is not ScanStatus.OK:
+                    self.get_logger().info(
+                        f"tag {event.tag_id}: {event.status.name}, {event.status_detail}"
+                    )
+            case FlowersSeen():
+                self.observations.publish(flower(event, stamp, self._frame_id))
+            case PassCompleted():
+                self.get_logger().info(
+                    f"pass {event.pass_index + 1} completed;"
+                    f" failed tags: {', '.join(event.failed) or 'none'}"
+                )
+
+    def wait_for_delivery(self, timeout_s: float) -> bool:
+        """Wait until every subscriber has acknowledged everything; False when time runs out."""
+        return all(
+            publisher.wait_for_all_acked(Duration(seconds=timeout_s))
+            for publisher in (self.observations, self._discovered_tags, self._map)
+        )
+
+    def _latched(self, message: type[Any], parameter: str, default: str, depth: int) -> Any:
+        topic = self._name(parameter, default)
+        profile = QoSProfile(
+            history=HistoryPolicy.KEEP_LAST,
+            depth=depth,
+            reliability=ReliabilityPolicy.RELIABLE,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL,
+        )
+        try:
+            return self.create_publisher(message, topic, profile)
+        except InvalidTopicNameException as error:
+            reason = str(error).partition("\n")[0].rstrip(":")
+            raise ParameterError(f"parameter {parameter} is {topic!r}: {reason}") from error
+
+    def _name(self, parameter: str, default: str) -> str:
+        try:
+            value = self.declare_parameter(
+                parameter, default, ParameterDescriptor(read_only=True)
+            ).value
+        except InvalidParameterTypeException as error:
+            raise ParameterError(f"parameter {parameter}: {error}") from error
+        if not value:
+            raise ParameterError(f"parameter {parameter} is empty, expected a name")
+        return str(value)
+
+
+def play(events: Iterator[Event], *, speed: float, once: bool, ros_arguments: list[str]) -> None:
+    """Play events until a stop signal comes or, with `once`, the first pass is completed.
+
+    `speed` is patrol seconds per second. `ros_arguments` is the whole command line.
+    Raises ParameterError, before anything was published.
+    """
+    with _running_node(ros_arguments) as node:
+        node.get_logger().info(f"patrol starts at speed {speed:g}")
+        if _stopped_before(lambda: node.observations.get_subscription_count() > 0, _LISTENERS_S):
+            return
+        start = monotonic()
+        for event in events:
+            if _stopped_within(start + event.at_s / speed - monotonic()):
+                return
+            node.publish(event)
+            if once and isinstance(event, PassCompleted):
+                break
+        if _stopped_before(lambda: node.wait_for_delivery(0.0), _DELIVERY_S):
+            return
+
+
+@contextmanager
+def _running_node(ros_arguments: list[str]) -> Iterator[PatrolNode]:
+    """Start a node that listens (to /clock, to parameter services) in a thread of its own."""
+    rclpy.init(args=ros_arguments, signal_handler_options=SignalHandlerOptions.NO)
+    executor = SingleThreadedExecutor()
+    try:
+        node = PatrolNode()
+        executor.add_node(node)
+        thread = Thread(target=_spin, args=(executor,), name="ros")
+        thread.start()
+        try:
+            yield node
+        finally:
+            executor.shutdown(timeout_sec=2.0)
+            thread.join()
+            node.destroy_node()
+    finally:
+        rclpy.try_shutdown()
+
+
+def _spin(executor: SingleThreadedExecutor) -> None:
+    with suppress(ExternalShutdownException):
+        executor.spin()
+
+
+def _stopped_within(seconds: float) -> bool:
+    """Sleep, but wake at once for a stop signal; returns whether there was one."""
+    return signal.sigtimedwait(STOP_SIGNALS, max(0.0, seconds)) is not None
+
+
+def _stopped_before(condition: Callable[[], bool], timeout_s: float) -> bool:
+    """Wait for a condition, no longer than the time-out; returns whether a stop signal came."""
+    deadline = monotonic() + timeout_s
+    while not condition() and monotonic() < deadline:
+        if _stopped_within(_POLL_S):
+            return True
+    return False

@@ -1,0 +1,143 @@
+"""The plants on the tables and their pests: what the camera could see at each tag.
+
+Everything is a function of the seed: nothing here changes while the patrol runs, so a look at one
+tag never depends on the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import dist
+from random import Random
+
+from lupin_patrol.chance import stream
+from lupin_patrol.geometry import Point
+from lupin_patrol.house import TABLE_HEIGHT_M, House, Table, Tag
+
+SPECIES = ("lupin", "tulip", "gerbera", "orchid", "rose")
+
+_PLANT_SPACING_M = 0.09
+_IN_FLOWER = 0.75
+_POSITION_NOISE_M = 0.01
+_OVERLOOKED = 0.06
+# How likely a pest breaks out in a pass, and after how many passes at most it is gone.
+_OUTBREAK = 0.6
+_LONGEST_OUTBREAK = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Bloom:
+    """One flower: position in m (map), height above the soil in m, confidence 0 to 1."""
+
+    position: Point
+    height_m: float
+    species: str
+    confidence: float
+    anomaly: bool
+
+    @property
+    def z(self) -> float:
+        """Height above the floor, m."""
+        return TABLE_HEIGHT_M + self.height_m
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What the camera made of the plants around a tag."""
+
+    species: str
+    confidence: float
+    anomaly: bool
+    flower_count: int
+    bug_count: int
+    blooms: tuple[Bloom, ...]
+
+
+class Plants:
+    """All plants of a greenhouse. Each table grows one species; a bloom belongs to one tag."""
+
+    def __init__(self, house: House, seed: int) -> None:
+        self._seed = seed
+        self._tag_ids = [tag.tag_id for tag in house.tags]
+        self._blooms: dict[str, list[Bloom]] = {tag_id: [] for tag_id in self._tag_ids}
+        self._species: dict[str, str] = {}
+        for table in house.tables:
+            tags = [tag for tag in house.tags if tag.table == table]
+            species = stream(seed, "species", table.name).choice(SPECIES)
+            for tag in tags:
+                self._species[tag.tag_id] = species
+            for bloom in _grow(table, species, seed) if tags else ():
+                self._blooms[_nearest(tags, bloom.position).tag_id].append(bloom)
+
+    def species(self, tag_id: str) -> str:
+        """Return what grows at a tag."""
+        return self._species[tag_id]
+
+    def bugs(self, tag_id: str, pass_index: int) -> int:
+        """How many pests sit at a tag during one pass; 0: none.
+
+        A pest breaks out in one pass at one tag, gets fewer, and is gone after at most
+        _LONGEST_OUTBREAK passes. There is one in the very first pass, so that a demo shows it.
+        """
+        bugs = 0
+        for start in range(max(0, pass_index - _LONGEST_OUTBREAK + 1), pass_index + 1):
+            chance = stream(self._seed, "outbreak", start)
+            breaks_out = chance.random() < _OUTBREAK or start == 0
+            where = chance.choice(self._tag_ids)
+            passes = chance.randint(1, _LONGEST_OUTBREAK)
+            at_first = chance.randint(3, 12)
+            if breaks_out and where == tag_id and pass_index < start + passes:
+                bugs = max(bugs, at_first // (1 + pass_index - start))
+        return bugs
+
+    def look(self, tag_id: str, pass_index: int, attempt: int) -> Look:
+        """Look at the plants of a tag: some flowers are overlooked, the others placed to 1 cm."""
+        chance = stream(self._seed, "look", tag_id, pass_index, attempt)
+        bugs = self.bugs(tag_id, pass_index)
+        blooms = self._blooms[tag_id]
+        infested = set(chance.sample(range(len(blooms)), min(len(blooms), bugs, 3)))
+        seen = tuple(
+            replace(
+                bloom,
+                position=_jitter(bloom.position, chance),
+                confidence=chance.uniform(0.72, 0.99),
+                anomaly=index in infested,
+            )
+            for index, bloom in enumerate(blooms)
+            if index in infested or chance.random() > _OVERLOOKED
+        )
+        return Look(
+            species=self.species(tag_id),
+            confidence=chance.uniform(0.8, 0.99),
+            anomaly=bugs > 0,
+            flower_count=len(seen),
+            bug_count=bugs,
+            blooms=seen,
+        )
+
+
+def _grow(table: Table, species: str, seed: int) -> Iterator[Bloom]:
+    """Plant a table in rows that leave room for the looks' noise, and let most plants flower."""
+    chance = stream(seed, "grow", table.name)
+    rect = table.rect
+    columns = max(1, round((rect.x1 - rect.x0) / _PLANT_SPACING_M))
+    rows = max(1, round((rect.y1 - rect.y0) / _PLANT_SPACING_M))
+    for row in range(rows):
+        for column in range(columns):
+            position = (
+                rect.x0 + (column + 0.5) * (rect.x1 - rect.x0) / columns,
+                rect.y0 + (row + 0.5) * (rect.y1 - rect.y0) / rows,
+            )
+            height_m = chance.uniform(0.12, 0.38)
+            if chance.random() < _IN_FLOWER:
+                yield Bloom(_jitter(position, chance), height_m, species, 1.0, anomaly=False)
+
+
+def _nearest(tags: list[Tag], position: Point) -> Tag:
+    return min(tags, key=lambda tag: dist(tag.position, position))
+
+
+def _jitter(position: Point, chance: Random) -> Point:
+    noise = _POSITION_NOISE_M
+    return position[0] + chance.uniform(-noise, noise), position[1] + chance.uniform(-noise, noise)

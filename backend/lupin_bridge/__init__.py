@@ -1,0 +1,1 @@
+"""The web bridge of the lupin_twin greenhouse digital twin."""

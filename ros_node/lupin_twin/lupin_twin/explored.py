@@ -71,6 +71,7 @@ def occupancy_map(
 
     Raises:
         ValueError: a map that cannot be right; the message names the defect.
+
     """
     for name, number in (
         ("resolution", resolution),

@@ -53,6 +53,7 @@ class FieldRules:
 
     Raises:
         ValueError: a rule out of its range, named with its value and the limit.
+
     """
 
     idw_power: float
@@ -76,6 +77,7 @@ def check_request(request: FieldRequest, max_grid_cells: int) -> tuple[int, int]
     Raises:
         FieldRefused: the request names no sensor, its numbers make no grid, or a grid of more than
             `max_grid_cells` cells.
+
     """
     if not request.sensor_type:
         raise FieldRefused("sensor_type is empty, must name a sensor")
@@ -165,6 +167,7 @@ class FieldEngine:
 
         Raises:
             FieldRefused: see `check_request`.
+
         """
         check_request(request, self.rules.max_grid_cells)
         key = self._key(request, store.observation_count, occupancy)

@@ -28,10 +28,10 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import chain
+from itertools import chain, pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -41,13 +41,15 @@ COINCIDENT_EPS_M: Final = 1e-3
 
 # Pairs of a part are evaluated at once up to here: two float64 arrays of this size stay in the
 # second-level cache, and the numpy calls on them cost several times their own overhead.
-_MAX_PAIRS: Final = 40_960
+_MAX_PAIRS: Final = 32_768
 _MIN_PAIRS: Final = 2_048
+_MAX_PIECES: Final = 4
 
 # 1/d² is used as it is up to here; past it (and for any power but 2) the weights are scaled by
 # the nearest distance of the cell, so that none overflows and the largest is exactly 1.
 _MAX_PLAIN_REACH_M: Final = 1e6
 _MAX_PLAIN_VALUE: Final = 1e100
+_COINCIDENT_WEIGHT: Final = 0.999 / COINCIDENT_EPS_M**2
 
 _FLOAT32_MANTISSA_BITS: Final = 24
 _FLOAT64_NOISE_ULPS: Final = 4
@@ -103,6 +105,7 @@ def grid_dimensions(
     Raises:
         ValueError: a number that is not finite, a resolution that is not positive, or an inverted
             box.
+
     """
     _check_finite("resolution", resolution)
     if resolution <= 0.0:
@@ -170,16 +173,9 @@ def compute_idw_field(
 
     Raises:
         ValueError: an argument out of its range, named with its value and the limit.
+
     """
     width, height = grid_dimensions(bbox_min_x, bbox_min_y, bbox_max_x, bbox_max_y, resolution)
-    for name, number in (
-        ("falloff_radius_m", falloff_radius_m),
-        ("max_distance_m", max_distance_m),
-        ("power", power),
-    ):
-        _check_finite(name, number)
-        if number < 0.0:
-            raise ValueError(f"{name} is {number}, must not be less than 0")
     if explored_mask is not None and (
         explored_mask.shape != (height, width) or explored_mask.dtype != np.bool_
     ):
@@ -188,23 +184,27 @@ def compute_idw_field(
             f"of shape {(height, width)} (height, width)"
         )
     x, y, value = _columns(samples)
-    values = np.full((height, width), np.nan, dtype=np.float32)
-    painter = _Painter(
-        x=x,
-        y=y,
-        value=value,
-        cell_x=cell_centres(bbox_min_x, width, resolution),
-        cell_y=cell_centres(bbox_min_y, height, resolution),
+    scale = _scale(value)
+    max_pairs = min(max(width * height, _MIN_PAIRS), _MAX_PAIRS)
+    idw = PairwiseIdw(
         falloff_radius_m=falloff_radius_m,
         max_distance_m=max_distance_m,
         power=power,
-        explored=explored_mask,
-        values=values,
+        max_pairs=max(max_pairs, value.size),
     )
-    # 0/0 is a cell that nothing reaches, 1/0 a sample on a cell's centre, an overflow a reading
-    # past float32: all of them are meant, and none is worth a warning.
+    values = np.full((height, width), np.nan, dtype=np.float32)
+    painter = _Painter(
+        (x, y, value / scale),
+        cell_centres(bbox_min_x, width, resolution),
+        cell_centres(bbox_min_y, height, resolution),
+        idw,
+        explored_mask,
+        values,
+    )
     with np.errstate(all="ignore"):
-        painter.paint()
+        painter.paint(max_pairs)
+        if scale != 1.0:
+            values *= scale
         value_min, value_max = _finite_range(values)
     values.setflags(write=False)
     return FieldGrid(
@@ -253,11 +253,101 @@ def _finite_range(values: npt.NDArray[np.float32]) -> tuple[float, float]:
     return float(low), float(high)
 
 
+class PairwiseIdw:
+    """The definition's rules 2 to 5 for any points, given their squared distances to the samples.
+
+    Raises:
+        ValueError: a rule out of its range, named with its value and the limit.
+
+    Not to be shared between threads: the intermediate arrays are kept for the next evaluation.
+    """
+
+    def __init__(
+        self, *, falloff_radius_m: float, max_distance_m: float, power: float, max_pairs: int
+    ) -> None:
+        for name, number in (
+            ("falloff_radius_m", falloff_radius_m),
+            ("max_distance_m", max_distance_m),
+            ("power", power),
+        ):
+            _check_finite(name, number)
+            if number < 0.0:
+                raise ValueError(f"{name} is {number}, must not be less than 0")
+        self.power = power
+        self.max_distance = max_distance_m
+        self.falloff_square = _largest_square_within(falloff_radius_m)
+        self.max_square = _largest_square_within(max_distance_m)
+        self.reach_square = max(self.falloff_square, self.max_square)
+        self._plain_weights = power == 2.0 and falloff_radius_m <= _MAX_PLAIN_REACH_M
+        self._square = np.empty(max_pairs)
+        self._weight = np.empty(max_pairs)
+        self._within = np.empty(max_pairs, dtype=np.bool_)
+
+    def squares(self, samples: int, points: int) -> FloatArray:
+        """An array (samples, points) to put the squared distances (m²) into, for `evaluate`."""
+        return self._square[: samples * points].reshape(samples, points)
+
+    def evaluate(self, square: FloatArray, value: FloatArray) -> FloatArray:
+        """The points' values, NaN behind the gate; `square` is `squares()`, filled, and is spent.
+
+        A sample that does not count for a point has an infinite squared distance to it. Call it
+        with numpy's floating point warnings off: 0/0 is a point that nothing reaches, 1/0 a sample
+        on a point.
+        """
+        weight = self._weight[: square.size].reshape(square.shape)
+        within = self._within[: square.size].reshape(square.shape)
+        np.less_equal(square, self.falloff_square, out=within)
+        weight.fill(0.0)
+        if self._plain_weights:
+            return self._evaluate_plain(square, value, weight, within)
+        return self._evaluate_normalised(square, value, weight, within)
+
+    def _evaluate_plain(
+        self, square: FloatArray, value: FloatArray, weight: FloatArray, within: BoolArray
+    ) -> FloatArray:
+        """Power 2: 1/d² needs no root, and the nearest sample is seldom asked for."""
+        np.divide(1.0, square, out=weight, where=within)
+        total = weight.sum(axis=0)
+        points: FloatArray = (value @ weight) / total
+        # Rules 3 and 5 give the nearest sample's value. One closer than COINCIDENT_EPS_M alone weighs
+        # this much, and is looked for only where the weights do.
+        asks_nearest = ~(total < _COINCIDENT_WEIGHT)
+        if self.falloff_square < self.max_square:
+            asks_nearest |= total == 0.0
+        if asks_nearest.any():
+            asking = np.flatnonzero(asks_nearest)
+            # With the root: two squares a rounding apart can be the same distance, and of equally
+            # near samples the first one counts.
+            distance = np.sqrt(square[:, asking])
+            nearest = value[distance.argmin(axis=0)]
+            takes = (distance.min(axis=0) < COINCIDENT_EPS_M) | (total[asking] == 0.0)
+            points[asking[takes]] = nearest[takes]
+        if self.falloff_square != self.max_square:
+            points[square.min(axis=0) > self.max_square] = np.nan
+        return points
+
+    def _evaluate_normalised(
+        self, square: FloatArray, value: FloatArray, weight: FloatArray, within: BoolArray
+    ) -> FloatArray:
+        """Any power: the weights are (nearest/d)ᵖ, so that the largest is 1 and none overflows."""
+        distance = np.sqrt(square, out=square)
+        shortest = distance.min(axis=0)
+        np.divide(shortest, distance, out=weight, where=within)
+        np.power(weight, self.power, out=weight, where=within)
+        total = weight.sum(axis=0)
+        points: FloatArray = (value @ weight) / total
+        special = np.flatnonzero((shortest < COINCIDENT_EPS_M) | (total == 0.0))
+        if special.size:
+            points[special] = value[distance[:, special].argmin(axis=0)]
+        points[shortest > self.max_distance] = np.nan
+        return points
+
+
 def _largest_square_within(radius: float) -> float:
     """The largest float64 whose square root is not greater than `radius`.
 
-    `sqrt(d2) <= radius` and `d2 <= _largest_square_within(radius)` are the same then, to the bit,
-    and the root need not be taken for every pair.
+    `sqrt(square) <= radius` and `square <= _largest_square_within(radius)` are the same then, to
+    the bit, and the root need not be taken for every pair.
     """
     square = min(radius * radius, sys.float_info.max)
     while math.sqrt(square) > radius:
@@ -268,7 +358,7 @@ def _largest_square_within(radius: float) -> float:
 
 
 class _Part(NamedTuple):
-    """Rows `top` to `bottom` and columns `left` to `right` (exclusive) and who may reach them."""
+    """Rows `top` to `bottom`, columns `left` to `right` (exclusive), and the samples near them."""
 
     top: int
     bottom: int
@@ -277,16 +367,12 @@ class _Part(NamedTuple):
     reaching: IndexArray
 
     @property
-    def cells(self) -> int:
-        return (self.bottom - self.top) * (self.right - self.left)
+    def cells(self) -> tuple[slice, slice]:
+        return slice(self.top, self.bottom), slice(self.left, self.right)
 
-    def halves(self) -> tuple[_Part, _Part]:
-        """Both halves along the longer side."""
-        if self.bottom - self.top > self.right - self.left:
-            middle = (self.top + self.bottom) // 2
-            return self._replace(bottom=middle), self._replace(top=middle)
-        middle = (self.left + self.right) // 2
-        return self._replace(right=middle), self._replace(left=middle)
+    @property
+    def pairs(self) -> int:
+        return (self.bottom - self.top) * (self.right - self.left) * self.reaching.size
 
 
 class _Painter:
@@ -294,134 +380,81 @@ class _Painter:
 
     def __init__(
         self,
-        *,
-        x: FloatArray,
-        y: FloatArray,
-        value: FloatArray,
+        samples: tuple[FloatArray, FloatArray, FloatArray],
         cell_x: FloatArray,
         cell_y: FloatArray,
-        falloff_radius_m: float,
-        max_distance_m: float,
-        power: float,
+        idw: PairwiseIdw,
         explored: BoolArray | None,
         values: npt.NDArray[np.float32],
     ) -> None:
-        self.x, self.y, self.value = x, y, value
+        self.x, self.y, self.value = samples
         self.cell_x, self.cell_y = cell_x, cell_y
-        self.falloff, self.max_distance, self.power = falloff_radius_m, max_distance_m, power
-        self.falloff_square = _largest_square_within(falloff_radius_m)
-        self.max_square = _largest_square_within(max_distance_m)
-        self.reach_square = max(self.falloff_square, self.max_square)
+        self.idw = idw
         self.explored = explored
         self.values = values
-        # Σ(v/dᵖ) must not overflow either; a power of two scales without rounding.
-        largest = float(np.abs(value).max(initial=0.0))
-        self.scale = 2.0 ** math.frexp(largest)[1] if largest > _MAX_PLAIN_VALUE else 1.0
-        self.scaled_value = value / self.scale
-        self.plain_weights = power == 2.0 and falloff_radius_m <= _MAX_PLAIN_REACH_M
-        self.max_pairs = min(max(values.size, _MIN_PAIRS), _MAX_PAIRS)
-        pairs = max(self.max_pairs, value.size)
-        self.squares = np.empty(pairs)
-        self.weights = np.empty(pairs)
-        self.within = np.empty(pairs, dtype=np.bool_)
 
-    def paint(self) -> None:
+    def paint(self, max_pairs: int) -> None:
+        """Fill `values`; a part with no more pairs than `max_pairs` is evaluated at once."""
         height, width = self.values.shape
-        parts = [_Part(0, height, 0, width, np.arange(self.value.size))]
+        whole = _Part(0, height, 0, width, np.arange(self.value.size))
+        parts = list(self._split(whole, 1, 1)) if whole.pairs else []
         while parts:
             part = parts.pop()
-            if self.explored is not None and not self._explored(part).any():
-                continue
-            part = part._replace(reaching=self._reaching(part))
-            if part.reaching.size == 0:
-                continue
-            if part.cells > 1 and part.cells * part.reaching.size > self.max_pairs:
-                parts.extend(part.halves())
-            else:
+            rows, columns = part.bottom - part.top, part.right - part.left
+            if part.pairs <= max_pairs or rows * columns == 1:
                 self._evaluate(part)
+                continue
+            # A piece keeps some half of the samples, so half as many pieces as the pairs ask for.
+            pieces = round(math.sqrt(part.pairs / max_pairs / 2.0))
+            if pieces <= 1:
+                parts.extend(self._split(part, *((2, 1) if rows > columns else (1, 2))))
+                continue
+            side = max(rows, columns) / min(pieces, _MAX_PIECES)
+            parts.extend(self._split(part, math.ceil(rows / side), math.ceil(columns / side)))
 
-    def _explored(self, part: _Part) -> BoolArray:
-        assert self.explored is not None
-        return self.explored[part.top : part.bottom, part.left : part.right]
+    def _split(self, part: _Part, down: int, across: int) -> Iterator[_Part]:
+        """`part` in `down` times `across` pieces, without those that stay NaN as a whole.
 
-    def _reaching(self, part: _Part) -> IndexArray:
-        """Those of the part's samples that reach at least the nearest point of its cells.
-
-        Rounding is monotonic, so no cell's own squared distance is below this one, and no sample
-        is lost to float noise.
+        A piece keeps the samples that reach the nearest point of its cells. Rounding is monotonic,
+        so no cell's own squared distance is below that point's, and none is lost to float noise.
         """
-        x, y = self.x[part.reaching], self.y[part.reaching]
-        dx = np.maximum(self.cell_x[part.left] - x, x - self.cell_x[part.right - 1])
-        dy = np.maximum(self.cell_y[part.top] - y, y - self.cell_y[part.bottom - 1])
-        np.maximum(dx, 0.0, out=dx)
-        np.maximum(dy, 0.0, out=dy)
-        square = dx * dx + dy * dy
-        if square.min(initial=np.inf) > self.max_square:
-            return part.reaching[:0]
-        reaching: IndexArray = part.reaching[square <= self.reach_square]
-        return reaching
+        rows, columns = _edges(part.top, part.bottom, down), _edges(part.left, part.right, across)
+        x_gaps = _gap_squares(self.x[part.reaching], self.cell_x, columns)
+        y_gaps = _gap_squares(self.y[part.reaching], self.cell_y, rows)
+        for (top, bottom), y_gap in zip(pairwise(rows), y_gaps, strict=True):
+            for (left, right), x_gap in zip(pairwise(columns), x_gaps, strict=True):
+                if self.explored is not None and not self.explored[top:bottom, left:right].any():
+                    continue
+                gap = x_gap + y_gap
+                if gap.min() <= self.idw.max_square:
+                    reaching = part.reaching[gap <= self.idw.reach_square]
+                    yield _Part(top, bottom, left, right, reaching)
 
     def _evaluate(self, part: _Part) -> None:
-        near = part.reaching
-        dx = self.x[near, None] - self.cell_x[part.left : part.right]
-        dy = self.y[near, None] - self.cell_y[part.top : part.bottom]
-        rows, columns = part.bottom - part.top, part.right - part.left
-        pairs = near.size * part.cells
-        square = self.squares[:pairs].reshape(near.size, part.cells)
+        rows, columns = part.cells
+        dx = self.x[part.reaching, None] - self.cell_x[columns]
+        dy = self.y[part.reaching, None] - self.cell_y[rows]
+        count, height, width = part.reaching.size, dy.shape[1], dx.shape[1]
+        square = self.idw.squares(count, height * width)
         np.add(
             (dy * dy)[:, :, None],
             (dx * dx)[:, None, :],
-            out=square.reshape(near.size, rows, columns),
+            out=square.reshape(count, height, width),
         )
-        weight = self.weights[:pairs].reshape(square.shape)
-        within = self.within[:pairs].reshape(square.shape)
-        mean = self._plain if self.plain_weights else self._normalised
-        cells = mean(near, square, weight, within).reshape(rows, columns)
+        points = self.idw.evaluate(square, self.value[part.reaching]).reshape(height, width)
         if self.explored is not None:
-            cells[~self._explored(part)] = np.nan
-        self.values[part.top : part.bottom, part.left : part.right] = cells
+            points[~self.explored[part.cells]] = np.nan
+        self.values[part.cells] = points
 
-    def _plain(
-        self, near: IndexArray, square: FloatArray, weight: FloatArray, within: BoolArray
-    ) -> FloatArray:
-        """Rules 2 to 5 for power 2, where 1/d² needs no root and the nearest is seldom needed."""
-        np.less_equal(square, self.falloff_square, out=within)
-        weight.fill(0.0)
-        np.divide(1.0, square, out=weight, where=within)
-        total = weight.sum(axis=0)
-        cells: FloatArray = (self.scaled_value[near] @ weight) / total
-        if self.scale != 1.0:
-            cells *= self.scale
-        # A sample closer than COINCIDENT_EPS_M alone weighs this much.
-        special = ~(total < 0.999 / COINCIDENT_EPS_M**2)
-        if self.falloff_square < self.max_square:
-            special |= total == 0.0
-        if special.any():
-            chosen = np.flatnonzero(special)
-            distance = np.sqrt(square[:, chosen])
-            nearest = distance.argmin(axis=0)
-            shortest = distance.min(axis=0)
-            takes = (shortest < COINCIDENT_EPS_M) | (total[chosen] == 0.0)
-            cells[chosen[takes]] = self.value[near[nearest[takes]]]
-        if self.falloff_square != self.max_square:
-            cells[square.min(axis=0) > self.max_square] = np.nan
-        return cells
 
-    def _normalised(
-        self, near: IndexArray, square: FloatArray, weight: FloatArray, within: BoolArray
-    ) -> FloatArray:
-        """Rules 2 to 5 for any power: weights are (nearest/d)ᵖ, so the largest is exactly 1."""
-        distance = np.sqrt(square, out=square)
-        shortest = distance.min(axis=0)
-        np.less_equal(distance, self.falloff, out=within)
-        weight.fill(0.0)
-        np.divide(shortest, distance, out=weight, where=within)
-        np.power(weight, self.power, out=weight, where=within)
-        cells: FloatArray = (self.scaled_value[near] @ weight) / weight.sum(axis=0)
-        if self.scale != 1.0:
-            cells *= self.scale
-        chosen = np.flatnonzero((shortest < COINCIDENT_EPS_M) | (shortest > self.falloff))
-        if chosen.size:
-            cells[chosen] = self.value[near[distance[:, chosen].argmin(axis=0)]]
-        cells[shortest > self.max_distance] = np.nan
-        return cells
+def _edges(first: int, end: int, pieces: int) -> list[int]:
+    return [first + (end - first) * piece // pieces for piece in range(pieces + 1)]
+
+
+def _gap_squares(position: FloatArray, centres: FloatArray, edges: list[int]) -> FloatArray:
+    """Squared distance (m²) along one axis from each piece's cells to each position."""
+    low = centres[edges[:-1], None]
+    high = centres[[edge - 1 for edge in edges[1:]], None]
+    gap: FloatArray = np.maximum(low - position, position - high)
+    np.maximum(gap, 0.0, out=gap)
+    return np.square(gap, out=gap)

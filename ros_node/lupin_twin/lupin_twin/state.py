@@ -168,6 +168,7 @@ class TwinStore:
 
         Raises:
             Rejected: a text or a list past its bound; nothing is kept then.
+
         """
         check_texts(observation.tag_id, *(reading.name for reading in observation.readings))
         tag = self._tag(observation.tag_id)
@@ -190,6 +191,7 @@ class TwinStore:
 
         Raises:
             Rejected: a text or a list past its bound; nothing is kept then.
+
         """
         flower = observation.flower
         check_texts(observation.tag_id, flower.species, *(b.species for b in flower.blooms))
@@ -212,6 +214,7 @@ class TwinStore:
 
         Raises:
             Rejected: a text past its bound, or one tag too many.
+
         """
         check_texts(tag_id)
         tag = self._tag(tag_id)

@@ -1,0 +1,106 @@
+# Two commands are all a newcomer needs: `make run` and `make test`. `make help` lists the rest.
+
+PYTHON ?= python3
+HOST   ?= 127.0.0.1
+PORT   ?= 8000
+ARGS   ?=
+
+VENV := .venv
+BIN  := $(VENV)/bin
+DONE := .make
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+
+# pip must neither look at a user's site-packages nor at the modules of a sourced ROS.
+export PYTHONNOUSERSITE := 1
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+# A checked run: ROS serialises a field of the wrong type as garbage unless this is set.
+TEST_ENV := ROS_PYTHON_CHECK_FIELDS=1 ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST \
+            ROS_LOG_DIR=$(CURDIR)/$(DONE)/ros_log
+
+say = @printf '\033[1m==> %s\033[0m\n'
+
+.PHONY: help setup run test lint types unit hmi-test bench bench-live clean
+
+help: ## what there is
+	@grep -E '^[a-z-]+:.*## ' Makefile | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
+
+run: setup ## twin, bridge, HMI and the simulated patrol on http://127.0.0.1:8000 (PORT=…, HOST=…)
+	$(say) 'demo on http://$(HOST):$(PORT) (Ctrl-C ends it)'
+	@exec $(BIN)/lupin-twin demo --host $(HOST) --port $(PORT) $(ARGS)
+
+setup: $(DONE)/python $(DONE)/hmi ## everything that `make run` needs; nothing to do the second time
+
+# --- set-up ------------------------------------------------------------------------------------
+
+$(DONE)/checked: .ci/preflight Makefile
+	@mkdir -p $(DONE)
+	@PYTHON='$(PYTHON)' .ci/preflight
+	@touch $@
+
+$(VENV)/pyvenv.cfg: | $(DONE)/checked
+	$(say) 'making a virtual environment in $(VENV)'
+	@$(PYTHON) -m venv $(VENV)
+
+MSGS_SOURCES := $(wildcard ros_node/lupin_msgs/*.* ros_node/lupin_msgs/*/*)
+$(DONE)/msgs: $(MSGS_SOURCES) $(VENV)/pyvenv.cfg
+	$(say) 'installing the ROS wheels and building lupin_msgs against them (about a minute)'
+	@env -u PYTHONPATH $(BIN)/pip install --quiet ./ros_node/lupin_msgs
+	@touch $@
+
+$(DONE)/python: pyproject.toml requirements.txt $(wildcard ros_node/*/setup.py) $(DONE)/msgs
+	$(say) 'installing the Python packages'
+	@grep -v '^\./ros_node/lupin_msgs' requirements.txt > $(DONE)/requirements.txt
+	@env -u PYTHONPATH $(BIN)/pip install --quiet -r $(DONE)/requirements.txt
+	@touch $@
+
+$(DONE)/node_modules: package.json package-lock.json | $(DONE)/checked
+	$(say) 'installing the front-end packages'
+	@npm ci --no-audit --no-fund --loglevel=error
+	@touch $@
+
+HMI_SOURCES := $(shell find frontend -type f -not -path '*/node_modules/*' 2>/dev/null) \
+               backend/lupin_bridge/sensors.json
+$(DONE)/hmi: $(HMI_SOURCES) $(DONE)/node_modules
+	$(say) 'building the HMI'
+	@npm run --silent build
+	@touch $@
+
+$(DONE)/chromium: .ci/chromium | $(DONE)/checked
+	@.ci/chromium
+	@touch $@
+
+# --- checks ------------------------------------------------------------------------------------
+
+test: setup $(DONE)/chromium lint types hmi-test unit ## every check: lint, types, unit, real ROS, browser
+	$(say) 'all checks passed'
+
+lint: setup ## ruff, ESLint, Prettier
+	$(say) 'lint'
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@npm run --silent lint
+	@npm run --silent format:check
+
+types: setup ## mypy and tsc, both strict; the browser's types against the server's schema
+	$(say) 'types'
+	@$(BIN)/mypy
+	@npm run --silent typecheck
+	@npm run --silent types:check
+
+hmi-test: setup ## the HMI's unit tests
+	$(say) 'front-end unit tests'
+	@npm run --silent test
+
+unit: setup $(DONE)/chromium ## Python tests, real ROS and real browser included
+	$(say) 'Python tests: units, ROS over DDS, browser'
+	@$(TEST_ENV) $(BIN)/pytest -q -n 2 --dist worksteal tests
+
+bench: setup $(DONE)/chromium ## measure: ratios side by side, nothing asserted
+	@$(TEST_ENV) $(BIN)/python -m tests.bench
+
+clean: ## remove everything that set-up and builds have made
+	rm -rf $(VENV) $(DONE) node_modules backend/lupin_bridge/static

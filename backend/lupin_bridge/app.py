@@ -1,0 +1,74 @@
+"""The FastAPI application: every route, and the page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fastapi import FastAPI, Request, Response
+from starlette.staticfiles import StaticFiles
+
+from lupin_bridge import (
+    docs_page,
+    routes_field,
+    routes_health,
+    routes_map,
+    routes_state,
+    schema,
+)
+from lupin_bridge.bridge import Bridge
+from lupin_bridge.http_tools import error_response
+from lupin_bridge.security import ReadOnly
+
+STATIC_FOLDER = Path(__file__).parent / "static"
+
+
+def create_app(bridge: Bridge | None, static_folder: Path = STATIC_FOLDER) -> FastAPI:
+    """The application around a bridge that its caller starts and stops.
+
+    Without a bridge it can only describe itself (OpenAPI).
+    """
+    app = FastAPI(
+        title="lupin-twin",
+        version="0.1.0",
+        summary="Digital twin of a greenhouse: every tag's state, and fields of every sensor.",
+        description=_DESCRIPTION,
+        docs_url=None,  # FastAPI's own page loads its scripts from the internet
+        redoc_url=None,
+        openapi_url=None,
+    )
+    app.state.bridge = bridge
+    for module in (routes_state, routes_field, routes_map, routes_health, docs_page):
+        app.include_router(module.router)
+    app.add_middleware(ReadOnly)
+    app.add_exception_handler(404, _not_found)
+    if static_folder.is_dir():
+        app.mount("/", StaticFiles(directory=static_folder, html=True), name="hmi")
+    _describe_frames(app)
+    return app
+
+
+_DESCRIPTION = """
+Read-only: every route answers GET and HEAD alone. Positions are metres in the map frame, values
+are in the sensor's unit, what is not known is null. `/ws/state` is a WebSocket that sends
+`StateFrame` and `StatusFrame` as JSON text: the current ones at once, then every change.
+"""
+
+
+async def _not_found(request: Request, _error: Exception) -> Response:
+    return error_response(f"there is nothing at {request.url.path[:128]!r}; see /docs", 404)
+
+
+def _describe_frames(app: FastAPI) -> None:
+    """Add the WebSocket frames, which OpenAPI has no place for, to the document's schemas."""
+    plain = app.openapi
+
+    def with_frames() -> dict[str, object]:
+        document = plain()
+        schemas = document.setdefault("components", {}).setdefault("schemas", {})
+        for model in (schema.StateFrame, schema.StatusFrame):
+            described = model.model_json_schema(ref_template="#/components/schemas/{model}")
+            schemas.update(described.pop("$defs", {}))
+            schemas[model.__name__] = described
+        return document
+
+    app.openapi = with_frames  # type: ignore[method-assign]  # FastAPI's documented way

@@ -1,0 +1,144 @@
+"""Source to clients: takes what the twin tells, paces it, and keeps watch over both sides."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import time
+import uuid
+from concurrent.futures import ThreadPoolExecutor
+
+from lupin_bridge.frames import FrameWriter, status_frame
+from lupin_bridge.hub import Client, Hub, Writable
+from lupin_bridge.settings import Settings
+from lupin_bridge.source import Revised, TwinSource
+from lupin_bridge.status import Liveness, Status
+
+log = logging.getLogger(__name__)
+
+# How often silence and stuck clients are looked for. Silence counts from 3 s on, and a client has
+# to know by 3.5 s.
+WATCH_PERIOD_S = 0.2
+
+
+class Bridge:
+    """Everything between a source and its listeners. Belongs to the event loop."""
+
+    def __init__(self, source: TwinSource, settings: Settings) -> None:
+        self.source = source
+        self.settings = settings
+        # Numbers the maps of this process alone: a restarted bridge must not match old ETags.
+        self.identity = uuid.uuid4().hex[:12]
+        # Large fields and pictures are written off the loop.
+        self.pool = ThreadPoolExecutor(max_workers=2, thread_name_prefix="encode")
+        self.hub = Hub(settings.max_clients, settings.client_timeout_s)
+        self.frames = FrameWriter()
+        self._liveness = Liveness()
+        self._latest: Revised | None = None
+        self._told: Status | None = None
+        self._next_push_s = 0.0
+        self._push_timer: asyncio.TimerHandle | None = None
+        self._watch: asyncio.Task[None] | None = None
+
+    async def start(self) -> None:
+        """Start the source and the watch.
+
+        Raises:
+            Exception: whatever the source raised at its start.
+
+        """
+        await self.source.start(self._on_state, self._on_death)
+        self._tell_status()
+        self._watch = asyncio.create_task(self._keep_watch(), name="watch")
+
+    async def stop(self) -> None:
+        """Stop both; the clients were told by `say_goodbye`."""
+        if self._watch is not None:
+            self._watch.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._watch
+        if self._push_timer is not None:
+            self._push_timer.cancel()
+        await self.source.stop()
+        self.pool.shutdown(wait=False, cancel_futures=True)
+
+    def say_goodbye(self) -> None:
+        """Tell every client that the bridge is about to go."""
+        self._liveness.shutting_down = True
+        self._tell_status()
+
+    # --- for the routes -----------------------------------------------------------------------
+
+    @property
+    def latest(self) -> Revised | None:
+        """The newest state, before any pacing; None while no twin was heard."""
+        return self._latest
+
+    @property
+    def status(self) -> Status:
+        """The status now."""
+        return self._liveness.status(time.monotonic())
+
+    def join(self, connection: Writable) -> Client:
+        """Add a listener; it has the status and the current state when this returns."""
+        return self.hub.join(connection, time.monotonic())
+
+    def serve(self, client: Client) -> None:
+        """A listener's socket is free again."""
+        self.hub.serve(client, time.monotonic())
+
+    # --- from the source ----------------------------------------------------------------------
+
+    def _on_state(self, state: Revised) -> None:
+        self._latest = state
+        now_s = time.monotonic()
+        self._liveness.last_state_s = now_s
+        if self._push_timer is not None:
+            return  # it will take this state along
+        if now_s >= self._next_push_s:
+            self._push()
+        else:
+            loop = asyncio.get_running_loop()
+            self._push_timer = loop.call_later(self._next_push_s - now_s, self._push)
+
+    def _push(self) -> None:
+        self._push_timer = None
+        state = self._latest
+        if state is None:
+            return
+        now_s = time.monotonic()
+        self._next_push_s = now_s + 1.0 / self.settings.max_rate_hz
+        self._tell_status()
+        self.hub.publish(self.frames.state(state.snapshot, state.revision), now_s)
+
+    def _on_death(self) -> None:
+        self._liveness.thread_dead = True
+        self._tell_status()
+
+    # --- the watch ----------------------------------------------------------------------------
+
+    def _tell_status(self) -> None:
+        status = self.status
+        if self._told is not None and self._told.reason == status.reason:
+            return
+        if self._told is not None or not status.is_live:
+            log.log(
+                logging.INFO if status.is_live else logging.WARNING,
+                "%s",
+                status.frame()["message"],
+            )
+        self._told = status
+        self.hub.announce(status_frame(status), time.monotonic())
+
+    async def _keep_watch(self) -> None:
+        while True:
+            await asyncio.sleep(WATCH_PERIOD_S)
+            try:
+                self._tell_status()
+                stuck = self.hub.dismiss_stuck(time.monotonic())
+            except Exception:
+                log.exception("the watch met an error and goes on")
+                continue
+            if stuck:
+                log.warning("closed %d clients that took no frame", stuck)

@@ -1,0 +1,140 @@
+"""The command `lupin-twin`: `serve` (twin and bridge) and `demo` (the same plus the patrol)."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import logging
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import NoReturn
+
+from lupin_bridge.app import create_app
+from lupin_bridge.bridge import Bridge
+from lupin_bridge.local_twin import LocalTwin
+from lupin_bridge.server import BridgeServer, address_of, listen
+from lupin_bridge.settings import SettingError, Settings, option
+from lupin_twin.parameters import ParameterError
+
+log = logging.getLogger("lupin_bridge")
+
+USAGE_ERROR = 2
+PATROL_STOP_S = 1.5
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a role; returns the process's exit code."""
+    own, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
+    options = _parser().parse_args(own)
+    try:
+        settings = Settings(**{spec.name: getattr(options, spec.name) for spec in fields(Settings)})
+    except SettingError as error:
+        _fail(str(error))
+    _prepare_process()
+    patrol = _start_patrol() if options.role == "demo" else None
+    try:
+        return asyncio.run(_serve(settings, ros_args))
+    except ParameterError as error:
+        _fail(str(error))
+    except KeyboardInterrupt:
+        return 0
+    finally:
+        if patrol is not None:
+            _stop_patrol(patrol)
+
+
+def split_ros_args(argv: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Our own arguments, and ROS's: from `--ros-args` to `--` or the end, as ROS defines it."""
+    own: list[str] = []
+    ros: list[str] = []
+    in_ros = False
+    for argument in argv:
+        if argument == "--ros-args":
+            in_ros = True
+        elif in_ros and argument == "--":
+            ros.append(argument)
+            in_ros = False
+            continue
+        (ros if in_ros else own).append(argument)
+    return own, ros
+
+
+async def _serve(settings: Settings, ros_args: Sequence[str]) -> int:
+    try:
+        listener = listen(settings.host, settings.port)
+    except OSError as error:
+        _fail(f"cannot listen on {settings.host} port {settings.port}: {error.strerror}")
+    twin = LocalTwin(ros_args=ros_args, timeout_s=settings.field_timeout_s)
+    bridge = Bridge(twin, settings)
+    server = BridgeServer(create_app(bridge), bridge)
+    await bridge.start()
+    print(f"lupin-twin: {address_of(listener)}", flush=True)  # noqa: T201  # for people and scripts
+    try:
+        await server.serve(sockets=[listener])
+    finally:
+        await bridge.stop()
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="lupin-twin",
+        description="Digital twin of a greenhouse: ROS 2 node, web bridge and browser HMI.",
+        epilog="Everything from --ros-args on goes to ROS: --ros-args -p idw_power:=3.0",
+    )
+    roles = parser.add_subparsers(dest="role", required=True, metavar="ROLE")
+    common = argparse.ArgumentParser(add_help=False)
+    for spec in fields(Settings):
+        common.add_argument(
+            option(spec.name),
+            type=type(spec.default),
+            default=spec.default,
+            metavar=spec.name.rpartition("_")[2].upper(),
+            help=f"{spec.metadata['help']} (default: {spec.default})",
+        )
+    for role, text in (
+        ("serve", "the twin and the bridge in one process"),
+        ("demo", "serve, plus a simulated patrol in a second process"),
+    ):
+        roles.add_parser(role, parents=[common], help=text, description=text)
+    return parser
+
+
+def _prepare_process() -> None:
+    # rcl wants a place for its logs; without a home directory it would refuse to start.
+    if "ROS_LOG_DIR" not in os.environ and not os.environ.get("HOME"):
+        os.environ["ROS_LOG_DIR"] = tempfile.mkdtemp(prefix="lupin-twin-log-")
+    logging.basicConfig(
+        level=logging.INFO,
+        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
+        stream=sys.stderr,
+    )
+    # Its news (started, waiting, connection open) are ours to tell, once.
+    logging.getLogger("uvicorn").setLevel(logging.WARNING)
+
+
+def _start_patrol() -> subprocess.Popen[bytes]:
+    # The environment goes along whole: the ROS wheels' own variables only work together.
+    return subprocess.Popen([sys.executable, "-m", "lupin_patrol"])
+
+
+def _stop_patrol(patrol: subprocess.Popen[bytes]) -> None:
+    patrol.terminate()
+    try:
+        patrol.wait(PATROL_STOP_S)
+    except subprocess.TimeoutExpired:
+        patrol.kill()
+        patrol.wait()
+
+
+def _fail(message: str) -> NoReturn:
+    print(f"lupin-twin: {message}", file=sys.stderr)  # noqa: T201  # there is no logger yet
+    raise SystemExit(USAGE_ERROR)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,124 @@
+"""The source of `serve`: a twin in this process, in a thread of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import uuid
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
+
+from lupin_bridge.ros_thread import RosThread
+from lupin_bridge.source import Revised, RevisedGrid, TwinTimeoutError
+from lupin_twin.explored import OccupancyMap
+from lupin_twin.fields import FieldJob, FieldRequest
+from lupin_twin.idw import FieldGrid
+from lupin_twin.node import TwinNode
+from lupin_twin.state import Observation
+
+ResultT = TypeVar("ResultT")
+
+
+class LocalTwin:
+    """`TwinSource` over a `TwinNode` of this process."""
+
+    def __init__(self, *, ros_args: Sequence[str], timeout_s: float) -> None:
+        self._ros_args = ros_args
+        self._timeout_s = timeout_s
+        # A restarted server must never match an ETag of its predecessor, whose counts it repeats.
+        self._identity = uuid.uuid4().hex[:12]
+        self._thread: RosThread[TwinNode, Revised]
+        # Two, so that one heavy field does not hold up all the others.
+        self._pool = ThreadPoolExecutor(max_workers=2, thread_name_prefix="field")
+        self._computing: dict[object, asyncio.Task[FieldGrid]] = {}
+
+    async def start(
+        self, on_state: Callable[[Revised], None], on_death: Callable[[], None]
+    ) -> None:
+        """Start the ROS thread with its node; see `TwinSource.start`."""
+
+        def make_node(context: Any, post: Callable[[Revised], None]) -> TwinNode:
+            node = TwinNode(context=context)
+            node.add_listener(lambda snapshot: post(Revised(snapshot, self._revision_of(node))))
+            post(Revised(node.snapshot(), self._revision_of(node)))
+            return node
+
+        self._thread = RosThread(
+            make_node, ros_args=self._ros_args, on_event=on_state, on_death=on_death
+        )
+        await self._thread.start()
+
+    async def stop(self) -> None:
+        """Stop the ROS thread and the workers."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        await self._thread.stop()
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether the ROS thread runs."""
+        return self._thread.is_alive
+
+    @property
+    def callback_errors(self) -> int:
+        """Errors met by the node's callbacks so far."""
+        return self._thread.callback_errors
+
+    def revision(self) -> str:
+        """The process's identity, the observation count and the map's revision."""
+        return self._thread.peek(self._revision_of)
+
+    def max_distance_m(self) -> float:
+        """The parameter `idw_max_distance_m`."""
+        return self._thread.peek(lambda node: node.parameters.idw_max_distance_m)
+
+    def max_grid_cells(self) -> int:
+        """The parameter `max_grid_cells`."""
+        return self._thread.peek(lambda node: node.parameters.max_grid_cells)
+
+    def occupancy_map(self) -> OccupancyMap | None:
+        """The latest map that the node accepted."""
+        return self._thread.peek(lambda node: node.occupancy_map)
+
+    async def field(self, request: FieldRequest) -> RevisedGrid:
+        """A hit from the node's cache, or the field computed on a worker and handed back to it."""
+
+        def look_up(node: TwinNode) -> tuple[FieldGrid | FieldJob, str]:
+            answer = node.fields.lookup(request, node.store, node.occupancy_map)
+            return answer, self._revision_of(node)
+
+        answer, revision = await self._ask(look_up)
+        if isinstance(answer, FieldJob):
+            answer = await self._compute_once(answer)
+        return RevisedGrid(answer, revision)
+
+    async def history(self, tag_id: str) -> tuple[Observation, ...] | None:
+        """The last `buffer_len` scans of a tag."""
+        return await self._ask(lambda node: node.store.history(tag_id))
+
+    async def _compute_once(self, job: FieldJob) -> FieldGrid:
+        """Identical requests in flight share one computation; who leaves does not end it."""
+        task = self._computing.get(job.key)
+        if task is None:
+            task = asyncio.create_task(self._compute(job))
+            self._computing[job.key] = task
+            task.add_done_callback(lambda _: self._computing.pop(job.key, None))
+        return await asyncio.shield(task)
+
+    async def _compute(self, job: FieldJob) -> FieldGrid:
+        loop = asyncio.get_running_loop()
+        grid = await loop.run_in_executor(self._pool, job.compute)
+        await self._ask(lambda node: node.fields.keep(job, grid))
+        return grid
+
+    async def _ask(self, work: Callable[[TwinNode], ResultT]) -> ResultT:
+        try:
+            async with asyncio.timeout(self._timeout_s):
+                return await self._thread.call(work)
+        except TimeoutError:
+            raise TwinTimeoutError(
+                f"the twin did not answer within {self._timeout_s:g} s (field_timeout_s)"
+            ) from None
+
+    def _revision_of(self, node: TwinNode) -> str:
+        observation_count, map_revision = node.revision
+        return f"{self._identity}-{observation_count}-{map_revision}"

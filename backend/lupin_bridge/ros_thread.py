@@ -1,0 +1,209 @@
+"""The ROS thread and the only bridge between it and the event loop.
+
+Towards the loop go the newest event (`post`) and the answers to calls; towards ROS go calls. Both
+directions wake the other side at once. Nothing here knows what the node does.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any, Generic, Protocol, TypeVar
+
+import rclpy
+from rclpy.context import Context
+from rclpy.signals import SignalHandlerOptions
+
+from lupin_bridge.source import TwinUnavailableError
+from lupin_twin.executor import TwinExecutor
+
+log = logging.getLogger(__name__)
+
+# A stop waits this long for the ROS thread; a callback that computes a large field takes less.
+STOP_TIMEOUT_S = 1.5
+
+
+class BridgedNode(Protocol):
+    """What the thread needs of the node it runs."""
+
+    callback_errors: int
+
+    def report_executor_error(self, what: str, error: Exception) -> None:
+        """Count and log an error that the executor met."""
+
+    def destroy_node(self) -> object:
+        """Give everything back to rclpy."""
+
+
+NodeT = TypeVar("NodeT", bound=BridgedNode)
+EventT = TypeVar("EventT")
+ResultT = TypeVar("ResultT")
+
+
+class RosThread(Generic[NodeT, EventT]):
+    """Runs one node in one thread of its own.
+
+    `make_node(context, post)` is called in the thread; the node calls `post(event)` with what the
+    loop should know. On the loop, `on_event(event)` gets the newest one (what came in between is
+    skipped), and `on_death()` is told once if the thread ends without having been stopped.
+    """
+
+    def __init__(
+        self,
+        make_node: Callable[[Context, Callable[[EventT], None]], NodeT],
+        *,
+        ros_args: Sequence[str],
+        on_event: Callable[[EventT], None],
+        on_death: Callable[[], None],
+    ) -> None:
+        self._make_node = make_node
+        self._ros_args = list(ros_args)
+        self._on_event = on_event
+        self._on_death = on_death
+        self._loop: asyncio.AbstractEventLoop
+        self._started: asyncio.Future[None]
+        self._thread = threading.Thread(target=self._run, name="ros", daemon=True)
+        self._context = Context()
+        self._executor: TwinExecutor | None = None
+        self._node: NodeT | None = None
+        self._newest: EventT | None = None
+        self._is_waking = False
+        self._is_stopping = False
+
+    # --- on the event loop ------------------------------------------------------------------
+
+    async def start(self) -> None:
+        """Start the thread; returns when the node is there.
+
+        Raises:
+            Exception: whatever `make_node` raised, `lupin_twin.parameters.ParameterError` for one.
+
+        """
+        self._loop = asyncio.get_running_loop()
+        self._started = self._loop.create_future()
+        self._thread.start()
+        await self._started
+
+    async def stop(self) -> None:
+        """Stop the node and join the thread."""
+        self._is_stopping = True
+        if self._executor is not None:
+            executor = self._executor
+            # Both wait for the callback that is running: not on the loop.
+            await asyncio.to_thread(executor.shutdown, STOP_TIMEOUT_S)
+        await asyncio.to_thread(self._thread.join, STOP_TIMEOUT_S)
+        if self._thread.is_alive():
+            log.error("the ROS thread did not end within %s s", STOP_TIMEOUT_S)
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether the thread runs."""
+        return self._thread.is_alive()
+
+    @property
+    def callback_errors(self) -> int:
+        """Errors met by the node's callbacks so far."""
+        return 0 if self._node is None else self._node.callback_errors
+
+    def peek(self, read: Callable[[NodeT], ResultT]) -> ResultT:
+        """Read one immutable value off the node without asking its thread.
+
+        Raises:
+            TwinUnavailableError: there is no node.
+
+        """
+        if self._node is None:
+            raise TwinUnavailableError("the ROS thread has no node")
+        return read(self._node)
+
+    async def call(self, work: Callable[[NodeT], ResultT]) -> ResultT:
+        """Run `work(node)` in the ROS thread, between two callbacks, and return its result.
+
+        Raises:
+            TwinUnavailableError: the thread has ended.
+            Exception: whatever `work` raised.
+
+        """
+        if self._executor is None or not self._thread.is_alive() or self._is_stopping:
+            raise TwinUnavailableError("the ROS thread is not running")
+        result: asyncio.Future[ResultT] = self._loop.create_future()
+
+        def run() -> None:
+            assert self._node is not None  # set before the executor is
+            try:
+                value = work(self._node)
+            except Exception as error:  # noqa: BLE001  # handed to the caller
+                self._to_loop(_settle, result, None, error)
+            else:
+                self._to_loop(_settle, result, value, None)
+
+        self._executor.create_task(run)
+        return await result
+
+    # --- in the ROS thread ------------------------------------------------------------------
+
+    def _run(self) -> None:
+        error: BaseException | None = None
+        try:
+            rclpy.init(
+                args=self._ros_args,
+                context=self._context,
+                # The web server owns the signals.
+                signal_handler_options=SignalHandlerOptions.NO,
+            )
+            self._node = self._make_node(self._context, self._post)
+            executor = TwinExecutor(self._node.report_executor_error, context=self._context)
+            executor.add_node(self._node)
+            self._executor = executor
+            self._to_loop(_settle, self._started, None, None)
+            executor.spin_until_shutdown()
+        except BaseException as caught:  # noqa: BLE001  # no thread dies unseen
+            error = caught
+        finally:
+            self._end(error)
+
+    def _end(self, error: BaseException | None) -> None:
+        if self._node is not None:
+            self._node.destroy_node()
+        if self._context.ok():
+            rclpy.try_shutdown(context=self._context)
+        if self._executor is None:
+            failure = error if isinstance(error, Exception) else TwinUnavailableError(repr(error))
+            self._to_loop(_settle, self._started, None, failure)
+        elif not self._is_stopping:
+            log.critical("the ROS thread has ended", exc_info=error)
+            self._to_loop(self._on_death)
+
+    def _post(self, event: EventT) -> None:
+        self._newest = event
+        # One wake-up for as many events as come before the loop gets round to it.
+        if not self._is_waking:
+            self._is_waking = True
+            self._to_loop(self._drain)
+
+    def _to_loop(self, callback: Callable[..., None], *args: Any) -> None:
+        try:
+            self._loop.call_soon_threadsafe(callback, *args)
+        except RuntimeError:
+            # The loop is closed: nobody is left to be told.
+            log.debug("event loop closed, dropped %r", callback)
+
+    # --- on the event loop again --------------------------------------------------------------
+
+    def _drain(self) -> None:
+        # First the flag, then the value: an event posted in between wakes the loop once more.
+        self._is_waking = False
+        event = self._newest
+        if event is not None:
+            self._on_event(event)
+
+
+def _settle(future: asyncio.Future[Any], value: Any, error: BaseException | None) -> None:
+    if future.done():  # the one who asked has gone
+        return
+    if error is None:
+        future.set_result(value)
+    else:
+        future.set_exception(error)

@@ -1,0 +1,157 @@
+"""The field of one sensor, as JSON, PNG or NPY."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from fastapi import APIRouter, Request, Response
+
+from lupin_bridge import field_formats, field_query, schema
+from lupin_bridge.bridge import Bridge
+from lupin_bridge.field_formats import JSON, NPY, PNG, FieldFormat
+from lupin_bridge.http_tools import REVALIDATE, bridge_of, error_response, json_response, read_route
+from lupin_bridge.source import TwinTimeoutError, TwinUnavailableError
+from lupin_twin.fields import FieldRefused, check_request, default_box
+
+router = APIRouter()
+
+_NUMBER = {"type": "number"}
+
+
+def _parameter(name: str, schema_: dict[str, Any], description: str, required: bool = False) -> Any:
+    return {
+        "name": name,
+        "in": "query",
+        "required": required,
+        "schema": schema_,
+        "description": description,
+    }
+
+
+# Read by hand (field_query), so that a refusal is GetField's own body; documented here.
+_PARAMETERS = [
+    _parameter("sensor_type", {"type": "string"}, "name of a sensor, as in a reading", True),
+    _parameter(
+        "resolution",
+        {**_NUMBER, "default": field_query.DEFAULT_RESOLUTION_M},
+        "m, side of a square cell; greater than 0",
+    ),
+    *(
+        _parameter(name, _NUMBER, "m, map frame; without a box: all pinned tags and their reach")
+        for name in field_query.BOX_NAMES
+    ),
+    _parameter(
+        "scale",
+        {"type": "integer", "minimum": 1, "maximum": 1000, "default": 1},
+        "PNG only: pixels a cell along each side",
+    ),
+]
+_BINARY = {"schema": {"type": "string", "format": "binary"}}
+_REFUSALS: dict[int | str, dict[str, Any]] = {
+    304: {"description": "the ETag still holds"},
+    400: {"model": schema.GetFieldResponse, "description": "refused; error_message says why"},
+    503: {"model": schema.ErrorMessage, "description": "the twin is not there"},
+    504: {"model": schema.ErrorMessage, "description": "the twin did not answer in time"},
+}
+
+
+def _register(field_format: FieldFormat) -> None:
+    content = (
+        {"model": schema.GetFieldResponse}
+        if field_format is JSON
+        else {"content": {field_format.media_type: _BINARY}}
+    )
+
+    @read_route(
+        router,
+        f"/api/field.{field_format.name}",
+        summary=f"The field of one sensor as {field_format.name.upper()}",
+        responses={200: content, **_REFUSALS},
+        openapi_extra={"parameters": _PARAMETERS},
+        name=f"field_{field_format.name}",
+    )
+    async def field_in_one_format(request: Request) -> Response:
+        return await _field(request, field_format)
+
+
+@read_route(
+    router,
+    "/api/field",
+    summary="The field of one sensor, in the format that Accept asks for",
+    responses={
+        200: {
+            "model": schema.GetFieldResponse,
+            "content": {PNG.media_type: _BINARY, NPY.media_type: _BINARY},
+        },
+        **_REFUSALS,
+        406: {"model": schema.ErrorMessage, "description": "no format that Accept allows"},
+    },
+    openapi_extra={"parameters": _PARAMETERS},
+)
+async def field(request: Request) -> Response:
+    """Inverse-distance-weighted from the pinned tags; not known where no tag is near."""
+    field_format = field_query.negotiate(request.headers.get("accept"))
+    if field_format is None:
+        types = ", ".join(known.media_type for known in field_formats.FORMATS)
+        return error_response(f"Accept allows none of {types}", 406, {"Vary": "Accept"})
+    response = await _field(request, field_format)
+    response.headers["Vary"] = "Accept"
+    return response
+
+
+for _format in field_formats.FORMATS:
+    _register(_format)
+
+
+async def _field(request: Request, field_format: FieldFormat) -> Response:
+    bridge = bridge_of(request)
+    try:
+        return await _answer(bridge, request, field_format)
+    except FieldRefused as error:
+        return json_response(field_formats.refusal_json(str(error)), 400)
+    except TwinTimeoutError as error:
+        return error_response(str(error), 504)
+    except TwinUnavailableError as error:
+        return error_response(str(error), 503, {"Retry-After": "3"})
+
+
+async def _answer(bridge: Bridge, request: Request, field_format: FieldFormat) -> Response:
+    source = bridge.source
+    query = field_query.parse(request.query_params.multi_items())
+    asked = query.request(_box_of_all_tags(bridge))
+    max_cells = source.max_grid_cells()
+    width, height = check_request(asked, max_cells)
+    field_query.check_scale(query, field_format, width * height, max_cells)
+    known = request.headers.get("if-none-match")
+    tag = field_query.etag(source.revision(), asked, field_format, query.scale)
+    if field_query.matches(known, tag):
+        return Response(status_code=304, headers={"ETag": tag, **REVALIDATE})
+    result = await source.field(asked)
+    # The revision that the field was made from, which may be newer than the one just compared.
+    tag = field_query.etag(result.revision, asked, field_format, query.scale)
+    loop = asyncio.get_running_loop()
+    body = await loop.run_in_executor(
+        bridge.pool,
+        field_formats.write,
+        result.grid,
+        field_format,
+        asked.sensor_type,
+        query.scale,
+    )
+    headers = field_query.headers(
+        field_formats.metadata(result.grid, asked.sensor_type),
+        f"{asked.sensor_type}.{field_format.name}",
+    )
+    return Response(
+        body, headers={**headers, "ETag": tag, **REVALIDATE}, media_type=field_format.media_type
+    )
+
+
+def _box_of_all_tags(bridge: Bridge) -> field_query.Box:
+    latest = bridge.latest
+    tags = () if latest is None else latest.snapshot.tags
+    return default_box(
+        [(tag.pose.x, tag.pose.y) for tag in tags if tag.pose is not None],
+        bridge.source.max_distance_m(),
+    )

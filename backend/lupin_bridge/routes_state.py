@@ -1,0 +1,96 @@
+"""The state: over WebSocket, as JSON, and tag by tag."""
+
+from __future__ import annotations
+
+import orjson
+from fastapi import APIRouter, Request, Response, WebSocket
+
+from lupin_bridge import schema, state_json
+from lupin_bridge.bridge import Bridge
+from lupin_bridge.http_tools import bridge_of, error_response, json_response, read_route
+from lupin_bridge.hub import CLOSE_TRY_AGAIN_LATER
+from lupin_bridge.source import TwinUnavailableError
+from lupin_bridge.ws_protocol import CONNECTION_KEY, Connection
+
+router = APIRouter()
+
+_NO_TWIN = "no twin has been heard yet"
+_UNAVAILABLE = {503: {"model": schema.ErrorMessage, "description": "no twin was heard yet"}}
+_NO_TAG = {404: {"model": schema.ErrorMessage, "description": "no such tag"}}
+
+
+@router.websocket("/ws/state")
+async def ws_state(websocket: WebSocket) -> None:
+    """The status and the current state at once, then every change; a client is not listened to."""
+    bridge: Bridge = websocket.app.state.bridge
+    if bridge.hub.is_full:
+        await websocket.accept()
+        limit = bridge.settings.max_clients
+        await websocket.close(CLOSE_TRY_AGAIN_LATER, f"{limit} clients are connected, the limit")
+        return
+    await websocket.accept()
+    connection: Connection = getattr(websocket.state, CONNECTION_KEY)
+    client = bridge.join(connection)
+    connection.on_writable = lambda: bridge.serve(client)
+    try:
+        while (await websocket.receive())["type"] != "websocket.disconnect":
+            pass
+    finally:
+        connection.on_writable = None
+        bridge.hub.leave(client)
+
+
+@read_route(
+    router,
+    "/api/state",
+    summary="The current state of every tag",
+    responses={200: {"model": schema.TwinState}, **_UNAVAILABLE},
+)
+async def state(request: Request) -> Response:
+    """The newest TwinState with the message's own field names."""
+    bridge = bridge_of(request)
+    latest = bridge.latest
+    if latest is None:
+        return error_response(_NO_TWIN, 503)
+    return json_response(bridge.frames.json.state(latest.snapshot))
+
+
+@read_route(
+    router,
+    "/api/tags/{tag_id}",
+    summary="One tag",
+    responses={200: {"model": schema.TwinTagState}, **_NO_TAG, **_UNAVAILABLE},
+)
+async def tag(request: Request, tag_id: str) -> Response:
+    """Everything that the twin knows about one tag."""
+    bridge = bridge_of(request)
+    latest = bridge.latest
+    if latest is None:
+        return error_response(_NO_TWIN, 503)
+    for candidate in latest.snapshot.tags:
+        if candidate.tag_id == tag_id:
+            return json_response(bridge.frames.json.tag(candidate, latest.snapshot.stamp_ns))
+    return _no_such_tag(tag_id, len(latest.snapshot.tags))
+
+
+@read_route(
+    router,
+    "/api/tags/{tag_id}/history",
+    summary="The last scans of one tag",
+    responses={200: {"model": schema.TagHistory}, **_NO_TAG, **_UNAVAILABLE},
+)
+async def history(request: Request, tag_id: str) -> Response:
+    """The tag's last scans that brought readings, sensor by sensor, oldest first."""
+    bridge = bridge_of(request)
+    try:
+        scans = await bridge.source.history(tag_id)
+    except TwinUnavailableError as error:
+        return error_response(str(error), 503)
+    if scans is None:
+        latest = bridge.latest
+        return _no_such_tag(tag_id, 0 if latest is None else len(latest.snapshot.tags))
+    return json_response(orjson.dumps(state_json.history(tag_id, scans)))
+
+
+def _no_such_tag(tag_id: str, known: int) -> Response:
+    return error_response(f"no tag {tag_id[:64]!r} is known ({known} others are)", 404)

@@ -1,0 +1,80 @@
+"""What the routes need of a twin, wherever it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from lupin_twin.explored import OccupancyMap
+from lupin_twin.fields import FieldRequest
+from lupin_twin.idw import FieldGrid
+from lupin_twin.state import Observation, Snapshot
+
+
+class TwinUnavailableError(RuntimeError):
+    """The twin cannot answer now: it is not there, or it took too long."""
+
+
+class TwinTimeoutError(TwinUnavailableError):
+    """The twin took longer than `field_timeout_s`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Revised:
+    """A snapshot and the revision that it belongs to."""
+
+    snapshot: Snapshot
+    revision: str
+
+
+@dataclass(frozen=True, slots=True)
+class RevisedGrid:
+    """A field and the revision that it was computed from."""
+
+    grid: FieldGrid
+    revision: str
+
+
+class TwinSource(Protocol):
+    """A twin in this process, or one elsewhere. Everything here is called on the event loop."""
+
+    async def start(
+        self, on_state: Callable[[Revised], None], on_death: Callable[[], None]
+    ) -> None:
+        """Start; `on_state` gets every change (the newest, where they come fast)."""
+
+    async def stop(self) -> None:
+        """Stop and release everything."""
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether the thread behind this source runs."""
+
+    @property
+    def callback_errors(self) -> int:
+        """Errors met by ROS callbacks so far."""
+
+    def revision(self) -> str:
+        """The revision now: opaque, changes exactly when a field could."""
+
+    def max_distance_m(self) -> float:
+        """How far a tag's reading reaches, m: the margin of a field's default box."""
+
+    def max_grid_cells(self) -> int:
+        """The largest field or picture served, in cells or pixels."""
+
+    def occupancy_map(self) -> OccupancyMap | None:
+        """The latest map, if any has come."""
+
+    async def field(self, request: FieldRequest) -> RevisedGrid:
+        """Compute a field.
+
+        Raises:
+            lupin_twin.fields.FieldRefused: a bad request.
+            TwinUnavailableError: nobody there to compute it.
+
+        """
+
+    async def history(self, tag_id: str) -> tuple[Observation, ...] | None:
+        """The last scans of a tag; None: no such tag."""

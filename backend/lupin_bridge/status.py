@@ -1,0 +1,70 @@
+"""Whether the twin behind the bridge is alive, as one value that everything else tells.
+
+Pure: the time is an argument, seconds of a clock that never jumps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+# The twin publishes at least once a second (parameter state_publish_rate_hz, default 1); three
+# missed publications are no accident.
+STALE_AFTER_S = 3.0
+
+Reason = Literal["live", "never_seen", "stale", "thread_dead", "shutting_down"]
+
+_MESSAGES: dict[Reason, str] = {
+    "live": "The twin is live.",
+    "never_seen": "No twin has been heard yet. Start it, or check ROS_DOMAIN_ID.",
+    "stale": "The twin has fallen silent. Check that its process runs and is reachable.",
+    "thread_dead": "The bridge's ROS thread has ended. Restart the bridge.",
+    "shutting_down": "The bridge is shutting down.",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """`reason` says why the twin counts as live or offline; `state_age_s` is None: never."""
+
+    reason: Reason
+    state_age_s: float | None
+
+    @property
+    def is_live(self) -> bool:
+        """Whether what the bridge serves is current."""
+        return self.reason == "live"
+
+    def frame(self) -> dict[str, Any]:
+        """`schema.StatusFrame`."""
+        return {
+            "type": "status",
+            "twin": "live" if self.is_live else "offline",
+            "reason": self.reason,
+            "message": _MESSAGES[self.reason],
+            "state_age_seconds": None if self.state_age_s is None else round(self.state_age_s, 3),
+        }
+
+
+@dataclass(slots=True)
+class Liveness:
+    """What is known of the twin: when its last state came, and whether the thread still runs."""
+
+    stale_after_s: float = STALE_AFTER_S
+    last_state_s: float | None = None
+    thread_dead: bool = False
+    shutting_down: bool = False
+
+    def status(self, now_s: float) -> Status:
+        """The status at `now_s`."""
+        age = None if self.last_state_s is None else max(0.0, now_s - self.last_state_s)
+        return Status(self._reason(age), age)
+
+    def _reason(self, age_s: float | None) -> Reason:
+        if self.shutting_down:
+            return "shutting_down"
+        if self.thread_dead:
+            return "thread_dead"
+        if age_s is None:
+            return "never_seen"
+        return "live" if age_s < self.stale_after_s else "stale"

@@ -1,0 +1,60 @@
+"""The WebSocket connection as the fan-out needs it: write at once, or know that it cannot take it.
+
+uvicorn hands an application `send()` alone, which waits for a slow client. The fan-out must not
+wait: it asks, and keeps the newest frame for the moment at which the client is ready again.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+
+CONNECTION_KEY = "connection"
+
+# How long a client that is told to go has to read the reason before its socket is torn down.
+CLOSE_GRACE_S = 1.0
+
+
+class Connection(WebSocketsSansIOProtocol):
+    """uvicorn's protocol, that also puts itself into `scope["state"]["connection"]`."""
+
+    def __init__(
+        self,
+        config: Any,
+        server_state: Any,
+        app_state: dict[str, Any],
+        _loop: asyncio.AbstractEventLoop | None = None,
+    ) -> None:
+        super().__init__(config, server_state, {**app_state, CONNECTION_KEY: self}, _loop)
+        self.on_writable: Callable[[], None] | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Stop at the first byte that the socket does not take: what is queued is one frame."""
+        super().connection_made(transport)
+        self.transport.set_write_buffer_limits(high=0)
+
+    def resume_writing(self) -> None:
+        """The socket has taken everything: time for the newest frame."""
+        super().resume_writing()
+        if self.on_writable is not None:
+            self.on_writable()
+
+    @property
+    def can_take(self) -> bool:
+        """Whether everything written so far has gone out, and more may follow."""
+        return self.writable.is_set() and not self.close_sent and not self.transport.is_closing()
+
+    def write(self, wire: bytes) -> None:
+        """Write a whole frame; never waits. The caller has asked `can_take`."""
+        self.transport.write(wire)
+
+    def dismiss(self, code: int, reason: str) -> None:
+        """Send a close frame with the reason, and tear the socket down if nobody reads it."""
+        if not self.close_sent and not self.transport.is_closing():
+            self.conn.send_close(code, reason)
+            self.transport.write(b"".join(self.conn.data_to_send()))
+            self.close_sent = True
+        self.loop.call_later(CLOSE_GRACE_S, self.transport.abort)

@@ -1,0 +1,35 @@
+"""Start the twin: `ros2 launch lupin_twin twin.launch.py [use_sim_time:=true] [params_file:=…]`."""
+
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+from launch import LaunchDescription
+
+
+def generate_launch_description() -> LaunchDescription:
+    """One node, its parameters from a file, and the clock to go by."""
+    default_params = Path(get_package_share_directory("lupin_twin")) / "config" / "twin.yaml"
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument(
+                "params_file", default_value=str(default_params), description="parameters, YAML"
+            ),
+            DeclareLaunchArgument(
+                "use_sim_time", default_value="false", description="follow /clock"
+            ),
+            Node(
+                package="lupin_twin",
+                executable="twin_node",
+                name="lupin_twin",
+                output="screen",
+                parameters=[
+                    LaunchConfiguration("params_file"),
+                    {"use_sim_time": LaunchConfiguration("use_sim_time")},
+                ],
+            ),
+        ]
+    )

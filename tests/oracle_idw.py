@@ -34,24 +34,31 @@ def field_by_loop(
                 values.append(math.nan)
             else:
                 values.append(
-                    value_at(cell_x, cell_y, samples, falloff_radius_m, max_distance_m, power)
+                    value_at(
+                        (cell_x, cell_y),
+                        samples,
+                        falloff_radius_m=falloff_radius_m,
+                        max_distance_m=max_distance_m,
+                        power=power,
+                    )
                 )
     return values
 
 
 def value_at(
-    cell_x: float,
-    cell_y: float,
+    point: tuple[float, float],
     samples: Sequence[tuple[float, float, float]],
+    *,
     falloff_radius_m: float,
     max_distance_m: float,
     power: float,
 ) -> float:
     """Rules 2 to 5 of the definition at one point."""
+    point_x, point_y = point
     nearest_distance = math.inf
     nearest_value = math.nan
     for x, y, value in samples:
-        distance = math.sqrt((x - cell_x) ** 2 + (y - cell_y) ** 2)
+        distance = math.sqrt((x - point_x) ** 2 + (y - point_y) ** 2)
         if distance < nearest_distance:
             nearest_distance = distance
             nearest_value = value
@@ -62,7 +69,7 @@ def value_at(
     weighted_sum = 0.0
     weight_sum = 0.0
     for x, y, value in samples:
-        distance = math.sqrt((x - cell_x) ** 2 + (y - cell_y) ** 2)
+        distance = math.sqrt((x - point_x) ** 2 + (y - point_y) ** 2)
         if distance <= falloff_radius_m:
             # 1/dᵖ times a constant of the cell: the quotient is the same, and it cannot overflow.
             weight = (nearest_distance / distance) ** power

@@ -65,17 +65,17 @@ def main() -> int:
     try:
         options = parse(remove_ros_args(sys.argv)[1:])
     except RuntimeError as error:  # what rclpy raises for ROS arguments that it cannot parse
-        return _refuse(error)
+        return _refuse(f"cannot use these ROS arguments: {error}")
     mission = Mission(GreenhouseSimulator(), options.seed, options.day_speed)
     try:
         play(mission.events(), speed=options.speed, once=options.once, ros_arguments=sys.argv)
     except ParameterError as error:
-        return _refuse(error)
+        return _refuse(str(error))
     return 0
 
 
-def _refuse(error: Exception) -> int:
-    sys.stderr.write(f"patrol_node: error: {' '.join(str(error).split())}\n")
+def _refuse(reason: str) -> int:
+    sys.stderr.write(f"patrol_node: error: {' '.join(reason.split())}\n")
     return 2
 
 

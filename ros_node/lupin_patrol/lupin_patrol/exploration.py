@@ -64,11 +64,6 @@ class Exploration:
         self._truth = np.where(wall | self._covered.any(axis=1), OCCUPIED, FREE).astype(np.int8)
         self._cells = np.full(rows * columns, UNKNOWN, dtype=np.int8)
 
-    @property
-    def is_complete(self) -> bool:
-        """Whether every cell is known."""
-        return not (self._cells == UNKNOWN).any()
-
     def look_from(self, position: Point) -> bool:
         """Add what is in view from there; returns whether anything was new.
 

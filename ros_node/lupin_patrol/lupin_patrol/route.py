@@ -40,9 +40,9 @@ class Roadmap:
         total = (
             self._straight(start)[:, np.newaxis] + self._length + self._straight(goal)[np.newaxis]
         )
-        first, last = np.unravel_index(np.argmin(total), total.shape)
-        if not np.isfinite(total[first, last]):
+        if not np.isfinite(total).any():
             raise ValueError(f"no way from {start} to {goal} is {2 * CLEARANCE_M} m wide")
+        first, last = np.unravel_index(np.argmin(total), total.shape)
         corner, bends = int(first), []
         while corner != last:
             bends.append(corner)

@@ -1,0 +1,54 @@
+"""The options of `patrol_node`."""
+
+from __future__ import annotations
+
+import pytest
+
+from lupin_patrol.cli import parse
+
+
+def test_defaults() -> None:
+    options = parse([])
+    assert (options.speed, options.day_speed, options.seed, options.once) == (1.0, 60.0, 0, False)
+
+
+def test_options_are_read() -> None:
+    options = parse(["--speed", "20", "--day-speed", "0", "--seed", "7", "--once"])
+    assert (options.speed, options.day_speed, options.seed, options.once) == (20.0, 0.0, 7, True)
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "limits"),
+    [
+        ("--speed", "0", "a number from 0.1 to 50"),
+        ("--speed", "50.1", "a number from 0.1 to 50"),
+        ("--speed", "nan", "a number from 0.1 to 50"),
+        ("--speed", "fast", "a number from 0.1 to 50"),
+        ("--speed", "-1", "a number from 0.1 to 50"),
+        ("--day-speed", "-0.1", "a number from 0 to 3600"),
+        ("--day-speed", "inf", "a number from 0 to 3600"),
+        ("--seed", "1.5", "a whole number from 0 to 4294967295"),
+        ("--seed", "-1", "a whole number from 0 to 4294967295"),
+        ("--seed", "4294967296", "a whole number from 0 to 4294967295"),
+    ],
+)
+def test_a_bad_value_is_refused_in_one_line_with_option_value_and_limits(
+    capsys: pytest.CaptureFixture[str], option: str, value: str, limits: str
+) -> None:
+    with pytest.raises(SystemExit) as refusal:
+        parse([option, value])
+    assert refusal.value.code == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"patrol_node: error: argument {option}: {value!r} is ")
+    assert line.endswith(f"expected {limits}")
+
+
+@pytest.mark.parametrize("arguments", [["--spee", "2"], ["--twice"], ["stray"]])
+def test_an_unknown_option_is_refused_and_named(
+    capsys: pytest.CaptureFixture[str], arguments: list[str]
+) -> None:
+    with pytest.raises(SystemExit) as refusal:
+        parse(arguments)
+    assert refusal.value.code == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert arguments[0] in line

@@ -1,0 +1,143 @@
+"""The occupancy grid that grows."""
+
+from __future__ import annotations
+
+from math import dist
+
+import numpy as np
+import pytest
+from greenhouse_sim.simulator import GreenhouseSimulator
+
+from lupin_patrol.exploration import (
+    FREE,
+    OCCUPIED,
+    RESOLUTION_M,
+    UNKNOWN,
+    VIEW_RADIUS_M,
+    Exploration,
+    Grid,
+)
+from lupin_patrol.geometry import Point, Rect
+from lupin_patrol.house import House, Table, read_house
+
+# A table in the middle of a hall, the robot left of it.
+TABLE = Rect(1.5, 1.0, 2.0, 2.0)
+HALL = House(Rect(0.0, 0.0, 3.0, 3.0), (Table("middle", TABLE),), ())
+LEFT: Point = (1.0, 1.5)
+
+
+def cell(grid: Grid, point: Point) -> int:
+    """The value at a point, by nav_msgs/OccupancyGrid's own rule."""
+    column = int((point[0] - grid.origin[0]) / grid.resolution_m)
+    row = int((point[1] - grid.origin[1]) / grid.resolution_m)
+    return int(np.frombuffer(grid.cells, dtype=np.int8)[row * grid.width + column])
+
+
+def explored_from(*positions: Point, house: House = HALL) -> Grid:
+    exploration = Exploration(house)
+    for position in positions:
+        exploration.look_from(position)
+    return exploration.snapshot()
+
+
+def everywhere(house: House) -> list[Point]:
+    return [
+        (x, y)
+        for x in np.arange(0.25, house.interior.x1, 0.5).tolist()
+        for y in np.arange(0.25, house.interior.y1, 0.5).tolist()
+        if house.is_free((x, y))
+    ]
+
+
+def test_at_first_nothing_is_known() -> None:
+    grid = Exploration(HALL).snapshot()
+    assert grid.known == 0
+    assert set(np.frombuffer(grid.cells, dtype=np.int8)) == {UNKNOWN}
+
+
+def test_the_grid_covers_the_house_and_a_ring_of_wall() -> None:
+    grid = Exploration(read_house(GreenhouseSimulator())).snapshot()
+    assert (grid.width, grid.height, grid.resolution_m) == (82, 162, 0.05)
+    assert grid.origin == (-0.05, -0.05)
+    assert len(grid.cells) == 82 * 162
+
+
+def test_a_complete_map_has_tables_and_walls_and_else_free_floor() -> None:
+    house = read_house(GreenhouseSimulator())
+    grid = explored_from(*everywhere(house), house=house)
+    assert grid.known == len(grid.cells)
+    for row in range(grid.height):
+        for column in range(grid.width):
+            x = grid.origin[0] + (column + 0.5) * RESOLUTION_M
+            y = grid.origin[1] + (row + 0.5) * RESOLUTION_M
+            is_floor = house.interior.contains((x, y)) and not any(
+                table.rect.contains((x, y)) for table in house.tables
+            )
+            assert cell(grid, (x, y)) == (FREE if is_floor else OCCUPIED), (x, y)
+
+
+def test_the_robot_sees_floor_table_and_wall_around_it() -> None:
+    grid = explored_from(LEFT)
+    assert cell(grid, (0.8, 1.6)) == FREE
+    assert cell(grid, (1.55, 1.5)) == OCCUPIED  # the table's near edge
+    assert cell(grid, (1.95, 1.5)) == OCCUPIED  # and its far one: it is seen from above
+    assert cell(grid, (-0.025, 1.5)) == OCCUPIED  # the wall
+
+
+def test_what_stands_behind_a_table_is_hidden() -> None:
+    grid = explored_from(LEFT)
+    assert cell(grid, (2.2, 1.5)) == UNKNOWN
+    assert cell(grid, (2.2, 2.9)) == FREE  # past the table's end
+
+
+def test_a_table_is_hidden_by_another_one() -> None:
+    behind = Table("behind", Rect(2.5, 1.3, 2.7, 1.7))
+    house = House(HALL.interior, (*HALL.tables, behind), ())
+    assert cell(explored_from(LEFT, house=house), (2.6, 1.5)) == UNKNOWN
+    assert cell(explored_from((2.2, 1.5), house=house), (2.6, 1.5)) == OCCUPIED
+
+
+def test_nothing_is_known_beyond_the_view_radius() -> None:
+    far = House(Rect(0.0, 0.0, 8.0, 2.0), (), ())
+    grid = explored_from((0.5, 1.0), house=far)
+    cells = np.frombuffer(grid.cells, dtype=np.int8).reshape(grid.height, grid.width)
+    for row, column in np.argwhere(cells != UNKNOWN):
+        x, y = grid.origin[0] + (column + 0.5) * 0.05, grid.origin[1] + (row + 0.5) * 0.05
+        assert dist((x, y), (0.5, 1.0)) <= VIEW_RADIUS_M
+    assert cell(grid, (0.5 + VIEW_RADIUS_M - 0.1, 1.0)) == FREE
+    assert cell(grid, (0.5 + VIEW_RADIUS_M + 0.1, 1.0)) == UNKNOWN
+
+
+def test_the_map_only_ever_grows() -> None:
+    exploration = Exploration(HALL)
+    before = np.frombuffer(exploration.snapshot().cells, dtype=np.int8)
+    for position in everywhere(HALL):
+        exploration.look_from(position)
+        after = np.frombuffer(exploration.snapshot().cells, dtype=np.int8)
+        assert (after[before != UNKNOWN] == before[before != UNKNOWN]).all()
+        before = after
+
+
+def test_a_look_says_whether_it_showed_anything_new() -> None:
+    exploration = Exploration(HALL)
+    assert exploration.look_from(LEFT)
+    assert not exploration.look_from(LEFT)
+    for position in everywhere(HALL):
+        exploration.look_from(position)
+    assert not exploration.look_from((2.5, 2.5))
+
+
+def test_a_snapshot_does_not_change_any_more() -> None:
+    exploration = Exploration(HALL)
+    exploration.look_from(LEFT)
+    snapshot = exploration.snapshot()
+    known = snapshot.known
+    exploration.look_from((2.5, 1.5))
+    assert snapshot.known == known < exploration.snapshot().known
+
+
+@pytest.mark.parametrize("extent", [3.0, 3.01, 2.99])
+def test_a_house_that_is_no_multiple_of_the_cell_is_covered(extent: float) -> None:
+    grid = Exploration(House(Rect(0.0, 0.0, extent, 3.0), (), ())).snapshot()
+    wall_starts = grid.origin[0] + (grid.width - 1) * RESOLUTION_M
+    assert extent - 1e-9 <= wall_starts < extent + RESOLUTION_M - 1e-9

@@ -1,0 +1,178 @@
+"""The patrol as its own process, over real DDS."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+from greenhouse_sim.simulator import GreenhouseSimulator
+from lupin_msgs.msg import DiscoveredTags, Observation
+from nav_msgs.msg import OccupancyGrid
+
+from tests.support.domains import ros_env
+from tests.support.processes import Process
+from tests.support.ros import Peer, latched
+
+OBSERVATIONS = "/floranova/observations"
+DISCOVERED_TAGS = "/perception/discovered_tags"
+MAP = "/map"
+
+
+def patrol(domain: int, *arguments: str) -> Process:
+    return Process([sys.executable, "-m", "lupin_patrol", *arguments], ros_env(domain))
+
+
+@dataclass
+class Heard:
+    """All that came on the three topics, asked for as the contract has it."""
+
+    observations: list[Any] = field(default_factory=list)
+    discovered_tags: list[Any] = field(default_factory=list)
+    maps: list[Any] = field(default_factory=list)
+
+    def listen(
+        self,
+        peer: Peer,
+        observations: str = OBSERVATIONS,
+        discovered_tags: str = DISCOVERED_TAGS,
+        map_topic: str = MAP,
+    ) -> Heard:
+        for kind, topic, depth, heard in (
+            (Observation, observations, 50, self.observations),
+            (DiscoveredTags, discovered_tags, 50, self.discovered_tags),
+            (OccupancyGrid, map_topic, 1, self.maps),
+        ):
+            peer.node.create_subscription(kind, topic, heard.append, latched(depth))
+        return self
+
+    @property
+    def read_tags(self) -> set[str]:
+        return {
+            o.tag_reading.tag_id
+            for o in self.observations
+            if o.kind == Observation.KIND_TAG_READING and o.status == Observation.STATUS_OK
+        }
+
+    @property
+    def seen_tags(self) -> set[str]:
+        return {o.flower.tag_id for o in self.observations if o.kind == Observation.KIND_FLOWER}
+
+    def map_is_complete(self) -> bool:
+        return bool(self.maps) and not (np.asarray(self.maps[-1].data) == -1).any()
+
+
+def test_one_pass_shows_the_whole_greenhouse_and_ends(domain: int) -> None:
+    tags = GreenhouseSimulator().tag_manager.get_tags()
+    with Peer(domain) as peer:
+        heard = Heard().listen(peer)
+        with patrol(domain, "--once", "--speed", "10") as process:
+            peer.until(heard.map_is_complete, "a complete map")
+            peer.until(lambda: len(heard.discovered_tags[-1].tags) == 29, "29 discovered tags")
+            peer.until(lambda: heard.read_tags == set(tags), "a reading of every tag")
+            peer.until(lambda: heard.seen_tags == set(tags), "a look at every tag")
+            peer.until(lambda: process.exit_code is not None, "the end of the process")
+            assert process.exit_code == 0
+            assert "Traceback" not in process.output
+
+    # Nothing got lost on the way: two observations a tag, and the two that failed at first.
+    assert len(heard.observations) == 2 * 29 + 2
+    for observation in heard.observations:
+        assert observation.header.frame_id == "map"
+        assert observation.header.stamp.sec > 0
+        reading = observation.tag_reading
+        if reading.tag_id and observation.status == Observation.STATUS_OK:
+            assert [r.name for r in reading.readings] == tags[reading.tag_id]["sensors"]
+            assert observation.tag_pose_in_map.position.x == tags[reading.tag_id]["x"]
+            assert reading.stamp == observation.header.stamp
+
+
+def test_who_comes_late_gets_the_latched_map_and_list(domain: int) -> None:
+    with Peer(domain) as early, patrol(domain, "--speed", "30"):
+        first = Heard().listen(early)
+        # The map is published when it grows: once it is complete, never again.
+        early.until(first.map_is_complete, "a complete map")
+        with Peer(domain, "late") as late:
+            second = Heard().listen(late)
+            late.until(second.map_is_complete, "the latched map")
+            assert len(second.maps) == 1
+            late.until(
+                lambda: second.discovered_tags and len(second.discovered_tags[-1].tags) == 29,
+                "the latched list of tags",
+            )
+            # It missed the oldest observations of this pass (the latch holds 50). The next ones
+            # bring every tag.
+            late.until(lambda: len(second.read_tags) == 29, "a reading of every tag")
+
+
+def test_topics_and_frame_are_parameters(domain: int) -> None:
+    parameters = {
+        "observations_topic": "robot/observations",
+        "discovered_tags_topic": "/elsewhere/tags",
+        "map_topic": "/elsewhere/map",
+        "frame_id": "greenhouse",
+    }
+    arguments = [part for name, value in parameters.items() for part in ("-p", f"{name}:={value}")]
+    with Peer(domain) as peer:
+        heard = Heard().listen(peer, "/robot/observations", "/elsewhere/tags", "/elsewhere/map")
+        with patrol(domain, "--speed", "20", "--ros-args", *arguments):
+            peer.until(
+                lambda: heard.observations and heard.discovered_tags and heard.maps, "every topic"
+            )
+    for message in (heard.observations[0], heard.discovered_tags[0], heard.maps[0]):
+        assert message.header.frame_id == "greenhouse"
+
+
+def test_stamps_follow_simulated_time(domain: int) -> None:
+    with Peer(domain) as peer:
+        heard = Heard().listen(peer)
+
+        def heard_simulated_time() -> bool:
+            peer.set_clock(1234.5)  # again and again: /clock is not latched
+            return bool(heard.observations) and heard.observations[-1].header.stamp.sec == 1234
+
+        with patrol(domain, "--speed", "20", "--ros-args", "-p", "use_sim_time:=true"):
+            peer.until(heard_simulated_time, "a stamp in simulated time")
+    assert heard.observations[-1].header.stamp.nanosec == 500_000_000
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_cleanly_even_while_it_waits_for_long(
+    domain: int, number: signal.Signals
+) -> None:
+    with Peer(domain) as peer, patrol(domain, "--speed", "0.1") as process:
+        heard = Heard().listen(peer)
+        peer.until(lambda: heard.maps, "the first look around")
+        assert process.stop(number) == 0
+        assert "Traceback" not in process.output
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_cleanly_while_nobody_listens(domain: int, number: signal.Signals) -> None:
+    with patrol(domain) as process:
+        process.wait_for_output("patrol starts")
+        assert process.stop(number) == 0
+        assert "Traceback" not in process.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["--speed", "0"], "--speed: '0' is out of range, expected a number from 0.1 to 50"),
+        (["--ros-args", "-p", "frame_id:=''"], "parameter frame_id is empty"),
+        (["--ros-args", "-p", "frame_id:=5"], "parameter frame_id"),
+        (["--ros-args", "-p", "map_topic:=a//b"], "parameter map_topic is 'a//b'"),
+        (["--ros-args", "--bogus"], "--bogus"),
+    ],
+)
+def test_a_bad_argument_is_refused_in_one_line(
+    domain: int, arguments: list[str], named: str
+) -> None:
+    with patrol(domain, *arguments) as process:
+        assert process.wait() == 2
+        [line] = process.output.splitlines()
+        assert line.startswith("patrol_node: error: ")
+        assert named in line

@@ -14,10 +14,11 @@ from typing import Any, Generic, Protocol, TypeVar
 
 import rclpy
 from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from lupin_bridge.source import TwinUnavailableError
-from lupin_twin.executor import TwinExecutor
+from lupin_twin.spinning import spin_until_shutdown
 
 log = logging.getLogger(__name__)
 
@@ -30,8 +31,8 @@ class BridgedNode(Protocol):
 
     callback_errors: int
 
-    def report_executor_error(self, what: str, error: Exception) -> None:
-        """Count and log an error that the executor met."""
+    def report(self, what: str, error: Exception) -> None:
+        """Count and log an error that left a callback."""
 
     def destroy_node(self) -> object:
         """Give everything back to rclpy."""
@@ -66,7 +67,7 @@ class RosThread(Generic[NodeT, EventT]):
         self._started: asyncio.Future[None]
         self._thread = threading.Thread(target=self._run, name="ros", daemon=True)
         self._context = Context()
-        self._executor: TwinExecutor | None = None
+        self._executor: SingleThreadedExecutor | None = None
         self._node: NodeT | None = None
         self._newest: EventT | None = None
         self._is_waking = False
@@ -154,11 +155,11 @@ class RosThread(Generic[NodeT, EventT]):
                 signal_handler_options=SignalHandlerOptions.NO,
             )
             self._node = self._make_node(self._context, self._post)
-            executor = TwinExecutor(self._node.report_executor_error, context=self._context)
+            executor = SingleThreadedExecutor(context=self._context)
             executor.add_node(self._node)
             self._executor = executor
             self._to_loop(_settle, self._started, None, None)
-            executor.spin_until_shutdown()
+            spin_until_shutdown(executor, self._node.report)
         except BaseException as caught:  # noqa: BLE001  # no thread dies unseen
             error = caught
         finally:

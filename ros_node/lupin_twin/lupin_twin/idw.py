@@ -187,7 +187,7 @@ def compute_idw_field(
             f"explored_mask is {explored_mask.dtype} of shape {explored_mask.shape}, must be bool "
             f"of shape {(height, width)} (height, width)"
         )
-    x, y, value = _columns(samples)
+    x, y, value = sample_columns(samples)
     max_pairs = min(max(width * height, _MIN_PAIRS), _MAX_PAIRS)
     idw = PairwiseIdw(
         falloff_radius_m=falloff_radius_m,
@@ -227,10 +227,15 @@ def _check_finite(name: str, number: float) -> None:
         raise ValueError(f"{name} is {number}, must be finite")
 
 
-def _columns(
+def sample_columns(
     samples: Sequence[tuple[float, float, float]],
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The samples' x, y and values, each contiguous."""
+    """The samples' x and y (m) and values, as arrays; values past `_LARGEST_VALUE` count as that.
+
+    Raises:
+        ValueError: a sample that is not three finite numbers.
+
+    """
     flat = np.fromiter(chain.from_iterable(samples), dtype=np.float64)
     if flat.size != 3 * len(samples):
         raise ValueError(f"samples hold {flat.size} numbers, must be 3 each of {len(samples)}")

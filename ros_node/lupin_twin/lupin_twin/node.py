@@ -23,16 +23,17 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import InvalidServiceNameException, InvalidTopicNameException
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
 from lupin_twin import convert
-from lupin_twin.executor import TwinExecutor
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.field_cache import FieldCache
 from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused, FieldRules
 from lupin_twin.parameters import ParameterError, TwinParameters, describe
+from lupin_twin.spinning import spin_until_shutdown
 from lupin_twin.state import Rejected, Snapshot, TwinStore
 from lupin_twin.throttle import Throttle
 
@@ -258,7 +259,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         except FieldRefused as error:
             reason = str(error)
         except Exception as error:  # noqa: BLE001  # the caller must not wait for ever
-            self._report("get_field", error)
+            self.report("get_field", error)
             reason = f"the twin failed to compute the field: {error}"
         refusal = convert.refusal()
         refusal.error_message = reason
@@ -320,20 +321,16 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
             try:
                 callback(*args)
             except Exception as error:  # noqa: BLE001  # one bad message must not end the node
-                self._report(what, error)
+                self.report(what, error)
 
         return run
 
-    def _report(self, what: str, error: Exception) -> None:
+    def report(self, what: str, error: Exception) -> None:
         """Count and log an error of a callback, with its trace, throttled."""
         self.callback_errors += 1
         if self._throttle.ask(("error", what), time.monotonic()) is not None:
             trace = "".join(traceback.format_exception(error))
             self.get_logger().error(f"error number {self.callback_errors}, in {what}:\n{trace}")
-
-    def report_executor_error(self, what: str, error: Exception) -> None:
-        """For the executor: what it met outside every callback."""
-        self._report(what, error)
 
 
 @contextmanager
@@ -355,10 +352,10 @@ def main(args: Sequence[str] | None = None) -> int:
         print(f"lupin_twin: {error}", file=sys.stderr)  # noqa: T201  # there is no logger yet
         rclpy.try_shutdown()
         return 2
-    executor = TwinExecutor(node.report_executor_error)
+    executor = SingleThreadedExecutor()
     executor.add_node(node)
     try:
-        executor.spin_until_shutdown()
+        spin_until_shutdown(executor, node.report)
     except KeyboardInterrupt:
         pass
     finally:

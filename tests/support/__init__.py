@@ -1,0 +1,1 @@
+"""What the tests share: ROS domains, processes, a ROS peer, and messages."""

@@ -1,0 +1,52 @@
+"""One ROS domain a test, also when several test runs share the machine."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+# 0 is everybody's default; above 101 the ports of DDS run into those of outgoing connections.
+DOMAINS = range(1, 102)
+
+
+@contextmanager
+def own_domain() -> Iterator[int]:
+    """Lease a ROS_DOMAIN_ID that no other test on this machine has now."""
+    folder = Path(tempfile.gettempdir()) / "lupin-twin-test-domains"
+    folder.mkdir(exist_ok=True)
+    # Where to begin differs by process, so that a domain is not reused right after its last user.
+    offset = os.getpid() * 7 + _leases_so_far()
+    for step in range(len(DOMAINS)):
+        domain = DOMAINS[(offset + step) % len(DOMAINS)]
+        with (folder / str(domain)).open("w") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                continue
+            yield domain
+            return
+    raise RuntimeError("all ROS domains are in use by other tests")
+
+
+_leases = 0
+
+
+def _leases_so_far() -> int:
+    global _leases  # noqa: PLW0603  # a counter of this process
+    _leases += 1
+    return _leases
+
+
+def ros_env(domain: int, **more: str) -> dict[str, str]:
+    """The environment of a process in a ROS domain of this machine alone."""
+    return {
+        **os.environ,
+        "ROS_DOMAIN_ID": str(domain),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_PYTHON_CHECK_FIELDS": "1",
+        **more,
+    }

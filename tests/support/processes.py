@@ -1,0 +1,109 @@
+"""Real processes: started, watched, and ended without a trace."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from tests.support.domains import ros_env
+from tests.support.waiting import PATIENCE_S, wait_for
+
+
+class Process:
+    """A process with its output in a file; killed with all its children at the end of `with`."""
+
+    def __init__(self, command: Sequence[str], env: Mapping[str, str]) -> None:
+        self._output = tempfile.NamedTemporaryFile("w+", suffix=".log", delete=False)  # noqa: SIM115
+        self._process = subprocess.Popen(
+            command,
+            env=dict(env),
+            stdin=subprocess.DEVNULL,
+            stdout=self._output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        _type: type[BaseException] | None,
+        error: BaseException | None,
+        _trace: TracebackType | None,
+    ) -> None:
+        self.kill()
+        if error is not None:
+            print(f"--- output of {self._process.args!r}\n{self.output}")
+        self._output.close()
+        Path(self._output.name).unlink()
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    @property
+    def output(self) -> str:
+        """All that it has printed so far, both streams."""
+        return Path(self._output.name).read_text(encoding="utf-8", errors="replace")
+
+    @property
+    def exit_code(self) -> int | None:
+        return self._process.poll()
+
+    def wait_for_output(self, text: str, timeout_s: float = PATIENCE_S) -> str:
+        """Wait until it has printed `text`; returns the line that holds it."""
+
+        def look() -> str | None:
+            for line in self.output.splitlines():
+                if text in line:
+                    return line
+            if self.exit_code is not None:
+                raise AssertionError(f"ended with {self.exit_code} before {text!r}:\n{self.output}")
+            return None
+
+        return str(wait_for(look, f"{text!r} in the output", timeout_s))
+
+    def send(self, number: signal.Signals) -> None:
+        """Send a signal to the process alone."""
+        self._process.send_signal(number)
+
+    def wait(self, timeout_s: float = PATIENCE_S) -> int:
+        """Wait for its end and return the exit code."""
+        return self._process.wait(timeout_s)
+
+    def stop(self, number: signal.Signals = signal.SIGINT, timeout_s: float = PATIENCE_S) -> int:
+        """Signal it and wait for its end; returns the exit code."""
+        self.send(number)
+        return self.wait(timeout_s)
+
+    def kill(self) -> None:
+        """Kill it and all that it started."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+
+
+def twin_node(domain: int, *ros_args: str) -> Process:
+    """The twin alone, as the executable `twin_node`."""
+    command = [sys.executable, "-m", "lupin_twin.node", *ros_args]
+    return Process(command, ros_env(domain))
+
+
+def lupin_twin(domain: int, role: str, *args: str, **env: str) -> Process:
+    """`lupin-twin ROLE` on a free port; ask `url_of` for its address."""
+    command = [sys.executable, "-m", "lupin_bridge.cli", role, "--port", "0", *args]
+    return Process(command, ros_env(domain, **env))
+
+
+def url_of(process: Process) -> str:
+    """The address that a `lupin-twin` process announces once it serves."""
+    return process.wait_for_output("lupin-twin: http").partition(": ")[2].strip()

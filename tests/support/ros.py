@@ -1,0 +1,147 @@
+"""The other side of the topics: a ROS node of the test's own, in the test's own process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, Self, TypeVar
+
+import rclpy
+from lupin_msgs.msg import DiscoveredTags, Observation, TwinState
+from lupin_msgs.srv import GetField
+from nav_msgs.msg import OccupancyGrid
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+
+from tests.support.waiting import PATIENCE_S, wait_for
+
+T = TypeVar("T")
+
+
+def latched(depth: int) -> QoSProfile:
+    """Written out here once more: the tests hold the node to the contract, not to its own code."""
+    return QoSProfile(
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    )
+
+
+class Peer:
+    """A node that publishes what a robot would and listens to the twin."""
+
+    def __init__(self, domain: int, name: str = "peer") -> None:
+        self._context = Context()
+        rclpy.init(args=[], context=self._context, domain_id=domain)
+        self.node = rclpy.create_node(name, context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._publishers: dict[str, Any] = {}
+        self.states: list[Any] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        _type: type[BaseException] | None,
+        _error: BaseException | None,
+        _trace: TracebackType | None,
+    ) -> None:
+        self._executor.shutdown(timeout_sec=2)
+        self.node.destroy_node()
+        rclpy.try_shutdown(context=self._context)
+
+    # --- publishing -------------------------------------------------------------------------
+
+    def publish(self, topic: str, message: Any, depth: int = 50) -> Any:
+        """Publish latched, without waiting for anybody; returns the publisher."""
+        publisher = self.publisher(topic, type(message), depth)
+        publisher.publish(message)
+        return publisher
+
+    def publisher(self, topic: str, message_type: Any, depth: int = 50) -> Any:
+        """The latched publisher on a topic, made at the first call."""
+        if topic not in self._publishers:
+            self._publishers[topic] = self.node.create_publisher(
+                message_type, topic, latched(depth)
+            )
+        return self._publishers[topic]
+
+    def observe(self, *messages: Any) -> None:
+        """Publish observations."""
+        for message in messages:
+            self.publish("/floranova/observations", message)
+
+    def discover(self, message: Any) -> None:
+        """Publish discovered tags."""
+        self.publish("/perception/discovered_tags", message)
+
+    def publish_map(self, message: Any) -> None:
+        """Publish an occupancy grid."""
+        self.publish("/map", message, depth=1)
+
+    def set_clock(self, seconds: float) -> None:
+        """Publish simulated time until a state carries it: `/clock` is not latched."""
+        clock = Clock()
+        clock.clock.sec = int(seconds)
+        clock.clock.nanosec = int((seconds % 1) * 1e9)
+
+        def tick() -> Any:
+            self.publish("/clock", clock, depth=1)
+            return self._newest(lambda state: state.header.stamp == clock.clock)
+
+        if not self.states:
+            self.listen()
+        self.until(tick, f"a state at {seconds} s")
+
+    # --- listening --------------------------------------------------------------------------
+
+    def listen(self, durability: DurabilityPolicy = DurabilityPolicy.TRANSIENT_LOCAL) -> None:
+        """Subscribe to `/twin/state`; what comes is appended to `states`."""
+        qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=durability)
+        self.node.create_subscription(TwinState, "/twin/state", self.states.append, qos)
+
+    def until(self, look: Callable[[], T], what: str, timeout_s: float = PATIENCE_S) -> T:
+        """Spin until `look` gives something true, and return that."""
+        return wait_for(look, what, timeout_s, meanwhile=self.spin_briefly)
+
+    def spin_briefly(self) -> None:
+        """Handle what is there, or wait a moment for it."""
+        self._executor.spin_once(timeout_sec=0.05)
+
+    def wait_for_twin(self) -> None:
+        """Wait until a twin listens to the three topics, so that a volatile message is not lost."""
+        for topic in ("/floranova/observations", "/perception/discovered_tags", "/map"):
+            self.until(lambda topic=topic: self.node.count_subscribers(topic), f"a twin on {topic}")  # type: ignore[misc]
+
+    def state(self, accept: Callable[[Any], bool], what: str) -> Any:
+        """The first state that `accept` takes, from now on (the newest one included)."""
+        if not self.states:
+            self.listen()
+        return self.until(lambda: self._newest(accept), what)
+
+    def _newest(self, accept: Callable[[Any], bool]) -> Any:
+        return self.states[-1] if self.states and accept(self.states[-1]) else None
+
+    def tag(self, tag_id: str, accept: Callable[[Any], bool] = lambda _: True) -> Any:
+        """The tag in the first state in which it is there and `accept` takes it."""
+        state = self.state(
+            lambda state: any(t.tag_id == tag_id and accept(t) for t in state.tags),
+            f"tag {tag_id} as expected",
+        )
+        return next(tag for tag in state.tags if tag.tag_id == tag_id)
+
+    def get_field(self, **request: Any) -> Any:
+        """Call `/twin/get_field` and return the response."""
+        client = self.node.create_client(GetField, "/twin/get_field")
+        self.until(client.service_is_ready, "the service /twin/get_field")
+        future = client.call_async(GetField.Request(**request))
+        self.until(future.done, "an answer of /twin/get_field")
+        self.node.destroy_client(client)
+        return future.result()
+
+
+__all__ = ["DiscoveredTags", "Observation", "OccupancyGrid", "Peer", "latched"]

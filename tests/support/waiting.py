@@ -1,0 +1,39 @@
+"""Waiting on conditions; the only place in the tests that passes time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+T = TypeVar("T")
+
+# Discovery takes up to 3 s on an idle machine; a busy one with two test processes takes longer.
+PATIENCE_S = 20.0
+_PAUSE_S = 0.01
+
+
+def wait_for(
+    look: Callable[[], T],
+    what: str,
+    timeout_s: float = PATIENCE_S,
+    meanwhile: Callable[[], object] | None = None,
+) -> T:
+    """Call `look` until it gives something true, and return that.
+
+    `meanwhile` is called between two looks (spin a node, say); without it a short pause is made.
+
+    Raises:
+        AssertionError: nothing true within `timeout_s`; names what was waited for.
+    """
+    deadline = time.monotonic() + timeout_s
+    while True:
+        found = look()
+        if found:
+            return found
+        if time.monotonic() > deadline:
+            raise AssertionError(f"waited {timeout_s:g} s in vain for {what}; last: {found!r}")
+        if meanwhile is None:
+            time.sleep(_PAUSE_S)
+        else:
+            meanwhile()

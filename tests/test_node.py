@@ -1,0 +1,459 @@
+"""The node over real DDS: every test talks to a twin in a process of its own."""
+
+from __future__ import annotations
+
+import math
+import signal
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from lupin_msgs.msg import Observation
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import serialize_message
+
+from tests.support import messages
+from tests.support.domains import own_domain
+from tests.support.messages import discovered, look, occupancy_grid, scan
+from tests.support.processes import Process, twin_node
+from tests.support.ros import Peer
+
+FAST = ("--ros-args", "-p", "state_publish_rate_hz:=20.0")
+
+
+class Twin:
+    """A twin in a process, and a peer that knows it is heard."""
+
+    def __init__(self, process: Process, peer: Peer) -> None:
+        self.process, self.peer = process, peer
+
+    def warning(self, *words: str) -> str:
+        """Wait for a warning that holds all of the words."""
+
+        def look_for() -> str | None:
+            lines = self.process.output.splitlines()
+            return next((x for x in lines if "WARN" in x and all(w in x for w in words)), None)
+
+        return str(self.peer.until(look_for, f"a warning with {words}"))
+
+    def settled(self, tag_id: str = "marker") -> Any:
+        """Send one good observation and wait for it: all that was sent before is handled then."""
+        self.peer.observe(scan(tag_id, {"temperature": 1.0}))
+        return self.peer.tag(tag_id)
+
+    def tags(self) -> dict[str, Any]:
+        return {tag.tag_id: tag for tag in self.peer.states[-1].tags}
+
+
+def _twin(*ros_args: str) -> Iterator[Twin]:
+    with (
+        own_domain() as domain,
+        twin_node(domain, *ros_args) as process,
+        Peer(domain) as peer,
+    ):
+        peer.wait_for_twin()
+        yield Twin(process, peer)
+
+
+@pytest.fixture(scope="module")
+def shared() -> Iterator[Twin]:
+    """One twin for many tests, each with tags of its own."""
+    yield from _twin(*FAST)
+
+
+@pytest.fixture
+def twin() -> Iterator[Twin]:
+    """A twin of the test's own."""
+    yield from _twin(*FAST)
+
+
+# --- the state ----------------------------------------------------------------------------------
+
+
+def test_a_twin_alone_publishes_an_empty_state_at_once(domain: int) -> None:
+    with twin_node(domain, "--ros-args", "-p", "state_publish_rate_hz:=0.01"), Peer(domain) as peer:
+        state = peer.state(lambda _: True, "a state")
+    assert list(state.tags) == []
+    assert state.header.frame_id == "map"
+    assert state.header.stamp.sec > 0
+
+
+def test_late_joiner_gets_the_latched_state_and_a_volatile_one_waits_for_the_next(
+    domain: int,
+) -> None:
+    rate = ("--ros-args", "-p", "state_publish_rate_hz:=0.2")
+    with twin_node(domain, *rate), Peer(domain, "first") as first:
+        first.state(lambda _: True, "the first state")
+        with Peer(domain, "late") as late:
+            joined_ns = late.node.get_clock().now().nanoseconds
+            volatile: list[Any] = []
+            late.node.create_subscription(
+                type(first.states[0]),
+                "/twin/state",
+                volatile.append,
+                QoSProfile(
+                    depth=1,
+                    reliability=ReliabilityPolicy.RELIABLE,
+                    durability=DurabilityPolicy.VOLATILE,
+                ),
+            )
+            latched_state = late.state(lambda _: True, "the latched state")
+            late.until(lambda: volatile, "the next state, for the volatile one")
+    assert stamp_ns(latched_state) < joined_ns
+    assert stamp_ns(volatile[0]) > joined_ns
+
+
+def stamp_ns(state: Any) -> int:
+    return int(state.header.stamp.sec * 1_000_000_000 + state.header.stamp.nanosec)
+
+
+def test_fifty_observations_latched_before_the_twin_started_are_all_heard(domain: int) -> None:
+    with Peer(domain) as producer:
+        producer.observe(*(scan(f"t{i}", {"co2": 400.0 + i}, at=(i, 0)) for i in range(50)))
+        with twin_node(domain, *FAST):
+            state = producer.state(lambda s: len(s.tags) == 50, "all 50 tags")
+    assert [tag.tag_id for tag in state.tags] == [f"t{i}" for i in range(50)]
+    assert [tag.readings[0].value for tag in state.tags] == [400.0 + i for i in range(50)]
+
+
+def test_sigint_and_sigterm_end_the_node_at_once_and_quietly(domain: int) -> None:
+    for number in (signal.SIGINT, signal.SIGTERM):
+        with twin_node(domain, *FAST) as process, Peer(domain) as peer:
+            peer.state(lambda _: True, "a state")
+            assert process.stop(number, timeout_s=2.0) == 0
+            assert "Traceback" not in process.output
+
+
+# --- ingestion, rule by rule --------------------------------------------------------------------
+
+
+def test_a_scan_brings_readings_time_and_pose(shared: Twin) -> None:
+    shared.peer.observe(scan("a1", {"temperature": 21.5, "humidity": 60.0}, at=(1.0, 2.0)))
+    tag = shared.peer.tag("a1")
+    assert {r.name: r.value for r in tag.readings} == {"temperature": 21.5, "humidity": 60.0}
+    assert (tag.pose.position.x, tag.pose.position.y, tag.pose.orientation.w) == (1.0, 2.0, 1.0)
+    assert tag.last_observed.sec > 0
+    assert 0.0 <= tag.stale_seconds < 60.0
+
+
+def test_readings_are_latest_per_sensor(shared: Twin) -> None:
+    shared.peer.observe(
+        scan("a2", {"temperature": 20.0, "co2": 500.0}), scan("a2", {"temperature": 22.0})
+    )
+    tag = shared.peer.tag("a2", lambda t: t.readings[0].value == 22.0)
+    assert {r.name: r.value for r in tag.readings} == {"temperature": 22.0, "co2": 500.0}
+
+
+def test_a_later_pose_never_moves_a_pin(shared: Twin) -> None:
+    shared.peer.observe(
+        scan("a3", {"co2": 1.0}, at=(1, 1)),
+        scan("a3", {"co2": 2.0}, at=(9, 9)),
+        look("a3", species="rose", at=(8, 8)),
+    )
+    shared.peer.discover(discovered({"a3": messages.pose(7, 7), "a3-seen": messages.pose(1, 1)}))
+    shared.peer.tag("a3-seen")
+    tag = shared.peer.tag("a3", lambda t: t.species == "rose")
+    assert (tag.pose.position.x, tag.pose.position.y) == (1.0, 1.0)
+
+
+def test_discovery_before_scan_pins_and_the_scan_does_not_move_it(shared: Twin) -> None:
+    shared.peer.discover(discovered({"a4": messages.pose(3, 4)}))
+    tag = shared.peer.tag("a4")
+    assert (list(tag.readings), tag.species, tag.last_observed.sec) == ([], "", 0)
+    assert math.isinf(tag.stale_seconds)
+    shared.peer.observe(scan("a4", {"co2": 1.0}, at=(5, 5)))
+    tag = shared.peer.tag("a4", lambda t: len(t.readings) == 1)
+    assert (tag.pose.position.x, tag.pose.position.y) == (3.0, 4.0)
+
+
+def test_scan_before_discovery_keeps_the_scans_pose_or_takes_the_discoverys(shared: Twin) -> None:
+    shared.peer.observe(scan("a5", {"co2": 1.0}, at=(1, 2)), scan("a6", {"co2": 2.0}))
+    assert shared.peer.tag("a6").pose.orientation.w == 0.0
+    shared.peer.discover(discovered({"a5": messages.pose(3, 3), "a6": messages.pose(4, 4)}))
+    tag = shared.peer.tag("a6", lambda t: t.pose.orientation.w != 0.0)
+    assert (tag.pose.position.x, tag.readings[0].value) == (4.0, 2.0)
+    assert shared.peer.tag("a5").pose.position.x == 1.0
+
+
+def test_a_flower_before_both_pins_a_tag_that_nothing_pinned(shared: Twin) -> None:
+    shared.peer.observe(look("a7", at=(2, 3)))
+    shared.peer.tag("a7", lambda t: t.pose.orientation.w == 1.0)
+    shared.peer.discover(discovered({"a7": messages.pose(7, 7)}))
+    shared.peer.observe(scan("a7", {"co2": 1.0}, at=(8, 8)))
+    tag = shared.peer.tag("a7", lambda t: len(t.readings) == 1)
+    assert (tag.pose.position.x, tag.pose.position.y) == (2.0, 3.0)
+
+
+@pytest.mark.parametrize(
+    "status",
+    [
+        Observation.STATUS_UNREACHABLE,
+        Observation.STATUS_SCAN_FAILED,
+        Observation.STATUS_SKIPPED,
+        77,
+    ],
+)
+def test_a_failed_scan_is_listed_without_a_pose(shared: Twin, status: int) -> None:
+    shared.peer.observe(scan(f"b{status}", {}, at=(1, 1), status=status))
+    tag = shared.peer.tag(f"b{status}")
+    assert tag.pose.orientation.w == 0.0
+    assert tag.last_observed.sec > 0
+
+
+@pytest.mark.parametrize("broken", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("path", ["scan", "flower", "discovery"])
+def test_a_pose_that_is_not_finite_is_no_pose(shared: Twin, path: str, broken: float) -> None:
+    tag_id = f"c-{path}-{broken}"
+    if path == "scan":
+        shared.peer.observe(scan(tag_id, {"co2": 1.0}, at=(broken, 1.0)))
+    elif path == "flower":
+        shared.peer.observe(look(tag_id, at=(1.0, broken)))
+    else:
+        shared.peer.discover(discovered({tag_id: messages.pose(1.0, 1.0, broken)}))
+        shared.peer.observe(scan(tag_id))
+    assert shared.peer.tag(tag_id).pose.orientation.w == 0.0
+
+
+def test_w_zero_is_no_pose_in_a_scan_and_taken_as_one_in_a_discovery(shared: Twin) -> None:
+    shared.peer.observe(scan("c1", {"co2": 1.0}))
+    assert shared.peer.tag("c1").pose.orientation.w == 0.0
+    shared.peer.discover(discovered({"c1": messages.pose(2.0, 2.0, w=0.0)}))
+    tag = shared.peer.tag("c1", lambda t: t.pose.orientation.w != 0.0)
+    assert (tag.pose.position.x, tag.pose.orientation.w) == (2.0, 1.0)
+
+
+def test_flower_results_are_latest_wins_and_a_clean_look_clears_a_pest(shared: Twin) -> None:
+    shared.peer.observe(
+        scan("d1", {"co2": 420.0}),
+        look("d1", "rose", anomaly=True, bug_count=3, flower_count=2, blooms=[(1, 1), (2, 2)]),
+    )
+    tag = shared.peer.tag("d1", lambda t: t.anomaly)
+    assert (tag.bug_count, tag.flower_count, len(tag.flowers)) == (3, 2, 2)
+    shared.peer.observe(look("d1", "lupin", footprint=[(0, 0), (1, 0), (1, 1)]))
+    tag = shared.peer.tag("d1", lambda t: not t.anomaly)
+    assert (tag.species, tag.bug_count, tag.flower_count, len(tag.flowers)) == ("lupin", 0, 0, 0)
+    assert len(tag.box_footprint.points) == 3
+    assert tag.readings[0].value == 420.0
+
+
+def test_a_failed_look_is_listed_and_clears_nothing(shared: Twin) -> None:
+    shared.peer.observe(look("d2", "rose", anomaly=True))
+    shared.peer.tag("d2", lambda t: t.anomaly)
+    shared.peer.observe(
+        look("d2", "", status=Observation.STATUS_SCAN_FAILED),
+        look("d3", "", at=(1, 1), status=Observation.STATUS_UNREACHABLE),
+    )
+    assert shared.peer.tag("d3").pose.orientation.w == 0.0
+    assert shared.peer.tag("d2").anomaly
+
+
+def test_counts_at_the_messages_range_stay_there(shared: Twin) -> None:
+    shared.peer.observe(look("d4", flower_count=65_535, bug_count=65_535))
+    tag = shared.peer.tag("d4")
+    assert (tag.flower_count, tag.bug_count) == (65_535, 65_535)
+
+
+def test_an_empty_frame_counts_as_the_expected_one(shared: Twin) -> None:
+    shared.peer.observe(scan("e1", {"co2": 1.0}, at=(1, 1), frame_id=""))
+    assert shared.peer.tag("e1").pose.position.x == 1.0
+
+
+def test_the_flower_poses_own_frame_comes_before_the_observations(shared: Twin) -> None:
+    shared.peer.observe(
+        look("e2", frame_id="odom", pose_frame_id="map"),
+        look("e3", frame_id="", pose_frame_id=""),
+    )
+    shared.peer.tag("e2")
+    shared.peer.tag("e3")
+
+
+# --- what is dropped, and how loudly ------------------------------------------------------------
+
+
+def test_a_wrong_frame_is_dropped_on_each_path_and_names_both_frames(twin: Twin) -> None:
+    twin.peer.observe(
+        scan("scan", {"co2": 1.0}, at=(1, 1), frame_id="odom"),
+        look("flower-own", frame_id="map", pose_frame_id="camera"),
+        look("flower-header", frame_id="base_link"),
+    )
+    twin.peer.discover(discovered({"discovery": messages.pose(1, 1)}, frame_id="laser"))
+    twin.peer.publish_map(occupancy_grid([[0]], frame_id="other_map"))
+    twin.warning("/floranova/observations", "'odom'", "'map'")
+    twin.warning("/perception/discovered_tags", "'laser'", "'map'")
+    twin.warning("/map", "'other_map'", "'map'")
+    twin.settled()
+    assert set(twin.tags()) == {"marker"}
+
+
+def test_an_anomaly_and_an_unknown_kind_are_dropped_with_a_throttled_warning(twin: Twin) -> None:
+    anomaly, unknown = scan("x", {"co2": 1.0}), scan("y", {"co2": 1.0})
+    anomaly.kind, unknown.kind = Observation.KIND_ANOMALY, 9
+    # Kind comes before frame: a wrong frame in an anomaly is not what the warning is about.
+    anomaly.header.frame_id = "odom"
+    twin.peer.observe(*[anomaly] * 10, *[unknown] * 10)
+    twin.warning("KIND_ANOMALY")
+    twin.warning("kind 9")
+    twin.settled()
+    assert set(twin.tags()) == {"marker"}
+    assert twin.process.output.count("KIND_ANOMALY") == 1
+    assert twin.process.output.count("kind 9") == 1
+    assert "odom" not in twin.process.output
+
+
+def test_an_empty_tag_id_is_dropped_on_each_path(twin: Twin) -> None:
+    twin.peer.observe(scan("", {"co2": 1.0}), look(""))
+    twin.peer.discover(discovered({"": messages.pose(1, 1), "good": messages.pose(2, 2)}))
+    twin.peer.tag("good")
+    twin.settled()
+    assert set(twin.tags()) == {"good", "marker"}
+    twin.warning("tag_id is empty")
+
+
+def test_a_message_cut_short_or_too_large_is_dropped_and_the_node_lives(twin: Twin) -> None:
+    data = bytes(serialize_message(scan("broken", {"co2": 1.0})))
+    publisher = twin.peer.publisher("/floranova/observations", Observation)
+    publisher.publish(data[:40])
+    twin.warning("unreadable")
+    publisher.publish(scan("large", {f"sensor{i}": 1.0 for i in range(50_000)}))
+    twin.warning("bytes", "limit is 1000000")
+    twin.settled()
+    assert set(twin.tags()) == {"marker"}
+
+
+def test_a_tag_past_its_bounds_is_refused_with_the_value_and_the_limit(twin: Twin) -> None:
+    twin.peer.observe(scan("many", {f"sensor{i}": 1.0 for i in range(65)}))
+    twin.warning("65", "limit is 64")
+    twin.peer.observe(scan("t" * 300, {"co2": 1.0}))
+    twin.settled()
+    assert set(twin.tags()) == {"marker"}
+
+
+def test_a_malformed_map_is_refused_and_the_last_good_one_stays(domain: int) -> None:
+    clip = ("--ros-args", "-p", "clip_to_explored:=true", "-p", "state_publish_rate_hz:=20.0")
+    with twin_node(domain, *clip) as process, Peer(domain) as peer:
+        peer.wait_for_twin()
+        twin = Twin(process, peer)
+        peer.observe(scan("1", {"co2": 500.0}, at=(0.5, 0.5)))
+        peer.publish_map(occupancy_grid([[0, -1]]))
+        peer.until(lambda: known_cells(peer) == [True, False], "the clipped field")
+        broken = occupancy_grid([[0, 0]])
+        broken.info.width = 7
+        peer.publish_map(broken)
+        twin.warning("map data holds 2 cells", "the last one stays")
+        assert known_cells(peer) == [True, False]
+        peer.publish_map(occupancy_grid([[-1, 0]]))
+        peer.until(lambda: known_cells(peer) == [False, True], "the field of the next map")
+
+
+def known_cells(peer: Peer) -> list[bool]:
+    response = peer.get_field(sensor_type="co2", resolution=1.0, bbox_max_x=2.0, bbox_max_y=1.0)
+    return [not math.isnan(value) for value in response.values]
+
+
+# --- the field ----------------------------------------------------------------------------------
+
+
+def test_get_field_over_the_service(twin: Twin) -> None:
+    twin.peer.observe(
+        scan("1", {"temperature": 20.0}, at=(0.5, 0.5)),
+        scan("2", {"temperature": math.nan, "co2": math.inf}, at=(1.5, 0.5)),
+        scan("3", {"temperature": 30.0}),
+    )
+    twin.peer.tag("3")
+    response = twin.peer.get_field(
+        sensor_type="temperature", resolution=1.0, bbox_max_x=4.0, bbox_max_y=1.0
+    )
+    assert (response.ok, response.error_message) == (True, "")
+    assert (response.width, response.height, response.sample_count) == (4, 1, 1)
+    assert list(response.values[:2]) == [20.0, 20.0]
+    assert all(math.isnan(value) for value in response.values[2:])
+    assert (response.value_min, response.value_max, response.resolution_used) == (20.0, 20.0, 1.0)
+    readings = {r.name: r.value for r in twin.peer.tag("2").readings}
+    assert math.isnan(readings["temperature"])
+    assert math.isinf(readings["co2"])
+
+
+def test_a_pin_by_discovery_alone_enters_the_next_field(twin: Twin) -> None:
+    box = {"sensor_type": "co2", "resolution": 1.0, "bbox_max_x": 1.0, "bbox_max_y": 1.0}
+    twin.peer.observe(scan("1", {"co2": 400.0}))
+    twin.peer.tag("1")
+    assert twin.peer.get_field(**box).sample_count == 0
+    twin.peer.discover(discovered({"1": messages.pose(0.5, 0.5)}))
+    twin.peer.tag("1", lambda t: t.pose.orientation.w != 0.0)
+    assert list(twin.peer.get_field(**box).values) == [400.0]
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"sensor_type": ""}, "sensor_type"),
+        ({"resolution": 0.0}, "resolution"),
+        ({"resolution": -1.0}, "resolution"),
+        ({"resolution": math.nan}, "resolution"),
+        ({"bbox_min_x": math.inf}, "bbox_min_x"),
+        ({"bbox_max_y": math.nan}, "bbox_max_y"),
+        ({"bbox_min_x": 2.0}, "bbox_m"),
+        ({"bbox_min_y": 2.0}, "bbox_m"),
+        ({"resolution": 1e-9, "bbox_max_x": 1000.0, "bbox_max_y": 1000.0}, "1000000"),
+    ],
+)
+def test_a_bad_request_is_refused_with_everything_else_zeroed(
+    shared: Twin, change: dict[str, Any], named: str
+) -> None:
+    request = {"sensor_type": "co2", "resolution": 0.5, "bbox_max_x": 1.0, "bbox_max_y": 1.0}
+    response = shared.peer.get_field(**(request | change))
+    assert not response.ok
+    assert named in response.error_message
+    rest = {
+        name: getattr(response, name)
+        for name in response.get_fields_and_field_types()
+        if name not in ("ok", "error_message", "values")
+    }
+    assert rest == dict.fromkeys(rest, 0)
+    assert len(response.values) == 0
+
+
+# --- time ---------------------------------------------------------------------------------------
+
+
+def test_stamps_and_staleness_follow_the_simulated_clock(domain: int) -> None:
+    with twin_node(domain, *FAST, "-p", "use_sim_time:=true"), Peer(domain) as peer:
+        peer.wait_for_twin()
+        peer.set_clock(100.0)
+        peer.observe(scan("now", {"co2": 1.0}), scan("before", {"co2": 1.0}, stamp_s=60.0))
+        tag = peer.tag("now")
+        assert (tag.last_observed.sec, tag.stale_seconds) == (100, 0.0)
+        assert peer.tag("before").stale_seconds == 40.0
+        peer.set_clock(130.5)
+        assert peer.tag("now", lambda t: t.stale_seconds > 0.0).stale_seconds == 30.5
+        peer.set_clock(50.0)
+        assert [tag.stale_seconds for tag in peer.states[-1].tags] == [0.0, 0.0]
+
+
+# --- parameters ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value"),
+    [
+        ("idw_power", "-1.0"),
+        ("state_publish_rate_hz", "0.0"),
+        ("buffer_len", "0"),
+        ("max_grid_cells", "true"),
+        ("frame_id", "''"),
+        ("observations_topic", "'not a topic'"),
+    ],
+)
+def test_a_parameter_out_of_its_range_stops_the_node_and_is_named(
+    domain: int, parameter: str, value: str
+) -> None:
+    with twin_node(domain, "--ros-args", "-p", f"{parameter}:={value}") as process:
+        assert process.wait() == 2
+        assert f"parameter {parameter} is" in process.output
+        assert "Traceback" not in process.output
+
+
+def test_the_shipped_parameter_file_starts_the_node(domain: int) -> None:
+    file = "ros_node/lupin_twin/config/twin.yaml"
+    with twin_node(domain, "--ros-args", "--params-file", file), Peer(domain) as peer:
+        peer.state(lambda _: True, "a state")

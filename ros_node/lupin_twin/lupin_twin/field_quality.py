@@ -78,7 +78,7 @@ def leave_one_out(
         falloff_radius_m=falloff_radius_m,
         max_distance_m=max_distance_m,
         power=power,
-        max_pairs=max(_MAX_PAIRS, len(samples)),
+        max_pairs=_MAX_PAIRS,
     )
     predicted = _predictions(x, y, measured, idw)
     judged = np.flatnonzero(~np.isnan(predicted))
@@ -121,8 +121,8 @@ def _predictions(x: FloatArray, y: FloatArray, value: FloatArray, idw: PairwiseI
             part, near = parts.pop()
             gap = _gap_squares(x[part], x[near]) + _gap_squares(y[part], y[near])
             near = near[gap <= idw.reach_square]
-            if part.size * near.size <= _MAX_PAIRS or part.size == 1:
-                predicted[part] = _predict_part(part, near, x, y, value, idw)
+            if idw.fits(near.size, part.size):
+                predicted[part] = _predict_part(part, near, (x, y, value), idw)
                 continue
             along = x[part] if np.ptp(x[part]) > np.ptp(y[part]) else y[part]
             order = part[np.argsort(along, kind="stable")]
@@ -134,15 +134,16 @@ def _predictions(x: FloatArray, y: FloatArray, value: FloatArray, idw: PairwiseI
 def _predict_part(
     part: IndexArray,
     near: IndexArray,
-    x: FloatArray,
-    y: FloatArray,
-    value: FloatArray,
+    samples: tuple[FloatArray, FloatArray, FloatArray],
     idw: PairwiseIdw,
 ) -> FloatArray:
+    x, y, value = samples
     square = idw.squares(near.size, part.size)
-    dx = x[near][:, None] - x[part]
-    dy = y[near][:, None] - y[part]
-    np.add(dx * dx, dy * dy, out=square)
+    gap = x[near][:, None] - x[part]
+    np.square(gap, out=square)
+    np.subtract(y[near][:, None], y[part], out=gap)
+    np.square(gap, out=gap)
+    np.add(square, gap, out=square)
     # A sample has no say about itself. `near` is in recorded order and holds all of `part`.
     square[np.searchsorted(near, part), np.arange(part.size)] = np.inf
     return idw.evaluate(square, value[near])

@@ -43,6 +43,9 @@ COINCIDENT_EPS_M: Final = 1e-3
 # second-level cache, and the numpy calls on them cost several times their own overhead.
 _MAX_PAIRS: Final = 40_960
 _MIN_PAIRS: Final = 2_048
+# With fewer points than this to a sample, numpy's loops are all overhead; only where more than a
+# thousand samples reach one part does it take memory past _MAX_PAIRS.
+_MIN_POINTS: Final = 32
 _MAX_PIECES: Final = 8
 
 # 1/d² is used as it is up to here; past it (and for any power but 2) the weights are scaled by
@@ -61,6 +64,24 @@ _FLOAT64_NOISE_ULPS: Final = 4
 FloatArray = npt.NDArray[np.float64]
 IndexArray = npt.NDArray[np.intp]
 BoolArray = npt.NDArray[np.bool_]
+
+
+def _largest_square_within(radius: float) -> float:
+    """The largest float64 whose square root is not greater than `radius`.
+
+    `sqrt(square) <= radius` and `square <= _largest_square_within(radius)` are the same then, to
+    the bit, and the root need not be taken for every pair.
+    """
+    square = min(radius * radius, sys.float_info.max)
+    while math.sqrt(square) > radius:
+        square = math.nextafter(square, 0.0)
+    while math.sqrt(following := math.nextafter(square, math.inf)) <= radius:
+        square = following
+    return square
+
+
+# The largest squared distance that is closer than COINCIDENT_EPS_M, which itself is not.
+_COINCIDENT_SQUARE: Final = _largest_square_within(math.nextafter(COINCIDENT_EPS_M, 0.0))
 
 
 class FieldSample(NamedTuple):
@@ -173,7 +194,7 @@ def compute_idw_field(
 
     `samples` are (x, y, value) in the order they were recorded; `FieldSample` is one. No samples
     make a field without a value, which is no error. `explored_mask` has the grid's shape,
-    (height, width). Memory beyond the grid's own is a few arrays of `_MAX_PAIRS` and the samples.
+    (height, width).
 
     Raises:
         ValueError: an argument out of its range, named with its value and the limit.
@@ -188,12 +209,11 @@ def compute_idw_field(
             f"of shape {(height, width)} (height, width)"
         )
     x, y, value = sample_columns(samples)
-    max_pairs = min(max(width * height, _MIN_PAIRS), _MAX_PAIRS)
     idw = PairwiseIdw(
         falloff_radius_m=falloff_radius_m,
         max_distance_m=max_distance_m,
         power=power,
-        max_pairs=max(max_pairs, value.size),
+        max_pairs=min(max(width * height, _MIN_PAIRS), _MAX_PAIRS),
     )
     values = np.full((height, width), np.nan, dtype=np.float32)
     painter = _Painter(
@@ -206,7 +226,7 @@ def compute_idw_field(
         values=values,
     )
     with np.errstate(all="ignore"):
-        painter.paint(max_pairs)
+        painter.paint()
         value_min, value_max = _finite_range(values)
     values.setflags(write=False)
     return FieldGrid(
@@ -282,19 +302,32 @@ class PairwiseIdw:
             if number < 0.0:
                 raise ValueError(f"{name} is {number}, must not be less than 0")
         self.power = power
+        self.falloff_radius = falloff_radius_m
         self.max_distance = max_distance_m
         self.falloff_square = _largest_square_within(falloff_radius_m)
         self.max_square = _largest_square_within(max_distance_m)
         self.reach_square = max(self.falloff_square, self.max_square)
+        self._equal_radii = falloff_radius_m == max_distance_m
         self._plain_weights = power == 2.0 and falloff_radius_m <= _MAX_PLAIN_REACH_M
+        self.max_pairs = max_pairs
+        self._allocate(max_pairs)
+
+    def _allocate(self, pairs: int) -> None:
         # In one block: the allocator gives it back to the next field instead of to the system,
         # and a fifth of a small field's time, page faults, is saved.
-        self._square, self._weight = np.empty((2, max_pairs))
-        self._within = np.empty(max_pairs, dtype=np.bool_)
+        self._square, self._weight = np.empty((2, pairs))
+        self._within = np.empty(pairs, dtype=np.bool_)
+
+    def fits(self, samples: int, points: int) -> bool:
+        """Whether so many are better evaluated at once than in parts."""
+        return samples * points <= self.max_pairs or points <= _MIN_POINTS
 
     def squares(self, samples: int, points: int) -> FloatArray:
         """An array (samples, points) to put the squared distances (m²) into, for `evaluate`."""
-        return self._square[: samples * points].reshape(samples, points)
+        pairs = samples * points
+        if pairs > self._square.size:
+            self._allocate(pairs)
+        return self._square[:pairs].reshape(samples, points)
 
     def evaluate(self, square: FloatArray, value: FloatArray) -> FloatArray:
         """The points' values, NaN behind the gate; `square` is `squares()`, filled, and is spent.
@@ -316,24 +349,21 @@ class PairwiseIdw:
     ) -> FloatArray:
         """Power 2: 1/d² needs no root, and the nearest sample is seldom asked for."""
         np.divide(1.0, square, out=weight, where=within)
-        total = np.add.reduce(weight, axis=0)
+        total = np.ones(value.size) @ weight
         points: FloatArray = (value @ weight) / total
-        # Rules 3 and 5 give the nearest sample's value. It is looked for only where the weights say
-        # that one may be coincident, or that none is within the falloff.
-        has_gaps = self.falloff_square < self.max_square
-        if has_gaps or not np.maximum.reduce(total) < _COINCIDENT_WEIGHT:
-            asks_nearest = ~(total < _COINCIDENT_WEIGHT)
-            if has_gaps:
-                asks_nearest |= total == 0.0
-            asking = np.flatnonzero(asks_nearest)
-            # With the root: two squares a rounding apart can be the same distance, and of equally
+        # With equal radii a point out of reach is 0/0 by now, and the nearest sample matters only
+        # where the weights are so large that one may be coincident.
+        if self._equal_radii and np.maximum.reduce(total) < _COINCIDENT_WEIGHT:
+            return points
+        shortest = np.minimum.reduce(square, axis=0)
+        special = np.flatnonzero((shortest <= _COINCIDENT_SQUARE) | (total == 0.0))
+        if special.size:
+            # Of the root: two squares a rounding apart can be the same distance, and of equally
             # near samples the first one counts.
-            distance = np.sqrt(square[:, asking])
-            nearest = value[distance.argmin(axis=0)]
-            takes = (distance.min(axis=0) < COINCIDENT_EPS_M) | (total[asking] == 0.0)
-            points[asking[takes]] = nearest[takes]
-        if self.falloff_square != self.max_square:
-            points[square.min(axis=0) > self.max_square] = np.nan
+            distance = square[:, special]
+            np.sqrt(distance, out=distance)
+            points[special] = value[distance.argmin(axis=0)]
+        points[shortest > self.max_square] = np.nan
         return points
 
     def _evaluate_normalised(
@@ -341,30 +371,15 @@ class PairwiseIdw:
     ) -> FloatArray:
         """Any power: the weights are (nearest/d)ᵖ, so that the largest is 1 and none overflows."""
         distance = np.sqrt(square, out=square)
-        shortest = distance.min(axis=0)
+        shortest = np.minimum.reduce(distance, axis=0)
         np.divide(shortest, distance, out=weight, where=within)
         np.power(weight, self.power, out=weight, where=within)
-        total = np.add.reduce(weight, axis=0)
-        points: FloatArray = (value @ weight) / total
-        special = np.flatnonzero((shortest < COINCIDENT_EPS_M) | (total == 0.0))
+        points: FloatArray = (value @ weight) / (np.ones(value.size) @ weight)
+        special = np.flatnonzero((shortest < COINCIDENT_EPS_M) | (shortest > self.falloff_radius))
         if special.size:
             points[special] = value[distance[:, special].argmin(axis=0)]
         points[shortest > self.max_distance] = np.nan
         return points
-
-
-def _largest_square_within(radius: float) -> float:
-    """The largest float64 whose square root is not greater than `radius`.
-
-    `sqrt(square) <= radius` and `square <= _largest_square_within(radius)` are the same then, to
-    the bit, and the root need not be taken for every pair.
-    """
-    square = min(radius * radius, sys.float_info.max)
-    while math.sqrt(square) > radius:
-        square = math.nextafter(square, 0.0)
-    while math.sqrt(following := math.nextafter(square, math.inf)) <= radius:
-        square = following
-    return square
 
 
 class _Part(NamedTuple):
@@ -383,10 +398,6 @@ class _Part(NamedTuple):
     @property
     def columns(self) -> int:
         return self.right - self.left
-
-    @property
-    def pairs(self) -> int:
-        return self.rows * self.columns * self.reaching.size
 
 
 class _Painter:
@@ -410,20 +421,19 @@ class _Painter:
         self.explored = explored
         self.values = values
 
-    def paint(self, max_pairs: int) -> None:
-        """Fill `values`; a part with no more pairs than `max_pairs` is evaluated at once."""
+    def paint(self) -> None:
         height, width = self.values.shape
         whole = _Part(0, height, 0, width, np.arange(self.value.size))
-        parts = list(self._split(whole, 1, 1)) if whole.pairs else []
+        parts = list(self._split(whole, 1, 1)) if self.value.size else []
         while parts:
             part = parts.pop()
-            if part.pairs <= max_pairs or part.rows * part.columns == 1:
+            if self.idw.fits(part.reaching.size, part.rows * part.columns):
                 self._evaluate(part)
             else:
-                parts.extend(self._split(part, *self._pieces(part, max_pairs)))
+                parts.extend(self._split(part, *self._pieces(part)))
 
-    def _pieces(self, part: _Part, max_pairs: int) -> tuple[int, int]:
-        """How many pieces down and across: the fewest that should come to `max_pairs` each.
+    def _pieces(self, part: _Part) -> tuple[int, int]:
+        """How many pieces down and across: the fewest that should be small enough.
 
         As if the samples lay evenly over the part and its surroundings within their reach; where
         they do not, a piece is split again.
@@ -433,7 +443,10 @@ class _Painter:
         down, across = (2, 1) if part.rows > part.columns else (1, 2)
         for pieces in range(2, _MAX_PIECES + 1):
             rows, columns = part.rows / down, part.columns / across
-            if density * (rows + around) * (columns + around) * rows * columns <= max_pairs:
+            if (
+                density * (rows + around) * (columns + around) * rows * columns
+                <= self.idw.max_pairs
+            ):
                 break
             side = max(part.rows, part.columns) / pieces
             down, across = math.ceil(part.rows / side), math.ceil(part.columns / side)

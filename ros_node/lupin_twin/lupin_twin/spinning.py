@@ -5,11 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.executors import ExternalShutdownException, ShutdownException
-
-# How long one wait lasts at most. Work and a shutdown end a wait at once; this is only for the
-# case that neither is noticed.
-WAIT_SECONDS = 0.5
+from rclpy.executors import ExternalShutdownException
 
 
 def spin_until_shutdown(executor: Any, on_error: Callable[[str, Exception], None]) -> None:
@@ -18,10 +14,12 @@ def spin_until_shutdown(executor: Any, on_error: Callable[[str, Exception], None
     An exception that leaves a callback ends rclpy's own `spin`, and with it a thread that nobody
     watches. Here it goes to `on_error(what, exception)`, and the spinning goes on.
     """
-    while executor.context.ok():
+    while True:
         try:
-            executor.spin_once(timeout_sec=WAIT_SECONDS)
-        except (ExternalShutdownException, ShutdownException):
+            executor.spin()
+        except ExternalShutdownException:
             return
         except Exception as error:  # noqa: BLE001  # whatever it is
             on_error("a callback", error)
+        else:
+            return

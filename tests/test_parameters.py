@@ -1,0 +1,100 @@
+"""Parameters: the contract's names and defaults, and a clear word for each bad value."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from lupin_twin.parameters import ParameterError, TwinParameters, describe
+
+# DESIGN's table, and field_cache_mb.
+DEFAULTS = {
+    "observations_topic": "/floranova/observations",
+    "discovered_tags_topic": "/perception/discovered_tags",
+    "map_topic": "/map",
+    "state_topic": "/twin/state",
+    "field_service_name": "/twin/get_field",
+    "state_publish_rate_hz": 1.0,
+    "frame_id": "map",
+    "buffer_len": 32,
+    "idw_power": 2.0,
+    "idw_falloff_radius_m": 1.5,
+    "idw_max_distance_m": 1.5,
+    "clip_to_explored": False,
+    "max_grid_cells": 1_000_000,
+    "field_cache_mb": 64.0,
+}
+
+
+def parameters(name: str, value: Any) -> TwinParameters:
+    return TwinParameters(**{name: value})
+
+
+def test_names_and_defaults() -> None:
+    assert asdict(TwinParameters()) == DEFAULTS
+
+
+def test_the_shipped_file_holds_every_parameter_at_its_default() -> None:
+    file = Path("ros_node/lupin_twin/config/twin.yaml")
+    assert yaml.safe_load(file.read_text())["lupin_twin"]["ros__parameters"] == DEFAULTS
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("state_publish_rate_hz", 0.0),
+        ("state_publish_rate_hz", 1e6),
+        ("idw_power", 0.0),
+        ("idw_power", math.nan),
+        ("idw_power", math.inf),
+        ("idw_power", "two"),
+        ("idw_falloff_radius_m", -1.5),
+        ("idw_max_distance_m", math.inf),
+        ("buffer_len", 0),
+        ("buffer_len", 1.5),
+        ("buffer_len", True),
+        ("max_grid_cells", 0),
+        ("field_cache_mb", -1.0),
+        ("clip_to_explored", 1),
+        ("frame_id", ""),
+        ("frame_id", 7),
+        ("map_topic", ""),
+        ("observations_topic", None),
+    ],
+)
+def test_a_bad_value_is_refused_by_name_with_the_value(name: str, value: Any) -> None:
+    with pytest.raises(ParameterError) as caught:
+        parameters(name, value)
+    message = str(caught.value)
+    assert message.startswith(f"parameter {name} is ")
+    assert "expected" in message
+    assert value == "" or str(value) in message
+
+
+@pytest.mark.parametrize("name", [f.name for f in fields(TwinParameters) if f.metadata["low"]])
+def test_the_ends_of_a_range_are_in_it_and_what_lies_beyond_is_not(name: str) -> None:
+    spec = next(f for f in fields(TwinParameters) if f.name == name)
+    low, high = spec.metadata["low"], spec.metadata["high"]
+    for end in (low, high):
+        assert getattr(parameters(name, end), name) == end
+    beyond: Any
+    for beyond in (low / 2 if isinstance(low, float) else low - 1, high * 2):
+        with pytest.raises(ParameterError, match=name):
+            parameters(name, beyond)
+
+
+def test_a_whole_number_is_a_number() -> None:
+    power = parameters("idw_power", 3).idw_power
+    assert (power, type(power)) == (3.0, float)
+
+
+def test_every_parameter_is_described() -> None:
+    for spec in fields(TwinParameters):
+        description, limits = describe(spec.name)
+        assert description
+        assert bool(limits) == (type(spec.default) in (int, float))

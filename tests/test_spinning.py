@@ -1,0 +1,86 @@
+"""Spinning survives a callback that raises, and ends when ROS does; in this process."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+
+from lupin_twin.spinning import spin_until_shutdown
+from tests.support.waiting import wait_for
+
+
+class Spinning:
+    """A node whose timer runs `work`, spun in a thread."""
+
+    def __init__(self, domain: int) -> None:
+        self.context = Context()
+        rclpy.init(args=[], context=self.context, domain_id=domain)
+        self.node = rclpy.create_node("spinning", context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self.errors: list[tuple[str, Exception]] = []
+        self.thread = threading.Thread(target=spin_until_shutdown, args=(self.executor, self.note))
+
+    def note(self, what: str, error: Exception) -> None:
+        self.errors.append((what, error))
+
+    def has_ended(self) -> bool:
+        return not self.thread.is_alive()
+
+
+@pytest.fixture
+def spinning(domain: int) -> Iterator[Spinning]:
+    it = Spinning(domain)
+    yield it
+    it.executor.shutdown(timeout_sec=2)
+    it.thread.join(5)
+    it.node.destroy_node()
+    rclpy.try_shutdown(context=it.context)
+
+
+def test_a_callback_that_raises_is_reported_and_the_next_one_runs(spinning: Spinning) -> None:
+    calls: list[int] = []
+
+    def work() -> None:
+        calls.append(1)
+        raise ValueError(f"call {len(calls)}")
+
+    spinning.node.create_timer(0.01, work)
+    spinning.thread.start()
+    wait_for(lambda: len(spinning.errors) >= 3, "three errors")
+    assert [str(error) for _, error in spinning.errors[:3]] == ["call 1", "call 2", "call 3"]
+
+
+def test_it_ends_with_the_executor(spinning: Spinning) -> None:
+    spinning.thread.start()
+    spinning.executor.shutdown(timeout_sec=2)
+    wait_for(spinning.has_ended, "the end of the spinning")
+    assert spinning.errors == []
+
+
+def test_it_ends_with_the_context(spinning: Spinning) -> None:
+    spinning.thread.start()
+    spinning.node.create_timer(0.01, lambda: rclpy.try_shutdown(context=spinning.context))
+    wait_for(spinning.has_ended, "the end of the spinning")
+    assert spinning.errors == []
+
+
+def test_what_is_no_exception_ends_it(spinning: Spinning, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SystemExit and its like are meant to end a thread; that it has ended is for others to see."""
+    seen: list[Any] = []
+    monkeypatch.setattr(threading, "excepthook", seen.append)
+
+    def leave() -> None:
+        raise KeyboardInterrupt
+
+    spinning.node.create_timer(0.01, leave)
+    spinning.thread.start()
+    wait_for(spinning.has_ended, "the end of the spinning")
+    assert spinning.errors == []
+    assert seen[0].exc_type is KeyboardInterrupt

@@ -1,0 +1,267 @@
+"""The store, rule by rule; no ROS here."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lupin_twin import state
+from lupin_twin.state import (
+    Bloom,
+    Flower,
+    FlowerObservation,
+    Observation,
+    Pose,
+    Reading,
+    Rejected,
+    TwinStore,
+)
+
+S = state.NANOSECONDS_PER_SECOND
+
+
+def at(x: float, y: float = 0.0) -> Pose:
+    return Pose(x, y, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def scan(
+    tag_id: str,
+    at_s: float = 1.0,
+    pose: Pose | None = None,
+    succeeded: bool = True,
+    **readings: float,
+) -> Observation:
+    values = tuple(Reading(name, value) for name, value in readings.items())
+    return Observation(tag_id, round(at_s * S), values, pose, succeeded)
+
+
+def look(
+    tag_id: str, at_s: float = 1.0, pose: Pose | None = None, **flower: object
+) -> FlowerObservation:
+    return FlowerObservation(tag_id, round(at_s * S), Flower(**flower), pose)  # type: ignore[arg-type]
+
+
+def tag(store: TwinStore, tag_id: str) -> state.TagState:
+    return next(t for t in store.snapshot(0, "map").tags if t.tag_id == tag_id)
+
+
+def test_readings_are_latest_per_name_and_keep_their_order() -> None:
+    store = TwinStore()
+    store.record(scan("1", co2=1.0, light=2.0))
+    store.record(scan("1", light=3.0, humidity=4.0))
+    assert [(r.name, r.value) for r in tag(store, "1").readings] == [
+        ("co2", 1.0),
+        ("light", 3.0),
+        ("humidity", 4.0),
+    ]
+
+
+def test_first_pose_wins_whoever_brings_it() -> None:
+    for first, second, third in (
+        ("scan", "pin", "look"),
+        ("pin", "scan", "look"),
+        ("look", "scan", "pin"),
+    ):
+        store = TwinStore()
+        writes = {
+            "scan": lambda x, s=store: s.record(scan("1", pose=at(x))),
+            "look": lambda x, s=store: s.record_flower(look("1", pose=at(x))),
+            "pin": lambda x, s=store: s.pin("1", at(x)),
+        }
+        for x, name in enumerate((first, second, third)):
+            writes[name](float(x))
+        assert tag(store, "1").pose == at(0.0), (first, second, third)
+
+
+def test_a_tag_without_a_pose_takes_the_first_that_comes() -> None:
+    store = TwinStore()
+    store.record(scan("1", co2=1.0))
+    assert tag(store, "1").pose is None
+    assert store.pin("1", at(5.0))
+    assert not store.pin("1", at(6.0))
+    assert tag(store, "1").pose == at(5.0)
+    assert store.is_pinned("1")
+    assert not store.is_pinned("2")
+
+
+def test_a_pin_touches_neither_readings_nor_species_nor_time() -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=3.0, co2=1.0))
+    store.record_flower(look("1", at_s=4.0, species="rose"))
+    before = tag(store, "1")
+    store.pin("1", at(5.0))
+    assert tag(store, "1") == dataclasses.replace(before, pose=at(5.0))
+
+
+def test_flower_results_replace_and_leave_readings_alone() -> None:
+    store = TwinStore()
+    bloom = Bloom(0.0, 0.0, 0.0, 0.1, "rose", 0.9, anomaly=True)
+    store.record(scan("1", co2=1.0))
+    store.record_flower(look("1", species="rose", anomaly=True, bug_count=2, blooms=(bloom,)))
+    store.record_flower(look("1", species="lupin"))
+    assert tag(store, "1").flower == Flower(species="lupin")
+    assert [r.value for r in tag(store, "1").readings] == [1.0]
+
+
+def test_every_accepted_write_counts_one_and_a_refused_one_none() -> None:
+    store = TwinStore()
+    store.record(scan("1", co2=1.0))
+    store.record(scan("1", succeeded=False))
+    store.record_flower(look("1"))
+    store.pin("2", at(1.0))
+    assert store.observation_count == 4
+    store.pin("2", at(2.0))
+    for refused in (scan("x" * 300), scan("3", **{"n" * 300: 1.0})):
+        with pytest.raises(Rejected):
+            store.record(refused)
+    assert store.observation_count == 4
+    assert {t.tag_id for t in store.snapshot(0, "map").tags} == {"1", "2"}
+
+
+def test_age_is_since_the_last_observation_and_never_negative() -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=100.0, co2=1.0))
+    assert tag(store, "1").stale_seconds(130 * S) == 30.0
+    assert tag(store, "1").stale_seconds(50 * S) == 0.0
+
+
+def test_a_tag_never_observed_is_infinitely_old() -> None:
+    store = TwinStore()
+    store.pin("1", at(1.0))
+    assert tag(store, "1").last_observed_ns is None
+    assert math.isinf(tag(store, "1").stale_seconds(5 * S))
+
+
+def test_a_failed_scan_is_listed_and_makes_nothing_look_younger() -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=10.0, succeeded=False))
+    assert tag(store, "1").last_observed_ns == 10 * S
+    store.record(scan("1", at_s=20.0, co2=1.0))
+    store.record(scan("1", at_s=30.0, succeeded=False))
+    assert tag(store, "1").last_observed_ns == 20 * S
+    store.record(scan("1", at_s=40.0, succeeded=False, light=1.0))
+    assert tag(store, "1").last_observed_ns == 40 * S
+
+
+def test_samples_need_a_pose_and_a_finite_reading_and_keep_the_first_mention_order() -> None:
+    store = TwinStore()
+    store.record(scan("late", co2=5.0))
+    store.record(scan("nan", pose=at(1.0), co2=math.nan))
+    store.record(scan("inf", pose=at(2.0), co2=math.inf))
+    store.record(scan("other", pose=at(3.0), light=1.0))
+    store.record(scan("good", pose=at(4.0, 7.0), co2=6.0))
+    assert store.samples_for_sensor("co2") == ((4.0, 7.0, 6.0),)
+    store.pin("late", at(9.0))
+    assert store.samples_for_sensor("co2") == ((9.0, 0.0, 5.0), (4.0, 7.0, 6.0))
+    readings = {t.tag_id: t.readings[0].value for t in store.snapshot(0, "map").tags}
+    assert math.isnan(readings["nan"])
+    assert math.isinf(readings["inf"])
+
+
+def test_history_keeps_the_last_scans_that_brought_readings() -> None:
+    store = TwinStore(buffer_len=2)
+    assert store.history("1") is None
+    store.pin("1", at(1.0))
+    assert store.history("1") == ()
+    scans = [scan("1", at_s=float(i), co2=float(i)) for i in range(3)]
+    for each in scans:
+        store.record(each)
+    store.record(scan("1", at_s=9.0, succeeded=False))
+    assert store.history("1") == (scans[1], scans[2])
+
+
+def test_bounds_name_the_value_and_the_limit() -> None:
+    store = TwinStore()
+    bloom = Bloom(0.0, 0.0, 0.0, 0.1, "rose", 0.9, anomaly=False)
+    too_many: list[Observation | FlowerObservation] = [
+        scan("1", **{f"s{i}": 0.0 for i in range(state.MAX_SENSORS_PER_TAG + 1)}),
+        look("1", blooms=(bloom,) * (state.MAX_BLOOMS_PER_TAG + 1)),
+        look("1", footprint=((0.0, 0.0, 0.0),) * (state.MAX_FOOTPRINT_POINTS + 1)),
+        look("1", species="r" * (state.MAX_TEXT_LENGTH + 1)),
+        look("1", blooms=(dataclasses.replace(bloom, species="r" * 257),)),
+    ]
+    for observation in too_many:
+        with pytest.raises(Rejected, match="limit is"):
+            if isinstance(observation, Observation):
+                store.record(observation)
+            else:
+                store.record_flower(observation)
+    assert store.snapshot(0, "map").tags == ()
+
+
+def test_one_tag_too_many_is_refused_and_the_known_ones_go_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(state, "MAX_TAGS", 2)
+    store = TwinStore()
+    store.record(scan("1", co2=1.0))
+    store.pin("2", at(1.0))
+    with pytest.raises(Rejected, match="tags: 3, the limit is 2"):
+        store.record(scan("3", co2=1.0))
+    with pytest.raises(Rejected):
+        store.pin("4", at(1.0))
+    store.record(scan("1", co2=2.0))
+    assert tag(store, "1").readings[0].value == 2.0
+
+
+def test_a_snapshot_stays_as_it_was() -> None:
+    store = TwinStore()
+    store.record(scan("1", co2=1.0))
+    before = store.snapshot(7, "map")
+    store.record(scan("1", co2=2.0))
+    assert (before.stamp_ns, before.frame_id) == (7, "map")
+    assert before.tags[0].readings[0].value == 1.0
+
+
+@pytest.mark.parametrize("field", ["x", "y", "z", "qx", "qy", "qz", "qw"])
+@pytest.mark.parametrize("broken", [math.nan, math.inf, -math.inf])
+def test_one_number_that_is_not_finite_makes_a_pose_not_finite(field: str, broken: float) -> None:
+    assert at(1.0).is_finite
+    assert not dataclasses.replace(at(1.0), **{field: broken}).is_finite
+
+
+writes = st.lists(
+    st.tuples(
+        st.sampled_from(["record", "fail", "flower", "pin"]),
+        st.sampled_from(["a", "b", "c"]),
+        st.integers(0, 100),
+        st.one_of(st.none(), st.floats(-5, 5)),
+    ),
+    max_size=30,
+)
+
+
+@given(writes)
+def test_against_the_plainest_store(steps: list[tuple[str, str, int, float | None]]) -> None:
+    """Poses and times of any sequence of writes, against dictionaries."""
+    store = TwinStore()
+    poses: dict[str, float] = {}
+    times: dict[str, int] = {}
+    known: list[str] = []
+    for kind, tag_id, at_s, x in steps:
+        pose = None if x is None else at(x)
+        if kind == "record":
+            store.record(scan(tag_id, at_s, pose, co2=1.0))
+            times[tag_id] = at_s * S
+        elif kind == "fail":
+            store.record(scan(tag_id, at_s, succeeded=False))
+            times.setdefault(tag_id, at_s * S)
+        elif kind == "flower":
+            store.record_flower(look(tag_id, at_s, pose))
+            times[tag_id] = at_s * S
+        elif pose is not None:
+            store.pin(tag_id, pose)
+        else:
+            continue
+        if tag_id not in known:
+            known.append(tag_id)
+        if x is not None and kind != "fail":
+            poses.setdefault(tag_id, x)
+    tags = store.snapshot(0, "map").tags
+    assert [t.tag_id for t in tags] == known
+    assert {t.tag_id: t.pose.x for t in tags if t.pose} == poses
+    assert {t.tag_id: t.last_observed_ns for t in tags if t.last_observed_ns is not None} == times

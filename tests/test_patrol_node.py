@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
 from greenhouse_sim.simulator import GreenhouseSimulator
 from lupin_msgs.msg import DiscoveredTags, Observation
 from nav_msgs.msg import OccupancyGrid
+from rosgraph_msgs.msg import Clock
 
 from tests.support.domains import ros_env
 from tests.support.processes import Process
@@ -131,7 +133,8 @@ def test_stamps_follow_simulated_time(domain: int) -> None:
         heard = Heard().listen(peer)
 
         def heard_simulated_time() -> bool:
-            peer.set_clock(1234.5)  # again and again: /clock is not latched
+            # Again and again: who listens to /clock does not ask for the latched one.
+            peer.publish("/clock", Clock(clock=Time(sec=1234, nanosec=500_000_000)), depth=1)
             return bool(heard.observations) and heard.observations[-1].header.stamp.sec == 1234
 
         with patrol(domain, "--speed", "20", "--ros-args", "-p", "use_sim_time:=true"):

@@ -58,7 +58,8 @@ def value_at(
     nearest_distance = math.inf
     nearest_value = math.nan
     for x, y, value in samples:
-        distance = math.sqrt((x - point_x) ** 2 + (y - point_y) ** 2)
+        dx, dy = x - point_x, y - point_y
+        distance = math.sqrt(dx * dx + dy * dy)
         if distance < nearest_distance:
             nearest_distance = distance
             nearest_value = value
@@ -69,7 +70,8 @@ def value_at(
     weighted_sum = 0.0
     weight_sum = 0.0
     for x, y, value in samples:
-        distance = math.sqrt((x - point_x) ** 2 + (y - point_y) ** 2)
+        dx, dy = x - point_x, y - point_y
+        distance = math.sqrt(dx * dx + dy * dy)
         if distance <= falloff_radius_m:
             # 1/dᵖ times a constant of the cell: the quotient is the same, and it cannot overflow.
             weight = (nearest_distance / distance) ** power

@@ -27,7 +27,7 @@ _KNOWN_MAX: Final = 100
 _EDGE_NOISE_CELLS: Final = 1e-4
 
 # Cells of the field that a turned map is looked up for at once; bounds the memory it takes.
-_CELLS_AT_ONCE: Final = 65_536
+_CELLS_AT_ONCE: Final = 16_384
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,10 +94,7 @@ def occupancy_map(
             f"map data holds {len(data)} cells, must be width x height = {width} x {height} "
             f"= {width * height}"
         )
-    try:
-        cells = np.array(data, dtype=np.int8).reshape(height, width)
-    except OverflowError as error:
-        raise ValueError(f"map data holds a number that is not int8: {error}") from error
+    cells = _int8_copy(data).reshape(height, width)
     cells.setflags(write=False)
     return OccupancyMap(
         frame_id=frame_id,
@@ -111,6 +108,22 @@ def occupancy_map(
         cells=cells,
         revision=revision,
     )
+
+
+def _int8_copy(data: Sequence[int] | npt.NDArray[np.int8]) -> npt.NDArray[np.int8]:
+    given = np.asarray(data)
+    if given.size == 0:
+        return np.zeros(0, dtype=np.int8)
+    if given.dtype != np.int8:
+        limits = np.iinfo(np.int8)
+        if not np.issubdtype(given.dtype, np.integer):
+            raise ValueError(f"map data is {given.dtype}, must be int8")
+        if given.min() < limits.min or given.max() > limits.max:
+            raise ValueError(
+                f"map data ranges from {given.min()} to {given.max()}, must be within "
+                f"{limits.min} to {limits.max}"
+            )
+    return given.astype(np.int8, copy=True)
 
 
 def explored_mask(

@@ -57,7 +57,10 @@ class BridgeServer(uvicorn.Server):
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """A bound socket, so that an address in use is known before anything else starts.
+    """A listening socket, so that an address in use is known before anything else starts.
+
+    It listens from here on, not from when the server takes over: whoever comes in between waits
+    for a moment instead of being turned away.
 
     Raises:
         OSError: the address cannot be had.
@@ -68,6 +71,7 @@ def listen(host: str, port: int) -> socket.socket:
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((host, port))
+        listener.listen()
     except OSError:
         listener.close()
         raise
@@ -76,6 +80,6 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def address_of(listener: socket.socket) -> str:
-    """The URL of a bound socket, for a person to open."""
+    """The URL of a listening socket, for a person to open."""
     host, port = listener.getsockname()[:2]
     return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"

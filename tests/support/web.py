@@ -1,0 +1,107 @@
+"""The bridge from outside: a real `lupin-twin serve`, HTTP, WebSocket, and the robot's side."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import httpx
+from websockets.sync.client import ClientConnection, connect
+
+from tests.support.domains import own_domain
+from tests.support.processes import Process, lupin_twin, url_of
+from tests.support.ros import Peer
+from tests.support.waiting import PATIENCE_S, wait_for
+
+Frame = dict[str, Any]
+
+
+def ws_url(url: str) -> str:
+    """The address of the WebSocket at a bridge's address."""
+    return url.replace("http", "ws", 1) + "/ws/state"
+
+
+class Listener:
+    """A WebSocket client that reads frames one by one."""
+
+    def __init__(self, connection: ClientConnection) -> None:
+        self.connection = connection
+
+    def next(self, timeout_s: float = PATIENCE_S) -> Frame:
+        """The next frame, whatever its type."""
+        frame: Frame = json.loads(self.connection.recv(timeout=timeout_s))
+        return frame
+
+    def until(self, kind: str, accept: Callable[[Frame], bool] = lambda _: True) -> Frame:
+        """Read on to the first frame of a type that `accept` takes, and return that."""
+
+        def look() -> Frame | None:
+            frame = self.next()
+            return frame if frame["type"] == kind and accept(frame) else None
+
+        found = wait_for(look, f"a {kind} frame as expected", meanwhile=lambda: None)
+        assert found is not None
+        return found
+
+    def until_tag(self, tag_id: str) -> Frame:
+        """Read on to the first state frame that has the tag, and return that frame."""
+        return self.until("state", lambda frame: tag_id in tag_ids(frame["state"]))
+
+
+def tag_ids(state: dict[str, Any]) -> list[str]:
+    """The tags of a state (`schema.TwinState` as JSON), in its order."""
+    return [tag["tag_id"] for tag in state["tags"]]
+
+
+@contextmanager
+def listener(url: str, **options: Any) -> Iterator[Listener]:
+    """A WebSocket client of the bridge at `url`."""
+    with connect(ws_url(url), proxy=None, max_size=None, **options) as connection:
+        yield Listener(connection)
+
+
+class Bridge:
+    """A bridge in a process of its own, and the two sides of it: a ROS peer and an HTTP client."""
+
+    def __init__(self, process: Process, url: str, peer: Peer, http: httpx.Client) -> None:
+        self.process, self.url, self.peer, self.http = process, url, peer, http
+
+    def get(self, path: str, headers: dict[str, str] | None = None, **query: Any) -> httpx.Response:
+        """GET a path; keyword arguments are the query."""
+        return self.http.get(path, headers=headers, params=query or None)
+
+    def json(self, path: str, **query: Any) -> Any:
+        """The JSON at a path, which has to be there."""
+        response = self.get(path, **query)
+        assert response.status_code == 200, response.text
+        return response.json()
+
+    def tag(self, tag_id: str, accept: Callable[[Any], bool] = lambda _: True) -> Any:
+        """A tag as soon as the bridge has it and `accept` takes it."""
+
+        def look() -> Any:
+            tags = self.json("/api/state")["tags"]
+            return next((t for t in tags if t["tag_id"] == tag_id and accept(t)), None)
+
+        return wait_for(look, f"tag {tag_id} as expected at {self.url}")
+
+    def listen(self) -> Any:
+        """A `Listener`, in a `with`."""
+        return listener(self.url)
+
+
+@contextmanager
+def bridge(*options: str, domain: int | None = None, **env: str) -> Iterator[Bridge]:
+    """`lupin-twin serve` with these options, in a ROS domain of its own unless one is given."""
+    if domain is None:
+        with own_domain() as leased, bridge(*options, domain=leased, **env) as running:
+            yield running
+        return
+    with (
+        lupin_twin(domain, "serve", *options, **env) as process,
+        Peer(domain) as peer,
+        httpx.Client(base_url=url_of(process), timeout=PATIENCE_S, trust_env=False) as http,
+    ):
+        yield Bridge(process, str(http.base_url).rstrip("/"), peer, http)

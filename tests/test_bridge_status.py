@@ -1,0 +1,49 @@
+"""Status: live, or offline for one of four reasons."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import pytest
+
+from lupin_bridge import schema
+from lupin_bridge.status import STALE_AFTER_S, Liveness, Reason, Status
+
+
+def test_a_twin_is_live_until_it_was_silent_for_the_limit() -> None:
+    liveness = Liveness(last_state_s=100.0)
+    assert liveness.status(100.0 + STALE_AFTER_S - 0.001).reason == "live"
+    assert liveness.status(100.0 + STALE_AFTER_S).reason == "stale"
+
+
+def test_a_twin_that_was_never_heard_has_no_age() -> None:
+    assert Liveness().status(5.0) == Status("never_seen", None)
+
+
+def test_an_age_is_never_negative() -> None:
+    assert Liveness(last_state_s=10.0).status(9.0) == Status("live", 0.0)
+
+
+def test_a_twin_that_is_heard_again_is_live_again() -> None:
+    liveness = Liveness(last_state_s=0.0)
+    assert liveness.status(50.0).reason == "stale"
+    liveness.last_state_s = 50.0
+    assert liveness.status(50.0).is_live
+
+
+def test_the_reason_nearest_to_the_cure_comes_first() -> None:
+    liveness = Liveness(last_state_s=0.0)
+    liveness.thread_dead = True
+    assert liveness.status(0.0) == Status("thread_dead", 0.0)
+    liveness.shutting_down = True
+    assert liveness.status(0.0) == Status("shutting_down", 0.0)
+
+
+@pytest.mark.parametrize("reason", get_args(Reason))
+@pytest.mark.parametrize("age_s", [None, 1.23456])
+def test_every_status_has_a_frame_of_the_contract(reason: Reason, age_s: float | None) -> None:
+    frame = schema.StatusFrame.model_validate(Status(reason, age_s).frame())
+    assert (frame.twin == "live") == (reason == "live")
+    assert frame.reason == reason
+    assert frame.message
+    assert frame.state_age_seconds == (None if age_s is None else 1.235)

@@ -45,6 +45,13 @@ def look(
     return FlowerObservation(tag_id, round(at_s * S), Flower(**flower), pose)  # type: ignore[arg-type]
 
 
+def write(store: TwinStore, observation: Observation | FlowerObservation) -> None:
+    if isinstance(observation, Observation):
+        store.record(observation)
+    else:
+        store.record_flower(observation)
+
+
 def tag(store: TwinStore, tag_id: str) -> state.TagState:
     return next(t for t in store.snapshot(0, "map").tags if t.tag_id == tag_id)
 
@@ -115,7 +122,7 @@ def test_every_accepted_write_counts_one_and_a_refused_one_none() -> None:
     store.pin("2", at(1.0))
     assert store.observation_count == 4
     store.pin("2", at(2.0))
-    for refused in (scan("x" * 300), scan("3", **{"n" * 300: 1.0})):
+    for refused in (scan("x" * 300), Observation("3", S, (Reading("n" * 300, 1.0),))):
         with pytest.raises(Rejected):
             store.record(refused)
     assert store.observation_count == 4
@@ -178,7 +185,7 @@ def test_bounds_name_the_value_and_the_limit() -> None:
     store = TwinStore()
     bloom = Bloom(0.0, 0.0, 0.0, 0.1, "rose", 0.9, anomaly=False)
     too_many: list[Observation | FlowerObservation] = [
-        scan("1", **{f"s{i}": 0.0 for i in range(state.MAX_SENSORS_PER_TAG + 1)}),
+        Observation("1", S, tuple(Reading(f"s{i}", 0.0) for i in range(65))),
         look("1", blooms=(bloom,) * (state.MAX_BLOOMS_PER_TAG + 1)),
         look("1", footprint=((0.0, 0.0, 0.0),) * (state.MAX_FOOTPRINT_POINTS + 1)),
         look("1", species="r" * (state.MAX_TEXT_LENGTH + 1)),
@@ -186,10 +193,7 @@ def test_bounds_name_the_value_and_the_limit() -> None:
     ]
     for observation in too_many:
         with pytest.raises(Rejected, match="limit is"):
-            if isinstance(observation, Observation):
-                store.record(observation)
-            else:
-                store.record_flower(observation)
+            write(store, observation)
     assert store.snapshot(0, "map").tags == ()
 
 

@@ -65,7 +65,7 @@ def _describe_frames(app: FastAPI) -> None:
     def with_frames() -> dict[str, object]:
         document = plain()
         schemas = document.setdefault("components", {}).setdefault("schemas", {})
-        for model in (schema.StateFrame, schema.StatusFrame):
+        for model in (schema.StateFrame, schema.DeltaFrame, schema.StatusFrame):
             described = model.model_json_schema(ref_template="#/components/schemas/{model}")
             schemas.update(described.pop("$defs", {}))
             schemas[model.__name__] = described

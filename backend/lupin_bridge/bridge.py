@@ -9,8 +9,8 @@ import time
 import uuid
 from concurrent.futures import ThreadPoolExecutor
 
-from lupin_bridge.frames import FrameWriter, status_frame
-from lupin_bridge.hub import Client, Hub, Writable
+from lupin_bridge.frames import FrameWriter
+from lupin_bridge.hub import Client, Hub
 from lupin_bridge.settings import Settings
 from lupin_bridge.source import Revised, TwinSource
 from lupin_bridge.status import Liveness, Status
@@ -80,9 +80,9 @@ class Bridge:
         """The status now."""
         return self._liveness.status(time.monotonic())
 
-    def join(self, connection: Writable) -> Client:
+    def join(self, client: Client) -> None:
         """Add a listener; it has the status and the current state when this returns."""
-        return self.hub.join(connection, time.monotonic())
+        self.hub.join(client, time.monotonic())
 
     def serve(self, client: Client) -> None:
         """A listener's socket is free again."""
@@ -129,14 +129,16 @@ class Bridge:
                 status.frame()["message"],
             )
         self._told = status
-        self.hub.announce(status_frame(status), time.monotonic())
+        self.hub.announce(status, time.monotonic())
 
     async def _keep_watch(self) -> None:
         while True:
             await asyncio.sleep(WATCH_PERIOD_S)
             try:
                 self._tell_status()
-                stuck = self.hub.dismiss_stuck(time.monotonic())
+                now_s = time.monotonic()
+                self.hub.serve_all(now_s)  # who asked for a low rate may be due by now
+                stuck = self.hub.dismiss_stuck(now_s)
             except Exception:
                 log.exception("the watch met an error and goes on")
                 continue

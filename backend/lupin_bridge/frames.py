@@ -1,15 +1,24 @@
-"""WebSocket frames: each made once, ready for the wire, and shared by every client."""
+"""WebSocket frames of the state: each encoding made once, and shared by every client.
+
+Pure. A frame is written in an encoding when the first client asks for it, and kept for the others.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Final
 
+import cbor2
 import orjson
 from websockets.frames import Frame, Opcode
 
-from lupin_bridge.state_json import StateJson
+from lupin_bridge.state_json import StateJson, header
 from lupin_bridge.status import Status
-from lupin_twin.state import Snapshot
+from lupin_twin.state import Snapshot, TagState
+
+JSON: Final = "json"
+CBOR: Final = "cbor"
 
 
 def text_frame(payload: bytes) -> bytes:
@@ -17,34 +26,107 @@ def text_frame(payload: bytes) -> bytes:
     return Frame(Opcode.TEXT, payload).serialize(mask=False)
 
 
-def status_frame(status: Status) -> bytes:
+def binary_frame(payload: bytes) -> bytes:
+    """Bytes as one WebSocket binary frame."""
+    return Frame(Opcode.BINARY, payload).serialize(mask=False)
+
+
+def _cbor_frame(json_payload: bytes) -> bytes:
+    # By way of the JSON: what the two encodings say is the same to the last field.
+    return binary_frame(cbor2.dumps(orjson.loads(json_payload)))
+
+
+_WRITERS: Final[Mapping[str, Callable[[bytes], bytes]]] = {JSON: text_frame, CBOR: _cbor_frame}
+ENCODINGS: Final = tuple(_WRITERS)
+
+
+def status_frame(status: Status, encoding: str = JSON) -> bytes:
     """A status as a WebSocket frame."""
-    return text_frame(orjson.dumps(status.frame()))
+    return _WRITERS[encoding](orjson.dumps(status.frame()))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class StateFrame:
-    """One state on its way to every client."""
+    """One state on its way to every client.
+
+    `base` is the frame before it, whose own base is cut off: a delta goes back by one.
+    """
 
     seq: int
     revision: str
     snapshot: Snapshot
-    wire: bytes
+    json: bytes
+    base: StateFrame | None
+    _writer: FrameWriter
+    _wires: dict[tuple[str, str], bytes] = field(default_factory=dict)
+
+    def let_go(self) -> None:
+        """Keep only what a delta needs: or every frame ever made would stay in memory."""
+        self.base = None
+        self._wires.clear()
+
+    def full(self, encoding: str) -> bytes:
+        """`schema.StateFrame` as a WebSocket frame."""
+        return self.wire("full", encoding, self._full)
+
+    def delta(self, encoding: str) -> bytes:
+        """`schema.DeltaFrame` as a WebSocket frame: only what is not as in `base`."""
+        return self.wire("delta", encoding, self._delta)
+
+    def wire(self, kind: str, encoding: str, payload: Callable[[], bytes]) -> bytes:
+        """The frame of this kind in this encoding, from `payload()` if it is the first call."""
+        key = (kind, encoding)
+        if key not in self._wires:
+            self._wires[key] = _WRITERS[encoding](payload())
+        return self._wires[key]
+
+    def _full(self) -> bytes:
+        return b'{"type":"state","seq":%d,"revision":%b,"state":%b}' % (
+            self.seq,
+            orjson.dumps(self.revision),
+            self.json,
+        )
+
+    def _delta(self) -> bytes:
+        assert self.base is not None  # the hub asks only then
+        before = {tag.tag_id: tag for tag in self.base.snapshot.tags}
+        changed: list[TagState] = []
+        for tag in self.snapshot.tags:
+            if before.pop(tag.tag_id, None) is not tag:
+                changed.append(tag)  # noqa: PERF401  # the pop is the point
+        stamp_ns = self.snapshot.stamp_ns
+        return (
+            b'{"type":"delta","seq":%d,"base":%d,"revision":%b,"header":%b,'
+            b'"changed":[%b],"removed":%b}'
+        ) % (
+            self.seq,
+            self.base.seq,
+            orjson.dumps(self.revision),
+            orjson.dumps(header(stamp_ns, self.snapshot.frame_id)),
+            b",".join([self._writer.json.tag(tag, stamp_ns) for tag in changed]),
+            orjson.dumps(list(before)),
+        )
 
 
 class FrameWriter:
-    """Numbers the frames and writes them; `seq` starts at 1 and grows by one a frame."""
+    """Numbers the frames; `seq` starts at 1 and grows by one a frame."""
 
     def __init__(self) -> None:
-        self._seq = 0
         self.json = StateJson()
+        self._newest: StateFrame | None = None
 
     def state(self, snapshot: Snapshot, revision: str) -> StateFrame:
         """The next state frame."""
-        self._seq += 1
-        payload = b'{"type":"state","seq":%d,"revision":%b,"state":%b}' % (
-            self._seq,
-            orjson.dumps(revision),
-            self.json.state(snapshot),
+        base = self._newest
+        if base is not None:
+            base.let_go()
+        frame = StateFrame(
+            seq=1 if base is None else base.seq + 1,
+            revision=revision,
+            snapshot=snapshot,
+            json=self.json.state(snapshot),
+            base=base,
+            _writer=self,
         )
-        return StateFrame(self._seq, revision, snapshot, text_frame(payload))
+        self._newest = frame
+        return frame

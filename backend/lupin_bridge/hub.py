@@ -5,19 +5,22 @@ the one before. To any other client nothing is written and nothing queued; when 
 again it gets the newest frame there is, and sees from `seq` what it skipped. A client that cannot
 take a frame for `client_timeout_s` is closed.
 
-No input or output here and no clock: connections and times are arguments.
+No input or output here and no clock: connections and times (seconds of a clock that never jumps)
+are arguments.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
-from lupin_bridge.frames import StateFrame
+from lupin_bridge.frames import JSON, StateFrame, status_frame
+from lupin_bridge.status import Status
 
 # RFC 6455, section 7.4.1, and the IANA registry: 1008 policy violation, 1013 try again later.
-CLOSE_TOO_SLOW = 1008
-CLOSE_TRY_AGAIN_LATER = 1013
+CLOSE_POLICY: Final = 1008
+CLOSE_TRY_AGAIN_LATER: Final = 1013
 
 
 class Writable(Protocol):
@@ -34,13 +37,31 @@ class Writable(Protocol):
         """Close with a reason, whether or not the other side reads."""
 
 
+def plain_wire(client: Client, frame: StateFrame) -> bytes:
+    """A frame for a listener of `/ws/state`: a delta where it asked for them and has the base."""
+    base = frame.base
+    if client.delta and base is not None and base.seq == client.sent_seq:
+        return frame.delta(client.encoding)
+    return frame.full(client.encoding)
+
+
 @dataclass(slots=True, eq=False)
 class Client:
-    """One listener: what it has got, and since when it owes us room in its socket."""
+    """One listener: what it asked for, what it has got, and since when its socket is full.
+
+    `min_interval_s` is the least time between two frames; `wire` writes a frame as this client
+    reads it.
+    """
 
     connection: Writable
+    encoding: str = JSON
+    delta: bool = False
+    min_interval_s: float = 0.0
+    wants_status: bool = True
+    wire: Callable[[Client, StateFrame], bytes] = plain_wire
     sent_seq: int = 0
-    status_due: bool = False
+    next_due_s: float = 0.0
+    status_due: bool = True
     blocked_since_s: float | None = None
 
 
@@ -48,11 +69,15 @@ class Hub:
     """Every client and the newest frame. Belongs to the event loop."""
 
     def __init__(self, max_clients: int, client_timeout_s: float) -> None:
-        self._max_clients = max_clients
+        self.max_clients = max_clients
+        self.frames_sent = 0
+        self.frames_skipped = 0
+        self.bytes_sent = 0
         self._client_timeout_s = client_timeout_s
         self._clients: set[Client] = set()
         self._frame: StateFrame | None = None
-        self._status: bytes | None = None
+        self._status: Status | None = None
+        self._status_wires: dict[str, bytes] = {}
 
     def __len__(self) -> int:
         return len(self._clients)
@@ -60,14 +85,17 @@ class Hub:
     @property
     def is_full(self) -> bool:
         """Whether one more client would be one too many."""
-        return len(self._clients) >= self._max_clients
+        return len(self._clients) >= self.max_clients
 
-    def join(self, connection: Writable, now_s: float) -> Client:
+    @property
+    def blocked(self) -> int:
+        """How many clients have a socket that takes nothing just now."""
+        return sum(client.blocked_since_s is not None for client in self._clients)
+
+    def join(self, client: Client, now_s: float) -> None:
         """Add a client and give it the status and the current state at once, in that order."""
-        client = Client(connection, status_due=True)
         self._clients.add(client)
         self.serve(client, now_s)
-        return client
 
     def leave(self, client: Client) -> None:
         """Forget a client; harmless if it has left already."""
@@ -76,28 +104,41 @@ class Hub:
     def publish(self, frame: StateFrame, now_s: float) -> None:
         """Make this the newest frame and give it to everyone who can take it."""
         self._frame = frame
-        self._serve_all(now_s)
+        self.serve_all(now_s)
 
-    def announce(self, status: bytes, now_s: float) -> None:
-        """Make this the status (a WebSocket frame) and give it to everyone who can take it."""
+    def announce(self, status: Status, now_s: float) -> None:
+        """Make this the status and give it to everyone who can take it."""
         self._status = status
+        self._status_wires.clear()
         for client in self._clients:
             client.status_due = True
-        self._serve_all(now_s)
+        self.serve_all(now_s)
+
+    def serve_all(self, now_s: float) -> None:
+        """Give everyone what they lack and can take now."""
+        for client in self._clients:
+            self.serve(client, now_s)
 
     def serve(self, client: Client, now_s: float) -> None:
-        """Give a client what it lacks, as far as its socket takes it."""
-        if client.status_due and self._status is not None:
-            if not self._write(client, self._status, now_s):
+        """Give a client what it lacks, as far as its socket takes it and its rate allows."""
+        if client.status_due and client.wants_status and self._status is not None:
+            if not self._write(client, self._status_wire(client.encoding), now_s):
                 return
             client.status_due = False
         frame = self._frame
-        if (
-            frame is not None
-            and frame.seq != client.sent_seq
-            and self._write(client, frame.wire, now_s)
-        ):
+        if frame is None or frame.seq == client.sent_seq or now_s < client.next_due_s:
+            return
+        if not client.connection.can_take:
+            self._mark_blocked(client, now_s)
+            return
+        if self._write(client, client.wire(client, frame), now_s):
+            if client.sent_seq:
+                self.frames_skipped += frame.seq - client.sent_seq - 1
+            self.frames_sent += 1
             client.sent_seq = frame.seq
+            # By the client's own beat, not from this frame on: frames come a little early or late.
+            client.next_due_s = max(client.next_due_s, now_s - client.min_interval_s)
+            client.next_due_s += client.min_interval_s
 
     def dismiss_stuck(self, now_s: float) -> int:
         """Close every client that has not taken a frame for too long; returns how many."""
@@ -110,19 +151,25 @@ class Hub:
         for client in stuck:
             self.leave(client)
             client.connection.dismiss(
-                CLOSE_TOO_SLOW, f"took no frame for {self._client_timeout_s:g} s"
+                CLOSE_POLICY, f"took no frame for {self._client_timeout_s:g} s"
             )
         return len(stuck)
 
-    def _serve_all(self, now_s: float) -> None:
-        for client in self._clients:
-            self.serve(client, now_s)
+    def _status_wire(self, encoding: str) -> bytes:
+        assert self._status is not None  # `serve` has looked
+        if encoding not in self._status_wires:
+            self._status_wires[encoding] = status_frame(self._status, encoding)
+        return self._status_wires[encoding]
 
     def _write(self, client: Client, wire: bytes, now_s: float) -> bool:
         if not client.connection.can_take:
-            if client.blocked_since_s is None:
-                client.blocked_since_s = now_s
+            self._mark_blocked(client, now_s)
             return False
         client.blocked_since_s = None
         client.connection.write(wire)
+        self.bytes_sent += len(wire)
         return True
+
+    def _mark_blocked(self, client: Client, now_s: float) -> None:
+        if client.blocked_since_s is None:
+            client.blocked_since_s = now_s

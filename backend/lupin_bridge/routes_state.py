@@ -5,10 +5,12 @@ from __future__ import annotations
 import orjson
 from fastapi import APIRouter, Request, Response, WebSocket
 
-from lupin_bridge import schema, state_json
+from lupin_bridge import listen_query, schema, state_json
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.frames import CBOR
 from lupin_bridge.http_tools import bridge_of, error_response, json_response, read_route
-from lupin_bridge.hub import CLOSE_TRY_AGAIN_LATER
+from lupin_bridge.hub import CLOSE_POLICY, CLOSE_TRY_AGAIN_LATER, Client
+from lupin_bridge.listen_query import ListenRefused
 from lupin_bridge.source import TwinUnavailableError
 from lupin_bridge.ws_protocol import CONNECTION_KEY, Connection
 
@@ -23,15 +25,26 @@ _NO_TAG = {404: {"model": schema.ErrorMessage, "description": "no such tag"}}
 async def ws_state(websocket: WebSocket) -> None:
     """The status and the current state at once, then every change; a client is not listened to."""
     bridge: Bridge = websocket.app.state.bridge
+    offered: list[str] = websocket.scope["subprotocols"]
+    await websocket.accept(subprotocol=CBOR if CBOR in offered else None)
     if bridge.hub.is_full:
-        await websocket.accept()
-        limit = bridge.settings.max_clients
+        limit = bridge.hub.max_clients
         await websocket.close(CLOSE_TRY_AGAIN_LATER, f"{limit} clients are connected, the limit")
         return
-    await websocket.accept()
+    try:
+        query = listen_query.parse(websocket.query_params.multi_items(), offered)
+    except ListenRefused as error:
+        await websocket.close(CLOSE_POLICY, str(error))
+        return
     connection: Connection = getattr(websocket.state, CONNECTION_KEY)
-    client = bridge.join(connection)
+    client = Client(
+        connection,
+        encoding=query.encoding,
+        delta=query.delta,
+        min_interval_s=query.min_interval_s,
+    )
     connection.on_writable = lambda: bridge.serve(client)
+    bridge.join(client)
     try:
         while (await websocket.receive())["type"] != "websocket.disconnect":
             pass

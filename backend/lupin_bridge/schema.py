@@ -117,6 +117,23 @@ class StateFrame(Contract):
     state: TwinState
 
 
+class DeltaFrame(Contract):
+    """WebSocket frame (`?delta=1`): what is not as in the frame numbered `base`.
+
+    A client that has `base` replaces the `changed` tags, appends those it did not know, in this
+    order, and drops the `removed` ones. A tag's age in an unchanged tag is `header.stamp` less its
+    `last_observed`. A client that skipped a frame gets a full `StateFrame` instead.
+    """
+
+    type: Literal["delta"]
+    seq: int
+    base: int
+    revision: str = Field(description="opaque; changes exactly when a field could")
+    header: Header
+    changed: list[TwinTagState]
+    removed: list[str] = Field(description="tag_ids; a restarted twin knows fewer tags")
+
+
 class StatusFrame(Contract):
     """WebSocket frame, and the body of `/readyz`: whether the twin behind the bridge is alive."""
 

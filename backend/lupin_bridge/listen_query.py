@@ -1,0 +1,68 @@
+"""What a WebSocket client asks for in its query string. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from lupin_bridge.frames import CBOR, ENCODINGS, JSON
+
+_SWITCH: Final = {"0": False, "1": True}
+MIN_RATE_HZ: Final = 0.01
+
+
+class ListenRefused(ValueError):
+    """A query that cannot be served; the message names the parameter, the value and the limit."""
+
+
+@dataclass(frozen=True, slots=True)
+class ListenQuery:
+    """How a client wants its frames."""
+
+    delta: bool = False
+    encoding: str = JSON
+    max_rate_hz: float = math.inf
+
+    @property
+    def min_interval_s(self) -> float:
+        """The least time between two frames, s."""
+        return 1.0 / self.max_rate_hz
+
+
+def parse(parameters: Sequence[tuple[str, str]], subprotocols: Sequence[str] = ()) -> ListenQuery:
+    """Read the query string's (name, value) pairs, and the subprotocols that the client offers.
+
+    Raises:
+        ListenRefused: an unknown or repeated parameter, or a value out of its range.
+
+    """
+    values: dict[str, str] = {}
+    for name, value in parameters:
+        if name not in ("delta", "encoding", "max_rate_hz"):
+            raise ListenRefused(
+                f"parameter {name[:32]!r} is unknown, expected delta, encoding or max_rate_hz"
+            )
+        if name in values:
+            raise ListenRefused(f"{name} is given more than once, expected one value")
+        values[name] = value
+    encoding = values.get("encoding", CBOR if CBOR in subprotocols else JSON)
+    if encoding not in ENCODINGS:
+        raise ListenRefused(f"encoding is {encoding[:32]!r}, expected {' or '.join(ENCODINGS)}")
+    delta = values.get("delta", "0")
+    if delta not in _SWITCH:
+        raise ListenRefused(f"delta is {delta[:32]!r}, expected 0 or 1")
+    return ListenQuery(_SWITCH[delta], encoding, _rate(values.get("max_rate_hz")))
+
+
+def _rate(text: str | None) -> float:
+    if text is None:
+        return math.inf
+    try:
+        rate = float(text)
+    except ValueError:
+        rate = math.nan
+    if not rate >= MIN_RATE_HZ:  # false for NaN too
+        raise ListenRefused(f"max_rate_hz is {text[:32]!r}, expected a number from {MIN_RATE_HZ}")
+    return rate

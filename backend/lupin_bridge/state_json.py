@@ -42,7 +42,7 @@ class StateJson:
     def tag(self, tag: TagState, now_ns: int) -> bytes:
         """One tag as JSON of `schema.TwinTagState`, its age as of `now_ns` (ROS time, ns)."""
         kept = self._kept.get(tag.tag_id)
-        if kept is None or False:
+        if kept is None or kept[0] is not tag:
             kept = (tag, *_split_at_age(orjson.dumps(tag_fields(tag))))
             self._kept[tag.tag_id] = kept
         return kept[1] + age(tag.stale_seconds(now_ns)) + kept[2]

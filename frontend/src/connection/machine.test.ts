@@ -1,0 +1,167 @@
+import { describe, expect, test } from 'vitest';
+
+import type { StatusFrame } from '../contract/types';
+import {
+  DEAD_MS,
+  INITIAL,
+  nextDeadline,
+  OPENING_MS,
+  phaseOf,
+  SILENCE_MS,
+  step,
+  type Command,
+  type Connection,
+  type ConnectionEvent,
+} from './machine';
+
+const status = (twin: StatusFrame['twin']): StatusFrame => ({
+  type: 'status',
+  twin,
+  reason: twin === 'live' ? 'live' : 'stale',
+  message: '',
+  state_age_seconds: 0,
+});
+
+/** Runs events one after another. */
+function run(...events: ConnectionEvent[]): { connection: Connection; commands: Command[] } {
+  const commands: Command[] = [];
+  const connection = events.reduce((current, event) => {
+    const next = step(current, event);
+    commands.push(next.command);
+    return next.connection;
+  }, INITIAL);
+  return { connection, commands };
+}
+
+const started: ConnectionEvent[] = [
+  { type: 'start', now: 0 },
+  { type: 'opened', now: 20 },
+  { type: 'frame', now: 25, status: status('live') },
+];
+const live = run(...started).connection;
+const closed = (now: number, code: number | null = 1006): ConnectionEvent => ({
+  type: 'closed',
+  now,
+  code,
+  random: 1,
+});
+
+describe('phases', () => {
+  test('connecting until the first frame, then live', () => {
+    expect(phaseOf(INITIAL, 0)).toBe('connecting');
+    expect(phaseOf(run(...started.slice(0, 1)).connection, 10)).toBe('connecting');
+    expect(phaseOf(run(...started.slice(0, 2)).connection, 22)).toBe('connecting');
+    expect(phaseOf(live, 30)).toBe('live');
+  });
+
+  test('three seconds without a frame are stale, and a frame heals it', () => {
+    expect(phaseOf(live, 25 + SILENCE_MS - 1)).toBe('live');
+    expect(phaseOf(live, 25 + SILENCE_MS)).toBe('stale');
+    const again = step(live, { type: 'frame', now: 4_000 }).connection;
+    expect(phaseOf(again, 4_001)).toBe('live');
+  });
+
+  test('the bridge says that the twin is gone, and that it is back', () => {
+    const gone = step(live, { type: 'frame', now: 100, status: status('offline') }).connection;
+    expect(phaseOf(gone, 101)).toBe('offline');
+    const heartbeat = step(gone, { type: 'frame', now: 1_000 }).connection;
+    expect(phaseOf(heartbeat, 1_001)).toBe('offline');
+    const back = step(heartbeat, { type: 'frame', now: 2_000, status: status('live') }).connection;
+    expect(phaseOf(back, 2_001)).toBe('live');
+  });
+
+  test('lost is reconnecting, also while the next attempt opens', () => {
+    const lost = step(live, closed(100)).connection;
+    expect(phaseOf(lost, 101)).toBe('reconnecting');
+    const opening = step(lost, { type: 'tick', now: 10_000, random: 0 }).connection;
+    expect(phaseOf(opening, 10_001)).toBe('reconnecting');
+    const open = step(opening, { type: 'opened', now: 10_010 }).connection;
+    expect(phaseOf(open, 10_011)).toBe('reconnecting');
+  });
+
+  test('a first attempt that fails is reconnecting', () => {
+    const { connection } = run({ type: 'start', now: 0 }, closed(5));
+    expect(phaseOf(connection, 6)).toBe('reconnecting');
+  });
+
+  test('an old word about the twin does not outlive its connection', () => {
+    const { connection } = run(
+      ...started,
+      { type: 'frame', now: 30, status: status('offline') },
+      closed(40),
+      { type: 'tick', now: 9_999, random: 0 },
+      { type: 'opened', now: 10_000 },
+      { type: 'frame', now: 10_001 },
+    );
+    expect(phaseOf(connection, 10_002)).toBe('live');
+  });
+});
+
+describe('attempts', () => {
+  test('the next one waits for its back-off', () => {
+    const lost = step(live, closed(100)).connection;
+    expect(lost.socket).toEqual({ kind: 'closed', retryAt: 600 });
+    expect(nextDeadline(lost, 100)).toBe(600);
+    expect(step(lost, { type: 'tick', now: 599, random: 1 }).command).toBeNull();
+    expect(step(lost, { type: 'tick', now: 600, random: 1 }).command).toBe('reopen');
+  });
+
+  test('failures in a row wait longer; a connection that held starts afresh', () => {
+    let { connection } = run({ type: 'start', now: 0 }, closed(0));
+    const pauses: number[] = [];
+    for (let i = 0; i < 4; i++) {
+      const at = nextDeadline(connection, 0);
+      connection = step(connection, { type: 'tick', now: at, random: 1 }).connection;
+      connection = step(connection, closed(at)).connection;
+      pauses.push(nextDeadline(connection, at) - at);
+    }
+    expect(pauses).toEqual([1000, 2000, 4000, 8000]);
+
+    connection = step(connection, { type: 'wake', now: 50_000 }).connection;
+    connection = step(connection, { type: 'opened', now: 50_010 }).connection;
+    connection = step(connection, closed(60_000)).connection;
+    expect(connection.failures).toBe(1);
+  });
+
+  test('a server that accepts and hangs up at once is not hammered', () => {
+    let { connection } = run({ type: 'start', now: 0 });
+    for (let i = 0; i < 5; i++) {
+      connection = step(connection, { type: 'opened', now: i }).connection;
+      connection = step(connection, { type: 'frame', now: i }).connection;
+      connection = step(connection, closed(i)).connection;
+      connection = step(connection, { type: 'wake', now: i }).connection;
+    }
+    expect(connection.failures).toBe(5);
+  });
+
+  test('the tab or the network coming back does not wait', () => {
+    const lost = step(live, closed(100)).connection;
+    expect(step(lost, { type: 'wake', now: 101 }).command).toBe('reopen');
+  });
+
+  test('waking up leaves a living connection alone, and replaces a silent one', () => {
+    expect(step(live, { type: 'wake', now: 500 }).command).toBeNull();
+    expect(step(live, { type: 'wake', now: 25 + SILENCE_MS }).command).toBe('reopen');
+  });
+
+  test('an attempt that hangs is given up', () => {
+    const { connection } = run({ type: 'start', now: 0 });
+    expect(nextDeadline(connection, 0)).toBe(OPENING_MS);
+    const given = step(connection, { type: 'tick', now: OPENING_MS, random: 1 });
+    expect(given.command).toBe('drop');
+    expect(given.connection.failures).toBe(1);
+  });
+
+  test('a connection silent for long is dropped although nobody closed it', () => {
+    expect(nextDeadline(live, 30)).toBe(25 + SILENCE_MS);
+    expect(step(live, { type: 'tick', now: 25 + SILENCE_MS, random: 1 }).command).toBeNull();
+    expect(nextDeadline(live, 25 + SILENCE_MS)).toBe(25 + DEAD_MS);
+    expect(step(live, { type: 'tick', now: 25 + DEAD_MS, random: 1 }).command).toBe('drop');
+  });
+
+  test('each connection is an epoch of its own', () => {
+    expect(live.epoch).toBe(1);
+    const second = step(step(live, closed(50)).connection, { type: 'wake', now: 60 }).connection;
+    expect(step(second, { type: 'opened', now: 70 }).connection.epoch).toBe(2);
+  });
+});

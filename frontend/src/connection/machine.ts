@@ -1,0 +1,157 @@
+/**
+ * The connection's states and what leads from one to another. Pure: time and chance are
+ * arguments, sockets and timers live in `socket.ts`.
+ */
+import type { StatusFrame } from '../contract/types';
+import { backoffMs } from './backoff';
+
+/** No frame for this long: what is on the page is not to be taken for the present any more. */
+export const SILENCE_MS = 3_000;
+/** No frame for this long: the connection is dead although nobody said so; make a new one. */
+export const DEAD_MS = 8_000;
+/** An attempt that takes longer is given up. */
+export const OPENING_MS = 6_000;
+/** A connection that held this long starts the back-off afresh when it breaks. */
+const PROVEN_MS = 5_000;
+
+/** What the operator is told. */
+export type Phase = 'connecting' | 'live' | 'stale' | 'offline' | 'reconnecting';
+
+export type Socket =
+  | { readonly kind: 'closed'; readonly retryAt: number }
+  | { readonly kind: 'opening'; readonly since: number }
+  | { readonly kind: 'open'; readonly since: number; readonly lastFrameAt: number | null };
+
+export interface Connection {
+  readonly socket: Socket;
+  /** Grows by one with each connection that opened; what was fetched before is out of date. */
+  readonly epoch: number;
+  /** Attempts failed in a row. */
+  readonly failures: number;
+  readonly closeCode: number | null;
+  /** The bridge's last word about the twin, on this connection. */
+  readonly status: StatusFrame | null;
+}
+
+/** All times are ms on the monotonic clock. */
+export type ConnectionEvent =
+  | { readonly type: 'start'; readonly now: number }
+  | { readonly type: 'opened'; readonly now: number }
+  | { readonly type: 'frame'; readonly now: number; readonly status?: StatusFrame }
+  | {
+      readonly type: 'closed';
+      readonly now: number;
+      readonly code: number | null;
+      readonly random: number;
+    }
+  /** The tab became visible or the network returned. */
+  | { readonly type: 'wake'; readonly now: number }
+  /** A deadline of `nextDeadline` may have passed. */
+  | { readonly type: 'tick'; readonly now: number; readonly random: number };
+
+/** What the shell has to do. "reopen": drop the socket, if any, and make a new one. */
+export type Command = 'reopen' | 'drop' | null;
+
+export const INITIAL: Connection = {
+  socket: { kind: 'closed', retryAt: 0 },
+  epoch: 0,
+  failures: 0,
+  closeCode: null,
+  status: null,
+};
+
+export interface Step {
+  readonly connection: Connection;
+  readonly command: Command;
+}
+
+export function step(connection: Connection, event: ConnectionEvent): Step {
+  const { socket } = connection;
+  const { now } = event;
+  switch (event.type) {
+    case 'start':
+      return open(connection, now);
+    case 'opened':
+      return stay({
+        ...connection,
+        epoch: connection.epoch + 1,
+        status: null,
+        socket: { kind: 'open', since: now, lastFrameAt: null },
+      });
+    case 'frame':
+      if (socket.kind !== 'open') return stay(connection);
+      return stay({
+        ...connection,
+        status: event.status ?? connection.status,
+        socket: { ...socket, lastFrameAt: now },
+      });
+    case 'closed':
+      if (socket.kind === 'closed') return stay(connection);
+      return { connection: fail(connection, now, event.code, event.random), command: null };
+    case 'wake':
+      if (socket.kind === 'closed') return open(connection, now);
+      // After a sleep the socket often looks open and is not.
+      return socket.kind === 'open' && silence(socket, now) >= SILENCE_MS
+        ? open(connection, now)
+        : stay(connection);
+    case 'tick':
+      if (socket.kind === 'closed') {
+        return now >= socket.retryAt ? open(connection, now) : stay(connection);
+      }
+      if (
+        socket.kind === 'opening'
+          ? now - socket.since >= OPENING_MS
+          : silence(socket, now) >= DEAD_MS
+      ) {
+        return { connection: fail(connection, now, null, event.random), command: 'drop' };
+      }
+      return stay(connection);
+  }
+}
+
+const stay = (connection: Connection): Step => ({ connection, command: null });
+
+const open = (connection: Connection, now: number): Step => ({
+  connection: { ...connection, socket: { kind: 'opening', since: now } },
+  command: 'reopen',
+});
+
+function fail(
+  connection: Connection,
+  now: number,
+  closeCode: number | null,
+  random: number,
+): Connection {
+  const { socket } = connection;
+  const proven = socket.kind === 'open' && now - socket.since >= PROVEN_MS;
+  const failures = proven ? 1 : connection.failures + 1;
+  const retryAt = now + backoffMs(failures, random, closeCode);
+  return { ...connection, failures, closeCode, socket: { kind: 'closed', retryAt } };
+}
+
+const silence = (socket: Socket & { kind: 'open' }, now: number): number =>
+  now - (socket.lastFrameAt ?? socket.since);
+
+/** When to send the next tick. */
+export function nextDeadline({ socket }: Connection, now: number): number {
+  switch (socket.kind) {
+    case 'closed':
+      return socket.retryAt;
+    case 'opening':
+      return socket.since + OPENING_MS;
+    case 'open': {
+      const last = socket.lastFrameAt ?? socket.since;
+      return last + (now - last < SILENCE_MS ? SILENCE_MS : DEAD_MS);
+    }
+  }
+}
+
+export function phaseOf(connection: Connection, now: number): Phase {
+  const { socket, status } = connection;
+  if (socket.kind === 'open' && socket.lastFrameAt !== null) {
+    if (silence(socket, now) >= SILENCE_MS) return 'stale';
+    return status?.twin === 'offline' ? 'offline' : 'live';
+  }
+  const first = connection.epoch <= (socket.kind === 'open' ? 1 : 0) && connection.failures === 0;
+  return first ? 'connecting' : 'reconnecting';
+}

@@ -1,0 +1,115 @@
+import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
+
+import type { Frame } from '../contract/types';
+import { stateFrame } from '../testing/tags';
+import { phaseOf, SILENCE_MS, type Connection, type Phase } from './machine';
+import { connect, type Link } from './socket';
+
+class FakeSocket {
+  static readonly made: FakeSocket[] = [];
+  onopen: (() => void) | null = null;
+  onclose: ((event: { code: number }) => void) | null = null;
+  onmessage: ((event: { data: unknown }) => void) | null = null;
+  closed = false;
+
+  constructor(readonly url: string) {
+    FakeSocket.made.push(this);
+  }
+
+  close(): void {
+    this.closed = true;
+  }
+
+  speak(frame: Frame): void {
+    this.onmessage?.({ data: JSON.stringify(frame) });
+  }
+}
+
+let link: Link;
+let frames: Frame[];
+let phases: Phase[];
+const socket = (index: number): FakeSocket => {
+  const made = FakeSocket.made.at(index);
+  if (!made) throw new Error(`no socket ${index}`);
+  return made;
+};
+
+beforeEach(() => {
+  vi.useFakeTimers({ toFake: ['setTimeout', 'clearTimeout', 'performance'] });
+  vi.stubGlobal('WebSocket', FakeSocket);
+  FakeSocket.made.length = 0;
+  frames = [];
+  phases = [];
+  link = connect('ws://test/ws/state', {
+    onConnection: (connection: Connection) => {
+      const phase = phaseOf(connection, performance.now());
+      if (phases.at(-1) !== phase) phases.push(phase);
+    },
+    onFrame: (frame) => frames.push(frame),
+  });
+});
+
+afterEach(() => {
+  link.stop();
+  vi.useRealTimers();
+});
+
+describe('socket shell', () => {
+  test('goes live, goes stale without a word, and reconnects by itself', () => {
+    socket(0).onopen?.();
+    socket(0).speak(stateFrame([]));
+    expect(phases).toEqual(['connecting', 'live']);
+    vi.advanceTimersByTime(SILENCE_MS + 10);
+    expect(phases.at(-1)).toBe('stale');
+    vi.advanceTimersByTime(30_000);
+    expect(phases.at(-1)).toBe('reconnecting');
+    expect(FakeSocket.made.length).toBeGreaterThan(1);
+    expect(socket(0).closed).toBe(true);
+  });
+
+  test('a dropped socket is not heard any more', () => {
+    socket(0).onopen?.();
+    vi.advanceTimersByTime(20_000);
+    socket(0).speak(stateFrame([]));
+    expect(frames).toEqual([]);
+  });
+
+  test('takes up again with a server that counts anew', () => {
+    socket(0).onopen?.();
+    socket(0).speak(stateFrame([], { seq: 500 }));
+    socket(0).onclose?.({ code: 1012 });
+    vi.advanceTimersByTime(1_000);
+    socket(-1).onopen?.();
+    socket(-1).speak(stateFrame([], { seq: 1 }));
+    expect(frames).toHaveLength(2);
+    expect(phases.at(-1)).toBe('live');
+  });
+
+  test.each(['online', 'pageshow'])('%s tries at once', (event) => {
+    socket(0).onclose?.({ code: 1006 });
+    expect(FakeSocket.made).toHaveLength(1);
+    window.dispatchEvent(new Event(event));
+    expect(FakeSocket.made).toHaveLength(2);
+  });
+
+  test('the tab becoming visible tries at once', () => {
+    socket(0).onclose?.({ code: 1006 });
+    document.dispatchEvent(new Event('visibilitychange'));
+    expect(FakeSocket.made).toHaveLength(2);
+  });
+
+  test('passes over what is no frame', () => {
+    socket(0).onopen?.();
+    socket(0).onmessage?.({ data: 'nonsense' });
+    socket(0).onmessage?.({ data: new ArrayBuffer(2) });
+    expect(frames).toEqual([]);
+  });
+
+  test('stopped is stopped', () => {
+    link.stop();
+    window.dispatchEvent(new Event('online'));
+    vi.advanceTimersByTime(60_000);
+    expect(FakeSocket.made).toHaveLength(1);
+    expect(socket(0).closed).toBe(true);
+  });
+});

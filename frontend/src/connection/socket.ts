@@ -1,0 +1,85 @@
+import { parseFrame } from '../contract/frames';
+import type { Frame } from '../contract/types';
+import { INITIAL, nextDeadline, step, type Connection, type ConnectionEvent } from './machine';
+
+export interface ConnectionHandlers {
+  /** The connection changed, or a deadline passed and its phase may have. */
+  readonly onConnection: (connection: Connection) => void;
+  readonly onFrame: (frame: Frame, connection: Connection) => void;
+}
+
+export interface Link {
+  /** Does not wait for the back-off any longer. */
+  readonly retry: () => void;
+  readonly stop: () => void;
+}
+
+/** The thin shell around `machine.ts`: one socket, one timer, the browser's wake-up events. */
+export function connect(url: string, handlers: ConnectionHandlers): Link {
+  let connection = INITIAL;
+  let socket: WebSocket | null = null;
+  let timer: ReturnType<typeof setTimeout> | undefined;
+
+  const send = (event: ConnectionEvent): void => {
+    const { connection: next, command } = step(connection, event);
+    connection = next;
+    if (command !== null) drop();
+    if (command === 'reopen') open();
+    clearTimeout(timer);
+    timer = setTimeout(tick, Math.max(0, nextDeadline(connection, event.now) - event.now));
+    handlers.onConnection(connection);
+  };
+
+  const tick = (): void => {
+    send({ type: 'tick', now: performance.now(), random: Math.random() });
+  };
+
+  // Handlers are taken off before closing: a dropped socket that still speaks is not heard.
+  const drop = (): void => {
+    if (!socket) return;
+    socket.onopen = socket.onmessage = socket.onclose = null;
+    socket.close();
+    socket = null;
+  };
+
+  const open = (): void => {
+    socket = new WebSocket(url);
+    socket.onopen = () => {
+      send({ type: 'opened', now: performance.now() });
+    };
+    socket.onclose = ({ code }) => {
+      socket = null;
+      send({ type: 'closed', now: performance.now(), code, random: Math.random() });
+    };
+    socket.onmessage = ({ data }) => {
+      const frame = typeof data === 'string' ? parseFrame(data) : null;
+      if (!frame) return;
+      const now = performance.now();
+      send(
+        frame.type === 'status' ? { type: 'frame', now, status: frame } : { type: 'frame', now },
+      );
+      handlers.onFrame(frame, connection);
+    };
+  };
+
+  const retry = (): void => {
+    send({ type: 'wake', now: performance.now() });
+  };
+  const wake = (): void => {
+    if (document.visibilityState === 'visible') retry();
+  };
+  document.addEventListener('visibilitychange', wake);
+  window.addEventListener('online', wake);
+  window.addEventListener('pageshow', wake);
+
+  send({ type: 'start', now: performance.now() });
+
+  const stop = (): void => {
+    document.removeEventListener('visibilitychange', wake);
+    window.removeEventListener('online', wake);
+    window.removeEventListener('pageshow', wake);
+    clearTimeout(timer);
+    drop();
+  };
+  return { retry, stop };
+}

@@ -1,0 +1,109 @@
+/** The bridge's routes. Addresses are relative to the page, so any path prefix works. */
+import type { Field } from '../domain/field';
+import { parseNpy } from './npy';
+import type { OccupancyGrid, TagHistory } from './types';
+
+/** Leave-one-out error of a field: each tag guessed from the others. */
+export interface FieldQuality {
+  readonly sensor: string;
+  /** In the sensor's unit; null: too few tags to judge. */
+  readonly rmse: number | null;
+  readonly judgedCount: number;
+}
+
+/** A refusal by the server, with its reason. */
+export class Refusal extends Error {
+  readonly status: number;
+
+  constructor(status: number, message: string) {
+    super(message);
+    this.name = 'Refusal';
+    this.status = status;
+  }
+}
+
+export const route = (path: string): URL => new URL(path, document.baseURI);
+
+export function stateSocketUrl(): string {
+  const url = route('ws/state');
+  url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
+  url.hash = '';
+  return url.href;
+}
+
+async function get(path: string, signal: AbortSignal, headers?: HeadersInit): Promise<Response> {
+  // "no-cache": the browser asks with its ETag each time, and a 304 costs no body.
+  const response = await fetch(route(path), {
+    signal,
+    cache: 'no-cache',
+    ...(headers ? { headers } : {}),
+  });
+  if (!response.ok) throw new Refusal(response.status, await reasonOf(response));
+  return response;
+}
+
+/** Both kinds of refusal in the contract carry their reason in one field. */
+async function reasonOf(response: Response): Promise<string> {
+  const body: unknown = await response.json().catch(() => null);
+  if (typeof body === 'object' && body !== null) {
+    for (const key of ['error_message', 'detail'] as const) {
+      const text = (body as Record<string, unknown>)[key];
+      if (typeof text === 'string' && text !== '') return text;
+    }
+  }
+  return `${response.status} ${response.statusText}`.trim();
+}
+
+export async function fetchField(
+  query: { readonly sensor: string; readonly resolution: number },
+  signal: AbortSignal,
+): Promise<Field> {
+  const parts = new URLSearchParams({
+    sensor_type: query.sensor,
+    resolution: String(query.resolution),
+  });
+  const response = await get(`api/field.npy?${parts.toString()}`, signal);
+  const grid = parseNpy(await response.arrayBuffer());
+  const header = (name: string): number => {
+    const value = Number(response.headers.get(name) ?? NaN);
+    if (!Number.isFinite(value)) throw new Error(`field: header ${name} is missing or no number`);
+    return value;
+  };
+  return {
+    sensor: query.sensor,
+    width: grid.width,
+    height: grid.height,
+    originX: header('X-Field-Origin-X'),
+    originY: header('X-Field-Origin-Y'),
+    resolution: header('X-Field-Resolution'),
+    valueMin: header('X-Field-Value-Min'),
+    valueMax: header('X-Field-Value-Max'),
+    sampleCount: header('X-Field-Sample-Count'),
+    values: grid.values,
+  };
+}
+
+export async function fetchQuality(
+  sensor: string,
+  signal: AbortSignal,
+): Promise<FieldQuality | null> {
+  const parts = new URLSearchParams({ sensor_type: sensor });
+  const response = await get(`api/field/quality?${parts.toString()}`, signal);
+  const body = (await response.json()) as { rmse: number | null; judged_count: number };
+  return { sensor, rmse: body.rmse, judgedCount: body.judged_count };
+}
+
+export async function fetchMap(signal: AbortSignal): Promise<OccupancyGrid> {
+  const response = await get('api/map', signal);
+  return (await response.json()) as OccupancyGrid;
+}
+
+export async function fetchMapPicture(signal: AbortSignal): Promise<Blob> {
+  const response = await get('api/map.png', signal);
+  return response.blob();
+}
+
+export async function fetchHistory(tagId: string, signal: AbortSignal): Promise<TagHistory> {
+  const response = await get(`api/tags/${encodeURIComponent(tagId)}/history`, signal);
+  return (await response.json()) as TagHistory;
+}

@@ -1,0 +1,31 @@
+import { expect, test } from 'vitest';
+
+import { stateFrame, wireTag } from '../testing/tags';
+import { parseFrame } from './frames';
+
+test('reads both kinds of frame', () => {
+  const frame = stateFrame([wireTag()]);
+  expect(parseFrame(JSON.stringify(frame))).toEqual(frame);
+  const status = {
+    type: 'status',
+    twin: 'offline',
+    reason: 'stale',
+    message: '',
+    state_age_seconds: 4,
+  };
+  expect(parseFrame(JSON.stringify(status))).toEqual(status);
+});
+
+test.each([
+  'no json',
+  'null',
+  '7',
+  '[]',
+  '{"type":"delta"}',
+  '{"type":"state","revision":"r","state":{}}',
+  '{"type":"state","revision":"r","state":null}',
+  '{"type":"state","state":{"tags":[]}}',
+  '{"type":"status"}',
+])('passes over %s', (text) => {
+  expect(parseFrame(text)).toBeNull();
+});

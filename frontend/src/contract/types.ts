@@ -1,0 +1,13 @@
+/** The web contract's types under short names; generated from the server's schema. */
+import type { components } from './openapi.gen';
+
+type Schemas = components['schemas'];
+
+export type StateFrame = Schemas['StateFrame'];
+export type StatusFrame = Schemas['StatusFrame'];
+export type Frame = StateFrame | StatusFrame;
+export type TwinTagState = Schemas['TwinTagState'];
+export type OccupancyGrid = Schemas['OccupancyGrid'];
+export type TagHistory = Schemas['TagHistory'];
+export type WirePoint = Schemas['Point'];
+export type WireTime = Schemas['Time'];

@@ -1,0 +1,103 @@
+import { describe, expect, test } from 'vitest';
+
+import { mapPoint } from '../geometry/coordinates';
+import {
+  fieldPixels,
+  interpolate,
+  resolutionFor,
+  smoothDetail,
+  valueAt,
+  type Field,
+} from './field';
+
+function field(rows: readonly (readonly number[])[]): Field {
+  const width = rows[0]?.length ?? 0;
+  return {
+    sensor: 'temperature',
+    width,
+    height: rows.length,
+    originX: 10,
+    originY: -2,
+    resolution: 0.5,
+    valueMin: 0,
+    valueMax: 10,
+    sampleCount: 3,
+    values: Float32Array.from(rows.flat()),
+  };
+}
+
+/** Row 0, the lowest y, is written first. */
+const small = field([
+  [0, 5, 10],
+  [NaN, 2, 4],
+]);
+const range = { low: 0, high: 10 };
+const alpha = (data: Uint8ClampedArray, pixel: number): number => data[pixel * 4 + 3] ?? -1;
+
+describe('value under a point', () => {
+  test('is that of the cell which holds it', () => {
+    expect(valueAt(small, mapPoint(10.01, -1.99))).toBe(0);
+    expect(valueAt(small, mapPoint(10.51, -1.51))).toBe(5);
+    expect(valueAt(small, mapPoint(11.49, -1.01))).toBe(4);
+  });
+
+  test('is unknown for NaN and outside', () => {
+    expect(valueAt(small, mapPoint(10.2, -1.2))).toBeNull();
+    expect(valueAt(small, mapPoint(9.99, -1.9))).toBeNull();
+    expect(valueAt(small, mapPoint(11.51, -1.9))).toBeNull();
+    expect(valueAt(small, mapPoint(10.2, -0.99))).toBeNull();
+  });
+});
+
+describe('picture', () => {
+  test('has row 0 at the bottom', () => {
+    const { data, width, height } = fieldPixels(small, [200, 10, 20], range, 1);
+    expect([width, height]).toEqual([3, 2]);
+    expect(alpha(data, 5)).toBe(Math.round(255 * 0.6));
+    expect([...data.slice(5 * 4, 5 * 4 + 3)]).toEqual([200, 10, 20]);
+  });
+
+  test('is transparent at the minimum and where nothing is known', () => {
+    const { data } = fieldPixels(small, [200, 10, 20], range, 1);
+    expect(alpha(data, 0)).toBe(0);
+    expect(alpha(data, 3)).toBe(0);
+  });
+
+  test('smooth: no colour bleeds into a cell that is not known, and none out of it', () => {
+    const grid = field([
+      [8, 8, 8],
+      [8, NaN, 8],
+      [8, 8, 8],
+    ]);
+    const detail = 4;
+    const { data, width } = fieldPixels(grid, [1, 2, 3], range, detail);
+    for (let y = 0; y < 3 * detail; y++) {
+      for (let x = 0; x < 3 * detail; x++) {
+        const isHole = Math.floor(x / detail) === 1 && Math.floor(y / detail) === 1;
+        expect(alpha(data, y * width + x)).toBe(isHole ? 0 : Math.round(255 * 0.6 * 0.8));
+      }
+    }
+  });
+
+  test('smooth: goes evenly from one centre to the next', () => {
+    const grid = field([[0, 10]]);
+    expect(interpolate(grid, 0, 0)).toBe(0);
+    expect(interpolate(grid, 0.25, 0)).toBe(2.5);
+    expect(interpolate(grid, 1, 0)).toBe(10);
+    expect(interpolate(grid, -0.5, 0)).toBe(0);
+  });
+});
+
+test('cells stay few enough, and no finer than 5 cm', () => {
+  expect(resolutionFor({ minX: 0, minY: 0, maxX: 7, maxY: 11 }, 60_000)).toBe(0.05);
+  const large = { minX: 0, minY: 0, maxX: 100, maxY: 60 };
+  const step = resolutionFor(large, 60_000);
+  expect(step).toBe(0.5);
+  expect(6000 / step ** 2).toBeLessThanOrEqual(60_000);
+});
+
+test('a smooth picture stays under two million pixels', () => {
+  const grid = { ...small, width: 1000, height: 1000 };
+  expect(smoothDetail(grid)).toBe(1);
+  expect(smoothDetail(small)).toBe(8);
+});

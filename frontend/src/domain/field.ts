@@ -1,0 +1,116 @@
+import { mapPoint, type Bounds, type MapPoint } from '../geometry/coordinates';
+import { RAMP } from './sensors';
+import { fraction, type Range, type Rgb } from './ramp';
+
+/** A reconstructed field of one sensor. */
+export interface Field {
+  readonly sensor: string;
+  /** Cells. */
+  readonly width: number;
+  readonly height: number;
+  /** Lower left corner of cell (0, 0), metres in the map frame. */
+  readonly originX: number;
+  readonly originY: number;
+  /** Metres a cell. */
+  readonly resolution: number;
+  /** Over the known cells, in the sensor's unit; both 0 where there is none. */
+  readonly valueMin: number;
+  readonly valueMax: number;
+  /** Tags that contributed. */
+  readonly sampleCount: number;
+  /** Row-major, row 0 at the bottom (lowest y); not-a-number: not known. */
+  readonly values: Float32Array;
+}
+
+/** The value of the cell that holds the point; null outside the grid and where it is not known. */
+export function valueAt(field: Field, point: MapPoint): number | null {
+  const column = Math.floor((point.x - field.originX) / field.resolution);
+  const row = Math.floor((point.y - field.originY) / field.resolution);
+  if (column < 0 || column >= field.width || row < 0 || row >= field.height) return null;
+  const value = field.values[row * field.width + column];
+  return value === undefined || Number.isNaN(value) ? null : value;
+}
+
+/** The finest round cell size, in metres, that keeps a box under `maxCells` cells. */
+export function resolutionFor(bounds: Bounds, maxCells: number): number {
+  const area = (bounds.maxX - bounds.minX) * (bounds.maxY - bounds.minY);
+  const finest = Math.sqrt(Math.max(0, area) / maxCells);
+  for (const step of [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50]) {
+    if (step >= finest) return step;
+  }
+  return finest;
+}
+
+export interface Pixels {
+  readonly width: number;
+  readonly height: number;
+  /** RGBA, top row first. */
+  readonly data: Uint8ClampedArray<ArrayBuffer>;
+}
+
+/**
+ * Colours a field. Not-a-number is fully transparent. The picture's top row is the grid's last
+ * row. With `detail` above 1 every cell becomes detail x detail pixels whose values are
+ * interpolated between cell centres, in values and not in colours: a picture scaled by the
+ * browser would let colour bleed into cells that are not known.
+ */
+export function fieldPixels(field: Field, colour: Rgb, range: Range, detail: number): Pixels {
+  const width = field.width * detail;
+  const height = field.height * detail;
+  const data = new Uint8ClampedArray(width * height * 4);
+  const scale = 255 * RAMP.maxAlpha;
+  let at = 0;
+  for (let top = 0; top < height; top++) {
+    const y = height - 1 - top;
+    for (let x = 0; x < width; x++, at += 4) {
+      const value =
+        detail === 1
+          ? (field.values[y * field.width + x] ?? NaN)
+          : interpolate(field, (x + 0.5) / detail - 0.5, (y + 0.5) / detail - 0.5);
+      if (Number.isNaN(value)) continue;
+      data[at] = colour[0];
+      data[at + 1] = colour[1];
+      data[at + 2] = colour[2];
+      data[at + 3] = scale * fraction(range, value);
+    }
+  }
+  return { width, height, data };
+}
+
+/**
+ * Value between cell centres, `u` and `v` in cells with the first centre at 0. Not-a-number
+ * where the cell that holds the point is; unknown neighbours have no say.
+ */
+export function interpolate(field: Field, u: number, v: number): number {
+  const { width, height, values } = field;
+  const own = values[Math.round(v) * width + Math.round(u)] ?? NaN;
+  if (Number.isNaN(own)) return NaN;
+  const column = Math.floor(u);
+  const row = Math.floor(v);
+  let sum = 0;
+  let weights = 0;
+  for (let dr = 0; dr < 2; dr++) {
+    const r = row + dr;
+    if (r < 0 || r >= height) continue;
+    for (let dc = 0; dc < 2; dc++) {
+      const c = column + dc;
+      if (c < 0 || c >= width) continue;
+      const value = values[r * width + c] ?? NaN;
+      if (Number.isNaN(value)) continue;
+      const weight = (1 - Math.abs(u - c)) * (1 - Math.abs(v - r));
+      sum += weight * value;
+      weights += weight;
+    }
+  }
+  return weights > 0 ? sum / weights : own;
+}
+
+/** Pixels a cell edge for a smooth picture, so that it stays under two million pixels. */
+export function smoothDetail(field: Field): number {
+  const cells = Math.max(1, field.width * field.height);
+  return Math.max(1, Math.min(8, Math.floor(Math.sqrt(2_000_000 / cells))));
+}
+
+export function fieldOrigin(field: Field): MapPoint {
+  return mapPoint(field.originX, field.originY);
+}

@@ -1,0 +1,39 @@
+import { expect, test } from 'vitest';
+
+import { ageText, metresText, numberText, percentText, readingText } from './format';
+import { sensorNamed } from './sensors';
+
+test.each([
+  [0, '0.0'],
+  [0.042, '0.04'],
+  [-0.004, '0.00'],
+  [21.456, '21.5'],
+  [-3.25, '\u22123.3'],
+  [99.96, '100.0'],
+  [612.4, '612'],
+  [1234567, '1.23e+6'],
+])('%d reads %s', (value, text) => {
+  expect(numberText(value)).toBe(text);
+});
+
+test('a reading holds on to its unit', () => {
+  expect(readingText(sensorNamed('temperature'), 20, 'C')).toBe('20.0\u00a0°C');
+  expect(readingText(sensorNamed('temperature'), 20, 'F')).toBe('68.0\u00a0°F');
+  expect(readingText(sensorNamed('ph'), 7, 'C')).toBe('7.0');
+});
+
+test.each([
+  [0.9, '0\u00a0s'],
+  [59.9, '59\u00a0s'],
+  [60, '1\u00a0min'],
+  [3599, '59\u00a0min'],
+  [3600, '1\u00a0h 0\u00a0min'],
+  [90_061, '1\u00a0d 1\u00a0h'],
+])('%d s is %s old', (seconds, text) => {
+  expect(ageText(seconds)).toBe(text);
+});
+
+test('shares and lengths', () => {
+  expect(percentText(0.847)).toBe('85\u00a0%');
+  expect(metresText(-1.456)).toBe('\u22121.46');
+});

@@ -1,0 +1,62 @@
+import { RAMP, type Sensor } from './sensors';
+
+/** Red, green, blue from 0 to 255. */
+export type Rgb = readonly [number, number, number];
+
+/** Lowest and highest value of a colour scale, in the sensor's unit. */
+export interface Range {
+  readonly low: number;
+  readonly high: number;
+}
+
+/** CSS Color 4, "Converting HSL colors to sRGB". Degrees, percent, percent. */
+export function hslToRgb(hue: number, saturation: number, lightness: number): Rgb {
+  const s = saturation / 100;
+  const l = lightness / 100;
+  const channel = (n: number): number => {
+    const k = (n + hue / 30) % 12;
+    return Math.round(255 * (l - s * Math.min(l, 1 - l) * Math.max(-1, Math.min(k - 3, 9 - k, 1))));
+  };
+  return [channel(0), channel(8), channel(4)];
+}
+
+/** The one colour of a sensor; values differ by how much of it there is. */
+export function sensorColour(sensor: Sensor): Rgb {
+  return hslToRgb(sensor.hue, RAMP.saturation, sensor.lightness);
+}
+
+/**
+ * Where a value lies in a range, from 0 to 1 and clamped. A range of no width gives 1: a house
+ * with one reading shows where that reading reaches, as the bridge's PNG does.
+ */
+export function fraction(range: Range, value: number): number {
+  const width = range.high - range.low;
+  if (!(width > 0)) return value >= range.low ? 1 : 0;
+  return Math.min(1, Math.max(0, (value - range.low) / width));
+}
+
+/** Alpha of the heat map, 0 to 1: transparent at the minimum, `max_alpha` at the maximum. */
+export function fieldAlpha(range: Range, value: number): number {
+  return RAMP.maxAlpha * fraction(range, value);
+}
+
+export function mix(from: Rgb, to: Rgb, share: number): Rgb {
+  const channel = (a: number, b: number): number => Math.round(a + (b - a) * share);
+  return [channel(from[0], to[0]), channel(from[1], to[1]), channel(from[2], to[2])];
+}
+
+export function rgbText([r, g, b]: Rgb, alpha = 1): string {
+  return alpha === 1 ? `rgb(${r} ${g} ${b})` : `rgb(${r} ${g} ${b} / ${alpha})`;
+}
+
+/** Smallest range around the finite values; null without any. */
+export function rangeOf(values: Iterable<number | null | undefined>): Range | null {
+  let low = Infinity;
+  let high = -Infinity;
+  for (const value of values) {
+    if (value === null || value === undefined || !Number.isFinite(value)) continue;
+    low = Math.min(low, value);
+    high = Math.max(high, value);
+  }
+  return low <= high ? { low, high } : null;
+}

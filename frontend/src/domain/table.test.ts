@@ -1,0 +1,75 @@
+import { describe, expect, test } from 'vitest';
+
+import { readings, tag } from '../testing/tags';
+import { houseHealth } from './health';
+import { sensorNamed } from './sensors';
+import { filterRows, rowsOf, sortRows, tableCsv, type Row } from './table';
+
+const tags = [
+  tag({ tag_id: '2', readings: readings({ temperature: 20 }), species: 'rose' }),
+  tag({ tag_id: '10', readings: readings({ temperature: 35 }), anomaly: true, bug_count: 3 }),
+  tag({ tag_id: '9', readings: readings({ humidity: 60 }), stale_seconds: 80 }),
+  tag({
+    tag_id: '1',
+    stale_seconds: null,
+    pose: { position: { x: 0, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 0 } },
+  }),
+];
+const rows = rowsOf(tags, houseHealth(tags));
+const ids = (list: readonly Row[]): string[] => list.map((row) => row.tag.id);
+
+describe('sorting', () => {
+  test('ids by number', () => {
+    expect(ids(sortRows(rows, { column: 'tag', descending: false }))).toEqual([
+      '1',
+      '2',
+      '9',
+      '10',
+    ]);
+  });
+
+  test('what has no value is last in both directions', () => {
+    const up = ids(sortRows(rows, { column: 'temperature', descending: false }));
+    const down = ids(sortRows(rows, { column: 'temperature', descending: true }));
+    expect(up).toEqual(['2', '10', '1', '9']);
+    expect(down).toEqual(['10', '2', '1', '9']);
+  });
+
+  test.each([
+    ['health', '10'],
+    ['pest', '10'],
+    ['age', '9'],
+    ['species', '2'],
+  ])('by %s, highest first', (column, first) => {
+    expect(ids(sortRows(rows, { column, descending: true }))[0]).toBe(first);
+  });
+});
+
+describe('filter', () => {
+  test.each([
+    ['', ['2', '10', '9', '1']],
+    ['ROSE', ['2']],
+    ['pest', ['10']],
+    ['no pin', ['1']],
+    ['humid', ['9']],
+    ['critical temp', ['10']],
+    ['rose pest', []],
+  ])('%j', (text, expected) => {
+    expect(ids(filterRows(rows, text, null))).toEqual(expected);
+  });
+
+  test('by health', () => {
+    expect(ids(filterRows(rows, '', 'no-data'))).toEqual(['1']);
+  });
+});
+
+test('the file has every tag, values in the shown unit, and ages of now', () => {
+  const sensors = [sensorNamed('temperature'), sensorNamed('humidity')];
+  const text = tableCsv(rows, sensors, 'F', 10);
+  const lines = text.split('\r\n');
+  expect(lines[0]).toContain('Temperature [°F],Humidity [%]');
+  expect(lines).toHaveLength(1 + tags.length + 1);
+  expect(lines[1]).toBe('2,Healthy,Temperature,68,,rose,,0,0,no,15,1,2');
+  expect(lines[2]).toBe('10,Critical,Temperature,95,,,,0,3,yes,15,1,2');
+  expect(lines[4]).toBe('1,No data,,,,,,0,0,no,,,');
+});

@@ -1,0 +1,139 @@
+/** Rows of the table: what is in a column, how it sorts, what a filter finds. */
+import { S } from '../strings';
+import { csv, type Cell } from './csv';
+import type { HealthStatus, HouseHealth, TagHealth } from './health';
+import { sensorNamed, type Sensor } from './sensors';
+import { compareIds, type Tag } from './twin';
+import { toShown, unitOf, type TemperatureUnit } from './units';
+
+export interface Row {
+  readonly tag: Tag;
+  readonly health: TagHealth;
+}
+
+export function rowsOf(tags: readonly Tag[], health: HouseHealth): Row[] {
+  return tags.flatMap((tag) => {
+    const own = health.byTag.get(tag.id);
+    return own ? [{ tag, health: own }] : [];
+  });
+}
+
+type Key = number | string | null;
+
+/** What a column sorts by; null sorts last in both directions. */
+export function sortKey({ tag, health }: Row, column: string): Key {
+  switch (column) {
+    case 'health':
+      return health.deviation;
+    case 'tag':
+      return tag.id;
+    case 'species':
+      return tag.species || null;
+    case 'flowers':
+      return tag.staleSeconds === null ? null : tag.flowerCount;
+    case 'pest':
+      return tag.anomaly ? 1 + tag.bugCount : 0;
+    case 'age':
+      return tag.staleSeconds;
+    default:
+      return tag.readings.get(column) ?? null;
+  }
+}
+
+export function sortRows(
+  rows: readonly Row[],
+  { column, descending }: { readonly column: string; readonly descending: boolean },
+): Row[] {
+  const direction = descending ? -1 : 1;
+  return [...rows].sort((a, b) => {
+    const ka = sortKey(a, column);
+    const kb = sortKey(b, column);
+    if (ka === null || kb === null) {
+      if (ka !== kb) return ka === null ? 1 : -1;
+    } else {
+      const order =
+        typeof ka === 'number' && typeof kb === 'number'
+          ? ka - kb
+          : compareIds(String(ka), String(kb));
+      if (order !== 0) return direction * order;
+    }
+    return compareIds(a.tag.id, b.tag.id);
+  });
+}
+
+/** Rows of that health, or of any, in which every word of the text occurs. */
+export function filterRows(
+  rows: readonly Row[],
+  text: string,
+  health: HealthStatus | null,
+): readonly Row[] {
+  const words = text.toLowerCase().split(/\s+/).filter(Boolean);
+  return rows.filter(
+    (row) =>
+      (health === null || row.health.status === health) &&
+      words.every((word) => haystack(row).includes(word)),
+  );
+}
+
+function haystack({ tag, health }: Row): string {
+  return [
+    tag.id,
+    tag.species || S.unclassified,
+    S.health[health.status],
+    tag.anomaly ? S.pest : '',
+    tag.at ? '' : S.notOnMap,
+    tag.staleSeconds === null ? S.neverObserved : '',
+    ...[...tag.readings.keys()].map((name) => `${name} ${sensorNamed(name).label}`),
+  ]
+    .join(' ')
+    .toLowerCase();
+}
+
+/** The table as a file: raw values at full precision, in the units that the page shows. */
+export function tableCsv(
+  rows: readonly Row[],
+  sensors: readonly Sensor[],
+  unit: TemperatureUnit,
+  /** Seconds passed since the snapshot was taken. */
+  elapsedSeconds: number,
+): string {
+  const T = S.csv;
+  const header: Cell[] = [
+    T.tag,
+    T.health,
+    T.driver,
+    ...sensors.map((sensor) => {
+      const suffix = unitOf(sensor, unit);
+      return suffix ? `${sensor.label} [${suffix}]` : sensor.label;
+    }),
+    T.species,
+    T.confidence,
+    T.flowers,
+    T.bugs,
+    T.pest,
+    T.age,
+    T.x,
+    T.y,
+  ];
+  const lines = rows.map(({ tag, health }): Cell[] => [
+    tag.id,
+    S.health[health.status],
+    health.sensor === null ? null : sensorNamed(health.sensor).label,
+    ...sensors.map((sensor): Cell => {
+      const value = tag.readings.get(sensor.name);
+      return value == null ? null : round(toShown(sensor, value, unit));
+    }),
+    tag.species || null,
+    tag.speciesConfidence === null ? null : round(tag.speciesConfidence),
+    tag.flowerCount,
+    tag.bugCount,
+    tag.anomaly ? T.yes : T.no,
+    tag.staleSeconds === null ? null : Math.round(tag.staleSeconds + elapsedSeconds),
+    tag.at && round(tag.at.x),
+    tag.at && round(tag.at.y),
+  ]);
+  return csv([header, ...lines]);
+}
+
+/** Drops the noise of binary fractions (float32 23.4 is 23.399999618530273). */
+const round = (value: number): number => Number(value.toPrecision(7));

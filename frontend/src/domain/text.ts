@@ -1,0 +1,26 @@
+/**
+ * Strings from the wire are a stranger's. React and fillText never run them as markup; this
+ * takes the rest: characters that move or hide other text, and lengths that break a layout.
+ */
+
+// C0 and C1 controls, soft hyphen, zero-width characters, line and paragraph separators, marks
+// and overrides of writing direction, invisible operators, byte-order mark, tag characters.
+const INVISIBLE =
+  /[\p{Cc}\p{Cs}\u00ad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\u{e0000}-\u{e007f}]/gu;
+/** More than this many combining marks on one letter reach into other lines. */
+const STACKED_MARKS = /(\p{M}{3})\p{M}+/gu;
+
+const REPLACEMENT = '\ufffd';
+const LONGEST = 80;
+
+/** Text fit to show: nothing invisible, marks bounded, at most `longest` characters. */
+export function shown(text: string, longest = LONGEST): string {
+  // Cut first: a megabyte needs no cleaning to show eighty characters.
+  const clean = text
+    .slice(0, longest * 8)
+    .replace(INVISIBLE, REPLACEMENT)
+    .replace(STACKED_MARKS, '$1')
+    .trim();
+  const letters = Array.from(clean);
+  return letters.length > longest ? `${letters.slice(0, longest - 1).join('')}…` : clean;
+}

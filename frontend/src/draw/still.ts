@@ -1,0 +1,130 @@
+/** What changes only with the data or the view: ground, SLAM map, heat map, grid, boxes. */
+import type { Field } from '../domain/field';
+import { mix, rgbText } from '../domain/ramp';
+import { canvasPoint, toCanvas, toMap, type MapPoint, type View } from '../geometry/coordinates';
+import { imageToCanvas, type Placement } from '../geometry/image';
+import { gridStep, lengthText } from '../geometry/scale';
+import type { Palette } from './palette';
+import { canvasOfPixels, type Surface } from './surface';
+
+export function drawGround({ context, size }: Surface, palette: Palette): void {
+  context.fillStyle = rgbText(palette.ground);
+  context.fillRect(0, 0, size.width, size.height);
+}
+
+/** The SLAM map in the theme's colours: its grey becomes the way from wall to floor. */
+export function tintMap(pixels: ImageData, palette: Palette): HTMLCanvasElement {
+  const source = pixels.data;
+  const data = new Uint8ClampedArray(source.length);
+  const tones = Array.from({ length: 256 }, (_, grey) =>
+    mix(palette.wall, palette.floor, grey / 255),
+  );
+  for (let i = 0; i < source.length; i += 4) {
+    const alpha = source[i + 3] ?? 0;
+    if (alpha === 0) continue;
+    const tone = tones[source[i] ?? 0] ?? palette.floor;
+    data[i] = tone[0];
+    data[i + 1] = tone[1];
+    data[i + 2] = tone[2];
+    data[i + 3] = alpha;
+  }
+  return canvasOfPixels({ data, width: pixels.width, height: pixels.height });
+}
+
+/** Draws a picture that lies in the map, cell for cell and never blurred. */
+export function drawPicture(
+  { context, ratio }: Surface,
+  view: View,
+  picture: HTMLCanvasElement,
+  placement: Placement,
+): void {
+  const [a, b, c, d, e, f] = imageToCanvas(placement, view);
+  context.save();
+  context.transform(a, b, c, d, e, f);
+  context.imageSmoothingEnabled = view.scale * placement.resolution * ratio < 1;
+  context.drawImage(picture, 0, 0);
+  context.restore();
+}
+
+export function fieldPlacement(field: Field, picture: HTMLCanvasElement): Placement {
+  const detail = picture.width / Math.max(1, field.width);
+  return {
+    originX: field.originX,
+    originY: field.originY,
+    yaw: 0,
+    resolution: field.resolution / detail,
+    width: picture.width,
+    height: picture.height,
+  };
+}
+
+const GRID_GAP_PX = 56;
+
+/** Lines at round metres, with the numbers along the left and the upper edge. */
+export function drawGrid({ context, size }: Surface, view: View, palette: Palette): void {
+  const step = gridStep(view.scale, GRID_GAP_PX);
+  const topLeft = toMap(view, canvasPoint(0, 0));
+  const bottomRight = toMap(view, canvasPoint(size.width, size.height));
+  const columns = multiples(topLeft.x, bottomRight.x, step);
+  const rows = multiples(bottomRight.y, topLeft.y, step);
+  const sharp = (value: number): number => Math.round(value) + 0.5;
+
+  context.strokeStyle = palette.gridLine;
+  context.lineWidth = 1;
+  context.beginPath();
+  for (const x of columns) {
+    const at = sharp(view.x + x * view.scale);
+    context.moveTo(at, 0);
+    context.lineTo(at, size.height);
+  }
+  for (const y of rows) {
+    const at = sharp(view.y - y * view.scale);
+    context.moveTo(0, at);
+    context.lineTo(size.width, at);
+  }
+  context.stroke();
+
+  context.fillStyle = palette.gridText;
+  context.font = '500 10.5px "Inter Variable", system-ui, sans-serif';
+  context.textBaseline = 'top';
+  context.textAlign = 'left';
+  for (const x of columns) context.fillText(tick(x), view.x + x * view.scale + 4, 4);
+  context.textBaseline = 'bottom';
+  for (const y of rows) {
+    const at = view.y - y * view.scale - 2;
+    if (at > 28) context.fillText(tick(y), 4, at);
+  }
+}
+
+function multiples(from: number, to: number, step: number): number[] {
+  const values: number[] = [];
+  for (let i = Math.ceil(from / step); i * step <= to; i++) values.push(i * step);
+  return values;
+}
+
+const tick = (metres: number): string =>
+  (metres < 0 ? '\u2212' : '') +
+  (Math.abs(metres) < 1e-9 ? '0' : lengthText(Math.abs(metres))).replace('\u00a0', ' ');
+
+/** Outlines of the planter boxes; several tags of one box draw it once. */
+export function drawBoxes(
+  { context }: Surface,
+  view: View,
+  boxes: readonly (readonly MapPoint[])[],
+  palette: Palette,
+): void {
+  context.fillStyle = palette.boxFill;
+  context.strokeStyle = palette.boxLine;
+  context.lineWidth = 1.25;
+  context.beginPath();
+  for (const box of boxes) {
+    box.forEach((corner, index) => {
+      const { x, y } = toCanvas(view, corner);
+      if (index === 0) context.moveTo(x, y);
+      else context.lineTo(x, y);
+    });
+    context.closePath();
+  }
+  context.fill();
+  context.stroke();
+}

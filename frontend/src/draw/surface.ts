@@ -1,0 +1,84 @@
+import type { Size } from '../geometry/coordinates';
+
+/** A canvas ready to draw on in CSS pixels. */
+export interface Surface {
+  readonly context: CanvasRenderingContext2D;
+  readonly size: Size;
+  /** Device pixels a CSS pixel. */
+  readonly ratio: number;
+}
+
+export function newCanvas(width: number, height: number): HTMLCanvasElement {
+  const canvas = document.createElement('canvas');
+  canvas.width = Math.max(1, Math.round(width));
+  canvas.height = Math.max(1, Math.round(height));
+  return canvas;
+}
+
+export function contextOf(canvas: HTMLCanvasElement): CanvasRenderingContext2D {
+  const context = canvas.getContext('2d');
+  if (!context) throw new Error('this browser has no 2d canvas');
+  return context;
+}
+
+/** Goes back to CSS pixels and empties the canvas. */
+export function clear({ context, size, ratio }: Surface): void {
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.globalAlpha = 1;
+  context.clearRect(0, 0, size.width, size.height);
+}
+
+export function canvasOfPixels(pixels: {
+  readonly data: Uint8ClampedArray<ArrayBuffer>;
+  readonly width: number;
+  readonly height: number;
+}): HTMLCanvasElement {
+  const canvas = newCanvas(pixels.width, pixels.height);
+  if (pixels.width > 0 && pixels.height > 0) {
+    contextOf(canvas).putImageData(new ImageData(pixels.data, pixels.width, pixels.height), 0, 0);
+  }
+  return canvas;
+}
+
+/**
+ * Small pictures painted once and then only copied: without a GPU a copy is many times cheaper
+ * than a path. Emptied when it grows beyond `limit`, so that a page of days stays small.
+ */
+export class Sprites {
+  readonly #sprites = new Map<string, HTMLCanvasElement>();
+  readonly #ratio: number;
+  readonly #limit: number;
+
+  constructor(ratio: number, limit = 2_000) {
+    this.#ratio = ratio;
+    this.#limit = limit;
+  }
+
+  get(
+    key: string,
+    width: number,
+    height: number,
+    paint: (context: CanvasRenderingContext2D) => void,
+  ): HTMLCanvasElement {
+    const known = this.#sprites.get(key);
+    if (known) return known;
+    if (this.#sprites.size >= this.#limit) this.#sprites.clear();
+    const sprite = newCanvas(Math.ceil(width) * this.#ratio, Math.ceil(height) * this.#ratio);
+    const context = contextOf(sprite);
+    context.scale(this.#ratio, this.#ratio);
+    paint(context);
+    this.#sprites.set(key, sprite);
+    return sprite;
+  }
+
+  /** Copies a sprite with its top left corner at (x, y) CSS pixels, on whole device pixels. */
+  draw({ context, ratio }: Surface, sprite: HTMLCanvasElement, x: number, y: number): void {
+    context.drawImage(
+      sprite,
+      Math.round(x * ratio) / ratio,
+      Math.round(y * ratio) / ratio,
+      sprite.width / ratio,
+      sprite.height / ratio,
+    );
+  }
+}

@@ -1,0 +1,19 @@
+import { S } from '../strings';
+
+/** Hands a file to the browser's download. */
+export function save(blob: Blob, name: string): void {
+  const link = document.createElement('a');
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  // The download has its own reference by then; a minute is ample for a slow one to start.
+  setTimeout(() => {
+    URL.revokeObjectURL(link.href);
+  }, 60_000);
+}
+
+/** A name that sorts by time and is legal everywhere: 2026-05-01T14-03-22. */
+export function fileName(kind: string, extension: string, epochMs: number): string {
+  const stamp = new Date(epochMs).toISOString().slice(0, 19).replaceAll(':', '-');
+  return `${S.fileName(kind, stamp)}.${extension}`;
+}

@@ -1,0 +1,82 @@
+import { describe, expect, test } from 'vitest';
+
+import {
+  boundsOf,
+  cameraOf,
+  canvasPoint,
+  corners,
+  fit,
+  MAX_SCALE,
+  mapPoint,
+  toCanvas,
+  toMap,
+  viewOf,
+} from './coordinates';
+
+const view = { x: 100, y: 300, scale: 50 };
+
+describe('map and canvas', () => {
+  test('y grows upwards in the map and downwards on the canvas', () => {
+    expect(toCanvas(view, mapPoint(1, 2))).toEqual({ x: 150, y: 200 });
+    expect(toCanvas(view, mapPoint(1, 3)).y).toBeLessThan(toCanvas(view, mapPoint(1, 2)).y);
+  });
+
+  test('the two conversions undo each other', () => {
+    expect(toMap(view, toCanvas(view, mapPoint(-3.25, 7.5)))).toEqual({ x: -3.25, y: 7.5 });
+    expect(toCanvas(view, toMap(view, canvasPoint(17, 23)))).toEqual({ x: 17, y: 23 });
+  });
+});
+
+describe('fit', () => {
+  const size = { width: 600, height: 800 };
+  const insets = { top: 10, right: 60, bottom: 40, left: 20 };
+  const bounds = { minX: -1, minY: 0, maxX: 3, maxY: 8 };
+
+  test('shows all of the bounds within what the insets leave', () => {
+    const fitted = fit(bounds, size, insets);
+    for (const corner of corners(bounds)) {
+      const { x, y } = toCanvas(fitted, corner);
+      expect(x).toBeGreaterThanOrEqual(insets.left - 1e-9);
+      expect(x).toBeLessThanOrEqual(size.width - insets.right + 1e-9);
+      expect(y).toBeGreaterThanOrEqual(insets.top - 1e-9);
+      expect(y).toBeLessThanOrEqual(size.height - insets.bottom + 1e-9);
+    }
+  });
+
+  test('fills the tighter side', () => {
+    expect(fit(bounds, size, insets).scale).toBeCloseTo((800 - 50) / 8);
+  });
+
+  test('a single tag is not magnified without end', () => {
+    const dot = { minX: 2, minY: 2, maxX: 2, maxY: 2 };
+    expect(fit(dot, size, insets).scale).toBeLessThan(MAX_SCALE);
+  });
+});
+
+test('bounds of points, and of none', () => {
+  expect(boundsOf([mapPoint(1, 5), mapPoint(-2, 3)])).toEqual({
+    minX: -2,
+    minY: 3,
+    maxX: 1,
+    maxY: 5,
+  });
+  expect(boundsOf([])).toBeNull();
+});
+
+describe('a camera does not depend on the screen', () => {
+  test('it survives the way to a view and back', () => {
+    const size = { width: 600, height: 800 };
+    const camera = { x: 1.5, y: 4, span: 6 };
+    const back = cameraOf(viewOf(camera, size), size);
+    expect(back.x).toBeCloseTo(1.5);
+    expect(back.y).toBeCloseTo(4);
+    expect(back.span).toBeCloseTo(6);
+  });
+
+  test('on another screen it has the same centre and the same metres across', () => {
+    const small = { width: 300, height: 200 };
+    const shown = viewOf({ x: 1.5, y: 4, span: 6 }, small);
+    expect(toMap(shown, canvasPoint(150, 100))).toEqual({ x: 1.5, y: 4 });
+    expect(200 / shown.scale).toBeCloseTo(6);
+  });
+});

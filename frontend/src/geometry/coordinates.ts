@@ -1,0 +1,118 @@
+/**
+ * Two frames and the one pair of conversions between them.
+ *
+ * `MapPoint`: metres in the map frame, x right, y up. `CanvasPoint`: CSS pixels in the map view,
+ * x right, y down. The branding makes a mix-up a compile error; the flip of y happens here and
+ * nowhere else.
+ */
+export type MapPoint = Readonly<{ x: number; y: number }> & { readonly __frame: 'map' };
+export type CanvasPoint = Readonly<{ x: number; y: number }> & { readonly __frame: 'canvas' };
+
+export const mapPoint = (x: number, y: number): MapPoint => ({ x, y }) as MapPoint;
+export const canvasPoint = (x: number, y: number): CanvasPoint => ({ x, y }) as CanvasPoint;
+
+/**
+ * Where the map is on the canvas: the map's origin lies at (x, y) pixels, one metre is `scale`
+ * pixels. The same numbers as a d3-zoom transform over the coordinates (x, -y) in metres.
+ */
+export interface View {
+  readonly x: number;
+  readonly y: number;
+  readonly scale: number;
+}
+
+export interface Size {
+  readonly width: number;
+  readonly height: number;
+}
+
+/** An upright box in metres. */
+export interface Bounds {
+  readonly minX: number;
+  readonly minY: number;
+  readonly maxX: number;
+  readonly maxY: number;
+}
+
+/** Pixels to leave free at each side when fitting. */
+export interface Insets {
+  readonly top: number;
+  readonly right: number;
+  readonly bottom: number;
+  readonly left: number;
+}
+
+export function toCanvas(view: View, point: MapPoint): CanvasPoint {
+  return canvasPoint(view.x + point.x * view.scale, view.y - point.y * view.scale);
+}
+
+export function toMap(view: View, point: CanvasPoint): MapPoint {
+  return mapPoint((point.x - view.x) / view.scale, (view.y - point.y) / view.scale);
+}
+
+/** Smallest box around all points; null without any. */
+export function boundsOf(points: Iterable<MapPoint>): Bounds | null {
+  let minX = Infinity;
+  let minY = Infinity;
+  let maxX = -Infinity;
+  let maxY = -Infinity;
+  for (const { x, y } of points) {
+    minX = Math.min(minX, x);
+    minY = Math.min(minY, y);
+    maxX = Math.max(maxX, x);
+    maxY = Math.max(maxY, y);
+  }
+  return minX <= maxX ? { minX, minY, maxX, maxY } : null;
+}
+
+export function corners(bounds: Bounds): MapPoint[] {
+  return [
+    mapPoint(bounds.minX, bounds.minY),
+    mapPoint(bounds.maxX, bounds.minY),
+    mapPoint(bounds.maxX, bounds.maxY),
+    mapPoint(bounds.minX, bounds.maxY),
+  ];
+}
+
+export const MIN_SCALE = 4;
+export const MAX_SCALE = 2000;
+/** A single tag has a box of no size; a fit shows at least this much around it, in metres. */
+const MIN_EXTENT_M = 2;
+
+const clampScale = (scale: number): number => Math.min(MAX_SCALE, Math.max(MIN_SCALE, scale));
+
+/** The view that shows all of `bounds`, centred in what the insets leave free. */
+export function fit(bounds: Bounds, size: Size, insets: Insets): View {
+  const width = Math.max(1, size.width - insets.left - insets.right);
+  const height = Math.max(1, size.height - insets.top - insets.bottom);
+  const extentX = Math.max(MIN_EXTENT_M, bounds.maxX - bounds.minX);
+  const extentY = Math.max(MIN_EXTENT_M, bounds.maxY - bounds.minY);
+  const scale = clampScale(Math.min(width / extentX, height / extentY));
+  const centre = mapPoint((bounds.minX + bounds.maxX) / 2, (bounds.minY + bounds.maxY) / 2);
+  return {
+    scale,
+    x: insets.left + width / 2 - centre.x * scale,
+    y: insets.top + height / 2 + centre.y * scale,
+  };
+}
+
+/** A view independent of the screen: its centre, and the metres across the shorter side. */
+export interface Camera {
+  readonly x: number;
+  readonly y: number;
+  readonly span: number;
+}
+
+export function cameraOf(view: View, size: Size): Camera {
+  const centre = toMap(view, canvasPoint(size.width / 2, size.height / 2));
+  return { x: centre.x, y: centre.y, span: Math.min(size.width, size.height) / view.scale };
+}
+
+export function viewOf(camera: Camera, size: Size): View {
+  const scale = clampScale(Math.min(size.width, size.height) / camera.span);
+  return {
+    scale,
+    x: size.width / 2 - camera.x * scale,
+    y: size.height / 2 + camera.y * scale,
+  };
+}

@@ -1,0 +1,118 @@
+/**
+ * Placing labels so that they do not pile up: each tries its longest text and its places in
+ * turn, and is left out when nothing is free. Important ones come first. Works in pixels
+ * relative to the map's origin, so a pan reuses the result.
+ */
+export interface LabelRequest {
+  readonly id: string;
+  /** Centre of the pin, pixels. */
+  readonly x: number;
+  readonly y: number;
+  /** Half of the pin's size, pixels. */
+  readonly radius: number;
+  /** Higher is placed first. */
+  readonly priority: number;
+  /** Texts from the most to the least telling, each with its width in pixels. */
+  readonly texts: readonly { readonly text: string; readonly width: number }[];
+}
+
+export interface PlacedLabel {
+  readonly id: string;
+  readonly text: string;
+  /** Top left corner, pixels. */
+  readonly x: number;
+  readonly y: number;
+  readonly width: number;
+}
+
+interface Box {
+  readonly left: number;
+  readonly top: number;
+  readonly right: number;
+  readonly bottom: number;
+}
+
+const GAP = 4;
+const BUCKET = 64;
+
+export function placeLabels(requests: readonly LabelRequest[], height: number): PlacedLabel[] {
+  const taken = new Buckets();
+  for (const { x, y, radius } of requests) {
+    const r = radius * 0.8;
+    taken.add({ left: x - r, top: y - r, right: x + r, bottom: y + r });
+  }
+  const ordered = requests
+    .map((request, index) => ({ request, index }))
+    .sort((a, b) => b.request.priority - a.request.priority || a.index - b.index);
+
+  const placed: PlacedLabel[] = [];
+  for (const { request } of ordered) {
+    const spot = firstFree(request, height, taken);
+    if (!spot) continue;
+    taken.add(spot.box);
+    placed.push({
+      id: request.id,
+      text: spot.text,
+      x: spot.box.left,
+      y: spot.box.top,
+      width: spot.box.right - spot.box.left,
+    });
+  }
+  return placed;
+}
+
+function firstFree(
+  { x, y, radius, texts }: LabelRequest,
+  height: number,
+  taken: Buckets,
+): { text: string; box: Box } | null {
+  const reach = radius + GAP;
+  for (const { text, width } of texts) {
+    const corners: readonly (readonly [number, number])[] = [
+      [x + reach, y - height / 2],
+      [x - reach - width, y - height / 2],
+      [x - width / 2, y - reach - height],
+      [x - width / 2, y + reach],
+    ];
+    for (const [left, top] of corners) {
+      const box = { left, top, right: left + width, bottom: top + height };
+      if (taken.isFree(box)) return { text, box };
+    }
+  }
+  return null;
+}
+
+/** Boxes by the squares they touch, so that a thousand labels do not cost a million checks. */
+class Buckets {
+  readonly #boxes = new Map<string, Box[]>();
+
+  add(box: Box): void {
+    for (const key of keys(box)) {
+      const list = this.#boxes.get(key);
+      if (list) list.push(box);
+      else this.#boxes.set(key, [box]);
+    }
+  }
+
+  isFree(box: Box): boolean {
+    for (const key of keys(box)) {
+      for (const other of this.#boxes.get(key) ?? []) {
+        const apart =
+          box.right <= other.left ||
+          other.right <= box.left ||
+          box.bottom <= other.top ||
+          other.bottom <= box.top;
+        if (!apart) return false;
+      }
+    }
+    return true;
+  }
+}
+
+function* keys(box: Box): Generator<string> {
+  for (let i = Math.floor(box.left / BUCKET); i <= Math.floor(box.right / BUCKET); i++) {
+    for (let j = Math.floor(box.top / BUCKET); j <= Math.floor(box.bottom / BUCKET); j++) {
+      yield `${i}:${j}`;
+    }
+  }
+}

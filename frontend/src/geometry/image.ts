@@ -1,0 +1,121 @@
+import type { OccupancyGrid } from '../contract/types';
+import { mapPoint, type Bounds, type MapPoint, type View } from './coordinates';
+
+/** Canvas transform (a, b, c, d, e, f) as CanvasRenderingContext2D.setTransform takes it. */
+export type Affine = readonly [number, number, number, number, number, number];
+
+/** Where an upright or turned picture lies in the map: its lower left corner, size and yaw. */
+export interface Placement {
+  /** Lower left corner of the grid's cell (0, 0), metres in the map frame. */
+  readonly originX: number;
+  readonly originY: number;
+  /** Turn about that corner, radians, counter-clockwise. */
+  readonly yaw: number;
+  /** Metres a pixel. */
+  readonly resolution: number;
+  /** Pixels. */
+  readonly width: number;
+  readonly height: number;
+}
+
+/** Yaw of a rotation about z; a quaternion of zeros counts as no turn. */
+export function yawOf(q: {
+  x: number | null;
+  y: number | null;
+  z: number | null;
+  w: number | null;
+}): number {
+  const x = q.x ?? 0;
+  const y = q.y ?? 0;
+  const z = q.z ?? 0;
+  const w = q.w ?? 0;
+  return Math.atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z);
+}
+
+export function mapPlacement(grid: OccupancyGrid): Placement {
+  const { origin, resolution, width, height } = grid.info;
+  return {
+    originX: origin.position.x ?? 0,
+    originY: origin.position.y ?? 0,
+    yaw: yawOf(origin.orientation),
+    resolution,
+    width,
+    height,
+  };
+}
+
+/**
+ * Takes a picture's pixels (column, row from the top) to canvas pixels. The picture's top row is
+ * the grid's last row: pixel (column, row) lies at ((column), (height - row)) * resolution in
+ * the grid, which is then turned by yaw and moved to the origin.
+ */
+export function imageToCanvas(placement: Placement, view: View): Affine {
+  const { originX, originY, yaw, resolution, height } = placement;
+  const cos = Math.cos(yaw) * resolution;
+  const sin = Math.sin(yaw) * resolution;
+  const leftTopX = originX - sin * height;
+  const leftTopY = originY + cos * height;
+  return [
+    cos * view.scale,
+    -sin * view.scale,
+    sin * view.scale,
+    cos * view.scale,
+    view.x + leftTopX * view.scale,
+    view.y - leftTopY * view.scale,
+  ];
+}
+
+/** Corners in the map frame of the pixels from (left, top) to (right, bottom), exclusive. */
+export function pixelBoxCorners(
+  placement: Placement,
+  box: { left: number; top: number; right: number; bottom: number },
+): MapPoint[] {
+  const { originX, originY, yaw, resolution, height } = placement;
+  const place = (column: number, row: number): MapPoint => {
+    const u = column * resolution;
+    const v = (height - row) * resolution;
+    return mapPoint(
+      originX + u * Math.cos(yaw) - v * Math.sin(yaw),
+      originY + u * Math.sin(yaw) + v * Math.cos(yaw),
+    );
+  };
+  return [
+    place(box.left, box.bottom),
+    place(box.right, box.bottom),
+    place(box.right, box.top),
+    place(box.left, box.top),
+  ];
+}
+
+/** The smallest pixel box that holds every pixel which is not fully transparent. */
+export function opaqueBox(
+  rgba: Uint8ClampedArray,
+  width: number,
+  height: number,
+): { left: number; top: number; right: number; bottom: number } | null {
+  let left = width;
+  let right = 0;
+  let top = height;
+  let bottom = 0;
+  for (let row = 0; row < height; row++) {
+    for (let column = 0; column < width; column++) {
+      if (rgba[(row * width + column) * 4 + 3] === 0) continue;
+      if (column < left) left = column;
+      if (column >= right) right = column + 1;
+      if (row < top) top = row;
+      bottom = row + 1;
+    }
+  }
+  return left < right ? { left, top, right, bottom } : null;
+}
+
+export function union(a: Bounds | null, b: Bounds | null): Bounds | null {
+  if (!a) return b;
+  if (!b) return a;
+  return {
+    minX: Math.min(a.minX, b.minX),
+    minY: Math.min(a.minY, b.minY),
+    maxX: Math.max(a.maxX, b.maxX),
+    maxY: Math.max(a.maxY, b.maxY),
+  };
+}

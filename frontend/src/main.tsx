@@ -1,0 +1,43 @@
+import { StrictMode } from 'react';
+import { createRoot } from 'react-dom/client';
+
+import './styles/tokens.css';
+import './styles/base.css';
+import './styles/layout.css';
+import './styles/map.css';
+import './styles/table.css';
+import './styles/card.css';
+import './styles/kiosk.css';
+import './styles/print.css';
+import { startAddress } from './store/address';
+import { prefer, store } from './store/app';
+import { startLive } from './store/live';
+import { startLoaders } from './store/loaders';
+import { keepSettings, readSettings } from './store/settings';
+import { startTheme } from './store/theme';
+import { App } from './ui/App';
+import { startShortcuts } from './ui/shortcuts';
+
+prefer(readSettings(window.localStorage));
+let { settings } = store.get();
+store.subscribe(() => {
+  if (store.get().settings === settings) return;
+  ({ settings } = store.get());
+  keepSettings(window.localStorage, settings);
+});
+
+const kiosk = new URLSearchParams(window.location.search).get('kiosk') === '1';
+
+startTheme();
+startAddress();
+startLoaders();
+startLive();
+if (!kiosk) startShortcuts();
+
+const root = document.getElementById('root');
+if (!root) throw new Error('index.html has no #root');
+createRoot(root).render(
+  <StrictMode>
+    <App kiosk={kiosk} />
+  </StrictMode>,
+);

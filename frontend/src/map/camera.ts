@@ -1,0 +1,116 @@
+import { select } from 'd3-selection';
+import { zoom, zoomIdentity, type D3ZoomEvent, type ZoomTransform } from 'd3-zoom';
+
+import {
+  cameraOf,
+  fit,
+  MAX_SCALE,
+  MIN_SCALE,
+  toCanvas,
+  viewOf,
+  type Bounds,
+  type Camera,
+  type Insets,
+  type MapPoint,
+  type Size,
+  type View,
+} from '../geometry/coordinates';
+
+export interface CameraHandlers {
+  readonly onView: (view: View) => void;
+  /** The operator came to rest on a view. */
+  readonly onCamera: (camera: Camera) => void;
+}
+
+const toView = ({ x, y, k }: ZoomTransform): View => ({ x, y, scale: k });
+
+/** Space around what is fitted: less on a phone, where each pixel counts. */
+export function fitInsets({ width }: Size): Insets {
+  return width < 560
+    ? { top: 26, right: 60, bottom: 40, left: 26 }
+    : { top: 30, right: 76, bottom: 52, left: 40 };
+}
+
+/** Wheel, pinch and drag on one element, and the programmed moves; d3-zoom keeps the transform. */
+export class MapCamera {
+  readonly #selection;
+  readonly #zoom;
+  #size: Size = { width: 0, height: 0 };
+  #view: View = { x: 0, y: 0, scale: 50 };
+  /** A move of the program's own is no choice of the operator's. */
+  #programmed = false;
+
+  constructor(element: HTMLElement, handlers: CameraHandlers) {
+    this.#selection = select<HTMLElement, unknown>(element);
+    this.#zoom = zoom<HTMLElement, unknown>()
+      .scaleExtent([MIN_SCALE, MAX_SCALE])
+      // Without the browser's layout: the size is known from the resize observer.
+      .extent(() => [
+        [0, 0],
+        [this.#size.width, this.#size.height],
+      ])
+      .clickDistance(6)
+      .on('zoom', (event: D3ZoomEvent<HTMLElement, unknown>) => {
+        this.#view = toView(event.transform);
+        handlers.onView(this.#view);
+      })
+      .on('end', () => {
+        if (!this.#programmed) handlers.onCamera(cameraOf(this.#view, this.#size));
+      });
+    this.#selection.call(this.#zoom);
+  }
+
+  get view(): View {
+    return this.#view;
+  }
+
+  get size(): Size {
+    return this.#size;
+  }
+
+  resize(size: Size): void {
+    this.#size = size;
+  }
+
+  /** Shows a camera, or everything within `bounds`. Not told to `onCamera`. */
+  goTo(camera: Camera | null, bounds: Bounds | null): void {
+    if (this.#size.width === 0 || this.#size.height === 0) return;
+    const view = camera
+      ? viewOf(camera, this.#size)
+      : bounds && fit(bounds, this.#size, fitInsets(this.#size));
+    if (!view) return;
+    const { x, y, scale } = this.#view;
+    if (view.x === x && view.y === y && view.scale === scale) return;
+    this.#programmed = true;
+    this.#zoom.transform(this.#selection, zoomIdentity.translate(view.x, view.y).scale(view.scale));
+    this.#programmed = false;
+  }
+
+  zoomBy(factor: number): void {
+    this.#zoom.scaleBy(this.#selection, factor);
+  }
+
+  /** Moves what is seen, by a share of the view's size. */
+  panBy(x: number, y: number): void {
+    const { scale } = this.#view;
+    this.#zoom.translateBy(
+      this.#selection,
+      (-x * this.#size.width) / scale,
+      (-y * this.#size.height) / scale,
+    );
+  }
+
+  /** Brings a point into view; one that is well inside stays where it is. */
+  show(point: MapPoint): void {
+    const { x, y } = toCanvas(this.#view, point);
+    const { width, height } = this.#size;
+    const margin = 48;
+    const isInside = x > margin && y > margin && x < width - margin && y < height - margin;
+    if (isInside || width === 0) return;
+    this.#zoom.translateTo(this.#selection, point.x, -point.y);
+  }
+
+  destroy(): void {
+    this.#selection.on('.zoom', null);
+  }
+}

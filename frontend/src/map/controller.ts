@@ -1,0 +1,267 @@
+/** Ties the map's canvases to the store: draws what changed, once a frame, and nothing else. */
+import { DARK, LIGHT } from '../draw/palette';
+import { PULSE_MS, type Pulse } from '../draw/overlay';
+import {
+  boundsOf,
+  canvasPoint,
+  toMap,
+  type Bounds,
+  type CanvasPoint,
+  type MapPoint,
+  type View,
+} from '../geometry/coordinates';
+import { nearest } from '../geometry/nearest';
+import { act, store, type AppState } from '../store/app';
+import { selectRange } from '../store/derived';
+import { isDark, onThemeChange } from '../store/theme';
+import { MapCamera } from './camera';
+import { onMapCommand, type MapCommand } from './commands';
+import { Painter, type Canvases } from './painter';
+import { pointedAt } from './pointer';
+
+/** A finger hits a pin from this far, a mouse from a bit less; CSS pixels. */
+const TOUCH_REACH = 26;
+const MOUSE_REACH = 16;
+
+type Part = 'still' | 'pins' | 'overlay';
+
+export function runMap(element: HTMLElement, canvases: Canvases): () => void {
+  const painter = new Painter(canvases, isDark() ? DARK : LIGHT);
+  const calm = window.matchMedia('(prefers-reduced-motion: reduce)');
+  const dirty = new Set<Part>();
+  let frame = 0;
+  let pulses: readonly Pulse[] = [];
+  let crosshair = false;
+  let shown = store.get();
+
+  const camera = new MapCamera(element, {
+    onView: (view) => {
+      publish(view);
+      spoil('still', 'pins', 'overlay');
+    },
+    onCamera: (chosen) => {
+      act({ type: 'camera', camera: chosen });
+    },
+  });
+
+  const publish = ({ x, y, scale }: View): void => {
+    canvases.overlay.dataset['view'] = [x, y, scale].map((n) => n.toFixed(4)).join(',');
+    element.dispatchEvent(new CustomEvent('mapview', { detail: { scale } }));
+    if (crosshair) pointedAt.dispatch(centre());
+  };
+
+  const spoil = (...parts: Part[]): void => {
+    for (const part of parts) dirty.add(part);
+    if (frame === 0 && camera.size.width > 0) frame = requestAnimationFrame(paint);
+  };
+
+  const paint = (): void => {
+    frame = 0;
+    const state = store.get();
+    const now = performance.now();
+    const parts = new Set(dirty);
+    dirty.clear();
+    if (parts.has('still')) painter.paintStill(state, camera.view, now);
+    if (parts.has('pins')) painter.paintPins(state, camera.view, now);
+    if (parts.has('overlay')) {
+      pulses = pulses.filter(({ since }) => now - since < PULSE_MS);
+      painter.paintOverlay(state, camera.view, { pulses, now, crosshair });
+    }
+    if (pulses.length > 0) spoil('overlay');
+  };
+
+  const centre = (): MapPoint =>
+    toMap(camera.view, canvasPoint(camera.size.width / 2, camera.size.height / 2));
+
+  const update = (): void => {
+    const before = shown;
+    const state = store.get();
+    shown = state;
+    const { twin, view } = state;
+    const changedTwin = twin.snapshot !== before.twin.snapshot;
+    if (changedTwin && twin.snapshot && !calm.matches) {
+      pulses = [...pulses, ...newPulses(state)];
+    }
+    const sameMap = twin.map === before.twin.map;
+    const stillChanged =
+      !sameMap ||
+      twin.field !== before.twin.field ||
+      view.layers !== before.view.layers ||
+      view.sensor !== before.view.sensor ||
+      selectRange(state) !== selectRange(before) ||
+      (changedTwin && twin.snapshot?.revision !== before.twin.snapshot?.revision);
+    if (stillChanged) spoil('still');
+    if (changedTwin || stillChanged || state.settings !== before.settings) spoil('pins', 'overlay');
+    if (view.selected !== before.view.selected || view.hovered !== before.view.hovered) {
+      spoil('pins', 'overlay');
+    }
+    if (view.camera !== before.view.camera || (!view.camera && (changedTwin || !sameMap))) {
+      camera.goTo(view.camera, contentBounds(state));
+    }
+  };
+
+  const tagAt = (point: CanvasPoint, reach: number): string | null => {
+    if (!store.get().view.layers.has('pins')) return null;
+    const { pins } = painter.scene(store.get(), performance.now());
+    return nearest(pins, camera.view, point, reach)?.id ?? null;
+  };
+
+  const pointOf = (event: PointerEvent | MouseEvent): CanvasPoint => {
+    const box = element.getBoundingClientRect();
+    return canvasPoint(event.clientX - box.left, event.clientY - box.top);
+  };
+
+  const onPointerMove = (event: PointerEvent): void => {
+    if (event.pointerType === 'touch') return;
+    const point = pointOf(event);
+    pointedAt.dispatch(toMap(camera.view, point));
+    const hovered = event.buttons === 0 ? tagAt(point, MOUSE_REACH) : null;
+    act({ type: 'hover', tagId: hovered });
+    element.dataset['hand'] = hovered === null ? 'grab' : 'point';
+  };
+  const onPointerLeave = (): void => {
+    pointedAt.dispatch(crosshair ? centre() : null);
+    act({ type: 'hover', tagId: null });
+  };
+  const onClick = (event: MouseEvent): void => {
+    const isTouch = event instanceof PointerEvent && event.pointerType === 'touch';
+    const point = pointOf(event);
+    if (isTouch) pointedAt.dispatch(toMap(camera.view, point));
+    act({ type: 'select', tagId: tagAt(point, isTouch ? TOUCH_REACH : MOUSE_REACH) });
+  };
+  const setCrosshair = (on: boolean): void => {
+    crosshair = on;
+    pointedAt.dispatch(on ? centre() : null);
+    spoil('overlay');
+  };
+  const onFocus = (): void => {
+    setCrosshair(element.matches(':focus-visible'));
+  };
+  const onBlur = (): void => {
+    setCrosshair(false);
+  };
+  const onKeyDown = (event: KeyboardEvent): void => {
+    if (event.altKey || event.ctrlKey || event.metaKey) return;
+    if (!crosshair) setCrosshair(true);
+    if (event.key === 'Enter' || event.key === ' ') {
+      const { width, height } = camera.size;
+      act({ type: 'select', tagId: tagAt(canvasPoint(width / 2, height / 2), 60) });
+      event.preventDefault();
+      return;
+    }
+    const command = keyCommand(event);
+    if (!command) return;
+    event.preventDefault();
+    run(command);
+  };
+
+  const run = (command: MapCommand): void => {
+    switch (command.type) {
+      case 'fit':
+        act({ type: 'camera', camera: null });
+        camera.goTo(null, contentBounds(store.get()));
+        break;
+      case 'zoom':
+        camera.zoomBy(command.factor);
+        break;
+      case 'pan':
+        camera.panBy(command.x, command.y);
+        break;
+      case 'show': {
+        const tag = store.get().twin.snapshot?.tags.find(({ id }) => id === command.tagId);
+        if (tag?.at) camera.show(tag.at);
+        break;
+      }
+    }
+  };
+
+  const resize = new ResizeObserver(([entry]) => {
+    if (!entry) return;
+    const { width, height } = entry.contentRect;
+    camera.resize({ width, height });
+    if (width === 0 || height === 0) return;
+    painter.resize({ width, height }, window.devicePixelRatio);
+    const state = store.get();
+    camera.goTo(state.view.camera, contentBounds(state));
+    spoil('still', 'pins', 'overlay');
+  });
+  resize.observe(element);
+
+  // Pins fade while nothing arrives: look again now and then.
+  const fading = setInterval(() => {
+    spoil('pins');
+  }, 5_000);
+  void document.fonts.ready.then(() => {
+    painter.forget();
+    spoil('still', 'pins');
+  });
+
+  const stops = [
+    store.subscribe(update),
+    onMapCommand(run),
+    onThemeChange(() => {
+      painter.setPalette(isDark() ? DARK : LIGHT);
+      spoil('still', 'pins', 'overlay');
+    }),
+  ];
+  element.addEventListener('pointermove', onPointerMove);
+  element.addEventListener('pointerleave', onPointerLeave);
+  element.addEventListener('click', onClick);
+  element.addEventListener('focus', onFocus);
+  element.addEventListener('blur', onBlur);
+  element.addEventListener('keydown', onKeyDown);
+  return () => {
+    for (const stop of stops) stop();
+    resize.disconnect();
+    clearInterval(fading);
+    cancelAnimationFrame(frame);
+    camera.destroy();
+    element.removeEventListener('pointermove', onPointerMove);
+    element.removeEventListener('pointerleave', onPointerLeave);
+    element.removeEventListener('click', onClick);
+    element.removeEventListener('focus', onFocus);
+    element.removeEventListener('blur', onBlur);
+    element.removeEventListener('keydown', onKeyDown);
+  };
+}
+
+function newPulses({ twin }: AppState): Pulse[] {
+  const fresh = new Set(twin.snapshot?.fresh);
+  const since = performance.now();
+  return (twin.snapshot?.tags ?? []).flatMap((tag) =>
+    tag.at && fresh.has(tag.id) ? [{ at: tag.at, since }] : [],
+  );
+}
+
+/** What a fit shows: everything pinned or planted, and the known part of the map. */
+function contentBounds({ twin }: AppState): Bounds | null {
+  const points = (twin.snapshot?.tags ?? []).flatMap((tag) => [
+    ...(tag.at ? [tag.at] : []),
+    ...tag.footprint,
+  ]);
+  return boundsOf([...points, ...(twin.map.value?.known ?? [])]);
+}
+
+function keyCommand({ key, shiftKey }: KeyboardEvent): MapCommand | null {
+  const far = shiftKey ? 0.5 : 0.1;
+  switch (key) {
+    case 'ArrowLeft':
+      return { type: 'pan', x: -far, y: 0 };
+    case 'ArrowRight':
+      return { type: 'pan', x: far, y: 0 };
+    case 'ArrowUp':
+      return { type: 'pan', x: 0, y: -far };
+    case 'ArrowDown':
+      return { type: 'pan', x: 0, y: far };
+    case '+':
+    case '=':
+      return { type: 'zoom', factor: 1.25 };
+    case '-':
+      return { type: 'zoom', factor: 0.8 };
+    case '0':
+    case 'Home':
+      return { type: 'fit' };
+    default:
+      return null;
+  }
+}

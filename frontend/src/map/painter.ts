@@ -1,0 +1,197 @@
+import { fieldPixels, smoothDetail, type Field } from '../domain/field';
+import type { HouseHealth } from '../domain/health';
+import { sensorColour, type Range } from '../domain/ramp';
+import { sensorNamed } from '../domain/sensors';
+import type { Snapshot } from '../domain/twin';
+import type { TemperatureUnit } from '../domain/units';
+import { drawCrosshair, drawMark, drawPulses, type Pulse } from '../draw/overlay';
+import type { Palette } from '../draw/palette';
+import {
+  drawBlooms,
+  drawLabels,
+  drawPins,
+  LABEL_FONT,
+  LABEL_HEIGHT,
+  labelRequests,
+} from '../draw/pins';
+import { buildScene, type Scene } from '../draw/scene';
+import {
+  drawBoxes,
+  drawGrid,
+  drawGround,
+  drawPicture,
+  fieldPlacement,
+  tintMap,
+} from '../draw/still';
+import { canvasOfPixels, clear, contextOf, Sprites, type Surface } from '../draw/surface';
+import type { Size, View } from '../geometry/coordinates';
+import { placeLabels } from '../geometry/declutter';
+import type { AppState } from '../store/app';
+import { memoLast, selectHealth, selectRange } from '../store/derived';
+import type { MapPicture } from './picture';
+
+export interface Canvases {
+  readonly still: HTMLCanvasElement;
+  readonly pins: HTMLCanvasElement;
+  readonly overlay: HTMLCanvasElement;
+}
+
+/** Fading is worked out anew this often even when nothing else changes, ms. */
+const FADE_TICK_MS = 5_000;
+
+const EMPTY_SCENE: Scene = { pins: [], blooms: [], boxes: [] };
+
+/**
+ * Puts the state on three canvases: the still layers, the pins, and what moves by itself. It
+ * keeps only what is dear to make (coloured pictures, sprites, label places), each under the
+ * data that it was made from.
+ */
+export class Painter {
+  readonly #canvases: Canvases;
+  #size: Size = { width: 0, height: 0 };
+  #ratio = 1;
+  #palette: Palette;
+  #sprites = new Sprites(1);
+  readonly #measure = new Map<string, number>();
+
+  constructor(canvases: Canvases, palette: Palette) {
+    this.#canvases = canvases;
+    this.#palette = palette;
+  }
+
+  resize(size: Size, ratio: number): void {
+    this.#size = size;
+    this.#ratio = ratio;
+    for (const canvas of Object.values(this.#canvases) as HTMLCanvasElement[]) {
+      canvas.width = Math.round(size.width * ratio);
+      canvas.height = Math.round(size.height * ratio);
+    }
+    this.forget();
+  }
+
+  setPalette(palette: Palette): void {
+    this.#palette = palette;
+    this.forget();
+  }
+
+  /** Drops sprites and text widths: the theme, the pixel ratio or the font has changed. */
+  forget(): void {
+    this.#sprites = new Sprites(this.#ratio);
+    this.#measure.clear();
+  }
+
+  #surface(canvas: HTMLCanvasElement): Surface {
+    const surface = { context: contextOf(canvas), size: this.#size, ratio: this.#ratio };
+    clear(surface);
+    return surface;
+  }
+
+  paintStill(state: AppState, view: View, now: number): void {
+    const surface = this.#surface(this.#canvases.still);
+    const { layers } = state.view;
+    drawGround(surface, this.#palette);
+    const picture = state.twin.map.value;
+    if (picture && layers.has('map')) {
+      drawPicture(surface, view, this.#mapPicture(picture, this.#palette), picture.placement);
+    }
+    if (layers.has('grid')) drawGrid(surface, view, this.#palette);
+    if (layers.has('boxes')) drawBoxes(surface, view, this.scene(state, now).boxes, this.#palette);
+    const field = state.twin.field.value;
+    const range = selectRange(state);
+    if (field && range && field.sampleCount > 0 && layers.has('field')) {
+      const detail = layers.has('smooth') ? smoothDetail(field) : 1;
+      const coloured = this.#fieldPicture(field, range, detail);
+      drawPicture(surface, view, coloured, fieldPlacement(field, coloured));
+    }
+  }
+
+  paintPins(state: AppState, view: View, now: number): void {
+    const surface = this.#surface(this.#canvases.pins);
+    const { layers } = state.view;
+    const scene = this.scene(state, now);
+    if (layers.has('blooms')) drawBlooms(surface, view, scene.blooms, this.#sprites, this.#palette);
+    if (!layers.has('pins')) return;
+    const colour = sensorColour(sensorNamed(state.view.sensor));
+    drawPins(surface, view, scene.pins, colour, this.#sprites, this.#palette);
+    if (!layers.has('labels')) return;
+    const labels = this.#labels(scene, view.scale, state.view.selected ?? state.view.hovered);
+    drawLabels(surface, view, labels, this.#sprites, this.#palette);
+  }
+
+  paintOverlay(
+    state: AppState,
+    view: View,
+    moving: {
+      readonly pulses: readonly Pulse[];
+      readonly now: number;
+      readonly crosshair: boolean;
+    },
+  ): void {
+    const surface = this.#surface(this.#canvases.overlay);
+    drawPulses(surface, view, moving.pulses, moving.now, this.#palette);
+    for (const tag of state.twin.snapshot?.tags ?? []) {
+      if (!tag.at) continue;
+      if (tag.id === state.view.selected) drawMark(surface, view, tag.at, true, this.#palette);
+      else if (tag.id === state.view.hovered) drawMark(surface, view, tag.at, false, this.#palette);
+    }
+    if (moving.crosshair) drawCrosshair(surface, this.#palette);
+  }
+
+  scene(state: AppState, now: number): Scene {
+    const { snapshot } = state.twin;
+    if (!snapshot) return EMPTY_SCENE;
+    return this.#scene(
+      snapshot,
+      selectHealth(state),
+      state.view.sensor,
+      selectRange(state),
+      state.settings.unit,
+      Math.floor(now / FADE_TICK_MS),
+    );
+  }
+
+  readonly #scene = memoLast(
+    (
+      snapshot: Snapshot,
+      health: HouseHealth,
+      sensor: string,
+      range: Range | null,
+      unit: TemperatureUnit,
+      tick: number,
+    ) =>
+      buildScene({
+        snapshot,
+        health,
+        sensor: sensorNamed(sensor),
+        range,
+        unit,
+        now: Math.max(tick * FADE_TICK_MS, snapshot.takenAt),
+      }),
+  );
+
+  readonly #labels = memoLast((scene: Scene, scale: number, first: string | null) =>
+    placeLabels(
+      labelRequests(scene.pins, scale, first, (text) => this.#widthOf(text)),
+      LABEL_HEIGHT,
+    ),
+  );
+
+  #widthOf(text: string): number {
+    const known = this.#measure.get(text);
+    if (known !== undefined) return known;
+    if (this.#measure.size > 5_000) this.#measure.clear();
+    const context = contextOf(this.#canvases.pins);
+    context.font = LABEL_FONT;
+    const width = Math.ceil(context.measureText(text).width);
+    this.#measure.set(text, width);
+    return width;
+  }
+
+  readonly #mapPicture = memoLast((picture: MapPicture, palette: Palette) =>
+    tintMap(picture.pixels, palette),
+  );
+
+  readonly #fieldPicture = memoLast((field: Field, range: Range, detail: number) =>
+    canvasOfPixels(fieldPixels(field, sensorColour(sensorNamed(field.sensor)), range, detail)),
+  );
+}

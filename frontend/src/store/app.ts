@@ -1,0 +1,51 @@
+import { createStore, useSelected } from './create';
+import { DEFAULT_SETTINGS, type Settings } from './settings';
+import { NO_TWIN, reduceTwin, type TwinAction, type TwinState } from './twin';
+import { DEFAULT_VIEW, reduceView, type ViewAction, type ViewState } from './view';
+
+export interface AppState {
+  readonly twin: TwinState;
+  readonly view: ViewState;
+  readonly settings: Settings;
+}
+
+export type AppAction =
+  | { readonly slice: 'twin'; readonly action: TwinAction }
+  | { readonly slice: 'view'; readonly action: ViewAction }
+  | { readonly slice: 'settings'; readonly settings: Partial<Settings> };
+
+export function reduceApp(state: AppState, action: AppAction): AppState {
+  switch (action.slice) {
+    case 'twin': {
+      const twin = reduceTwin(state.twin, action.action);
+      return twin === state.twin ? state : { ...state, twin };
+    }
+    case 'view': {
+      const view = reduceView(state.view, action.action);
+      return view === state.view ? state : { ...state, view };
+    }
+    case 'settings':
+      return { ...state, settings: { ...state.settings, ...action.settings } };
+  }
+}
+
+export const store = createStore(
+  { twin: NO_TWIN, view: DEFAULT_VIEW, settings: DEFAULT_SETTINGS },
+  reduceApp,
+);
+
+export const act = (action: ViewAction): void => {
+  store.dispatch({ slice: 'view', action });
+};
+
+export const receive = (action: TwinAction): void => {
+  store.dispatch({ slice: 'twin', action });
+};
+
+export const prefer = (settings: Partial<Settings>): void => {
+  store.dispatch({ slice: 'settings', settings });
+};
+
+export function useApp<Part>(select: (state: AppState) => Part): Part {
+  return useSelected(store, select);
+}

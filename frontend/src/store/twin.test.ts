@@ -1,0 +1,47 @@
+import { describe, expect, test } from 'vitest';
+
+import { step, INITIAL } from '../connection/machine';
+import { stateFrame, wireTag } from '../testing/tags';
+import { NO_TWIN, reduceTwin } from './twin';
+
+const late = stateFrame([wireTag({ tag_id: 'a' }), wireTag({ tag_id: 'b' })], { seq: 900 });
+
+describe('state frames', () => {
+  test('one frame is enough for a page that comes late', () => {
+    const { snapshot } = reduceTwin(NO_TWIN, { type: 'state', frame: late, now: 50 });
+    expect(snapshot?.tags.map(({ id }) => id)).toEqual(['a', 'b']);
+    expect(snapshot?.takenAt).toBe(50);
+  });
+
+  test('an old state that the bridge kept is as old as the bridge says', () => {
+    const { snapshot } = reduceTwin(NO_TWIN, {
+      type: 'state',
+      frame: late,
+      now: 100_000,
+      stateAgeSeconds: 40,
+    });
+    expect(snapshot?.takenAt).toBe(60_000);
+  });
+
+  test('a restarted server counts from one again and is believed', () => {
+    const before = reduceTwin(NO_TWIN, { type: 'state', frame: late, now: 50 });
+    const frame = stateFrame([wireTag({ tag_id: 'c' })], { seq: 1, sec: 3, revision: 'new' });
+    const after = reduceTwin(before, { type: 'state', frame, now: 60 });
+    expect(after.snapshot?.tags.map(({ id }) => id)).toEqual(['c']);
+    expect(after.snapshot?.revision).toBe('new');
+  });
+});
+
+test('a frame that only moves the clock is no reason to render', () => {
+  const open = [
+    { type: 'start', now: 0 } as const,
+    { type: 'opened', now: 1 } as const,
+    { type: 'frame', now: 2 } as const,
+  ].reduce((connection, event) => step(connection, event).connection, INITIAL);
+  const live = reduceTwin(NO_TWIN, { type: 'connection', connection: open, now: 3 });
+  expect(live.phase).toBe('live');
+  const heard = step(open, { type: 'frame', now: 100 }).connection;
+  expect(reduceTwin(live, { type: 'connection', connection: heard, now: 101 })).toBe(live);
+  const silent = reduceTwin(live, { type: 'connection', connection: heard, now: 9_000 });
+  expect(silent.phase).toBe('stale');
+});

@@ -1,0 +1,82 @@
+/** What came from the server: the connection, the greenhouse, and what is fetched about it. */
+import type { FieldQuality } from '../contract/api';
+import type { StateFrame, StatusFrame } from '../contract/types';
+import { INITIAL, phaseOf, type Connection, type Phase } from '../connection/machine';
+import type { Field } from '../domain/field';
+import { snapshotOf, type Snapshot } from '../domain/twin';
+import type { MapPicture } from '../map/picture';
+
+/** Something fetched beside the frames. While it is fetched again, the old value stays. */
+export interface Fetched<T> {
+  readonly value: T | null;
+  readonly state: 'waiting' | 'ready' | 'failed';
+  /** Why it failed, for a person to read. */
+  readonly message: string;
+}
+
+export const NOTHING: Fetched<never> = { value: null, state: 'waiting', message: '' };
+
+export interface TwinState {
+  readonly phase: Phase;
+  readonly connection: Connection;
+  readonly snapshot: Snapshot | null;
+  readonly field: Fetched<Field>;
+  readonly map: Fetched<MapPicture>;
+  readonly quality: FieldQuality | null;
+}
+
+export const NO_TWIN: TwinState = {
+  phase: 'connecting',
+  connection: INITIAL,
+  snapshot: null,
+  field: NOTHING,
+  map: NOTHING,
+  quality: null,
+};
+
+export type TwinAction =
+  | { readonly type: 'connection'; readonly connection: Connection; readonly now: number }
+  | {
+      readonly type: 'state';
+      readonly frame: StateFrame;
+      readonly now: number;
+      /** Set on the first frame of a connection: how old the state was when it was sent. */
+      readonly stateAgeSeconds?: number | null;
+    }
+  | { readonly type: 'field'; readonly field: Fetched<Field> }
+  | { readonly type: 'map'; readonly map: Fetched<MapPicture> }
+  | { readonly type: 'quality'; readonly quality: FieldQuality | null };
+
+export function reduceTwin(state: TwinState, action: TwinAction): TwinState {
+  switch (action.type) {
+    case 'connection': {
+      const phase = phaseOf(action.connection, action.now);
+      if (phase === state.phase && sameToTheEye(action.connection, state.connection)) return state;
+      return { ...state, phase, connection: action.connection };
+    }
+    case 'state': {
+      // No comparison of seq: one socket delivers in order, and a restarted server counts anew.
+      const arrivedAt = action.now - (action.stateAgeSeconds ?? 0) * 1000;
+      return { ...state, snapshot: snapshotOf(action.frame, arrivedAt, state.snapshot) };
+    }
+    case 'field':
+      return { ...state, field: action.field };
+    case 'map':
+      return { ...state, map: action.map };
+    case 'quality':
+      return { ...state, quality: action.quality };
+  }
+}
+
+/** Each frame moves the connection's clock; only the rest is worth a render. */
+function sameToTheEye(a: Connection, b: Connection): boolean {
+  return (
+    a.epoch === b.epoch &&
+    a.failures === b.failures &&
+    a.socket.kind === b.socket.kind &&
+    sameStatus(a.status, b.status)
+  );
+}
+
+const sameStatus = (a: StatusFrame | null, b: StatusFrame | null): boolean =>
+  a?.twin === b?.twin && a?.reason === b?.reason && a?.message === b?.message;

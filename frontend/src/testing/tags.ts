@@ -1,0 +1,46 @@
+/** Small builders for tests. */
+import type { StateFrame, TwinTagState } from '../contract/types';
+import { tagOf, type Snapshot, type Tag } from '../domain/twin';
+
+export function wireTag(over: Partial<TwinTagState> = {}): TwinTagState {
+  return {
+    tag_id: '1',
+    pose: { position: { x: 1, y: 2, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } },
+    readings: [],
+    last_observed: { sec: 100, nanosec: 0 },
+    stale_seconds: 5,
+    species: '',
+    species_confidence: null,
+    anomaly: false,
+    flower_count: 0,
+    bug_count: 0,
+    flowers: [],
+    box_footprint: { points: [] },
+    ...over,
+  };
+}
+
+export const tag = (over: Partial<TwinTagState> = {}): Tag => tagOf(wireTag(over));
+
+export const readings = (values: Record<string, number | null>): TwinTagState['readings'] =>
+  Object.entries(values).map(([name, value]) => ({ name, value }));
+
+export function stateFrame(
+  tags: readonly TwinTagState[],
+  { seq = 1, sec = 1000, revision = 'r1' } = {},
+): StateFrame {
+  return {
+    type: 'state',
+    seq,
+    revision,
+    state: { header: { stamp: { sec, nanosec: 0 }, frame_id: 'map' }, tags },
+  };
+}
+
+export const snapshot = (tags: readonly Tag[]): Snapshot => ({
+  tags,
+  revision: 'r1',
+  stamp: '1000.0',
+  takenAt: 0,
+  fresh: [],
+});

@@ -1,0 +1,84 @@
+import { useEffect, type JSX } from 'react';
+
+import { act, useApp } from '../store/app';
+import { useSelected } from '../store/create';
+import { S } from '../strings';
+import { FrozenBanner } from './FrozenBanner';
+import { Header } from './Header';
+import { HelpDialog } from './HelpDialog';
+import { Icon } from './Icon';
+import { MapPanel } from './MapPanel';
+import { TagsPanel } from './TagsPanel';
+import { toast } from './toast';
+
+export function App({ kiosk }: { kiosk: boolean }): JSX.Element {
+  const phase = useApp((state) => state.twin.phase);
+  const pane = useApp((state) => state.view.pane);
+  const selected = useApp((state) => state.view.selected);
+  const message = useSelected(toast, (text) => text);
+
+  // The row of a tag that was chosen on the map comes into view.
+  useEffect(() => {
+    if (selected === null) return;
+    document
+      .querySelector(`tr[data-tag-id="${CSS.escape(selected)}"]`)
+      ?.scrollIntoView({ block: 'nearest' });
+  }, [selected]);
+
+  return (
+    <div
+      className={kiosk ? 'app kiosk' : 'app'}
+      data-testid="app"
+      data-connection-state={phase}
+      data-fresh={phase === 'live'}
+      data-pane={pane}
+    >
+      {!kiosk && (
+        <a className="skip" href="#tags" onClick={skipToTable}>
+          {S.skipToTable}
+        </a>
+      )}
+      <Header kiosk={kiosk} />
+      <FrozenBanner />
+      <main className="panels">
+        <MapPanel kiosk={kiosk} />
+        <TagsPanel kiosk={kiosk} />
+      </main>
+      {!kiosk && <PaneTabs />}
+      <HelpDialog />
+      <div className="toast" role="status">
+        {message}
+      </div>
+    </div>
+  );
+}
+
+/** By hand, because the fragment of the address belongs to the permalink. */
+function skipToTable(event: React.MouseEvent): void {
+  event.preventDefault();
+  act({ type: 'pane', pane: 'tags' });
+  requestAnimationFrame(() => document.getElementById('tags')?.focus());
+}
+
+/** On a narrow screen: map or table. */
+function PaneTabs(): JSX.Element {
+  const pane = useApp((state) => state.view.pane);
+  const tab = (name: 'map' | 'tags', label: string): JSX.Element => (
+    <button
+      type="button"
+      aria-pressed={pane === name}
+      onClick={() => {
+        act({ type: 'pane', pane: name });
+      }}
+    >
+      <Icon name={name === 'map' ? 'map' : 'list'} />
+      {label}
+    </button>
+  );
+  return (
+    <nav className="pane-tabs" aria-label={`${S.mapRegion} / ${S.tags}`}>
+      {tab('map', S.mapRegion)}
+      {tab('tags', S.tags)}
+    </nav>
+  );
+}

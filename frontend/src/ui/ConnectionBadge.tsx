@@ -1,0 +1,27 @@
+import type { JSX } from 'react';
+
+import { useApp } from '../store/app';
+import { S } from '../strings';
+
+/** The connection's state in a shape and a word; told to screen readers when it changes. */
+export function ConnectionBadge(): JSX.Element {
+  const phase = useApp((state) => state.twin.phase);
+  return (
+    <div className="connection" role="status" data-testid="connection" data-phase={phase}>
+      <span className="unseen">{S.phaseLabel}: </span>
+      <svg viewBox="0 0 16 16" width="14" height="14" aria-hidden="true">
+        {phase === 'live' && <circle cx="8" cy="8" r="6" className="solid" />}
+        {(phase === 'connecting' || phase === 'reconnecting') && (
+          <circle cx="8" cy="8" r="6" className="ring turning" />
+        )}
+        {(phase === 'stale' || phase === 'offline') && (
+          <>
+            <circle cx="8" cy="8" r="6" className="ring" />
+            <path d="M3.8 12.2l8.4-8.4" className="ring" />
+          </>
+        )}
+      </svg>
+      <span>{S.phase[phase]}</span>
+    </div>
+  );
+}

@@ -1,0 +1,81 @@
+import {
+  createContext,
+  useCallback,
+  useContext,
+  useEffect,
+  useId,
+  useRef,
+  useState,
+  type JSX,
+  type ReactNode,
+} from 'react';
+
+const Close = createContext<() => void>(() => undefined);
+
+/** Closes the panel that the caller is in, and gives the focus back to its button. */
+export const useClose = (): (() => void) => useContext(Close);
+
+interface Props {
+  readonly label: string;
+  readonly button: ReactNode;
+  readonly className: string;
+  readonly children: ReactNode;
+}
+
+/** A button that opens a panel beside it; Escape, a click elsewhere or leaving it closes. */
+export function Disclosure({ label, button, className, children }: Props): JSX.Element {
+  const [open, setOpen] = useState(false);
+  const root = useRef<HTMLDivElement>(null);
+  const trigger = useRef<HTMLButtonElement>(null);
+  const id = useId();
+  const close = useCallback(() => {
+    setOpen(false);
+    trigger.current?.focus();
+  }, []);
+
+  useEffect(() => {
+    if (!open) return;
+    const onPointerDown = (event: PointerEvent): void => {
+      if (!root.current?.contains(event.target as Node)) setOpen(false);
+    };
+    const onKeyDown = (event: KeyboardEvent): void => {
+      if (event.key !== 'Escape') return;
+      event.stopPropagation();
+      setOpen(false);
+      trigger.current?.focus();
+    };
+    const onFocusIn = (event: FocusEvent): void => {
+      if (!root.current?.contains(event.target as Node)) setOpen(false);
+    };
+    document.addEventListener('pointerdown', onPointerDown);
+    document.addEventListener('keydown', onKeyDown, true);
+    document.addEventListener('focusin', onFocusIn);
+    return () => {
+      document.removeEventListener('pointerdown', onPointerDown);
+      document.removeEventListener('keydown', onKeyDown, true);
+      document.removeEventListener('focusin', onFocusIn);
+    };
+  }, [open]);
+
+  return (
+    <div className={`disclosure ${className}`} ref={root}>
+      <button
+        type="button"
+        className="icon-button"
+        ref={trigger}
+        aria-label={label}
+        title={label}
+        aria-expanded={open}
+        aria-controls={id}
+        onClick={() => {
+          setOpen(!open);
+        }}
+      >
+        {button}
+      </button>
+      <div id={id} className="disclosure-panel" hidden={!open} role="group" aria-label={label}>
+        {open && <Close value={close}>{children}</Close>}
+      </div>
+    </div>
+  );
+}

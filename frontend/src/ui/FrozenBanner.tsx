@@ -1,0 +1,44 @@
+import type { JSX } from 'react';
+
+import type { StatusFrame } from '../contract/types';
+import { clockText, ageText } from '../domain/format';
+import { retryConnection } from '../store/live';
+import { useApp } from '../store/app';
+import { S } from '../strings';
+import { epochOf, useNow } from './useNow';
+
+/** Why the bridge calls the twin offline, for a person. */
+export function offlineReason(status: StatusFrame | null): string {
+  return (status && S.offlineWhy[status.reason]) || S.frozenWhy.offline;
+}
+
+/** Across the page whenever what it shows is not the present. */
+export function FrozenBanner(): JSX.Element | null {
+  const phase = useApp((state) => state.twin.phase);
+  const takenAt = useApp((state) => state.twin.snapshot?.takenAt);
+  const connection = useApp((state) => state.twin.connection);
+  const now = useNow();
+  if (phase === 'live' || takenAt === undefined) return null;
+  const { socket } = connection;
+  const wait = socket.kind === 'closed' ? Math.ceil((socket.retryAt - now) / 1000) : 0;
+  return (
+    <div className="frozen" role="alert" data-testid="frozen">
+      <strong>{S.frozenSince(clockText(epochOf(takenAt)))}</strong>
+      {/* What counts on by itself is not read out each second. */}
+      <span aria-hidden="true" className="frozen-age">
+        {S.agoSuffix(ageText(Math.max(0, now - takenAt) / 1000))}
+      </span>
+      <span className="frozen-why">
+        {phase === 'offline' ? offlineReason(connection.status) : S.frozenWhy[phase]}
+      </span>
+      {phase === 'reconnecting' && (
+        <>
+          <span aria-hidden="true">{S.nextTry(Math.max(0, wait))}</span>
+          <button type="button" onClick={retryConnection}>
+            {S.retryNow}
+          </button>
+        </>
+      )}
+    </div>
+  );
+}

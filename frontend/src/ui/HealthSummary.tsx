@@ -1,0 +1,88 @@
+import type { JSX } from 'react';
+
+import { readingText } from '../domain/format';
+import type { HealthStatus, HouseHealth } from '../domain/health';
+import { sensorNamed } from '../domain/sensors';
+import { shown } from '../domain/text';
+import type { TemperatureUnit } from '../domain/units';
+import { act, useApp } from '../store/app';
+import { selectHealth } from '../store/derived';
+import { S } from '../strings';
+import { commandMap } from '../map/commands';
+import { HealthMark } from './HealthMark';
+
+const ORDER: readonly HealthStatus[] = ['critical', 'stressed', 'healthy', 'no-data'];
+
+/** The house's state, what drives it, and how many tags are in which state. */
+export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
+  const health = useApp(selectHealth);
+  const filter = useApp((state) => state.view.health);
+  const unit = useApp((state) => state.settings.unit);
+  const driver = driverText(health, unit);
+  const { worst } = health;
+  return (
+    <section
+      className="health"
+      aria-label={S.healthHeading}
+      data-testid="house-health"
+      data-health={health.status}
+    >
+      <div className="health-house">
+        <h2>
+          <span className="unseen">{S.healthHeading}: </span>
+          <HealthMark status={health.status} />
+        </h2>
+        {worst && worst.deviation !== null && worst.deviation > 0 && !kiosk ? (
+          <button
+            type="button"
+            className="health-driver"
+            data-testid="health-driver"
+            data-tag-id={worst.tagId}
+            onClick={() => {
+              act({ type: 'select', tagId: worst.tagId });
+              commandMap({ type: 'show', tagId: worst.tagId });
+            }}
+          >
+            {driver}
+          </button>
+        ) : (
+          <p className="health-driver" data-testid="health-driver">
+            {driver}
+          </p>
+        )}
+      </div>
+      <ul className="health-counts">
+        {ORDER.map((status) => (
+          <li key={status}>
+            <button
+              type="button"
+              aria-pressed={filter === status}
+              aria-label={S.healthFilter(S.health[status], health.counts[status])}
+              disabled={kiosk}
+              data-health={status}
+              onClick={() => {
+                act({ type: 'health', status: filter === status ? null : status });
+              }}
+            >
+              <HealthMark status={status} word={false} />
+              <strong>{health.counts[status]}</strong>
+              <span>{S.health[status]}</span>
+            </button>
+          </li>
+        ))}
+      </ul>
+    </section>
+  );
+}
+
+/** The tag and sensor that make the house what it is. */
+export function driverText({ worst }: HouseHealth, unit: TemperatureUnit): string {
+  if (worst?.sensor == null || worst.value === null) return S.healthNothing;
+  if (worst.deviation === 0) return S.healthAllWell;
+  const sensor = sensorNamed(worst.sensor);
+  return S.healthDriver(
+    shown(worst.tagId, 24),
+    sensor.label,
+    readingText(sensor, worst.value, unit),
+  );
+}

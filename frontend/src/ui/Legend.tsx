@@ -1,0 +1,140 @@
+import { useMemo, type CSSProperties, type JSX } from 'react';
+
+import { numberText, readingText, valueText } from '../domain/format';
+import { fraction, rgbText, sensorColour, type Range } from '../domain/ramp';
+import { RAMP, sensorNamed, type Sensor } from '../domain/sensors';
+import { speciesColours, UNKNOWN_SPECIES } from '../domain/species';
+import { shown } from '../domain/text';
+import { differenceToShown, unitOf, type TemperatureUnit } from '../domain/units';
+import { snapshotSpecies } from '../draw/scene';
+import { useApp } from '../store/app';
+import { selectRange } from '../store/derived';
+import { S } from '../strings';
+import { RangeControl } from './RangeControl';
+
+export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
+  const name = useApp((state) => state.view.sensor);
+  const unit = useApp((state) => state.settings.unit);
+  const range = useApp(selectRange);
+  const field = useApp((state) => state.twin.field.value);
+  const quality = useApp((state) => state.twin.quality);
+  const sensor = sensorNamed(name);
+  const samples = field?.sensor === name ? field.sampleCount : 0;
+  const rmse = quality?.sensor === name ? quality.rmse : null;
+  return (
+    <section className="legend" aria-label={S.legend} data-testid="legend">
+      <div className="legend-scale">
+        <div className="legend-title">
+          <strong>{shown(sensor.label, 32)}</strong> <span>{unitOf(sensor, unit)}</span>
+        </div>
+        <Ramp sensor={sensor} range={range} unit={unit} />
+      </div>
+      <div className="legend-facts">
+        <span data-testid="sample-count">
+          {samples > 0 ? S.legendTags(samples) : S.legendNoTags}
+        </span>
+        {rmse !== null && (
+          <span title={S.legendErrorHint} data-testid="rmse">
+            {S.legendError(
+              `±${numberText(differenceToShown(sensor, rmse, unit))}\u00a0${unitOf(sensor, unit)}`,
+            )}
+          </span>
+        )}
+        <span className="legend-note">{S.legendTransparent}</span>
+      </div>
+      <Keys />
+      {!kiosk && <RangeControl sensor={sensor} range={range} />}
+    </section>
+  );
+}
+
+/** The colours of pins (above) and heat map (below) from the lowest to the highest value. */
+function Ramp({
+  sensor,
+  range,
+  unit,
+}: {
+  sensor: Sensor;
+  range: Range | null;
+  unit: TemperatureUnit;
+}): JSX.Element {
+  const colour = sensorColour(sensor);
+  const style = {
+    '--ramp': rgbText(colour),
+    '--ramp-field': rgbText(colour, RAMP.maxAlpha),
+  } as CSSProperties;
+  const ideal = range && sensor.ideal;
+  const from = ideal && fraction(range, ideal[0]);
+  const to = ideal && fraction(range, ideal[1]);
+  return (
+    <div className="ramp" style={style}>
+      <div className="ramp-bar" aria-hidden="true">
+        <span className="ramp-pins" />
+        <span className="ramp-field" />
+        {from !== null && to !== null && to > from && (
+          <span
+            className="ramp-ideal"
+            style={{ left: `${from * 100}%`, width: `${(to - from) * 100}%` }}
+          />
+        )}
+      </div>
+      <div className="ramp-ends">
+        <span data-testid="range-low">{range ? valueText(sensor, range.low, unit) : '–'}</span>
+        {sensor.ideal && (
+          <span className="ramp-note">
+            {S.legendIdeal(
+              valueText(sensor, sensor.ideal[0], unit),
+              valueText(sensor, sensor.ideal[1], unit),
+            )}
+          </span>
+        )}
+        <span data-testid="range-high">{range ? readingText(sensor, range.high, unit) : '–'}</span>
+      </div>
+    </div>
+  );
+}
+
+/** What pins and dots mean. */
+function Keys(): JSX.Element {
+  const snapshot = useApp((state) => state.twin.snapshot);
+  const species = useMemo(
+    () => (snapshot ? [...speciesColours(snapshotSpecies(snapshot))] : []),
+    [snapshot],
+  );
+  const unknown = snapshot?.tags.some((tag) => tag.blooms.some((bloom) => bloom.species === ''));
+  return (
+    <ul className="legend-keys">
+      <li>
+        <svg viewBox="0 0 16 16" width="16" height="16" aria-hidden="true">
+          <path d="M8 1.5 14.5 8 8 14.5 1.5 8Z" className="key-pin" />
+        </svg>
+        {S.pinValue}
+      </li>
+      <li>
+        <svg viewBox="0 0 16 16" width="16" height="16" aria-hidden="true">
+          <path d="M8 1.5 14.5 8 8 14.5 1.5 8Z" className="key-pin hollow dashed" />
+        </svg>
+        {S.pinLacking}
+      </li>
+      <li>
+        <svg viewBox="0 0 16 16" width="16" height="16" aria-hidden="true">
+          <circle cx="8" cy="8" r="6.2" className="key-pest" />
+          <path d="M8 4.6v4M8 11v.01" className="key-pest-mark" />
+        </svg>
+        {S.pinPest}
+      </li>
+      {species.map(([name, colour]) => (
+        <li key={name}>
+          <span className="dot" style={{ background: rgbText(colour) }} />
+          <bdi>{shown(name, 24)}</bdi>
+        </li>
+      ))}
+      {unknown && (
+        <li>
+          <span className="dot" style={{ background: rgbText(UNKNOWN_SPECIES) }} />
+          {S.legendUnknownSpecies}
+        </li>
+      )}
+    </ul>
+  );
+}

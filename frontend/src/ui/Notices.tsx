@@ -1,0 +1,64 @@
+import type { JSX } from 'react';
+
+import { sensorNamed } from '../domain/sensors';
+import { shown } from '../domain/text';
+import { useApp, type AppState } from '../store/app';
+import { S } from '../strings';
+import { offlineReason } from './FrozenBanner';
+
+interface Notice {
+  readonly id: string;
+  readonly title: string;
+  readonly hint?: string;
+  /** In the middle of an otherwise empty map. */
+  readonly large?: boolean;
+}
+
+/** What is missing, and what to do about it; the most basic lack first and alone. */
+export function noticeFor({ twin, view }: AppState): Notice | null {
+  const { snapshot, phase, connection } = twin;
+  const offline = {
+    id: 'no-twin',
+    title: S.emptyNoTwin,
+    hint: offlineReason(connection.status),
+    large: true,
+  };
+  if (!snapshot) {
+    if (phase === 'offline') return offline;
+    return phase === 'connecting'
+      ? { id: 'connecting', title: S.emptyConnecting, hint: S.emptyConnectingHint, large: true }
+      : { id: 'unreachable', title: S.emptyUnreachable, hint: S.emptyUnreachableHint, large: true };
+  }
+  if (snapshot.tags.length === 0) {
+    if (phase === 'offline') return offline;
+    return { id: 'no-tags', title: S.emptyNoTags, hint: S.emptyNoTagsHint, large: true };
+  }
+  if (!snapshot.tags.some((tag) => tag.at)) {
+    return { id: 'no-pins', title: S.emptyNoPins, hint: S.emptyNoPinsHint };
+  }
+  if (!snapshot.tags.some((tag) => tag.at && tag.readings.get(view.sensor) != null)) {
+    const label = shown(sensorNamed(view.sensor).label, 32);
+    return { id: 'no-reading', title: S.emptyNoReading(label), hint: S.emptyNoReadingHint };
+  }
+  if (twin.field.state === 'failed') {
+    return { id: 'field-failed', title: S.fieldFailed(shown(twin.field.message, 160)) };
+  }
+  if (!twin.map.value && twin.map.state === 'failed') {
+    return { id: 'no-map', title: S.emptyNoMap };
+  }
+  return null;
+}
+
+export function Notices(): JSX.Element | null {
+  const id = useApp((state) => noticeFor(state)?.id);
+  const title = useApp((state) => noticeFor(state)?.title);
+  const hint = useApp((state) => noticeFor(state)?.hint);
+  const large = useApp((state) => noticeFor(state)?.large);
+  if (!id) return null;
+  return (
+    <div className={large ? 'notice notice-large' : 'notice'} data-testid="notice" data-notice={id}>
+      <strong>{title}</strong>
+      {hint && <span>{hint}</span>}
+    </div>
+  );
+}

@@ -1,0 +1,53 @@
+import { useEffect, useRef, useState, type JSX } from 'react';
+
+import { valueAt } from '../domain/field';
+import { metresText, readingText } from '../domain/format';
+import { sensorNamed } from '../domain/sensors';
+import { lengthText, scaleBar } from '../geometry/scale';
+import { pointedAt } from '../map/pointer';
+import { useApp } from '../store/app';
+import { useSelected } from '../store/create';
+import { S } from '../strings';
+
+/** The field's value at the point that mouse or crosshair is on. */
+export function Readout(): JSX.Element | null {
+  const point = useSelected(pointedAt, (at) => at);
+  const field = useApp((state) => state.twin.field.value);
+  const name = useApp((state) => state.view.sensor);
+  const unit = useApp((state) => state.settings.unit);
+  if (!point) return null;
+  const sensor = sensorNamed(name);
+  const value = field?.sensor === name ? valueAt(field, point) : null;
+  return (
+    <output className="readout" data-testid="readout">
+      <strong>{value === null ? S.notKnown : readingText(sensor, value, unit)}</strong>
+      <span>{S.position(metresText(point.x), metresText(point.y))}</span>
+    </output>
+  );
+}
+
+const LONGEST_BAR_PX = 110;
+
+/** A round length and how long it is on the map. */
+export function ScaleBar(): JSX.Element {
+  const root = useRef<HTMLDivElement>(null);
+  const [scale, setScale] = useState(50);
+  useEffect(() => {
+    const map = document.getElementById('map-view');
+    const onView = (event: Event): void => {
+      setScale((event as CustomEvent<{ scale: number }>).detail.scale);
+    };
+    map?.addEventListener('mapview', onView);
+    return () => {
+      map?.removeEventListener('mapview', onView);
+    };
+  }, []);
+  const bar = scaleBar(scale, LONGEST_BAR_PX);
+  const length = lengthText(bar.metres);
+  return (
+    <div className="scale-bar" ref={root} role="img" aria-label={S.scaleBar(length)}>
+      <span className="bar" style={{ width: `${bar.pixels}px` }} />
+      <span>{length}</span>
+    </div>
+  );
+}

@@ -1,0 +1,36 @@
+import type { JSX } from 'react';
+
+import { rgbText, sensorColour } from '../domain/ramp';
+import { shown } from '../domain/text';
+import { unitOf } from '../domain/units';
+import { act, useApp } from '../store/app';
+import { selectSensors } from '../store/derived';
+import { S } from '../strings';
+import { Segmented } from './Segmented';
+
+/** Which sensor the map shows. */
+export function SensorPicker(): JSX.Element {
+  const sensors = useApp(selectSensors);
+  const sensor = useApp((state) => state.view.sensor);
+  const unit = useApp((state) => state.settings.unit);
+  return (
+    <Segmented
+      legend={S.sensors}
+      className="sensors"
+      value={sensor}
+      options={sensors.map((each) => ({
+        value: each.name,
+        label: (
+          <>
+            <span className="swatch" style={{ background: rgbText(sensorColour(each)) }} />
+            <span className="sensor-label">{shown(each.label, 32)}</span>
+            <span className="sensor-unit">{unitOf(each, unit)}</span>
+          </>
+        ),
+      }))}
+      onChange={(name) => {
+        act({ type: 'sensor', sensor: name });
+      }}
+    />
+  );
+}

@@ -1,0 +1,85 @@
+import type { JSX } from 'react';
+
+import type { TagHistory } from '../contract/types';
+import { readingText } from '../domain/format';
+import { rgbText, sensorColour } from '../domain/ramp';
+import type { Sensor } from '../domain/sensors';
+import type { TemperatureUnit } from '../domain/units';
+import { S } from '../strings';
+
+type Values = TagHistory['sensors'][number]['values'];
+
+export interface SparkPoint {
+  readonly x: number;
+  readonly y: number;
+}
+
+const WIDTH = 96;
+const HEIGHT = 26;
+const PAD = 3;
+
+/** Points of the line, oldest first, by time along x; gaps (no number) split it into pieces. */
+export function sparkLines(values: Values): SparkPoint[][] {
+  const known = values.flatMap(({ value }) => (value === null ? [] : [value]));
+  const low = Math.min(...known);
+  const high = Math.max(...known);
+  const seconds = values.map(({ stamp }) => stamp.sec + stamp.nanosec / 1e9);
+  const start = seconds[0] ?? 0;
+  const length = (seconds.at(-1) ?? 0) - start;
+  const pieces: SparkPoint[][] = [];
+  let piece: SparkPoint[] = [];
+  values.forEach(({ value }, index) => {
+    if (value === null) {
+      piece = [];
+      return;
+    }
+    if (piece.length === 0) pieces.push(piece);
+    // A clock that jumped back has no order by time; then the scans are spread evenly.
+    const along =
+      length > 0
+        ? ((seconds[index] ?? start) - start) / length
+        : index / Math.max(1, values.length - 1);
+    const up = high > low ? (value - low) / (high - low) : 0.5;
+    piece.push({
+      x: PAD + Math.min(1, Math.max(0, along)) * (WIDTH - 2 * PAD),
+      y: HEIGHT - PAD - up * (HEIGHT - 2 * PAD),
+    });
+  });
+  return pieces;
+}
+
+export function Sparkline({
+  sensor,
+  values,
+  unit,
+}: {
+  sensor: Sensor;
+  values: Values;
+  unit: TemperatureUnit;
+}): JSX.Element | null {
+  const known = values.flatMap(({ value }) => (value === null ? [] : [value]));
+  if (known.length < 2) return null;
+  const label = S.cardHistory(
+    known.length,
+    readingText(sensor, Math.min(...known), unit),
+    readingText(sensor, Math.max(...known), unit),
+  );
+  const pieces = sparkLines(values);
+  const last = pieces.at(-1)?.at(-1);
+  return (
+    <svg
+      className="sparkline"
+      viewBox={`0 0 ${WIDTH} ${HEIGHT}`}
+      width={WIDTH}
+      height={HEIGHT}
+      role="img"
+      aria-label={label}
+      style={{ color: rgbText(sensorColour(sensor)) }}
+    >
+      {pieces.map((piece, index) => (
+        <polyline key={index} points={piece.map(({ x, y }) => `${x},${y}`).join(' ')} />
+      ))}
+      {last && <circle cx={last.x} cy={last.y} r={2.5} />}
+    </svg>
+  );
+}

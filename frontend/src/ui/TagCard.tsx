@@ -1,0 +1,181 @@
+import { useEffect, useRef, type JSX } from 'react';
+
+import { metresText, percentText, readingText, valueText } from '../domain/format';
+import { sideOf } from '../domain/health';
+import { sensorNamed } from '../domain/sensors';
+import { shown } from '../domain/text';
+import type { Tag } from '../domain/twin';
+import { unitOf, type TemperatureUnit } from '../domain/units';
+import type { TagHistory } from '../contract/types';
+import { commandMap } from '../map/commands';
+import { act, useApp } from '../store/app';
+import { selectHealth } from '../store/derived';
+import { S } from '../strings';
+import { HealthMark } from './HealthMark';
+import { Icon } from './Icon';
+import { Sparkline } from './Sparkline';
+import { Age, PestMark } from './TagRow';
+import { useHistory } from './useHistory';
+
+/** Everything about one tag, over the map. */
+export function TagCard({ tagId }: { tagId: string }): JSX.Element {
+  const tag = useApp((state) => state.twin.snapshot?.tags.find(({ id }) => id === tagId));
+  const health = useApp((state) => selectHealth(state).byTag.get(tagId));
+  const takenAt = useApp((state) => state.twin.snapshot?.takenAt ?? 0);
+  const unit = useApp((state) => state.settings.unit);
+  const history = useHistory(tagId, tag?.observation);
+  const root = useRef<HTMLElement>(null);
+  const cameFrom = useRef<Element | null>(null);
+
+  // Where the card opened from gets the focus back, if it is still somewhere in the card.
+  useEffect(() => {
+    cameFrom.current = document.activeElement;
+    const card = root.current;
+    return () => {
+      const hadFocus = card?.contains(document.activeElement);
+      if (hadFocus && cameFrom.current instanceof HTMLElement) cameFrom.current.focus();
+    };
+  }, []);
+
+  return (
+    <aside
+      ref={root}
+      className="card"
+      aria-label={S.card(shown(tagId, 24))}
+      data-testid="tag-card"
+      data-tag-id={tagId}
+    >
+      <header>
+        <h2>
+          <bdi>{S.card(shown(tagId, 24))}</bdi>
+        </h2>
+        {health && <HealthMark status={health.status} />}
+        <button
+          type="button"
+          className="icon-button"
+          aria-label={S.cardClose}
+          title={S.cardClose}
+          onClick={() => {
+            act({ type: 'select', tagId: null });
+          }}
+        >
+          <Icon name="close" />
+        </button>
+      </header>
+      {tag ? (
+        <CardBody tag={tag} takenAt={takenAt} unit={unit} history={history} />
+      ) : (
+        <p>{S.cardGone}</p>
+      )}
+    </aside>
+  );
+}
+
+function CardBody({
+  tag,
+  takenAt,
+  unit,
+  history,
+}: {
+  tag: Tag;
+  takenAt: number;
+  unit: TemperatureUnit;
+  history: TagHistory | null;
+}): JSX.Element {
+  const { at } = tag;
+  return (
+    <div className="card-body">
+      {tag.anomaly && (
+        <p className="card-pest">
+          <PestMark count={tag.bugCount} />
+        </p>
+      )}
+      {tag.readings.size === 0 && <p className="faint">{S.cardNoReadings}</p>}
+      <ul className="card-readings">
+        {[...tag.readings].map(([name, value]) => (
+          <CardReading
+            key={name}
+            name={name}
+            value={value}
+            unit={unit}
+            values={history?.sensors.find((each) => each.name === name)?.values ?? []}
+          />
+        ))}
+      </ul>
+      <dl className="card-facts">
+        <dt>{S.columns.age}</dt>
+        <dd>
+          <Age staleSeconds={tag.staleSeconds} takenAt={takenAt} />
+        </dd>
+        <dt>{S.columns.species}</dt>
+        <dd>
+          {tag.species ? <bdi>{shown(tag.species, 40)}</bdi> : S.unclassified}
+          {tag.species && tag.speciesConfidence !== null && (
+            <span className="faint"> {S.confidence(percentText(tag.speciesConfidence))}</span>
+          )}
+        </dd>
+        <dt>{S.cardBlooms}</dt>
+        <dd>{tag.flowerCount}</dd>
+        <dt>{S.cardPosition}</dt>
+        <dd>
+          {at ? (
+            <button
+              type="button"
+              className="text-button"
+              title={S.cardShow}
+              onClick={() => {
+                commandMap({ type: 'show', tagId: tag.id });
+              }}
+            >
+              {S.position(metresText(at.x), metresText(at.y))}
+            </button>
+          ) : (
+            <span>{S.notOnMapLong}</span>
+          )}
+        </dd>
+      </dl>
+    </div>
+  );
+}
+
+function CardReading({
+  name,
+  value,
+  unit,
+  values,
+}: {
+  name: string;
+  value: number | null;
+  unit: TemperatureUnit;
+  values: TagHistory['sensors'][number]['values'];
+}): JSX.Element {
+  const sensor = sensorNamed(name);
+  const side = value === null ? null : sideOf(sensor.ideal, value);
+  return (
+    <li data-sensor={name}>
+      <span className="card-label">{shown(sensor.label, 32)}</span>
+      <strong className="card-value">
+        {value === null ? S.sensorFailed : readingText(sensor, value, unit)}
+      </strong>
+      <span className="card-spark">
+        <Sparkline sensor={sensor} values={values} unit={unit} />
+      </span>
+      {sensor.ideal && (
+        <span className="card-ideal" data-side={side}>
+          {side && side !== 'within' && (
+            <>
+              <Icon name={side === 'below' ? 'down' : 'up'} size={12} />
+              {S[side]}
+              {' · '}
+            </>
+          )}
+          {S.healthIdeal(
+            valueText(sensor, sensor.ideal[0], unit),
+            valueText(sensor, sensor.ideal[1], unit),
+            unitOf(sensor, unit),
+          )}
+        </span>
+      )}
+    </li>
+  );
+}

@@ -1,0 +1,175 @@
+import { memo, type JSX } from 'react';
+
+import { ageSeconds } from '../domain/age';
+import { ageText, percentText, valueText } from '../domain/format';
+import { sideOf, type TagHealth } from '../domain/health';
+import type { Sensor } from '../domain/sensors';
+import { shown } from '../domain/text';
+import type { Tag } from '../domain/twin';
+import type { TemperatureUnit } from '../domain/units';
+import { commandMap } from '../map/commands';
+import { act } from '../store/app';
+import { S } from '../strings';
+import { HealthMark } from './HealthMark';
+import { Icon } from './Icon';
+import { useNow } from './useNow';
+
+interface Props {
+  readonly tag: Tag;
+  readonly health: TagHealth;
+  readonly sensors: readonly Sensor[];
+  readonly chosen: string;
+  readonly unit: TemperatureUnit;
+  readonly takenAt: number;
+  readonly selected: boolean;
+  readonly hovered: boolean;
+}
+
+export const TagRow = memo(function TagRow({
+  tag,
+  health,
+  sensors,
+  chosen,
+  unit,
+  takenAt,
+  selected,
+  hovered,
+}: Props): JSX.Element {
+  return (
+    <tr
+      data-tag-id={tag.id}
+      data-health={health.status}
+      data-pinned={tag.at !== null}
+      data-pest={tag.anomaly}
+      data-selected={selected}
+      data-hovered={hovered}
+      onPointerEnter={() => {
+        act({ type: 'hover', tagId: tag.id });
+      }}
+      onPointerLeave={() => {
+        act({ type: 'hover', tagId: null });
+      }}
+    >
+      <th scope="row">
+        {/* The button's hit area covers the whole row (see table.css). */}
+        <button
+          type="button"
+          className="row-button"
+          aria-pressed={selected}
+          onClick={() => {
+            act({ type: 'select', tagId: selected ? null : tag.id });
+            if (!selected) commandMap({ type: 'show', tagId: tag.id });
+          }}
+        >
+          <bdi>{shown(tag.id, 24)}</bdi>
+        </button>
+        {!tag.at && (
+          <span className="chip" title={S.notOnMapLong}>
+            {S.notOnMap}
+          </span>
+        )}
+      </th>
+      <td className="cell-health">
+        <HealthMark status={health.status} />
+      </td>
+      {sensors.map((sensor) => (
+        <td
+          key={sensor.name}
+          className={sensor.name === chosen ? 'number chosen' : 'number other'}
+          data-sensor={sensor.name}
+        >
+          <Reading sensor={sensor} value={tag.readings.get(sensor.name)} unit={unit} />
+        </td>
+      ))}
+      <td className="cell-species">
+        {tag.species ? (
+          <>
+            <bdi>{shown(tag.species, 28)}</bdi>
+            {tag.speciesConfidence !== null && (
+              <span className="faint" title={S.confidence(percentText(tag.speciesConfidence))}>
+                {percentText(tag.speciesConfidence)}
+              </span>
+            )}
+          </>
+        ) : (
+          <span className="faint">{S.noSensor}</span>
+        )}
+      </td>
+      <td className="number optional">{tag.flowerCount > 0 ? tag.flowerCount : ''}</td>
+      <td className="cell-pest">{tag.anomaly && <PestMark count={tag.bugCount} />}</td>
+      <td className="number cell-age">
+        <Age staleSeconds={tag.staleSeconds} takenAt={takenAt} />
+      </td>
+    </tr>
+  );
+});
+
+export function PestMark({ count }: { count: number }): JSX.Element {
+  return (
+    <span className="pest">
+      <svg viewBox="0 0 16 16" width="15" height="15" aria-hidden="true">
+        <path d="M8 1 15.5 14.5H.5Z" className="body" />
+        <path d="M8 5.8v4M8 12.1v.01" className="mark" />
+      </svg>
+      {S.pest}
+      {count > 0 && <span className="faint">{S.pestCount(count)}</span>}
+    </span>
+  );
+}
+
+/** Seconds tick here alone, so that a table of hundreds is not rendered anew each second. */
+export function Age({
+  staleSeconds,
+  takenAt,
+}: {
+  staleSeconds: number | null;
+  takenAt: number;
+}): JSX.Element {
+  const now = useNow();
+  const age = ageSeconds(staleSeconds, takenAt, now);
+  return age === null ? (
+    <span className="faint" title={S.neverObservedLong}>
+      {S.neverObserved}
+    </span>
+  ) : (
+    <>{ageText(age)}</>
+  );
+}
+
+function Reading({
+  sensor,
+  value,
+  unit,
+}: {
+  sensor: Sensor;
+  value: number | null | undefined;
+  unit: TemperatureUnit;
+}): JSX.Element {
+  if (value === undefined) {
+    return (
+      <span className="faint">
+        <span aria-hidden="true">{S.noSensor}</span>
+        <span className="unseen">{S.noSensorLong}</span>
+      </span>
+    );
+  }
+  if (value === null) {
+    return (
+      <span className="failed" title={S.sensorFailedLong}>
+        {S.sensorFailed}
+      </span>
+    );
+  }
+  const side = sideOf(sensor.ideal, value);
+  return (
+    <>
+      {side === 'below' || side === 'above' ? (
+        <span className="beyond" title={side === 'below' ? S.below : S.above}>
+          <Icon name={side === 'below' ? 'down' : 'up'} size={12} />
+          <span className="unseen">{side === 'below' ? S.below : S.above} </span>
+        </span>
+      ) : null}
+      {valueText(sensor, value, unit)}
+    </>
+  );
+}

@@ -1,0 +1,141 @@
+import { memo, useMemo, type JSX, type ReactNode } from 'react';
+
+import { rgbText, sensorColour } from '../domain/ramp';
+import type { Sensor } from '../domain/sensors';
+import { filterRows, rowsOf, sortRows } from '../domain/table';
+import { shown } from '../domain/text';
+import { unitOf } from '../domain/units';
+import { act, useApp } from '../store/app';
+import { selectHealth, selectSensors } from '../store/derived';
+import { S } from '../strings';
+import { Icon } from './Icon';
+import { TagRow } from './TagRow';
+
+/** Every tag, also those without a pin and those whose scan failed. */
+export function TagTable(): JSX.Element {
+  const snapshot = useApp((state) => state.twin.snapshot);
+  const health = useApp(selectHealth);
+  const sensors = useApp(selectSensors);
+  const chosen = useApp((state) => state.view.sensor);
+  const selected = useApp((state) => state.view.selected);
+  const hovered = useApp((state) => state.view.hovered);
+  const sort = useApp((state) => state.view.sort);
+  const filter = useApp((state) => state.view.filter);
+  const status = useApp((state) => state.view.health);
+  const unit = useApp((state) => state.settings.unit);
+
+  const rows = useMemo(
+    () => sortRows(filterRows(rowsOf(snapshot?.tags ?? [], health), filter, status), sort),
+    [snapshot, health, filter, status, sort],
+  );
+  const columns = 6 + sensors.length;
+  return (
+    <table className="tags" data-testid="tag-table">
+      <caption className="unseen">{S.tableCaption}</caption>
+      <thead>
+        <tr>
+          <ColumnHead id="tag">{S.columns.tag}</ColumnHead>
+          <ColumnHead id="health">{S.columns.health}</ColumnHead>
+          {sensors.map((sensor) => (
+            <SensorHead
+              key={sensor.name}
+              sensor={sensor}
+              unit={unitOf(sensor, unit)}
+              chosen={sensor.name === chosen}
+            />
+          ))}
+          <ColumnHead id="species">{S.columns.species}</ColumnHead>
+          <ColumnHead id="flowers" className="number optional">
+            {S.columns.flowers}
+          </ColumnHead>
+          <ColumnHead id="pest">{S.columns.pest}</ColumnHead>
+          <ColumnHead id="age" className="number">
+            {S.columns.age}
+          </ColumnHead>
+        </tr>
+      </thead>
+      <tbody>
+        {rows.map((row) => (
+          <TagRow
+            key={row.tag.id}
+            tag={row.tag}
+            health={row.health}
+            sensors={sensors}
+            chosen={chosen}
+            unit={unit}
+            takenAt={snapshot?.takenAt ?? 0}
+            selected={row.tag.id === selected}
+            hovered={row.tag.id === hovered}
+          />
+        ))}
+        {rows.length === 0 && snapshot && snapshot.tags.length > 0 && (
+          <tr className="no-match">
+            <td colSpan={columns}>
+              {S.nothingMatches}{' '}
+              <button
+                type="button"
+                className="text-button"
+                onClick={() => {
+                  act({ type: 'filter', text: '' });
+                  act({ type: 'health', status: null });
+                }}
+              >
+                {S.filterClear}
+              </button>
+            </td>
+          </tr>
+        )}
+      </tbody>
+    </table>
+  );
+}
+
+const SensorHead = memo(function SensorHead({
+  sensor,
+  unit,
+  chosen,
+}: {
+  sensor: Sensor;
+  unit: string;
+  chosen: boolean;
+}): JSX.Element {
+  return (
+    <ColumnHead id={sensor.name} className={chosen ? 'number chosen' : 'number other'}>
+      <span className="swatch" style={{ background: rgbText(sensorColour(sensor)) }} />
+      {shown(sensor.label, 24)} <span className="head-unit">{unit}</span>
+    </ColumnHead>
+  );
+});
+
+function ColumnHead({
+  id,
+  className,
+  children,
+}: {
+  id: string;
+  className?: string;
+  children: ReactNode;
+}): JSX.Element {
+  const sort = useApp((state) => state.view.sort);
+  const own = sort.column === id;
+  return (
+    <th
+      scope="col"
+      className={className}
+      data-column={id}
+      aria-sort={own ? (sort.descending ? 'descending' : 'ascending') : 'none'}
+    >
+      <button
+        type="button"
+        onClick={() => {
+          act({ type: 'sort', column: id });
+        }}
+      >
+        <span>{children}</span>
+        <span className="sort-mark" data-on={own}>
+          <Icon name={own && sort.descending ? 'down' : 'up'} size={14} />
+        </span>
+      </button>
+    </th>
+  );
+}

@@ -1,0 +1,75 @@
+import type { JSX } from 'react';
+
+import { saveTable } from '../export/actions';
+import { filterRows, rowsOf } from '../domain/table';
+import { act, useApp } from '../store/app';
+import { selectHealth } from '../store/derived';
+import { S } from '../strings';
+import { AttentionList } from './AttentionList';
+import { HealthSummary } from './HealthSummary';
+import { Icon } from './Icon';
+import { TagTable } from './TagTable';
+
+export const FILTER_ID = 'tag-filter';
+
+export function TagsPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
+  return (
+    <section className="tags-panel" aria-label={S.tags} id="tags" tabIndex={-1}>
+      <HealthSummary kiosk={kiosk} />
+      {kiosk ? (
+        <AttentionList />
+      ) : (
+        <>
+          <FilterBar />
+          {/* Scrolls by itself, so the keyboard must be able to reach it. */}
+          {/* eslint-disable-next-line jsx-a11y/no-noninteractive-tabindex */}
+          <div className="table-scroll" role="region" aria-label={S.tableCaption} tabIndex={0}>
+            <TagTable />
+          </div>
+        </>
+      )}
+    </section>
+  );
+}
+
+function FilterBar(): JSX.Element {
+  const filter = useApp((state) => state.view.filter);
+  const status = useApp((state) => state.view.health);
+  const all = useApp((state) => state.twin.snapshot?.tags.length ?? 0);
+  const count = useApp((state) =>
+    state.twin.snapshot
+      ? filterRows(
+          rowsOf(state.twin.snapshot.tags, selectHealth(state)),
+          state.view.filter,
+          state.view.health,
+        ).length
+      : 0,
+  );
+  return (
+    <div className="filter-bar">
+      <label className="search">
+        <span className="unseen">{S.filter}</span>
+        <Icon name="search" size={18} />
+        <input
+          id={FILTER_ID}
+          type="search"
+          value={filter}
+          placeholder={S.filterHint}
+          autoComplete="off"
+          spellCheck={false}
+          maxLength={200}
+          onChange={(event) => {
+            act({ type: 'filter', text: event.target.value });
+          }}
+        />
+      </label>
+      <span className="count" role="status" data-testid="row-count">
+        {S.shownOf(count, all)}
+        {status && ` · ${S.health[status]}`}
+      </span>
+      <button type="button" className="text-button" title={S.saveCsv} onClick={saveTable}>
+        <Icon name="download" size={18} /> {S.saveCsvShort}
+      </button>
+    </div>
+  );
+}

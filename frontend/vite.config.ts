@@ -1,0 +1,39 @@
+import { fileURLToPath } from 'node:url';
+
+import react from '@vitejs/plugin-react';
+import { defineConfig } from 'vitest/config';
+
+const here = (path: string): string => fileURLToPath(new URL(path, import.meta.url));
+
+const BRIDGE = process.env['LUPIN_BRIDGE'] ?? 'http://127.0.0.1:8000';
+
+export default defineConfig({
+  root: here('.'),
+  // Relative, so that the bridge may stand behind any path prefix.
+  base: './',
+  plugins: [react()],
+  build: {
+    outDir: here('../backend/lupin_bridge/static'),
+    emptyOutDir: true,
+    // A data: URL for a script, style or font would need a wider Content-Security-Policy.
+    assetsInlineLimit: 0,
+    // The polyfill is an inline script in some outputs; every browser of the last years preloads.
+    modulePreload: { polyfill: false },
+    target: 'es2022',
+  },
+  server: {
+    host: '127.0.0.1',
+    proxy: {
+      '/api': BRIDGE,
+      '/ws': { target: BRIDGE, ws: true },
+      '/readyz': BRIDGE,
+      '/healthz': BRIDGE,
+    },
+  },
+  test: {
+    environment: 'jsdom',
+    include: ['src/**/*.test.{ts,tsx}', 'scripts/**/*.test.{ts,mjs}'],
+    restoreMocks: true,
+    unstubGlobals: true,
+  },
+});

@@ -29,7 +29,7 @@ def test_a_value_out_of_its_range_is_named_with_the_range(spec: Any) -> None:
     low, high = spec.metadata["low"], spec.metadata["high"]
     for value in (math.nextafter(low, -math.inf), math.nextafter(high, math.inf), math.nan):
         with pytest.raises(SettingError) as refused:
-            Settings(**{spec.name: value})
+            Settings(**{spec.name: value})  # type: ignore[arg-type]
         for named in (option(spec.name), str(value), f"{low:g}", f"{high:g}"):
             assert named in str(refused.value)
 

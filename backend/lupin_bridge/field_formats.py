@@ -137,12 +137,13 @@ def _palette_indices(grid: FieldGrid) -> npt.NDArray[np.uint8]:
     """0 where the value is not finite, else 1 (value_min) to 255 (value_max)."""
     values = _rows(grid)
     span = grid.value_max - grid.value_min
-    known = np.isfinite(values)
-    with np.errstate(invalid="ignore", over="ignore"):
-        if span > 0.0:
-            steps = (values - np.float32(grid.value_min)) * np.float32((_RAMP_STEPS - 1) / span)
-        else:
-            # One value everywhere is the maximum as much as the minimum: show it.
-            steps = np.full_like(values, _RAMP_STEPS - 1)
-        indices = np.rint(np.clip(steps, 0, _RAMP_STEPS - 1)) + 1
-        return np.where(known, indices, 0).astype(np.uint8)
+    if span > 0.0:
+        # In float64: the span of two float32, or the inverse of it, may be past float32.
+        steps = np.subtract(values, grid.value_min, dtype=np.float64)
+        steps *= (_RAMP_STEPS - 1) / span
+        np.rint(steps, out=steps)
+    else:
+        # One value everywhere is the maximum as much as the minimum: show it.
+        steps = np.full(values.shape, _RAMP_STEPS - 1.0)
+    steps += 1
+    return np.where(np.isfinite(values), steps, 0).astype(np.uint8)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 from urllib.parse import quote
@@ -19,6 +20,7 @@ from lupin_twin.fields import FieldRefused, FieldRequest
 DEFAULT_RESOLUTION_M: Final = 0.1
 BOX_NAMES: Final = ("bbox_min_x", "bbox_min_y", "bbox_max_x", "bbox_max_y")
 NAMES: Final = ("sensor_type", "resolution", *BOX_NAMES, "scale")
+_PLAIN: Final = re.compile(r"[0-9A-Za-z+.-]+")
 
 Box = tuple[float, float, float, float]
 
@@ -68,10 +70,12 @@ def parse(parameters: Sequence[tuple[str, str]]) -> FieldQuery:
 
 
 def _number(name: str, text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise FieldRefused(f"{name} is {text[:64]!r}, expected a number") from None
+    # float() takes more than plain numbers: `1_000`, and the digits of every script. Blanks around
+    # are fine: in a query string, `+2` reads ` 2`.
+    if _PLAIN.fullmatch(text.strip(" ")):
+        with suppress(ValueError):
+            return float(text)
+    raise FieldRefused(f"{name} is {text[:64]!r}, expected a number")
 
 
 def _scale(text: str) -> int:

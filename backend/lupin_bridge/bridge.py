@@ -94,6 +94,7 @@ class Bridge:
         self._latest = state
         now_s = time.monotonic()
         self._liveness.last_state_s = now_s
+        self._liveness.twin_count = self.source.twin_count()
         if self._push_timer is not None:
             return  # it will take this state along
         if now_s >= self._next_push_s:
@@ -120,14 +121,11 @@ class Bridge:
 
     def _tell_status(self) -> None:
         status = self.status
-        if self._told is not None and self._told.reason == status.reason:
+        if not status.is_news_after(self._told):
             return
-        if self._told is not None or not status.is_live:
-            log.log(
-                logging.INFO if status.is_live else logging.WARNING,
-                "%s",
-                status.frame()["message"],
-            )
+        is_good = status.is_live and status.twin_count <= 1
+        if self._told is not None or not is_good:
+            log.log(logging.INFO if is_good else logging.WARNING, "%s", status.message)
         self._told = status
         self.hub.announce(status, time.monotonic())
 

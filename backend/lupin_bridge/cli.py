@@ -1,4 +1,4 @@
-"""The command `lupin-twin`: `serve` (twin and bridge) and `demo` (the same plus the patrol)."""
+"""The command `lupin-twin` and its roles: `serve`, `demo` and `web`."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.local_twin import LocalTwin
 from lupin_bridge.server import BridgeServer, address_of, listen
 from lupin_bridge.settings import SettingError, Settings, option
+from lupin_bridge.web_twin import WebTwin
 from lupin_twin.parameters import ParameterError
 
 log = logging.getLogger("lupin_bridge")
@@ -35,16 +36,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SettingError as error:
         _fail(str(error))
     _prepare_process()
-    patrol = _start_patrol() if options.role == "demo" else None
     try:
-        return asyncio.run(_serve(settings, ros_args))
+        return asyncio.run(_run(options.role, settings, ros_args))
     except ParameterError as error:
         _fail(str(error))
     except KeyboardInterrupt:
         return 0
-    finally:
-        if patrol is not None:
-            _stop_patrol(patrol)
 
 
 def split_ros_args(argv: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -63,20 +60,33 @@ def split_ros_args(argv: Sequence[str]) -> tuple[list[str], list[str]]:
     return own, ros
 
 
-async def _serve(settings: Settings, ros_args: Sequence[str]) -> int:
+ROLES = {
+    "serve": "the twin and the bridge in one process",
+    "demo": "serve, plus a simulated patrol in a second process",
+    "web": "the bridge alone, for a twin elsewhere; as many of these as needed",
+}
+
+
+async def _run(role: str, settings: Settings, ros_args: Sequence[str]) -> int:
     try:
         listener = listen(settings.host, settings.port)
     except OSError as error:
         _fail(f"cannot listen on {settings.host} port {settings.port}: {error.strerror}")
-    twin = LocalTwin(ros_args=ros_args, timeout_s=settings.field_timeout_s)
-    bridge = Bridge(twin, settings)
+    make_source = WebTwin if role == "web" else LocalTwin
+    source = make_source(ros_args=ros_args, timeout_s=settings.field_timeout_s)
+    bridge = Bridge(source, settings)
     server = BridgeServer(create_app(bridge), bridge)
     await bridge.start()
+    patrol = _start_patrol() if role == "demo" else None
     print(f"lupin-twin: {address_of(listener)}", flush=True)  # noqa: T201  # for people and scripts
     try:
         await server.serve(sockets=[listener])
     finally:
+        if patrol is not None:
+            patrol.terminate()
         await bridge.stop()
+        if patrol is not None:
+            await asyncio.to_thread(_wait_or_kill, patrol)
     return 0
 
 
@@ -96,10 +106,7 @@ def _parser() -> argparse.ArgumentParser:
             metavar=spec.name.rpartition("_")[2].upper(),
             help=f"{spec.metadata['help']} (default: {spec.default})",
         )
-    for role, text in (
-        ("serve", "the twin and the bridge in one process"),
-        ("demo", "serve, plus a simulated patrol in a second process"),
-    ):
+    for role, text in ROLES.items():
         roles.add_parser(role, parents=[common], help=text, description=text)
     return parser
 
@@ -122,8 +129,7 @@ def _start_patrol() -> subprocess.Popen[bytes]:
     return subprocess.Popen([sys.executable, "-m", "lupin_patrol"])
 
 
-def _stop_patrol(patrol: subprocess.Popen[bytes]) -> None:
-    patrol.terminate()
+def _wait_or_kill(patrol: subprocess.Popen[bytes]) -> None:
     try:
         patrol.wait(PATROL_STOP_S)
     except subprocess.TimeoutExpired:

@@ -16,6 +16,9 @@ from lupin_twin.idw import FieldGrid
 from lupin_twin.node import TwinNode
 from lupin_twin.state import Observation
 
+# A third of what counts as silence (`status.STALE_AFTER_S`).
+HEARTBEAT_S = 1.0
+
 ResultT = TypeVar("ResultT")
 
 
@@ -39,8 +42,9 @@ class LocalTwin:
 
         def make_node(context: Any, post: Callable[[Revised], None]) -> TwinNode:
             node = TwinNode(context=context)
-            node.add_listener(lambda snapshot: post(Revised(snapshot, self._revision_of(node))))
-            post(Revised(node.snapshot(), self._revision_of(node)))
+            node.add_listener(
+                lambda snapshot: post(Revised(snapshot, self._revision_of(node))), HEARTBEAT_S
+            )
             return node
 
         self._thread = RosThread(
@@ -66,6 +70,10 @@ class LocalTwin:
     def revision(self) -> str:
         """The process's identity, the observation count and the map's revision."""
         return self._thread.peek(self._revision_of)
+
+    def twin_count(self) -> int:
+        """How many nodes publish the state topic, ours included."""
+        return self._thread.peek(lambda node: node.twins.value)
 
     def max_distance_m(self) -> float:
         """The parameter `idw_max_distance_m`."""

@@ -115,9 +115,7 @@ class RosThread(Generic[NodeT, EventT]):
             TwinUnavailableError: there is no node.
 
         """
-        if self._node is None:
-            raise TwinUnavailableError("the ROS thread has no node")
-        return read(self._node)
+        return read(self._require_node())
 
     async def call(self, work: Callable[[NodeT], ResultT]) -> ResultT:
         """Run `work(node)` in the ROS thread, between two callbacks, and return its result.
@@ -132,9 +130,8 @@ class RosThread(Generic[NodeT, EventT]):
         result: asyncio.Future[ResultT] = self._loop.create_future()
 
         def run() -> None:
-            assert self._node is not None  # set before the executor is
             try:
-                value = work(self._node)
+                value = work(self._require_node())
             except Exception as error:  # noqa: BLE001  # handed to the caller
                 self._to_loop(_settle, result, None, error)
             else:
@@ -142,6 +139,43 @@ class RosThread(Generic[NodeT, EventT]):
 
         self._executor.create_task(run)
         return await result
+
+    async def ask(
+        self, start: Callable[[NodeT], Any], give_up: Callable[[NodeT, Any], None]
+    ) -> Any:
+        """Run `start(node)`, which returns an rclpy Future, and wait for that future's result.
+
+        Awaiting it as it is would spin a core; its done callback wakes the loop instead. If the
+        waiting ends early (a time-out), `give_up(node, future)` runs in the ROS thread.
+
+        Raises:
+            TwinUnavailableError: the thread has ended.
+            Exception: whatever `start` or the future raised.
+
+        """
+        result: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
+
+        def begin(node: NodeT) -> Any:
+            future = start(node)
+            future.add_done_callback(
+                lambda done: self._to_loop(
+                    _settle, result, None if done.exception() else done.result(), done.exception()
+                )
+            )
+            return future
+
+        future = await self.call(begin)
+        try:
+            return await result
+        except asyncio.CancelledError:
+            if self._executor is not None:
+                self._executor.create_task(lambda: give_up(self._require_node(), future))
+            raise
+
+    def _require_node(self) -> NodeT:
+        if self._node is None:
+            raise TwinUnavailableError("the ROS thread has no node")
+        return self._node
 
     # --- in the ROS thread ------------------------------------------------------------------
 

@@ -58,6 +58,9 @@ class TwinSource(Protocol):
     def revision(self) -> str:
         """The revision now: opaque, changes exactly when a field could."""
 
+    def twin_count(self) -> int:
+        """How many nodes publish the state topic; more than 1 is a mistake."""
+
     def max_distance_m(self) -> float:
         """How far a tag's reading reaches, m: the margin of a field's default box."""
 

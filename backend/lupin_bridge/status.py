@@ -25,15 +25,33 @@ _MESSAGES: dict[Reason, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """`reason` says why the twin counts as live or offline; `state_age_s` is None: never."""
+    """`reason` says why the twin counts as live or offline; `state_age_s` is None: never.
+
+    `twin_count` is how many nodes publish the state topic; more than one is a mistake.
+    """
 
     reason: Reason
     state_age_s: float | None
+    twin_count: int = 1
 
     @property
     def is_live(self) -> bool:
         """Whether what the bridge serves is current."""
         return self.reason == "live"
+
+    @property
+    def message(self) -> str:
+        """What to tell a person."""
+        if self.is_live and self.twin_count > 1:
+            return (
+                f"{self.twin_count} twins publish on the same topic, and what you see is a mixture "
+                "of them. Stop all but one, or give them ROS domains of their own."
+            )
+        return _MESSAGES[self.reason]
+
+    def is_news_after(self, before: Status | None) -> bool:
+        """Whether clients have to be told, who were told `before`."""
+        return before is None or (before.reason, before.message) != (self.reason, self.message)
 
     def frame(self) -> dict[str, Any]:
         """`schema.StatusFrame`."""
@@ -41,7 +59,7 @@ class Status:
             "type": "status",
             "twin": "live" if self.is_live else "offline",
             "reason": self.reason,
-            "message": _MESSAGES[self.reason],
+            "message": self.message,
             "state_age_seconds": None if self.state_age_s is None else round(self.state_age_s, 3),
         }
 
@@ -52,13 +70,14 @@ class Liveness:
 
     stale_after_s: float = STALE_AFTER_S
     last_state_s: float | None = None
+    twin_count: int = 1
     thread_dead: bool = False
     shutting_down: bool = False
 
     def status(self, now_s: float) -> Status:
         """The status at `now_s`."""
         age = None if self.last_state_s is None else max(0.0, now_s - self.last_state_s)
-        return Status(self._reason(age), age)
+        return Status(self._reason(age), age, self.twin_count)
 
     def _reason(self, age_s: float | None) -> Reason:
         if self.shutting_down:

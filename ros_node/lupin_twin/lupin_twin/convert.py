@@ -218,13 +218,18 @@ def field_request(request: Any) -> FieldRequest:
     )
 
 
-def snapshot_of(msg: Any) -> Snapshot:
-    """lupin_msgs/TwinState as a snapshot: the other direction of `StateMessages`."""
-    return Snapshot(
-        stamp_ns=nanoseconds(msg.header.stamp),
-        frame_id=msg.header.frame_id,
-        tags=tuple(_tag_state(tag) for tag in msg.tags),
-    )
+def snapshot_of(msg: Any, before: Snapshot | None = None) -> Snapshot:
+    """lupin_msgs/TwinState as a snapshot: the other direction of `StateMessages`.
+
+    A tag that is as it was in `before` is the very same value, as it is in the store's snapshots:
+    whoever looks for changes compares identities.
+    """
+    known = {} if before is None else {tag.tag_id: tag for tag in before.tags}
+    tags = []
+    for tag in map(_tag_state, msg.tags):
+        same = known.get(tag.tag_id)
+        tags.append(same if same is not None and same == tag else tag)
+    return Snapshot(nanoseconds(msg.header.stamp), msg.header.frame_id, tuple(tags))
 
 
 def _tag_state(tag: Any) -> TagState:
@@ -328,6 +333,35 @@ def fill_field_response(response: Any, grid: FieldGrid) -> Any:
     response.value_max = float(grid.value_max)
     response.sample_count = int(grid.sample_count)
     return response
+
+
+def grid_of(response: Any) -> FieldGrid:
+    """A GetField.Response that is `ok` as a grid: the other direction of `fill_field_response`."""
+    values = np.array(response.values, dtype=np.float32)
+    values.setflags(write=False)
+    return FieldGrid(
+        width=int(response.width),
+        height=int(response.height),
+        origin_x=float(response.origin_x),
+        origin_y=float(response.origin_y),
+        resolution=float(response.resolution_used),
+        values=values,
+        value_min=float(response.value_min),
+        value_max=float(response.value_max),
+        sample_count=int(response.sample_count),
+    )
+
+
+def field_request_message(request: FieldRequest) -> Any:
+    """A field's request as GetField.Request: the other direction of `field_request`."""
+    return GetField.Request(
+        sensor_type=request.sensor_type,
+        resolution=float(request.resolution),
+        bbox_min_x=float(request.bbox_min_x),
+        bbox_min_y=float(request.bbox_min_y),
+        bbox_max_x=float(request.bbox_max_x),
+        bbox_max_y=float(request.bbox_max_y),
+    )
 
 
 def refusal() -> Any:

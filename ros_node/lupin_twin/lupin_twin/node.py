@@ -36,6 +36,7 @@ from lupin_twin.parameters import ParameterError, TwinParameters, describe
 from lupin_twin.spinning import spin_until_shutdown
 from lupin_twin.state import Rejected, Snapshot, TwinStore
 from lupin_twin.throttle import Throttle
+from lupin_twin.twin_count import TwinCount
 
 NODE_NAME: Final = "lupin_twin"
 WARNING_PERIOD_S: Final = 5.0
@@ -86,10 +87,12 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         )
         self.occupancy_map: OccupancyMap | None = None
         self.callback_errors = 0
+        self.twins = TwinCount()
         self._map_revision = 0
         self._listeners: list[Callable[[Snapshot], None]] = []
         self._messages = convert.StateMessages()
         self._throttle = Throttle(WARNING_PERIOD_S)
+        self._group = MutuallyExclusiveCallbackGroup()
         self._connect()
         self._publish_state()
 
@@ -100,9 +103,15 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         """(observation_count, map revision): changes exactly when a field could."""
         return self.store.observation_count, self._map_revision
 
-    def add_listener(self, listener: Callable[[Snapshot], None]) -> None:
-        """Call `listener(snapshot)` on this thread after each change and at each publication."""
+    def add_listener(self, listener: Callable[[Snapshot], None], heartbeat_s: float) -> None:
+        """Call `listener(snapshot)` on this thread now, after each change, and as a heartbeat.
+
+        The heartbeat goes by the steady clock and does not depend on `state_publish_rate_hz`: who
+        listens can tell a quiet greenhouse from a dead twin, however rarely the topic is published.
+        """
         self._listeners.append(listener)
+        listener(self.snapshot())
+        self._every(heartbeat_s, "heartbeat", lambda: listener(self.snapshot()))
 
     def snapshot(self) -> Snapshot:
         """Every tag, now by ROS time."""
@@ -129,7 +138,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _connect(self) -> None:
         p = self.parameters
-        group = MutuallyExclusiveCallbackGroup()
+        group = self._group
         # raw: the size is checked, and a message that cannot be read is reported with its topic.
         subscriptions = (
             ("observations_topic", Observation, 50, MAX_OBSERVATION_BYTES, self._on_observation),
@@ -155,12 +164,15 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self.create_service(
                 GetField, p.field_service_name, self._on_get_field, callback_group=group
             )
+        self._every(1.0 / p.state_publish_rate_hz, "state timer", self._publish_state)
+
+    def _every(self, period_s: float, what: str, callback: Callable[[], None]) -> None:
         # The steady clock: a paused simulation is no reason to look dead. Stamps and ages in the
         # state follow ROS time all the same.
         self.create_timer(
-            1.0 / p.state_publish_rate_hz,
-            self._guarded("state timer", self._publish_state),
-            callback_group=group,
+            period_s,
+            self._guarded(what, callback),
+            callback_group=self._group,
             clock=Clock(clock_type=ClockType.STEADY_TIME),
         )
 
@@ -268,8 +280,13 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def _publish_state(self) -> None:
         snapshot = self.snapshot()
         self._state_publisher.publish(self._messages.build(snapshot))
-        for listener in self._listeners:
-            listener(snapshot)
+        topic = self.parameters.state_topic
+        if self.twins.see(int(self.count_publishers(topic)), time.monotonic()):
+            self._warn(
+                ("twins", 0),
+                f"{self.twins.value} nodes publish {topic}: consumers get a mixture; "
+                "stop all twins but one, or give them ROS domains of their own",
+            )
 
     # --- small parts ------------------------------------------------------------------------
 

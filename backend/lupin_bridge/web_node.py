@@ -1,0 +1,206 @@
+"""The ROS side of `lupin-twin web`: a consumer of a twin elsewhere, over its two ROS contracts."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections import deque
+from collections.abc import Callable, Sequence
+from hashlib import blake2b
+from typing import Any, Final
+
+from lupin_msgs.msg import TwinState
+from lupin_msgs.srv import GetField
+from nav_msgs.msg import OccupancyGrid
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message
+
+from lupin_twin import convert
+from lupin_twin.explored import OccupancyMap
+from lupin_twin.fields import FieldRequest
+from lupin_twin.node import latched
+from lupin_twin.parameters import TwinParameters
+from lupin_twin.state import Observation, Snapshot, TagState
+from lupin_twin.throttle import Throttle
+from lupin_twin.twin_count import TwinCount
+
+NODE_NAME: Final = "lupin_web"
+WARNING_PERIOD_S: Final = 5.0
+
+# 20,000 tags with all their flowers; a larger state is dropped before it becomes objects.
+MAX_STATE_BYTES: Final = 128_000_000
+MAX_MAP_BYTES: Final = 64_000_000
+
+# The twin's parameters that a consumer has to know too. They are not on the wire: where the twin's
+# are not the defaults, give both the same parameter file.
+SHARED_PARAMETERS: Final = (
+    "state_topic",
+    "field_service_name",
+    "map_topic",
+    "frame_id",
+    "buffer_len",
+    "idw_max_distance_m",
+    "max_grid_cells",
+)
+
+
+class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
+    """Follows `/twin/state` and `/map`, and asks `/twin/get_field`.
+
+    `on_state(snapshot)` is called for each state. Its tags are the very same values as in the one
+    before where nothing has changed.
+
+    Raises:
+        lupin_twin.parameters.ParameterError: a parameter out of its range.
+
+    """
+
+    def __init__(self, on_state: Callable[[Snapshot], None], *, context: Any = None) -> None:
+        super().__init__(NODE_NAME, context=context)
+        defaults = TwinParameters()
+        self.parameters = TwinParameters(
+            **{
+                name: self.declare_parameter(name, getattr(defaults, name)).value
+                for name in SHARED_PARAMETERS
+            }
+        )
+        self.callback_errors = 0
+        self.twins = TwinCount()
+        self.occupancy_map: OccupancyMap | None = None
+        self.digest = ""
+        self._on_state = on_state
+        self._newest: Snapshot | None = None
+        self._history: dict[str, deque[Observation]] = {}
+        self._digests: dict[str, tuple[TagState, bytes]] = {}
+        self._throttle = Throttle(WARNING_PERIOD_S)
+        group = MutuallyExclusiveCallbackGroup()
+        p = self.parameters
+        for message_type, topic, max_bytes, callback in (
+            (TwinState, p.state_topic, MAX_STATE_BYTES, self._take_state),
+            (OccupancyGrid, p.map_topic, MAX_MAP_BYTES, self._take_map),
+        ):
+            self.create_subscription(
+                message_type,
+                topic,
+                self._reader(topic, message_type, max_bytes, callback),
+                latched(1),
+                callback_group=group,
+                raw=True,
+            )
+        self.field_client = self.create_client(GetField, p.field_service_name, callback_group=group)
+
+    # --- for the source, on this node's thread ------------------------------------------------
+
+    @property
+    def revision(self) -> str:
+        """A digest of poses and readings, and the map's revision: the count is not on the wire."""
+        map_revision = 0 if self.occupancy_map is None else self.occupancy_map.revision
+        return f"{self.digest}-{map_revision}"
+
+    def request_field(self, request: FieldRequest) -> Any:
+        """Ask the twin; returns the rclpy Future of its response."""
+        return self.field_client.call_async(convert.field_request_message(request))
+
+    def forget_request(self, future: Any) -> None:
+        """Drop a request that nobody waits for any more, or it would be kept for ever."""
+        self.field_client.remove_pending_request(future)
+
+    def history(self, tag_id: str) -> tuple[Observation, ...] | None:
+        """The last `buffer_len` readings of a tag that were seen from here; None: no such tag."""
+        if self._newest is None or all(tag.tag_id != tag_id for tag in self._newest.tags):
+            return None
+        return tuple(self._history.get(tag_id, ()))
+
+    # --- callbacks ----------------------------------------------------------------------------
+
+    def _take_state(self, msg: Any) -> None:
+        before = self._newest
+        snapshot = convert.snapshot_of(msg, before)
+        known = set() if before is None else set(map(id, before.tags))
+        for tag in snapshot.tags:
+            if id(tag) not in known:
+                self._remember(tag)
+        if before is not None and len(snapshot.tags) < len(before.tags):
+            self._forget_all_but(snapshot.tags)
+        self._newest = snapshot
+        self.digest = self._digest_of(snapshot.tags)
+        topic = self.parameters.state_topic
+        if self.twins.see(int(self.count_publishers(topic)), time.monotonic()):
+            self._say(
+                ("twins", 0),
+                f"{self.twins.value} nodes publish {topic}: what is shown is a mixture; "
+                "stop all twins but one, or give them ROS domains of their own",
+            )
+        self._on_state(snapshot)
+
+    def _take_map(self, msg: Any) -> None:
+        frame_id, expected = msg.header.frame_id, self.parameters.frame_id
+        if frame_id not in ("", expected):
+            self._say(
+                ("frame", 0), f"dropped a map: its frame is {frame_id[:64]!r}, not {expected!r}"
+            )
+            return
+        revision = 1 if self.occupancy_map is None else self.occupancy_map.revision + 1
+        try:
+            self.occupancy_map = convert.map_of(msg, revision)
+        except ValueError as error:
+            self._say(("map", 0), f"dropped a map: {error}; the last one stays")
+            return
+        if self._newest is not None:
+            self._on_state(self._newest)
+
+    # --- small parts --------------------------------------------------------------------------
+
+    def _remember(self, tag: TagState) -> None:
+        if not tag.readings or tag.last_observed_ns is None:
+            return
+        history = self._history.setdefault(tag.tag_id, deque(maxlen=self.parameters.buffer_len))
+        if not history or history[-1].stamp_ns != tag.last_observed_ns:
+            history.append(Observation(tag.tag_id, tag.last_observed_ns, tag.readings))
+
+    def _forget_all_but(self, tags: Sequence[TagState]) -> None:
+        ids = {tag.tag_id for tag in tags}
+        for kept in (self._history, self._digests):
+            for tag_id in [tag_id for tag_id in kept if tag_id not in ids]:
+                del kept[tag_id]
+
+    def _digest_of(self, tags: Sequence[TagState]) -> str:
+        total = blake2b(digest_size=12)
+        for tag in tags:
+            kept = self._digests.get(tag.tag_id)
+            if kept is None or kept[0] is not tag:
+                text = repr((tag.tag_id, tag.pose, tag.readings))
+                digest = blake2b(text.encode("utf-8", "surrogatepass"), digest_size=12).digest()
+                kept = (tag, digest)
+                self._digests[tag.tag_id] = kept
+            total.update(kept[1])
+        return total.hexdigest()
+
+    def _reader(
+        self, topic: str, message_type: Any, max_bytes: int, callback: Callable[[Any], None]
+    ) -> Callable[[bytes], None]:
+        def read(data: bytes) -> None:
+            if len(data) > max_bytes:
+                self._say(
+                    ("size", topic),
+                    f"dropped a message on {topic}: {len(data)} bytes, the limit is {max_bytes}",
+                )
+                return
+            try:
+                callback(deserialize_message(data, message_type))
+            except Exception as error:  # noqa: BLE001  # one bad message must not end the node
+                self.report(topic, error)
+
+        return read
+
+    def report(self, what: str, error: Exception) -> None:
+        """Count and log an error of a callback, with its trace, throttled."""
+        self.callback_errors += 1
+        if self._throttle.ask(("error", what), time.monotonic()) is not None:
+            trace = "".join(traceback.format_exception(error))
+            self.get_logger().error(f"error number {self.callback_errors}, in {what}:\n{trace}")
+
+    def _say(self, key: tuple[str, object], text: str) -> None:
+        if self._throttle.ask(key, time.monotonic()) is not None:
+            self.get_logger().warning(text)

@@ -1,0 +1,113 @@
+"""The source of `web`: a twin elsewhere. As many of these as needed may share one twin."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from lupin_bridge.ros_thread import RosThread
+from lupin_bridge.source import Revised, RevisedGrid, TwinTimeoutError, TwinUnavailableError
+from lupin_bridge.web_node import WebNode
+from lupin_twin import convert
+from lupin_twin.explored import OccupancyMap
+from lupin_twin.fields import FieldRefused, FieldRequest
+from lupin_twin.state import Observation, Snapshot
+
+# Requests on their way to the twin at once. It answers one after the other anyway; more would
+# only wait in DDS, where they cannot be taken back.
+MAX_REQUESTS = 4
+
+
+class WebTwin:
+    """`TwinSource` over the ROS contracts of a twin in another process."""
+
+    def __init__(self, *, ros_args: Sequence[str], timeout_s: float) -> None:
+        self._ros_args = ros_args
+        self._timeout_s = timeout_s
+        self._thread: RosThread[WebNode, Revised]
+        self._asking: dict[FieldRequest, asyncio.Task[RevisedGrid]] = {}
+        self._slots = asyncio.Semaphore(MAX_REQUESTS)
+
+    async def start(
+        self, on_state: Callable[[Revised], None], on_death: Callable[[], None]
+    ) -> None:
+        """Start the ROS thread with its node; see `TwinSource.start`."""
+
+        def make_node(context: Any, post: Callable[[Revised], None]) -> WebNode:
+            def pass_on(snapshot: Snapshot) -> None:
+                post(Revised(snapshot, node.revision))
+
+            node = WebNode(pass_on, context=context)
+            return node
+
+        self._thread = RosThread(
+            make_node, ros_args=self._ros_args, on_event=on_state, on_death=on_death
+        )
+        await self._thread.start()
+
+    async def stop(self) -> None:
+        """Stop the ROS thread."""
+        await self._thread.stop()
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether the ROS thread runs."""
+        return self._thread.is_alive
+
+    @property
+    def callback_errors(self) -> int:
+        """Errors met by the node's callbacks so far."""
+        return self._thread.callback_errors
+
+    def revision(self) -> str:
+        """A digest of poses and readings, and the map's revision."""
+        return self._thread.peek(lambda node: node.revision)
+
+    def twin_count(self) -> int:
+        """How many nodes publish the state topic."""
+        return self._thread.peek(lambda node: node.twins.value)
+
+    def max_distance_m(self) -> float:
+        """The parameter `idw_max_distance_m`, as given to this process."""
+        return self._thread.peek(lambda node: node.parameters.idw_max_distance_m)
+
+    def max_grid_cells(self) -> int:
+        """The parameter `max_grid_cells`, as given to this process."""
+        return self._thread.peek(lambda node: node.parameters.max_grid_cells)
+
+    def occupancy_map(self) -> OccupancyMap | None:
+        """The latest map."""
+        return self._thread.peek(lambda node: node.occupancy_map)
+
+    async def history(self, tag_id: str) -> tuple[Observation, ...] | None:
+        """The last readings of a tag that were seen from here: history is not on the wire."""
+        return await self._thread.call(lambda node: node.history(tag_id))
+
+    async def field(self, request: FieldRequest) -> RevisedGrid:
+        """The field from the twin's service; identical requests in flight are asked once."""
+        task = self._asking.get(request)
+        if task is None:
+            task = asyncio.create_task(self._ask_once(request))
+            self._asking[request] = task
+            task.add_done_callback(lambda _: self._asking.pop(request, None))
+        return await asyncio.shield(task)
+
+    async def _ask_once(self, request: FieldRequest) -> RevisedGrid:
+        revision = self.revision()
+        try:
+            async with asyncio.timeout(self._timeout_s), self._slots:
+                if not self._thread.peek(lambda node: node.field_client.service_is_ready()):
+                    service = self._thread.peek(lambda node: node.parameters.field_service_name)
+                    raise TwinUnavailableError(f"no twin offers {service}: is it running?")
+                response = await self._thread.ask(
+                    lambda node: node.request_field(request),
+                    lambda node, future: node.forget_request(future),
+                )
+        except TimeoutError:
+            raise TwinTimeoutError(
+                f"the twin did not answer within {self._timeout_s:g} s (field_timeout_s)"
+            ) from None
+        if not response.ok:
+            raise FieldRefused(response.error_message)
+        return RevisedGrid(convert.grid_of(response), revision)

@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain, pairwise
@@ -123,51 +123,74 @@ def grid_dimensions(
     """(width, height) in cells: each `max(1, ceil(extent / resolution))`, float noise apart.
 
     Box and resolution are metres. An exact multiple stays one although its numbers were rounded:
-    1.1 m at 0.1 m is 11 cells, not 12, whether the numbers are float64 or went through float32 (as
-    GetField's do), near the origin or far from it. The result may be too large to allocate, which
-    is for the caller to refuse; it never overflows.
+    1.1 m at 0.1 m is 11 cells, not 12, near the origin or far from it, whether the numbers are
+    float64 or went through float32 as GetField's do (which shows: none has a digit more). The
+    result may be too large to allocate, which is for the caller to refuse; it never overflows.
 
     Raises:
         ValueError: a number that is not finite, a resolution that is not positive, or an inverted
             box.
 
     """
+    # numpy's scalars would compute, and warn, in their own precision.
+    low_x, low_y, high_x, high_y = (
+        float(bbox_min_x),
+        float(bbox_min_y),
+        float(bbox_max_x),
+        float(bbox_max_y),
+    )
+    resolution = float(resolution)
     _check_finite("resolution", resolution)
     if resolution <= 0.0:
         raise ValueError(f"resolution is {resolution} m, must be greater than 0")
+    _check_side("x", low_x, high_x)
+    _check_side("y", low_y, high_y)
+    noise = (
+        _noise_of_float32
+        if all(map(_fits_float32, (low_x, low_y, high_x, high_y, resolution)))
+        else _noise_of_float64
+    )
     return (
-        _cells_along("x", bbox_min_x, bbox_max_x, resolution),
-        _cells_along("y", bbox_min_y, bbox_max_y, resolution),
+        _cells_along(low_x, high_x, resolution, noise),
+        _cells_along(low_y, high_y, resolution, noise),
     )
 
 
-def _cells_along(axis: str, low: float, high: float, resolution: float) -> int:
+def _check_side(axis: str, low: float, high: float) -> None:
     _check_finite(f"bbox_min_{axis}", low)
     _check_finite(f"bbox_max_{axis}", high)
     if high < low:
         raise ValueError(
             f"bbox_max_{axis} is {high} m, must not be less than bbox_min_{axis} ({low} m)"
         )
+
+
+def _cells_along(
+    low: float, high: float, resolution: float, noise: Callable[[float], float]
+) -> int:
     quotient = (high - low) / resolution
     if math.isinf(quotient):
         # Past float64: exact arithmetic still names the size, so that a limit can be held to it.
         return math.ceil((Fraction(high) - Fraction(low)) / Fraction(resolution))
-    noise = (_noise(low) + _noise(high) + quotient * _noise(resolution)) / resolution
     nearest = round(quotient)
-    if abs(quotient - nearest) <= noise:
+    slack = (noise(low) + noise(high) + quotient * noise(resolution)) / resolution
+    if abs(quotient - nearest) <= slack:
         return max(1, nearest)
     return max(1, math.ceil(quotient))
 
 
-def _noise(number: float) -> float:
-    """How far rounding can have moved `number`.
+def _fits_float32(number: float) -> bool:
+    mantissa, _ = math.frexp(number)
+    return math.ldexp(mantissa, _FLOAT32_MANTISSA_BITS).is_integer()
 
-    A number with no more digits than float32 holds may have been rounded to it, by one unit in
-    its last place; any other never was, and carries float64's noise of a few operations.
-    """
-    mantissa, exponent = math.frexp(number)
-    if math.ldexp(mantissa, _FLOAT32_MANTISSA_BITS).is_integer():
-        return math.ldexp(1.0, exponent - _FLOAT32_MANTISSA_BITS)
+
+def _noise_of_float32(number: float) -> float:
+    """How far `number` may be off if it was rounded to float32: a unit in its last place."""
+    return math.ldexp(1.0, math.frexp(number)[1] - _FLOAT32_MANTISSA_BITS) if number else 0.0
+
+
+def _noise_of_float64(number: float) -> float:
+    """How far a few operations in float64 may have moved `number`."""
     return _FLOAT64_NOISE_ULPS * math.ulp(number)
 
 
@@ -232,9 +255,9 @@ def compute_idw_field(
     return FieldGrid(
         width=width,
         height=height,
-        origin_x=bbox_min_x,
-        origin_y=bbox_min_y,
-        resolution=resolution,
+        origin_x=float(bbox_min_x),
+        origin_y=float(bbox_min_y),
+        resolution=float(resolution),
         values=values.reshape(-1),
         value_min=value_min,
         value_max=value_max,
@@ -449,7 +472,8 @@ class _Painter:
             ):
                 break
             side = max(part.rows, part.columns) / pieces
-            down, across = math.ceil(part.rows / side), math.ceil(part.columns / side)
+            down = min(part.rows, math.ceil(part.rows / side))
+            across = min(part.columns, math.ceil(part.columns / side))
         return down, across
 
     def _split(self, part: _Part, down: int, across: int) -> Iterator[_Part]:

@@ -1,0 +1,368 @@
+"""GetField without ROS: what is refused, what is remembered, what an explored map clips."""
+
+from __future__ import annotations
+
+import math
+import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lupin_twin.explored import OccupancyMap, occupancy_map
+from lupin_twin.field_cache import FieldCache
+from lupin_twin.fields import (
+    FieldEngine,
+    FieldJob,
+    FieldRefused,
+    FieldRequest,
+    FieldRules,
+    check_request,
+    default_box,
+)
+from lupin_twin.idw import FieldGrid
+from lupin_twin.state import MAX_TEXT_LENGTH, Observation, Pose, Reading, TwinStore
+
+MAX_CELLS = 1_000_000
+
+
+def request_of(**changes: Any) -> FieldRequest:
+    """A request for 4 x 2 cells of 1 m from the origin, unless changed."""
+    given = {
+        "sensor_type": "temperature",
+        "resolution": 1.0,
+        "bbox_min_x": 0.0,
+        "bbox_min_y": 0.0,
+        "bbox_max_x": 4.0,
+        "bbox_max_y": 2.0,
+    }
+    return FieldRequest(**{**given, **changes})
+
+
+def rules_of(**changes: Any) -> FieldRules:
+    given = {
+        "idw_power": 2.0,
+        "falloff_radius_m": 1.5,
+        "max_distance_m": 1.5,
+        "clip_to_explored": False,
+        "max_grid_cells": MAX_CELLS,
+    }
+    return FieldRules(**{**given, **changes})
+
+
+def engine_of(**changes: Any) -> FieldEngine:
+    return FieldEngine(rules_of(**changes), FieldCache(max_bytes=64_000_000))
+
+
+def scan(tag_id: str, x: float, y: float, value: float) -> Observation:
+    return Observation(
+        tag_id=tag_id,
+        stamp_ns=1,
+        readings=(Reading("temperature", value),),
+        pose=Pose(x, y, 0.5, 0.0, 0.0, 0.0, 1.0),
+    )
+
+
+def map_of(rows: Any, revision: int = 1) -> OccupancyMap:
+    cells = np.array(rows, dtype=np.int8)
+    return occupancy_map(
+        frame_id="map",
+        stamp_ns=0,
+        width=cells.shape[1],
+        height=cells.shape[0],
+        resolution=1.0,
+        origin_x=0.0,
+        origin_y=0.0,
+        origin_yaw=0.0,
+        data=cells.ravel(),
+        revision=revision,
+    )
+
+
+@pytest.fixture
+def store() -> TwinStore:
+    """Two tags, at the centres of the request's cells (0, 0) and (3, 1)."""
+    store = TwinStore()
+    store.record(scan("a", 0.5, 0.5, 10.0))
+    store.record(scan("b", 3.5, 1.5, 20.0))
+    return store
+
+
+def answer(engine: FieldEngine, request: FieldRequest, *args: Any) -> FieldGrid:
+    """What a client gets: the remembered field, or the job's, which is remembered."""
+    found = engine.lookup(request, *args)
+    if isinstance(found, FieldGrid):
+        return found
+    grid = found.compute()
+    engine.keep(found, grid)
+    return grid
+
+
+# --- the request -----------------------------------------------------------------------------
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.floats())
+def test_request_holds_what_the_wire_can(number: float) -> None:
+    request = request_of(resolution=number, bbox_min_x=number, bbox_max_y=-number)
+    with np.errstate(all="ignore"):
+        expected = np.float32(number)
+    np.testing.assert_equal(request.resolution, float(expected))
+    np.testing.assert_equal(request.bbox_min_x, float(expected))
+    np.testing.assert_equal(request.bbox_max_y, -float(expected))
+    assert type(request.resolution) is float
+
+
+def test_request_over_ros_and_over_http_is_the_same() -> None:
+    over_ros = request_of(resolution=float(np.float32(0.1)), bbox_max_x=float(np.float32(1.1)))
+    assert over_ros == request_of(resolution=0.1, bbox_max_x=1.1)
+    assert check_request(over_ros, MAX_CELLS) == (11, 20)
+
+
+def test_request_is_frozen() -> None:
+    with pytest.raises(AttributeError):
+        request_of().resolution = 2.0  # type: ignore[misc]
+
+
+def test_dimensions_of_a_good_request() -> None:
+    assert check_request(request_of(), MAX_CELLS) == (4, 2)
+    assert check_request(request_of(), 8) == (4, 2)
+
+
+def test_box_without_extent_is_one_cell() -> None:
+    assert check_request(request_of(bbox_max_x=0.0, bbox_max_y=0.0), MAX_CELLS) == (1, 1)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"sensor_type": ""}, "sensor_type is empty, must name a sensor"),
+        (
+            {"sensor_type": "t" * (MAX_TEXT_LENGTH + 1)},
+            f"has {MAX_TEXT_LENGTH + 1} characters, the limit is {MAX_TEXT_LENGTH}",
+        ),
+        ({"resolution": 0.0}, r"resolution is 0\.0 m, must be greater than 0"),
+        ({"resolution": -1.0}, r"resolution is -1\.0 m, must be greater than 0"),
+        ({"resolution": 1e-50}, r"resolution is 0\.0 m, must be greater than 0"),
+        ({"resolution": math.nan}, "resolution is nan, must be finite"),
+        ({"resolution": math.inf}, "resolution is inf, must be finite"),
+        ({"bbox_min_x": math.nan}, "bbox_min_x is nan, must be finite"),
+        ({"bbox_min_y": -math.inf}, "bbox_min_y is -inf, must be finite"),
+        ({"bbox_max_x": 1e300}, "bbox_max_x is inf, must be finite"),
+        ({"bbox_max_y": math.nan}, "bbox_max_y is nan, must be finite"),
+        ({"bbox_min_x": 5.0}, r"bbox_max_x is 4\.0 m, must not be less than bbox_min_x \(5\.0 m\)"),
+        ({"bbox_max_y": -1.0}, r"bbox_max_y is -1\.0 m, must not be less than bbox_min_y \(0\.0"),
+        ({"resolution": 0.002}, r"0\.002 m makes 2000 x 1000 cells, the limit is 1000000 in all"),
+    ],
+)
+def test_bad_request_is_refused(changes: dict[str, Any], message: str, store: TwinStore) -> None:
+    with pytest.raises(FieldRefused, match=message):
+        check_request(request_of(**changes), MAX_CELLS)
+    engine = engine_of()
+    with pytest.raises(FieldRefused, match=message):
+        engine.lookup(request_of(**changes), store, None)
+    assert (engine.cache.hits, engine.cache.misses) == (0, 0)
+
+
+def test_one_cell_too_many_is_refused() -> None:
+    assert check_request(request_of(resolution=0.5), 32) == (8, 4)
+    with pytest.raises(FieldRefused, match="makes 8 x 4 cells, the limit is 31 in all"):
+        check_request(request_of(resolution=0.5), 31)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"resolution": 1e-9, "bbox_max_x": 1000.0, "bbox_max_y": 1000.0},
+        # 2³² x 2³² and 65,536 x 65,536 cells: 0 in 64 and in 32 bits.
+        {"resolution": 2.0**-20, "bbox_max_x": 2.0**12, "bbox_max_y": 2.0**12},
+        {"resolution": 1.0, "bbox_max_x": 65_536.0, "bbox_max_y": 65_536.0},
+        # The quotient overflows float32, the extent too.
+        {"resolution": 1e-45, "bbox_min_x": -3.4e38, "bbox_max_x": 3.4e38},
+        {"resolution": 1e-45, "bbox_max_x": 3.4e38, "bbox_max_y": 3.4e38},
+    ],
+)
+def test_grid_bomb_is_refused_without_an_allocation(
+    changes: dict[str, Any], store: TwinStore
+) -> None:
+    engine = engine_of()
+    request = request_of(**changes)
+    tracemalloc.start()
+    try:
+        with pytest.raises(FieldRefused, match="the limit is 1000000 in all"):
+            engine.lookup(request, store, None)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 20_000
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"idw_power": -1.0}, r"idw_power is -1\.0, must be finite and not less than 0"),
+        ({"falloff_radius_m": math.nan}, "falloff_radius_m is nan, must be finite"),
+        ({"max_distance_m": math.inf}, "max_distance_m is inf, must be finite"),
+        ({"max_grid_cells": 0}, "max_grid_cells is 0, must not be less than 1"),
+    ],
+)
+def test_rules_out_of_range_are_refused(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        rules_of(**changes)
+
+
+# --- the engine ------------------------------------------------------------------------------
+
+
+def test_first_request_is_a_job_and_the_second_a_hit(store: TwinStore) -> None:
+    engine = engine_of()
+    job = engine.lookup(request_of(), store, None)
+    assert isinstance(job, FieldJob)
+    grid = job.compute()
+    engine.keep(job, grid)
+    assert engine.lookup(request_of(), store, None) is grid
+    assert (engine.cache.hits, engine.cache.misses) == (1, 1)
+
+
+def test_field_is_of_the_stores_samples_by_the_rules(store: TwinStore) -> None:
+    grid = answer(engine_of(), request_of(), store, None)
+    assert (grid.width, grid.height, grid.sample_count) == (4, 2, 2)
+    rows = grid.values.reshape(2, 4)
+    assert (rows[0, 0], rows[1, 3]) == (10.0, 20.0)
+    assert not np.isnan(rows[0, 1])
+    narrow = answer(engine_of(falloff_radius_m=0.5, max_distance_m=0.5), request_of(), store, None)
+    assert np.isnan(narrow.values.reshape(2, 4)[0, 1])
+    store.record(scan("c", 1.5, 0.5, 30.0))
+    by_power = [
+        answer(engine_of(idw_power=power), request_of(), store, None).values.reshape(2, 4)[1, 0]
+        for power in (1.0, 2.0)
+    ]
+    assert by_power[0] != by_power[1]
+
+
+def test_sensor_that_nobody_reported_is_no_error(store: TwinStore) -> None:
+    grid = answer(engine_of(), request_of(sensor_type="sound"), store, None)
+    assert np.isnan(grid.values).all()
+    assert (grid.sample_count, grid.value_min, grid.value_max) == (0, 0.0, 0.0)
+
+
+def test_every_write_that_can_change_a_field_makes_it_anew(store: TwinStore) -> None:
+    engine = engine_of()
+    unpinned = Observation("d", stamp_ns=1, readings=(Reading("temperature", 40.0),))
+    store.record(unpinned)
+    before = answer(engine, request_of(), store, None)
+    store.record(scan("a", 0.5, 0.5, 11.0))
+    assert answer(engine, request_of(), store, None).values[0] == 11.0
+    assert before.values[0] == 10.0
+    store.pin("d", Pose(2.5, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0))
+    assert answer(engine, request_of(), store, None).values[2] == 40.0
+
+
+def test_job_holds_the_moment_it_was_made_in(store: TwinStore) -> None:
+    engine = engine_of()
+    job = engine.lookup(request_of(), store, None)
+    assert isinstance(job, FieldJob)
+    store.record(scan("a", 0.5, 0.5, 11.0))
+    grid = job.compute()
+    assert grid.values[0] == 10.0
+    engine.keep(job, grid)
+    assert answer(engine, request_of(), store, None).values[0] == 11.0
+
+
+def test_field_that_comes_late_is_no_answer_to_a_newer_request(store: TwinStore) -> None:
+    engine = engine_of()
+    late = engine.lookup(request_of(), store, None)
+    assert isinstance(late, FieldJob)
+    store.record(scan("a", 0.5, 0.5, 11.0))
+    newer = answer(engine, request_of(), store, None)
+    engine.keep(late, late.compute())
+    assert engine.lookup(request_of(), store, None) is newer
+
+
+def test_any_thread_may_compute(store: TwinStore) -> None:
+    engine = engine_of(clip_to_explored=True)
+    jobs = [
+        engine.lookup(request_of(resolution=0.01 * step), store, map_of([[0] * 4] * 2))
+        for step in range(1, 9)
+    ]
+    with ThreadPoolExecutor(4) as pool:
+        grids = list(pool.map(FieldJob.compute, jobs))
+    for job, grid in zip(jobs, grids, strict=True):
+        assert isinstance(job, FieldJob)
+        np.testing.assert_array_equal(grid.values, job.compute().values)
+
+
+def test_sliding_box_keeps_the_cache_within_its_bounds(store: TwinStore) -> None:
+    engine = FieldEngine(rules_of(), FieldCache(max_bytes=10_000))
+    for step in range(200):
+        box = {"bbox_min_x": step * 0.1, "bbox_max_x": step * 0.1 + 10.0}
+        answer(engine, request_of(resolution=0.5, **box), store, None)
+        assert len(engine.cache) <= 64
+        assert engine.cache.bytes <= 10_000
+    assert engine.cache.misses == 200
+
+
+# --- explored --------------------------------------------------------------------------------
+
+
+def test_map_clips_only_where_the_rules_say_so(store: TwinStore) -> None:
+    occupancy = map_of([[0, -1, 0, 0], [0, 0, 0, -1]])
+    unclipped = answer(engine_of(), request_of(), store, occupancy)
+    clipped = answer(engine_of(clip_to_explored=True), request_of(), store, occupancy)
+    known = np.array([1, 0, 1, 1, 1, 1, 1, 0], dtype=np.bool_)
+    np.testing.assert_array_equal(
+        clipped.values, np.where(known, unclipped.values, np.float32(np.nan))
+    )
+    assert not np.isnan(unclipped.values[1])
+
+
+def test_nothing_is_explored_before_a_map_came(store: TwinStore) -> None:
+    engine = engine_of(clip_to_explored=True)
+    grid = answer(engine, request_of(), store, None)
+    assert np.isnan(grid.values).all()
+    assert (grid.sample_count, grid.value_min, grid.value_max) == (2, 0.0, 0.0)
+    clipped = answer(engine, request_of(), store, map_of([[0] * 4] * 2, revision=0))
+    assert not np.isnan(clipped.values).all()
+
+
+def test_new_map_makes_fields_anew_only_where_it_clips(store: TwinStore) -> None:
+    first, second = map_of([[0] * 4] * 2, revision=1), map_of([[-1] * 4] * 2, revision=2)
+    clipping = engine_of(clip_to_explored=True)
+    assert not np.isnan(answer(clipping, request_of(), store, first).values).all()
+    assert np.isnan(answer(clipping, request_of(), store, second).values).all()
+    assert clipping.cache.hits == 0
+    plain = engine_of()
+    grid = answer(plain, request_of(), store, first)
+    assert plain.lookup(request_of(), store, second) is grid
+    assert plain.lookup(request_of(), store, None) is grid
+
+
+def test_job_holds_no_map_that_it_does_not_need(store: TwinStore) -> None:
+    occupancy = map_of([[0] * 4] * 2)
+    job = engine_of().lookup(request_of(), store, occupancy)
+    assert isinstance(job, FieldJob)
+    assert job.occupancy is None
+
+
+def test_mask_has_the_fields_own_grid(store: TwinStore) -> None:
+    """1.1 m at 0.1 m, in float32: both count 11 columns, or the mask would not fit."""
+    engine = engine_of(clip_to_explored=True)
+    request = request_of(resolution=0.1, bbox_max_x=1.1, bbox_max_y=2.3)
+    grid = answer(engine, request, store, map_of([[0] * 4] * 4))
+    assert (grid.width, grid.height) == (11, 23)
+    assert not np.isnan(grid.values[0])
+
+
+# --- the default box -------------------------------------------------------------------------
+
+
+def test_default_box_is_that_of_the_tags_and_their_reach() -> None:
+    positions = ((x, y) for x, y in [(1.0, 5.0), (-2.0, 3.0), (0.0, 8.5)])
+    assert default_box(positions, 1.5) == (-3.5, 1.5, 2.5, 10.0)
+
+
+def test_default_box_without_a_tag_is_the_reach_around_the_origin() -> None:
+    assert default_box([], 2.5) == (-2.5, -2.5, 2.5, 2.5)

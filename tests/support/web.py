@@ -17,6 +17,23 @@ from tests.support.waiting import PATIENCE_S, wait_for
 
 Frame = dict[str, Any]
 
+# Every HTTP route, and whether OpenAPI describes it (a page and the document itself need none).
+ROUTES = {
+    "/api/state": True,
+    "/api/tags/{tag_id}": True,
+    "/api/tags/{tag_id}/history": True,
+    "/api/field": True,
+    "/api/field.json": True,
+    "/api/field.png": True,
+    "/api/field.npy": True,
+    "/api/map": True,
+    "/api/map.png": True,
+    "/healthz": True,
+    "/readyz": True,
+    "/openapi.json": False,
+    "/docs": False,
+}
+
 
 def ws_url(url: str) -> str:
     """The address of the WebSocket at a bridge's address."""

@@ -1,0 +1,87 @@
+"""Twin, bridge and server in the test's own process and event loop, to look inside."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import time
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterator, Sequence
+from contextlib import asynccontextmanager, contextmanager
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import httpx
+
+from lupin_bridge.app import create_app
+from lupin_bridge.bridge import Bridge
+from lupin_bridge.local_twin import LocalTwin
+from lupin_bridge.server import BridgeServer, address_of, listen
+from lupin_bridge.settings import Settings
+from tests.support.waiting import PATIENCE_S
+
+T = TypeVar("T")
+
+
+@contextmanager
+def ros_domain(domain: int) -> Iterator[None]:
+    """Nodes that this process makes meanwhile are in that ROS domain."""
+    before = os.environ.get("ROS_DOMAIN_ID")
+    os.environ["ROS_DOMAIN_ID"] = str(domain)
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["ROS_DOMAIN_ID"]
+        else:
+            os.environ["ROS_DOMAIN_ID"] = before
+
+
+def run(domain: int, test: Coroutine[Any, Any, T]) -> T:
+    """Run a test's coroutine with its nodes in a ROS domain of its own."""
+    with ros_domain(domain):
+        return asyncio.run(test)
+
+
+async def until(look: Callable[[], T], what: str, timeout_s: float = PATIENCE_S) -> T:
+    """Call `look` until it gives something true, and return that; the loop goes on meanwhile."""
+    deadline = time.monotonic() + timeout_s
+    while True:
+        found = look()
+        if found:
+            return found
+        if time.monotonic() > deadline:
+            raise AssertionError(f"waited {timeout_s:g} s in vain for {what}; last: {found!r}")
+        await asyncio.sleep(0.01)
+
+
+@dataclass
+class Running:
+    """A server of this process: its parts, its address, and an HTTP client of it."""
+
+    twin: LocalTwin
+    bridge: Bridge
+    server: BridgeServer
+    url: str
+    http: httpx.AsyncClient
+
+
+@asynccontextmanager
+async def running(
+    settings: Settings | None = None, ros_args: Sequence[str] = ()
+) -> AsyncIterator[Running]:
+    """Serve on a free port, as `lupin-twin serve` does."""
+    settings = settings or Settings()
+    twin = LocalTwin(ros_args=ros_args, timeout_s=settings.field_timeout_s)
+    bridge = Bridge(twin, settings)
+    server = BridgeServer(create_app(bridge), bridge)
+    listener = listen("127.0.0.1", 0)
+    url = address_of(listener)
+    await bridge.start()
+    serving = asyncio.create_task(server.serve(sockets=[listener]))
+    async with httpx.AsyncClient(base_url=url, timeout=PATIENCE_S, trust_env=False) as http:
+        try:
+            yield Running(twin, bridge, server, url, http)
+        finally:
+            server.should_exit = True
+            await serving
+            await bridge.stop()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,7 +14,10 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from lupin_bridge.sensors import max_alpha, sensor
+from lupin_twin.field_quality import leave_one_out, painted_share
+from lupin_twin.fields import FieldRules
 from lupin_twin.idw import FieldGrid
+from lupin_twin.state import TagState
 
 # Palette index 0 is "not known"; the ramp has the other 255.
 _RAMP_STEPS: Final = 255
@@ -74,6 +78,30 @@ def write_json(grid: FieldGrid) -> bytes:
             "sample_count": grid.sample_count,
         },
         option=orjson.OPT_SERIALIZE_NUMPY,
+    )
+
+
+def write_quality(
+    grid: FieldGrid, tags: Sequence[TagState], sensor_type: str, rules: FieldRules
+) -> bytes:
+    """`schema.FieldQuality` of a field and of the tags that it was made from."""
+    quality = leave_one_out(
+        tags,
+        sensor_type,
+        falloff_radius_m=rules.falloff_radius_m,
+        max_distance_m=rules.max_distance_m,
+        power=rules.idw_power,
+    )
+    return orjson.dumps(
+        {
+            "sensor_type": sensor_type,
+            "unit": sensor(sensor_type).unit,
+            "sample_count": quality.judged + quality.unjudged,
+            "judged_count": quality.judged,
+            "rmse": quality.rmse,
+            "worst": quality.worst,
+            "painted_share": painted_share(grid),
+        }
     )
 
 

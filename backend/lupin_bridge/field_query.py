@@ -138,7 +138,7 @@ def _weight(media_type: str, ranges: Iterable[tuple[str, float]]) -> float:
     return max(found)[1] if found else 0.0
 
 
-def etag(revision: str, request: FieldRequest, field_format: FieldFormat, scale: int) -> str:
+def etag(revision: str, request: FieldRequest, kind: str, scale: int) -> str:
     """The strong ETag of a field: of the revision and of all that was asked for."""
     numbers = (
         request.resolution,
@@ -147,7 +147,7 @@ def etag(revision: str, request: FieldRequest, field_format: FieldFormat, scale:
         request.bbox_max_x,
         request.bbox_max_y,
     )
-    text = repr((revision, request.sensor_type, numbers, field_format.name, scale))
+    text = repr((revision, request.sensor_type, numbers, kind, scale))
     return f'"{hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=12).hexdigest()}"'
 
 

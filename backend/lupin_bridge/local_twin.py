@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from lupin_bridge.ros_thread import RosThread
 from lupin_bridge.source import Revised, RevisedGrid, TwinTimeoutError
 from lupin_twin.explored import OccupancyMap
-from lupin_twin.fields import FieldJob, FieldRequest
+from lupin_twin.fields import FieldJob, FieldRequest, FieldRules
 from lupin_twin.idw import FieldGrid
 from lupin_twin.node import TwinNode
 from lupin_twin.state import Observation
@@ -75,13 +75,9 @@ class LocalTwin:
         """How many nodes publish the state topic, ours included."""
         return self._thread.peek(lambda node: node.twins.value)
 
-    def max_distance_m(self) -> float:
-        """The parameter `idw_max_distance_m`."""
-        return self._thread.peek(lambda node: node.parameters.idw_max_distance_m)
-
-    def max_grid_cells(self) -> int:
-        """The parameter `max_grid_cells`."""
-        return self._thread.peek(lambda node: node.parameters.max_grid_cells)
+    def rules(self) -> FieldRules:
+        """The node's parameters for fields."""
+        return self._thread.peek(lambda node: node.fields.rules)
 
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map that the node accepted."""

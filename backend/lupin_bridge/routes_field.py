@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Awaitable
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
@@ -104,10 +105,26 @@ for _format in field_formats.FORMATS:
     _register(_format)
 
 
+@read_route(
+    router,
+    "/api/field/quality",
+    summary="How far off the field is, and how much of it is known",
+    responses={200: {"model": schema.FieldQuality}, **_REFUSALS},
+    openapi_extra={"parameters": _PARAMETERS[:-1]},
+)
+async def field_quality(request: Request) -> Response:
+    """The leave-one-out error of the current readings, and the share of cells painted."""
+    return await _refusing(_quality(request))
+
+
 async def _field(request: Request, field_format: FieldFormat) -> Response:
-    bridge = bridge_of(request)
+    return await _refusing(_answer(bridge_of(request), request, field_format))
+
+
+async def _refusing(answer: Awaitable[Response]) -> Response:
+    """Wait for an answer; what stands in its way becomes the answer."""
     try:
-        return await _answer(bridge, request, field_format)
+        return await answer
     except FieldRefused as error:
         return json_response(field_formats.refusal_json(str(error)), 400)
     except TwinTimeoutError as error:
@@ -116,20 +133,40 @@ async def _field(request: Request, field_format: FieldFormat) -> Response:
         return error_response(str(error), 503, {"Retry-After": "3"})
 
 
+async def _quality(request: Request) -> Response:
+    bridge = bridge_of(request)
+    query = field_query.parse(request.query_params.multi_items())
+    asked = query.request(_box_of_all_tags(bridge))
+    rules = bridge.source.rules()
+    check_request(asked, rules.max_grid_cells)
+    field_query.check_scale(query, JSON, 1, 1)
+    tag = field_query.etag(bridge.source.revision(), asked, "quality", 1)
+    if field_query.matches(request.headers.get("if-none-match"), tag):
+        return Response(status_code=304, headers={"ETag": tag, **REVALIDATE})
+    result = await bridge.source.field(asked)
+    tags = () if bridge.latest is None else bridge.latest.snapshot.tags
+    loop = asyncio.get_running_loop()
+    body = await loop.run_in_executor(
+        bridge.pool, field_formats.write_quality, result.grid, tags, asked.sensor_type, rules
+    )
+    tag = field_query.etag(result.revision, asked, "quality", 1)
+    return json_response(body, headers={"ETag": tag, **REVALIDATE})
+
+
 async def _answer(bridge: Bridge, request: Request, field_format: FieldFormat) -> Response:
     source = bridge.source
     query = field_query.parse(request.query_params.multi_items())
     asked = query.request(_box_of_all_tags(bridge))
-    max_cells = source.max_grid_cells()
+    max_cells = source.rules().max_grid_cells
     width, height = check_request(asked, max_cells)
     field_query.check_scale(query, field_format, width * height, max_cells)
     known = request.headers.get("if-none-match")
-    tag = field_query.etag(source.revision(), asked, field_format, query.scale)
+    tag = field_query.etag(source.revision(), asked, field_format.name, query.scale)
     if field_query.matches(known, tag):
         return Response(status_code=304, headers={"ETag": tag, **REVALIDATE})
     result = await source.field(asked)
     # The revision that the field was made from, which may be newer than the one just compared.
-    tag = field_query.etag(result.revision, asked, field_format, query.scale)
+    tag = field_query.etag(result.revision, asked, field_format.name, query.scale)
     loop = asyncio.get_running_loop()
     body = await loop.run_in_executor(
         bridge.pool,
@@ -153,5 +190,5 @@ def _box_of_all_tags(bridge: Bridge) -> field_query.Box:
     tags = () if latest is None else latest.snapshot.tags
     return default_box(
         [(tag.pose.x, tag.pose.y) for tag in tags if tag.pose is not None],
-        bridge.source.max_distance_m(),
+        bridge.source.rules().max_distance_m,
     )

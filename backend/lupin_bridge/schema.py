@@ -164,6 +164,27 @@ class GetFieldResponse(Contract):
     sample_count: int
 
 
+class TagError(Contract):
+    """One tag's reading against what the other tags say of its place."""
+
+    tag_id: str
+    measured: float
+    predicted: float
+    error: float = Field(description="predicted less measured, sensor's unit")
+
+
+class FieldQuality(Contract):
+    """What an honest map should also tell: its leave-one-out error and how much of it is known."""
+
+    sensor_type: str
+    unit: str
+    sample_count: int = Field(description="tags that contribute: pinned, with a finite reading")
+    judged_count: int = Field(description="of those, the ones with another in reach")
+    rmse: float | None = Field(description="sensor's unit; null: no tag could be judged")
+    worst: TagError | None
+    painted_share: float = Field(description="cells that are known, 0 to 1")
+
+
 class MapMetaData(Contract):
     """Size and place of the occupancy grid; resolution in m a cell."""
 

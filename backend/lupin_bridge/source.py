@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from lupin_twin.explored import OccupancyMap
-from lupin_twin.fields import FieldRequest
+from lupin_twin.fields import FieldRequest, FieldRules
 from lupin_twin.idw import FieldGrid
 from lupin_twin.state import Observation, Snapshot
 
@@ -61,11 +61,8 @@ class TwinSource(Protocol):
     def twin_count(self) -> int:
         """How many nodes publish the state topic; more than 1 is a mistake."""
 
-    def max_distance_m(self) -> float:
-        """How far a tag's reading reaches, m: the margin of a field's default box."""
-
-    def max_grid_cells(self) -> int:
-        """The largest field or picture served, in cells or pixels."""
+    def rules(self) -> FieldRules:
+        """The rules by which fields are made, and their limit."""
 
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map, if any has come."""

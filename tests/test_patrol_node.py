@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import signal
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
+from threading import Event, Thread
 from typing import Any
 
 import numpy as np
@@ -15,9 +18,12 @@ from lupin_msgs.msg import DiscoveredTags, Observation
 from nav_msgs.msg import OccupancyGrid
 from rosgraph_msgs.msg import Clock
 
+from lupin_patrol import node
+from lupin_patrol.events import PassCompleted
 from tests.support.domains import ros_env
 from tests.support.processes import Process
 from tests.support.ros import Peer, latched
+from tests.support.waiting import PATIENCE_S
 
 OBSERVATIONS = "/floranova/observations"
 DISCOVERED_TAGS = "/perception/discovered_tags"
@@ -90,6 +96,30 @@ def test_one_pass_shows_the_whole_greenhouse_and_ends(domain: int) -> None:
             assert [r.name for r in reading.readings] == tags[reading.tag_id]["sensors"]
             assert observation.tag_pose_in_map.position.x == tags[reading.tag_id]["x"]
             assert reading.stamp == observation.header.stamp
+
+
+def test_it_does_not_begin_before_somebody_listens(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Else a fast patrol would push its first observations out of the latch during discovery.
+    monkeypatch.setattr(node, "_LISTENERS_S", PATIENCE_S)
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+    has_begun = Event()
+
+    def events() -> Iterator[PassCompleted]:
+        has_begun.set()
+        yield PassCompleted(0.0, 0, ())
+
+    patrol_thread = Thread(
+        target=partial(node.play, events(), speed=1.0, once=True, ros_arguments=[])
+    )
+    with Peer(domain) as peer:
+        patrol_thread.start()
+        peer.until(lambda: peer.node.count_publishers(OBSERVATIONS), "the patrol")
+        assert not has_begun.is_set()
+        Heard().listen(peer)
+        peer.until(has_begun.is_set, "the first event")
+        peer.until(lambda: not patrol_thread.is_alive(), "the end of the patrol")
 
 
 def test_who_comes_late_gets_the_latched_map_and_list(domain: int) -> None:

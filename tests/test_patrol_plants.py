@@ -92,6 +92,15 @@ def test_pests_come_now_and_then_and_go_after_two_passes(house: House, plants: P
     assert 0.9 < quiet / (29 * len(PASSES)) < 1.0
 
 
+def test_a_flower_with_a_pest_is_never_overlooked(house: House) -> None:
+    for seed in range(40):
+        plants = Plants(house, seed)
+        for tag in house.tags:
+            bugs = plants.bugs(tag.tag_id, 0)
+            shown = sum(bloom.anomaly for bloom in plants.look(tag.tag_id, 0, 0).blooms)
+            assert shown == min(3, bugs, len(plants._blooms[tag.tag_id]))
+
+
 def test_a_pest_shows_in_the_look_and_on_some_blooms(house: House, plants: Plants) -> None:
     shown = 0
     for pass_index in PASSES:

@@ -88,7 +88,8 @@ def test_the_tour_is_far_shorter_than_the_list_of_tags(house: House, roadmap: Ro
 
 
 def test_a_small_tour_is_the_shortest_one() -> None:
-    stops = [(3.5, 3.5), (0.5, 3.5), (2.0, 0.5), (3.5, 0.5), (2.0, 3.5), (0.5, 2.0)]
+    # Going to the nearest one each time makes a detour of 0.7 m here.
+    stops = [(3.5, 2.0), (3.5, 2.0), (0.5, 1.5), (2.5, 2.0), (2.0, 3.5), (3.5, 1.5)]
     start = (0.5, 0.5)
 
     def length(order: tuple[int, ...] | list[int]) -> float:

@@ -45,8 +45,8 @@ export const S = {
     'no-data': 'No data',
   } satisfies Record<HealthStatus, string>,
   healthHeading: 'House health',
-  healthDriver: (tag: string, sensor: string, value: string): string =>
-    `Tag ${tag}: ${sensor} ${value}`,
+  healthDriver: (tag: string, sensor: string, value: string, ideal: string): string =>
+    `Tag ${tag}: ${sensor} ${value}, ${ideal}`,
   healthIdeal: (low: string, high: string, unit: string): string =>
     `ideal ${low} to ${high} ${unit}`,
   healthAllWell: 'Every judged reading lies within its ideal range',
@@ -109,7 +109,7 @@ export const S = {
   tags: 'Tags',
   tableCaption: 'All tags with their latest readings',
   filter: 'Filter tags',
-  filterHint: 'tag, species, pest, no pin …',
+  filterHint: 'tag, species, pest …',
   filterClear: 'Clear filter',
   shownOf: (shown: number, all: number): string =>
     shown === all ? counted(all, 'tag', 'tags') : `${shown} of ${counted(all, 'tag', 'tags')}`,

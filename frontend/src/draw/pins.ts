@@ -59,7 +59,6 @@ export function drawPins(
   for (const pin of pins) {
     const { x, y } = toCanvas(view, pin.at);
     if (!inside(surface, x, y, box)) continue;
-    if (pin.pest) drawPest(surface, x, y, radius, sprites, palette);
     const key = `pin ${radius} ${pin.kind} ${pin.share} ${colour.join()}`;
     const sprite = sprites.get(key, box, box, (context) => {
       context.translate(box / 2, box / 2);
@@ -68,6 +67,12 @@ export function drawPins(
     surface.context.globalAlpha = pin.strength;
     sprites.draw(surface, sprite, x - box / 2, y - box / 2);
     surface.context.globalAlpha = 1;
+  }
+  // Last, so that no neighbour covers a warning; and never faded.
+  for (const pin of pins) {
+    if (!pin.pest) continue;
+    const { x, y } = toCanvas(view, pin.at);
+    if (inside(surface, x, y, box * 2)) drawPest(surface, x, y, radius, sprites, palette);
   }
 }
 

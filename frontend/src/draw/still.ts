@@ -88,7 +88,11 @@ export function drawGrid({ context, size }: Surface, view: View, palette: Palett
   context.font = '500 10.5px "Inter Variable", system-ui, sans-serif';
   context.textBaseline = 'top';
   context.textAlign = 'left';
-  for (const x of columns) context.fillText(tick(x), view.x + x * view.scale + 4, 4);
+  for (const x of columns) {
+    const at = view.x + x * view.scale + 4;
+    // The buttons are in the upper right corner, the other axis begins in the left one.
+    if (at > 30 && at < size.width - 96) context.fillText(tick(x), at, 4);
+  }
   context.textBaseline = 'bottom';
   for (const y of rows) {
     const at = view.y - y * view.scale - 2;

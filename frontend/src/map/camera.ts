@@ -100,14 +100,15 @@ export class MapCamera {
     );
   }
 
-  /** Brings a point into view; one that is well inside stays where it is. */
-  show(point: MapPoint): void {
+  /** Brings a point into view; one that is well inside the free part stays where it is. */
+  show(point: MapPoint, coveredBelow: number): void {
     const { x, y } = toCanvas(this.#view, point);
-    const { width, height } = this.#size;
-    const margin = 48;
+    const { width } = this.#size;
+    const height = Math.max(0, this.#size.height - coveredBelow);
+    const margin = Math.min(40, height / 4);
     const isInside = x > margin && y > margin && x < width - margin && y < height - margin;
     if (isInside || width === 0) return;
-    this.#zoom.translateTo(this.#selection, point.x, -point.y);
+    this.#zoom.translateTo(this.#selection, point.x, -point.y, [width / 2, height / 2]);
   }
 
   destroy(): void {

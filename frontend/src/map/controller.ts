@@ -95,6 +95,13 @@ export function runMap(element: HTMLElement, canvases: Canvases): () => void {
     if (view.selected !== before.view.selected || view.hovered !== before.view.hovered) {
       spoil('pins', 'overlay');
     }
+    const { selected } = view;
+    if (selected !== null && selected !== before.view.selected) {
+      // Once the card is there, which covers part of the map on a phone.
+      requestAnimationFrame(() => {
+        run({ type: 'show', tagId: selected });
+      });
+    }
     if (view.camera !== before.view.camera || (!view.camera && (changedTwin || !sameMap))) {
       camera.goTo(view.camera, contentBounds(state));
     }
@@ -169,7 +176,7 @@ export function runMap(element: HTMLElement, canvases: Canvases): () => void {
         break;
       case 'show': {
         const tag = store.get().twin.snapshot?.tags.find(({ id }) => id === command.tagId);
-        if (tag?.at) camera.show(tag.at);
+        if (tag?.at) camera.show(tag.at, coveredBelow(element));
         break;
       }
     }
@@ -223,6 +230,14 @@ export function runMap(element: HTMLElement, canvases: Canvases): () => void {
     element.removeEventListener('blur', onBlur);
     element.removeEventListener('keydown', onKeyDown);
   };
+}
+
+/** Height of the map's lower part that the tag's card lies over, in pixels. */
+function coveredBelow(element: HTMLElement): number {
+  const card = document.querySelector('.card')?.getBoundingClientRect();
+  const map = element.getBoundingClientRect();
+  const overlaps = card && card.left < map.right && card.top < map.bottom && card.bottom > map.top;
+  return overlaps ? map.bottom - card.top : 0;
 }
 
 function newPulses({ twin }: AppState): Pulse[] {

@@ -47,8 +47,13 @@ export function startLoaders(): () => void {
     },
   });
 
+  let missingSince = -1;
+  let seen: AppState | null = null;
+
   const update = (): void => {
     const state = store.get();
+    if (seen?.twin === state.twin && seen.view.sensor === state.view.sensor) return;
+    seen = state;
     const base = baseKey(state);
     if (base === null) return;
     const { sensor } = state.view;
@@ -58,11 +63,22 @@ export function startLoaders(): () => void {
     }
     field.want(fieldTask(base, sensor, state.twin.snapshot));
     map.want({ key: base, group: 'map', run: loadMap });
-    quality.want({
-      key: `${base}|${sensor}`,
-      group: sensor,
-      run: (signal) => fetchQuality(sensor, signal).catch(nullWhereMissing),
-    });
+    const { epoch } = state.twin.connection;
+    quality.want(
+      epoch === missingSince
+        ? null
+        : {
+            key: `${base}|${sensor}`,
+            group: sensor,
+            run: (signal) =>
+              fetchQuality(sensor, signal).catch((error: unknown) => {
+                // A server without this route: the page does without, until the next server.
+                if (!(error instanceof Refusal) || error.status !== 404) throw error;
+                missingSince = epoch;
+                return null;
+              }),
+          },
+    );
   };
   update();
   return store.subscribe(update);
@@ -92,12 +108,6 @@ function fieldTask(base: string, sensor: string, snapshot: Snapshot | null): Tas
     group: sensor,
     run: (signal) => fetchField({ sensor, resolution }, signal),
   };
-}
-
-/** A server without this route: the page leaves the figure out. */
-function nullWhereMissing(error: unknown): null {
-  if (error instanceof Refusal && error.status === 404) return null;
-  throw error instanceof Error ? error : new Error(String(error));
 }
 
 function reason(error: unknown): string {

@@ -2,12 +2,15 @@ import { useEffect, type JSX } from 'react';
 
 import { act, useApp } from '../store/app';
 import { useSelected } from '../store/create';
+import { selectHealth } from '../store/derived';
 import { S } from '../strings';
 import { FrozenBanner } from './FrozenBanner';
 import { Header } from './Header';
 import { HelpDialog } from './HelpDialog';
+import { HealthMark } from './HealthMark';
 import { Icon } from './Icon';
 import { MapPanel } from './MapPanel';
+import { TagCard } from './TagCard';
 import { TagsPanel } from './TagsPanel';
 import { toast } from './toast';
 
@@ -43,6 +46,7 @@ export function App({ kiosk }: { kiosk: boolean }): JSX.Element {
       <main className="panels">
         <MapPanel kiosk={kiosk} />
         <TagsPanel kiosk={kiosk} />
+        {selected !== null && <TagCard key={selected} tagId={selected} />}
       </main>
       {!kiosk && <PaneTabs />}
       <HelpDialog />
@@ -63,6 +67,7 @@ function skipToTable(event: React.MouseEvent): void {
 /** On a narrow screen: map or table. */
 function PaneTabs(): JSX.Element {
   const pane = useApp((state) => state.view.pane);
+  const status = useApp((state) => selectHealth(state).status);
   const tab = (name: 'map' | 'tags', label: string): JSX.Element => (
     <button
       type="button"
@@ -73,6 +78,7 @@ function PaneTabs(): JSX.Element {
     >
       <Icon name={name === 'map' ? 'map' : 'list'} />
       {label}
+      {name === 'tags' && <HealthMark status={status} word={false} />}
     </button>
   );
   return (

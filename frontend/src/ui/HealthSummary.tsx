@@ -1,6 +1,6 @@
 import type { JSX } from 'react';
 
-import { readingText } from '../domain/format';
+import { readingText, valueText } from '../domain/format';
 import type { HealthStatus, HouseHealth } from '../domain/health';
 import { sensorNamed } from '../domain/sensors';
 import { shown } from '../domain/text';
@@ -8,7 +8,6 @@ import type { TemperatureUnit } from '../domain/units';
 import { act, useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
 import { S } from '../strings';
-import { commandMap } from '../map/commands';
 import { HealthMark } from './HealthMark';
 
 const ORDER: readonly HealthStatus[] = ['critical', 'stressed', 'healthy', 'no-data'];
@@ -40,7 +39,6 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
             data-tag-id={worst.tagId}
             onClick={() => {
               act({ type: 'select', tagId: worst.tagId });
-              commandMap({ type: 'show', tagId: worst.tagId });
             }}
           >
             {driver}
@@ -84,5 +82,11 @@ export function driverText({ worst }: HouseHealth, unit: TemperatureUnit): strin
     shown(worst.tagId, 24),
     sensor.label,
     readingText(sensor, worst.value, unit),
+    sensor.ideal
+      ? S.legendIdeal(
+          valueText(sensor, sensor.ideal[0], unit),
+          valueText(sensor, sensor.ideal[1], unit),
+        )
+      : '',
   );
 }

@@ -1,7 +1,7 @@
 import { useEffect, useRef, type JSX } from 'react';
 
 import { metresText, percentText, readingText, valueText } from '../domain/format';
-import { sideOf } from '../domain/health';
+import { deviation, sideOf, statusOf } from '../domain/health';
 import { sensorNamed } from '../domain/sensors';
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';
@@ -103,19 +103,26 @@ function CardBody({
         ))}
       </ul>
       <dl className="card-facts">
-        <dt>{S.columns.age}</dt>
-        <dd>
-          <Age staleSeconds={tag.staleSeconds} takenAt={takenAt} />
-        </dd>
-        <dt>{S.columns.species}</dt>
-        <dd>
+        <div>
+          <dt>{S.columns.age}</dt>
+          <dd>
+            <Age staleSeconds={tag.staleSeconds} takenAt={takenAt} />
+          </dd>
+        </div>
+        <div>
+          <dt>{S.columns.species}</dt>
+          <dd>
           {tag.species ? <bdi>{shown(tag.species, 40)}</bdi> : S.unclassified}
           {tag.species && tag.speciesConfidence !== null && (
             <span className="faint"> {S.confidence(percentText(tag.speciesConfidence))}</span>
           )}
         </dd>
+        </div>
+        <div>
         <dt>{S.cardBlooms}</dt>
         <dd>{tag.flowerCount}</dd>
+        </div>
+        <div>
         <dt>{S.cardPosition}</dt>
         <dd>
           {at ? (
@@ -124,6 +131,7 @@ function CardBody({
               className="text-button"
               title={S.cardShow}
               onClick={() => {
+                act({ type: 'pane', pane: 'map' });
                 commandMap({ type: 'show', tagId: tag.id });
               }}
             >
@@ -133,6 +141,7 @@ function CardBody({
             <span>{S.notOnMapLong}</span>
           )}
         </dd>
+        </div>
       </dl>
     </div>
   );
@@ -161,7 +170,11 @@ function CardReading({
         <Sparkline sensor={sensor} values={values} unit={unit} />
       </span>
       {sensor.ideal && (
-        <span className="card-ideal" data-side={side}>
+        <span
+          className="card-ideal"
+          data-side={side}
+          data-health={value === null ? null : statusOf(deviation(sensor.ideal, value))}
+        >
           {side && side !== 'within' && (
             <>
               <Icon name={side === 'below' ? 'down' : 'up'} size={12} />

@@ -2,12 +2,11 @@ import { memo, type JSX } from 'react';
 
 import { ageSeconds } from '../domain/age';
 import { ageText, percentText, valueText } from '../domain/format';
-import { sideOf, type TagHealth } from '../domain/health';
+import { deviation, sideOf, statusOf, type TagHealth } from '../domain/health';
 import type { Sensor } from '../domain/sensors';
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';
 import type { TemperatureUnit } from '../domain/units';
-import { commandMap } from '../map/commands';
 import { act } from '../store/app';
 import { S } from '../strings';
 import { HealthMark } from './HealthMark';
@@ -58,7 +57,6 @@ export const TagRow = memo(function TagRow({
           aria-pressed={selected}
           onClick={() => {
             act({ type: 'select', tagId: selected ? null : tag.id });
-            if (!selected) commandMap({ type: 'show', tagId: tag.id });
           }}
         >
           <bdi>{shown(tag.id, 24)}</bdi>
@@ -71,6 +69,9 @@ export const TagRow = memo(function TagRow({
       </th>
       <td className="cell-health">
         <HealthMark status={health.status} />
+      </td>
+      <td className="number cell-age">
+        <Age staleSeconds={tag.staleSeconds} takenAt={takenAt} />
       </td>
       {sensors.map((sensor) => (
         <td
@@ -95,11 +96,8 @@ export const TagRow = memo(function TagRow({
           <span className="faint">{S.noSensor}</span>
         )}
       </td>
-      <td className="number optional">{tag.flowerCount > 0 ? tag.flowerCount : ''}</td>
       <td className="cell-pest">{tag.anomaly && <PestMark count={tag.bugCount} />}</td>
-      <td className="number cell-age">
-        <Age staleSeconds={tag.staleSeconds} takenAt={takenAt} />
-      </td>
+      <td className="number optional">{tag.flowerCount > 0 ? tag.flowerCount : ''}</td>
     </tr>
   );
 });
@@ -111,7 +109,7 @@ export function PestMark({ count }: { count: number }): JSX.Element {
         <path d="M8 1 15.5 14.5H.5Z" className="body" />
         <path d="M8 5.8v4M8 12.1v.01" className="mark" />
       </svg>
-      {S.pest}
+      <span className="pest-word">{S.pest}</span>
       {count > 0 && <span className="faint">{S.pestCount(count)}</span>}
     </span>
   );
@@ -164,7 +162,11 @@ function Reading({
   return (
     <>
       {side === 'below' || side === 'above' ? (
-        <span className="beyond" title={side === 'below' ? S.below : S.above}>
+        <span
+          className="beyond"
+          data-health={sensor.ideal && statusOf(deviation(sensor.ideal, value))}
+          title={side === 'below' ? S.below : S.above}
+        >
           <Icon name={side === 'below' ? 'down' : 'up'} size={12} />
           <span className="unseen">{side === 'below' ? S.below : S.above} </span>
         </span>

@@ -1,4 +1,4 @@
-import { memo, useMemo, type JSX, type ReactNode } from 'react';
+import { memo, useMemo, type CSSProperties, type JSX, type ReactNode } from 'react';
 
 import { rgbText, sensorColour } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
@@ -36,6 +36,9 @@ export function TagTable(): JSX.Element {
         <tr>
           <ColumnHead id="tag">{S.columns.tag}</ColumnHead>
           <ColumnHead id="health">{S.columns.health}</ColumnHead>
+          <ColumnHead id="age" className="number">
+            {S.columns.age}
+          </ColumnHead>
           {sensors.map((sensor) => (
             <SensorHead
               key={sensor.name}
@@ -45,12 +48,9 @@ export function TagTable(): JSX.Element {
             />
           ))}
           <ColumnHead id="species">{S.columns.species}</ColumnHead>
+          <ColumnHead id="pest">{S.columns.pest}</ColumnHead>
           <ColumnHead id="flowers" className="number optional">
             {S.columns.flowers}
-          </ColumnHead>
-          <ColumnHead id="pest">{S.columns.pest}</ColumnHead>
-          <ColumnHead id="age" className="number">
-            {S.columns.age}
           </ColumnHead>
         </tr>
       </thead>
@@ -100,8 +100,11 @@ const SensorHead = memo(function SensorHead({
   chosen: boolean;
 }): JSX.Element {
   return (
-    <ColumnHead id={sensor.name} className={chosen ? 'number chosen' : 'number other'}>
-      <span className="swatch" style={{ background: rgbText(sensorColour(sensor)) }} />
+    <ColumnHead
+      id={sensor.name}
+      className={chosen ? 'number sensor chosen' : 'number sensor other'}
+      style={{ '--sensor': rgbText(sensorColour(sensor)) } as CSSProperties}
+    >
       {shown(sensor.label, 24)} <span className="head-unit">{unit}</span>
     </ColumnHead>
   );
@@ -110,10 +113,12 @@ const SensorHead = memo(function SensorHead({
 function ColumnHead({
   id,
   className,
+  style,
   children,
 }: {
   id: string;
   className?: string;
+  style?: CSSProperties;
   children: ReactNode;
 }): JSX.Element {
   const sort = useApp((state) => state.view.sort);
@@ -122,6 +127,7 @@ function ColumnHead({
     <th
       scope="col"
       className={className}
+      style={style}
       data-column={id}
       aria-sort={own ? (sort.descending ? 'descending' : 'ascending') : 'none'}
     >

@@ -97,5 +97,4 @@ function stepTag(by: 1 | -1): void {
   const tag = rows[(next + rows.length) % rows.length]?.tag;
   if (!tag) return;
   act({ type: 'select', tagId: tag.id });
-  commandMap({ type: 'show', tagId: tag.id });
 }

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import count
+from random import Random
 from typing import Any
 
 from lupin_patrol.chance import stream
@@ -120,37 +121,27 @@ class Mission:
         blocked = status is ScanStatus.UNREACHABLE
         yield from self._drive(tag.stop, pass_index, _BLOCKED_SHORT_M if blocked else 0.0)
         self._now_s += _READ_S
-        chance = stream(self._seed, "scan", tag.tag_id, pass_index, attempt)
         time_of_day_s = (START_OF_DAY_S + self._now_s * self._day_speed) % SECONDS_PER_DAY
-        if status is not ScanStatus.OK:
-            yield TagScanned(
-                self._now_s,
-                pass_index,
-                tag.tag_id,
-                status,
-                _DETAILS[status],
-                time_of_day_s,
-                (),
-                None,
-            )
-            return
-        # The first pass builds the map and so defines where the tags are; later ones localise
-        # themselves in it.
-        noise = 0.0 if pass_index == 0 else 1.0
-        pose = TagPose(
-            (
-                tag.position[0] + noise * chance.gauss(0.0, _POSE_NOISE_M),
-                tag.position[1] + noise * chance.gauss(0.0, _POSE_NOISE_M),
-            ),
-            tag.yaw + noise * chance.gauss(0.0, _YAW_NOISE_RAD),
-        )
-        readings = self._climate.read(tag.sensors, tag.position, time_of_day_s, chance)
+        pose: TagPose | None = None
+        readings: tuple[tuple[str, float], ...] = ()
+        if status is ScanStatus.OK:
+            chance = stream(self._seed, "scan", tag.tag_id, pass_index, attempt)
+            pose = _locate(tag, pass_index, chance)
+            readings = self._climate.read(tag.sensors, tag.position, time_of_day_s, chance)
         yield TagScanned(
-            self._now_s, pass_index, tag.tag_id, status, "", time_of_day_s, readings, pose
+            at_s=self._now_s,
+            pass_index=pass_index,
+            tag_id=tag.tag_id,
+            status=status,
+            status_detail=_DETAILS[status],
+            time_of_day_s=time_of_day_s,
+            readings=readings,
+            pose=pose,
         )
-        self._now_s += _PICTURE_S
-        look = self._plants.look(tag.tag_id, pass_index, attempt)
-        yield FlowersSeen(self._now_s, pass_index, tag.tag_id, pose, look, tag.table.rect)
+        if pose is not None:
+            self._now_s += _PICTURE_S
+            look = self._plants.look(tag.tag_id, pass_index, attempt)
+            yield FlowersSeen(self._now_s, pass_index, tag.tag_id, pose, look, tag.table.rect)
 
     def _drive(self, goal: Point, pass_index: int, short_m: float = 0.0) -> Iterator[Event]:
         """Drive to a goal, or stop a little before it, and look around on the way."""
@@ -175,3 +166,19 @@ class Mission:
 
     def _way_length(self, goal: Point) -> float:
         return length_of(self._roadmap.way(self._position, goal))
+
+
+def _locate(tag: Tag, pass_index: int, chance: Random) -> TagPose:
+    """Say where a tag is, to about a centimetre.
+
+    The first pass builds the map and so defines where the tags are: it is exact. The later ones
+    localise themselves in it.
+    """
+    noise = 0.0 if pass_index == 0 else 1.0
+    return TagPose(
+        (
+            tag.position[0] + noise * chance.gauss(0.0, _POSE_NOISE_M),
+            tag.position[1] + noise * chance.gauss(0.0, _POSE_NOISE_M),
+        ),
+        tag.yaw + noise * chance.gauss(0.0, _YAW_NOISE_RAD),
+    )

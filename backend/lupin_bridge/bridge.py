@@ -5,12 +5,16 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 import time
 import uuid
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
+from lupin_bridge.field_limits import FieldLimits
 from lupin_bridge.frames import FrameWriter
 from lupin_bridge.hub import Client, Hub
+from lupin_bridge.metrics import Metrics, Sample
 from lupin_bridge.settings import Settings
 from lupin_bridge.source import Revised, TwinSource
 from lupin_bridge.status import Liveness, Status
@@ -33,7 +37,11 @@ class Bridge:
         # Large fields and pictures are written off the loop.
         self.pool = ThreadPoolExecutor(max_workers=2, thread_name_prefix="encode")
         self.hub = Hub(settings.max_clients, settings.client_timeout_s)
+        self.field_limits = FieldLimits(
+            settings.field_rate_hz, settings.field_concurrency, settings.field_total_concurrency
+        )
         self.frames = FrameWriter()
+        self.metrics = Metrics(self._measure)
         self._liveness = Liveness()
         self._latest: Revised | None = None
         self._told: Status | None = None
@@ -88,6 +96,32 @@ class Bridge:
         """A listener's socket is free again."""
         self.hub.serve(client, time.monotonic())
 
+    def _measure(self) -> Iterator[Sample]:
+        hub, source, status = self.hub, self.source, self.status
+        tags = () if self._latest is None else self._latest.snapshot.tags
+        cache = source.cache_counts()
+        yield "lupin_clients", len(hub)
+        yield "lupin_clients_blocked", hub.blocked
+        yield "lupin_clients_dismissed", hub.clients_dismissed
+        yield "lupin_frames_sent", hub.frames_sent
+        yield "lupin_frames_skipped", hub.frames_skipped
+        yield "lupin_bytes_sent", hub.bytes_sent
+        yield "lupin_ros_thread_alive", source.is_alive
+        yield "lupin_ros_calls_waiting", source.calls_waiting
+        yield "lupin_ros_callback_errors", source.callback_errors
+        yield "lupin_twin_live", status.is_live
+        yield "lupin_twins", status.twin_count
+        yield (
+            "lupin_state_age_seconds",
+            math.inf if status.state_age_s is None else status.state_age_s,
+        )
+        yield "lupin_tags", len(tags)
+        yield "lupin_tags_pinned", sum(tag.pose is not None for tag in tags)
+        yield "lupin_field_cache_hits", cache.hits
+        yield "lupin_field_cache_misses", cache.misses
+        yield "lupin_field_cache_entries", cache.entries
+        yield "lupin_field_cache_bytes", cache.bytes
+
     # --- from the source ----------------------------------------------------------------------
 
     def _on_state(self, state: Revised) -> None:
@@ -112,6 +146,7 @@ class Bridge:
         self._next_push_s = now_s + 1.0 / self.settings.max_rate_hz
         self._tell_status()
         self.hub.publish(self.frames.state(state.snapshot, state.revision), now_s)
+        self.metrics.push_seconds.observe(time.monotonic() - state.made_s)
 
     def _on_death(self) -> None:
         self._liveness.thread_dead = True

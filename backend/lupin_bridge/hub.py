@@ -49,15 +49,17 @@ def plain_wire(client: Client, frame: StateFrame) -> bytes:
 class Client:
     """One listener: what it asked for, what it has got, and since when its socket is full.
 
-    `min_interval_s` is the least time between two frames; `wire` writes a frame as this client
-    reads it.
+    `min_interval_s` is the time between two frames, on average at least, or between any two where
+    `strict_interval`; `wire` writes a frame as this client reads it.
     """
 
     connection: Writable
     encoding: str = JSON
     delta: bool = False
     min_interval_s: float = 0.0
+    strict_interval: bool = False
     wants_status: bool = True
+    wants_state: bool = True
     wire: Callable[[Client, StateFrame], bytes] = plain_wire
     sent_seq: int = 0
     next_due_s: float = 0.0
@@ -73,6 +75,7 @@ class Hub:
         self.frames_sent = 0
         self.frames_skipped = 0
         self.bytes_sent = 0
+        self.clients_dismissed = 0
         self._client_timeout_s = client_timeout_s
         self._clients: set[Client] = set()
         self._frame: StateFrame | None = None
@@ -125,6 +128,10 @@ class Hub:
             if not self._write(client, self._status_wire(client.encoding), now_s):
                 return
             client.status_due = False
+        if not client.wants_state:
+            if client.connection.can_take:
+                client.blocked_since_s = None
+            return
         frame = self._frame
         if frame is None or frame.seq == client.sent_seq or now_s < client.next_due_s:
             return
@@ -137,8 +144,10 @@ class Hub:
             self.frames_sent += 1
             client.sent_seq = frame.seq
             # By the client's own beat, not from this frame on: frames come a little early or late.
-            client.next_due_s = max(client.next_due_s, now_s - client.min_interval_s)
-            client.next_due_s += client.min_interval_s
+            beat_s = max(client.next_due_s, now_s - client.min_interval_s)
+            client.next_due_s = client.min_interval_s + (
+                now_s if client.strict_interval else beat_s
+            )
 
     def dismiss_stuck(self, now_s: float) -> int:
         """Close every client that has not taken a frame for too long; returns how many."""
@@ -153,6 +162,7 @@ class Hub:
             client.connection.dismiss(
                 CLOSE_POLICY, f"took no frame for {self._client_timeout_s:g} s"
             )
+        self.clients_dismissed += len(stuck)
         return len(stuck)
 
     def _status_wire(self, encoding: str) -> bytes:

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
 from lupin_bridge.ros_thread import RosThread
-from lupin_bridge.source import Revised, RevisedGrid, TwinTimeoutError
+from lupin_bridge.source import CacheCounts, Revised, RevisedGrid, TwinNames, TwinTimeoutError
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldJob, FieldRequest, FieldRules
 from lupin_twin.idw import FieldGrid
@@ -63,6 +63,11 @@ class LocalTwin:
         return self._thread.is_alive
 
     @property
+    def calls_waiting(self) -> int:
+        """Calls that wait for the ROS thread now."""
+        return self._thread.calls_waiting
+
+    @property
     def callback_errors(self) -> int:
         """Errors met by the node's callbacks so far."""
         return self._thread.callback_errors
@@ -78,6 +83,20 @@ class LocalTwin:
     def rules(self) -> FieldRules:
         """The node's parameters for fields."""
         return self._thread.peek(lambda node: node.fields.rules)
+
+    def names(self) -> TwinNames:
+        """The parameters `state_topic` and `field_service_name` as ROS resolves them."""
+        return self._thread.peek(
+            lambda node: TwinNames(
+                node.resolve_topic_name(node.parameters.state_topic),
+                node.resolve_service_name(node.parameters.field_service_name),
+            )
+        )
+
+    def cache_counts(self) -> CacheCounts:
+        """The node's cache of fields."""
+        cache = self._thread.peek(lambda node: node.fields.cache)
+        return CacheCounts(cache.hits, cache.misses, len(cache), cache.bytes)
 
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map that the node accepted."""

@@ -70,6 +70,7 @@ class RosThread(Generic[NodeT, EventT]):
         self._executor: SingleThreadedExecutor | None = None
         self._node: NodeT | None = None
         self._newest: EventT | None = None
+        self._calls_waiting = 0
         self._is_waking = False
         self._is_stopping = False
 
@@ -102,6 +103,11 @@ class RosThread(Generic[NodeT, EventT]):
     def is_alive(self) -> bool:
         """Whether the thread runs."""
         return self._thread.is_alive()
+
+    @property
+    def calls_waiting(self) -> int:
+        """Calls whose answer has not come yet."""
+        return self._calls_waiting
 
     @property
     def callback_errors(self) -> int:
@@ -138,7 +144,11 @@ class RosThread(Generic[NodeT, EventT]):
                 self._to_loop(_settle, result, value, None)
 
         self._executor.create_task(run)
-        return await result
+        self._calls_waiting += 1
+        try:
+            return await result
+        finally:
+            self._calls_waiting -= 1
 
     async def ask(
         self, start: Callable[[NodeT], Any], give_up: Callable[[NodeT, Any], None]

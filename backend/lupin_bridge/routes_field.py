@@ -3,15 +3,27 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable
+import time
+from collections.abc import Awaitable, Callable
+from contextlib import ExitStack
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
+from starlette.types import Receive, Scope, Send
 
 from lupin_bridge import field_formats, field_query, schema
+from lupin_bridge.access_middleware import client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.field_formats import JSON, NPY, PNG, FieldFormat
-from lupin_bridge.http_tools import REVALIDATE, bridge_of, error_response, json_response, read_route
+from lupin_bridge.field_limits import BusyError, ClientLimitError
+from lupin_bridge.http_tools import (
+    JSON_TYPE,
+    REVALIDATE,
+    bridge_of,
+    error_response,
+    json_response,
+    read_route,
+)
 from lupin_bridge.source import TwinTimeoutError, TwinUnavailableError
 from lupin_twin.fields import FieldRefused, check_request, default_box
 
@@ -52,7 +64,8 @@ _BINARY = {"schema": {"type": "string", "format": "binary"}}
 _REFUSALS: dict[int | str, dict[str, Any]] = {
     304: {"description": "the ETag still holds"},
     400: {"model": schema.GetFieldResponse, "description": "refused; error_message says why"},
-    503: {"model": schema.ErrorMessage, "description": "the twin is not there"},
+    429: {"model": schema.GetFieldResponse, "description": "this client asks for too much"},
+    503: {"model": schema.ErrorMessage, "description": "the twin is not there, or busy"},
     504: {"model": schema.ErrorMessage, "description": "the twin did not answer in time"},
 }
 
@@ -127,10 +140,38 @@ async def _refusing(answer: Awaitable[Response]) -> Response:
         return await answer
     except FieldRefused as error:
         return json_response(field_formats.refusal_json(str(error)), 400)
+    except ClientLimitError as error:
+        return json_response(field_formats.refusal_json(str(error)), 429, error.headers)
+    except BusyError as error:
+        return error_response(str(error), 503, error.headers)
     except TwinTimeoutError as error:
         return error_response(str(error), 504)
     except TwinUnavailableError as error:
         return error_response(str(error), 503, {"Retry-After": "3"})
+
+
+class _FieldResponse(Response):
+    """An answer that lets go of its place in the limits once the client has taken it, or left."""
+
+    let_go: Callable[[], None] | None = None
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            if self.let_go is not None:
+                self.let_go()
+
+
+async def _limited(request: Request, compute: Callable[[], Awaitable[_FieldResponse]]) -> Response:
+    """Compute within the client's and everybody's limits."""
+    limits = bridge_of(request).field_limits
+    with ExitStack() as held:
+        held.enter_context(limits.request(client_of(request), time.monotonic()))
+        with limits.computing():
+            response = await compute()
+        response.let_go = held.pop_all().close
+    return response
 
 
 async def _quality(request: Request) -> Response:
@@ -143,14 +184,19 @@ async def _quality(request: Request) -> Response:
     tag = field_query.etag(bridge.source.revision(), asked, "quality", 1)
     if field_query.matches(request.headers.get("if-none-match"), tag):
         return Response(status_code=304, headers={"ETag": tag, **REVALIDATE})
-    result = await bridge.source.field(asked)
-    tags = () if bridge.latest is None else bridge.latest.snapshot.tags
-    loop = asyncio.get_running_loop()
-    body = await loop.run_in_executor(
-        bridge.pool, field_formats.write_quality, result.grid, tags, asked.sensor_type, rules
-    )
-    tag = field_query.etag(result.revision, asked, "quality", 1)
-    return json_response(body, headers={"ETag": tag, **REVALIDATE})
+    with bridge.metrics.field_seconds.time():
+    
+    async def compute() -> _FieldResponse:
+        result = await bridge.source.field(asked)
+        tags = () if bridge.latest is None else bridge.latest.snapshot.tags
+        loop = asyncio.get_running_loop()
+        body = await loop.run_in_executor(
+            bridge.pool, field_formats.write_quality, result.grid, tags, asked.sensor_type, rules
+        )
+        tag = field_query.etag(result.revision, asked, "quality", 1)
+        return _FieldResponse(body, headers={"ETag": tag, **REVALIDATE}, media_type=JSON_TYPE)
+
+    return await _limited(request, compute)
 
 
 async def _answer(bridge: Bridge, request: Request, field_format: FieldFormat) -> Response:
@@ -164,25 +210,29 @@ async def _answer(bridge: Bridge, request: Request, field_format: FieldFormat) -
     tag = field_query.etag(source.revision(), asked, field_format.name, query.scale)
     if field_query.matches(known, tag):
         return Response(status_code=304, headers={"ETag": tag, **REVALIDATE})
-    result = await source.field(asked)
-    # The revision that the field was made from, which may be newer than the one just compared.
-    tag = field_query.etag(result.revision, asked, field_format.name, query.scale)
-    loop = asyncio.get_running_loop()
-    body = await loop.run_in_executor(
-        bridge.pool,
-        field_formats.write,
-        result.grid,
-        field_format,
-        asked.sensor_type,
-        query.scale,
-    )
-    headers = field_query.headers(
-        field_formats.metadata(result.grid, asked.sensor_type),
-        f"{asked.sensor_type}.{field_format.name}",
-    )
-    return Response(
-        body, headers={**headers, "ETag": tag, **REVALIDATE}, media_type=field_format.media_type
-    )
+    with bridge.metrics.field_seconds.time():
+    
+    async def compute() -> _FieldResponse:
+        result = await source.field(asked)
+        # The revision that the field was made from, which may be newer than the one just compared.
+        tag = field_query.etag(result.revision, asked, field_format.name, query.scale)
+        loop = asyncio.get_running_loop()
+        body = await loop.run_in_executor(
+            bridge.pool,
+            field_formats.write,
+            result.grid,
+            field_format,
+            asked.sensor_type,
+            query.scale,
+        )
+        headers = field_query.headers(
+            field_formats.metadata(result.grid, asked.sensor_type),
+            f"{asked.sensor_type}.{field_format.name}",
+        )
+        headers |= {"ETag": tag, **REVALIDATE}
+        return _FieldResponse(body, headers=headers, media_type=field_format.media_type)
+
+    return await _limited(request, compute)
 
 
 def _box_of_all_tags(bridge: Bridge) -> field_query.Box:

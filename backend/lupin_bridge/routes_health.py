@@ -1,4 +1,4 @@
-"""Liveness of the bridge and readiness of the twin behind it."""
+"""Liveness of the bridge, readiness of the twin behind it, and metrics of both."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import orjson
 from fastapi import APIRouter, Request, Response
 
 from lupin_bridge import schema
-from lupin_bridge.http_tools import bridge_of, json_response, read_route
+from lupin_bridge.http_tools import NEVER_KEEP, bridge_of, json_response, read_route
+from lupin_bridge.metrics import CONTENT_TYPE
 
 router = APIRouter()
 
@@ -30,6 +31,18 @@ async def healthz(request: Request) -> Response:
         "callback_errors": source.callback_errors,
     }
     return json_response(orjson.dumps(body), 200 if alive else 503)
+
+
+@read_route(
+    router,
+    "/metrics",
+    summary="Metrics for Prometheus",
+    responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
+)
+async def metrics(request: Request) -> Response:
+    """Clients, frames, latencies, fields, and the ROS thread, in Prometheus' text format."""
+    text = bridge_of(request).metrics.text()
+    return Response(text, headers=NEVER_KEEP, media_type=CONTENT_TYPE)
 
 
 @read_route(

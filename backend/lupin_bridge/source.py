@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from lupin_twin.explored import OccupancyMap
@@ -22,10 +23,21 @@ class TwinTimeoutError(TwinUnavailableError):
 
 @dataclass(frozen=True, slots=True)
 class Revised:
-    """A snapshot and the revision that it belongs to."""
+    """A snapshot, the revision that it belongs to, and when it was made (monotonic clock)."""
 
     snapshot: Snapshot
     revision: str
+    made_s: float = field(default_factory=time.monotonic, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class CacheCounts:
+    """How the cache of fields does."""
+
+    hits: int = 0
+    misses: int = 0
+    entries: int = 0
+    bytes: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +46,14 @@ class RevisedGrid:
 
     grid: FieldGrid
     revision: str
+
+
+@dataclass(frozen=True, slots=True)
+class TwinNames:
+    """What the twin's topic and service are called in ROS, from the root on and after remapping."""
+
+    state_topic: str
+    field_service: str
 
 
 class TwinSource(Protocol):
@@ -52,6 +72,10 @@ class TwinSource(Protocol):
         """Whether the thread behind this source runs."""
 
     @property
+    def calls_waiting(self) -> int:
+        """Calls that wait for the ROS thread now."""
+
+    @property
     def callback_errors(self) -> int:
         """Errors met by ROS callbacks so far."""
 
@@ -63,6 +87,12 @@ class TwinSource(Protocol):
 
     def rules(self) -> FieldRules:
         """The rules by which fields are made, and their limit."""
+
+    def names(self) -> TwinNames:
+        """What the twin's topic and service are called."""
+
+    def cache_counts(self) -> CacheCounts:
+        """How the cache of fields does; all 0 where it is not in this process."""
 
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map, if any has come."""

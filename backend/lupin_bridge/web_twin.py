@@ -7,7 +7,14 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from lupin_bridge.ros_thread import RosThread
-from lupin_bridge.source import Revised, RevisedGrid, TwinTimeoutError, TwinUnavailableError
+from lupin_bridge.source import (
+    CacheCounts,
+    Revised,
+    RevisedGrid,
+    TwinNames,
+    TwinTimeoutError,
+    TwinUnavailableError,
+)
 from lupin_bridge.web_node import WebNode
 from lupin_twin import convert
 from lupin_twin.explored import OccupancyMap
@@ -56,6 +63,11 @@ class WebTwin:
         return self._thread.is_alive
 
     @property
+    def calls_waiting(self) -> int:
+        """Calls that wait for the ROS thread now."""
+        return self._thread.calls_waiting
+
+    @property
     def callback_errors(self) -> int:
         """Errors met by the node's callbacks so far."""
         return self._thread.callback_errors
@@ -71,6 +83,19 @@ class WebTwin:
     def rules(self) -> FieldRules:
         """The twin's parameters for fields, as far as this process was given the same."""
         return self._thread.peek(lambda node: node.rules)
+
+    def names(self) -> TwinNames:
+        """The parameters `state_topic` and `field_service_name` as ROS resolves them."""
+        return self._thread.peek(
+            lambda node: TwinNames(
+                node.resolve_topic_name(node.parameters.state_topic),
+                node.resolve_service_name(node.parameters.field_service_name),
+            )
+        )
+
+    def cache_counts(self) -> CacheCounts:
+        """Nothing: the cache is the twin's."""
+        return CacheCounts()
 
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map."""

@@ -1,0 +1,78 @@
+"""What Prometheus scrapes: numbers are read off at the scrape, times are histograms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Final
+
+from prometheus_client import CollectorRegistry, Histogram, ProcessCollector, generate_latest
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
+
+Sample = tuple[str, float]
+
+GAUGES: Final = {
+    "lupin_clients": "WebSocket clients that follow the state",
+    "lupin_clients_blocked": "clients whose socket takes nothing just now",
+    "lupin_ros_thread_alive": "1 while the ROS thread runs",
+    "lupin_ros_calls_waiting": "calls that wait for the ROS thread",
+    "lupin_twin_live": "1 while the twin is live",
+    "lupin_twins": "twins that publish the state; more than 1 is a mistake",
+    "lupin_state_age_seconds": "seconds since the last state came; infinite: none has",
+    "lupin_tags": "tags that the twin knows",
+    "lupin_tags_pinned": "tags that have a pose",
+    "lupin_field_cache_entries": "fields in the cache",
+    "lupin_field_cache_bytes": "memory of the fields in the cache",
+}
+# Written with `_total` behind the name, as Prometheus wants it.
+COUNTERS: Final = {
+    "lupin_clients_dismissed": "clients closed because they took no frame for too long",
+    "lupin_frames_sent": "state frames written to clients",
+    "lupin_frames_skipped": "state frames that a client did not get, being slow or wanting fewer",
+    "lupin_bytes_sent": "bytes of frames written to clients",
+    "lupin_ros_callback_errors": "errors met by ROS callbacks",
+    "lupin_field_cache_hits": "fields served from the cache",
+    "lupin_field_cache_misses": "fields that had to be computed",
+}
+HISTOGRAMS: Final = {
+    "lupin_push_seconds": (
+        "from a change in the ROS thread until every ready client has been written its frame"
+    ),
+    "lupin_field_seconds": "until a field is there: from the cache, computed, or asked for",
+}
+
+# From a millisecond to the time-out of a field.
+_SECONDS: Final = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
+
+
+class Metrics(Collector):
+    """The bridge's metrics; `read` gives a sample of each gauge and counter at each scrape."""
+
+    def __init__(self, read: Callable[[], Iterable[Sample]]) -> None:
+        self._read = read
+        self._registry = CollectorRegistry()
+        self._registry.register(self)
+        ProcessCollector(registry=self._registry)
+        self.push_seconds = self._histogram("lupin_push_seconds")
+        self.field_seconds = self._histogram("lupin_field_seconds")
+
+    def describe(self) -> Iterable[Metric]:
+        """Nothing: the registry would scrape at once, before there is anything to read."""
+        return ()
+
+    def collect(self) -> Iterator[Metric]:
+        """The gauges and counters, for the registry."""
+        for name, value in self._read():
+            if name in GAUGES:
+                yield GaugeMetricFamily(name, GAUGES[name], value)
+            else:
+                yield CounterMetricFamily(name, COUNTERS[name], value)
+
+    def text(self) -> bytes:
+        """Everything in Prometheus' text format, version 0.0.4."""
+        return generate_latest(self._registry)
+
+    def _histogram(self, name: str) -> Histogram:
+        return Histogram(name, HISTOGRAMS[name], buckets=_SECONDS, registry=self._registry)

@@ -1,0 +1,68 @@
+"""Metrics as Prometheus reads them, from a real bridge with a real twin."""
+
+from __future__ import annotations
+
+import httpx
+from prometheus_client.parser import text_string_to_metric_families
+from websockets.sync.client import connect
+
+from lupin_bridge.metrics import CONTENT_TYPE, COUNTERS, GAUGES, HISTOGRAMS, Metrics
+from tests.support.messages import scan
+from tests.support.processes import lupin_twin, url_of
+from tests.support.ros import Peer
+from tests.support.waiting import wait_for
+
+
+def scrape(url: str) -> dict[str, float]:
+    response = httpx.get(f"{url}/metrics")
+    assert response.headers["content-type"] == CONTENT_TYPE
+    return {
+        sample.name: sample.value
+        for family in text_string_to_metric_families(response.text)
+        for sample in family.samples
+        if "le" not in sample.labels
+    }
+
+
+def test_every_metric_is_there_and_follows_what_happens(domain: int) -> None:
+    with lupin_twin(domain, "serve") as process, Peer(domain) as peer:
+        url = url_of(process)
+        before = scrape(url)
+        names = {*GAUGES, *(f"{name}_total" for name in COUNTERS)}
+        names |= {f"{name}_count" for name in HISTOGRAMS}
+        assert names <= set(before)
+        assert (before["lupin_clients"], before["lupin_tags"]) == (0.0, 0.0)
+        peer.wait_for_twin()
+        with connect(url.replace("http", "ws") + "/ws/state") as client:
+            client.recv()
+            peer.observe(scan("1", {"co2": 500.0}, at=(1, 1)), scan("2", {"co2": 500.0}))
+            wait_for(lambda: scrape(url)["lupin_tags"] == 2.0, "both tags")
+            for _ in range(2):
+                httpx.get(f"{url}/api/field.json", params={"sensor_type": "co2"})
+            after = scrape(url)
+        assert (after["lupin_clients"], after["lupin_tags_pinned"]) == (1.0, 1.0)
+        assert after["lupin_frames_sent_total"] >= 2.0
+        assert after["lupin_bytes_sent_total"] > 100.0
+        assert after["lupin_push_seconds_count"] > before["lupin_push_seconds_count"]
+        assert after["lupin_field_seconds_count"] == 2.0
+        assert after["lupin_field_cache_misses_total"] == 1.0
+        assert after["lupin_field_cache_hits_total"] == 1.0
+        assert after["lupin_field_cache_bytes"] > 0.0
+        assert (after["lupin_ros_thread_alive"], after["lupin_twin_live"]) == (1.0, 1.0)
+        assert after["lupin_state_age_seconds"] < 3.0
+        assert after["lupin_ros_callback_errors_total"] == 0.0
+
+
+def test_samples_are_read_at_the_scrape_and_not_before() -> None:
+    reads: list[int] = []
+
+    def read() -> list[tuple[str, float]]:
+        reads.append(1)
+        return [("lupin_clients", 7.0), ("lupin_frames_sent", 9.0)]
+
+    metrics = Metrics(read)
+    assert reads == []
+    text = metrics.text().decode()
+    assert "\nlupin_clients 7.0\n" in text
+    assert "\nlupin_frames_sent_total 9.0\n" in text
+    assert len(reads) == 1

@@ -21,10 +21,7 @@ def test_json_is_one_object_a_line_with_the_error(capsys: pytest.CaptureFixture[
     logs.set_up(logs.JSON)
     log = logging.getLogger("lupin_bridge.test")
     log.info("tag %s\nsecond line", "7°")
-    try:
-        raise ValueError("broken")
-    except ValueError:
-        log.exception("failed")
+    log.error("failed", exc_info=ValueError("broken"))
     first, second = (json.loads(line) for line in capsys.readouterr().err.splitlines())
     assert first["message"] == "tag 7°\nsecond line"
     assert (first["level"], first["logger"]) == ("info", "lupin_bridge.test")

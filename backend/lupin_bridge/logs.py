@@ -38,6 +38,7 @@ def set_up(log_format: str) -> None:
         handler.setFormatter(JsonFormatter())
     else:
         handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
-    logging.basicConfig(level=logging.INFO, handlers=[handler])
+    logging.root.addHandler(handler)
+    logging.root.setLevel(logging.INFO)
     # Its news (started, waiting, connection open) are ours to tell, once.
     logging.getLogger("uvicorn").setLevel(logging.WARNING)

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import signal
+import sys
+from pathlib import Path
+
 import pytest
 
 from lupin_patrol.cli import parse
+from tests.support.domains import ros_env
+from tests.support.processes import Process
+from tests.support.waiting import wait_for
 
 
 def test_defaults() -> None:
@@ -52,3 +59,19 @@ def test_an_unknown_option_is_refused_and_named(
     assert refusal.value.code == 2
     [line] = capsys.readouterr().err.splitlines()
     assert arguments[0] in line
+
+
+def test_it_ends_with_its_parent_even_when_that_is_killed(domain: int) -> None:
+    parent = [
+        sys.executable,
+        "-c",
+        "import subprocess, sys; "
+        "child = subprocess.Popen([sys.executable, '-m', 'lupin_patrol', '--end-with-parent']); "
+        "print('child', child.pid, flush=True); child.wait()",
+    ]
+    with Process(parent, ros_env(domain)) as process:
+        child = Path("/proc", process.wait_for_output("child").split()[1])
+        process.wait_for_output("patrol starts")
+        process.send(signal.SIGKILL)
+        process.wait()
+        wait_for(lambda: not child.exists(), "the end of the patrol")

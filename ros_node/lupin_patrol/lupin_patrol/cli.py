@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import ctypes
+import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
 from typing import NoReturn
+
+_PR_SET_PDEATHSIG = 1
 
 SPEED_LIMITS = (0.1, 50.0)
 DAY_SPEED_LIMITS = (0.0, 3600.0)
@@ -48,6 +52,11 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument(
         "--once", action="store_true", help="end after one pass, its retries included"
     )
+    parser.add_argument(
+        "--end-with-parent",
+        action="store_true",
+        help="end when the process that started this one does, even by kill -9 (Linux)",
+    )
     return parser.parse_args(arguments)
 
 
@@ -66,12 +75,22 @@ def main() -> int:
         options = parse(remove_ros_args(sys.argv)[1:])
     except RuntimeError as error:  # what rclpy raises for ROS arguments that it cannot parse
         return _refuse(f"cannot use these ROS arguments: {error}")
+    if options.end_with_parent:
+        _end_with_parent()
     mission = Mission(GreenhouseSimulator(), options.seed, options.day_speed)
     try:
         play(mission.events(), speed=options.speed, once=options.once, ros_arguments=sys.argv)
     except ParameterError as error:
         return _refuse(str(error))
     return 0
+
+
+def _end_with_parent() -> None:
+    """Have the kernel send SIGTERM when the parent is gone (prctl(2))."""
+    parent = os.getppid()
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != parent:  # it went before the kernel was asked
+        sys.exit(0)
 
 
 def _refuse(reason: str) -> int:

@@ -199,6 +199,8 @@ class RosThread(Generic[NodeT, EventT]):
                 signal_handler_options=SignalHandlerOptions.NO,
             )
             self._node = self._make_node(self._context, self._post)
+            if self._newest is not None:
+                self._post(self._newest)
             executor = SingleThreadedExecutor(context=self._context)
             executor.add_node(self._node)
             self._executor = executor
@@ -223,8 +225,9 @@ class RosThread(Generic[NodeT, EventT]):
 
     def _post(self, event: EventT) -> None:
         self._newest = event
-        # One wake-up for as many events as come before the loop gets round to it.
-        if not self._is_waking:
+        # One wake-up for as many events as come before the loop gets round to it, and none before
+        # there is a node to look at.
+        if self._node is not None and not self._is_waking:
             self._is_waking = True
             self._to_loop(self._drain)
 

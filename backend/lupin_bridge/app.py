@@ -12,21 +12,28 @@ from lupin_bridge import (
     routes_field,
     routes_health,
     routes_map,
+    routes_signin,
     routes_state,
     schema,
 )
+from lupin_bridge.access_middleware import Access, AccessControl
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.http_protocol import PieceByPiece
 from lupin_bridge.http_tools import error_response
 from lupin_bridge.security import ReadOnly
 
 STATIC_FOLDER = Path(__file__).parent / "static"
 
 
-def create_app(bridge: Bridge | None, static_folder: Path = STATIC_FOLDER) -> FastAPI:
+def create_app(
+    bridge: Bridge | None, static_folder: Path = STATIC_FOLDER, access: Access | None = None
+) -> FastAPI:
     """The application around a bridge that its caller starts and stops.
 
-    Without a bridge it can only describe itself (OpenAPI).
+    Without a bridge it can only describe itself (OpenAPI). Without `access` it goes by the names
+    of this machine, and asks for no token.
     """
+    access = access or Access()
     app = FastAPI(
         title="lupin-twin",
         version="0.1.0",
@@ -37,9 +44,21 @@ def create_app(bridge: Bridge | None, static_folder: Path = STATIC_FOLDER) -> Fa
         openapi_url=None,
     )
     app.state.bridge = bridge
-    for module in (routes_state, routes_field, routes_map, routes_health, docs_page):
+    app.state.access = access
+    for module in (
+        routes_state,
+        routes_field,
+        routes_map,
+        routes_health,
+        routes_signin,
+        docs_page,
+    ):
         app.include_router(module.router)
+    # The last one added is the first to be asked.
+    if bridge is not None:
+        app.add_middleware(PieceByPiece, timeout_s=bridge.settings.client_timeout_s)
     app.add_middleware(ReadOnly)
+    app.add_middleware(AccessControl, access=access)
     app.add_exception_handler(404, _not_found)
     if static_folder.is_dir():
         app.mount("/", StaticFiles(directory=static_folder, html=True), name="hmi")

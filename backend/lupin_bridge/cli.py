@@ -6,18 +6,22 @@ import argparse
 import asyncio
 import logging
 import os
+import socket
 import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import fields
-from typing import NoReturn
+from typing import Any, NoReturn
 
+from lupin_bridge.access import exposure
+from lupin_bridge.access_middleware import Access
 from lupin_bridge.app import create_app
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.local_twin import LocalTwin
 from lupin_bridge.server import BridgeServer, address_of, listen
 from lupin_bridge.settings import SettingError, Settings, option
+from lupin_bridge.tls import check_pair
 from lupin_bridge.web_twin import WebTwin
 from lupin_twin.parameters import ParameterError
 
@@ -32,12 +36,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     own, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
     options = _parser().parse_args(own)
     try:
-        settings = Settings(**{spec.name: getattr(options, spec.name) for spec in fields(Settings)})
+        settings = _settings_from(options)
+        # Taken out of the environment: the processes that we start have no use for it.
+        access = Access.of(settings, os.environ.pop("LUPIN_TOKEN", None))
+        if settings.tls_cert:
+            check_pair(settings.tls_cert, settings.tls_key)
     except SettingError as error:
         _fail(str(error))
     _prepare_process()
     try:
-        return asyncio.run(_run(options.role, settings, ros_args))
+        return asyncio.run(_run(options.role, settings, access, ros_args))
     except ParameterError as error:
         _fail(str(error))
     except KeyboardInterrupt:
@@ -67,18 +75,20 @@ ROLES = {
 }
 
 
-async def _run(role: str, settings: Settings, ros_args: Sequence[str]) -> int:
+async def _run(role: str, settings: Settings, access: Access, ros_args: Sequence[str]) -> int:
     try:
         listener = listen(settings.host, settings.port)
     except OSError as error:
         _fail(f"cannot listen on {settings.host} port {settings.port}: {error.strerror}")
+    _warn_of_exposure(listener, access)
     make_source = WebTwin if role == "web" else LocalTwin
     source = make_source(ros_args=ros_args, timeout_s=settings.field_timeout_s)
     bridge = Bridge(source, settings)
-    server = BridgeServer(create_app(bridge), bridge)
+    server = BridgeServer(create_app(bridge, access=access), bridge)
     await bridge.start()
     patrol = _start_patrol() if role == "demo" else None
-    print(f"lupin-twin: {address_of(listener)}", flush=True)  # noqa: T201  # for people and scripts
+    url = address_of(listener, "https" if access.secure else "http")
+    print(f"lupin-twin: {url}", flush=True)  # noqa: T201  # for people and scripts
     try:
         await server.serve(sockets=[listener])
     finally:
@@ -90,6 +100,15 @@ async def _run(role: str, settings: Settings, ros_args: Sequence[str]) -> int:
     return 0
 
 
+def _settings_from(options: argparse.Namespace) -> Settings:
+    values: dict[str, Any] = {}
+    for spec in fields(Settings):
+        value = getattr(options, spec.name)
+        # What may be given more than once comes as a list.
+        values[spec.name] = tuple(value) if isinstance(value, list) else value
+    return Settings(**values)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="lupin-twin",
@@ -99,12 +118,15 @@ def _parser() -> argparse.ArgumentParser:
     roles = parser.add_subparsers(dest="role", required=True, metavar="ROLE")
     common = argparse.ArgumentParser(add_help=False)
     for spec in fields(Settings):
+        default: Any = spec.default
+        repeatable = isinstance(default, tuple)
         common.add_argument(
             option(spec.name),
-            type=type(spec.default),
-            default=spec.default,
+            type=str if repeatable else type(default),
+            action="append" if repeatable else "store",
+            default=list(default) if repeatable else default,
             metavar=spec.name.rpartition("_")[2].upper(),
-            help=f"{spec.metadata['help']} (default: {spec.default})",
+            help=f"{spec.metadata['help']} (default: {default or 'none'})",
         )
     for role, text in ROLES.items():
         roles.add_parser(role, parents=[common], help=text, description=text)
@@ -124,9 +146,18 @@ def _prepare_process() -> None:
     logging.getLogger("uvicorn").setLevel(logging.WARNING)
 
 
+def _warn_of_exposure(listener: socket.socket, access: Access) -> None:
+    for warning in exposure(
+        listener.getsockname()[0],
+        has_token=access.credentials is not None,
+        has_tls=access.secure,
+    ):
+        log.warning("%s", warning)
+
+
 def _start_patrol() -> subprocess.Popen[bytes]:
     # The environment goes along whole: the ROS wheels' own variables only work together.
-    return subprocess.Popen([sys.executable, "-m", "lupin_patrol"])
+    return subprocess.Popen([sys.executable, "-m", "lupin_patrol", "--end-with-parent"])
 
 
 def _wait_or_kill(patrol: subprocess.Popen[bytes]) -> None:

@@ -165,10 +165,11 @@ class _FieldResponse(Response):
 
 async def _limited(request: Request, compute: Callable[[], Awaitable[_FieldResponse]]) -> Response:
     """Compute within the client's and everybody's limits."""
-    limits = bridge_of(request).field_limits
+    bridge = bridge_of(request)
+    limits = bridge.field_limits
     with ExitStack() as held:
         held.enter_context(limits.request(client_of(request), time.monotonic()))
-        with limits.computing():
+        with limits.computing(), bridge.metrics.field_seconds.time():
             response = await compute()
         response.let_go = held.pop_all().close
     return response
@@ -184,8 +185,7 @@ async def _quality(request: Request) -> Response:
     tag = field_query.etag(bridge.source.revision(), asked, "quality", 1)
     if field_query.matches(request.headers.get("if-none-match"), tag):
         return Response(status_code=304, headers={"ETag": tag, **REVALIDATE})
-    with bridge.metrics.field_seconds.time():
-    
+
     async def compute() -> _FieldResponse:
         result = await bridge.source.field(asked)
         tags = () if bridge.latest is None else bridge.latest.snapshot.tags
@@ -210,8 +210,7 @@ async def _answer(bridge: Bridge, request: Request, field_format: FieldFormat) -
     tag = field_query.etag(source.revision(), asked, field_format.name, query.scale)
     if field_query.matches(known, tag):
         return Response(status_code=304, headers={"ETag": tag, **REVALIDATE})
-    with bridge.metrics.field_seconds.time():
-    
+
     async def compute() -> _FieldResponse:
         result = await source.field(asked)
         # The revision that the field was made from, which may be newer than the one just compared.

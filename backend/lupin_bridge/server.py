@@ -11,6 +11,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.http_protocol import HttpConnection
 from lupin_bridge.ws_protocol import Connection
 
 log = logging.getLogger(__name__)
@@ -29,6 +30,7 @@ class BridgeServer(uvicorn.Server):
         super().__init__(
             uvicorn.Config(
                 app,
+                http=HttpConnection,
                 ws=Connection,
                 ws_per_message_deflate=False,  # 2 ms against 30 ms of CPU for 50 clients a frame
                 ws_max_size=MAX_INBOUND_BYTES,
@@ -37,6 +39,8 @@ class BridgeServer(uvicorn.Server):
                 access_log=False,
                 log_config=None,
                 server_header=False,
+                ssl_certfile=bridge.settings.tls_cert or None,
+                ssl_keyfile=bridge.settings.tls_key or None,
                 proxy_headers=False,  # who asks is who is connected, whatever a header claims
                 timeout_graceful_shutdown=GRACEFUL_SHUTDOWN_S,
             )
@@ -81,7 +85,7 @@ def listen(host: str, port: int) -> socket.socket:
     return listener
 
 
-def address_of(listener: socket.socket) -> str:
+def address_of(listener: socket.socket, scheme: str = "http") -> str:
     """The URL of a listening socket, for a person to open."""
     host, port = listener.getsockname()[:2]
-    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+    return f"{scheme}://[{host}]:{port}" if ":" in host else f"{scheme}://{host}:{port}"

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from lupin_bridge.access import OriginError, parse_origin
+
 
 class SettingError(ValueError):
     """A setting out of its range; the message names it, its value and the limit."""
@@ -30,11 +32,27 @@ class Settings:
     )
     max_clients: int = _setting(5_000, "WebSocket clients at most", 1, 100_000)
     client_timeout_s: float = _setting(
-        30.0, "a client that takes no frame for this long is closed", 1.0, 3_600.0
+        30.0, "a client that takes nothing for this long is closed", 1.0, 3_600.0
     )
     field_timeout_s: float = _setting(
         10.0, "a field request that takes longer ends in 504", 0.1, 600.0
     )
+    field_rate_hz: float = _setting(
+        20.0, "field requests a second and client; two seconds' worth at once", 0.1, 10_000.0
+    )
+    field_concurrency: int = _setting(
+        8, "field requests in flight for one client; a browser makes six", 1, 1_000
+    )
+    field_total_concurrency: int = _setting(
+        32, "field requests being computed for all clients together", 1, 10_000
+    )
+    allow_origin: tuple[str, ...] = _setting(
+        (),
+        "origin whose pages may read the bridge too, and whose host is a name of the bridge, such "
+        "as https://panel.example; may be given more than once",
+    )
+    tls_cert: str = _setting("", "PEM file with the certificate chain: serve https and wss")
+    tls_key: str = _setting("", "PEM file with the certificate's private key, not encrypted")
 
     def __post_init__(self) -> None:
         for spec in fields(self):
@@ -46,6 +64,14 @@ class Settings:
                 )
         if not self.host:
             raise SettingError("--host is empty, must be an address")
+        for origin in self.allow_origin:
+            try:
+                parse_origin(origin)
+            except OriginError as error:
+                raise SettingError(f"--allow-origin: {error}") from None
+        if bool(self.tls_cert) != bool(self.tls_key):
+            given, missing = ("cert", "key") if self.tls_cert else ("key", "cert")
+            raise SettingError(f"--tls-{given} is given without --tls-{missing}, TLS needs both")
 
 
 def option(name: str) -> str:

@@ -42,6 +42,15 @@ class Connection(WebSocketsSansIOProtocol):
         if self.on_writable is not None:
             self.on_writable()
 
+    async def send(self, message: Any) -> None:
+        """Pass on; a handshake that was answered with a refusal counts as complete.
+
+        uvicorn would take it for one that the application forgot, and log an error for each.
+        """
+        await super().send(message)
+        if message["type"] == "websocket.http.response.body" and self.close_sent:
+            self.handshake_complete = True
+
     @property
     def can_take(self) -> bool:
         """Whether everything written so far has gone out, and more may follow."""
@@ -50,6 +59,15 @@ class Connection(WebSocketsSansIOProtocol):
     def write(self, wire: bytes) -> None:
         """Write a whole frame; never waits. The caller has asked `can_take`."""
         self.transport.write(wire)
+
+    async def write_when_free(self, wire: bytes) -> None:
+        """Write as soon as all before has gone out; at most one frame slips in between.
+
+        Nothing is written to a connection that is closing.
+        """
+        await self.writable.wait()
+        if not self.close_sent and not self.transport.is_closing():
+            self.transport.write(wire)
 
     def dismiss(self, code: int, reason: str) -> None:
         """Send a close frame with the reason, and tear the socket down if nobody reads it."""

@@ -1,0 +1,76 @@
+"""The bearer token, and the browser session that it opens. Pure.
+
+A session's cookie is stateless, so that it survives a restart and holds at every replica that has
+the same token: its expiry, and an HMAC (RFC 2104) of that under a key derived from the token. A
+new token ends every session.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import re
+from typing import Final
+
+from lupin_bridge.settings import SettingError
+
+MIN_TOKEN_LENGTH: Final = 16
+# RFC 6750, section 2.1: what may stand behind "Bearer" in a header.
+_TOKEN: Final = re.compile(r"[A-Za-z0-9._~+/-]+=*")
+
+# Long enough for a shift's screen not to ask daily, short enough for a lost tablet to forget.
+SESSION_S: Final = 7 * 24 * 3600
+
+_COOKIE: Final = re.compile(r"(?P<expires>[0-9]{1,12})\.(?P<mac>[0-9a-f]{64})")
+
+
+class TokenError(SettingError):
+    """A token that cannot be one; the message tells its length, never the token."""
+
+
+class Credentials:
+    """Tells the right token and its sessions from all others, in constant time."""
+
+    def __init__(self, token: str) -> None:
+        if len(token) < MIN_TOKEN_LENGTH:
+            raise TokenError(
+                f"LUPIN_TOKEN has {len(token)} characters, must have at least {MIN_TOKEN_LENGTH}: "
+                "make one with `openssl rand -hex 32`, or unset it"
+            )
+        if _TOKEN.fullmatch(token) is None:
+            raise TokenError(
+                "LUPIN_TOKEN holds a character that no bearer token may: use letters, digits and "
+                "-._~+/ (RFC 6750)"
+            )
+        self._digest = _digest(token.encode())
+        # Slow on purpose: whoever gets hold of a cookie must not find a weak token from it.
+        self._key = hashlib.scrypt(token.encode(), salt=b"lupin-twin session", n=2**14, r=8, p=1)
+        # Browsers keep one jar for all ports of a host: bridges with different tokens must not
+        # overwrite each other's session.
+        self.cookie_name: Final = f"lupin_session_{self._mac('name')[:8]}"
+
+    def accepts_header(self, authorization: str) -> bool:
+        """Whether an Authorization header carries the token."""
+        scheme, _, given = authorization.partition(" ")
+        # Digests, so that not even the token's length shows in the time taken.
+        right = hmac.compare_digest(_digest(given.strip().encode()), self._digest)
+        return right and scheme.lower() == "bearer"
+
+    def cookie(self, now_s: float) -> str:
+        """A session's cookie from `now_s` on, s since the epoch."""
+        expires = int(now_s) + SESSION_S
+        return f"{expires}.{self._mac(str(expires))}"
+
+    def accepts_cookie(self, value: str, now_s: float) -> bool:
+        """Whether a cookie is one of ours that has not expired."""
+        match = _COOKIE.fullmatch(value)
+        if match is None or int(match["expires"]) <= now_s:
+            return False
+        return hmac.compare_digest(match["mac"].encode(), self._mac(match["expires"]).encode())
+
+    def _mac(self, text: str) -> str:
+        return hmac.new(self._key, text.encode(), hashlib.sha256).hexdigest()
+
+
+def _digest(secret: bytes) -> bytes:
+    return hashlib.sha256(secret).digest()

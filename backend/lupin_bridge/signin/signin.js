@@ -1,0 +1,48 @@
+// Trades the token for a session cookie. The token travels in a header and is kept nowhere.
+
+const form = document.querySelector('form');
+const input = document.querySelector('input');
+const button = document.querySelector('button');
+const message = document.querySelector('#message');
+
+const enter = () => location.replace('./');
+
+/** What went wrong, for a person; the bridge words its refusals itself. */
+const reasonOf = async (response) => {
+  const body = await response.json().catch(() => ({}));
+  return body.detail ?? `The bridge answered ${response.status}.`;
+};
+
+const signIn = async () => {
+  const token = input.value.trim();
+  if (!/^[\w.~+/-]+=*$/.test(token)) {
+    return 'A token holds letters, digits and -._~+/ only.';
+  }
+  const headers = { Authorization: `Bearer ${token}` };
+  const response = await fetch('api/signin', { headers, cache: 'no-store' });
+  if (response.ok) {
+    enter();
+    return '';
+  }
+  return response.status === 401 ? 'This is not the right token.' : reasonOf(response);
+};
+
+form.addEventListener('submit', (event) => {
+  event.preventDefault();
+  button.disabled = true;
+  message.textContent = '';
+  signIn()
+    .catch(() => 'The bridge does not answer.')
+    .then((text) => {
+      message.textContent = text;
+      button.disabled = false;
+      if (text) input.select();
+    });
+});
+
+// A link on another page led here although a session is open: a strict cookie stays home then.
+fetch('readyz', { method: 'HEAD', cache: 'no-store' })
+  .then((response) => {
+    if (response.status === 200 || response.status === 503) enter();
+  })
+  .catch(() => {}); // told when the person tries

@@ -65,9 +65,11 @@ def test_it_ends_with_its_parent_even_when_that_is_killed(domain: int) -> None:
     parent = [
         sys.executable,
         "-c",
-        "import subprocess, sys; "
-        "child = subprocess.Popen([sys.executable, '-m', 'lupin_patrol', '--end-with-parent']); "
-        "print('child', child.pid, flush=True); child.wait()",
+        (
+            "import subprocess, sys; "
+            "child = subprocess.Popen([sys.executable, '-m', 'lupin_patrol', '--end-with-parent']); "
+            "print('child', child.pid, flush=True); child.wait()"
+        ),
     ]
     with Process(parent, ros_env(domain)) as process:
         child = Path("/proc", process.wait_for_output("child").split()[1])

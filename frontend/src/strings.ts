@@ -88,6 +88,7 @@ export const S = {
   legendError: (error: string): string => `leave-one-out error ${error}`,
   legendErrorHint:
     'Each tag is guessed from the others; this is the root mean square of the misses.',
+  legendErrorWorst: (tag: string, error: string): string => `Worst at tag ${tag}: ${error}.`,
   legendTransparent:
     'Colour grows from the minimum to the maximum. No colour: the minimum, or not known; ' +
     'point at the map to tell.',

@@ -36,7 +36,8 @@ function run(...events: ConnectionEvent[]): { connection: Connection; commands: 
 const started: ConnectionEvent[] = [
   { type: 'start', now: 0 },
   { type: 'opened', now: 20 },
-  { type: 'frame', now: 25, status: status('live') },
+  { type: 'frame', now: 24, status: status('live') },
+  { type: 'frame', now: 25, status: null },
 ];
 const live = run(...started).connection;
 const closed = (now: number, code: number | null = 1006): ConnectionEvent => ({
@@ -51,20 +52,21 @@ describe('phases', () => {
     expect(phaseOf(INITIAL, 0)).toBe('connecting');
     expect(phaseOf(run(...started.slice(0, 1)).connection, 10)).toBe('connecting');
     expect(phaseOf(run(...started.slice(0, 2)).connection, 22)).toBe('connecting');
+    expect(phaseOf(run(...started.slice(0, 3)).connection, 24)).toBe('connecting');
     expect(phaseOf(live, 30)).toBe('live');
   });
 
   test('three seconds without a frame are stale, and a frame heals it', () => {
     expect(phaseOf(live, 25 + SILENCE_MS - 1)).toBe('live');
     expect(phaseOf(live, 25 + SILENCE_MS)).toBe('stale');
-    const again = step(live, { type: 'frame', now: 4_000 }).connection;
+    const again = step(live, { type: 'frame', now: 4_000, status: null }).connection;
     expect(phaseOf(again, 4_001)).toBe('live');
   });
 
   test('the bridge says that the twin is gone, and that it is back', () => {
     const gone = step(live, { type: 'frame', now: 100, status: status('offline') }).connection;
     expect(phaseOf(gone, 101)).toBe('offline');
-    const heartbeat = step(gone, { type: 'frame', now: 1_000 }).connection;
+    const heartbeat = step(gone, { type: 'frame', now: 1_000, status: null }).connection;
     expect(phaseOf(heartbeat, 1_001)).toBe('offline');
     const back = step(heartbeat, { type: 'frame', now: 2_000, status: status('live') }).connection;
     expect(phaseOf(back, 2_001)).toBe('live');
@@ -84,6 +86,18 @@ describe('phases', () => {
     expect(phaseOf(connection, 6)).toBe('reconnecting');
   });
 
+  test('after a reconnect the page is live with the first state, not before', () => {
+    const again = [
+      closed(100),
+      { type: 'wake', now: 110 } as const,
+      { type: 'opened', now: 120 } as const,
+      { type: 'frame', now: 121, status: status('live') } as const,
+    ].reduce((connection, event) => step(connection, event).connection, live);
+    expect(phaseOf(again, 122)).toBe('reconnecting');
+    const state = step(again, { type: 'frame', now: 123, status: null }).connection;
+    expect(phaseOf(state, 124)).toBe('live');
+  });
+
   test('an old word about the twin does not outlive its connection', () => {
     const { connection } = run(
       ...started,
@@ -91,7 +105,7 @@ describe('phases', () => {
       closed(40),
       { type: 'tick', now: 9_999, random: 0 },
       { type: 'opened', now: 10_000 },
-      { type: 'frame', now: 10_001 },
+      { type: 'frame', now: 10_001, status: null },
     );
     expect(phaseOf(connection, 10_002)).toBe('live');
   });
@@ -127,7 +141,7 @@ describe('attempts', () => {
     let { connection } = run({ type: 'start', now: 0 });
     for (let i = 0; i < 5; i++) {
       connection = step(connection, { type: 'opened', now: i }).connection;
-      connection = step(connection, { type: 'frame', now: i }).connection;
+      connection = step(connection, { type: 'frame', now: i, status: null }).connection;
       connection = step(connection, closed(i)).connection;
       connection = step(connection, { type: 'wake', now: i }).connection;
     }

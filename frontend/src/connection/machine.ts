@@ -20,7 +20,13 @@ export type Phase = 'connecting' | 'live' | 'stale' | 'offline' | 'reconnecting'
 export type Socket =
   | { readonly kind: 'closed'; readonly retryAt: number }
   | { readonly kind: 'opening'; readonly since: number }
-  | { readonly kind: 'open'; readonly since: number; readonly lastFrameAt: number | null };
+  | {
+      readonly kind: 'open';
+      readonly since: number;
+      readonly lastFrameAt: number | null;
+      /** A state came on this connection; what the page shows from before it is not live. */
+      readonly hasState: boolean;
+    };
 
 export interface Connection {
   readonly socket: Socket;
@@ -37,7 +43,8 @@ export interface Connection {
 export type ConnectionEvent =
   | { readonly type: 'start'; readonly now: number }
   | { readonly type: 'opened'; readonly now: number }
-  | { readonly type: 'frame'; readonly now: number; readonly status?: StatusFrame }
+  /** A status frame brings its status, a state frame none. */
+  | { readonly type: 'frame'; readonly now: number; readonly status: StatusFrame | null }
   | {
       readonly type: 'closed';
       readonly now: number;
@@ -76,14 +83,18 @@ export function step(connection: Connection, event: ConnectionEvent): Step {
         ...connection,
         epoch: connection.epoch + 1,
         status: null,
-        socket: { kind: 'open', since: now, lastFrameAt: null },
+        socket: { kind: 'open', since: now, lastFrameAt: null, hasState: false },
       });
     case 'frame':
       if (socket.kind !== 'open') return stay(connection);
       return stay({
         ...connection,
         status: event.status ?? connection.status,
-        socket: { ...socket, lastFrameAt: now },
+        socket: {
+          ...socket,
+          lastFrameAt: now,
+          hasState: socket.hasState || event.status === null,
+        },
       });
     case 'closed':
       if (socket.kind === 'closed') return stay(connection);
@@ -150,7 +161,8 @@ export function phaseOf(connection: Connection, now: number): Phase {
   const { socket, status } = connection;
   if (socket.kind === 'open' && socket.lastFrameAt !== null) {
     if (silence(socket, now) >= SILENCE_MS) return 'stale';
-    return status?.twin === 'offline' ? 'offline' : 'live';
+    if (status?.twin === 'offline') return 'offline';
+    if (socket.hasState) return 'live';
   }
   const first = connection.epoch <= (socket.kind === 'open' ? 1 : 0) && connection.failures === 0;
   return first ? 'connecting' : 'reconnecting';

@@ -55,9 +55,7 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
       const frame = typeof data === 'string' ? parseFrame(data) : null;
       if (!frame) return;
       const now = performance.now();
-      send(
-        frame.type === 'status' ? { type: 'frame', now, status: frame } : { type: 'frame', now },
-      );
+      send({ type: 'frame', now, status: frame.type === 'status' ? frame : null });
       handlers.onFrame(frame, connection);
     };
   };

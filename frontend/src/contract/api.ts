@@ -1,15 +1,7 @@
 /** The bridge's routes. Addresses are relative to the page, so any path prefix works. */
 import type { Field } from '../domain/field';
 import { parseNpy } from './npy';
-import type { OccupancyGrid, TagHistory } from './types';
-
-/** Leave-one-out error of a field: each tag guessed from the others. */
-export interface FieldQuality {
-  readonly sensor: string;
-  /** In the sensor's unit; null: too few tags to judge. */
-  readonly rmse: number | null;
-  readonly judgedCount: number;
-}
+import type { FieldQuality, OccupancyGrid, TagHistory } from './types';
 
 /** A refusal by the server, with its reason. */
 export class Refusal extends Error {
@@ -83,14 +75,10 @@ export async function fetchField(
   };
 }
 
-export async function fetchQuality(
-  sensor: string,
-  signal: AbortSignal,
-): Promise<FieldQuality | null> {
+export async function fetchQuality(sensor: string, signal: AbortSignal): Promise<FieldQuality> {
   const parts = new URLSearchParams({ sensor_type: sensor });
   const response = await get(`api/field/quality?${parts.toString()}`, signal);
-  const body = (await response.json()) as { rmse: number | null; judged_count: number };
-  return { sensor, rmse: body.rmse, judgedCount: body.judged_count };
+  return (await response.json()) as FieldQuality;
 }
 
 export async function fetchMap(signal: AbortSignal): Promise<OccupancyGrid> {

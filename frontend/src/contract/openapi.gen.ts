@@ -132,6 +132,26 @@ export interface paths {
         readonly patch?: never;
         readonly trace?: never;
     };
+    readonly "/api/field/quality": {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        /**
+         * How far off the field is, and how much of it is known
+         * @description The leave-one-out error of the current readings, and the share of cells painted.
+         */
+        readonly get: operations["field_quality_api_field_quality_get"];
+        readonly put?: never;
+        readonly post?: never;
+        readonly delete?: never;
+        readonly options?: never;
+        readonly head?: never;
+        readonly patch?: never;
+        readonly trace?: never;
+    };
     readonly "/api/map": {
         readonly parameters: {
             readonly query?: never;
@@ -192,6 +212,26 @@ export interface paths {
         readonly patch?: never;
         readonly trace?: never;
     };
+    readonly "/metrics": {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        /**
+         * Metrics for Prometheus
+         * @description Clients, frames, latencies, fields, and the ROS thread, in Prometheus' text format.
+         */
+        readonly get: operations["metrics_metrics_get"];
+        readonly put?: never;
+        readonly post?: never;
+        readonly delete?: never;
+        readonly options?: never;
+        readonly head?: never;
+        readonly patch?: never;
+        readonly trace?: never;
+    };
     readonly "/readyz": {
         readonly parameters: {
             readonly query?: never;
@@ -212,6 +252,26 @@ export interface paths {
         readonly patch?: never;
         readonly trace?: never;
     };
+    readonly "/api/signin": {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        /**
+         * Trade the token for a session cookie
+         * @description For browsers: programs send `Authorization: Bearer` with every request instead.
+         */
+        readonly get: operations["sign_in_api_signin_get"];
+        readonly put?: never;
+        readonly post?: never;
+        readonly delete?: never;
+        readonly options?: never;
+        readonly head?: never;
+        readonly patch?: never;
+        readonly trace?: never;
+    };
 }
 export type webhooks = Record<string, never>;
 export interface components {
@@ -223,6 +283,37 @@ export interface components {
         readonly ErrorMessage: {
             /** Detail */
             readonly detail: string;
+        };
+        /**
+         * FieldQuality
+         * @description What an honest map should also tell: its leave-one-out error and how much of it is known.
+         */
+        readonly FieldQuality: {
+            /** Sensor Type */
+            readonly sensor_type: string;
+            /** Unit */
+            readonly unit: string;
+            /**
+             * Sample Count
+             * @description tags that contribute: pinned, with a finite reading
+             */
+            readonly sample_count: number;
+            /**
+             * Judged Count
+             * @description of those, the ones with another in reach
+             */
+            readonly judged_count: number;
+            /**
+             * Rmse
+             * @description sensor's unit; null: no tag could be judged
+             */
+            readonly rmse: number | null;
+            readonly worst: components["schemas"]["TagError"] | null;
+            /**
+             * Painted Share
+             * @description cells that are known, 0 to 1
+             */
+            readonly painted_share: number;
         };
         /**
          * FlowerPoint
@@ -421,6 +512,23 @@ export interface components {
             readonly state_age_seconds: number | null;
         };
         /**
+         * TagError
+         * @description One tag's reading against what the other tags say of its place.
+         */
+        readonly TagError: {
+            /** Tag Id */
+            readonly tag_id: string;
+            /** Measured */
+            readonly measured: number;
+            /** Predicted */
+            readonly predicted: number;
+            /**
+             * Error
+             * @description predicted less measured, sensor's unit
+             */
+            readonly error: number;
+        };
+        /**
          * TagHistory
          * @description The last scans of one tag (as many as the twin's `buffer_len`).
          */
@@ -512,6 +620,38 @@ export interface components {
              */
             readonly revision: string;
             readonly state: components["schemas"]["TwinState"];
+        };
+        /**
+         * DeltaFrame
+         * @description WebSocket frame (`?delta=1`): what is not as in the frame numbered `base`.
+         *
+         *     A client that has `base` replaces the `changed` tags, appends those it did not know, in this
+         *     order, and drops the `removed` ones. A tag's age in an unchanged tag is `header.stamp` less its
+         *     `last_observed`. A client that skipped a frame gets a full `StateFrame` instead.
+         */
+        readonly DeltaFrame: {
+            /**
+             * Type
+             * @constant
+             */
+            readonly type: "delta";
+            /** Seq */
+            readonly seq: number;
+            /** Base */
+            readonly base: number;
+            /**
+             * Revision
+             * @description opaque; changes exactly when a field could
+             */
+            readonly revision: string;
+            readonly header: components["schemas"]["Header"];
+            /** Changed */
+            readonly changed: readonly components["schemas"]["TwinTagState"][];
+            /**
+             * Removed
+             * @description tag_ids; a restarted twin knows fewer tags
+             */
+            readonly removed: readonly string[];
         };
     };
     responses: never;
@@ -936,6 +1076,73 @@ export interface operations {
             };
         };
     };
+    readonly field_quality_api_field_quality_get: {
+        readonly parameters: {
+            readonly query: {
+                /** @description name of a sensor, as in a reading */
+                readonly sensor_type: string;
+                /** @description m, side of a square cell; greater than 0 */
+                readonly resolution?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_min_x?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_min_y?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_max_x?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_max_y?: number;
+            };
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        readonly requestBody?: never;
+        readonly responses: {
+            /** @description Successful Response */
+            readonly 200: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["FieldQuality"];
+                };
+            };
+            /** @description the ETag still holds */
+            readonly 304: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description refused; error_message says why */
+            readonly 400: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["GetFieldResponse"];
+                };
+            };
+            /** @description the twin is not there */
+            readonly 503: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description the twin did not answer in time */
+            readonly 504: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+        };
+    };
     readonly occupancy_map_api_map_get: {
         readonly parameters: {
             readonly query?: never;
@@ -1055,6 +1262,26 @@ export interface operations {
             };
         };
     };
+    readonly metrics_metrics_get: {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        readonly requestBody?: never;
+        readonly responses: {
+            /** @description Successful Response */
+            readonly 200: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "text/plain": string;
+                };
+            };
+        };
+    };
     readonly readyz_readyz_get: {
         readonly parameters: {
             readonly query?: never;
@@ -1080,6 +1307,51 @@ export interface operations {
                 };
                 content: {
                     readonly "application/json": components["schemas"]["StatusFrame"];
+                };
+            };
+        };
+    };
+    readonly sign_in_api_signin_get: {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        readonly requestBody?: never;
+        readonly responses: {
+            /** @description Set-Cookie carries the session */
+            readonly 204: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description no Authorization: Bearer, or a wrong */
+            readonly 401: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description this bridge asks for no token */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description too many wrong tokens */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
                 };
             };
         };

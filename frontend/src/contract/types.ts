@@ -8,6 +8,7 @@ export type StatusFrame = Schemas['StatusFrame'];
 export type Frame = StateFrame | StatusFrame;
 export type TwinTagState = Schemas['TwinTagState'];
 export type OccupancyGrid = Schemas['OccupancyGrid'];
+export type FieldQuality = Schemas['FieldQuality'];
 export type TagHistory = Schemas['TagHistory'];
 export type WirePoint = Schemas['Point'];
 export type WireTime = Schemas['Time'];

@@ -1,5 +1,6 @@
 /** Fetches what the frames do not carry, whenever the twin's revision says that it changed. */
-import { fetchField, fetchQuality, Refusal, type FieldQuality } from '../contract/api';
+import { fetchField, fetchQuality, Refusal } from '../contract/api';
+import type { FieldQuality } from '../contract/types';
 import { resolutionFor, type Field } from '../domain/field';
 import type { Snapshot } from '../domain/twin';
 import { boundsOf } from '../geometry/coordinates';

@@ -36,11 +36,11 @@ test('a frame that only moves the clock is no reason to render', () => {
   const open = [
     { type: 'start', now: 0 } as const,
     { type: 'opened', now: 1 } as const,
-    { type: 'frame', now: 2 } as const,
+    { type: 'frame', now: 2, status: null } as const,
   ].reduce((connection, event) => step(connection, event).connection, INITIAL);
   const live = reduceTwin(NO_TWIN, { type: 'connection', connection: open, now: 3 });
   expect(live.phase).toBe('live');
-  const heard = step(open, { type: 'frame', now: 100 }).connection;
+  const heard = step(open, { type: 'frame', now: 100, status: null }).connection;
   expect(reduceTwin(live, { type: 'connection', connection: heard, now: 101 })).toBe(live);
   const silent = reduceTwin(live, { type: 'connection', connection: heard, now: 9_000 });
   expect(silent.phase).toBe('stale');

@@ -1,6 +1,5 @@
 /** What came from the server: the connection, the greenhouse, and what is fetched about it. */
-import type { FieldQuality } from '../contract/api';
-import type { StateFrame, StatusFrame } from '../contract/types';
+import type { FieldQuality, StateFrame, StatusFrame } from '../contract/types';
 import { INITIAL, phaseOf, type Connection, type Phase } from '../connection/machine';
 import type { Field } from '../domain/field';
 import { snapshotOf, type Snapshot } from '../domain/twin';

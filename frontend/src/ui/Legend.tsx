@@ -1,5 +1,6 @@
 import { useMemo, type CSSProperties, type JSX } from 'react';
 
+import type { FieldQuality } from '../contract/types';
 import { numberText, readingText, valueText } from '../domain/format';
 import { fraction, rgbText, sensorColour, type Range } from '../domain/ramp';
 import { RAMP, sensorNamed, type Sensor } from '../domain/sensors';
@@ -20,7 +21,6 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
   const quality = useApp((state) => state.twin.quality);
   const sensor = sensorNamed(name);
   const samples = field?.sensor === name ? field.sampleCount : 0;
-  const rmse = quality?.sensor === name ? quality.rmse : null;
   return (
     <section className="legend" aria-label={S.legend} data-testid="legend">
       <div className="legend-scale">
@@ -33,18 +33,36 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
         <span data-testid="sample-count">
           {samples > 0 ? S.legendTags(samples) : S.legendNoTags}
         </span>
-        {rmse !== null && (
-          <span title={S.legendErrorHint} data-testid="rmse">
-            {S.legendError(
-              `±${numberText(differenceToShown(sensor, rmse, unit))}\u00a0${unitOf(sensor, unit)}`,
-            )}
-          </span>
-        )}
+        {quality?.sensor_type === name && <Quality quality={quality} sensor={sensor} unit={unit} />}
         <span className="legend-note">{S.legendTransparent}</span>
       </div>
       <Keys />
       {!kiosk && <RangeControl sensor={sensor} range={range} />}
     </section>
+  );
+}
+
+/** How far off the field is where a tag could be guessed from the others. */
+function Quality({
+  quality,
+  sensor,
+  unit,
+}: {
+  quality: FieldQuality;
+  sensor: Sensor;
+  unit: TemperatureUnit;
+}): JSX.Element | null {
+  const { rmse, worst } = quality;
+  if (rmse === null) return null;
+  const error = (value: number): string =>
+    `±${numberText(differenceToShown(sensor, Math.abs(value), unit))}\u00a0${unitOf(sensor, unit)}`;
+  const atWorst = worst
+    ? ` ${S.legendErrorWorst(shown(worst.tag_id, 24), error(worst.error))}`
+    : '';
+  return (
+    <span title={S.legendErrorHint + atWorst} data-testid="rmse">
+      {S.legendError(error(rmse))}
+    </span>
   );
 }
 

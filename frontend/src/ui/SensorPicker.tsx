@@ -1,4 +1,4 @@
-import type { JSX } from 'react';
+import { useEffect, useRef, type JSX } from 'react';
 
 import { rgbText, sensorColour } from '../domain/ramp';
 import { shown } from '../domain/text';
@@ -13,24 +13,33 @@ export function SensorPicker(): JSX.Element {
   const sensors = useApp(selectSensors);
   const sensor = useApp((state) => state.view.sensor);
   const unit = useApp((state) => state.settings.unit);
+  const root = useRef<HTMLDivElement>(null);
+  // On a phone the chosen one may be out of sight: by a link, or by its key.
+  useEffect(() => {
+    root.current
+      ?.querySelector('input:checked')
+      ?.parentElement?.scrollIntoView({ block: 'nearest', inline: 'nearest' });
+  }, [sensor]);
   return (
-    <Segmented
-      legend={S.sensors}
-      className="sensors"
-      value={sensor}
-      options={sensors.map((each) => ({
-        value: each.name,
-        label: (
-          <>
-            <span className="swatch" style={{ background: rgbText(sensorColour(each)) }} />
-            <span className="sensor-label">{shown(each.label, 32)}</span>
-            <span className="sensor-unit">{unitOf(each, unit)}</span>
-          </>
-        ),
-      }))}
-      onChange={(name) => {
-        act({ type: 'sensor', sensor: name });
-      }}
-    />
+    <div className="sensor-picker" ref={root}>
+      <Segmented
+        legend={S.sensors}
+        className="sensors"
+        value={sensor}
+        options={sensors.map((each) => ({
+          value: each.name,
+          label: (
+            <>
+              <span className="swatch" style={{ background: rgbText(sensorColour(each)) }} />
+              <span className="sensor-label">{shown(each.label, 32)}</span>
+              <span className="sensor-unit">{unitOf(each, unit)}</span>
+            </>
+          ),
+        }))}
+        onChange={(name) => {
+          act({ type: 'sensor', sensor: name });
+        }}
+      />
+    </div>
   );
 }

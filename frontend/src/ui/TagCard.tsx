@@ -112,35 +112,35 @@ function CardBody({
         <div>
           <dt>{S.columns.species}</dt>
           <dd>
-          {tag.species ? <bdi>{shown(tag.species, 40)}</bdi> : S.unclassified}
-          {tag.species && tag.speciesConfidence !== null && (
-            <span className="faint"> {S.confidence(percentText(tag.speciesConfidence))}</span>
-          )}
-        </dd>
+            {tag.species ? <bdi>{shown(tag.species, 40)}</bdi> : S.unclassified}
+            {tag.species && tag.speciesConfidence !== null && (
+              <span className="faint"> {S.confidence(percentText(tag.speciesConfidence))}</span>
+            )}
+          </dd>
         </div>
         <div>
-        <dt>{S.cardBlooms}</dt>
-        <dd>{tag.flowerCount}</dd>
+          <dt>{S.cardBlooms}</dt>
+          <dd>{tag.flowerCount}</dd>
         </div>
         <div>
-        <dt>{S.cardPosition}</dt>
-        <dd>
-          {at ? (
-            <button
-              type="button"
-              className="text-button"
-              title={S.cardShow}
-              onClick={() => {
-                act({ type: 'pane', pane: 'map' });
-                commandMap({ type: 'show', tagId: tag.id });
-              }}
-            >
-              {S.position(metresText(at.x), metresText(at.y))}
-            </button>
-          ) : (
-            <span>{S.notOnMapLong}</span>
-          )}
-        </dd>
+          <dt>{S.cardPosition}</dt>
+          <dd>
+            {at ? (
+              <button
+                type="button"
+                className="text-button"
+                title={S.cardShow}
+                onClick={() => {
+                  act({ type: 'pane', pane: 'map' });
+                  commandMap({ type: 'show', tagId: tag.id });
+                }}
+              >
+                {S.position(metresText(at.x), metresText(at.y))}
+              </button>
+            ) : (
+              <span>{S.notOnMapLong}</span>
+            )}
+          </dd>
         </div>
       </dl>
     </div>

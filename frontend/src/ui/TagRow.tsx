@@ -82,6 +82,7 @@ export const TagRow = memo(function TagRow({
           <Reading sensor={sensor} value={tag.readings.get(sensor.name)} unit={unit} />
         </td>
       ))}
+      <td className="cell-pest">{tag.anomaly && <PestMark count={tag.bugCount} />}</td>
       <td className="cell-species">
         {tag.species ? (
           <>
@@ -96,7 +97,6 @@ export const TagRow = memo(function TagRow({
           <span className="faint">{S.noSensor}</span>
         )}
       </td>
-      <td className="cell-pest">{tag.anomaly && <PestMark count={tag.bugCount} />}</td>
       <td className="number optional">{tag.flowerCount > 0 ? tag.flowerCount : ''}</td>
     </tr>
   );

@@ -47,8 +47,8 @@ export function TagTable(): JSX.Element {
               chosen={sensor.name === chosen}
             />
           ))}
-          <ColumnHead id="species">{S.columns.species}</ColumnHead>
           <ColumnHead id="pest">{S.columns.pest}</ColumnHead>
+          <ColumnHead id="species">{S.columns.species}</ColumnHead>
           <ColumnHead id="flowers" className="number optional">
             {S.columns.flowers}
           </ColumnHead>

@@ -67,7 +67,8 @@ def test_it_ends_with_its_parent_even_when_that_is_killed(domain: int) -> None:
         "-c",
         (
             "import subprocess, sys; "
-            "child = subprocess.Popen([sys.executable, '-m', 'lupin_patrol', '--end-with-parent']); "
+            "patrol = [sys.executable, '-m', 'lupin_patrol', '--end-with-parent']; "
+            "child = subprocess.Popen(patrol); "
             "print('child', child.pid, flush=True); child.wait()"
         ),
     ]

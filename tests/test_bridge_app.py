@@ -31,7 +31,7 @@ def ask(static_folder: Path, method: str, path: str) -> httpx.Response:
 
     async def request() -> httpx.Response:
         transport = httpx.ASGITransport(create_app(None, static_folder))
-        async with httpx.AsyncClient(transport=transport, base_url="http://twin") as client:
+        async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
             return await client.request(method, path)
 
     return asyncio.run(request())

@@ -69,7 +69,9 @@ def create_app(
 _DESCRIPTION = """
 Read-only: every route answers GET and HEAD alone. Positions are metres in the map frame, values
 are in the sensor's unit, what is not known is null. `/ws/state` is a WebSocket that sends
-`StateFrame` and `StatusFrame` as JSON text: the current ones at once, then every change.
+`StateFrame` and `StatusFrame` as JSON text: the current ones at once, then every change. A bridge
+with a token (`LUPIN_TOKEN`) wants it as `Authorization: Bearer` with every request, `/healthz`
+excepted; a browser signs in at `/signin`.
 """
 
 

@@ -9,7 +9,6 @@ from typing import Final
 
 from fastapi import APIRouter, Request, Response
 
-from lupin_bridge import schema
 from lupin_bridge.access_middleware import Access
 from lupin_bridge.credentials import SESSION_S
 from lupin_bridge.http_tools import NEVER_KEEP, REVALIDATE, error_response, read_route
@@ -20,20 +19,12 @@ router = APIRouter()
 _FOLDER: Final = Path(__file__).parent / "signin"
 
 
-@read_route(
-    router,
-    "/api/signin",
-    summary="Trade the token for a session cookie",
-    responses={
-        204: {"description": "Set-Cookie carries the session"},
-        401: {"model": schema.ErrorMessage, "description": "no Authorization: Bearer, or a wrong"},
-        404: {"model": schema.ErrorMessage, "description": "this bridge asks for no token"},
-        429: {"model": schema.ErrorMessage, "description": "too many wrong tokens"},
-    },
-    status_code=204,
-)
+@read_route(router, "/api/signin", include_in_schema=False)
 async def sign_in(request: Request) -> Response:
-    """For browsers: programs send `Authorization: Bearer` with every request instead."""
+    """Trade the token, which `AccessControl` has looked at, for a session cookie.
+
+    For the page below: programs send `Authorization: Bearer` with every request instead.
+    """
     access = _access_of(request)
     if access.credentials is None:
         return error_response("this bridge asks for no token: there is nothing to sign in to", 404)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -11,6 +12,7 @@ import httpx
 from websockets.sync.client import ClientConnection, connect
 
 from tests.support.domains import own_domain
+from tests.support.messages import look
 from tests.support.processes import Process, lupin_twin, url_of
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
@@ -61,6 +63,14 @@ class Listener:
         found = wait_for(look, f"a {kind} frame as expected", meanwhile=lambda: None)
         assert found is not None
         return found
+
+    def until_text(self, text: str) -> None:
+        """Read on past the first frame that holds a text; frames are not decoded."""
+        wait_for(
+            lambda: text in str(self.connection.recv(timeout=PATIENCE_S)),
+            f"a frame with {text}",
+            meanwhile=lambda: None,
+        )
 
     def until_tag(self, tag_id: str) -> Frame:
         """Read on to the first state frame that has the tag, and return that frame."""
@@ -122,3 +132,36 @@ def bridge(*options: str, domain: int | None = None, **env: str) -> Iterator[Bri
         httpx.Client(base_url=url_of(process), timeout=PATIENCE_S, trust_env=False) as http,
     ):
         yield Bridge(process, str(http.base_url).rstrip("/"), peer, http)
+
+
+# --- clients that do not read -------------------------------------------------------------------
+
+_UPGRADE = (
+    b"GET /ws/state HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n"
+)
+
+
+@contextmanager
+def deaf_client(url: str) -> Iterator[socket.socket]:
+    """A WebSocket client that asks for frames and reads none, with little room for them."""
+    host, port = url.removeprefix("http://").split(":")
+    with socket.socket() as client:
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        client.settimeout(PATIENCE_S)
+        client.connect((host, int(port)))
+        client.sendall(_UPGRADE)
+        yield client
+
+
+def overfill(running: Bridge, reader: Listener) -> None:
+    """Let the twin send states until no socket can hold those that a deaf client leaves unread.
+
+    A socket takes 4 MB (Linux's tcp_wmem); these are eight states of 0.3 MB to 2.5 MB, 10 MB in
+    all. Returns when `reader` has the last one.
+    """
+    message = look("", blooms=[(i, i) for i in range(2_000)])
+    for number in range(8):
+        message.flower.tag_id = f"fat {number}"
+        running.peer.observe(message)
+        reader.until_text(f'"tag_id":"fat {number}"')

@@ -26,6 +26,11 @@ log = logging.getLogger(__name__)
 WATCH_PERIOD_S = 0.2
 
 
+# A heartbeat this soon after a frame is spared. With one heartbeat a second, two frames are never
+# farther apart than 1.8 s; a browser calls 3 s silence.
+HEARTBEAT_SPARED_S = 0.8
+
+
 class Bridge:
     """Everything between a source and its listeners. Belongs to the event loop."""
 
@@ -45,6 +50,8 @@ class Bridge:
         self._liveness = Liveness()
         self._latest: Revised | None = None
         self._told: Status | None = None
+        self._pushed: Revised | None = None
+        self._pushed_s = 0.0
         self._next_push_s = 0.0
         self._push_timer: asyncio.TimerHandle | None = None
         self._watch: asyncio.Task[None] | None = None
@@ -131,11 +138,26 @@ class Bridge:
         self._liveness.twin_count = self.source.twin_count()
         if self._push_timer is not None:
             return  # it will take this state along
+        if self._is_old_news(state, now_s):
+            return
         if now_s >= self._next_push_s:
             self._push()
         else:
             loop = asyncio.get_running_loop()
             self._push_timer = loop.call_later(self._next_push_s - now_s, self._push)
+
+    def _is_old_news(self, state: Revised, now_s: float) -> bool:
+        """Whether this is a mere heartbeat, and a frame has just gone out.
+
+        It would tell nobody anything, and a change right behind it would have to wait for its turn.
+        """
+        pushed = self._pushed
+        return (
+            pushed is not None
+            and now_s < self._pushed_s + HEARTBEAT_SPARED_S
+            and state.revision == pushed.revision
+            and state.snapshot.tags == pushed.snapshot.tags
+        )
 
     def _push(self) -> None:
         self._push_timer = None
@@ -143,7 +165,11 @@ class Bridge:
         if state is None:
             return
         now_s = time.monotonic()
-        self._next_push_s = now_s + 1.0 / self.settings.max_rate_hz
+        self._pushed, self._pushed_s = state, now_s
+        # A beat, not a distance from this frame on: after one late change all that follow, as often as
+        # frames may go out, would have to wait as long as that one was late.
+        interval_s = 1.0 / self.settings.max_rate_hz
+        self._next_push_s = max(self._next_push_s, now_s - interval_s) + interval_s
         self._tell_status()
         self.hub.publish(self.frames.state(state.snapshot, state.revision), now_s)
         self.metrics.push_seconds.observe(time.monotonic() - state.made_s)

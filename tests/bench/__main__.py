@@ -1,0 +1,21 @@
+"""`make bench`: every benchmark in turn; ratios side by side, nothing asserted."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+# In the order of the way through the system: field, truth, bridge, page.
+BENCHES = ("bench_field", "bench_truth", "bench_bridge", "bench_page")
+
+
+def main() -> int:
+    """Run the benchmarks named on the command line, or all."""
+    for name in sys.argv[1:] or BENCHES:
+        print(f"\n=== {name}", flush=True)
+        importlib.import_module(f"tests.bench.{name}").main()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

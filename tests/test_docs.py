@@ -1,0 +1,98 @@
+"""What the README has to name: every option, parameter, topic, route, metric and command."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from lupin_bridge.app import create_app
+from lupin_bridge.cli import ROLES
+from lupin_bridge.settings import Settings, option
+from lupin_patrol import cli as patrol_cli
+from lupin_twin.parameters import TwinParameters
+
+ROOT = Path(__file__).resolve().parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def rows(title: str) -> dict[str, list[str]]:
+    """The tables below a heading: first cell, without its backticks, to the other cells."""
+    section = README.split(f"\n## {title}\n", 1)[1].split("\n## ", 1)[0]
+    lines = [line for line in section.splitlines() if line.startswith("| `")]
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    return {key: rest for first, *rest in cells for key in re.findall(r"`([^`]+)`", first)}
+
+
+def test_every_parameter_is_named_with_its_default() -> None:
+    documented = rows("Parameters of the twin")
+    documented.pop("use_sim_time")
+    assert {name: cells[0].strip("`") for name, cells in documented.items()} == {
+        spec.name: str(spec.default).lower()
+        if isinstance(spec.default, bool)
+        else str(spec.default)
+        for spec in fields(TwinParameters)
+    }
+
+
+def test_every_setting_is_named_with_its_default() -> None:
+    documented = {name: cells[0] for name, cells in rows("Settings of the bridge").items()}
+    expected = {
+        option(spec.name): "" if spec.default in ((), "") else str(spec.default)
+        for spec in fields(Settings)
+    }
+    assert documented == expected
+
+
+def test_every_route_is_named_and_none_that_is_not_there() -> None:
+    documented = set(rows("Ask it over HTTP and WebSocket"))
+    served = {"/", "/ws/state", "/rosbridge", "/signin", "/docs", "/openapi.json"}
+    served |= set(create_app(None).openapi()["paths"])
+    assert documented == served
+
+
+def test_every_topic_is_named_with_its_qos() -> None:
+    documented = rows("Ask it over ROS")
+    parameters = TwinParameters()
+    for topic, depth in (
+        (parameters.observations_topic, 50),
+        (parameters.discovered_tags_topic, 50),
+        (parameters.map_topic, 1),
+        (parameters.state_topic, 1),
+    ):
+        assert f"reliable, transient local, depth {depth}" in str(rows_by_name(topic))
+    assert parameters.field_service_name in README
+    assert documented == {}  # topics stand in the second column
+
+
+def rows_by_name(name: str) -> list[str]:
+    return [line for line in README.splitlines() if line.startswith("|") and f"`{name}`" in line]
+
+
+def test_every_role_and_patrol_option_is_named() -> None:
+    for role in ROLES:
+        assert f"`lupin-twin {role}`" in README
+    source = Path(patrol_cli.__file__).read_text(encoding="utf-8")
+    for name in set(re.findall(r'add_argument\(\s*"(--[a-z-]+)"', source)):
+        assert f"`{name}" in README
+
+
+def test_every_make_target_that_the_readme_names_is_there_and_the_two_that_matter_are_named() -> (
+    None
+):
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    named = set(re.findall(r"make ([a-z-]+)", README))
+    assert {"run", "test", "bench", "bench-live"} <= named
+    assert named <= targets
+
+
+@pytest.mark.parametrize("page", ["README.md", "backend/SECURITY.md"])
+def test_every_file_that_a_page_names_is_there(page: str) -> None:
+    text = (ROOT / page).read_text(encoding="utf-8")
+    links = re.findall(r"\]\(([^)#:]+)\)", text)
+    paths = re.findall(r"`((?:backend|frontend|ros_node|tests)/[^`]*)`", text)
+    for name in [*links, *paths]:
+        base = ROOT if name in paths else (ROOT / page).parent
+        assert (base / name).exists(), name

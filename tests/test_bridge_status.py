@@ -45,5 +45,16 @@ def test_every_status_has_a_frame_of_the_contract(reason: Reason, age_s: float |
     frame = schema.StatusFrame.model_validate(Status(reason, age_s).frame())
     assert (frame.twin == "live") == (reason == "live")
     assert frame.reason == reason
+    assert frame.has_map is False
     assert frame.message
     assert frame.state_age_seconds == (None if age_s is None else 1.235)
+
+
+def test_the_first_map_is_news_for_a_page_and_not_for_a_person() -> None:
+    liveness = Liveness(last_state_s=0.0)
+    before = liveness.status(0.0)
+    liveness.has_map = True
+    status = liveness.status(0.1)
+    assert status.is_news_after(before)
+    assert not status.says_more_than(before)
+    assert schema.StatusFrame.model_validate(status.frame()).has_map is True

@@ -136,6 +136,7 @@ class Bridge:
         now_s = time.monotonic()
         self._liveness.last_state_s = now_s
         self._liveness.twin_count = self.source.twin_count()
+        self._liveness.has_map = self.source.occupancy_map() is not None
         if self._push_timer is not None:
             return  # it will take this state along
         if self._is_old_news(state, now_s):
@@ -185,7 +186,8 @@ class Bridge:
         if not status.is_news_after(self._told):
             return
         is_good = status.is_live and status.twin_count <= 1
-        if self._told is not None or not is_good:
+        first = self._told is None
+        if (first and not is_good) or (self._told and status.says_more_than(self._told)):
             log.log(logging.INFO if is_good else logging.WARNING, "%s", status.message)
         self._told = status
         self.hub.announce(status, time.monotonic())

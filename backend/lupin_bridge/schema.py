@@ -144,6 +144,7 @@ class StatusFrame(Contract):
     state_age_seconds: float | None = Field(
         description="s since the bridge got its last state, by its own clock; null: never"
     )
+    has_map: bool = Field(description="false: /api/map answers 404, no map has come yet")
 
 
 class GetFieldResponse(Contract):

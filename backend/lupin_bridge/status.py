@@ -27,12 +27,14 @@ _MESSAGES: dict[Reason, str] = {
 class Status:
     """`reason` says why the twin counts as live or offline; `state_age_s` is None: never.
 
-    `twin_count` is how many nodes publish the state topic; more than one is a mistake.
+    `twin_count` is how many nodes publish the state topic; more than one is a mistake. `has_map`
+    spares a browser requests whose 404 it would show as an error.
     """
 
     reason: Reason
     state_age_s: float | None
     twin_count: int = 1
+    has_map: bool = False
 
     @property
     def is_live(self) -> bool:
@@ -51,7 +53,13 @@ class Status:
 
     def is_news_after(self, before: Status | None) -> bool:
         """Whether clients have to be told, who were told `before`."""
-        return before is None or (before.reason, before.message) != (self.reason, self.message)
+        return (
+            before is None or self.says_more_than(before) or before.has_map is not self.has_map
+        )
+
+    def says_more_than(self, before: Status) -> bool:
+        """Whether a person has to be told, who was told `before`."""
+        return (before.reason, before.message) != (self.reason, self.message)
 
     def frame(self) -> dict[str, Any]:
         """`schema.StatusFrame`."""
@@ -61,6 +69,7 @@ class Status:
             "reason": self.reason,
             "message": self.message,
             "state_age_seconds": None if self.state_age_s is None else round(self.state_age_s, 3),
+            "has_map": self.has_map,
         }
 
 
@@ -71,13 +80,14 @@ class Liveness:
     stale_after_s: float = STALE_AFTER_S
     last_state_s: float | None = None
     twin_count: int = 1
+    has_map: bool = False
     thread_dead: bool = False
     shutting_down: bool = False
 
     def status(self, now_s: float) -> Status:
         """The status at `now_s`."""
         age = None if self.last_state_s is None else max(0.0, now_s - self.last_state_s)
-        return Status(self._reason(age), age, self.twin_count)
+        return Status(self._reason(age), age, self.twin_count, self.has_map)
 
     def _reason(self, age_s: float | None) -> Reason:
         if self.shutting_down:

@@ -55,11 +55,13 @@ def value_at(
 ) -> float:
     """Rules 2 to 5 of the definition at one point."""
     point_x, point_y = point
+    distances = []
     nearest_distance = math.inf
     nearest_value = math.nan
     for x, y, value in samples:
         dx, dy = x - point_x, y - point_y
         distance = math.sqrt(dx * dx + dy * dy)
+        distances.append(distance)
         if distance < nearest_distance:
             nearest_distance = distance
             nearest_value = value
@@ -69,9 +71,7 @@ def value_at(
         return nearest_value
     weighted_sum = 0.0
     weight_sum = 0.0
-    for x, y, value in samples:
-        dx, dy = x - point_x, y - point_y
-        distance = math.sqrt(dx * dx + dy * dy)
+    for distance, (_, _, value) in zip(distances, samples, strict=True):
         if distance <= falloff_radius_m:
             # 1/dᵖ times a constant of the cell: the quotient is the same, and it cannot overflow.
             weight = (nearest_distance / distance) ** power

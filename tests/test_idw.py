@@ -309,11 +309,13 @@ def test_unexplored_cells_are_nan_whatever_lies_there() -> None:
     assert grid.values[0] == 1.0
 
 
-def test_gate_lets_through_at_its_distance_and_not_beyond() -> None:
-    assert field_at_origin([(0.9, 1.2, 7.0)], max_distance_m=1.5) == 7.0
-    assert field_at_origin([(1.5, 0.0, 7.0)], max_distance_m=1.5) == 7.0
-    beyond = math.nextafter(1.5, 2.0)
-    assert math.isnan(field_at_origin([(beyond, 0.0, 7.0)], max_distance_m=1.5))
+@pytest.mark.parametrize("power", [2.0, 3.0])
+@pytest.mark.parametrize("falloff", [0.5, 1.5, 3.0])
+def test_gate_lets_through_at_its_distance_and_not_beyond(falloff: float, power: float) -> None:
+    rules = {"falloff_radius_m": falloff, "max_distance_m": 1.5, "power": power}
+    assert field_at_origin([(0.9, 1.2, 7.0)], **rules) == 7.0
+    assert field_at_origin([(1.5, 0.0, 7.0)], **rules) == 7.0
+    assert math.isnan(field_at_origin([(math.nextafter(1.5, 2.0), 0.0, 7.0)], **rules))
 
 
 @pytest.mark.parametrize("power", [2.0, 3.0])

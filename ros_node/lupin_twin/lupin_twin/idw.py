@@ -18,10 +18,10 @@ The definition (Shepard, "A two-dimensional interpolation function for irregular
 
 A distance is the float64 `sqrt(dx * dx + dy * dy)`; of equally near samples the first one counts.
 
-How it is computed: the grid is halved, again and again, and each part keeps only the samples that
-reach it, until the cell-sample pairs of a part fit the processor's cache; there the definition is
-evaluated for all pairs at once. A part that nothing reaches is dropped on the way, so the cost
-follows the painted cells, and memory beyond the grid itself is bounded by one part's pairs.
+How it is computed: the grid is split into parts, and those again, and each part keeps only the
+samples that reach it, until its pairs of a cell and a sample fit the processor's cache; there the
+definition is evaluated for all pairs at once. A part that nothing reaches is dropped on the way.
+So the cost follows the painted cells, and memory beyond the grid's own is that of one part.
 """
 
 from __future__ import annotations
@@ -39,13 +39,15 @@ import numpy.typing as npt
 
 COINCIDENT_EPS_M: Final = 1e-3
 
-# Pairs of a part are evaluated at once up to here: two float64 arrays of this size stay in the
-# second-level cache, and the numpy calls on them cost several times their own overhead.
+# So many pairs of a part are evaluated at once: two float64 arrays of that size stay in the
+# second-level cache, and numpy's work on them is several times the cost of calling it. A grid of
+# fewer cells takes parts as small, so that memory stays in proportion to it.
 _MAX_PAIRS: Final = 40_960
 _MIN_PAIRS: Final = 2_048
-# With fewer points than this to a sample, numpy's loops are all overhead; only where more than a
-# thousand samples reach one part does it take memory past _MAX_PAIRS.
+# With fewer points than this to a sample, numpy's loops are all overhead. It takes memory past
+# _MAX_PAIRS only where more than a thousand samples reach one part.
 _MIN_POINTS: Final = 32
+# A part is split into so many pieces along a side at most; it bounds what a split itself takes.
 _MAX_PIECES: Final = 8
 
 # 1/d² is used as it is up to here; past it (and for any power but 2) the weights are scaled by
@@ -445,6 +447,7 @@ class _Painter:
         self.values = values
 
     def paint(self) -> None:
+        """Fill `values`, part by part."""
         height, width = self.values.shape
         whole = _Part(0, height, 0, width, np.arange(self.value.size))
         parts = list(self._split(whole, 1, 1)) if self.value.size else []
@@ -466,10 +469,8 @@ class _Painter:
         down, across = (2, 1) if part.rows > part.columns else (1, 2)
         for pieces in range(2, _MAX_PIECES + 1):
             rows, columns = part.rows / down, part.columns / across
-            if (
-                density * (rows + around) * (columns + around) * rows * columns
-                <= self.idw.max_pairs
-            ):
+            reaching = density * (rows + around) * (columns + around)
+            if reaching * rows * columns <= self.idw.max_pairs:
                 break
             side = max(part.rows, part.columns) / pieces
             down = min(part.rows, math.ceil(part.rows / side))

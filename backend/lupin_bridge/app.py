@@ -12,6 +12,7 @@ from lupin_bridge import (
     routes_field,
     routes_health,
     routes_map,
+    routes_rosbridge,
     routes_signin,
     routes_state,
     schema,
@@ -47,6 +48,7 @@ def create_app(
     app.state.access = access
     for module in (
         routes_state,
+        routes_rosbridge,
         routes_field,
         routes_map,
         routes_health,

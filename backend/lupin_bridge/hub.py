@@ -129,8 +129,8 @@ class Hub:
                 return
             client.status_due = False
         if not client.wants_state:
-            if client.connection.can_take:
-                client.blocked_since_s = None
+            if not client.connection.can_take:
+                self._mark_blocked(client, now_s)
             return
         frame = self._frame
         if frame is None or frame.seq == client.sent_seq or now_s < client.next_due_s:
@@ -143,11 +143,11 @@ class Hub:
                 self.frames_skipped += frame.seq - client.sent_seq - 1
             self.frames_sent += 1
             client.sent_seq = frame.seq
-            # By the client's own beat, not from this frame on: frames come a little early or late.
-            beat_s = max(client.next_due_s, now_s - client.min_interval_s)
-            client.next_due_s = client.min_interval_s + (
-                now_s if client.strict_interval else beat_s
-            )
+            beat_s = now_s
+            if not client.strict_interval:
+                # The client's own beat, not from this frame on: frames come a little early or late.
+                beat_s = max(client.next_due_s, now_s - client.min_interval_s)
+            client.next_due_s = beat_s + client.min_interval_s
 
     def dismiss_stuck(self, now_s: float) -> int:
         """Close every client that has not taken a frame for too long; returns how many."""

@@ -25,7 +25,7 @@ def test_json_is_one_object_a_line_with_the_error(capsys: pytest.CaptureFixture[
     first, second = (json.loads(line) for line in capsys.readouterr().err.splitlines())
     assert first["message"] == "tag 7°\nsecond line"
     assert (first["level"], first["logger"]) == ("info", "lupin_bridge.test")
-    assert first["time"].endswith("Z")
+    assert first["time"].endswith("+00:00")
     assert "error" not in first
     assert second["error"].endswith("ValueError: broken")
 

@@ -167,8 +167,8 @@ class Bridge:
             return
         now_s = time.monotonic()
         self._pushed, self._pushed_s = state, now_s
-        # A beat, not a distance from this frame on: after one late change all that follow, as often as
-        # frames may go out, would have to wait as long as that one was late.
+        # A beat, not a distance from this frame on: or after one late change all that follow would
+        # be as late.
         interval_s = 1.0 / self.settings.max_rate_hz
         self._next_push_s = max(self._next_push_s, now_s - interval_s) + interval_s
         self._tell_status()
@@ -185,7 +185,7 @@ class Bridge:
         status = self.status
         if not status.is_news_after(self._told):
             return
-        is_good = status.is_live and status.twin_count <= 1
+        is_good = (status.is_live and status.twin_count <= 1) or status.reason == "shutting_down"
         first = self._told is None
         if (first and not is_good) or (self._told and status.says_more_than(self._told)):
             log.log(logging.INFO if is_good else logging.WARNING, "%s", status.message)

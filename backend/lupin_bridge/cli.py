@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any, NoReturn
 
+from lupin_bridge import logs
 from lupin_bridge.access import exposure
 from lupin_bridge.access_middleware import Access
 from lupin_bridge.app import create_app
@@ -44,6 +45,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SettingError as error:
         _fail(str(error))
     _prepare_process()
+    logs.set_up(settings.log_format)
     try:
         return asyncio.run(_run(options.role, settings, access, ros_args))
     except ParameterError as error:
@@ -137,13 +139,6 @@ def _prepare_process() -> None:
     # rcl wants a place for its logs; without a home directory it would refuse to start.
     if "ROS_LOG_DIR" not in os.environ and not os.environ.get("HOME"):
         os.environ["ROS_LOG_DIR"] = tempfile.mkdtemp(prefix="lupin-twin-log-")
-    logging.basicConfig(
-        level=logging.INFO,
-        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
-        stream=sys.stderr,
-    )
-    # Its news (started, waiting, connection open) are ours to tell, once.
-    logging.getLogger("uvicorn").setLevel(logging.WARNING)
 
 
 def _warn_of_exposure(listener: socket.socket, access: Access) -> None:

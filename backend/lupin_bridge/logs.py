@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import sys
-import time
+from datetime import UTC, datetime
 from typing import Final
 
 TEXT: Final = "text"
@@ -16,12 +16,10 @@ FORMATS: Final = (TEXT, JSON)
 class JsonFormatter(logging.Formatter):
     """One JSON object a record: time (UTC), level, logger, message, and the error if any."""
 
-    converter = time.gmtime
-
     def format(self, record: logging.LogRecord) -> str:
         """The record as one line."""
         fields = {
-            "time": f"{self.formatTime(record, '%Y-%m-%dT%H:%M:%S')}.{int(record.msecs):03d}Z",
+            "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
             "level": record.levelname.lower(),
             "logger": record.name,
             "message": record.getMessage(),

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from lupin_bridge.access import OriginError, parse_origin
+from lupin_bridge.logs import FORMATS, TEXT
 
 
 class SettingError(ValueError):
@@ -52,6 +53,7 @@ class Settings:
         "as https://panel.example; may be given more than once",
     )
     tls_cert: str = _setting("", "PEM file with the certificate chain: serve https and wss")
+    log_format: str = _setting(TEXT, f"{' or '.join(FORMATS)}: lines for people or for a collector")
     tls_key: str = _setting("", "PEM file with the certificate's private key, not encrypted")
 
     def __post_init__(self) -> None:
@@ -62,6 +64,10 @@ class Settings:
                 raise SettingError(
                     f"{option(spec.name)} is {value}, must be from {low:g} to {high:g}"
                 )
+        if self.log_format not in FORMATS:
+            raise SettingError(
+                f"--log-format is {self.log_format!r}, must be {' or '.join(FORMATS)}"
+            )
         if not self.host:
             raise SettingError("--host is empty, must be an address")
         for origin in self.allow_origin:

@@ -139,6 +139,7 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._on_state(snapshot)
 
     def _take_map(self, msg: Any) -> None:
+        # Kept, and told with the next state: a map is no sign of life of the twin.
         frame_id, expected = msg.header.frame_id, self.parameters.frame_id
         if frame_id not in ("", expected):
             self._say(
@@ -151,8 +152,6 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         except ValueError as error:
             self._say(("map", 0), f"dropped a map: {error}; the last one stays")
             return
-        if self._newest is not None:
-            self._on_state(self._newest)
 
     # --- small parts --------------------------------------------------------------------------
 

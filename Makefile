@@ -102,5 +102,8 @@ unit: setup $(DONE)/chromium ## Python tests, real ROS and real browser included
 bench: setup $(DONE)/chromium ## measure: ratios side by side, nothing asserted
 	@$(TEST_ENV) $(BIN)/python -m tests.bench
 
+bench-live: setup ## the live bridge with up to 5,000 clients, in five minutes
+	@$(TEST_ENV) $(BIN)/python -m tests.bench.bench_live $(ARGS)
+
 clean: ## remove everything that set-up and builds have made
 	rm -rf $(VENV) $(DONE) node_modules backend/lupin_bridge/static

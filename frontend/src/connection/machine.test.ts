@@ -20,6 +20,7 @@ const status = (twin: StatusFrame['twin']): StatusFrame => ({
   reason: twin === 'live' ? 'live' : 'stale',
   message: '',
   state_age_seconds: 0,
+  has_map: true,
 });
 
 /** Runs events one after another. */

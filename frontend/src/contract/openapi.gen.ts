@@ -252,26 +252,6 @@ export interface paths {
         readonly patch?: never;
         readonly trace?: never;
     };
-    readonly "/api/signin": {
-        readonly parameters: {
-            readonly query?: never;
-            readonly header?: never;
-            readonly path?: never;
-            readonly cookie?: never;
-        };
-        /**
-         * Trade the token for a session cookie
-         * @description For browsers: programs send `Authorization: Bearer` with every request instead.
-         */
-        readonly get: operations["sign_in_api_signin_get"];
-        readonly put?: never;
-        readonly post?: never;
-        readonly delete?: never;
-        readonly options?: never;
-        readonly head?: never;
-        readonly patch?: never;
-        readonly trace?: never;
-    };
 }
 export type webhooks = Record<string, never>;
 export interface components {
@@ -510,6 +490,11 @@ export interface components {
              * @description s since the bridge got its last state, by its own clock; null: never
              */
             readonly state_age_seconds: number | null;
+            /**
+             * Has Map
+             * @description false: /api/map answers 404, no map has come yet
+             */
+            readonly has_map: boolean;
         };
         /**
          * TagError
@@ -849,7 +834,16 @@ export interface operations {
                     readonly "application/json": components["schemas"]["ErrorMessage"];
                 };
             };
-            /** @description the twin is not there */
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["GetFieldResponse"];
+                };
+            };
+            /** @description the twin is not there, or busy */
             readonly 503: {
                 headers: {
                     readonly [name: string]: unknown;
@@ -918,7 +912,16 @@ export interface operations {
                     readonly "application/json": components["schemas"]["GetFieldResponse"];
                 };
             };
-            /** @description the twin is not there */
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["GetFieldResponse"];
+                };
+            };
+            /** @description the twin is not there, or busy */
             readonly 503: {
                 headers: {
                     readonly [name: string]: unknown;
@@ -987,7 +990,16 @@ export interface operations {
                     readonly "application/json": components["schemas"]["GetFieldResponse"];
                 };
             };
-            /** @description the twin is not there */
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["GetFieldResponse"];
+                };
+            };
+            /** @description the twin is not there, or busy */
             readonly 503: {
                 headers: {
                     readonly [name: string]: unknown;
@@ -1056,7 +1068,16 @@ export interface operations {
                     readonly "application/json": components["schemas"]["GetFieldResponse"];
                 };
             };
-            /** @description the twin is not there */
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["GetFieldResponse"];
+                };
+            };
+            /** @description the twin is not there, or busy */
             readonly 503: {
                 headers: {
                     readonly [name: string]: unknown;
@@ -1123,7 +1144,16 @@ export interface operations {
                     readonly "application/json": components["schemas"]["GetFieldResponse"];
                 };
             };
-            /** @description the twin is not there */
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["GetFieldResponse"];
+                };
+            };
+            /** @description the twin is not there, or busy */
             readonly 503: {
                 headers: {
                     readonly [name: string]: unknown;
@@ -1307,51 +1337,6 @@ export interface operations {
                 };
                 content: {
                     readonly "application/json": components["schemas"]["StatusFrame"];
-                };
-            };
-        };
-    };
-    readonly sign_in_api_signin_get: {
-        readonly parameters: {
-            readonly query?: never;
-            readonly header?: never;
-            readonly path?: never;
-            readonly cookie?: never;
-        };
-        readonly requestBody?: never;
-        readonly responses: {
-            /** @description Set-Cookie carries the session */
-            readonly 204: {
-                headers: {
-                    readonly [name: string]: unknown;
-                };
-                content?: never;
-            };
-            /** @description no Authorization: Bearer, or a wrong */
-            readonly 401: {
-                headers: {
-                    readonly [name: string]: unknown;
-                };
-                content: {
-                    readonly "application/json": components["schemas"]["ErrorMessage"];
-                };
-            };
-            /** @description this bridge asks for no token */
-            readonly 404: {
-                headers: {
-                    readonly [name: string]: unknown;
-                };
-                content: {
-                    readonly "application/json": components["schemas"]["ErrorMessage"];
-                };
-            };
-            /** @description too many wrong tokens */
-            readonly 429: {
-                headers: {
-                    readonly [name: string]: unknown;
-                };
-                content: {
-                    readonly "application/json": components["schemas"]["ErrorMessage"];
                 };
             };
         };

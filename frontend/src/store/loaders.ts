@@ -55,16 +55,20 @@ export function startLoaders(): () => void {
     const state = store.get();
     if (seen?.twin === state.twin && seen.view.sensor === state.view.sensor) return;
     seen = state;
-    const base = baseKey(state);
-    if (base === null) return;
+    const { epoch, status } = state.twin.connection;
     const { sensor } = state.view;
-    if (state.twin.field.value && state.twin.field.value.sensor !== sensor) {
+    const base = baseKey(state);
+    const wanted = base === null ? null : fieldTask(base, sensor, state.twin.snapshot);
+    // What the page does not show any more goes at once: a restarted twin begins empty.
+    const { value } = state.twin.field;
+    if (value && (value.sensor !== sensor || (base !== null && !wanted))) {
       receive({ type: 'field', field: NOTHING });
       receive({ type: 'quality', quality: null });
     }
-    field.want(fieldTask(base, sensor, state.twin.snapshot));
-    map.want({ key: base, group: 'map', run: loadMap });
-    const { epoch } = state.twin.connection;
+    if (base === null) return;
+    field.want(wanted);
+    if (state.twin.map.value && !status?.has_map) receive({ type: 'map', map: NOTHING });
+    map.want(status?.has_map ? { key: base, group: 'map', run: loadMap } : null);
     quality.want(
       epoch === missingSince
         ? null
@@ -85,11 +89,12 @@ export function startLoaders(): () => void {
   return store.subscribe(update);
 }
 
-/** Changes with the revision, and with each connection: another server may sit behind it. */
-function baseKey({ twin }: AppState): string | null {
-  return twin.snapshot && twin.connection.epoch > 0
-    ? `${twin.connection.epoch}|${twin.snapshot.revision}`
-    : null;
+/**
+ * Changes with the revision, and with each connection: another server may sit behind it. Null
+ * until the bridge has said on this connection what there is to ask for.
+ */
+function baseKey({ twin: { snapshot, connection } }: AppState): string | null {
+  return snapshot && connection.status ? `${connection.epoch}|${snapshot.revision}` : null;
 }
 
 function fieldTask(base: string, sensor: string, snapshot: Snapshot | null): Task<Field> | null {

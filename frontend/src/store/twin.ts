@@ -78,4 +78,7 @@ function sameToTheEye(a: Connection, b: Connection): boolean {
 }
 
 const sameStatus = (a: StatusFrame | null, b: StatusFrame | null): boolean =>
-  a?.twin === b?.twin && a?.reason === b?.reason && a?.message === b?.message;
+  a?.twin === b?.twin &&
+  a?.reason === b?.reason &&
+  a?.message === b?.message &&
+  a?.has_map === b?.has_map;

@@ -43,7 +43,7 @@ export function noticeFor({ twin, view }: AppState): Notice | null {
   if (twin.field.state === 'failed') {
     return { id: 'field-failed', title: S.fieldFailed(shown(twin.field.message, 160)) };
   }
-  if (!twin.map.value && twin.map.state === 'failed') {
+  if (!twin.map.value && (!connection.status?.has_map || twin.map.state === 'failed')) {
     return { id: 'no-map', title: S.emptyNoMap };
   }
   return null;

@@ -7,6 +7,8 @@ import type { TagHistory } from '../contract/types';
 export function useHistory(tagId: string, observation: string | undefined): TagHistory | null {
   const [history, setHistory] = useState<TagHistory | null>(null);
   useEffect(() => {
+    // A tag that a link names and the twin does not know.
+    if (observation === undefined) return undefined;
     const abort = new AbortController();
     fetchHistory(tagId, abort.signal).then(setHistory, () => {
       // The card does without: history is an extra, and the next observation asks again.

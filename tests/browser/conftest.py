@@ -1,0 +1,51 @@
+"""Chromium for the browser tests, and pages of the HMI in it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, expect, sync_playwright
+
+from tests.browser.hmi import Hmi, open_hmi
+from tests.support.waiting import PATIENCE_S
+
+CHROMIUM = os.environ.get("CHROMIUM", "/usr/bin/chromium")
+# No GPU anywhere, and no word to anybody outside.
+CHROMIUM_ARGS = (
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+
+
+# Not by session: Playwright keeps an event loop running in this thread, and other tests of the
+# same worker call asyncio.run().
+@pytest.fixture(scope="package")
+def browser() -> Iterator[Browser]:
+    """A headless Chromium with an empty profile."""
+    expect.set_options(timeout=PATIENCE_S * 1000)
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(
+            executable_path=CHROMIUM, args=list(CHROMIUM_ARGS), headless=True
+        )
+        with chromium:
+            yield chromium
+
+
+@pytest.fixture
+def open_page(browser: Browser) -> Iterator[Callable[..., Hmi]]:
+    """`open_page(url, fragment, query, **options)` is `open_hmi` until the end of the test."""
+    with ExitStack() as pages:
+
+        def open_one(url: str, fragment: str = "", query: str = "", **options: Any) -> Hmi:
+            return pages.enter_context(open_hmi(browser, url, fragment, query, **options))
+
+        yield open_one

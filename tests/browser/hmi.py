@@ -1,0 +1,262 @@
+"""The HMI as an operator uses it, and as a surveyor of pixels looks at it."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+from urllib.parse import urlsplit
+
+from PIL import Image, ImageChops
+from playwright.sync_api import Browser, Locator, Page, WebSocket, expect
+
+from tests.support.waiting import PATIENCE_S, wait_for
+
+Pixel = tuple[int, int, int]
+
+WIDE: Final = {"width": 1440, "height": 900}
+PHONE: Final = {"width": 360, "height": 740}
+AXE: Final = Path(__file__).parents[2] / "node_modules/axe-core/axe.min.js"
+
+
+@dataclass(frozen=True)
+class View:
+    """Where the map lies: its origin at (x, y) pixels of the map view, `scale` pixels a metre."""
+
+    x: float
+    y: float
+    scale: float
+
+    def pixel(self, x: float, y: float) -> tuple[int, int]:
+        """The pixel of the map view that holds a point of the map frame, m."""
+        return int(self.x + x * self.scale), int(self.y - y * self.scale)
+
+
+@dataclass
+class Hmi:
+    """A page of the HMI, with all that it did beside what is to be seen."""
+
+    page: Page
+    url: str
+    # Regular expressions of what the console may say: a server that is killed is no secret.
+    allowed_noise: list[str] = field(default_factory=list)
+    console: list[str] = field(default_factory=list)
+    dialogs: list[str] = field(default_factory=list)
+    requests: list[str] = field(default_factory=list)
+    # All that came over its WebSockets, parsed.
+    frames: list[dict[str, Any]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        def on_console(message: Any) -> None:
+            if message.type in ("error", "warning"):
+                self.console.append(f"{message.type}: {message.text} {message.location['url']}")
+
+        def on_dialog(dialog: Any) -> None:
+            self.dialogs.append(dialog.message)
+            dialog.dismiss()
+
+        def on_websocket(socket: WebSocket) -> None:
+            self.requests.append(socket.url)
+            socket.on("framereceived", lambda text: self.frames.append(json.loads(text)))
+
+        self.page.on("console", on_console)
+        self.page.on("pageerror", lambda error: self.console.append(f"uncaught: {error}"))
+        self.page.on("dialog", on_dialog)
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.on("websocket", on_websocket)
+
+    # --- going there ------------------------------------------------------------------------
+
+    def go(self, fragment: str = "", query: str = "") -> None:
+        """Load the page anew; a permalink's fragment goes without its `#`."""
+        if self.page.url.partition("#")[0] == f"{self.url}/{query}":
+            self.page.goto("about:blank")  # else only the fragment changes, and nothing is loaded
+        self.page.goto(f"{self.url}/{query}{'#' if fragment else ''}{fragment}")
+
+    def allow_noise(self, pattern: str) -> None:
+        """Let the console say something that matches, from now on and before."""
+        self.allowed_noise.append(pattern)
+
+    def check_manners(self) -> None:
+        """Hold the page to a silent console, no dialog, and no request to another origin."""
+        noise = [
+            line for line in self.console if not any(re.search(p, line) for p in self.allowed_noise)
+        ]
+        assert noise == []
+        assert self.dialogs == []
+        own = urlsplit(self.url).netloc
+        assert [
+            url
+            for url in self.requests
+            if urlsplit(url).netloc != own and not url.startswith(("blob:", "data:", "about:"))
+        ] == []
+
+    # --- what it says -----------------------------------------------------------------------
+
+    @property
+    def app(self) -> Locator:
+        return self.page.get_by_test_id("app")
+
+    def expect_phase(self, phase: str, timeout_s: float = PATIENCE_S) -> None:
+        """Wait until the page says that its connection is in that phase."""
+        expect(self.app).to_have_attribute("data-connection-state", phase, timeout=timeout_s * 1000)
+
+    def expect(self, look: Callable[[], bool], what: str) -> None:
+        """Wait until something holds that no locator can tell."""
+        wait_for(look, what)
+
+    def test_id(self, name: str) -> Locator:
+        return self.page.get_by_test_id(name)
+
+    def row(self, tag_id: str) -> Locator:
+        """A tag's row of the table."""
+        return self.page.locator(f"tr[data-tag-id={json.dumps(tag_id)}]")
+
+    def cell(self, tag_id: str, sensor: str) -> Locator:
+        return self.row(tag_id).locator(f"td[data-sensor={json.dumps(sensor)}]")
+
+    def card(self, tag_id: str) -> Locator:
+        return self.page.locator(f"[data-testid=tag-card][data-tag-id={json.dumps(tag_id)}]")
+
+    def rows(self) -> list[str]:
+        """The ids in the table, from the top."""
+        ids = self.page.locator("tbody tr[data-tag-id]").evaluate_all(
+            "rows => rows.map(row => row.dataset.tagId)"
+        )
+        assert isinstance(ids, list)
+        return ids
+
+    def expect_rows(self, *tag_ids: str) -> None:
+        """Wait until the table lists exactly these, in this order."""
+        wait_for(lambda: self.rows() == list(tag_ids), f"the rows {tag_ids}")
+
+    def expect_samples(self, count: int) -> None:
+        """Wait for a field that so many tags contribute to."""
+        expect(self.test_id("sample-count")).to_have_text(re.compile(rf"^{count} tags? contribut"))
+
+    def choose_sensor(self, label: str) -> None:
+        self.page.locator(".sensors label", has_text=label).click()
+
+    # --- the map, pixel by pixel ------------------------------------------------------------
+
+    @property
+    def map(self) -> Locator:
+        return self.page.get_by_test_id("map")
+
+    def view(self) -> View:
+        text = self.page.get_by_test_id("map-canvas").get_attribute("data-view") or ""
+        return View(*(float(part) for part in text.split(",")))
+
+    def picture(self) -> Image.Image:
+        """The map view as it is on the screen, buttons and all; one pixel a CSS pixel."""
+        return Image.open(io.BytesIO(self.map.screenshot())).convert("RGB")
+
+    def settled_picture(self) -> Image.Image:
+        """The map view once it stays the same: all that is on its way has been drawn."""
+        pictures = [self.picture()]
+
+        def look() -> bool:
+            pictures.append(self.picture())
+            return len(pictures) > 3 and all(p == pictures[-1] for p in pictures[-3:])
+
+        wait_for(look, "a picture that stays the same")
+        return pictures[-1]
+
+    def expect_change(self, before: Image.Image) -> Box:
+        """Wait until the map view looks otherwise; returns the box of what is not the same."""
+        box = wait_for(lambda: changed_box(before, self.picture()), "a change of the map")
+        assert box is not None
+        return box
+
+    def expect_picture(self, wanted: Image.Image) -> None:
+        """Wait until the map view looks exactly like that."""
+        wait_for(lambda: changed_box(wanted, self.picture()) is None, "that very picture")
+
+    def pixels(self, points: Sequence[tuple[float, float]]) -> list[Pixel]:
+        """Colours on the screen at points of the map frame, m."""
+        picture, view = self.picture(), self.view()
+        return [_rgb(picture, *view.pixel(x, y)) for x, y in points]
+
+    def pixel(self, x: float, y: float) -> Pixel:
+        """The colour on the screen at a point of the map frame, m."""
+        return self.pixels([(x, y)])[0]
+
+    def expect_pixels(
+        self, wanted: Callable[[Pixel], bool], *points: tuple[float, float], what: str
+    ) -> None:
+        """Wait until all points of the map frame look as wanted."""
+        wait_for(
+            lambda: all(wanted(pixel) for pixel in self.pixels(points)),
+            f"{what} at {points}",
+        )
+
+    def click_map(self, x: float, y: float) -> None:
+        """Click on a point of the map frame, m."""
+        left, top = self.view().pixel(x, y)
+        self.map.click(position={"x": left, "y": top})
+
+    def point_at(self, x: float, y: float) -> None:
+        """Move the mouse to a point of the map frame, m."""
+        left, top = self.view().pixel(x, y)
+        self.map.hover(position={"x": left, "y": top})
+
+    # --- the keyboard -----------------------------------------------------------------------
+
+    def tab_to(self, target: Locator, key: str = "Tab", most: int = 80) -> None:
+        """Reach an element with the Tab key alone."""
+        for _ in range(most):
+            if target.evaluate("element => element === document.activeElement"):
+                return
+            self.page.keyboard.press(key)
+        raise AssertionError(f"{target} was not reached with {most} times {key}")
+
+
+class Box(NamedTuple):
+    """An upright box of pixels, right and bottom exclusive."""
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+
+
+def changed_box(before: Image.Image, now: Image.Image) -> Box | None:
+    """The box of all pixels that differ; None where none does."""
+    box = ImageChops.difference(before, now).getbbox()
+    return box and Box(*box)
+
+
+def _rgb(picture: Image.Image, x: int, y: int) -> Pixel:
+    pixel = picture.getpixel((x, y))
+    assert isinstance(pixel, tuple)
+    return int(pixel[0]), int(pixel[1]), int(pixel[2])
+
+
+@contextmanager
+def open_hmi(
+    browser: Browser,
+    url: str,
+    fragment: str = "",
+    query: str = "",
+    *,
+    go: bool = True,
+    **context: Any,
+) -> Iterator[Hmi]:
+    """A page in a browser context of its own; its manners are checked at the end.
+
+    `context` are options of `Browser.new_context`; `go=False` leaves the page blank.
+    """
+    options = {"viewport": WIDE, "color_scheme": "light", "reduced_motion": "reduce", **context}
+    with browser.new_context(**options) as own:
+        page = own.new_page()
+        page.set_default_timeout(PATIENCE_S * 1000)
+        hmi = Hmi(page, url)
+        if go:
+            hmi.go(fragment, query)
+        yield hmi
+        hmi.check_manners()

@@ -1,0 +1,141 @@
+"""What the page shows as the greenhouse comes to be known: at once, in full, and honestly."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+
+import pytest
+from lupin_msgs.msg import Observation
+from playwright.sync_api import expect
+
+from tests.browser.hmi import Hmi
+from tests.support.domains import own_domain
+from tests.support.messages import discovered, look, occupancy_grid, pose, scan
+from tests.support.web import Bridge, bridge
+
+SILENT = ("--ros-args", "-p", "state_publish_rate_hz:=0.01")
+
+OpenPage = Callable[..., Hmi]
+
+
+@pytest.fixture(scope="module")
+def shared() -> Iterator[Bridge]:
+    """One bridge for many tests, each with tags of its own."""
+    with own_domain() as domain, bridge(domain=domain) as running:
+        running.peer.publish_map(occupancy_grid([[0] * 8] * 8))
+        running.peer.observe(scan("first", {"temperature": 20.0}, at=(1, 1)))
+        running.tag("first")
+        yield running
+
+
+def test_a_late_page_shows_every_tag_at_once_while_the_twin_is_silent(
+    domain: int, open_page: OpenPage
+) -> None:
+    ids = [str(i) for i in range(29)]
+    with bridge(*SILENT, domain=domain) as running:
+        running.peer.publish_map(occupancy_grid([[0] * 8] * 8))
+        running.peer.observe(
+            *(scan(i, {"temperature": 15.0 + int(i)}, at=(int(i) % 7, int(i) // 7)) for i in ids)
+        )
+        running.tag("28")
+        hmi = open_page(running.url)
+        hmi.expect_rows(*ids)
+        expect(hmi.cell("28", "temperature")).to_contain_text("43.0")
+        hmi.expect_phase("live")
+        hmi.expect_samples(29)
+    # All of it was in the first state, which the page did not have to wait for.
+    assert [frame["type"] for frame in hmi.frames[:2]] == ["status", "state"]
+    assert [tag["tag_id"] for tag in hmi.frames[1]["state"]["tags"]] == ids
+
+
+def test_the_page_says_what_is_missing_until_it_comes(domain: int, open_page: OpenPage) -> None:
+    with bridge(domain=domain) as running:
+        hmi = open_page(running.url)
+        notice = hmi.test_id("notice")
+        expect(notice).to_have_attribute("data-notice", "no-tags")
+        expect(notice).to_contain_text("lupin-twin demo")
+        hmi.expect_phase("live")
+        expect(hmi.test_id("row-count")).to_have_text("0 tags")
+
+        running.peer.observe(scan("a", {"co2": 500.0}))
+        expect(notice).to_have_attribute("data-notice", "no-pins")
+
+        running.peer.discover(discovered({"a": pose(1, 1)}))
+        expect(notice).to_have_attribute("data-notice", "no-reading")
+        expect(notice).to_contain_text("Temperature")
+
+        running.peer.observe(scan("a", {"temperature": 20.0}))
+        expect(notice).to_have_attribute("data-notice", "no-map")
+
+        running.peer.publish_map(occupancy_grid([[0] * 4] * 4))
+        expect(notice).to_have_count(0)
+
+
+def test_a_tag_without_a_pose_is_only_in_the_table(shared: Bridge, open_page: OpenPage) -> None:
+    shared.peer.observe(scan("lost", {"temperature": 24.0}))
+    hmi = open_page(shared.url)
+    row = hmi.row("lost")
+    expect(row).to_contain_text("No pin")
+    expect(row).to_have_attribute("data-pinned", "false")
+    expect(hmi.cell("lost", "temperature")).to_have_text("24.0")
+    row.get_by_role("button").click()
+    expect(hmi.card("lost")).to_contain_text("No position known yet")
+
+
+def test_a_failed_scan_is_listed_and_says_so_until_it_succeeds(
+    shared: Bridge, open_page: OpenPage
+) -> None:
+    hmi = open_page(shared.url)
+    failed = Observation.STATUS_SCAN_FAILED
+    shared.peer.observe(scan("tried", at=(2, 2), status=failed))
+    row = hmi.row("tried")
+    expect(row).to_have_attribute("data-pinned", "false")
+    expect(row).to_have_attribute("data-health", "no-data")
+    expect(row.locator(".cell-age")).to_contain_text(re.compile(r"\d+\ss"))
+    shared.peer.observe(scan("tried", {"temperature": 21.0}, at=(2, 2)))
+    expect(row).to_have_attribute("data-pinned", "true")
+    expect(hmi.cell("tried", "temperature")).to_have_text("21.0")
+
+
+def test_a_discovered_tag_has_a_pin_and_was_never_observed(
+    shared: Bridge, open_page: OpenPage
+) -> None:
+    shared.peer.discover(discovered({"seen": pose(3, 3)}))
+    hmi = open_page(shared.url)
+    expect(hmi.row("seen")).to_have_attribute("data-pinned", "true")
+    expect(hmi.row("seen").locator(".cell-age")).to_have_text("never")
+
+
+def test_a_sensor_that_gives_no_number_is_told_apart_from_one_that_is_not_there(
+    shared: Bridge, open_page: OpenPage
+) -> None:
+    shared.peer.observe(scan("broken", {"temperature": float("nan")}, at=(4, 2)))
+    hmi = open_page(shared.url)
+    expect(hmi.cell("broken", "temperature")).to_have_text("failed")
+    expect(hmi.cell("broken", "humidity")).to_contain_text("no such sensor")
+
+
+def test_a_pest_appears_on_map_and_table_and_a_clean_look_clears_it(
+    shared: Bridge, open_page: OpenPage
+) -> None:
+    shared.peer.observe(scan("crop", {"temperature": 20.0}, at=(6, 6)))
+    hmi = open_page(shared.url, "view=6,6,4&layers=pins")
+    expect(hmi.row("crop")).to_have_attribute("data-pest", "false")
+    before = hmi.settled_picture()
+
+    shared.peer.observe(look("crop", "lupin", at=(6, 6), anomaly=True, bug_count=3))
+    expect(hmi.row("crop")).to_have_attribute("data-pest", "true")
+    expect(hmi.row("crop").locator(".cell-pest")).to_contain_text("Pest3 bugs")
+    ring = hmi.expect_change(before)
+    # A ring about the pin, with a sign that reaches beyond it.
+    x, y = hmi.view().pixel(6, 6)
+    assert ring.left < x - 14
+    assert ring.right > x + 14
+    assert ring.top < y - 14
+    assert ring.bottom > y + 14
+
+    shared.peer.observe(look("crop", "lupin", at=(6, 6), anomaly=False))
+    expect(hmi.row("crop")).to_have_attribute("data-pest", "false")
+    expect(hmi.row("crop").locator(".cell-pest")).to_have_text("")
+    hmi.expect_picture(before)

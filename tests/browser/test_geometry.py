@@ -1,0 +1,267 @@
+"""Where things lie, by pixel: the field upright, pins on their cells, the map turned by its yaw."""
+
+from __future__ import annotations
+
+import colorsys
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from geometry_msgs.msg import Point, Pose, Quaternion
+from playwright.sync_api import expect
+
+from lupin_bridge import sensors
+from tests.browser.hmi import Hmi, Pixel
+from tests.support.messages import look, occupancy_grid, scan
+from tests.support.web import Bridge, bridge
+
+OpenPage = Callable[..., Hmi]
+
+SENSORS: Any = json.loads((Path(sensors.__file__).parent / "sensors.json").read_text())
+
+
+# What the light theme makes of occupied, free and unknown cells.
+WALL, FLOOR, GROUND = (84, 94, 88), (253, 253, 252), (232, 235, 231)
+
+
+def colour_of(sensor: str) -> Pixel:
+    """A sensor's colour, worked out here once more from its declaration."""
+    declared = SENSORS["sensors"][sensor]
+    parts = colorsys.hls_to_rgb(
+        declared["hue"] / 360, declared["lightness"] / 100, SENSORS["ramp"]["saturation"] / 100
+    )
+    red, green, blue = (round(255 * part) for part in parts)
+    return red, green, blue
+
+
+def over(base: Pixel, sensor: str, share: float) -> Pixel:
+    """The heat map's colour for that share of the range, upon a base."""
+    alpha = SENSORS["ramp"]["max_alpha"] * share
+    mixed = (round(b + alpha * (c - b)) for b, c in zip(base, colour_of(sensor), strict=True))
+    red, green, blue = mixed
+    return red, green, blue
+
+
+def close(a: Pixel, b: Pixel, most: int = 3) -> bool:
+    return max(abs(x - y) for x, y in zip(a, b, strict=True)) <= most
+
+
+def floor(width: int, height: int, origin: Any = None, resolution: float = 1.0) -> Any:
+    """A map of free floor."""
+    return occupancy_grid([[0] * width] * height, resolution=resolution, origin=origin)
+
+
+HOT = (4.0, 3.0)
+COLD = ((0.0, 0.0), (4.0, 0.0), (0.0, 3.0))
+
+
+def hot_corner(running: Bridge) -> None:
+    """Four tags too far apart to mix: three cold ones, and a hot one at large x and large y."""
+    running.peer.publish_map(
+        occupancy_grid([[0] * 8] * 7, origin=Pose(position=Point(x=-2.0, y=-2.0)))
+    )
+    for index, at in enumerate(COLD):
+        running.peer.observe(scan(f"cold{index}", {"temperature": 10.0}, at=at))
+    running.peer.observe(scan("hot", {"temperature": 30.0}, at=HOT))
+
+
+VIEW = "view=2,1.5,7"
+
+
+def test_the_heat_map_is_the_right_way_up(domain: int, open_page: OpenPage) -> None:
+    with bridge(domain=domain) as running:
+        hot_corner(running)
+        running.tag("hot")
+        hmi = open_page(running.url, f"{VIEW}&layers=map,field")
+        hmi.expect_samples(4)
+        beside_hot = (HOT[0] + 0.5, HOT[1] + 0.5)
+        beside_cold = [(x + 0.5, y + 0.5) for x, y in COLD]
+        [ground] = hmi.pixels([(2.0, -1.9)])  # on the floor, beyond the field
+        hmi.expect_pixels(
+            lambda pixel: close(pixel, over(ground, "temperature", 1.0)), beside_hot, what="heat"
+        )
+        # Transparent at the minimum.
+        assert hmi.pixels(beside_cold) == [ground] * 3
+
+
+def test_a_cell_that_is_not_known_shows_the_map_below_it(domain: int, open_page: OpenPage) -> None:
+    with bridge(domain=domain) as running:
+        hot_corner(running)
+        # A wall through the middle, farther than 1.5 m from every tag.
+        rows = [[0] * 8 for _ in range(7)]
+        rows[3][4] = 100
+        running.peer.publish_map(occupancy_grid(rows, origin=Pose(position=Point(x=-2.0, y=-2.0))))
+        running.tag("hot")
+        # The range begins far below every value, so that even the minimum has a colour, and so
+        # would a zero in a cell's place.
+        hmi = open_page(running.url, f"{VIEW}&layers=map,field&range=-30,30")
+        hmi.expect_samples(4)
+        wall, free, corner = (2.5, 1.5), (2.5, 0.5), (-1.4, -1.4)
+        known = [(0.5, 0.5), (4.5, 3.5), (0.5, 3.5), (4.5, 0.5)]
+        shares = [40 / 60, 1.0, 40 / 60, 40 / 60]
+        hmi.expect_pixels(lambda pixel: pixel != hmi.pixel(2.5, 0.5), known[1], what="a field")
+        with_field = hmi.settled_picture()
+        view = hmi.view()
+        hmi.go(f"{VIEW}&layers=map&range=-30,30")
+        expect(hmi.row("hot")).to_be_visible()
+        hmi.expect_pixels(lambda pixel: close(pixel, WALL), wall, what="the wall")
+        bare = hmi.settled_picture()
+        assert hmi.view() == view
+        for point in (wall, free, corner):
+            at = view.pixel(*point)
+            assert with_field.getpixel(at) == bare.getpixel(at)
+        for point, share in zip(known, shares, strict=True):
+            at = view.pixel(*point)
+            assert close(rgb(with_field, at), over(rgb(bare, at), "temperature", share))
+
+
+def rgb(picture: Any, at: tuple[int, int]) -> Pixel:
+    red, green, blue = picture.getpixel(at)
+    return red, green, blue
+
+
+def test_the_field_ends_on_the_cells_where_the_server_says(
+    domain: int, open_page: OpenPage
+) -> None:
+    with bridge(domain=domain) as running:
+        running.peer.publish_map(floor(6, 6))
+        running.peer.observe(scan("a", {"co2": 900.0}, at=(3.1, 2.3)))
+        running.tag("a")
+        hmi = open_page(running.url, "sensor=co2&view=3,3,6&layers=map")
+        expect(hmi.row("a")).to_be_visible()
+        bare = hmi.settled_picture()
+        hmi.go("sensor=co2&view=3,3,6&layers=map,field")
+        hmi.expect_samples(1)
+        disc = hmi.expect_change(bare)
+        view = hmi.view()
+        grid = running.json("/api/field.json", sensor_type="co2", resolution=0.05)
+        cells = [
+            (index % grid["width"], index // grid["width"])
+            for index, value in enumerate(grid["values"])
+            if value is not None
+        ]
+        step = grid["resolution_used"]
+        left = grid["origin_x"] + min(i for i, _ in cells) * step
+        right = grid["origin_x"] + (max(i for i, _ in cells) + 1) * step
+        bottom = grid["origin_y"] + min(j for _, j in cells) * step
+        top = grid["origin_y"] + (max(j for _, j in cells) + 1) * step
+        wanted = (*view.pixel(left, top), *view.pixel(right, bottom))
+        assert max(abs(a - b) for a, b in zip(disc, wanted, strict=True)) <= 1
+
+
+def test_a_pin_sits_on_its_pose_and_in_its_cell(domain: int, open_page: OpenPage) -> None:
+    with bridge(domain=domain) as running:
+        running.peer.publish_map(floor(6, 6))
+        at = (3.125, 2.375)
+        running.peer.observe(scan("a", {"co2": 900.0}, at=at))
+        running.tag("a")
+        for camera in ("view=3,3,6", "view=3.1,2.4,0.4"):
+            hmi = open_page(running.url, f"sensor=co2&{camera}&layers=map")
+            expect(hmi.row("a")).to_be_visible()
+            bare = hmi.settled_picture()
+            hmi.go(f"sensor=co2&{camera}&layers=map,pins")
+            pin = hmi.expect_change(bare)
+            x, y = hmi.view().pixel(*at)
+            assert abs((pin.left + pin.right - 1) / 2 - x) <= 1
+            assert abs((pin.top + pin.bottom - 1) / 2 - y) <= 1
+            # The only value is the maximum: the body has the full colour, at its very middle.
+            assert close(hmi.pixel(*at), colour_of("co2"))
+        # Zoomed in this far a cell is as large as the pin, and the pin's is the known one whose
+        # centre is nearest: the field's value there is the tag's own.
+        hmi.page.keyboard.press("Escape")
+        hmi.point_at(*at)
+        expect(hmi.test_id("readout")).to_have_text("900 ppmx 3.12 m, y 2.38 m")
+
+
+def test_a_planter_box_and_its_blooms_lie_where_they_were_seen(
+    domain: int, open_page: OpenPage
+) -> None:
+    box = [(1.0, 4.0), (2.5, 4.0), (2.5, 4.5), (1.0, 4.5)]
+    with bridge(domain=domain) as running:
+        running.peer.publish_map(floor(6, 6))
+        running.peer.observe(
+            scan("a", {"co2": 900.0}, at=(5, 1)),
+            look("a", footprint=box, blooms=[(1.25, 4.25), (2.25, 4.3)], flower_count=2),
+        )
+        running.tag("a", lambda tag: tag["flowers"])
+        hmi = open_page(running.url, "view=3,3,6&layers=map")
+        expect(hmi.row("a")).to_be_visible()
+        bare = hmi.settled_picture()
+        view = hmi.view()
+        hmi.go("view=3,3,6&layers=map,boxes")
+        outline = hmi.expect_change(bare)
+        wanted = (*view.pixel(1.0, 4.5), *view.pixel(2.5, 4.0))
+        assert max(abs(a - b) for a, b in zip(outline, wanted, strict=True)) <= 2
+        hmi.go("view=3,3,6&layers=map,blooms")
+        dots = hmi.expect_change(bare)
+        # One dot is at the lower left of the other: as far from the box on each side.
+        left, bottom = view.pixel(1.25, 4.25)
+        right, top = view.pixel(2.25, 4.3)
+        reach = (left - dots.left, top - dots.top, dots.right - 1 - right, dots.bottom - 1 - bottom)
+        assert max(reach) <= 5
+        assert max(reach) - min(reach) <= 1
+
+
+def test_a_map_with_a_yaw_lies_turned_about_its_origin(domain: int, open_page: OpenPage) -> None:
+    yaw = math.radians(30)
+    origin = Pose(
+        position=Point(x=1.0, y=-1.0),
+        orientation=Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2)),
+    )
+    # No two turns or mirrorings of this look the same.
+    rows = [
+        [100, 0, 0, 100],
+        [0, 0, 100, -1],
+        [-1, 0, 0, 0],
+    ]
+    with bridge(domain=domain) as running:
+        running.peer.publish_map(occupancy_grid(rows, resolution=0.5, origin=origin))
+        running.peer.observe(scan("a", {"co2": 900.0}, at=(1, 0)))
+        running.tag("a")
+        hmi = open_page(running.url, "view=1.5,0,4&layers=map")
+        expect(hmi.row("a")).to_be_visible()
+
+        def centre(column: int, row: int) -> tuple[float, float]:
+            u, v = (column + 0.5) * 0.5, (row + 0.5) * 0.5
+            return (
+                1.0 + u * math.cos(yaw) - v * math.sin(yaw),
+                -1.0 + u * math.sin(yaw) + v * math.cos(yaw),
+            )
+
+        looks = {100: WALL, 0: FLOOR, -1: GROUND}
+        at = {centre(i, j): cell for j, row in enumerate(rows) for i, cell in enumerate(row)}
+        hmi.expect_pixels(lambda pixel: pixel == WALL, centre(0, 0), what="the map's first cell")
+        assert hmi.pixels(list(at)) == [looks[cell] for cell in at.values()]
+
+
+def test_without_a_chosen_view_all_of_it_is_in_sight(domain: int, open_page: OpenPage) -> None:
+    with bridge(domain=domain) as running:
+        running.peer.publish_map(floor(6, 6))
+        running.peer.observe(
+            scan("a", {"co2": 1.0}, at=(-3, 1)), scan("b", {"co2": 2.0}, at=(9, 4))
+        )
+        running.tag("b")
+        hmi = open_page(running.url)
+        expect(hmi.row("b")).to_be_visible()
+        box = hmi.map.bounding_box()
+        assert box is not None
+
+        def all_in_sight() -> bool:
+            view = hmi.view()
+            return all(
+                0 < x < box["width"] and 0 < y < box["height"]
+                for x, y in (view.pixel(*point) for point in [(-3, 1), (9, 4), (0, 0), (6, 6)])
+            )
+
+        hmi.expect(all_in_sight, "everything in sight")
+        # A tag that comes later, farther out, is brought into sight too.
+        running.peer.observe(scan("c", {"co2": 3.0}, at=(14, 12)))
+        expect(hmi.row("c")).to_be_visible()
+
+        def later_too() -> bool:
+            x, y = hmi.view().pixel(14, 12)
+            return all_in_sight() and 0 < x < box["width"] and 0 < y < box["height"]
+
+        hmi.expect(later_too, "the late tag in sight")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -67,6 +68,13 @@ def test_every_reference_leads_to_a_type() -> None:
 def test_asking_for_it_twice_gives_the_same() -> None:
     app = create_app(None)
     assert app.openapi() == app.openapi() == DOCUMENT
+
+
+def test_the_copy_that_the_browsers_types_are_made_from_is_fresh() -> None:
+    copy = Path(__file__).parents[1] / "frontend" / "openapi.json"
+    assert copy.read_bytes() == document(), (
+        f"stale: run `python -m lupin_bridge.openapi > {copy}` and `npm run types:gen`"
+    )
 
 
 def test_the_command_needs_no_ros() -> None:

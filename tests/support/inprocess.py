@@ -17,6 +17,7 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.local_twin import LocalTwin
 from lupin_bridge.server import BridgeServer, address_of, listen
 from lupin_bridge.settings import Settings
+from lupin_twin.node import TwinNode
 from tests.support.waiting import PATIENCE_S
 
 T = TypeVar("T")
@@ -63,6 +64,10 @@ class Running:
     server: BridgeServer
     url: str
     http: httpx.AsyncClient
+
+    async def in_ros_thread(self, work: Callable[[TwinNode], T]) -> T:
+        """Run `work(node)` in the ROS thread and return its result."""
+        return await self.twin._thread.call(work)
 
 
 @asynccontextmanager

@@ -28,10 +28,12 @@ ROUTES = {
     "/api/field.json": True,
     "/api/field.png": True,
     "/api/field.npy": True,
+    "/api/field/quality": True,
     "/api/map": True,
     "/api/map.png": True,
     "/healthz": True,
     "/readyz": True,
+    "/metrics": True,
     "/openapi.json": False,
     "/docs": False,
 }

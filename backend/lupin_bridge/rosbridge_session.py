@@ -26,10 +26,10 @@ from lupin_bridge.source import TwinNames
 
 MAX_SUBSCRIPTIONS: Final = 32
 
-# A page subscribes a few times and calls a few services a second; a script that calls GetField
-# and waits for each answer reaches some hundreds.
-MAX_MESSAGES_PER_S: Final = 1_000
-MAX_BURST: Final = 2_000
+# A page subscribes a few times and then calls a service now and again; more fields than
+# `field_rate_hz` (20 a second) it does not get anyway.
+MAX_MESSAGES_PER_S: Final = 100
+MAX_BURST: Final = 500
 
 
 class TooManyMessages(ValueError):

@@ -1,10 +1,11 @@
 """`/rosbridge`: roslib clients read the twin here as they would through rosbridge.
 
-What is served and what is refused stands in `rosbridge`. Of one client there are at most
-`MAX_OPEN_CALLS` calls under way, `MAX_RUNNING_CALLS` of them with the twin; one that takes longer
-than `field_timeout_s`, or than its own `timeout`, ends with `result` false. Replies wait for a slow
-client one by one, and while they wait nothing more is read from it; after `client_timeout_s` it is
-closed, as any other client.
+What is served and what is refused stands in `rosbridge`. Of one connection there are at most
+`MAX_OPEN_CALLS` calls under way, `MAX_RUNNING_CALLS` of them with the twin; the others wait. One
+that takes longer than `field_timeout_s`, or than its own `timeout`, ends with `result` false, and
+so does one past `field_rate_hz` or the other limits of fields, which hold here as over HTTP.
+Replies wait for a slow client, at most one for each running call, and nothing more is read from
+it meanwhile; after `client_timeout_s` it is closed, as any other client.
 """
 
 from __future__ import annotations
@@ -12,12 +13,15 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
+from contextlib import ExitStack
 from typing import Final
 
 from fastapi import APIRouter, WebSocket
 
 from lupin_bridge import field_formats
+from lupin_bridge.access_middleware import client_of
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.field_limits import FieldLimitError
 from lupin_bridge.frames import text_frame
 from lupin_bridge.hub import CLOSE_POLICY, CLOSE_TRY_AGAIN_LATER, Client
 from lupin_bridge.rosbridge import service_failure, service_response
@@ -25,7 +29,7 @@ from lupin_bridge.rosbridge_services import FieldCall
 from lupin_bridge.rosbridge_session import Session, TooManyMessages
 from lupin_bridge.source import TwinUnavailableError
 from lupin_bridge.ws_protocol import CONNECTION_KEY, Connection
-from lupin_twin.fields import FieldRefused
+from lupin_twin.fields import FieldRefused, FieldRequest
 
 MAX_OPEN_CALLS: Final = 32
 MAX_RUNNING_CALLS: Final = 2
@@ -52,6 +56,7 @@ class _Conversation:
     def __init__(self, websocket: WebSocket, bridge: Bridge) -> None:
         self._websocket = websocket
         self._bridge = bridge
+        self._address = client_of(websocket)
         self._connection: Connection = getattr(websocket.state, CONNECTION_KEY)
         self._session = Session(bridge.source.names())
         self._client = Client(
@@ -129,31 +134,33 @@ class _Conversation:
 
     async def _answer(self, field_call: FieldCall, limit_s: float) -> None:
         deadline_s = asyncio.get_running_loop().time() + limit_s
+        call, limits = field_call.call, self._bridge.field_limits
         async with self._running:
-            call = field_call.call
-            try:
-                async with asyncio.timeout_at(deadline_s):
-                    response = await self._response(field_call)
-            except TimeoutError:
-                text = f"{call.service} did not answer within {limit_s:g} s"
-                response = service_failure(call.id, call.service, text)
-            except TwinUnavailableError as error:
-                response = service_failure(call.id, call.service, str(error))
-            except Exception:
-                log.exception("a call of %s met an error", call.service)
-                text = "the bridge met an error of its own, see its log"
-                response = service_failure(call.id, call.service, text)
-            await self._send(response)
+            with ExitStack() as held:
+                try:
+                    held.enter_context(limits.request(self._address, time.monotonic()))
+                    async with asyncio.timeout_at(deadline_s):
+                        values = await self._values(field_call.request)
+                    response = service_response(call.id, call.service, values, result=True)
+                except TimeoutError:
+                    text = f"{call.service} did not answer within {limit_s:g} s"
+                    response = service_failure(call.id, call.service, text)
+                except (FieldLimitError, TwinUnavailableError) as error:
+                    response = service_failure(call.id, call.service, str(error))
+                except Exception:
+                    log.exception("a call of %s met an error", call.service)
+                    text = "the bridge met an error of its own, see its log"
+                    response = service_failure(call.id, call.service, text)
+                await self._send(response)
 
-    async def _response(self, field_call: FieldCall) -> bytes:
-        call = field_call.call
-        try:
-            result = await self._bridge.source.field(field_call.request)
-        except FieldRefused as error:
-            # The service has answered, and the answer is no: as over ROS, `ok` false says so.
-            values = field_formats.refusal_json(str(error))
-        else:
-            values = await asyncio.get_running_loop().run_in_executor(
-                self._bridge.pool, field_formats.write_json, result.grid
+    async def _values(self, request: FieldRequest) -> bytes:
+        bridge = self._bridge
+        with bridge.field_limits.computing(), bridge.metrics.field_seconds.time():
+            try:
+                result = await bridge.source.field(request)
+            except FieldRefused as error:
+                # The service has answered, and the answer is no: as over ROS, `ok` false says so.
+                return field_formats.refusal_json(str(error))
+            return await asyncio.get_running_loop().run_in_executor(
+                bridge.pool, field_formats.write_json, result.grid
             )
-        return service_response(call.id, call.service, values, result=True)

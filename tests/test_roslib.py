@@ -1,0 +1,162 @@
+"""The real roslib, from npm, against the real bridge: existing clients connect unchanged."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support import messages
+from tests.support.domains import own_domain, ros_env
+from tests.support.processes import Process, lupin_twin, twin_node, url_of
+from tests.support.ros import Peer
+from tests.support.web import Bridge, bridge, listener
+
+SCRIPT = Path(__file__).with_name("roslib_client.mjs")
+
+
+def roslib(url: str, scenario: str) -> Process:
+    """A process that plays a scenario of `roslib_client.mjs`."""
+    node = shutil.which("node")
+    assert node is not None, "node is not installed"
+    address = url.replace("http", "ws", 1) + "/rosbridge"
+    return Process([node, str(SCRIPT), address, scenario], ros_env(0))
+
+
+def told_by(process: Process) -> Any:
+    """What a scenario has told at its end."""
+    assert process.wait() == 0, process.output
+    return json.loads(process.output.splitlines()[-1])
+
+
+def play(url: str, scenario: str) -> Any:
+    with roslib(url, scenario) as process:
+        return told_by(process)
+
+
+@pytest.fixture(scope="module")
+def house() -> Iterator[Bridge]:
+    """A twin with one tag."""
+    with bridge() as running:
+        running.peer.observe(messages.scan("1", {"temperature": 20.0}, at=(0.0, 0.0)))
+        running.peer.wait_for_twin()
+        with running.listen() as frames:
+            frames.until_tag("1")
+        yield running
+
+
+def test_a_subscriber_gets_the_state(house: Bridge) -> None:
+    state = play(house.url, "latch")["state"]
+    (tag,) = state["tags"]
+    assert (tag["tag_id"], tag["readings"]) == ("1", [{"name": "temperature", "value": 20.0}])
+    assert state["header"]["frame_id"] == "map"
+
+
+def test_fields_come_with_null_where_nothing_is_known(house: Bridge) -> None:
+    told = play(house.url, "field")
+    assert told["known"]["callback"] == "done"
+    known = told["known"]["values"]
+    assert (known["ok"], known["width"], known["height"]) == (True, 12, 12)
+    assert set(known["values"]) == {20.0, None}
+    assert known == house.json(
+        "/api/field",
+        sensor_type="temperature",
+        resolution=0.5,
+        bbox_min_x=-3,
+        bbox_min_y=-3,
+        bbox_max_x=3,
+        bbox_max_y=3,
+    )
+
+
+def test_a_field_that_is_refused_and_a_call_that_fails_are_two_things(house: Bridge) -> None:
+    told = play(house.url, "field")
+    assert told["refused"]["callback"] == "done"
+    assert told["refused"]["values"]["ok"] is False
+    assert "resolution" in told["refused"]["values"]["error_message"]
+    assert told["failed"]["callback"] == "failed"
+    assert told["failed"]["values"].startswith("args.colour is unknown")
+    assert told["late"] == {
+        "callback": "failed",
+        "values": "/twin/get_field did not answer within 1e-09 s",
+    }
+
+
+def test_roslibs_questions_about_names_are_answered(house: Bridge) -> None:
+    told = play(house.url, "names")
+    assert told["topics"] == {"topics": ["/twin/state"], "types": ["lupin_msgs/msg/TwinState"]}
+    assert told["topicType"] == "lupin_msgs/msg/TwinState"
+    assert "/twin/get_field" in told["services"]
+    assert told["serviceType"] == "lupin_msgs/srv/GetField"
+    assert told["nodes"]["failed"].startswith("service 'rosapi/nodes' is not served")
+
+
+def test_what_writes_is_refused(house: Bridge) -> None:
+    told = play(house.url, "write")
+    assert [status["msg"].partition(":")[0] for status in told["told"]] == [
+        "advertise is refused",
+        "publish is refused",
+        "unadvertise is refused",
+        "advertise_service is refused",
+        "auth is refused",
+    ]
+    assert {status["level"] for status in told["told"]} == {"error"}
+    assert told["told"][1]["id"].startswith("publish:/cmd_vel:"), "roslib's own id comes back"
+    assert told["afterLevelNone"] == []
+    house.peer.spin_briefly()
+    assert house.peer.node.count_publishers("/cmd_vel") == 0
+
+
+def test_two_components_of_a_page_share_a_topic(house: Bridge) -> None:
+    told = play(house.url, "two")
+    assert told["warnings"] == [
+        "compression 'cbor' is not served: messages are plain JSON",
+        "queue_length 10 is served as 1: the newest state only",
+    ]
+    assert told["heardAfterUnsubscribe"] == 0
+    assert told["afterTheEnd"] == 0
+
+
+def test_a_subscription_outlives_the_bridge() -> None:
+    with own_domain() as domain, lupin_twin(domain, "serve") as first, Peer(domain) as peer:
+        url = url_of(first)
+        peer.wait_for_twin()
+        peer.observe(messages.scan("old", {"temperature": 20.0}))
+        peer.spin_briefly()
+        with listener(url) as frames:
+            frames.until_tag("old")
+        with roslib(url, "reconnect") as client:
+            client.wait_for_output("subscribed")
+            first.kill()
+            port = url.rpartition(":")[2]
+            with lupin_twin(domain, "serve", "--port", port) as second:
+                assert url_of(second) == url
+                told = told_by(client)
+    assert [tag["tag_id"] for tag in told["before"]["tags"]] == ["old"]
+    # The robot's topics are latched, too: the new twin may know the tag again by now.
+    assert [tag["tag_id"] for tag in told["after"]["tags"]] in ([], ["old"])
+
+
+def test_the_last_state_is_there_although_the_twin_is_silent() -> None:
+    with (
+        own_domain() as domain,
+        twin_node(domain) as twin,
+        lupin_twin(domain, "web") as web,
+        Peer(domain) as peer,
+    ):
+        url = url_of(web)
+        peer.wait_for_twin()
+        peer.observe(messages.scan("1", {"temperature": 20.0}))
+        peer.spin_briefly()
+        with listener(url) as frames:
+            frames.until_tag("1")
+            # No tag has a pose: all cells are unknown, and that is an answer of the twin.
+            assert set(play(url, "field")["known"]["values"]["values"]) == {None}
+            twin.kill()
+            frames.until("status", lambda frame: bool(frame["twin"] == "offline"))
+        state = play(url, "latch")["state"]
+    assert [tag["tag_id"] for tag in state["tags"]] == ["1"]

@@ -66,11 +66,32 @@ def test_the_page_does_not_hide_a_route(static: Path) -> None:
 
 @pytest.mark.parametrize(
     "path",
-    ["/../secret.txt", "/..%2fsecret.txt", "/assets/..%2f..%2fsecret.txt", "/%2e%2e/secret.txt"],
+    [
+        "/../secret.txt",
+        "/..%2fsecret.txt",
+        "/%2e%2e/secret.txt",
+        "/%2e%2e%2fsecret.txt",
+        "/%252e%252e%252fsecret.txt",
+        "/..%5csecret.txt",
+        "/assets/..%2f..%2fsecret.txt",
+        "/assets/../../secret.txt",
+        "/link.txt",
+        "/folder/secret.txt",
+        "//etc/passwd",
+        "/%2fetc%2fpasswd",
+        "/etc/passwd",
+        "/file:///etc/passwd",
+        "/assets/a.js%00.txt",
+        "/%00",
+        "/" + "x/" * 5_000,
+    ],
 )
 def test_nothing_outside_the_folder_is_served(static: Path, path: str) -> None:
+    (static / "link.txt").symlink_to(static.parent / "secret.txt")
+    (static / "folder").symlink_to(static.parent)
     answer = ask(static, "GET", path)
     assert answer.status_code == 404
+    assert "root:" not in answer.text
     assert "secret" not in answer.text.replace("secret.txt", "")
 
 

@@ -39,6 +39,21 @@ def test_an_empty_host_is_refused() -> None:
         Settings(host="")
 
 
+@pytest.mark.parametrize("origin", ["", "*", "null", "panel.example", "http://panel.example/x"])
+def test_an_allowed_origin_has_to_be_one(origin: str) -> None:
+    with pytest.raises(SettingError, match=r"--allow-origin: .* is not an origin") as refused:
+        Settings(allow_origin=("http://good.example", origin))
+    assert repr(origin) in str(refused.value)
+
+
+def test_tls_needs_both_files() -> None:
+    assert Settings(tls_cert="c.pem", tls_key="k.pem").tls_key == "k.pem"
+    with pytest.raises(SettingError, match="--tls-cert is given without --tls-key"):
+        Settings(tls_cert="c.pem")
+    with pytest.raises(SettingError, match="--tls-key is given without --tls-cert"):
+        Settings(tls_key="k.pem")
+
+
 def test_every_setting_has_a_help_text_and_an_option_of_its_name() -> None:
     assert all(spec.metadata["help"] for spec in fields(Settings))
     assert option("client_timeout_s") == "--client-timeout-s"

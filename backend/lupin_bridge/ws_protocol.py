@@ -32,9 +32,13 @@ class Connection(WebSocketsSansIOProtocol):
         self.on_writable: Callable[[], None] | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Stop at the first byte that the socket does not take: what is queued is one frame."""
+        """Stop at the first bytes that the socket does not take: what is queued is one frame.
+
+        Over TLS, asyncio keeps another 64 kB below the limit that can be set.
+        """
         super().connection_made(transport)
-        self.transport.set_write_buffer_limits(high=0)
+        # Not 0: asyncio's TLS transport stops at the limit, not past it, and would stop on nothing.
+        self.transport.set_write_buffer_limits(high=1, low=0)
 
     def resume_writing(self) -> None:
         """The socket has taken everything: time for the newest frame."""

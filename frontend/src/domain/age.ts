@@ -4,17 +4,9 @@ const FADE_FROM_S = 60;
 const FADE_TO_S = 1800;
 const FAINTEST = 0.35;
 
-/**
- * Seconds since a tag was observed: its age in the snapshot plus the time since then, both ends
- * by one monotonic clock. A difference to the wall clock would be wrong in simulation and on a
- * tablet whose clock is off.
- */
-export function ageSeconds(
-  staleSeconds: number | null,
-  takenAt: number,
-  now: number,
-): number | null {
-  return staleSeconds === null ? null : staleSeconds + Math.max(0, now - takenAt) / 1000;
+/** Seconds since a moment on the monotonic clock; null: there was none. */
+export function ageSeconds(observedAt: number | null, now: number): number | null {
+  return observedAt === null ? null : Math.max(0, now - observedAt) / 1000;
 }
 
 /** How strongly to draw something of that age, 0.35 to 1, even in ratios of age; null: faintest. */

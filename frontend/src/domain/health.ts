@@ -43,8 +43,19 @@ export interface TagHealth {
   readonly value: number | null;
 }
 
+/** Tags are shared from one snapshot to the next; so is what follows from them. */
+const judged = new WeakMap<Tag, TagHealth>();
+
 /** A tag is as healthy as its worst sensor; of equals, the first reported. */
 export function tagHealth(tag: Tag): TagHealth {
+  const known = judged.get(tag);
+  if (known) return known;
+  const health = judge(tag);
+  judged.set(tag, health);
+  return health;
+}
+
+function judge(tag: Tag): TagHealth {
   let worst: TagHealth = {
     tagId: tag.id,
     status: 'no-data',

@@ -65,7 +65,7 @@ describe('filter', () => {
 
 test('the file has every tag, values in the shown unit, and ages of now', () => {
   const sensors = [sensorNamed('temperature'), sensorNamed('humidity')];
-  const text = tableCsv(rows, sensors, 'F', 10);
+  const text = tableCsv(rows, sensors, 'F', 10_000);
   const lines = text.split('\r\n');
   expect(lines[0]).toContain('Temperature [°F],Humidity [%]');
   expect(lines).toHaveLength(1 + tags.length + 1);

@@ -1,5 +1,6 @@
 /** Rows of the table: what is in a column, how it sorts, what a filter finds. */
 import { S } from '../strings';
+import { ageSeconds } from './age';
 import { csv, type Cell } from './csv';
 import type { HealthStatus, HouseHealth, TagHealth } from './health';
 import { sensorNamed, type Sensor } from './sensors';
@@ -30,11 +31,12 @@ export function sortKey({ tag, health }: Row, column: string): Key {
     case 'species':
       return tag.species || null;
     case 'flowers':
-      return tag.staleSeconds === null ? null : tag.flowerCount;
+      return tag.observedAt === null ? null : tag.flowerCount;
     case 'pest':
       return tag.anomaly ? 1 + tag.bugCount : 0;
     case 'age':
-      return tag.staleSeconds;
+      // The age itself grows with the clock; its order does not.
+      return tag.observedAt === null ? null : -tag.observedAt;
     default:
       return tag.readings.get(column) ?? null;
   }
@@ -82,7 +84,7 @@ function haystack({ tag, health }: Row): string {
     S.health[health.status],
     tag.anomaly ? S.pest : '',
     tag.at ? '' : S.notOnMap,
-    tag.staleSeconds === null ? S.neverObserved : '',
+    tag.observedAt === null ? S.neverObserved : '',
     ...[...tag.readings.keys()].map((name) => `${name} ${sensorNamed(name).label}`),
   ]
     .join(' ')
@@ -94,8 +96,8 @@ export function tableCsv(
   rows: readonly Row[],
   sensors: readonly Sensor[],
   unit: TemperatureUnit,
-  /** Seconds passed since the snapshot was taken. */
-  elapsedSeconds: number,
+  /** ms on the monotonic clock. */
+  now: number,
 ): string {
   const T = S.csv;
   const header: Cell[] = [
@@ -115,23 +117,26 @@ export function tableCsv(
     T.x,
     T.y,
   ];
-  const lines = rows.map(({ tag, health }): Cell[] => [
-    tag.id,
-    S.health[health.status],
-    health.sensor === null ? null : sensorNamed(health.sensor).label,
-    ...sensors.map((sensor): Cell => {
-      const value = tag.readings.get(sensor.name);
-      return value == null ? null : round(toShown(sensor, value, unit));
-    }),
-    tag.species || null,
-    tag.speciesConfidence === null ? null : round(tag.speciesConfidence),
-    tag.flowerCount,
-    tag.bugCount,
-    tag.anomaly ? T.yes : T.no,
-    tag.staleSeconds === null ? null : Math.round(tag.staleSeconds + elapsedSeconds),
-    tag.at && round(tag.at.x),
-    tag.at && round(tag.at.y),
-  ]);
+  const lines = rows.map(({ tag, health }): Cell[] => {
+    const age = ageSeconds(tag.observedAt, now);
+    return [
+      tag.id,
+      S.health[health.status],
+      health.sensor === null ? null : sensorNamed(health.sensor).label,
+      ...sensors.map((sensor): Cell => {
+        const value = tag.readings.get(sensor.name);
+        return value == null ? null : round(toShown(sensor, value, unit));
+      }),
+      tag.species || null,
+      tag.speciesConfidence === null ? null : round(tag.speciesConfidence),
+      tag.flowerCount,
+      tag.bugCount,
+      tag.anomaly ? T.yes : T.no,
+      age === null ? null : Math.round(age),
+      tag.at && round(tag.at.x),
+      tag.at && round(tag.at.y),
+    ];
+  });
   return csv([header, ...lines]);
 }
 

@@ -71,6 +71,27 @@ describe('snapshot', () => {
     expect(news.takenAt).toBe(9500);
   });
 
+  test('a tag’s age is its age on the wire plus the time since the frame', () => {
+    const made = snapshotOf(stateFrame([wireTag({ stale_seconds: 4 })]), 10_000, null);
+    expect(made.tags[0]?.observedAt).toBe(6_000);
+    const never = snapshotOf(stateFrame([wireTag({ stale_seconds: null })]), 10_000, null);
+    expect(never.tags[0]?.observedAt).toBeNull();
+  });
+
+  test('an unchanged tag is the same object, whatever its age; a changed one is not', () => {
+    const first = snapshotOf(stateFrame([wireTag({ stale_seconds: 1 })], { sec: 1 }), 1_000, null);
+    const later = stateFrame([wireTag({ stale_seconds: 2.1 })], { sec: 2 });
+    expect(snapshotOf(later, 2_000, first).tags[0]).toBe(first.tags[0]);
+    const read = stateFrame([wireTag({ readings: readings({ co2: 1 }) })], { sec: 2 });
+    expect(snapshotOf(read, 2_000, first).tags[0]).not.toBe(first.tags[0]);
+  });
+
+  test('in simulation at ten times the speed ages follow the twin’s clock', () => {
+    const first = snapshotOf(stateFrame([wireTag({ stale_seconds: 1 })], { sec: 1 }), 1_000, null);
+    const later = stateFrame([wireTag({ stale_seconds: 11 })], { sec: 11 });
+    expect(snapshotOf(later, 2_000, first).tags[0]?.observedAt).toBe(-9_000);
+  });
+
   test('names the tags that were observed since the last one', () => {
     const a = wireTag({ tag_id: 'a' });
     const b = wireTag({ tag_id: 'b' });

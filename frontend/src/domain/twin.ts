@@ -14,8 +14,8 @@ export interface Tag {
   readonly at: MapPoint | null;
   /** Latest reading by sensor, in its unit; null: the sensor gave not-a-number. */
   readonly readings: ReadonlyMap<string, number | null>;
-  /** Seconds since the last observation when the snapshot was taken; null: never observed. */
-  readonly staleSeconds: number | null;
+  /** When it was last observed, ms on the browser's monotonic clock; null: never. */
+  readonly observedAt: number | null;
   /** ROS time of the last observation, as a key to compare; "0.0" when there was none. */
   readonly observation: string;
   readonly species: string;
@@ -26,6 +26,8 @@ export interface Tag {
   readonly blooms: readonly Bloom[];
   /** Outline of the planter box. */
   readonly footprint: readonly MapPoint[];
+  /** What all this was read from. */
+  readonly wire: TwinTagState;
 }
 
 /** The greenhouse at one moment. */
@@ -52,7 +54,8 @@ function presentPoints(points: readonly WirePoint[]): MapPoint[] {
   return points.map(pointOf).filter((point) => point !== null);
 }
 
-export function tagOf(wire: TwinTagState): Tag {
+/** Reads a tag of a state that was new at `takenAt`, ms on the monotonic clock. */
+export function tagOf(wire: TwinTagState, takenAt: number): Tag {
   const { position, orientation } = wire.pose;
   return {
     id: wire.tag_id,
@@ -60,7 +63,7 @@ export function tagOf(wire: TwinTagState): Tag {
     // turn has another w, and ROS itself defaults it to 1.
     at: orientation.w === 0 || orientation.w === null ? null : pointOf(position),
     readings: new Map(wire.readings.map(({ name, value }) => [name, value])),
-    staleSeconds: wire.stale_seconds,
+    observedAt: observedAt(wire, takenAt),
     observation: timeKey(wire.last_observed),
     species: wire.species,
     speciesConfidence: wire.species_confidence,
@@ -72,7 +75,47 @@ export function tagOf(wire: TwinTagState): Tag {
       return at ? [{ at, species: flower.species, anomaly: flower.anomaly }] : [];
     }),
     footprint: presentPoints(wire.box_footprint.points),
+    wire,
   };
+}
+
+/**
+ * A tag's age on the wire plus the time since the frame, kept as a moment on one monotonic clock.
+ * A difference to the wall clock would be wrong in simulation, and on a tablet that is off.
+ */
+function observedAt({ stale_seconds: stale }: TwinTagState, takenAt: number): number | null {
+  return stale === null ? null : takenAt - stale * 1000;
+}
+
+/** Ages of one observation that differ by less come from the network, not from a new look. */
+const JITTER_MS = 1_500;
+
+/**
+ * The tag as it was, if nothing but its age went on: the page renders only what changed. Where
+ * the twin's clock runs at another speed (simulation), its ages still win.
+ */
+function sharedTag(before: Tag | undefined, wire: TwinTagState, takenAt: number): Tag {
+  if (before && equal({ ...wire, stale_seconds: before.wire.stale_seconds }, before.wire)) {
+    const moment = observedAt(wire, takenAt);
+    const drift = moment === null || before.observedAt === null ? 0 : moment - before.observedAt;
+    if (Math.abs(drift) < JITTER_MS && (moment === null) === (before.observedAt === null)) {
+      return before;
+    }
+  }
+  return tagOf(wire, takenAt);
+}
+
+/** Deep equality of plain JSON values. */
+function equal(a: unknown, b: unknown): boolean {
+  if (a === b) return true;
+  if (typeof a !== 'object' || typeof b !== 'object' || a === null || b === null) return false;
+  const keys = Object.keys(a);
+  return (
+    keys.length === Object.keys(b).length &&
+    keys.every((key) =>
+      equal((a as Record<string, unknown>)[key], (b as Record<string, unknown>)[key]),
+    )
+  );
 }
 
 /**
@@ -89,20 +132,23 @@ export function snapshotOf(
 ): Snapshot {
   const stamp = timeKey(frame.state.header.stamp);
   const repeated = before?.stamp === stamp;
-  const tags = frame.state.tags.map(tagOf).sort((a, b) => compareIds(a.id, b.id));
+  const takenAt = repeated ? Math.min(before.takenAt, arrivedAt) : arrivedAt;
+  const known = new Map(before?.tags.map((tag) => [tag.id, tag]));
+  const tags = frame.state.tags
+    .map((wire) => sharedTag(known.get(wire.tag_id), wire, takenAt))
+    .sort((a, b) => compareIds(a.id, b.id));
   return {
     tags,
     revision: frame.revision,
     stamp,
-    takenAt: repeated ? Math.min(before.takenAt, arrivedAt) : arrivedAt,
-    fresh: before ? freshTags(before.tags, tags) : [],
+    takenAt,
+    fresh: before ? freshTags(known, tags) : [],
   };
 }
 
-function freshTags(before: readonly Tag[], now: readonly Tag[]): string[] {
-  const known = new Map(before.map((tag) => [tag.id, tag.observation]));
+function freshTags(before: ReadonlyMap<string, Tag>, now: readonly Tag[]): string[] {
   return now
-    .filter((tag) => tag.staleSeconds !== null && known.get(tag.id) !== tag.observation)
+    .filter((tag) => tag.observedAt !== null && before.get(tag.id)?.observation !== tag.observation)
     .map((tag) => tag.id);
 }
 

@@ -76,11 +76,11 @@ export function buildScene(input: SceneInput): Scene {
 function pinOf(
   tag: Snapshot['tags'][number],
   at: MapPoint,
-  { snapshot, health, sensor, range, unit, now }: SceneInput,
+  { health, sensor, range, unit, now }: SceneInput,
 ): Pin {
   const value = tag.readings.get(sensor.name);
   const id = shown(tag.id, 12);
-  const strength = freshness(ageSeconds(tag.staleSeconds, snapshot.takenAt, now));
+  const strength = freshness(ageSeconds(tag.observedAt, now));
   const status = health.byTag.get(tag.id)?.status;
   return {
     id: tag.id,

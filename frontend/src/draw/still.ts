@@ -12,13 +12,18 @@ export function drawGround({ context, size }: Surface, palette: Palette): void {
   context.fillRect(0, 0, size.width, size.height);
 }
 
+/** The greys of /api/map.png between which a cell lies, from occupied to free. */
+const OCCUPIED_GREY = 70;
+const FREE_GREY = 236;
+
 /** The SLAM map in the theme's colours: its grey becomes the way from wall to floor. */
 export function tintMap(pixels: ImageData, palette: Palette): HTMLCanvasElement {
   const source = pixels.data;
   const data = new Uint8ClampedArray(source.length);
-  const tones = Array.from({ length: 256 }, (_, grey) =>
-    mix(palette.wall, palette.floor, grey / 255),
-  );
+  const tones = Array.from({ length: 256 }, (_, grey) => {
+    const free = (grey - OCCUPIED_GREY) / (FREE_GREY - OCCUPIED_GREY);
+    return mix(palette.wall, palette.floor, Math.min(1, Math.max(0, free)));
+  });
   for (let i = 0; i < source.length; i += 4) {
     const alpha = source[i + 3] ?? 0;
     if (alpha === 0) continue;
@@ -60,13 +65,26 @@ export function fieldPlacement(field: Field, picture: HTMLCanvasElement): Placem
 
 const GRID_GAP_PX = 56;
 
-/** Lines at round metres, with the numbers along the left and the upper edge. */
-export function drawGrid({ context, size }: Surface, view: View, palette: Palette): void {
+interface GridTicks {
+  readonly columns: readonly number[];
+  readonly rows: readonly number[];
+}
+
+/** Round metres within the surface. */
+function gridTicks({ size }: Surface, view: View): GridTicks {
   const step = gridStep(view.scale, GRID_GAP_PX);
   const topLeft = toMap(view, canvasPoint(0, 0));
   const bottomRight = toMap(view, canvasPoint(size.width, size.height));
-  const columns = multiples(topLeft.x, bottomRight.x, step);
-  const rows = multiples(bottomRight.y, topLeft.y, step);
+  return {
+    columns: multiples(topLeft.x, bottomRight.x, step),
+    rows: multiples(bottomRight.y, topLeft.y, step),
+  };
+}
+
+/** Lines at round metres. */
+export function drawGridLines(surface: Surface, view: View, palette: Palette): void {
+  const { context, size } = surface;
+  const { columns, rows } = gridTicks(surface, view);
   const sharp = (value: number): number => Math.round(value) + 0.5;
 
   context.strokeStyle = palette.gridLine;
@@ -83,7 +101,12 @@ export function drawGrid({ context, size }: Surface, view: View, palette: Palett
     context.lineTo(size.width, at);
   }
   context.stroke();
+}
 
+/** The grid's numbers, along the left and the upper edge of the view. */
+export function drawGridLabels(surface: Surface, view: View, palette: Palette): void {
+  const { context, size } = surface;
+  const { columns, rows } = gridTicks(surface, view);
   context.fillStyle = palette.gridText;
   context.font = '500 10.5px "Inter Variable", system-ui, sans-serif';
   context.textBaseline = 'top';

@@ -20,8 +20,7 @@ export function saveTable(): void {
     filterRows(rowsOf(snapshot.tags, selectHealth(state)), filter, health),
     sort,
   );
-  const elapsed = (performance.now() - snapshot.takenAt) / 1000;
-  const text = tableCsv(rows, selectSensors(state), state.settings.unit, elapsed);
+  const text = tableCsv(rows, selectSensors(state), state.settings.unit, performance.now());
   save(
     new Blob([text], { type: 'text/csv;charset=utf-8' }),
     fileName('tags', 'csv', epochOf(snapshot.takenAt)),

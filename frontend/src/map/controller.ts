@@ -23,7 +23,8 @@ import { pointedAt } from './pointer';
 const TOUCH_REACH = 26;
 const MOUSE_REACH = 16;
 
-type Part = 'still' | 'pins' | 'overlay';
+/** What is to be drawn anew; "view": nothing but the place and the scale changed. */
+type Part = 'still' | 'pins' | 'overlay' | 'view';
 
 export function runMap(element: HTMLElement, canvases: Canvases): () => void {
   const painter = new Painter(canvases, isDark() ? DARK : LIGHT);
@@ -37,7 +38,7 @@ export function runMap(element: HTMLElement, canvases: Canvases): () => void {
   const camera = new MapCamera(element, {
     onView: (view) => {
       publish(view);
-      spoil('still', 'pins', 'overlay');
+      spoil('view');
     },
     onCamera: (chosen) => {
       act({ type: 'camera', camera: chosen });
@@ -61,9 +62,13 @@ export function runMap(element: HTMLElement, canvases: Canvases): () => void {
     const now = performance.now();
     const parts = new Set(dirty);
     dirty.clear();
-    if (parts.has('still')) painter.paintStill(state, camera.view, now);
-    if (parts.has('pins')) painter.paintPins(state, camera.view, now);
-    if (parts.has('overlay')) {
+    if (parts.has('still') || parts.has('view')) {
+      painter.paintStill(state, camera.view, now, parts.has('still'));
+    }
+    if (parts.has('pins') || parts.has('view')) {
+      painter.paintPins(state, camera.view, now, parts.has('pins'));
+    }
+    if (parts.has('overlay') || parts.has('view')) {
       pulses = pulses.filter(({ since }) => now - since < PULSE_MS);
       painter.paintOverlay(state, camera.view, { pulses, now, crosshair });
     }
@@ -124,7 +129,8 @@ export function runMap(element: HTMLElement, canvases: Canvases): () => void {
     pointedAt.dispatch(toMap(camera.view, point));
     const hovered = event.buttons === 0 ? tagAt(point, MOUSE_REACH) : null;
     act({ type: 'hover', tagId: hovered });
-    element.dataset['hand'] = hovered === null ? 'grab' : 'point';
+    const hand = hovered === null ? 'grab' : 'point';
+    if (element.dataset['hand'] !== hand) element.dataset['hand'] = hand;
   };
   const onPointerLeave = (): void => {
     pointedAt.dispatch(crosshair ? centre() : null);

@@ -14,10 +14,12 @@ import {
   LABEL_HEIGHT,
   labelRequests,
 } from '../draw/pins';
+import { PanBuffer } from '../draw/panbuffer';
 import { buildScene, type Scene } from '../draw/scene';
 import {
   drawBoxes,
-  drawGrid,
+  drawGridLabels,
+  drawGridLines,
   drawGround,
   drawPicture,
   fieldPlacement,
@@ -53,6 +55,8 @@ export class Painter {
   #palette: Palette;
   #sprites = new Sprites(1);
   readonly #measure = new Map<string, number>();
+  readonly #stillBuffer = new PanBuffer();
+  readonly #pinBuffer = new PanBuffer();
 
   constructor(canvases: Canvases, palette: Palette) {
     this.#canvases = canvases;
@@ -76,6 +80,8 @@ export class Painter {
 
   /** Drops sprites and text widths: the theme, the pixel ratio or the font has changed. */
   forget(): void {
+    this.#stillBuffer.spoil();
+    this.#pinBuffer.spoil();
     this.#sprites = new Sprites(this.#ratio);
     this.#measure.clear();
   }
@@ -86,15 +92,24 @@ export class Painter {
     return surface;
   }
 
-  paintStill(state: AppState, view: View, now: number): void {
+  /** `isNew`: more than the view changed since the last time. */
+  paintStill(state: AppState, view: View, now: number, isNew: boolean): void {
     const surface = this.#surface(this.#canvases.still);
+    if (isNew) this.#stillBuffer.spoil();
+    this.#stillBuffer.draw(surface, view, (target, seen) => {
+      this.#drawStill(target, seen, state, now);
+    });
+    if (state.view.layers.has('grid')) drawGridLabels(surface, view, this.#palette);
+  }
+
+  #drawStill(surface: Surface, view: View, state: AppState, now: number): void {
     const { layers } = state.view;
     drawGround(surface, this.#palette);
     const picture = state.twin.map.value;
     if (picture && layers.has('map')) {
       drawPicture(surface, view, this.#mapPicture(picture, this.#palette), picture.placement);
     }
-    if (layers.has('grid')) drawGrid(surface, view, this.#palette);
+    if (layers.has('grid')) drawGridLines(surface, view, this.#palette);
     if (layers.has('boxes')) drawBoxes(surface, view, this.scene(state, now).boxes, this.#palette);
     const field = state.twin.field.value;
     const range = selectRange(state);
@@ -105,8 +120,15 @@ export class Painter {
     }
   }
 
-  paintPins(state: AppState, view: View, now: number): void {
+  paintPins(state: AppState, view: View, now: number, isNew: boolean): void {
     const surface = this.#surface(this.#canvases.pins);
+    if (isNew) this.#pinBuffer.spoil();
+    this.#pinBuffer.draw(surface, view, (target, seen) => {
+      this.#drawPins(target, seen, state, now);
+    });
+  }
+
+  #drawPins(surface: Surface, view: View, state: AppState, now: number): void {
     const { layers } = state.view;
     const scene = this.scene(state, now);
     if (layers.has('blooms')) drawBlooms(surface, view, scene.blooms, this.#sprites, this.#palette);

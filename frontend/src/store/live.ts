@@ -6,9 +6,12 @@ import { receive } from './app';
 
 /**
  * Frames come up to ten times a second; the page takes the newest four times a second at most.
- * More could not be read, and would cost a tablet its battery.
+ * More could not be read, and would cost a tablet its battery. A table of hundreds takes a frame's
+ * time to lay out, so a large house is shown once a second.
  */
-const SHORTEST_MS = 250;
+export function pauseMs(tags: number): number {
+  return tags > 150 ? 1_000 : 250;
+}
 
 let retry: (() => void) | null = null;
 
@@ -44,10 +47,13 @@ export function startLive(): () => void {
         // The first state may be an old one that the bridge kept; its status says how old.
         greeted = connection.epoch;
         take(connection.status?.state_age_seconds ?? null);
-      } else if (now - takenAt >= SHORTEST_MS) {
+        return;
+      }
+      const pause = pauseMs(frame.state.tags.length);
+      if (now - takenAt >= pause) {
         take(null);
       } else {
-        timer ??= setTimeout(take, SHORTEST_MS - (now - takenAt), null);
+        timer ??= setTimeout(take, pause - (now - takenAt), null);
       }
     },
   });

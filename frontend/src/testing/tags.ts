@@ -20,7 +20,7 @@ export function wireTag(over: Partial<TwinTagState> = {}): TwinTagState {
   };
 }
 
-export const tag = (over: Partial<TwinTagState> = {}): Tag => tagOf(wireTag(over));
+export const tag = (over: Partial<TwinTagState> = {}): Tag => tagOf(wireTag(over), 0);
 
 export const readings = (values: Record<string, number | null>): TwinTagState['readings'] =>
   Object.entries(values).map(([name, value]) => ({ name, value }));

@@ -50,7 +50,7 @@ export function AttentionList(): JSX.Element {
                 {tag.anomaly && <PestMark count={tag.bugCount} />}
               </span>
               <span className="faint">
-                <Age staleSeconds={tag.staleSeconds} takenAt={snapshot?.takenAt ?? 0} />
+                <Age observedAt={tag.observedAt} />
               </span>
             </li>
           );

@@ -21,7 +21,6 @@ import { useHistory } from './useHistory';
 export function TagCard({ tagId }: { tagId: string }): JSX.Element {
   const tag = useApp((state) => state.twin.snapshot?.tags.find(({ id }) => id === tagId));
   const health = useApp((state) => selectHealth(state).byTag.get(tagId));
-  const takenAt = useApp((state) => state.twin.snapshot?.takenAt ?? 0);
   const unit = useApp((state) => state.settings.unit);
   const history = useHistory(tagId, tag?.observation);
   const root = useRef<HTMLElement>(null);
@@ -62,23 +61,17 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
           <Icon name="close" />
         </button>
       </header>
-      {tag ? (
-        <CardBody tag={tag} takenAt={takenAt} unit={unit} history={history} />
-      ) : (
-        <p>{S.cardGone}</p>
-      )}
+      {tag ? <CardBody tag={tag} unit={unit} history={history} /> : <p>{S.cardGone}</p>}
     </aside>
   );
 }
 
 function CardBody({
   tag,
-  takenAt,
   unit,
   history,
 }: {
   tag: Tag;
-  takenAt: number;
   unit: TemperatureUnit;
   history: TagHistory | null;
 }): JSX.Element {
@@ -106,7 +99,7 @@ function CardBody({
         <div>
           <dt>{S.columns.age}</dt>
           <dd>
-            <Age staleSeconds={tag.staleSeconds} takenAt={takenAt} />
+            <Age observedAt={tag.observedAt} />
           </dd>
         </div>
         <div>

@@ -7,11 +7,10 @@ import type { Sensor } from '../domain/sensors';
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';
 import type { TemperatureUnit } from '../domain/units';
-import { act } from '../store/app';
 import { S } from '../strings';
 import { HealthMark } from './HealthMark';
 import { Icon } from './Icon';
-import { useNow } from './useNow';
+import { useTicking } from './useNow';
 
 interface Props {
   readonly tag: Tag;
@@ -19,7 +18,6 @@ interface Props {
   readonly sensors: readonly Sensor[];
   readonly chosen: string;
   readonly unit: TemperatureUnit;
-  readonly takenAt: number;
   readonly selected: boolean;
   readonly hovered: boolean;
 }
@@ -30,7 +28,6 @@ export const TagRow = memo(function TagRow({
   sensors,
   chosen,
   unit,
-  takenAt,
   selected,
   hovered,
 }: Props): JSX.Element {
@@ -42,23 +39,10 @@ export const TagRow = memo(function TagRow({
       data-pest={tag.anomaly}
       data-selected={selected}
       data-hovered={hovered}
-      onPointerEnter={() => {
-        act({ type: 'hover', tagId: tag.id });
-      }}
-      onPointerLeave={() => {
-        act({ type: 'hover', tagId: null });
-      }}
     >
       <th scope="row">
-        {/* The button's hit area covers the whole row (see table.css). */}
-        <button
-          type="button"
-          className="row-button"
-          aria-pressed={selected}
-          onClick={() => {
-            act({ type: 'select', tagId: selected ? null : tag.id });
-          }}
-        >
+        {/* Its click is heard by the table (TagTable), as is one anywhere in the row. */}
+        <button type="button" className="row-button" aria-pressed={selected}>
           <bdi>{shown(tag.id, 24)}</bdi>
         </button>
         {!tag.at && (
@@ -71,7 +55,7 @@ export const TagRow = memo(function TagRow({
         <HealthMark status={health.status} />
       </td>
       <td className="number cell-age">
-        <Age staleSeconds={tag.staleSeconds} takenAt={takenAt} />
+        <Age observedAt={tag.observedAt} />
       </td>
       {sensors.map((sensor) => (
         <td
@@ -116,21 +100,17 @@ export function PestMark({ count }: { count: number }): JSX.Element {
 }
 
 /** Seconds tick here alone, so that a table of hundreds is not rendered anew each second. */
-export function Age({
-  staleSeconds,
-  takenAt,
-}: {
-  staleSeconds: number | null;
-  takenAt: number;
-}): JSX.Element {
-  const now = useNow();
-  const age = ageSeconds(staleSeconds, takenAt, now);
-  return age === null ? (
-    <span className="faint" title={S.neverObservedLong}>
+export function Age({ observedAt }: { observedAt: number | null }): JSX.Element {
+  const text = useTicking((now) => {
+    const age = ageSeconds(observedAt, now);
+    return age === null ? null : ageText(age);
+  });
+  return text === null ? (
+    <span className="age faint" title={S.neverObservedLong}>
       {S.neverObserved}
     </span>
   ) : (
-    <>{ageText(age)}</>
+    <span className="age">{text}</span>
   );
 }
 

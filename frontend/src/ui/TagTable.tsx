@@ -1,11 +1,18 @@
-import { memo, useMemo, type CSSProperties, type JSX, type ReactNode } from 'react';
+import {
+  memo,
+  useMemo,
+  type CSSProperties,
+  type JSX,
+  type ReactNode,
+  type SyntheticEvent,
+} from 'react';
 
 import { rgbText, sensorColour } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
 import { filterRows, rowsOf, sortRows } from '../domain/table';
 import { shown } from '../domain/text';
 import { unitOf } from '../domain/units';
-import { act, useApp } from '../store/app';
+import { act, store, useApp } from '../store/app';
 import { selectHealth, selectSensors } from '../store/derived';
 import { S } from '../strings';
 import { Icon } from './Icon';
@@ -30,8 +37,31 @@ export function TagTable(): JSX.Element {
   );
   const columns = 6 + sensors.length;
   return (
-    <table className="tags" data-testid="tag-table">
+    // Keyboard and screen reader use the button in each row; for the pointer the whole row is
+    // its target. One listener here, because a layer per row makes a long table slow.
+    // eslint-disable-next-line jsx-a11y/click-events-have-key-events, jsx-a11y/no-noninteractive-element-interactions
+    <table
+      className="tags"
+      data-testid="tag-table"
+      onClick={onClick}
+      onPointerOver={onPointerOver}
+      onPointerLeave={onPointerLeave}
+    >
       <caption className="unseen">{S.tableCaption}</caption>
+      <colgroup>
+        <col className="col-tag" />
+        <col className="col-health" />
+        <col className="col-age" />
+        {sensors.map((sensor) => (
+          <col
+            key={sensor.name}
+            className={sensor.name === chosen ? 'col-sensor' : 'col-sensor other'}
+          />
+        ))}
+        <col className="col-pest" />
+        <col className="col-species" />
+        <col className="col-flowers optional" />
+      </colgroup>
       <thead>
         <tr>
           <ColumnHead id="tag">{S.columns.tag}</ColumnHead>
@@ -63,7 +93,6 @@ export function TagTable(): JSX.Element {
             sensors={sensors}
             chosen={chosen}
             unit={unit}
-            takenAt={snapshot?.takenAt ?? 0}
             selected={row.tag.id === selected}
             hovered={row.tag.id === hovered}
           />
@@ -88,6 +117,26 @@ export function TagTable(): JSX.Element {
       </tbody>
     </table>
   );
+}
+
+/** The tag whose row an event hit; null in the head. */
+function rowTag(event: SyntheticEvent): string | null {
+  const row = event.target instanceof Element ? event.target.closest('tr') : null;
+  return row?.dataset['tagId'] ?? null;
+}
+
+function onClick(event: SyntheticEvent): void {
+  const tagId = rowTag(event);
+  if (tagId === null) return;
+  act({ type: 'select', tagId: store.get().view.selected === tagId ? null : tagId });
+}
+
+function onPointerOver(event: SyntheticEvent): void {
+  act({ type: 'hover', tagId: rowTag(event) });
+}
+
+function onPointerLeave(): void {
+  act({ type: 'hover', tagId: null });
 }
 
 const SensorHead = memo(function SensorHead({

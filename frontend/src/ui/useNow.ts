@@ -23,6 +23,11 @@ export function useNow(): number {
   return useSyncExternalStore(subscribe, () => now);
 }
 
+/** Something that follows from the time; renders when it changes, not with each tick. */
+export function useTicking<Part extends string | null>(part: (now: number) => Part): Part {
+  return useSyncExternalStore(subscribe, () => part(now));
+}
+
 /** Time of day, ms since the epoch, of a moment on the monotonic clock. */
 export function epochOf(moment: number): number {
   return Date.now() - (performance.now() - moment);

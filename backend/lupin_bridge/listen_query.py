@@ -14,7 +14,10 @@ MIN_RATE_HZ: Final = 0.01
 
 
 class ListenRefused(ValueError):
-    """A query that cannot be served; the message names the parameter, the value and the limit."""
+    """A query that cannot be served; the message names the parameter, the value and the limit.
+
+    It goes into a close frame, which has room for 123 bytes (RFC 6455, section 5.5).
+    """
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,17 +45,17 @@ def parse(parameters: Sequence[tuple[str, str]], subprotocols: Sequence[str] = (
     for name, value in parameters:
         if name not in ("delta", "encoding", "max_rate_hz"):
             raise ListenRefused(
-                f"parameter {name[:32]!r} is unknown, expected delta, encoding or max_rate_hz"
+                f"parameter {_shown(name)} is unknown, expected delta, encoding or max_rate_hz"
             )
         if name in values:
             raise ListenRefused(f"{name} is given more than once, expected one value")
         values[name] = value
     encoding = values.get("encoding", CBOR if CBOR in subprotocols else JSON)
     if encoding not in ENCODINGS:
-        raise ListenRefused(f"encoding is {encoding[:32]!r}, expected {' or '.join(ENCODINGS)}")
+        raise ListenRefused(f"encoding is {_shown(encoding)}, expected {' or '.join(ENCODINGS)}")
     delta = values.get("delta", "0")
     if delta not in _SWITCH:
-        raise ListenRefused(f"delta is {delta[:32]!r}, expected 0 or 1")
+        raise ListenRefused(f"delta is {_shown(delta)}, expected 0 or 1")
     return ListenQuery(_SWITCH[delta], encoding, _rate(values.get("max_rate_hz")))
 
 
@@ -64,5 +67,9 @@ def _rate(text: str | None) -> float:
     except ValueError:
         rate = math.nan
     if not rate >= MIN_RATE_HZ:  # false for NaN too
-        raise ListenRefused(f"max_rate_hz is {text[:32]!r}, expected a number from {MIN_RATE_HZ}")
+        raise ListenRefused(f"max_rate_hz is {_shown(text)}, expected a number from {MIN_RATE_HZ}")
     return rate
+
+
+def _shown(text: str) -> str:
+    return f"{text!a:.40}"

@@ -2,88 +2,18 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import random
-import socket
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import Any
-from urllib.parse import urlsplit
+from collections.abc import Iterator
 
 import pytest
 from websockets.exceptions import ConnectionClosed
-from websockets.frames import Frame, Opcode
-from websockets.sync.client import ClientConnection, connect
 
 from lupin_bridge.rosbridge_session import MAX_BURST
-from lupin_bridge.routes_rosbridge import MAX_OPEN_CALLS
-from lupin_bridge.settings import Settings
-from lupin_twin.fields import FieldRequest
-from tests.support import inprocess, messages
+from tests.support import messages
 from tests.support.proc_stat import resident_mb
-from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.rosbridge import FIELD, FIELD_ARGS, TOPIC, Message, Ros, ros_at, tags
 from tests.support.web import Bridge, bridge
-
-TOPIC = "/twin/state"
-FIELD = "/twin/get_field"
-FIELD_ARGS: dict[str, Any] = {
-    "sensor_type": "temperature",
-    "resolution": 0.5,
-    "bbox_min_x": -3.0,
-    "bbox_min_y": -3.0,
-    "bbox_max_x": 3.0,
-    "bbox_max_y": 3.0,
-}
-
-Message = dict[str, Any]
-
-
-class Ros:
-    """A rosbridge client that sees every message."""
-
-    def __init__(self, connection: ClientConnection) -> None:
-        self.connection = connection
-
-    def send(self, **members: Any) -> None:
-        self.connection.send(json.dumps(members))
-
-    def next(self) -> Message:
-        message: Message = json.loads(self.connection.recv(timeout=PATIENCE_S))
-        return message
-
-    def subscribe(self, message_id: object = None, **options: Any) -> None:
-        self.send(**{"op": "subscribe", "topic": TOPIC, "id": message_id, **options})
-
-    def call(self, service: str, message_id: str = "call", **members: Any) -> Message:
-        """Call a service and return the very next message, whatever it is."""
-        self.send(op="call_service", service=service, id=message_id, **members)
-        return self.next()
-
-    def is_quiet(self) -> bool:
-        """Whether nothing came before the answer to a question asked now."""
-        return self.call("/rosapi/topics", "quiet?").get("id") == "quiet?"
-
-    def until_tag(self, tag_id: str) -> Message:
-        """Read on to the first state that has the tag."""
-
-        def look() -> Message | None:
-            message = self.next()
-            return message if message["op"] == "publish" and tag_id in tags(message) else None
-
-        found = wait_for(look, f"a state with tag {tag_id}", meanwhile=lambda: None)
-        assert found is not None
-        return found
-
-
-def tags(message: Message) -> list[str]:
-    return [tag["tag_id"] for tag in message["msg"]["tags"]]
-
-
-@contextmanager
-def ros_at(url: str) -> Iterator[Ros]:
-    with connect(f"{url.replace('http', 'ws', 1)}/rosbridge", proxy=None, max_size=None) as opened:
-        yield Ros(opened)
 
 
 @pytest.fixture(scope="module")
@@ -139,18 +69,11 @@ def test_before_a_subscription_and_after_its_end_no_state_comes(house: Bridge, r
     ros.subscribe("a")
     ros.until_tag("before")
     ros.send(op="unsubscribe", topic=TOPIC, id="a")
-    drain(ros)
+    ros.drain()
     observed(house, "after")
     assert ros.is_quiet()
     ros.subscribe("a")
     assert "after" in tags(ros.next())
-
-
-def drain(ros: Ros) -> None:
-    """Read on to the answer to a question asked now."""
-    message = ros.call("/rosapi/topics", "drained")
-    while message.get("id") != "drained":
-        message = ros.next()
 
 
 def test_a_throttled_subscription_gets_the_latched_state_and_waits(house: Bridge, ros: Ros) -> None:
@@ -352,15 +275,7 @@ def test_names_are_the_ones_that_ros_knows() -> None:
         ros.subscribe(topic="/house/state")
         assert ros.next()["topic"] == "/house/state"
         ros.subscribe()
-        assert "expected /house/state" in first(ros, "status")["msg"]
-
-
-def first(ros: Ros, op: str) -> Message:
-    """Read on to the first message of a kind."""
-    message = ros.next()
-    while message["op"] != op:
-        message = ros.next()
-    return message
+        assert "expected /house/state" in ros.first("status")["msg"]
 
 
 def test_one_client_too_many_is_turned_away_and_told_so() -> None:
@@ -382,162 +297,3 @@ def test_the_limits_of_fields_hold_here_too() -> None:
             "127.0.0.1 asks for more than 0.1 fields a second, the limit (field_rate_hz)"
         )
         assert house.get("/api/field", **FIELD_ARGS).status_code == 429, "of one client, together"
-
-
-# --- in this process, to hold the twin up ------------------------------------------------------
-
-
-def calls(count: int) -> list[str]:
-    return [
-        json.dumps({"op": "call_service", "service": FIELD, "id": f"{n}", "args": FIELD_ARGS})
-        for n in range(count)
-    ]
-
-
-async def in_thread(url: str, talk: Callable[[Ros], Any]) -> Any:
-    def connected() -> Any:
-        with ros_at(url) as ros:
-            return talk(ros)
-
-    return await asyncio.to_thread(connected)
-
-
-def test_open_calls_are_bounded_and_the_rest_is_answered(
-    domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    running_at_once = 0
-    most_at_once = 0
-
-    async def test() -> None:
-        held = asyncio.Event()
-        async with inprocess.running() as here:
-            plain = here.twin.field
-
-            async def slow_field(request: FieldRequest) -> Any:
-                nonlocal running_at_once, most_at_once
-                running_at_once += 1
-                most_at_once = max(most_at_once, running_at_once)
-                await held.wait()
-                running_at_once -= 1
-                return await plain(request)
-
-            monkeypatch.setattr(here.twin, "field", slow_field)
-            loop = asyncio.get_running_loop()
-
-            def talk(ros: Ros) -> None:
-                for call in calls(MAX_OPEN_CALLS + 3):
-                    ros.connection.send(call)
-                refused = [ros.next() for _ in range(3)]
-                assert {reply["id"] for reply in refused} == {"32", "33", "34"}
-                for reply in refused:
-                    assert reply["result"] is False
-                    assert reply["values"] == "32 calls are under way, the limit for one client"
-                loop.call_soon_threadsafe(held.set)
-                answered = [ros.next() for _ in range(MAX_OPEN_CALLS)]
-                assert all(reply["result"] is True for reply in answered)
-                assert ros.call(FIELD, args=FIELD_ARGS)["result"] is True, "there is room again"
-
-            await in_thread(here.url, talk)
-
-    inprocess.run(domain, test())
-    assert most_at_once == 2
-
-
-def test_a_twin_that_does_not_answer_ends_a_call(
-    domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    async def test() -> None:
-        async with inprocess.running(Settings(field_timeout_s=0.1)) as here:
-
-            async def no_field(_request: FieldRequest) -> Any:
-                await asyncio.Event().wait()
-
-            monkeypatch.setattr(here.twin, "field", no_field)
-            response = await in_thread(here.url, lambda ros: ros.call(FIELD, args=FIELD_ARGS))
-            assert response["result"] is False
-            assert response["values"] == f"{FIELD} did not answer within 0.1 s"
-
-    inprocess.run(domain, test())
-
-
-def test_a_client_that_leaves_takes_its_calls_along(
-    domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    async def test() -> None:
-        began, ended = 0, 0
-        async with inprocess.running() as here:
-
-            async def no_field(_request: FieldRequest) -> Any:
-                nonlocal began, ended
-                began += 1
-                try:
-                    await asyncio.Event().wait()
-                finally:
-                    ended += 1
-
-            monkeypatch.setattr(here.twin, "field", no_field)
-            gone = asyncio.Event()
-
-            async def leave() -> None:
-                def talk(ros: Ros) -> None:
-                    for call in calls(5):
-                        ros.connection.send(call)
-                    asyncio.run_coroutine_threadsafe(
-                        inprocess.until(lambda: began == 2, "two calls with the twin"), loop
-                    ).result()
-
-                await in_thread(here.url, talk)
-                gone.set()
-
-            loop = asyncio.get_running_loop()
-            await leave()
-            assert gone.is_set()
-            await inprocess.until(lambda: ended == 2, "the end of both")
-            await inprocess.until(lambda: len(here.bridge.hub) == 0, "a hub without clients")
-            assert began == 2, "those that waited were never begun"
-
-    inprocess.run(domain, test())
-
-
-def test_a_client_that_takes_no_reply_is_closed_and_meanwhile_holds_little(domain: int) -> None:
-    async def test() -> None:
-        async with inprocess.running(Settings(client_timeout_s=1.0)) as here:
-            # A reader that is let go of would be emptied by asyncio.
-            _reader, writer = await deaf(here.url)
-            large = {**FIELD_ARGS, "resolution": 0.0061}  # 10^6 cells, all null: 5 MB
-            call = {"op": "call_service", "service": FIELD, "id": "large", "args": large}
-            for _ in range(5):
-                writer.write(Frame(Opcode.TEXT, json.dumps(call).encode()).serialize(mask=True))
-            most_bytes = 0
-
-            def is_dismissed() -> bool:
-                nonlocal most_bytes
-                for connection in here.server.server_state.connections:
-                    waiting = connection.transport.get_write_buffer_size()
-                    most_bytes = max(most_bytes, waiting)
-                return here.bridge.hub.clients_dismissed == 1
-
-            await inprocess.until(is_dismissed, "its dismissal")
-            await inprocess.until(lambda: not here.server.server_state.connections, "its end")
-            assert 0 < most_bytes < 12_000_000, "the replies of the running calls"
-            writer.transport.abort()
-
-    inprocess.run(domain, test())
-
-
-async def deaf(url: str) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
-    """A rosbridge client that reads no message."""
-    address = urlsplit(url)
-    raw = socket.socket()
-    raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-    raw.setblocking(False)
-    loop = asyncio.get_running_loop()
-    await loop.sock_connect(raw, (address.hostname, address.port))
-    reader, writer = await asyncio.open_connection(sock=raw, limit=1024)
-    writer.write(
-        f"GET /rosbridge HTTP/1.1\r\nHost: {address.netloc}\r\nConnection: Upgrade\r\n"
-        "Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
-        "Sec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==\r\n\r\n".encode()
-    )
-    assert b" 101 " in await reader.readuntil(b"\r\n\r\n")
-    return reader, writer

@@ -1,0 +1,118 @@
+"""A rosbridge client that hides nothing, and one that does not read."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+from urllib.parse import urlsplit
+
+from websockets.frames import Frame, Opcode
+from websockets.sync.client import ClientConnection, connect
+
+from tests.support.waiting import PATIENCE_S, wait_for
+
+TOPIC = "/twin/state"
+FIELD = "/twin/get_field"
+FIELD_ARGS: dict[str, Any] = {
+    "sensor_type": "temperature",
+    "resolution": 0.5,
+    "bbox_min_x": -3.0,
+    "bbox_min_y": -3.0,
+    "bbox_max_x": 3.0,
+    "bbox_max_y": 3.0,
+}
+
+Message = dict[str, Any]
+
+
+class Ros:
+    """A rosbridge client that sees every message."""
+
+    def __init__(self, connection: ClientConnection) -> None:
+        self.connection = connection
+
+    def send(self, **members: Any) -> None:
+        self.connection.send(json.dumps(members))
+
+    def next(self) -> Message:
+        message: Message = json.loads(self.connection.recv(timeout=PATIENCE_S))
+        return message
+
+    def subscribe(self, message_id: object = None, **options: Any) -> None:
+        self.send(**{"op": "subscribe", "topic": TOPIC, "id": message_id, **options})
+
+    def call(self, service: str, message_id: str = "call", **members: Any) -> Message:
+        """Call a service and return the very next message, whatever it is."""
+        self.send(op="call_service", service=service, id=message_id, **members)
+        return self.next()
+
+    def is_quiet(self) -> bool:
+        """Whether nothing came before the answer to a question asked now."""
+        return self.call("/rosapi/topics", "quiet?").get("id") == "quiet?"
+
+    def drain(self) -> None:
+        """Read on to the answer to a question asked now."""
+        message = self.call("/rosapi/topics", "drained")
+        while message.get("id") != "drained":
+            message = self.next()
+
+    def first(self, op: str) -> Message:
+        """Read on to the first message of a kind."""
+        message = self.next()
+        while message["op"] != op:
+            message = self.next()
+        return message
+
+    def until_tag(self, tag_id: str) -> Message:
+        """Read on to the first state that has the tag."""
+
+        def look() -> Message | None:
+            message = self.next()
+            return message if message["op"] == "publish" and tag_id in tags(message) else None
+
+        found = wait_for(look, f"a state with tag {tag_id}", meanwhile=lambda: None)
+        assert found is not None
+        return found
+
+
+def tags(message: Message) -> list[str]:
+    return [tag["tag_id"] for tag in message["msg"]["tags"]]
+
+
+@contextmanager
+def ros_at(url: str) -> Iterator[Ros]:
+    with connect(f"{url.replace('http', 'ws', 1)}/rosbridge", proxy=None, max_size=None) as opened:
+        yield Ros(opened)
+
+
+def large_call() -> bytes:
+    """A frame that asks for 10^6 cells, all null: 5 MB."""
+    call = {
+        "op": "call_service",
+        "service": FIELD,
+        "id": "large",
+        "args": {**FIELD_ARGS, "resolution": 0.0061},
+    }
+    return Frame(Opcode.TEXT, json.dumps(call).encode()).serialize(mask=True)
+
+
+async def deaf(url: str) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+    """A rosbridge client that reads no message."""
+    address = urlsplit(url)
+    raw = socket.socket()
+    raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    raw.setblocking(False)
+    loop = asyncio.get_running_loop()
+    await loop.sock_connect(raw, (address.hostname, address.port))
+    reader, writer = await asyncio.open_connection(sock=raw, limit=1024)
+    writer.write(
+        f"GET /rosbridge HTTP/1.1\r\nHost: {address.netloc}\r\nConnection: Upgrade\r\n"
+        "Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+        "Sec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==\r\n\r\n".encode()
+    )
+    assert b" 101 " in await reader.readuntil(b"\r\n\r\n")
+    return reader, writer

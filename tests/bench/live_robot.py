@@ -1,0 +1,80 @@
+"""The robot of the live bench: fills a twin with tags, then changes one of them at a steady rate.
+
+Run as `python -m tests.bench.live_robot --domain D --tags N --rate-hz R`. It prints `filled` when
+the twin publishes all tags, and goes on until it is killed. Every change is an observation of the
+tag `beat`, whose reading `beat` is this machine's CLOCK_MONOTONIC at the moment of its
+publication: whoever sees it knows how long it was on its way.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import time
+from collections.abc import Iterable
+from typing import Any
+
+from rclpy.duration import Duration
+
+from tests.support.messages import look, scan
+from tests.support.ros import Peer
+
+BEAT = "beat"
+TOPIC = "/floranova/observations"
+# Fewer than the topic's depth: what is acknowledged has not been replaced by what came later.
+BATCH = 20
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--domain", type=int, required=True)
+    parser.add_argument("--tags", type=int, required=True)
+    parser.add_argument("--rate-hz", type=float, required=True)
+    options = parser.parse_args()
+    with Peer(options.domain, "bench_robot") as peer:
+        peer.wait_for_twin()
+        peer.listen()
+        fill(peer, [BEAT, *(str(number) for number in range(1, options.tags))])
+        print("filled", flush=True)
+        with contextlib.suppress(KeyboardInterrupt):
+            beat(peer, 1.0 / options.rate_hz)
+
+
+def fill(peer: Peer, tag_ids: Iterable[str]) -> None:
+    """Publish every tag until the twin has all of them."""
+    wanted = list(tag_ids)
+    missing = wanted
+    while missing:
+        for start in range(0, len(missing), BATCH):
+            for tag_id in missing[start : start + BATCH]:
+                peer.observe(*tag_messages(tag_id, 0 if tag_id == BEAT else int(tag_id)))
+            peer.publisher(TOPIC, None).wait_for_all_acked(Duration(seconds=5))
+        peer.states.clear()
+        state = peer.until(lambda: peer.states, "the next state")[-1]
+        known = {tag.tag_id for tag in state.tags if tag.flowers}
+        missing = [tag_id for tag_id in wanted if tag_id not in known]
+
+
+def tag_messages(tag_id: str, number: int) -> tuple[Any, Any]:
+    """A tag with three sensors, an outline and two blooms: as in the demo's house, on average."""
+    x, y = 0.5 * (number % 100), 0.5 * (number // 100)
+    readings = {"temperature": 21.3, "humidity": 64.0, "co2": 612.0}
+    corners = [(x - 0.1, y - 0.1), (x + 0.1, y - 0.1), (x + 0.1, y + 0.1), (x - 0.1, y + 0.1)]
+    blooms = [(x - 0.05, y), (x + 0.05, y)]
+    return (
+        scan(tag_id, {**readings, BEAT: 0.0} if tag_id == BEAT else readings, (x, y)),
+        look(tag_id, at=(x, y), flower_count=2, blooms=blooms, footprint=corners),
+    )
+
+
+def beat(peer: Peer, period_s: float) -> None:
+    """Publish for ever, on a grid of the monotonic clock."""
+    due_s = time.monotonic()
+    while True:
+        due_s += period_s
+        time.sleep(max(0.0, due_s - time.monotonic()))
+        peer.observe(scan(BEAT, {BEAT: time.monotonic()}))
+
+
+if __name__ == "__main__":
+    main()

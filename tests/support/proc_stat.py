@@ -1,0 +1,30 @@
+"""What a process costs, from /proc (proc_pid_stat(5), proc_pid_status(5))."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+_TICKS_PER_S = os.sysconf("SC_CLK_TCK")
+_PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
+
+
+def cpu_s(pid: int) -> float:
+    """Processor time of all its threads so far, user and system, s."""
+    # The name stands in brackets and may hold blanks and brackets of its own.
+    fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / _TICKS_PER_S
+
+
+def resident_mb(pid: int) -> float:
+    """Resident memory, MB (10^6 bytes)."""
+    pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
+    return pages * _PAGE_BYTES / 1e6
+
+
+def tcp_buffers_mb() -> float:
+    """What the kernel holds in the buffers of all TCP sockets of this machine, MB."""
+    for line in Path("/proc/net/sockstat").read_text(encoding="ascii").splitlines():
+        if line.startswith("TCP:"):
+            return int(line.split()[-1]) * _PAGE_BYTES / 1e6
+    raise AssertionError("/proc/net/sockstat has no line TCP:")

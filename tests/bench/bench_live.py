@@ -158,9 +158,10 @@ def serving(tags: int, rate_hz: float, *options: str) -> Iterator[Server]:
         server = stack.enter_context(
             lupin_twin(domain, "serve", "--max-rate-hz", str(rate_hz), *options)
         )
-        port = urlsplit(url_of(server)).port
+        url = url_of(server)
+        port = urlsplit(url).port
         assert port is not None
-        arguments = ("--domain", domain, "--tags", tags, "--rate-hz", rate_hz)
+        arguments = ("--domain", domain, "--url", url, "--tags", tags, "--rate-hz", rate_hz)
         robot = stack.enter_context(
             Process(
                 [sys.executable, "-m", "tests.bench.live_robot", *map(str, arguments)],

@@ -1,9 +1,9 @@
 """The robot of the live bench: fills a twin with tags, then changes one of them at a steady rate.
 
-Run as `python -m tests.bench.live_robot --domain D --tags N --rate-hz R`. It prints `filled` when
-the twin publishes all tags, and goes on until it is killed. Every change is an observation of the
-tag `beat`, whose reading `beat` is this machine's CLOCK_MONOTONIC at the moment of its
-publication: whoever sees it knows how long it was on its way.
+Run as `python -m tests.bench.live_robot --domain D --url U --tags N --rate-hz R`, with the address
+of the twin's bridge. It prints `filled` when the twin knows all tags, and goes on until it is
+killed. Every change is an observation of the tag `beat`, whose reading `beat` is this machine's
+CLOCK_MONOTONIC at the moment of its publication: whoever sees it knows how long it was on its way.
 """
 
 from __future__ import annotations
@@ -11,48 +11,46 @@ from __future__ import annotations
 import argparse
 import contextlib
 import time
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Any
 
-from rclpy.duration import Duration
+import httpx
 
 from tests.support.messages import look, scan
 from tests.support.ros import Peer
+from tests.support.waiting import wait_for
 
 BEAT = "beat"
-TOPIC = "/floranova/observations"
-# Fewer than the topic's depth: what is acknowledged has not been replaced by what came later.
+# Two messages a tag, and the topic holds 50: a batch that was waited for has lost none.
 BATCH = 20
 
 
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--domain", type=int, required=True)
+    parser.add_argument("--url", required=True)
     parser.add_argument("--tags", type=int, required=True)
     parser.add_argument("--rate-hz", type=float, required=True)
     options = parser.parse_args()
     with Peer(options.domain, "bench_robot") as peer:
         peer.wait_for_twin()
-        peer.listen()
-        fill(peer, [BEAT, *(str(number) for number in range(1, options.tags))])
+        with httpx.Client(base_url=options.url, trust_env=False) as http:
+            fill(peer, http, [BEAT, *(str(number) for number in range(1, options.tags))])
         print("filled", flush=True)
         with contextlib.suppress(KeyboardInterrupt):
             beat(peer, 1.0 / options.rate_hz)
 
 
-def fill(peer: Peer, tag_ids: Iterable[str]) -> None:
-    """Publish every tag until the twin has all of them."""
-    wanted = list(tag_ids)
-    missing = wanted
-    while missing:
-        for start in range(0, len(missing), BATCH):
-            for tag_id in missing[start : start + BATCH]:
-                peer.observe(*tag_messages(tag_id, 0 if tag_id == BEAT else int(tag_id)))
-            peer.publisher(TOPIC, None).wait_for_all_acked(Duration(seconds=5))
-        peer.states.clear()
-        state = peer.until(lambda: peer.states, "the next state")[-1]
-        known = {tag.tag_id for tag in state.tags if tag.flowers}
-        missing = [tag_id for tag_id in wanted if tag_id not in known]
+def fill(peer: Peer, http: httpx.Client, tag_ids: Sequence[str]) -> None:
+    """Publish every tag, no faster than the twin takes them."""
+    for start in range(0, len(tag_ids), BATCH):
+        batch = tag_ids[start : start + BATCH]
+        for tag_id in batch:
+            peer.observe(*tag_messages(tag_id, 0 if tag_id == BEAT else int(tag_id)))
+        wait_for(
+            lambda last=batch[-1]: http.get(f"/api/tags/{last}").json().get("flowers"),  # type: ignore[misc]
+            f"tag {batch[-1]} in the twin",
+        )
 
 
 def tag_messages(tag_id: str, number: int) -> tuple[Any, Any]:

@@ -346,10 +346,13 @@ def test_coincident_sample_is_taken_exactly(power: float, falloff: float) -> Non
     assert field_at_origin(samples, falloff_radius_m=falloff, power=power) == 7.0
 
 
-def test_sample_at_the_coincidence_distance_is_averaged() -> None:
-    # Weights 10⁶ and 4.
-    value = field_at_origin([(COINCIDENT_EPS_M, 0.0, 0.0), (0.5, 0.0, 1e6)])
-    assert value == pytest.approx(4e6 / 1000004.0, rel=1e-6)
+@pytest.mark.parametrize(("power", "weights"), [(2.0, (1e6, 4.0)), (3.0, (1e9, 8.0))])
+def test_sample_at_the_coincidence_distance_is_averaged(
+    power: float, weights: tuple[float, float]
+) -> None:
+    samples = [(COINCIDENT_EPS_M, 0.0, 0.0), (0.5, 0.0, 1e6)]
+    expected = 1e6 * weights[1] / sum(weights)
+    assert field_at_origin(samples, power=power) == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("power", [2.0, 3.0])
@@ -409,6 +412,17 @@ def test_equal_distances_tie_although_their_squares_are_a_rounding_apart() -> No
     for x, y in tied:
         samples = [(*first, 10.0), (x, y, 20.0)]
         assert field_at_origin(samples, falloff_radius_m=0.5, max_distance_m=2.0) == 10.0
+
+
+@pytest.mark.parametrize("power", [2.0, 3.0])
+def test_distance_at_a_radius_is_within_although_its_square_is_not(power: float) -> None:
+    """0.8 and 1.5 are the legs of a triangle whose long side, 1.7, is met exactly by rounding."""
+    assert 0.8 * 0.8 + 1.5 * 1.5 > 1.7 * 1.7
+    assert math.sqrt(0.8 * 0.8 + 1.5 * 1.5) == 1.7
+    gate = {"falloff_radius_m": 0.0, "max_distance_m": 1.7, "power": power}
+    assert field_at_origin([(0.8, 1.5, 7.0)], **gate) == 7.0
+    falloff = {"falloff_radius_m": 1.7, "max_distance_m": 3.0, "power": power}
+    assert field_at_origin([(0.8, 1.5, 10.0), (1.5, 0.8, 20.0)], **falloff) == 15.0
 
 
 def test_sample_outside_the_box_reaches_into_it() -> None:
@@ -498,6 +512,9 @@ def test_enormous_distances_still_weigh() -> None:
     far = {"falloff_radius_m": 1e150, "max_distance_m": 1e150}
     samples = [(1e140, 0.0, 10.0), (0.0, 2e140, 20.0)]
     assert field_at_origin(samples, **far) == pytest.approx((10 * 4 + 20) / 5)
+    # v/d² vanishes here, and the mean must not.
+    tiny = [(1e149, 0.0, 1e-28), (0.0, 1e149, 3e-28)]
+    assert field_at_origin(tiny, **far) == pytest.approx(2e-28, rel=1e-6)
     # A reach whose square overflows takes in whatever has a finite distance.
     assert field_at_origin(samples, falloff_radius_m=1e300, max_distance_m=1e300) > 0.0
 
@@ -664,6 +681,7 @@ def float32(number: float) -> float:
         (1.1001, 0.1, 12),
         (0.003, 0.001, 3),
         (70.0, 10.0, 7),
+        (0.027, 0.009, 3),
         (70.1, 10.0, 8),
     ],
 )

@@ -75,8 +75,6 @@ def _largest_square_within(radius: float) -> float:
     the bit, and the root need not be taken for every pair.
     """
     square = min(radius * radius, sys.float_info.max)
-    while math.sqrt(square) > radius:
-        square = math.nextafter(square, 0.0)
     while math.sqrt(following := math.nextafter(square, math.inf)) <= radius:
         square = following
     return square

@@ -51,8 +51,7 @@ export const S = {
     `ideal ${low} to ${high} ${unit}`,
   healthAllWell: 'Every judged reading lies within its ideal range',
   healthNothing: 'No reading with an ideal range yet',
-  healthFilter: (status: string, count: number): string =>
-    `${status}: ${counted(count, 'tag', 'tags')}. Show only these`,
+  healthFilter: ', show only these tags',
   attention: 'Needs attention',
   attentionNone: 'Nothing needs attention',
   below: 'below ideal',

@@ -10,6 +10,8 @@ test.each([
   ['\u2066left\u2069', '\ufffdleft\ufffd'],
   ['zero\u200bwidth', 'zero\ufffdwidth'],
   ['  12  ', '12'],
+  ['   ', '\u2423'],
+  ['', '\u2423'],
 ])('%j is shown as %j', (text, expected) => {
   expect(shown(text)).toBe(expected);
 });

@@ -12,8 +12,10 @@ const STACKED_MARKS = /(\p{M}{3})\p{M}+/gu;
 
 const REPLACEMENT = '\ufffd';
 const LONGEST = 80;
+/** Stands for text of which nothing can be seen: a name must have something to click on. */
+const BLANK = '\u2423';
 
-/** Text fit to show: nothing invisible, marks bounded, at most `longest` characters. */
+/** Text fit to show: never blank, nothing invisible, marks bounded, at most `longest` characters. */
 export function shown(text: string, longest = LONGEST): string {
   // Cut first: a megabyte needs no cleaning to show eighty characters.
   const clean = text
@@ -21,6 +23,7 @@ export function shown(text: string, longest = LONGEST): string {
     .replace(INVISIBLE, REPLACEMENT)
     .replace(STACKED_MARKS, '$1')
     .trim();
+  if (clean === '') return BLANK;
   const letters = Array.from(clean);
   return letters.length > longest ? `${letters.slice(0, longest - 1).join('')}…` : clean;
 }

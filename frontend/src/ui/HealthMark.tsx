@@ -26,6 +26,17 @@ const SHAPES: Readonly<Record<HealthStatus, JSX.Element>> = {
   'no-data': <circle cx="8" cy="8" r="6.3" className="hollow" />,
 };
 
+/** The shape alone, where the word stands beside it anyway. */
+export function HealthShape({ status }: { status: HealthStatus }): JSX.Element {
+  return (
+    <span className="health-mark" data-health={status}>
+      <svg viewBox="0 0 16 16" width="16" height="16" aria-hidden="true">
+        {SHAPES[status]}
+      </svg>
+    </span>
+  );
+}
+
 export function HealthMark({
   status,
   word = true,

@@ -8,7 +8,7 @@ import type { TemperatureUnit } from '../domain/units';
 import { act, useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
 import { S } from '../strings';
-import { HealthMark } from './HealthMark';
+import { HealthMark, HealthShape } from './HealthMark';
 
 const ORDER: readonly HealthStatus[] = ['critical', 'stressed', 'healthy', 'no-data'];
 
@@ -55,16 +55,15 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
             <button
               type="button"
               aria-pressed={filter === status}
-              aria-label={S.healthFilter(S.health[status], health.counts[status])}
               disabled={kiosk}
               data-health={status}
               onClick={() => {
                 act({ type: 'health', status: filter === status ? null : status });
               }}
             >
-              <HealthMark status={status} word={false} />
-              <strong>{health.counts[status]}</strong>
-              <span>{S.health[status]}</span>
+              <HealthShape status={status} />
+              <strong>{health.counts[status]}</strong> <span>{S.health[status]}</span>
+              {!kiosk && <span className="unseen">{S.healthFilter}</span>}
             </button>
           </li>
         ))}

@@ -121,7 +121,9 @@ function Keys(): JSX.Element {
   );
   const unknown = snapshot?.tags.some((tag) => tag.blooms.some((bloom) => bloom.species === ''));
   return (
-    <ul className="legend-keys">
+    // May scroll on a phone, so the keyboard must be able to reach it.
+    // eslint-disable-next-line jsx-a11y/no-noninteractive-tabindex
+    <ul className="legend-keys" aria-label={S.legend} tabIndex={0}>
       <li>
         <svg viewBox="0 0 16 16" width="16" height="16" aria-hidden="true">
           <path d="M8 1.5 14.5 8 8 14.5 1.5 8Z" className="key-pin" />

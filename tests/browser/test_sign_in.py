@@ -1,0 +1,124 @@
+"""Signing in as a person does it: the page, a wrong token, the right one, and coming back."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page, expect
+
+from tests.support.access import TOKEN, Served, served
+from tests.support.tls import Certificate, certificate
+from tests.support.waiting import PATIENCE_S
+
+
+@pytest.fixture(scope="module")
+def closed() -> Iterator[Served]:
+    with served(LUPIN_TOKEN=TOKEN) as running:
+        yield running
+        assert TOKEN not in running.process.output
+
+
+@pytest.fixture
+def context(browser: Browser) -> Iterator[BrowserContext]:
+    with browser.new_context(ignore_https_errors=True) as own:
+        own.set_default_timeout(PATIENCE_S * 1000)
+        yield own
+
+
+@pytest.fixture
+def page(context: BrowserContext) -> Page:
+    return context.new_page()
+
+
+def sign_in(page: Page, token: str) -> None:
+    page.get_by_label("Access token").fill(token)
+    page.get_by_role("button", name="Sign in").click()
+
+
+def expect_live(page: Page) -> None:
+    """Wait for the HMI, connected over its WebSocket."""
+    expect(page.get_by_test_id("app")).to_have_attribute("data-connection-state", "live")
+
+
+def test_a_person_signs_in_with_the_keyboard_alone(closed: Served, page: Page) -> None:
+    addresses: list[str] = []
+    page.on("request", lambda request: addresses.append(request.url))
+    page.goto(closed.url)
+    expect(page).to_have_url(closed.url + "/signin")
+    expect(page.get_by_label("Access token")).to_be_focused()
+    page.keyboard.type(TOKEN)
+    page.keyboard.press("Enter")
+    expect(page).to_have_url(re.compile(f"^{closed.url}/(#.*)?$"))
+    expect_live(page)
+    assert not [address for address in addresses if TOKEN in address]
+
+
+def test_a_wrong_token_is_told_and_can_be_corrected(closed: Served, page: Page) -> None:
+    page.goto(closed.url + "/signin")
+    sign_in(page, TOKEN[::-1].strip("=") + "x")
+    expect(page.get_by_role("alert")).to_have_text("This is not the right token.")
+    sign_in(page, "not a token")
+    expect(page.get_by_role("alert")).to_have_text(re.compile("letters, digits"))
+    assert "/signin" in page.url
+    sign_in(page, f" {TOKEN} ")
+    expect_live(page)
+
+
+def test_the_page_keeps_nothing_of_the_token(closed: Served, page: Page) -> None:
+    page.goto(closed.url + "/signin")
+    sign_in(page, TOKEN)
+    expect_live(page)
+    kept = page.evaluate(
+        "() => JSON.stringify([{...localStorage}, {...sessionStorage}, document.cookie])"
+    )
+    assert TOKEN not in kept
+    assert "lupin_session" not in kept, "scripts do not see the cookie"
+    (cookie,) = page.context.cookies()
+    assert cookie["httpOnly"]
+    assert cookie["sameSite"] == "Strict"
+    assert not cookie["secure"]
+    assert TOKEN not in cookie["value"]
+
+
+def test_a_session_outlives_the_page(closed: Served, context: BrowserContext, page: Page) -> None:
+    page.goto(closed.url + "/signin")
+    sign_in(page, TOKEN)
+    expect_live(page)
+    page.close()
+    another = context.new_page()
+    another.goto(closed.url)
+    expect_live(another)
+
+
+def test_a_link_on_another_page_leads_in_although_the_cookie_is_strict(
+    closed: Served, page: Page
+) -> None:
+    page.goto(closed.url + "/signin")
+    sign_in(page, TOKEN)
+    expect_live(page)
+    page.goto("data:text/html,elsewhere")
+    page.evaluate("url => { location.href = url }", closed.url + "/")
+    expect_live(page)
+
+
+def test_without_a_session_the_hmi_shows_nothing(closed: Served, page: Page) -> None:
+    answer = page.goto(closed.url)
+    assert answer is not None
+    assert answer.url == closed.url + "/signin"
+    expect(page.get_by_test_id("app")).to_have_count(0)
+
+
+def test_over_tls_the_cookie_is_secure(
+    context: BrowserContext, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    ours: Certificate = certificate(tmp_path_factory.mktemp("tls"))
+    with served(*ours.options, trust=ours.trust, LUPIN_TOKEN=TOKEN) as secure:
+        page = context.new_page()
+        page.goto(secure.url)
+        sign_in(page, TOKEN)
+        expect_live(page)
+        (cookie,) = context.cookies()
+        assert cookie["secure"]
+        assert page.evaluate("isSecureContext")

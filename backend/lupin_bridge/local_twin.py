@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
@@ -104,19 +104,21 @@ class LocalTwin:
 
     async def field(self, request: FieldRequest) -> RevisedGrid:
         """A hit from the node's cache, or the field computed on a worker and handed back to it."""
+        return await self._in_time(self._field(request))
 
+    async def history(self, tag_id: str) -> tuple[Observation, ...] | None:
+        """The last `buffer_len` scans of a tag."""
+        return await self._in_time(self._thread.call(lambda node: node.store.history(tag_id)))
+
+    async def _field(self, request: FieldRequest) -> RevisedGrid:
         def look_up(node: TwinNode) -> tuple[FieldGrid | FieldJob, str]:
             answer = node.fields.lookup(request, node.store, node.occupancy_map)
             return answer, self._revision_of(node)
 
-        answer, revision = await self._ask(look_up)
+        answer, revision = await self._thread.call(look_up)
         if isinstance(answer, FieldJob):
             answer = await self._compute_once(answer)
         return RevisedGrid(answer, revision)
-
-    async def history(self, tag_id: str) -> tuple[Observation, ...] | None:
-        """The last `buffer_len` scans of a tag."""
-        return await self._ask(lambda node: node.store.history(tag_id))
 
     async def _compute_once(self, job: FieldJob) -> FieldGrid:
         """Identical requests in flight share one computation; who leaves does not end it."""
@@ -124,19 +126,25 @@ class LocalTwin:
         if task is None:
             task = asyncio.create_task(self._compute(job))
             self._computing[job.key] = task
-            task.add_done_callback(lambda _: self._computing.pop(job.key, None))
+
+            def forget(done: asyncio.Task[FieldGrid]) -> None:
+                del self._computing[job.key]
+                if not done.cancelled():
+                    done.exception()  # looked at, should all who waited have left
+
+            task.add_done_callback(forget)
         return await asyncio.shield(task)
 
     async def _compute(self, job: FieldJob) -> FieldGrid:
         loop = asyncio.get_running_loop()
         grid = await loop.run_in_executor(self._pool, job.compute)
-        await self._ask(lambda node: node.fields.keep(job, grid))
+        await self._thread.call(lambda node: node.fields.keep(job, grid))
         return grid
 
-    async def _ask(self, work: Callable[[TwinNode], ResultT]) -> ResultT:
+    async def _in_time(self, answer: Coroutine[Any, Any, ResultT]) -> ResultT:
         try:
             async with asyncio.timeout(self._timeout_s):
-                return await self._thread.call(work)
+                return await answer
         except TimeoutError:
             raise TwinTimeoutError(
                 f"the twin did not answer within {self._timeout_s:g} s (field_timeout_s)"

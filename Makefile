@@ -59,7 +59,7 @@ $(DONE)/python: pyproject.toml requirements.txt $(wildcard ros_node/*/setup.py) 
 
 $(DONE)/node_modules: package.json package-lock.json | $(DONE)/checked
 	$(say) 'installing the front-end packages'
-	@npm ci --no-audit --no-fund --loglevel=error
+	@npm ci --no-audit --no-fund --no-update-notifier --loglevel=error
 	@touch $@
 
 HMI_SOURCES := $(shell find frontend -type f -not -path '*/node_modules/*' 2>/dev/null) \

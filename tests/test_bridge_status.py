@@ -58,3 +58,22 @@ def test_the_first_map_is_news_for_a_page_and_not_for_a_person() -> None:
     assert status.is_news_after(before)
     assert not status.says_more_than(before)
     assert schema.StatusFrame.model_validate(status.frame()).has_map is True
+
+
+def test_more_than_one_twin_is_said_as_long_as_they_live() -> None:
+    liveness = Liveness(last_state_s=0.0, twin_count=2)
+    assert liveness.status(0.0).is_live
+    assert liveness.status(0.0).message.startswith("2 twins publish on the same topic")
+    assert "silent" in liveness.status(10.0).message
+
+
+def test_what_is_news_for_clients_and_what_for_people() -> None:
+    live = Status("live", 0.1)
+    assert live.is_news_after(None)
+    assert not Status("live", 0.9).is_news_after(live), "an age alone is none"
+    for more in (Status("stale", 3.0), Status("live", 0.1, twin_count=2)):
+        assert more.is_news_after(live)
+        assert more.says_more_than(live)
+    mapped = Status("live", 0.1, has_map=True)
+    assert mapped.is_news_after(live)
+    assert not mapped.says_more_than(live)

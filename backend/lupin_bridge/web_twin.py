@@ -33,7 +33,7 @@ class WebTwin:
         self._ros_args = ros_args
         self._timeout_s = timeout_s
         self._thread: RosThread[WebNode, Revised]
-        self._asking: dict[FieldRequest, asyncio.Task[RevisedGrid]] = {}
+        self._asking: dict[tuple[str, FieldRequest], asyncio.Task[RevisedGrid]] = {}
         self._slots = asyncio.Semaphore(MAX_REQUESTS)
 
     async def start(
@@ -106,19 +106,23 @@ class WebTwin:
         return await self._thread.call(lambda node: node.history(tag_id))
 
     async def field(self, request: FieldRequest) -> RevisedGrid:
-        """The field from the twin's service; identical requests in flight are asked once."""
-        task = self._asking.get(request)
+        """The field from the twin's service; identical requests in flight are asked once.
+
+        Identical is what was asked at the same revision: who has heard of a change must not get
+        the field from before.
+        """
+        revision = self.revision()
+        task = self._asking.get((revision, request))
         if task is None:
-            task = asyncio.create_task(self._ask_once(request))
-            self._asking[request] = task
-            task.add_done_callback(lambda _: self._asking.pop(request, None))
+            task = asyncio.create_task(self._ask_once(revision, request))
+            self._asking[revision, request] = task
+            task.add_done_callback(lambda _: self._asking.pop((revision, request), None))
         return await asyncio.shield(task)
 
-    async def _ask_once(self, request: FieldRequest) -> RevisedGrid:
-        revision = self.revision()
+    async def _ask_once(self, revision: str, request: FieldRequest) -> RevisedGrid:
         try:
             async with asyncio.timeout(self._timeout_s), self._slots:
-                if not self._thread.peek(lambda node: node.field_client.service_is_ready()):
+                if not await self._thread.call(lambda node: node.field_client.service_is_ready()):
                     service = self._thread.peek(lambda node: node.parameters.field_service_name)
                     raise TwinUnavailableError(f"no twin offers {service}: is it running?")
                 response = await self._thread.ask(

@@ -11,7 +11,10 @@ import pytest
 from playwright.sync_api import Browser, expect, sync_playwright
 
 from tests.browser.hmi import Hmi, open_hmi
+from tests.browser.house import furnish
+from tests.support.domains import own_domain
 from tests.support.waiting import PATIENCE_S
+from tests.support.web import Bridge, bridge
 
 CHROMIUM = os.environ.get("CHROMIUM", "/usr/bin/chromium")
 # No GPU anywhere, and no word to anybody outside.
@@ -38,6 +41,14 @@ def browser() -> Iterator[Browser]:
         )
         with chromium:
             yield chromium
+
+
+@pytest.fixture(scope="package")
+def house() -> Iterator[Bridge]:
+    """A server with the greenhouse of `house.py`, for tests that change nothing in it."""
+    with own_domain() as domain, bridge(domain=domain) as running:
+        furnish(running)
+        yield running
 
 
 @pytest.fixture

@@ -78,6 +78,12 @@ class Hmi:
             self.page.goto("about:blank")  # else only the fragment changes, and nothing is loaded
         self.page.goto(f"{self.url}/{query}{'#' if fragment else ''}{fragment}")
 
+    def address(self) -> str:
+        """What is in the address bar now."""
+        address = self.page.evaluate("location.href")
+        assert isinstance(address, str)
+        return address
+
     def allow_noise(self, pattern: str) -> None:
         """Let the console say something that matches, from now on and before."""
         self.allowed_noise.append(pattern)
@@ -152,16 +158,20 @@ class Hmi:
         text = self.page.get_by_test_id("map-canvas").get_attribute("data-view") or ""
         return View(*(float(part) for part in text.split(",")))
 
-    def picture(self) -> Image.Image:
-        """The map view as it is on the screen, buttons and all; one pixel a CSS pixel."""
-        return Image.open(io.BytesIO(self.map.screenshot())).convert("RGB")
+    def picture(self, width: int | None = None) -> Image.Image:
+        """The map view as it is on the screen, buttons and all; one pixel a CSS pixel.
 
-    def settled_picture(self) -> Image.Image:
+        With `width` only its left part.
+        """
+        picture = Image.open(io.BytesIO(self.map.screenshot())).convert("RGB")
+        return picture if width is None else picture.crop((0, 0, width, picture.height))
+
+    def settled_picture(self, width: int | None = None) -> Image.Image:
         """The map view once it stays the same: all that is on its way has been drawn."""
-        pictures = [self.picture()]
+        pictures = [self.picture(width)]
 
         def look() -> bool:
-            pictures.append(self.picture())
+            pictures.append(self.picture(width))
             return len(pictures) > 3 and all(p == pictures[-1] for p in pictures[-3:])
 
         wait_for(look, "a picture that stays the same")
@@ -169,13 +179,17 @@ class Hmi:
 
     def expect_change(self, before: Image.Image) -> Box:
         """Wait until the map view looks otherwise; returns the box of what is not the same."""
-        box = wait_for(lambda: changed_box(before, self.picture()), "a change of the map")
+        box = wait_for(
+            lambda: changed_box(before, self.picture(before.width)), "a change of the map"
+        )
         assert box is not None
         return box
 
     def expect_picture(self, wanted: Image.Image) -> None:
         """Wait until the map view looks exactly like that."""
-        wait_for(lambda: changed_box(wanted, self.picture()) is None, "that very picture")
+        wait_for(
+            lambda: changed_box(wanted, self.picture(wanted.width)) is None, "that very picture"
+        )
 
     def pixels(self, points: Sequence[tuple[float, float]]) -> list[Pixel]:
         """Colours on the screen at points of the map frame, m."""

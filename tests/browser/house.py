@@ -1,0 +1,38 @@
+"""A small greenhouse with one of everything, for tests that only look at it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from lupin_msgs.msg import Observation
+
+from tests.support.messages import discovered, look, occupancy_grid, pose, scan
+from tests.support.web import Bridge
+
+# Numbers in their order, then names.
+TAGS = ("1", "2", "3", "9", "10", "failed", "seen")
+
+
+def observations() -> list[Any]:
+    """What the robot told: tag 9 has no pose, tag 10 a pest, and one scan failed."""
+    box = [(0.5, 0.8), (3.5, 0.8), (3.5, 1.2), (0.5, 1.2)]
+    return [
+        scan("10", {"temperature": 31.0, "humidity": 40.0}, at=(1, 3)),
+        scan("9", {"temperature": 22.0, "light": 900.0}),
+        scan("1", {"temperature": 20.0, "humidity": 60.0, "soil_moisture": 45.0}, at=(1, 1)),
+        scan("2", {"temperature": 23.0, "co2": 600.0}, at=(3, 1)),
+        scan("3", {"humidity": 70.0, "co2": float("nan")}, at=(3, 3)),
+        scan("failed", status=Observation.STATUS_SCAN_FAILED, at=(2, 2)),
+        look("1", "lupin", blooms=[(0.8, 1.0), (1.2, 1.0)], flower_count=2, footprint=box),
+        look("2", "tomato", blooms=[(2.9, 1.0)], flower_count=1, footprint=box),
+        look("10", "lupin", anomaly=True, bug_count=3),
+    ]
+
+
+def furnish(bridge: Bridge) -> None:
+    """Let a bridge's twin know all of it."""
+    bridge.peer.publish_map(occupancy_grid([[100] * 6, *([[100, 0, 0, 0, 0, 100]] * 4), [100] * 6]))
+    bridge.peer.discover(discovered({"seen": pose(4, 2)}))
+    bridge.peer.observe(*observations())
+    bridge.tag("10", lambda tag: tag["anomaly"])
+    bridge.tag("seen")

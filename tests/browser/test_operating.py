@@ -1,0 +1,316 @@
+"""The operator's hands: sensors, table, layers, range, units; by mouse and by keyboard alone."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.hmi import Hmi
+from tests.browser.house import TAGS
+from tests.support.web import Bridge
+
+OpenPage = Callable[..., Hmi]
+
+
+@pytest.fixture
+def hmi(house: Bridge, open_page: OpenPage) -> Hmi:
+    """A page that shows the whole house."""
+    page = open_page(house.url)
+    page.expect_rows(*TAGS)
+    page.expect_samples(3)
+    return page
+
+
+# --- sensors ------------------------------------------------------------------------------------
+
+
+def test_another_sensor_changes_heat_map_legend_and_column(hmi: Hmi) -> None:
+    legend, chosen = hmi.test_id("legend"), hmi.page.locator("thead th.chosen")
+    expect(legend).to_contain_text("Temperature °C")
+    expect(chosen).to_have_attribute("data-column", "temperature")
+    expect(hmi.test_id("range-low")).to_have_text("20.0")
+    expect(hmi.test_id("range-high")).to_have_text("31.0\u00a0°C")
+    before = hmi.settled_picture()
+
+    hmi.choose_sensor("Humidity")
+    expect(legend).to_contain_text("Humidity %")
+    expect(chosen).to_have_attribute("data-column", "humidity")
+    expect(hmi.test_id("range-low")).to_have_text("40.0")
+    expect(hmi.test_id("range-high")).to_have_text("70.0\u00a0%")
+    hmi.expect_change(before)
+    # At the tag with the most humid air: a clear blue where temperature's red was not.
+    red, _, blue = hmi.pixel(3.3, 3.3)
+    assert blue > red + 50
+
+
+def test_a_sensor_that_few_tags_carry_says_how_many_contribute(hmi: Hmi) -> None:
+    hmi.choose_sensor("Soil moisture")
+    hmi.expect_samples(1)
+    hmi.choose_sensor("Light")  # the only tag that carries it has no pose
+    expect(hmi.test_id("sample-count")).to_have_text("No tag contributes")
+    expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-reading")
+
+
+def test_fahrenheit_everywhere_and_kept(hmi: Hmi) -> None:
+    hmi.page.keyboard.press("u")
+    expect(hmi.cell("1", "temperature")).to_have_text("68.0")
+    expect(hmi.test_id("legend")).to_contain_text("Temperature °F")
+    expect(hmi.test_id("range-high")).to_have_text("87.8\u00a0°F")
+    hmi.page.reload()
+    expect(hmi.cell("1", "temperature")).to_have_text("68.0")
+
+
+def test_a_fixed_range_stays_when_the_data_would_have_another(hmi: Hmi) -> None:
+    hmi.page.get_by_role("radio", name="Fixed").check()
+    high = hmi.page.get_by_label("Highest °C")
+    high.fill("100")
+    high.press("Enter")
+    expect(hmi.test_id("range-high")).to_have_text("100\u00a0°C")
+    hmi.page.get_by_role("button", name="Use ideal range").click()
+    expect(hmi.test_id("range-low")).to_have_text("18.0")
+    expect(hmi.test_id("range-high")).to_have_text("26.0\u00a0°C")
+    hmi.page.get_by_role("radio", name="Auto").check()
+    expect(hmi.test_id("range-high")).to_have_text("31.0\u00a0°C")
+
+
+# --- table --------------------------------------------------------------------------------------
+
+
+def test_columns_sort_both_ways_and_say_so(hmi: Hmi) -> None:
+    header = hmi.page.locator("th[data-column=temperature]")
+    expect(header).to_have_attribute("aria-sort", "none")
+    expect(hmi.page.locator("th[data-column=tag]")).to_have_attribute("aria-sort", "ascending")
+
+    header.get_by_role("button").click()
+    expect(header).to_have_attribute("aria-sort", "ascending")
+    hmi.expect_rows("1", "9", "2", "10", "3", "failed", "seen")
+    header.get_by_role("button").click()
+    expect(header).to_have_attribute("aria-sort", "descending")
+    # Who has no reading stays last.
+    hmi.expect_rows("10", "2", "9", "1", "3", "failed", "seen")
+    expect(hmi.page.locator("th[aria-sort=ascending], th[aria-sort=descending]")).to_have_count(1)
+
+
+def test_a_filter_finds_words_in_any_order(hmi: Hmi) -> None:
+    field = hmi.page.get_by_role("searchbox")
+    field.fill("pest lup")
+    hmi.expect_rows("10")
+    expect(hmi.test_id("row-count")).to_have_text("1 of 7 tags")
+    field.fill("no such thing")
+    expect(hmi.page.locator("tr.no-match")).to_contain_text("No tag matches")
+    hmi.page.get_by_role("button", name="Clear filter").click()
+    hmi.expect_rows(*TAGS)
+
+
+def test_health_names_the_tag_that_drives_it_and_filters_the_table(hmi: Hmi) -> None:
+    # 31 °C is 5 above an ideal range that is 8 wide: 0.625, stressed.
+    expect(hmi.test_id("house-health")).to_have_attribute("data-health", "stressed")
+    driver = hmi.test_id("health-driver")
+    expect(driver).to_contain_text("Tag 10: Temperature 31.0\u00a0°C")
+    driver.click()
+    expect(hmi.card("10")).to_be_visible()
+    hmi.page.locator(".health-counts [data-health=no-data]").first.click()
+    hmi.expect_rows("failed", "seen")
+
+
+def test_a_row_and_its_pin_find_each_other(hmi: Hmi) -> None:
+    hmi.click_map(3, 1)
+    expect(hmi.card("2")).to_be_visible()
+    expect(hmi.row("2")).to_have_attribute("data-selected", "true")
+    hmi.point_at(1, 1)
+    expect(hmi.row("1")).to_have_attribute("data-hovered", "true")
+
+    hmi.page.get_by_role("button", name="Close").first.click()
+    before = hmi.settled_picture()
+    hmi.row("10").hover()
+    mark = hmi.expect_change(before)
+    x, y = hmi.view().pixel(1, 3)
+    assert abs((mark.left + mark.right - 1) / 2 - x) <= 1.5
+    assert abs((mark.top + mark.bottom - 1) / 2 - y) <= 1.5
+
+
+def test_the_card_tells_all_about_a_tag(hmi: Hmi) -> None:
+    hmi.click_map(1, 3)
+    card = hmi.card("10")
+    expect(card).to_contain_text("Pest3 bugs")
+    expect(card.locator("[data-sensor=temperature]")).to_contain_text("31.0\u00a0°C")
+    expect(card.locator("[data-sensor=temperature]")).to_contain_text("above ideal")
+    expect(card).to_contain_text("lupin")
+    expect(card).to_contain_text("x 1.00 m, y 3.00 m")
+
+
+# --- map ----------------------------------------------------------------------------------------
+
+
+def test_wheel_drag_and_buttons_move_the_map_about_the_pointer(hmi: Hmi) -> None:
+    start = hmi.view()
+    x, y = start.pixel(1, 1)
+    hmi.map.hover(position={"x": x, "y": y})
+    hmi.page.mouse.wheel(0, -240)
+    hmi.expect(lambda: hmi.view().scale > start.scale * 1.2, "a closer view")
+    # What is under the pointer stays there.
+    assert hmi.view().pixel(1, 1) == pytest.approx((x, y), abs=1)
+
+    zoomed = hmi.view()
+    hmi.page.mouse.down()
+    hmi.page.mouse.move(*_on_page(hmi, x + 60, y - 40), steps=4)
+    hmi.page.mouse.up()
+    moved = hmi.view()
+    assert (moved.x - zoomed.x, moved.y - zoomed.y) == pytest.approx((60, -40), abs=1)
+
+    hmi.page.get_by_role("button", name="Show everything").click()
+    hmi.expect(lambda: hmi.view() == start, "the view of everything")
+    hmi.page.get_by_role("button", name="Zoom in").click()
+    hmi.expect(lambda: hmi.view().scale > start.scale * 1.4, "a closer view")
+
+
+def _on_page(hmi: Hmi, x: float, y: float) -> tuple[float, float]:
+    box = hmi.map.bounding_box()
+    assert box is not None
+    return box["x"] + x, box["y"] + y
+
+
+def test_the_readout_tells_what_is_known_and_what_is_not(hmi: Hmi) -> None:
+    hmi.point_at(1.02, 2.98)
+    expect(hmi.test_id("readout")).to_have_text(
+        re.compile(r"^31\.0\s°Cx 1\.0\d m, y (2|3)\.\d\d m$")
+    )
+    hmi.point_at(5.9, 5.9)
+    expect(hmi.test_id("readout")).to_contain_text("not known")
+
+
+def test_each_layer_goes_and_comes_back(hmi: Hmi) -> None:
+    hmi.page.get_by_role("button", name="Layers").click()
+    panel = hmi.page.locator(".layers .disclosure-panel")
+    # The part of the map that the panel, which changes with each click, leaves free.
+    left = round(_on_page(hmi, 0, 0)[0])
+    free = panel.bounding_box()
+    assert free is not None
+    width = round(free["x"]) - left - 20
+    for box in panel.get_by_role("checkbox").all():
+        with_it = hmi.settled_picture(width)
+        box.click()
+        hmi.expect_change(with_it)
+        box.click()
+        hmi.expect_picture(with_it)
+    assert panel.get_by_role("checkbox").count() == 8
+
+
+# --- the keyboard alone -------------------------------------------------------------------------
+
+
+def test_sensor_layers_zoom_table_and_tag_by_keyboard_alone(hmi: Hmi) -> None:
+    keyboard = hmi.page.keyboard
+
+    hmi.tab_to(hmi.page.locator(".sensors input:checked"))
+    keyboard.press("ArrowRight")
+    expect(hmi.test_id("legend")).to_contain_text("Humidity %")
+
+    hmi.tab_to(hmi.map)
+    before = hmi.view()
+    keyboard.press("+")
+    hmi.expect(lambda: hmi.view().scale > before.scale, "a closer view")
+    keyboard.press("ArrowLeft")
+    hmi.expect(lambda: hmi.view().x > before.x - 100, "the map moved")
+    expect(hmi.test_id("readout")).to_be_visible()  # of the crosshair
+    keyboard.press("0")
+    hmi.expect(lambda: hmi.view() == before, "the view of everything")
+
+    hmi.tab_to(hmi.page.get_by_role("button", name="Zoom in"))
+    keyboard.press("Enter")
+    hmi.expect(lambda: hmi.view().scale > before.scale, "a closer view")
+
+    hmi.tab_to(hmi.page.get_by_role("button", name="Layers"))
+    keyboard.press("Space")
+    pins = hmi.page.get_by_role("checkbox", name="Tag pins")
+    hmi.tab_to(pins)
+    keyboard.press("Space")
+    expect(pins).not_to_be_checked()
+    keyboard.press("Escape")
+    expect(pins).to_have_count(0)
+    expect(hmi.page.get_by_role("button", name="Layers")).to_be_focused()
+
+    header = hmi.page.locator("th[data-column=humidity]")
+    hmi.tab_to(header.get_by_role("button"))
+    keyboard.press("Enter")
+    expect(header).to_have_attribute("aria-sort", "ascending")
+
+    hmi.tab_to(hmi.row("3").get_by_role("button"))
+    keyboard.press("Enter")
+    expect(hmi.card("3")).to_be_visible()
+    keyboard.press("Escape")
+    expect(hmi.card("3")).to_have_count(0)
+
+
+def test_every_focus_is_to_be_seen_and_none_is_a_trap(hmi: Hmi) -> None:
+    seen: list[str] = []
+    for _ in range(120):
+        hmi.page.keyboard.press("Tab")
+        name, ring, bare = hmi.page.evaluate(
+            """() => {
+              const element = document.activeElement;
+              const whole = element.closest('label') ?? element;
+              const look = () => [whole, ...whole.querySelectorAll('*')]
+                .map(getComputedStyle)
+                .map((style) => [style.outline, style.boxShadow, style.borderColor, style.top])
+                .join();
+              const ring = look();
+              element.blur();
+              const bare = look();
+              element.focus();
+              return [`${element.tagName} ${element.ariaLabel ?? whole.textContent}`, ring, bare];
+            }"""
+        )
+        if name.startswith("BODY"):
+            break
+        assert ring != bare, f"the focus is not to be seen on {name}"
+        seen.append(name)
+    else:
+        raise AssertionError(f"120 times Tab did not lead through the page: {seen[-5:]}")
+    assert len(seen) > 25
+
+
+def test_help_opens_takes_the_focus_and_gives_it_back(hmi: Hmi) -> None:
+    hmi.tab_to(hmi.map)
+    hmi.page.keyboard.press("?")
+    dialog = hmi.page.get_by_role("dialog")
+    expect(dialog).to_be_visible()
+    expect(dialog).to_contain_text("Choose a sensor")
+    assert dialog.evaluate("dialog => dialog.contains(document.activeElement)")
+    # No shortcut reaches through it.
+    hmi.page.keyboard.press("2")
+    hmi.page.keyboard.press("Escape")
+    expect(dialog).to_have_count(0)
+    expect(hmi.map).to_be_focused()
+    expect(hmi.test_id("legend")).to_contain_text("Temperature")
+
+
+def test_single_keys_choose_sensors_and_tags_unless_somebody_types(hmi: Hmi) -> None:
+    hmi.page.keyboard.press("3")
+    expect(hmi.test_id("legend")).to_contain_text("CO₂ ppm")
+    hmi.page.keyboard.press("n")
+    expect(hmi.card("1")).to_be_visible()
+    hmi.page.keyboard.press("n")
+    expect(hmi.card("2")).to_be_visible()
+    hmi.page.keyboard.press("p")
+    expect(hmi.card("1")).to_be_visible()
+    hmi.page.keyboard.press("/")
+    field = hmi.page.get_by_role("searchbox")
+    expect(field).to_be_focused()
+    hmi.page.keyboard.type("10")
+    expect(field).to_have_value("10")
+    hmi.expect_rows("10")
+    expect(hmi.test_id("legend")).to_contain_text("CO₂ ppm")
+
+
+def test_single_keys_can_be_switched_off(hmi: Hmi) -> None:
+    hmi.page.keyboard.press("?")
+    hmi.page.get_by_role("checkbox", name="Single-key shortcuts").click()
+    hmi.page.keyboard.press("Escape")
+    hmi.page.keyboard.press("3")
+    hmi.page.keyboard.press("n")
+    expect(hmi.test_id("tag-card")).to_have_count(0)
+    expect(hmi.test_id("legend")).to_contain_text("Temperature")

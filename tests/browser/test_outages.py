@@ -1,0 +1,167 @@
+"""When something is gone: nothing looks fresh that is not, and the page heals without a reload."""
+
+from __future__ import annotations
+
+import re
+import signal
+from collections.abc import Callable
+from urllib.parse import urlsplit
+
+from playwright.sync_api import expect
+
+from tests.browser.hmi import Hmi
+from tests.support.messages import occupancy_grid, scan
+from tests.support.processes import lupin_twin, twin_node, url_of
+from tests.support.ros import Peer
+from tests.support.web import bridge
+
+OpenPage = Callable[..., Hmi]
+
+CLOCK = re.compile(r"Last data at \d\d:\d\d:\d\d")
+
+
+def expect_frozen(hmi: Hmi, why: str) -> None:
+    """The page shows what it had, dimmed, and says since when and why."""
+    banner = hmi.test_id("frozen")
+    expect(banner).to_contain_text(CLOCK)
+    expect(banner).to_contain_text(why)
+    expect(hmi.app).to_have_attribute("data-fresh", "false")
+    expect(hmi.page.locator("canvas[data-layer=pins]")).to_have_css("opacity", "0.45")
+
+
+def expect_live(hmi: Hmi) -> None:
+    """The page is live again, and it is still the same page."""
+    hmi.expect_phase("live")
+    expect(hmi.test_id("frozen")).to_have_count(0)
+    expect(hmi.page.locator("canvas[data-layer=pins]")).to_have_css("opacity", "1")
+    assert hmi.page.evaluate("window.stayed") is True
+
+
+def stay(hmi: Hmi) -> None:
+    """Mark the page, so that a reload would be noticed."""
+    hmi.page.evaluate("window.stayed = true")
+
+
+def test_a_twin_that_comes_is_killed_and_comes_back(domain: int, open_page: OpenPage) -> None:
+    with lupin_twin(domain, "web") as web, Peer(domain) as peer:
+        hmi = open_page(url_of(web))
+        # The bridge tells what the twin's service will not answer while there is no twin.
+        hmi.allow_noise(r"503 .*/api/field")
+        stay(hmi)
+        hmi.expect_phase("offline")
+        expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-twin")
+        expect(hmi.test_id("notice")).to_contain_text("has not heard from any twin")
+
+        with twin_node(domain) as first:
+            peer.observe(scan("a", {"temperature": 20.0}, at=(1, 1)))
+            hmi.expect_rows("a")
+            hmi.expect_samples(1)
+            expect_live(hmi)
+            first.kill()
+            hmi.expect_phase("offline")
+            expect_frozen(hmi, "The twin has stopped publishing")
+            expect(hmi.cell("a", "temperature")).to_have_text("20.0")
+        told = [frame for frame in hmi.frames if frame["type"] == "status"][-1]
+        assert told["reason"] == "stale"
+        # The page turns with the frame that says so.
+        assert told["state_age_seconds"] <= 3.5
+
+        with twin_node(domain):
+            peer.observe(scan("b", {"temperature": 30.0}, at=(2, 1)))
+            hmi.expect_rows("a", "b")
+            hmi.expect_samples(2)
+            expect_live(hmi)
+
+
+def test_a_server_that_is_killed_and_starts_anew_with_other_tags(
+    domain: int, open_page: OpenPage
+) -> None:
+    with lupin_twin(domain, "serve") as old:
+        url = url_of(old)
+        with Peer(domain) as peer:
+            peer.publish_map(occupancy_grid([[0] * 6] * 6))
+            peer.observe(
+                scan("a", {"temperature": 20.0}, at=(1, 1)),
+                scan("gone", {"temperature": 40.0}, at=(4, 4)),
+            )
+            hmi = open_page(url, "view=3,3,8&layers=map,field")
+            stay(hmi)
+            hmi.expect_rows("a", "gone")
+            hmi.expect_samples(2)
+            hot, floor, ground = (4.0, 4.0), (5.5, 0.5), (-0.5, 3.0)
+            hmi.expect_pixels(lambda pixel: pixel != hmi.pixel(*floor), hot, what="the heat map")
+            seen = len(hmi.frames)
+        old.kill()
+    hmi.allow_noise("ERR_CONNECTION_REFUSED|ERR_EMPTY_RESPONSE|ERR_CONNECTION_RESET")
+    hmi.allow_noise("WebSocket connection .* failed")
+    hmi.expect_phase("reconnecting")
+    expect_frozen(hmi, "resumes by itself")
+    hmi.expect_rows("a", "gone")
+
+    with (
+        lupin_twin(domain, "serve", "--port", str(urlsplit(url).port)) as new,
+        Peer(domain) as peer,
+    ):
+        assert url_of(new) == url
+        peer.observe(scan("a", {"humidity": 61.0}))
+        hmi.expect_rows("a")
+        expect_live(hmi)
+        expect(hmi.cell("a", "temperature")).to_contain_text("no such sensor")
+        expect(hmi.cell("a", "humidity")).to_have_text("61.0")
+        # No heat map of a house that is no more, and not its map either.
+        expect(hmi.test_id("sample-count")).to_have_text("No tag contributes")
+        colour = hmi.pixel(*ground)
+        hmi.expect_pixels(lambda pixel: pixel == colour, hot, floor, what="bare ground")
+    later = [frame["seq"] for frame in hmi.frames[seen:] if frame["type"] == "state"]
+    assert min(later) == 1
+
+
+def test_thirty_seconds_without_a_network(domain: int, open_page: OpenPage) -> None:
+    with bridge(domain=domain) as running:
+        running.peer.publish_map(occupancy_grid([[0] * 6] * 6))
+        running.peer.observe(scan("a", {"temperature": 20.0}, at=(1, 1)))
+        hmi = open_page(running.url, go=False)
+        hmi.page.clock.install()
+        hmi.go()
+        stay(hmi)
+        hmi.expect_rows("a")
+        hmi.expect_samples(1)
+        hmi.expect_phase("live")
+
+        hmi.allow_noise("ERR_INTERNET_DISCONNECTED")
+        hmi.page.context.set_offline(True)
+        running.peer.observe(scan("b", {"temperature": 30.0}, at=(2, 1)))
+        running.tag("b")
+        hmi.page.clock.fast_forward(30_000)
+        hmi.expect_phase("reconnecting")
+        expect_frozen(hmi, "The connection to the bridge is lost")
+        expect(hmi.test_id("frozen")).to_contain_text(re.compile(r"[3-5]\d\ss ago"))
+        expect(hmi.row("a").locator(".cell-age")).to_have_text(re.compile(r"[3-5]\d\ss"))
+        hmi.expect_rows("a")
+
+        # At once: nobody waits for the back-off, whose pause is up to 15 s by now.
+        hmi.page.clock.pause_at(hmi.page.evaluate("Date.now() / 1000 + 1"))
+        hmi.page.context.set_offline(False)
+        hmi.expect_rows("a", "b")
+        hmi.page.clock.resume()
+        hmi.expect_samples(2)
+        expect_live(hmi)
+
+
+def test_a_server_that_hangs_is_noticed_although_the_connection_stays_open(
+    domain: int, open_page: OpenPage
+) -> None:
+    with bridge(domain=domain) as running:
+        running.peer.observe(scan("a", {"temperature": 20.0}))
+        hmi = open_page(running.url, go=False)
+        hmi.page.clock.install()
+        hmi.go()
+        stay(hmi)
+        hmi.expect_rows("a")
+        hmi.expect_phase("live")
+        running.process.send(signal.SIGSTOP)
+        hmi.page.clock.fast_forward(3_100)
+        hmi.expect_phase("stale")
+        expect_frozen(hmi, "nothing comes through it any more")
+        running.process.send(signal.SIGCONT)
+        expect_live(hmi)

@@ -1,0 +1,190 @@
+"""What leaves the page: links, CSV, PNG, and the settings that a browser keeps."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable
+from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
+
+import pytest
+from PIL import Image
+from playwright.sync_api import Download, expect
+
+from tests.browser.hmi import PHONE, Hmi
+from tests.browser.house import TAGS
+from tests.support.messages import look, scan
+from tests.support.web import Bridge, bridge
+
+OpenPage = Callable[..., Hmi]
+
+
+def test_a_link_shows_the_same_view_to_somebody_else(house: Bridge, open_page: OpenPage) -> None:
+    mine = open_page(house.url)
+    mine.expect_rows(*TAGS)
+    mine.choose_sensor("Humidity")
+    mine.expect_samples(3)
+    mine.click_map(3, 3)
+    mine.page.get_by_role("button", name="Layers").click()
+    mine.page.get_by_role("checkbox", name="Metre grid").uncheck()
+    mine.page.get_by_role("checkbox", name="Smooth heat map").check()
+    mine.page.keyboard.press("Escape")
+    mine.page.get_by_role("button", name="Zoom in").click()
+    mine.expect(
+        lambda: (
+            set(parse_qs(urlsplit(mine.address()).fragment)) == {"sensor", "tag", "view", "layers"}
+        ),
+        "an address that holds all of the view",
+    )
+
+    theirs = open_page(house.url, urlsplit(mine.address()).fragment)
+    expect(theirs.test_id("legend")).to_contain_text("Humidity %")
+    expect(theirs.card("3")).to_be_visible()
+    theirs.expect_samples(3)
+    before, after = mine.view(), theirs.view()
+    assert (after.x, after.y, after.scale) == pytest.approx(
+        (before.x, before.y, before.scale), abs=2
+    )
+    theirs.page.get_by_role("button", name="Layers").click()
+    expect(theirs.page.get_by_role("checkbox", name="Metre grid")).not_to_be_checked()
+    expect(theirs.page.get_by_role("checkbox", name="Smooth heat map")).to_be_checked()
+    expect(theirs.page.get_by_role("checkbox", name="Tag pins")).to_be_checked()
+
+
+def test_a_link_to_a_tag_that_is_not_there_says_so(house: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(house.url, "tag=nobody")
+    hmi.expect_rows(*TAGS)
+    expect(hmi.card("nobody")).to_contain_text("does not list this tag")
+
+
+def test_a_link_of_nonsense_is_the_whole_house(house: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(house.url, "view=1,,NaN&range=9,1&layers=%00,<b>&sensor=&tag=&%E0%A4%A")
+    hmi.expect_rows(*TAGS)
+    expect(hmi.test_id("legend")).to_contain_text("Temperature °C")
+    hmi.page.get_by_role("button", name="Layers").click()
+    assert hmi.page.get_by_role("checkbox", checked=True).count() == 0  # as the link says: none
+
+
+def save(hmi: Hmi, name: str) -> Download:
+    """Choose an entry of the menu that saves a file."""
+    hmi.page.get_by_role("button", name="Menu").click()
+    with hmi.page.expect_download() as download:
+        hmi.page.get_by_role("button", name=name).click()
+    return download.value
+
+
+def read_csv(download: Download) -> list[dict[str, str]]:
+    text = Path(download.path()).read_bytes()
+    assert text.startswith(b"\xef\xbb\xbf")  # spreadsheets take it for Latin-1 without
+    return list(csv.DictReader(io.StringIO(text.decode("utf-8-sig"), newline="")))
+
+
+def test_the_table_as_csv_holds_every_tag_and_raw_values(
+    house: Bridge, open_page: OpenPage
+) -> None:
+    hmi = open_page(house.url)
+    hmi.expect_rows(*TAGS)
+    download = save(hmi, "Save table as CSV")
+    assert download.suggested_filename.startswith("lupin-twin-tags-")
+    assert download.suggested_filename.endswith(".csv")
+    rows = {row["tag"]: row for row in read_csv(download)}
+    assert list(rows) == list(TAGS)
+    pest = rows["10"]
+    assert (pest["Temperature [°C]"], pest["Humidity [%]"], pest["CO₂ [ppm]"]) == ("31", "40", "")
+    assert (pest["species"], pest["bugs"], pest["pest"]) == ("lupin", "3", "yes")
+    assert (pest["x [m]"], pest["y [m]"]) == ("1", "3")
+    assert (rows["9"]["x [m]"], rows["9"]["Light [lx]"]) == ("", "900")  # no pose
+    assert rows["3"]["CO₂ [ppm]"] == ""  # the sensor gave no number
+    assert rows["seen"]["age [s]"] == ""  # never observed
+    assert int(rows["1"]["age [s]"]) >= 0
+
+
+def test_the_csv_is_the_table_as_it_is_filtered_and_sorted(
+    house: Bridge, open_page: OpenPage
+) -> None:
+    hmi = open_page(house.url)
+    hmi.expect_rows(*TAGS)
+    hmi.page.keyboard.press("u")
+    hmi.page.get_by_role("searchbox").fill("temperature")
+    header = hmi.page.locator("th[data-column=temperature]").get_by_role("button")
+    header.click()
+    header.click()
+    hmi.expect_rows("10", "2", "9", "1")
+    with hmi.page.expect_download() as download:
+        hmi.page.get_by_role("button", name="CSV").click()
+    rows = read_csv(download.value)
+    assert [row["tag"] for row in rows] == ["10", "2", "9", "1"]
+    assert rows[0]["Temperature [°F]"] == "87.8"
+
+
+def test_text_that_a_spreadsheet_would_run_is_disarmed(domain: int, open_page: OpenPage) -> None:
+    hostile = '=HYPERLINK("http://x.example","a")'
+    with bridge(domain=domain) as running:
+        running.peer.observe(
+            scan(hostile, {"temperature": -5.0}, at=(-1, 1)),
+            look(hostile, "@SUM(1+1)*cmd|' /C calc'!A0,\nsecond line"),
+        )
+        hmi = open_page(running.url)
+        hmi.expect(lambda: len(hmi.rows()) == 1, "the tag")
+        expect(hmi.page.locator(".cell-species")).to_contain_text("@SUM")
+        [row] = read_csv(save(hmi, "Save table as CSV"))
+    assert row["tag"] == "'" + hostile
+    assert row["species"] == "'@SUM(1+1)*cmd|' /C calc'!A0,\nsecond line"
+    assert row["Temperature [°C]"] == "-5"
+    assert row["x [m]"] == "-1"
+
+
+def test_the_map_as_png_is_what_is_on_the_screen(house: Bridge, open_page: OpenPage) -> None:
+    for options, ratio in (({}, 1), ({"device_scale_factor": 2, "viewport": PHONE}, 2)):
+        hmi = open_page(house.url, "layers=map,field,boxes", **options)
+        hmi.expect_samples(3)
+        hmi.settled_picture()
+        download = save(hmi, "Save map as PNG")
+        assert download.suggested_filename.endswith(".png")
+        picture = Image.open(download.path()).convert("RGB")
+        box = hmi.map.bounding_box()
+        assert box is not None
+        assert picture.width == pytest.approx(box["width"] * ratio, abs=1)
+        assert picture.height == pytest.approx((box["height"] + 40) * ratio, abs=1.5)
+        view = hmi.view()
+        shown = Image.open(io.BytesIO(hmi.map.screenshot())).convert("RGB")
+        for point in [(1.0, 3.0), (3.0, 1.0), (0.5, 0.5), (2.0, 2.0)]:
+            x, y = ((pixel + 0.5) * ratio for pixel in view.pixel(*point))
+            assert picture.getpixel((int(x), int(y))) == shown.getpixel((int(x), int(y)))
+        footer = picture.crop((0, picture.height - 40 * ratio, picture.width, picture.height))
+        assert len(set(footer.convert("L").tobytes())) > 10  # it is written on
+
+
+def test_copying_the_link_works_or_says_where_it_is(house: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(house.url, "sensor=co2", permissions=["clipboard-read", "clipboard-write"])
+    hmi.expect_rows(*TAGS)
+    hmi.page.get_by_role("button", name="Menu").click()
+    hmi.page.get_by_role("button", name="Copy link").click()
+    expect(hmi.page.locator(".toast")).to_have_text("Link copied")
+    assert hmi.page.evaluate("navigator.clipboard.readText()") == f"{house.url}/#sensor=co2"
+
+
+def test_the_theme_is_kept_and_follows_the_system_by_default(
+    house: Bridge, open_page: OpenPage
+) -> None:
+    hmi = open_page(house.url, color_scheme="dark")
+    root = hmi.page.locator("html")
+    expect(root).to_have_attribute("data-theme", "dark")
+    hmi.page.emulate_media(color_scheme="light")
+    expect(root).to_have_attribute("data-theme", "light")
+    hmi.page.get_by_role("button", name="Menu").click()
+    hmi.page.get_by_role("radio", name="Dark").check()
+    expect(root).to_have_attribute("data-theme", "dark")
+    hmi.page.reload()
+    expect(root).to_have_attribute("data-theme", "dark")
+
+
+def test_paper_has_every_row_and_is_light(house: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(house.url, color_scheme="dark")
+    hmi.expect_rows(*TAGS)
+    pdf = hmi.page.pdf(format="A4")
+    assert len(pdf) > 10_000
+    hmi.page.emulate_media(media="print")
+    expect(hmi.row("seen")).to_be_visible()
+    expect(hmi.page.get_by_role("button", name="Menu")).to_be_hidden()

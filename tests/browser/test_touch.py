@@ -1,0 +1,115 @@
+"""A phone in the hand: tap, drag, pinch, and the two halves of a narrow screen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.hmi import PHONE, Hmi
+from tests.browser.house import TAGS
+from tests.support.web import Bridge
+
+OpenPage = Callable[..., Hmi]
+
+
+@pytest.fixture
+def phone(house: Bridge, open_page: OpenPage) -> Hmi:
+    hmi = open_page(house.url, viewport=PHONE, has_touch=True, is_mobile=True)
+    hmi.expect_samples(3)
+    return hmi
+
+
+def drag(hmi: Hmi, *paths: Sequence[tuple[float, float]]) -> None:
+    """Fingers that each go along a path of the map view, pixels; all paths have as many points."""
+    box = hmi.map.bounding_box()
+    assert box is not None
+    session = hmi.page.context.new_cdp_session(hmi.page)
+
+    def touch(kind: str, points: Sequence[tuple[float, float]]) -> None:
+        places = [
+            {"x": box["x"] + x, "y": box["y"] + y, "id": index}
+            for index, (x, y) in enumerate(points)
+        ]
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
+        # Chromium hands a page one move a frame.
+        hmi.page.evaluate("new Promise(requestAnimationFrame)")
+
+    for index, points in enumerate(zip(*paths, strict=True)):
+        touch("touchMove" if index else "touchStart", points)
+    touch("touchEnd", [])
+    session.detach()
+
+
+def test_a_tap_on_a_pin_opens_its_card_and_one_beside_closes_it(phone: Hmi) -> None:
+    x, y = phone.view().pixel(1, 3)
+    # A finger is broad: it need not hit the middle.
+    phone.map.tap(position={"x": x + 12, "y": y - 12})
+    expect(phone.card("10")).to_be_visible()
+    expect(phone.card("10")).to_contain_text("31.0\u00a0°C")
+    box = phone.card("10").bounding_box()
+    assert box is not None
+    assert box["x"] >= 0
+    assert box["x"] + box["width"] <= PHONE["width"]
+    phone.page.get_by_role("button", name="Close").first.tap()
+    expect(phone.card("10")).to_have_count(0)
+
+
+def test_one_finger_moves_the_map(phone: Hmi) -> None:
+    before = phone.view()
+    drag(phone, [(150 + 10 * step, 150 + 5 * step) for step in range(5)])
+
+    def moved() -> bool:
+        after = phone.view()
+        return (after.x - before.x, after.y - before.y) == pytest.approx((40, 20), abs=1)
+
+    phone.expect(moved, "a map that followed the finger")
+    assert phone.view().scale == before.scale
+
+
+def test_two_fingers_zoom_about_their_middle(phone: Hmi) -> None:
+    before = phone.view()
+    middle = before.pixel(2, 2)
+    x, y = middle
+    reaches = (40, 50, 60, 70, 80)
+    drag(phone, [(x - reach, y) for reach in reaches], [(x + reach, y) for reach in reaches])
+    twice = pytest.approx(before.scale * 2, rel=0.02)
+    phone.expect(lambda: phone.view().scale == twice, "twice the scale")
+    assert phone.view().pixel(2, 2) == pytest.approx(middle, abs=2)
+    # The page itself did not zoom with it.
+    assert phone.page.evaluate("visualViewport.scale") == 1
+
+
+def test_a_narrow_screen_shows_one_half_at_a_time_and_nothing_sticks_out(phone: Hmi) -> None:
+    expect(phone.map).to_be_visible()
+    expect(phone.row("1")).to_be_hidden()
+    phone.page.get_by_role("navigation").get_by_role("button", name="Tags").tap()
+    expect(phone.row("1")).to_be_visible()
+    expect(phone.map).to_be_hidden()
+    phone.expect_rows(*TAGS)
+    for pane in ("Tags", "Map"):
+        phone.page.get_by_role("navigation").get_by_role("button", name=pane).tap()
+        assert phone.page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
+
+
+def test_what_a_finger_has_to_hit_is_large_enough(phone: Hmi) -> None:
+    for pane in ("Map", "Tags"):
+        phone.page.get_by_role("navigation").get_by_role("button", name=pane).tap()
+        # WCAG 2.2, 2.5.8: 24 pixels at least.
+        small = phone.page.evaluate(
+            """() => [...document.querySelectorAll('button, a, label, select, input')]
+              .filter((e) => e.checkVisibility() && !e.closest('.unseen, .skip, .row-button'))
+              .filter((e) => !(e.tagName === 'INPUT' && e.closest('label')))
+              .map((e) => [e, e.getBoundingClientRect()])
+              .filter(([, box]) => box.width > 0 && (box.width < 24 || box.height < 24))
+              .map(([e, box]) => `${e.textContent || e.ariaLabel} ${box.width}x${box.height}`)"""
+        )
+        assert small == []
+    # A row is hit anywhere, not only on the few letters of its id.
+    phone.page.get_by_role("navigation").get_by_role("button", name="Tags").tap()
+    box = phone.row("2").bounding_box()
+    assert box is not None
+    assert box["height"] >= 40
+    phone.page.touchscreen.tap(box["x"] + 200, box["y"] + box["height"] / 2)
+    expect(phone.row("2")).to_have_attribute("data-selected", "true")

@@ -166,11 +166,12 @@ def test_mask_is_the_map_cell_under_each_centre(
             assert mask[row, column] == known
 
 
-def test_empty_map_explores_nothing() -> None:
-    for width, height in ((0, 0), (0, 5), (5, 0)):
-        occupancy = map_of(np.zeros((height, width)), resolution=0.05)
-        assert occupancy.cells.shape == (height, width)
-        assert not mask_of(occupancy, 3, 2).any()
+@pytest.mark.parametrize("yaw", [0.0, 0.3])
+@pytest.mark.parametrize("shape", [(0, 0), (0, 5), (5, 0)])
+def test_empty_map_explores_nothing(shape: tuple[int, int], yaw: float) -> None:
+    occupancy = map_of(np.zeros(shape), resolution=0.05, origin_yaw=yaw)
+    assert occupancy.cells.shape == shape
+    assert not mask_of(occupancy, 3, 2).any()
 
 
 def test_turned_map_is_looked_up_in_bands() -> None:

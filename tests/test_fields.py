@@ -233,7 +233,7 @@ def test_field_is_of_the_stores_samples_by_the_rules(store: TwinStore) -> None:
     rows = grid.values.reshape(2, 4)
     assert (rows[0, 0], rows[1, 3]) == (10.0, 20.0)
     assert not np.isnan(rows[0, 1])
-    narrow = answer(engine_of(falloff_radius_m=0.5, max_distance_m=0.5), request_of(), store, None)
+    narrow = answer(engine_of(max_distance_m=0.5), request_of(), store, None)
     assert np.isnan(narrow.values.reshape(2, 4)[0, 1])
     store.record(scan("c", 1.5, 0.5, 30.0))
     by_power = [
@@ -241,6 +241,9 @@ def test_field_is_of_the_stores_samples_by_the_rules(store: TwinStore) -> None:
         for power in (1.0, 2.0)
     ]
     assert by_power[0] != by_power[1]
+    # With no tag within the falloff, the nearest is taken: "a", 1 m away.
+    nearest = answer(engine_of(falloff_radius_m=0.5), request_of(), store, None)
+    assert nearest.values.reshape(2, 4)[1, 0] == 10.0
 
 
 def test_sensor_that_nobody_reported_is_no_error(store: TwinStore) -> None:

@@ -514,7 +514,7 @@ def test_enormous_distances_still_weigh() -> None:
     assert field_at_origin(samples, **far) == pytest.approx((10 * 4 + 20) / 5)
     # v/d² vanishes here, and the mean must not.
     tiny = [(1e149, 0.0, 1e-28), (0.0, 1e149, 3e-28)]
-    assert field_at_origin(tiny, **far) == pytest.approx(2e-28, rel=1e-6)
+    assert field_at_origin(tiny, **far) == pytest.approx(2e-28, rel=1e-6, abs=0.0)
     # A reach whose square overflows takes in whatever has a finite distance.
     assert field_at_origin(samples, falloff_radius_m=1e300, max_distance_m=1e300) > 0.0
 
@@ -533,7 +533,7 @@ def test_enormous_readings_do_not_poison_their_neighbours() -> None:
 
 def test_readings_of_many_sizes_keep_their_precision() -> None:
     samples = [(0.5, 0.0, 1e-30), (0.0, 0.5, 3e-30)]
-    assert field_at_origin(samples) == pytest.approx(2e-30, rel=1e-6)
+    assert field_at_origin(samples) == pytest.approx(2e-30, rel=1e-6, abs=0.0)
 
 
 @pytest.mark.parametrize("resolution", [1e-9, 1e-6])

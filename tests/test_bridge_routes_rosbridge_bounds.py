@@ -8,15 +8,24 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from websockets.frames import Frame, Opcode
 
+from lupin_bridge.frames import StateFrame
 from lupin_bridge.rosbridge_session import Reaction, Session
 from lupin_bridge.routes_rosbridge import MAX_OPEN_CALLS
 from lupin_bridge.settings import Settings
 from lupin_bridge.source import TwinUnavailableError
 from lupin_twin.fields import FieldRequest
 from tests.support import inprocess
-from tests.support.rosbridge import FIELD, FIELD_ARGS, Ros, deaf, large_call, ros_at
+from tests.support.rosbridge import (
+    FIELD,
+    FIELD_ARGS,
+    LARGE_CALL,
+    TOPIC,
+    Ros,
+    deaf,
+    masked,
+    ros_at,
+)
 
 
 def calls(count: int) -> list[str]:
@@ -119,6 +128,50 @@ def test_an_error_on_the_way_ends_the_call_and_nothing_else(
     inprocess.run(domain, test())
 
 
+def test_who_has_not_subscribed_is_sent_nothing_and_counts_as_sent_nothing(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def test() -> None:
+        async with inprocess.running() as here:
+            hub = here.bridge.hub
+            reader, writer = await deaf(here.url)
+            await inprocess.until(lambda: len(hub) == 1, "the client")
+            published, plain = 0, hub.publish
+
+            def publish(frame: StateFrame, now_s: float) -> None:
+                nonlocal published
+                published += 1
+                plain(frame, now_s)
+
+            monkeypatch.setattr(hub, "publish", publish)
+            await inprocess.until(lambda: published == 2, "two states of the twin's heartbeat")
+            assert (hub.frames_sent, hub.bytes_sent) == (0, 0)
+            writer.write(masked({"op": "subscribe", "topic": TOPIC}))
+            assert b'"op":"publish"' in await reader.read(1 << 16)
+            assert hub.frames_sent == 1
+            writer.transport.abort()
+
+    inprocess.run(domain, test())
+
+
+def test_each_subscription_begins_with_the_state_although_it_is_no_new_one(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def test() -> None:
+        async with inprocess.running() as here:
+
+            def talk(ros: Ros) -> None:
+                ros.subscribe("a")
+                assert ros.next()["op"] == "publish"
+                monkeypatch.setattr(here.bridge.hub, "publish", lambda _frame, _now_s: None)
+                ros.subscribe("b")
+                assert ros.call("/rosapi/topics")["op"] == "publish"
+
+            await in_thread(here.url, talk)
+
+    inprocess.run(domain, test())
+
+
 def test_many_messages_at_once_do_not_hold_up_the_others(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -140,8 +193,7 @@ def test_many_messages_at_once_do_not_hold_up_the_others(
         async with inprocess.running() as here:
             other = asyncio.create_task(somebody_else())
             _reader, writer = await deaf(here.url)
-            level = Frame(Opcode.TEXT, b'{"op":"set_level","level":"none"}').serialize(mask=True)
-            writer.write(level * 100)
+            writer.write(masked({"op": "set_level", "level": "none"}) * 100)
             await inprocess.until(lambda: len(at_turn) == 100, "all of them")
             assert len(set(at_turn)) == 100, "somebody else's turn came after each"
             writer.transport.abort()
@@ -155,13 +207,14 @@ def test_a_client_that_leaves_takes_its_calls_along(
 ) -> None:
     async def test() -> None:
         began, ended = 0, 0
+        never = asyncio.Event()
         async with inprocess.running() as here:
 
             async def no_field(_request: FieldRequest) -> Any:
                 nonlocal began, ended
                 began += 1
                 try:
-                    await asyncio.Event().wait()
+                    await never.wait()
                 finally:
                     ended += 1
 
@@ -189,12 +242,22 @@ def test_a_client_that_leaves_takes_its_calls_along(
     inprocess.run(domain, test())
 
 
-def test_a_client_that_takes_no_reply_is_closed_and_meanwhile_holds_little(domain: int) -> None:
+@pytest.mark.parametrize("is_subscribed", [False, True])
+def test_a_client_that_takes_no_reply_is_closed_and_meanwhile_holds_little(
+    domain: int, monkeypatch: pytest.MonkeyPatch, is_subscribed: bool
+) -> None:
     async def test() -> None:
         async with inprocess.running(Settings(client_timeout_s=1.0)) as here:
             # A reader that is let go of would be emptied by asyncio.
             _reader, writer = await deaf(here.url)
-            writer.write(large_call() * 5)
+            hub = here.bridge.hub
+            await inprocess.until(lambda: len(hub) == 1, "the client")
+            if is_subscribed:
+                writer.write(masked({"op": "subscribe", "topic": TOPIC}))
+                await inprocess.until(lambda: hub.frames_sent == 1, "its first state")
+                # Nor does a state show that it is stuck, where the twin is silent.
+                monkeypatch.setattr(hub, "publish", lambda _frame, _now_s: None)
+            writer.write(masked(LARGE_CALL) * 5)
             most_bytes = 0
 
             def is_dismissed() -> bool:
@@ -202,7 +265,7 @@ def test_a_client_that_takes_no_reply_is_closed_and_meanwhile_holds_little(domai
                 for connection in here.server.server_state.connections:
                     waiting = connection.transport.get_write_buffer_size()
                     most_bytes = max(most_bytes, waiting)
-                return here.bridge.hub.clients_dismissed == 1
+                return hub.clients_dismissed == 1
 
             await inprocess.until(is_dismissed, "its dismissal")
             await inprocess.until(lambda: not here.server.server_state.connections, "its end")
@@ -216,7 +279,7 @@ def test_a_client_that_was_slow_to_take_a_reply_stays(domain: int) -> None:
     async def test() -> None:
         async with inprocess.running() as here:
             reader, writer = await deaf(here.url)
-            writer.write(large_call() * 3)
+            writer.write(masked(LARGE_CALL) * 3)
             await inprocess.until(lambda: here.bridge.hub.blocked == 1, "a full socket")
             while here.bridge.hub.blocked:
                 assert await reader.read(1 << 20), "it was closed"

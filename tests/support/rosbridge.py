@@ -28,6 +28,14 @@ FIELD_ARGS: dict[str, Any] = {
 
 Message = dict[str, Any]
 
+# Nearly 10^6 cells, all of them null: 5 MB.
+LARGE_CALL: Message = {
+    "op": "call_service",
+    "service": FIELD,
+    "id": "large",
+    "args": {**FIELD_ARGS, "resolution": 0.0061},
+}
+
 
 class Ros:
     """A rosbridge client that sees every message."""
@@ -89,15 +97,9 @@ def ros_at(url: str) -> Iterator[Ros]:
         yield Ros(opened)
 
 
-def large_call() -> bytes:
-    """A frame that asks for 10^6 cells, all null: 5 MB."""
-    call = {
-        "op": "call_service",
-        "service": FIELD,
-        "id": "large",
-        "args": {**FIELD_ARGS, "resolution": 0.0061},
-    }
-    return Frame(Opcode.TEXT, json.dumps(call).encode()).serialize(mask=True)
+def masked(message: Message) -> bytes:
+    """A message as a client's WebSocket frame."""
+    return Frame(Opcode.TEXT, json.dumps(message).encode()).serialize(mask=True)
 
 
 async def deaf(url: str) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:

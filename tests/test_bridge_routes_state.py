@@ -164,7 +164,22 @@ def test_a_tag_that_is_not_there_is_named_with_404(live: Bridge, path: str) -> N
 
 
 @pytest.mark.parametrize(
-    "tag_id", ["ä ö", "100%", "a?b=c#d", "<b>&amp;", "..", "日本", '"', "a\\b", "%2F", " "]
+    "tag_id",
+    [
+        "ä ö",
+        "100%",
+        "a?b=c#d",
+        "<b>&amp;",
+        "..",
+        "日本",
+        '"',
+        "a\\b",
+        "%2F",
+        " ",
+        "/",
+        "../x",
+        "x/1",
+    ],
 )
 def test_any_tag_id_is_found_by_its_percent_encoded_name(live: Bridge, tag_id: str) -> None:
     live.peer.observe(scan(tag_id, {"co2": 1.0}))

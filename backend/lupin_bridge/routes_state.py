@@ -68,27 +68,11 @@ async def state(request: Request) -> Response:
     return json_response(bridge.frames.json.state(latest.snapshot))
 
 
+# An id may hold a slash, which is decoded before the routes are tried: hence :path, and the longer
+# route first.
 @read_route(
     router,
-    "/api/tags/{tag_id}",
-    summary="One tag",
-    responses={200: {"model": schema.TwinTagState}, **_NO_TAG, **_UNAVAILABLE},
-)
-async def tag(request: Request, tag_id: str) -> Response:
-    """Everything that the twin knows about one tag."""
-    bridge = bridge_of(request)
-    latest = bridge.latest
-    if latest is None:
-        return error_response(_NO_TWIN, 503)
-    for candidate in latest.snapshot.tags:
-        if candidate.tag_id == tag_id:
-            return json_response(bridge.frames.json.tag(candidate, latest.snapshot.stamp_ns))
-    return _no_such_tag(tag_id, len(latest.snapshot.tags))
-
-
-@read_route(
-    router,
-    "/api/tags/{tag_id}/history",
+    "/api/tags/{tag_id:path}/history",
     summary="The last scans of one tag",
     responses={200: {"model": schema.TagHistory}, **_NO_TAG, **_UNAVAILABLE},
 )
@@ -103,6 +87,24 @@ async def history(request: Request, tag_id: str) -> Response:
         latest = bridge.latest
         return _no_such_tag(tag_id, 0 if latest is None else len(latest.snapshot.tags))
     return json_response(orjson.dumps(state_json.history(tag_id, scans)))
+
+
+@read_route(
+    router,
+    "/api/tags/{tag_id:path}",
+    summary="One tag",
+    responses={200: {"model": schema.TwinTagState}, **_NO_TAG, **_UNAVAILABLE},
+)
+async def tag(request: Request, tag_id: str) -> Response:
+    """Everything that the twin knows about one tag."""
+    bridge = bridge_of(request)
+    latest = bridge.latest
+    if latest is None:
+        return error_response(_NO_TWIN, 503)
+    for candidate in latest.snapshot.tags:
+        if candidate.tag_id == tag_id:
+            return json_response(bridge.frames.json.tag(candidate, latest.snapshot.stamp_ns))
+    return _no_such_tag(tag_id, len(latest.snapshot.tags))
 
 
 def _no_such_tag(tag_id: str, known: int) -> Response:

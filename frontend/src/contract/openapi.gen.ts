@@ -21,26 +21,6 @@ export interface paths {
         readonly patch?: never;
         readonly trace?: never;
     };
-    readonly "/api/tags/{tag_id}": {
-        readonly parameters: {
-            readonly query?: never;
-            readonly header?: never;
-            readonly path?: never;
-            readonly cookie?: never;
-        };
-        /**
-         * One tag
-         * @description Everything that the twin knows about one tag.
-         */
-        readonly get: operations["tag_api_tags__tag_id__get"];
-        readonly put?: never;
-        readonly post?: never;
-        readonly delete?: never;
-        readonly options?: never;
-        readonly head?: never;
-        readonly patch?: never;
-        readonly trace?: never;
-    };
     readonly "/api/tags/{tag_id}/history": {
         readonly parameters: {
             readonly query?: never;
@@ -53,6 +33,26 @@ export interface paths {
          * @description The tag's last scans that brought readings, sensor by sensor, oldest first.
          */
         readonly get: operations["history_api_tags__tag_id__history_get"];
+        readonly put?: never;
+        readonly post?: never;
+        readonly delete?: never;
+        readonly options?: never;
+        readonly head?: never;
+        readonly patch?: never;
+        readonly trace?: never;
+    };
+    readonly "/api/tags/{tag_id}": {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        /**
+         * One tag
+         * @description Everything that the twin knows about one tag.
+         */
+        readonly get: operations["tag_api_tags__tag_id__get"];
         readonly put?: never;
         readonly post?: never;
         readonly delete?: never;
@@ -676,7 +676,7 @@ export interface operations {
             };
         };
     };
-    readonly tag_api_tags__tag_id__get: {
+    readonly history_api_tags__tag_id__history_get: {
         readonly parameters: {
             readonly query?: never;
             readonly header?: never;
@@ -693,7 +693,7 @@ export interface operations {
                     readonly [name: string]: unknown;
                 };
                 content: {
-                    readonly "application/json": components["schemas"]["TwinTagState"];
+                    readonly "application/json": components["schemas"]["TagHistory"];
                 };
             };
             /** @description no such tag */
@@ -725,7 +725,7 @@ export interface operations {
             };
         };
     };
-    readonly history_api_tags__tag_id__history_get: {
+    readonly tag_api_tags__tag_id__get: {
         readonly parameters: {
             readonly query?: never;
             readonly header?: never;
@@ -742,7 +742,7 @@ export interface operations {
                     readonly [name: string]: unknown;
                 };
                 content: {
-                    readonly "application/json": components["schemas"]["TagHistory"];
+                    readonly "application/json": components["schemas"]["TwinTagState"];
                 };
             };
             /** @description no such tag */

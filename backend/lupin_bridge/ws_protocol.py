@@ -7,12 +7,17 @@ wait: it asks, and keeps the newest frame for the moment at which the client is 
 from __future__ import annotations
 
 import asyncio
+import socket
+import struct
 from collections.abc import Callable
 from typing import Any
 
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 CONNECTION_KEY = "connection"
+
+# What the kernel may hold of a frame before the network takes it: what is under way does not count.
+UNSENT_BYTES = 128 * 1024
 
 # How long a client that is told to go has to read the reason before its socket is torn down.
 CLOSE_GRACE_S = 1.0
@@ -37,6 +42,10 @@ class Connection(WebSocketsSansIOProtocol):
         Over TLS, asyncio keeps another 64 kB below the limit that can be set.
         """
         super().connection_made(transport)
+        # The kernel would take 4 MB more (tcp_wmem): for a slow reader, minutes of old states.
+        self.transport.get_extra_info("socket").setsockopt(
+            socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT_BYTES
+        )
         # Not 0: asyncio's TLS transport stops at the limit, not past it, and would stop on nothing.
         self.transport.set_write_buffer_limits(high=1, low=0)
 
@@ -54,6 +63,12 @@ class Connection(WebSocketsSansIOProtocol):
         await super().send(message)
         if message["type"] == "websocket.http.response.body" and self.close_sent:
             self.handshake_complete = True
+
+    def handle_ping(self) -> None:
+        """Answer a ping, unless its sender does not read: unread answers would only pile up."""
+        pong = b"".join(self.conn.data_to_send())
+        if self.writable.is_set():
+            self.transport.write(pong)
 
     @property
     def can_take(self) -> bool:
@@ -79,4 +94,12 @@ class Connection(WebSocketsSansIOProtocol):
             self.conn.send_close(code, reason)
             self.transport.write(b"".join(self.conn.data_to_send()))
             self.close_sent = True
-        self.loop.call_later(CLOSE_GRACE_S, self.transport.abort)
+        self.loop.call_later(CLOSE_GRACE_S, self._tear_down)
+
+    def _tear_down(self) -> None:
+        if self.transport.get_write_buffer_size() > 0:
+            # A reset: or the kernel would go on offering what nobody reads for four minutes more.
+            self.transport.get_extra_info("socket").setsockopt(
+                socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0)
+            )
+        self.transport.abort()

@@ -20,6 +20,7 @@ from lupin_bridge.access_middleware import Access
 from lupin_bridge.app import create_app
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.local_twin import LocalTwin
+from lupin_bridge.ros_thread import RosStartError
 from lupin_bridge.server import BridgeServer, address_of, listen
 from lupin_bridge.settings import SettingError, Settings, option
 from lupin_bridge.tls import check_pair
@@ -48,7 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     logs.set_up(settings.log_format)
     try:
         return asyncio.run(_run(options.role, settings, access, ros_args))
-    except ParameterError as error:
+    except (ParameterError, RosStartError) as error:
         _fail(str(error))
     except KeyboardInterrupt:
         return 0
@@ -131,13 +132,14 @@ def _parser() -> argparse.ArgumentParser:
             help=f"{spec.metadata['help']} (default: {default or 'none'})",
         )
     for role, text in ROLES.items():
-        roles.add_parser(role, parents=[common], help=text, description=text)
+        # No abbreviations: what one means would change with the next setting.
+        roles.add_parser(role, parents=[common], help=text, description=text, allow_abbrev=False)
     return parser
 
 
 def _prepare_process() -> None:
     # rcl wants a place for its logs; without a home directory it would refuse to start.
-    if "ROS_LOG_DIR" not in os.environ and not os.environ.get("HOME"):
+    if not (os.environ.get("ROS_LOG_DIR") or os.environ.get("HOME")):
         os.environ["ROS_LOG_DIR"] = tempfile.mkdtemp(prefix="lupin-twin-log-")
 
 

@@ -26,6 +26,10 @@ log = logging.getLogger(__name__)
 STOP_TIMEOUT_S = 1.5
 
 
+class RosStartError(RuntimeError):
+    """ROS cannot be started with these arguments; the message is rcl's own, in one line."""
+
+
 class BridgedNode(Protocol):
     """What the thread needs of the node it runs."""
 
@@ -80,6 +84,7 @@ class RosThread(Generic[NodeT, EventT]):
         """Start the thread; returns when the node is there.
 
         Raises:
+            RosStartError: ROS does not understand its arguments.
             Exception: whatever `make_node` raised, `lupin_twin.parameters.ParameterError` for one.
 
         """
@@ -192,12 +197,7 @@ class RosThread(Generic[NodeT, EventT]):
     def _run(self) -> None:
         error: BaseException | None = None
         try:
-            rclpy.init(
-                args=self._ros_args,
-                context=self._context,
-                # The web server owns the signals.
-                signal_handler_options=SignalHandlerOptions.NO,
-            )
+            self._init_ros()
             self._node = self._make_node(self._context, self._post)
             if self._newest is not None:
                 self._post(self._newest)
@@ -210,6 +210,17 @@ class RosThread(Generic[NodeT, EventT]):
             error = caught
         finally:
             self._end(error)
+
+    def _init_ros(self) -> None:
+        try:
+            rclpy.init(
+                args=self._ros_args,
+                context=self._context,
+                # The web server owns the signals.
+                signal_handler_options=SignalHandlerOptions.NO,
+            )
+        except Exception as error:  # rclpy raises several kinds
+            raise RosStartError(" ".join(str(error).split())) from error
 
     def _end(self, error: BaseException | None) -> None:
         if self._node is not None:

@@ -6,14 +6,16 @@ import statistics
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import rclpy
 from lupin_msgs.msg import TwinState
+from rclpy.context import Context
+
 from lupin_twin import convert
 from lupin_twin.node import latched
 from lupin_twin.state import Flower, Pose, Reading, Snapshot, TagState
-from rclpy.context import Context
-
 from tests.support.domains import own_domain
 
 S = 1_000_000_000
@@ -32,14 +34,36 @@ def tags(count: int) -> tuple[TagState, ...]:
     )
 
 
-def median_ms(run: Callable[[], object], times: int = 9) -> float:
+def few_changed(before: tuple[TagState, ...], turn: int) -> tuple[TagState, ...]:
+    """The same tags, every hundredth of them observed once more."""
+    return tuple(
+        replace(tag, last_observed_ns=turn * S) if i % 100 == turn % 100 else tag
+        for i, tag in enumerate(before)
+    )
+
+
+def timed_ms(run: Callable[[], object]) -> float:
+    start = time.perf_counter()
     run()
-    took = []
-    for _ in range(times):
-        start = time.perf_counter()
-        run()
-        took.append(time.perf_counter() - start)
-    return statistics.median(took) * 1e3
+    return (time.perf_counter() - start) * 1e3
+
+
+def measure(count: int, publisher: Any) -> None:
+    kept = convert.StateMessages()
+    rebuilt, few, published = [], [], []
+    now = tags(count)
+    kept.build(Snapshot(S, "map", now))
+    for turn in range(2, 12):
+        now = few_changed(now, turn)
+        snapshot = Snapshot(turn * S, "map", now)
+        rebuilt.append(timed_ms(partial(convert.StateMessages().build, snapshot)))
+        few.append(timed_ms(partial(kept.build, snapshot)))
+        published.append(timed_ms(partial(publisher.publish, kept.build(snapshot))))
+    build, publish = statistics.median(few), statistics.median(published)
+    print(
+        f"{count:>7}{statistics.median(rebuilt):>14.1f}{build:>14.1f}{publish:>10.1f}"
+        f"{build + publish:>10.1f}"
+    )
 
 
 def main() -> None:
@@ -50,35 +74,7 @@ def main() -> None:
         node = rclpy.create_node("bench_tick", context=context)
         publisher = node.create_publisher(TwinState, "/twin/state", latched(1))
         for count in (30, 1_000, 10_000):
-            before = tags(count)
-            messages = convert.StateMessages()
-            messages.build(Snapshot(2 * S, "map", before))
-            ticks = iter(range(10**6))
-
-            def few_changed(
-                before: tuple[TagState, ...] = before, messages: convert.StateMessages = messages
-            ) -> object:
-                tick = next(ticks)  # noqa: B023  # used up within the loop's turn
-                changed = {(tick + 100 * i) % len(before) for i in range(len(before) // 100 or 1)}
-                now = tuple(
-                    replace(tag, last_observed_ns=tick * S) if i in changed else tag
-                    for i, tag in enumerate(before)
-                )
-                start = time.perf_counter()
-                messages.build(Snapshot(tick * S, "map", now))
-                spent.append(time.perf_counter() - start)  # noqa: B023
-                return None
-
-            spent: list[float] = []
-            rebuilt = median_ms(
-                lambda b=before: convert.StateMessages().build(Snapshot(2 * S, "map", b))  # type: ignore[misc]
-            )
-            for _ in range(10):
-                few_changed()
-            few = statistics.median(spent) * 1e3
-            message = messages.build(Snapshot(3 * S, "map", before))
-            publish = median_ms(lambda m=message: publisher.publish(m))  # type: ignore[misc]
-            print(f"{count:>7}{rebuilt:>14.1f}{few:>14.1f}{publish:>10.1f}{few + publish:>10.1f}")
+            measure(count, publisher)
         node.destroy_node()
         rclpy.try_shutdown(context=context)
 

@@ -1,4 +1,4 @@
-"""The 1 Hz tick: building and publishing the state of a big greenhouse, all tags and few changed."""
+"""The 1 Hz tick: building and publishing the state of a big greenhouse, few tags changed or all."""
 
 from __future__ import annotations
 

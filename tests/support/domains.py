@@ -47,6 +47,5 @@ def ros_env(domain: int, **more: str) -> dict[str, str]:
         **os.environ,
         "ROS_DOMAIN_ID": str(domain),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-        "ROS_PYTHON_CHECK_FIELDS": "1",
         **more,
     }

@@ -84,6 +84,54 @@ def test_a_heartbeat_comes_although_nothing_changes_and_ages_grow(live: Bridge) 
     assert ages == sorted(set(ages))
 
 
+def test_who_asks_for_deltas_gets_the_state_once_and_then_what_changes(live: Bridge) -> None:
+    with live.listen(delta=1) as listener:
+        last = listener.until("state")["seq"]
+        live.peer.observe(scan("changed", {"co2": 1.0}))
+        while True:
+            delta = listener.next()
+            assert (delta["type"], delta["base"]) == ("delta", last)
+            schema.DeltaFrame.model_validate(delta)
+            last = delta["seq"]
+            if delta["changed"]:
+                break
+        assert [tag["tag_id"] for tag in delta["changed"]] == ["changed"]
+
+
+def test_who_asks_for_cbor_gets_the_same_in_binary(live: Bridge) -> None:
+    live.peer.observe(scan("binary", {"co2": float("nan")}, at=(1, 2)))
+    live.tag("binary")
+    with live.listen(encoding="cbor") as by_query:
+        assert isinstance(by_query.connection.recv(), bytes)
+        frame = by_query.until_tag("binary")
+    schema.StateFrame.model_validate(frame)
+    with live.listen(subprotocols=["other", "cbor"]) as by_subprotocol:
+        assert by_subprotocol.connection.subprotocol == "cbor"
+        by_subprotocol.until_tag("binary")
+
+
+def test_who_asks_for_fewer_frames_is_sent_fewer(live: Bridge) -> None:
+    with live.listen(max_rate_hz=0.01) as rare, live.listen() as frequent:
+        numbers = [rare.until("state")["seq"]]
+        for number in range(4):
+            live.peer.observe(scan(f"often {number}", {"co2": 1.0}))
+            frequent.until_tag(f"often {number}")
+        # One more may come at once, by the client's own beat; the next is due in 100 s.
+        numbers += [frame["seq"] for frame in rare.rest() if frame["type"] == "state"]
+        assert len(numbers) <= 2
+
+
+def test_what_cannot_be_served_is_refused_with_the_reason(live: Bridge) -> None:
+    with live.listen(rate="\U0001f337" * 40) as refused:
+        with pytest.raises(ConnectionClosedError) as closed:
+            refused.next()
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1008
+        assert closed.value.rcvd.reason == (
+            "parameter 'rate' is unknown, expected delta, encoding or max_rate_hz"
+        )
+
+
 def test_one_client_more_than_the_limit_is_told_so_and_sent_away() -> None:
     with bridge("--max-clients", "2", *SILENT) as small, small.listen() as one:
         with small.listen() as two:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import socket
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from typing import Any
+from urllib.parse import urlencode
 
+import cbor2
 import httpx
 from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Subprotocol
 
 from tests.support.domains import own_domain
 from tests.support.messages import look
@@ -39,9 +42,10 @@ ROUTES = {
 }
 
 
-def ws_url(url: str) -> str:
-    """The address of the WebSocket at a bridge's address."""
-    return url.replace("http", "ws", 1) + "/ws/state"
+def ws_url(url: str, **query: Any) -> str:
+    """The address of the WebSocket at a bridge's address; keyword arguments are the query."""
+    parameters = f"?{urlencode(query)}" if query else ""
+    return url.replace("http", "ws", 1) + "/ws/state" + parameters
 
 
 class Listener:
@@ -52,8 +56,17 @@ class Listener:
 
     def next(self, timeout_s: float = PATIENCE_S) -> Frame:
         """The next frame, whatever its type."""
-        frame: Frame = json.loads(self.connection.recv(timeout=timeout_s))
+        message = self.connection.recv(timeout=timeout_s)
+        frame: Frame = json.loads(message) if isinstance(message, str) else cbor2.loads(message)
         return frame
+
+    def rest(self) -> list[Frame]:
+        """The frames that have arrived so far and were not read."""
+        frames = []
+        with suppress(TimeoutError):
+            while True:
+                frames.append(self.next(timeout_s=0.0))
+        return frames
 
     def until(self, kind: str, accept: Callable[[Frame], bool] = lambda _: True) -> Frame:
         """Read on to the first frame of a type that `accept` takes, and return that."""
@@ -85,9 +98,14 @@ def tag_ids(state: dict[str, Any]) -> list[str]:
 
 
 @contextmanager
-def listener(url: str, **options: Any) -> Iterator[Listener]:
-    """A WebSocket client of the bridge at `url`."""
-    with connect(ws_url(url), proxy=None, max_size=None, **options) as connection:
+def listener(
+    url: str, subprotocols: Sequence[str] | None = None, **query: Any
+) -> Iterator[Listener]:
+    """A WebSocket client of the bridge at `url`; keyword arguments are the query."""
+    offered = None if subprotocols is None else [Subprotocol(name) for name in subprotocols]
+    with connect(
+        ws_url(url, **query), proxy=None, max_size=None, subprotocols=offered
+    ) as connection:
         yield Listener(connection)
 
 
@@ -116,9 +134,9 @@ class Bridge:
 
         return wait_for(look, f"tag {tag_id} as expected at {self.url}")
 
-    def listen(self) -> Any:
-        """A `Listener`, in a `with`."""
-        return listener(self.url)
+    def listen(self, **query: Any) -> Any:
+        """A `Listener`, in a `with`; keyword arguments are the query."""
+        return listener(self.url, **query)
 
 
 @contextmanager

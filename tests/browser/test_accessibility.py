@@ -1,0 +1,87 @@
+"""axe-core finds nothing to object to: light, dark, kiosk, phone, frozen, and with all panels open.
+
+Only here the page's own policy is bypassed, to get axe into the page.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.hmi import AXE, PHONE, WIDE, Hmi
+from tests.browser.house import TAGS
+from tests.support.messages import scan
+from tests.support.web import Bridge, bridge
+
+OpenPage = Callable[..., Hmi]
+
+RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
+
+
+def violations(hmi: Hmi) -> list[str]:
+    """What axe objects to, each with the elements that it means."""
+    hmi.page.evaluate(AXE.read_text(encoding="utf-8"))
+    found: list[dict[str, Any]] = hmi.page.evaluate(
+        "async (tags) => (await axe.run({ runOnly: tags })).violations", RULES
+    )
+    return [
+        f"{each['id']}: {each['help']}: {node['html'][:160]} {node['failureSummary'][:300]}"
+        for each in found
+        for node in each["nodes"]
+    ]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(
+    ("viewport", "query"),
+    [(WIDE, ""), (WIDE, "?kiosk=1"), (PHONE, "")],
+    ids=["wide", "kiosk", "phone"],
+)
+def test_the_page_as_it_opens(
+    house: Bridge, open_page: OpenPage, scheme: str, viewport: dict[str, int], query: str
+) -> None:
+    hmi = open_page(
+        house.url, "tag=10", query, color_scheme=scheme, viewport=viewport, bypass_csp=True
+    )
+    hmi.expect_samples(3)
+    assert violations(hmi) == []
+    if viewport is PHONE:
+        hmi.page.get_by_role("navigation").get_by_role("button", name="Tags").click()
+        expect(hmi.row("1")).to_be_visible()
+        assert violations(hmi) == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_what_opens_on_demand(house: Bridge, open_page: OpenPage, scheme: str) -> None:
+    hmi = open_page(house.url, color_scheme=scheme, bypass_csp=True)
+    hmi.expect_rows(*TAGS)
+    hmi.page.get_by_role("button", name="Layers").click()
+    assert violations(hmi) == []
+    hmi.page.get_by_role("button", name="Menu").click()
+    assert violations(hmi) == []
+    hmi.page.keyboard.press("Escape")
+    hmi.page.get_by_role("radio", name="Fixed").check()
+    hmi.page.get_by_role("searchbox").fill("nothing like this")
+    expect(hmi.page.locator(".no-match")).to_be_visible()
+    assert violations(hmi) == []
+    hmi.page.get_by_role("searchbox").blur()
+    hmi.page.keyboard.press("?")
+    expect(hmi.page.get_by_role("dialog")).to_be_visible()
+    assert violations(hmi) == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_an_empty_house_and_a_frozen_one(domain: int, open_page: OpenPage, scheme: str) -> None:
+    with bridge(domain=domain) as running:
+        hmi = open_page(running.url, color_scheme=scheme, bypass_csp=True)
+        expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-tags")
+        assert violations(hmi) == []
+        running.peer.observe(scan("a", {"temperature": 99.0}, at=(1, 1)))
+        hmi.expect_rows("a")
+        hmi.allow_noise("ERR_CONNECTION_REFUSED|ERR_EMPTY_RESPONSE|ERR_CONNECTION_RESET|WebSocket")
+        running.process.kill()
+        hmi.expect_phase("reconnecting")
+        assert violations(hmi) == []

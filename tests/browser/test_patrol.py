@@ -1,0 +1,110 @@
+"""The demo in the browser: the real patrol, faster than for people."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import sys
+from collections.abc import Callable
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from playwright.sync_api import expect
+
+from tests.browser.hmi import Hmi
+from tests.support.domains import ros_env
+from tests.support.processes import Process, lupin_twin, url_of
+
+OpenPage = Callable[..., Hmi]
+
+WATCH_PESTS = """
+() => {
+  window.pests = { seen: [], cleared: [] };
+  new MutationObserver((changes) => {
+    for (const { target, oldValue } of changes) {
+      const now = target.dataset.pest;
+      if (now === oldValue) continue;
+      (now === 'true' ? window.pests.seen : window.pests.cleared).push(target.dataset.tagId);
+    }
+  }).observe(document.querySelector('tbody'), {
+    attributeFilter: ['data-pest'], attributeOldValue: true, subtree: true,
+  });
+}
+"""
+
+
+def simulated_tags() -> dict[str, set[str]]:
+    """The simulator's own list: the sensors of each tag."""
+    path = files("greenhouse_sim") / "configs/tag_locations.json"
+    listed: Any = json.loads(Path(str(path)).read_text(encoding="utf-8"))
+    return {str(tag_id): set(tag["sensors"]) for tag_id, tag in listed["tags"].items()}
+
+
+def sensors_shown(hmi: Hmi) -> dict[str, set[str]]:
+    """The sensors that the table has a number of, for each tag."""
+    rows: dict[str, list[str]] = hmi.page.evaluate(
+        """() => Object.fromEntries(
+          [...document.querySelectorAll('tbody tr[data-tag-id]')].map((row) => [
+            row.dataset.tagId,
+            [...row.querySelectorAll('td[data-sensor]')]
+              .filter((cell) => /[0-9]/.test(cell.textContent))
+              .map((cell) => cell.dataset.sensor),
+          ]),
+        )"""
+    )
+    return {tag_id: set(sensors) for tag_id, sensors in rows.items()}
+
+
+def unbidden(output: str) -> list[str]:
+    """Lines of a log that say something went wrong."""
+    return [
+        line
+        for line in output.splitlines()
+        if re.search(r"warn|error|critical|traceback|exception", line, re.IGNORECASE)
+    ]
+
+
+def test_a_patrol_fills_the_page_and_a_pest_comes_and_goes(
+    domain: int, open_page: OpenPage
+) -> None:
+    tags = simulated_tags()
+    assert len(tags) == 29
+    patrol = [sys.executable, "-m", "lupin_patrol", "--speed", "15"]
+    with lupin_twin(domain, "serve") as server:
+        hmi = open_page(url_of(server))
+        hmi.expect_phase("live")
+        hmi.page.evaluate(WATCH_PESTS)
+        with Process(patrol, ros_env(domain)) as robot:
+            hmi.expect(lambda: sensors_shown(hmi) == tags, "every tag with its sensors")
+            expect(hmi.page.locator("tbody tr[data-pinned=true]")).to_have_count(29)
+            expect(hmi.page.locator("tbody .cell-species bdi")).to_have_count(29)
+            expect(hmi.test_id("notice")).to_have_count(0)
+            for label, name in (
+                ("Temperature", "temperature"),
+                ("CO₂", "co2"),
+                ("Soil moisture", "soil_moisture"),
+            ):
+                hmi.choose_sensor(label)
+                hmi.expect_samples(sum(name in sensors for sensors in tags.values()))
+            hmi.page.wait_for_function(
+                "() => window.pests.seen.some((tag) => window.pests.cleared.includes(tag))"
+            )
+            assert robot.exit_code is None
+            assert unbidden(robot.output) == []
+        hmi.expect_phase("live")
+        assert unbidden(server.output) == []
+
+
+def test_the_demo_is_one_command_that_shows_tags_and_ends_with_its_patrol(
+    domain: int, open_page: OpenPage
+) -> None:
+    with lupin_twin(domain, "demo") as demo:
+        hmi = open_page(url_of(demo))
+        hmi.expect(lambda: len(hmi.rows()) >= 3, "the first tags")
+        expect(hmi.page.locator("tbody tr[data-pinned=true]").first).to_be_visible()
+        hmi.allow_noise("ERR_CONNECTION_REFUSED|ERR_EMPTY_RESPONSE|ERR_CONNECTION_RESET|WebSocket")
+        assert demo.stop(signal.SIGINT) == 0
+        hmi.expect_phase("reconnecting")
+        assert unbidden(demo.output) == []

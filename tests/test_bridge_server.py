@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 import signal
 import socket
 import threading
@@ -11,7 +12,7 @@ from pathlib import Path
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from lupin_bridge.server import MAX_INBOUND_BYTES, address_of, listen
+from lupin_bridge.server import MAX_INBOUND_BYTES, address_of, allow_connections, listen
 from tests.support.inprocess import run, running
 from tests.support.web import Bridge, Listener, bridge, deaf_client, overfill
 
@@ -48,6 +49,33 @@ def test_who_connects_before_the_server_serves_has_only_to_wait() -> None:
 def test_ipv6_has_brackets_in_its_address() -> None:
     with listen("::1", 0) as listener:
         assert address_of(listener) == f"http://[::1]:{listener.getsockname()[1]}"
+
+
+@pytest.mark.parametrize(
+    ("soft", "hard", "clients", "expected"),
+    [
+        (1_024, 20_000, 5_000, 5_512),
+        (8_000, 20_000, 5_000, 8_000),
+        (1_024, 4_096, 5_000, 4_096),
+        (1_024, resource.RLIM_INFINITY, 5_000, 5_512),
+        (resource.RLIM_INFINITY, resource.RLIM_INFINITY, 5_000, resource.RLIM_INFINITY),
+    ],
+)
+def test_it_may_open_as_many_files_as_clients_need_and_says_where_it_may_not(
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    soft: int,
+    hard: int,
+    clients: int,
+    expected: int,
+) -> None:
+    limits = [(soft, hard)]
+    monkeypatch.setattr(resource, "getrlimit", lambda _: limits[-1])
+    monkeypatch.setattr(resource, "setrlimit", lambda _, both: limits.append(both))
+    allow_connections(clients)
+    assert limits[-1] == (expected, hard)
+    names_all = "--max-clients is 5000, but this process may open 4096 files" in caplog.text
+    assert names_all == (hard == 4_096)
 
 
 def test_an_address_in_use_is_refused_and_nothing_stays_open() -> None:

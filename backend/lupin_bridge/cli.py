@@ -21,7 +21,7 @@ from lupin_bridge.app import create_app
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.local_twin import LocalTwin
 from lupin_bridge.ros_thread import RosStartError
-from lupin_bridge.server import BridgeServer, address_of, listen
+from lupin_bridge.server import BridgeServer, address_of, allow_connections, listen
 from lupin_bridge.settings import SettingError, Settings, option
 from lupin_bridge.tls import check_pair
 from lupin_bridge.web_twin import WebTwin
@@ -84,6 +84,7 @@ async def _run(role: str, settings: Settings, access: Access, ros_args: Sequence
     except OSError as error:
         _fail(f"cannot listen on {settings.host} port {settings.port}: {error.strerror}")
     _warn_of_exposure(listener, access)
+    allow_connections(settings.max_clients)
     make_source = WebTwin if role == "web" else LocalTwin
     source = make_source(ros_args=ros_args, timeout_s=settings.field_timeout_s)
     bridge = Bridge(source, settings)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import resource
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,6 +20,8 @@ log = logging.getLogger(__name__)
 # Clients have nothing to say: what they send is read and thrown away, and bounded.
 MAX_INBOUND_BYTES = 65_536
 PING_PERIOD_S = 20.0
+# Files open beside the clients' sockets: DDS, plain HTTP requests, those who are turned away.
+SPARE_FILES = 512
 # Ctrl-C ends within 2 s: this for the requests in flight, the rest for the ROS thread.
 GRACEFUL_SHUTDOWN_S = 1
 
@@ -83,6 +86,27 @@ def listen(host: str, port: int) -> socket.socket:
         raise
     listener.setblocking(False)
     return listener
+
+
+def allow_connections(number: int) -> None:
+    """Raise this process's limit on open files to what so many clients need.
+
+    The usual limit of 1,024 is there for programs that use select(2), which this is not.
+    """
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = number + SPARE_FILES
+    if soft == resource.RLIM_INFINITY or soft >= wanted:
+        return
+    allowed = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (allowed, hard))
+    if allowed < wanted:
+        log.warning(
+            "--max-clients is %d, but this process may open %d files (ulimit -Hn), of which it "
+            "keeps %d for itself: lower the one or raise the other",
+            number,
+            hard,
+            SPARE_FILES,
+        )
 
 
 def address_of(listener: socket.socket, scheme: str = "http") -> str:

@@ -74,8 +74,8 @@ def listen(host: str, port: int) -> socket.socket:
 
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    # asyncio turns Nagle's algorithm off only where it is told that this is TCP. With it, the second
-    # write to a client (a body after its headers, a state after the status) waits 40 ms.
+    # asyncio turns Nagle's algorithm off only where it is told that this is TCP. With it, the
+    # second write to a client (a body after its headers, a state after the status) waits 40 ms.
     listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:

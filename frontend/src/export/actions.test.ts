@@ -1,0 +1,64 @@
+import { beforeEach, describe, expect, test, vi } from 'vitest';
+
+import { act, prefer } from '../store/app';
+import { showTags } from '../testing/page';
+import { readings, wireTag } from '../testing/tags';
+import { copyLink, saveTable } from './actions';
+import { fileName } from './save';
+
+let saved: Blob[];
+let names: string[];
+
+beforeEach(() => {
+  saved = [];
+  names = [];
+  URL.createObjectURL = (blob: Blob) => {
+    saved.push(blob);
+    return 'blob:test';
+  };
+  vi.spyOn(HTMLAnchorElement.prototype, 'click').mockImplementation(function (
+    this: HTMLAnchorElement,
+  ) {
+    names.push(this.download);
+  });
+  showTags([
+    wireTag({ tag_id: '10', readings: readings({ temperature: 20 }) }),
+    wireTag({ tag_id: '=9', readings: readings({ temperature: 30 }), species: 'rose' }),
+  ]);
+});
+
+describe('table as a file', () => {
+  const lines = async (): Promise<string[]> => (await saved[0]?.text())?.split('\r\n') ?? [];
+
+  test('is what the operator sees: filter, order and unit', async () => {
+    act({ type: 'filter', text: 'rose' });
+    prefer({ unit: 'F' });
+    saveTable();
+    const [head, first, ...rest] = await lines();
+    expect(head).toContain('Temperature [°F]');
+    expect(first).toMatch(/^'=9,.*,86,/);
+    expect(rest).toEqual(['']);
+    expect(names[0]).toMatch(/^lupin-twin-tags-.*\.csv$/);
+  });
+
+  test('is sorted as the table is', async () => {
+    act({ type: 'sort', column: 'temperature' });
+    act({ type: 'sort', column: 'temperature' });
+    saveTable();
+    expect((await lines())[1]).toMatch(/^'=9/);
+  });
+});
+
+test('a file’s name sorts by time and is legal everywhere', () => {
+  expect(fileName('map', 'png', Date.UTC(2026, 4, 1, 14, 3, 22))).toBe(
+    'lupin-twin-map-2026-05-01T14-03-22.png',
+  );
+});
+
+test('without a clipboard copying says no instead of failing', async () => {
+  expect(await copyLink()).toBe(false);
+  const writeText = vi.fn(() => Promise.resolve());
+  vi.stubGlobal('navigator', { clipboard: { writeText } });
+  expect(await copyLink()).toBe(true);
+  expect(writeText).toHaveBeenCalledWith(window.location.href);
+});

@@ -1,0 +1,81 @@
+import { beforeEach, describe, expect, test, vi, type Mock } from 'vitest';
+
+import { corners, mapPoint, toCanvas, type Camera, type View } from '../geometry/coordinates';
+import { MapCamera } from './camera';
+
+const size = { width: 600, height: 400 };
+const bounds = { minX: 0, minY: 0, maxX: 4, maxY: 8 };
+let onView: Mock<(view: View) => void>;
+let onCamera: Mock<(camera: Camera) => void>;
+let camera: MapCamera;
+
+beforeEach(() => {
+  onView = vi.fn<(view: View) => void>();
+  onCamera = vi.fn<(camera: Camera) => void>();
+  camera = new MapCamera(document.createElement('div'), { onView, onCamera });
+  camera.resize(size);
+});
+
+describe('camera', () => {
+  test('shows everything, and does not take that for the operator’s choice', () => {
+    camera.goTo(null, bounds);
+    for (const corner of corners(bounds)) {
+      const { x, y } = toCanvas(camera.view, corner);
+      expect(x >= 0 && x <= size.width && y >= 0 && y <= size.height).toBe(true);
+    }
+    expect(onView).toHaveBeenCalledTimes(1);
+    expect(onCamera).not.toHaveBeenCalled();
+  });
+
+  test('going where it is changes nothing', () => {
+    camera.goTo(null, bounds);
+    camera.goTo(null, bounds);
+    expect(onView).toHaveBeenCalledTimes(1);
+  });
+
+  test('before its size is known it stays where it is', () => {
+    camera.resize({ width: 0, height: 0 });
+    camera.goTo(null, bounds);
+    expect(onView).not.toHaveBeenCalled();
+  });
+
+  test('zooming keeps the middle, and is a choice', () => {
+    camera.goTo({ x: 2, y: 4, span: 8 }, null);
+    const before = camera.view.scale;
+    camera.zoomBy(2);
+    expect(camera.view.scale).toBeCloseTo(before * 2);
+    const middle = toCanvas(camera.view, mapPoint(2, 4));
+    expect(middle.x).toBeCloseTo(300);
+    expect(middle.y).toBeCloseTo(200);
+    expect(onCamera).toHaveBeenLastCalledWith(expect.objectContaining({ span: 4 }));
+  });
+
+  test('panning right and down moves the map left and up', () => {
+    camera.goTo({ x: 2, y: 4, span: 8 }, null);
+    camera.panBy(0.1, 0.1);
+    const middle = toCanvas(camera.view, mapPoint(2, 4));
+    expect(middle.x).toBeCloseTo(300 - 60);
+    expect(middle.y).toBeCloseTo(200 - 40);
+  });
+
+  test('shows a point that is out of sight, in the middle of what is free', () => {
+    camera.goTo({ x: 2, y: 4, span: 8 }, null);
+    camera.show(mapPoint(2, 40), 100);
+    const shown = toCanvas(camera.view, mapPoint(2, 40));
+    expect(shown.x).toBeCloseTo(300);
+    expect(shown.y).toBeCloseTo(150);
+  });
+
+  test('leaves a point alone that is in sight', () => {
+    camera.goTo({ x: 2, y: 4, span: 8 }, null);
+    const { view } = camera;
+    camera.show(mapPoint(2.5, 4.5), 0);
+    expect(camera.view).toEqual(view);
+  });
+
+  test('a point below the card is not in sight', () => {
+    camera.goTo({ x: 2, y: 4, span: 8 }, null);
+    camera.show(mapPoint(2, 2), 200);
+    expect(toCanvas(camera.view, mapPoint(2, 2)).y).toBeCloseTo(100);
+  });
+});

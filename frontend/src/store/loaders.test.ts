@@ -1,0 +1,138 @@
+import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
+
+import { goLive, goLost, showTags, status } from '../testing/page';
+import { readings, wireTag } from '../testing/tags';
+import { act, store } from './app';
+import { startLoaders } from './loaders';
+
+let asked: string[];
+let stop: () => void;
+let qualityStatus: number;
+
+function npy(values: readonly number[]): ArrayBuffer {
+  const header = `{'descr': '<f4', 'fortran_order': False, 'shape': (1, ${values.length}), }`;
+  const bytes = new Uint8Array(10 + header.length);
+  bytes.set([0x93, 0x4e, 0x55, 0x4d, 0x50, 0x59, 1, 0, header.length, 0]);
+  bytes.set(new TextEncoder().encode(header), 10);
+  const body = new Uint8Array(Float32Array.from(values).buffer);
+  const all = new Uint8Array(bytes.length + body.length);
+  all.set(bytes);
+  all.set(body, bytes.length);
+  return all.buffer;
+}
+
+beforeEach(() => {
+  vi.useFakeTimers();
+  asked = [];
+  qualityStatus = 404;
+  vi.stubGlobal('fetch', (url: URL) => {
+    asked.push(`${url.pathname}${url.search}`);
+    if (url.pathname === '/api/field.npy') {
+      const headers = {
+        'X-Field-Origin-X': '-1.5',
+        'X-Field-Origin-Y': '0.5',
+        'X-Field-Resolution': '0.05',
+        'X-Field-Value-Min': '1',
+        'X-Field-Value-Max': '2',
+        'X-Field-Sample-Count': '4',
+      };
+      return Promise.resolve(new Response(npy([1, 2]), { headers }));
+    }
+    return Promise.resolve(Response.json({ detail: 'none here' }, { status: qualityStatus }));
+  });
+  showTags([]);
+  goLost();
+  stop = startLoaders();
+});
+afterEach(() => {
+  stop();
+  vi.useRealTimers();
+});
+
+const settle = (): Promise<unknown> => vi.advanceTimersByTimeAsync(5);
+const count = (part: string): number => asked.filter((url) => url.includes(part)).length;
+const tags = [wireTag({ readings: readings({ temperature: 20 }) })];
+
+describe('loaders', () => {
+  test('fetch the field of the chosen sensor, with its place and range', async () => {
+    showTags(tags);
+    await settle();
+    expect(asked).toContain('/api/field.npy?sensor_type=temperature&resolution=0.05');
+    expect(store.get().twin.field.value).toMatchObject({
+      sensor: 'temperature',
+      originX: -1.5,
+      originY: 0.5,
+      valueMax: 2,
+      sampleCount: 4,
+    });
+  });
+
+  test('another sensor lets go of the old field at once and fetches its own', async () => {
+    showTags(tags);
+    await settle();
+    act({ type: 'sensor', sensor: 'co2' });
+    expect(store.get().twin.field.value).toBeNull();
+    await settle();
+    expect(store.get().twin.field.value?.sensor).toBe('co2');
+  });
+
+  test('the same revision is not fetched again; a new one is, and a new connection', async () => {
+    showTags(tags);
+    await settle();
+    const first = count('field.npy');
+    act({ type: 'hover', tagId: '1' });
+    await vi.advanceTimersByTimeAsync(5_000);
+    expect(count('field.npy')).toBe(first);
+    showTags(tags);
+    await vi.advanceTimersByTimeAsync(1_000);
+    expect(count('field.npy')).toBe(first + 1);
+  });
+
+  test('nobody pinned, nothing to ask for', async () => {
+    const pose = { position: { x: 0, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 0 } };
+    showTags([wireTag({ pose })]);
+    await settle();
+    expect(count('field.npy')).toBe(0);
+  });
+
+  test('a map is asked for only where the bridge has one', async () => {
+    showTags(tags);
+    await settle();
+    expect(count('/api/map')).toBeGreaterThan(0);
+    asked.length = 0;
+    goLive(status({ has_map: false }));
+    showTags(tags);
+    goLive(status({ has_map: false }));
+    await vi.advanceTimersByTimeAsync(40_000);
+    expect(count('/api/map')).toBeLessThanOrEqual(2);
+  });
+
+  test('a server without the error’s route is asked once', async () => {
+    showTags(tags);
+    await settle();
+    showTags(tags);
+    await vi.advanceTimersByTimeAsync(20_000);
+    expect(count('quality')).toBe(1);
+    expect(store.get().twin.quality).toBeNull();
+  });
+
+  test('a refusal is kept with its reason', async () => {
+    vi.stubGlobal('fetch', () =>
+      Promise.resolve(
+        Response.json({ ok: false, error_message: 'resolution is 0' }, { status: 400 }),
+      ),
+    );
+    showTags(tags);
+    await settle();
+    expect(store.get().twin.field).toMatchObject({ state: 'failed', message: 'resolution is 0' });
+  });
+
+  test('without a connection nothing is fetched', async () => {
+    showTags(tags);
+    await settle();
+    goLost();
+    asked.length = 0;
+    await vi.advanceTimersByTimeAsync(60_000);
+    expect(count('field.npy')).toBe(0);
+  });
+});

@@ -1,0 +1,61 @@
+/** Puts the page's one store into a known state. */
+import type { StatusFrame, TwinTagState } from '../contract/types';
+import { INITIAL, step, type ConnectionEvent } from '../connection/machine';
+import { prefer, receive, act } from '../store/app';
+import { DEFAULT_SETTINGS } from '../store/settings';
+import { NOTHING } from '../store/twin';
+import { DEFAULT_VIEW } from '../store/view';
+import { stateFrame } from './tags';
+
+export const status = (over: Partial<StatusFrame> = {}): StatusFrame => ({
+  type: 'status',
+  twin: 'live',
+  reason: 'live',
+  message: '',
+  state_age_seconds: 0,
+  has_map: true,
+  ...over,
+});
+
+let stamp = 1;
+
+/** The defaults, and a state with these tags, just received. */
+export function showTags(tags: readonly TwinTagState[]): void {
+  act({ type: 'look', view: DEFAULT_VIEW });
+  prefer(DEFAULT_SETTINGS);
+  receive({ type: 'field', field: NOTHING });
+  receive({ type: 'map', map: NOTHING });
+  receive({ type: 'quality', quality: null });
+  stamp += 1;
+  const frame = stateFrame(tags, { sec: stamp, revision: `r${stamp}` });
+  receive({ type: 'state', frame, now: performance.now() });
+  goLive();
+}
+
+/** Runs a connection through events and hands it to the store as it is at `now`. */
+export function connection(now: number, ...events: readonly ConnectionEvent[]): void {
+  const last = events.reduce((current, event) => step(current, event).connection, INITIAL);
+  receive({ type: 'connection', connection: last, now });
+}
+
+export function goLive(bridge: StatusFrame = status()): void {
+  const now = performance.now();
+  connection(
+    now,
+    { type: 'start', now },
+    { type: 'opened', now },
+    { type: 'frame', now, status: bridge },
+    { type: 'frame', now, status: null },
+  );
+}
+
+export function goLost(): void {
+  const now = performance.now();
+  connection(
+    now,
+    { type: 'start', now },
+    { type: 'opened', now },
+    { type: 'frame', now, status: null },
+    { type: 'closed', now, code: 1006, random: 1 },
+  );
+}

@@ -1,0 +1,57 @@
+import { fireEvent, render, screen } from '@testing-library/react';
+import { describe, expect, test } from 'vitest';
+
+import { Disclosure, useClose } from './Disclosure';
+
+function Inside(): React.JSX.Element {
+  return (
+    <button type="button" onClick={useClose()}>
+      Done
+    </button>
+  );
+}
+
+const show = (): HTMLElement => {
+  render(
+    <>
+      <Disclosure label="Things" button="=" className="things">
+        <Inside />
+      </Disclosure>
+      <button type="button">Elsewhere</button>
+    </>,
+  );
+  const trigger = screen.getByRole('button', { name: 'Things' });
+  fireEvent.click(trigger);
+  return trigger;
+};
+const isOpen = (): boolean => screen.queryByRole('button', { name: 'Done' }) !== null;
+
+describe('disclosure', () => {
+  test('opens and closes with its button, and says so', () => {
+    const trigger = show();
+    expect(isOpen()).toBe(true);
+    expect(trigger.getAttribute('aria-expanded')).toBe('true');
+    fireEvent.click(trigger);
+    expect(isOpen()).toBe(false);
+  });
+
+  test('Escape closes it and gives the focus back', () => {
+    const trigger = show();
+    fireEvent.keyDown(document.body, { key: 'Escape' });
+    expect(isOpen()).toBe(false);
+    expect(document.activeElement).toBe(trigger);
+  });
+
+  test('a press elsewhere, or the focus going elsewhere, closes it', () => {
+    show();
+    fireEvent.pointerDown(screen.getByRole('button', { name: 'Elsewhere' }));
+    expect(isOpen()).toBe(false);
+  });
+
+  test('what is inside can close it', () => {
+    const trigger = show();
+    fireEvent.click(screen.getByRole('button', { name: 'Done' }));
+    expect(isOpen()).toBe(false);
+    expect(document.activeElement).toBe(trigger);
+  });
+});

@@ -1,0 +1,111 @@
+import { fireEvent, render, screen, within } from '@testing-library/react';
+import { beforeEach, describe, expect, test } from 'vitest';
+
+import { act, prefer, store } from '../store/app';
+import { showTags } from '../testing/page';
+import { readings, wireTag } from '../testing/tags';
+import { TagTable } from './TagTable';
+
+const noPose = { position: { x: 0, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 0 } };
+
+beforeEach(() => {
+  showTags([
+    wireTag({
+      tag_id: '9',
+      readings: readings({ temperature: 20, humidity: null }),
+      species: 'rose',
+      species_confidence: 0.91,
+    }),
+    wireTag({ tag_id: '10', readings: readings({ temperature: 40 }), anomaly: true, bug_count: 2 }),
+    wireTag({ tag_id: '2', pose: noPose, stale_seconds: null }),
+  ]);
+});
+
+const row = (id: string): HTMLElement => {
+  const found = document.querySelector<HTMLElement>(`tr[data-tag-id="${id}"]`);
+  if (!found) throw new Error(`no row ${id}`);
+  return found;
+};
+const order = (): (string | undefined)[] =>
+  [...document.querySelectorAll<HTMLElement>('tbody tr')].map((each) => each.dataset['tagId']);
+const head = (name: RegExp): HTMLElement => screen.getByRole('columnheader', { name });
+const press = (name: RegExp): void => {
+  fireEvent.click(within(head(name)).getByRole('button'));
+};
+
+describe('table', () => {
+  test('lists every tag, also one without a pin that nobody observed', () => {
+    render(<TagTable />);
+    expect(order()).toEqual(['2', '9', '10']);
+    expect(row('2').dataset['pinned']).toBe('false');
+    expect(row('2').textContent).toContain('No pin');
+    expect(row('2').textContent).toContain('never');
+  });
+
+  test('shows readings, a failed sensor, species with confidence, pest and health', () => {
+    render(<TagTable />);
+    const cell = (id: string, sensor: string): string =>
+      row(id).querySelector(`[data-sensor="${sensor}"]`)?.textContent ?? '';
+    expect(cell('9', 'temperature')).toBe('20.0');
+    expect(cell('9', 'humidity')).toBe('failed');
+    expect(cell('9', 'co2')).toContain('no such sensor');
+    expect(cell('10', 'temperature')).toContain('above ideal');
+    expect(row('9').textContent).toContain('rose91');
+    expect(row('10').textContent).toContain('Pest');
+    expect(row('10').dataset['health']).toBe('critical');
+    expect(row('2').dataset['health']).toBe('no-data');
+  });
+
+  test('sorts by a column, up and down, and says so', () => {
+    render(<TagTable />);
+    expect(head(/^Tag/).getAttribute('aria-sort')).toBe('ascending');
+    press(/^Temperature/);
+    expect(head(/^Temperature/).getAttribute('aria-sort')).toBe('ascending');
+    expect(head(/^Tag/).getAttribute('aria-sort')).toBe('none');
+    expect(order()).toEqual(['9', '10', '2']);
+    press(/^Temperature/);
+    expect(head(/^Temperature/).getAttribute('aria-sort')).toBe('descending');
+    expect(order()).toEqual(['10', '9', '2']);
+  });
+
+  test('a click anywhere in a row chooses its tag, a second one lets go', () => {
+    render(<TagTable />);
+    fireEvent.click(row('9').lastElementChild ?? row('9'));
+    expect(store.get().view.selected).toBe('9');
+    expect(row('9').dataset['selected']).toBe('true');
+    fireEvent.click(within(row('9')).getByRole('button', { pressed: true }));
+    expect(store.get().view.selected).toBeNull();
+  });
+
+  test('a row under the pointer is hovered, as its pin then is', () => {
+    render(<TagTable />);
+    fireEvent.pointerOver(row('10'));
+    expect(store.get().view.hovered).toBe('10');
+    expect(row('10').dataset['hovered']).toBe('true');
+    fireEvent.pointerLeave(screen.getByRole('table'));
+    expect(store.get().view.hovered).toBeNull();
+  });
+
+  test('a filter that finds nothing offers the way out', () => {
+    act({ type: 'filter', text: 'nobody' });
+    render(<TagTable />);
+    expect(order()).toEqual([undefined]);
+    fireEvent.click(screen.getByRole('button', { name: 'Clear filter' }));
+    expect(order()).toHaveLength(3);
+  });
+
+  test('temperatures follow the chosen unit', () => {
+    prefer({ unit: 'F' });
+    render(<TagTable />);
+    expect(head(/^Temperature/).textContent).toContain('°F');
+    expect(row('9').querySelector('[data-sensor="temperature"]')?.textContent).toBe('68.0');
+  });
+
+  test('strings from the wire are text and nothing else', () => {
+    showTags([wireTag({ tag_id: '<img src=x onerror=alert(1)>', species: '\u202eevil' })]);
+    render(<TagTable />);
+    expect(document.querySelector('img')).toBeNull();
+    expect(document.body.textContent).toContain('<img src=x');
+    expect(document.body.textContent).not.toContain('\u202e');
+  });
+});

@@ -1,0 +1,71 @@
+import { fireEvent } from '@testing-library/react';
+import { afterEach, beforeEach, describe, expect, test } from 'vitest';
+
+import { onMapCommand, type MapCommand } from '../map/commands';
+import { prefer, store } from '../store/app';
+import { showTags } from '../testing/page';
+import { wireTag } from '../testing/tags';
+import { startShortcuts } from './shortcuts';
+
+let stop: () => void;
+let commands: MapCommand[];
+let unhear: () => void;
+
+beforeEach(() => {
+  showTags(['1', '2', '3'].map((tag_id) => wireTag({ tag_id })));
+  commands = [];
+  unhear = onMapCommand((command) => commands.push(command));
+  stop = startShortcuts();
+});
+afterEach(() => {
+  stop();
+  unhear();
+  document.body.replaceChildren();
+});
+
+const press = (
+  key: string,
+  init: KeyboardEventInit = {},
+  target: Element = document.body,
+): void => {
+  fireEvent.keyDown(target, { key, ...init });
+};
+
+describe('keys', () => {
+  test('digits choose sensors; beyond the last nothing happens', () => {
+    press('3');
+    expect(store.get().view.sensor).toBe('co2');
+    press('9');
+    expect(store.get().view.sensor).toBe('co2');
+  });
+
+  test('n and p walk through the tags and around', () => {
+    const walk = ['n', 'n', 'p', 'p', 'p'].map((key) => {
+      press(key);
+      return store.get().view.selected;
+    });
+    expect(walk).toEqual(['1', '2', '1', '3', '2']);
+    press('Escape');
+    expect(store.get().view.selected).toBeNull();
+  });
+
+  test('f, s, u and t', () => {
+    press('f');
+    expect(commands).toEqual([{ type: 'fit' }]);
+    press('s');
+    expect(store.get().view.layers.has('smooth')).toBe(true);
+    press('u');
+    expect(store.get().settings.unit).toBe('F');
+    press('t');
+    expect(store.get().settings.theme).toBe('dark');
+  });
+
+  test('not while typing, not with Control, and not when switched off', () => {
+    const input = document.body.appendChild(document.createElement('input'));
+    press('u', {}, input);
+    press('u', { ctrlKey: true });
+    prefer({ shortcuts: false });
+    press('u');
+    expect(store.get().settings.unit).toBe('C');
+  });
+});

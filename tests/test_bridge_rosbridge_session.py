@@ -202,18 +202,27 @@ def test_a_topic_is_called_what_the_client_calls_it(session: Session) -> None:
 
 
 class Socket:
-    """A connection that takes everything."""
+    """A connection that takes everything, or nothing."""
 
-    can_take = True
-
-    def __init__(self) -> None:
+    def __init__(self, can_take: bool = True) -> None:
+        self.can_take = can_take
         self.got: list[bytes] = []
+        self.dismissed = False
 
     def write(self, wire: bytes) -> None:
         self.got.append(wire)
 
     def dismiss(self, code: int, reason: str) -> None:
-        raise AssertionError(reason)
+        self.dismissed = True
+
+
+def test_who_has_not_subscribed_is_closed_when_its_socket_stays_full(session: Session) -> None:
+    hub, full, free = Hub(2, 30.0), Socket(can_take=False), Socket()
+    for socket in (full, free):
+        hub.join(Client(socket, wants_state=False, wire=lambda _client, f: session.wire(f)), 0.0)
+    assert hub.dismiss_stuck(29.9) == 0
+    assert hub.dismiss_stuck(30.0) == 1
+    assert (full.dismissed, free.dismissed) == (True, False)
 
 
 def test_a_throttled_client_gets_no_two_states_closer_than_it_asked(session: Session) -> None:

@@ -136,6 +136,7 @@ def test_who_has_not_subscribed_is_sent_nothing_and_counts_as_sent_nothing(
             hub = here.bridge.hub
             reader, writer = await deaf(here.url)
             await inprocess.until(lambda: len(hub) == 1, "the client")
+            writer.write(masked({"op": "set_level", "level": "none"}))
             published, plain = 0, hub.publish
 
             def publish(frame: StateFrame, now_s: float) -> None:

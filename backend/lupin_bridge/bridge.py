@@ -7,7 +7,6 @@ import contextlib
 import logging
 import math
 import time
-import uuid
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
@@ -37,8 +36,6 @@ class Bridge:
     def __init__(self, source: TwinSource, settings: Settings) -> None:
         self.source = source
         self.settings = settings
-        # Numbers the maps of this process alone: a restarted bridge must not match old ETags.
-        self.identity = uuid.uuid4().hex[:12]
         # Large fields and pictures are written off the loop.
         self.pool = ThreadPoolExecutor(max_workers=2, thread_name_prefix="encode")
         self.hub = Hub(settings.max_clients, settings.client_timeout_s)

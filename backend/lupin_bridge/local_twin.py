@@ -58,6 +58,11 @@ class LocalTwin:
         await self._thread.stop()
 
     @property
+    def identity(self) -> str:
+        """Of this process: its counts start over with the next one."""
+        return self._identity
+
+    @property
     def is_alive(self) -> bool:
         """Whether the ROS thread runs."""
         return self._thread.is_alive

@@ -60,7 +60,7 @@ async def _map(request: Request, kind: str) -> Response:
         return error_response(str(error), 503)
     if occupancy is None:
         return error_response("no map has come yet on the twin's map_topic", 404)
-    headers = {"ETag": f'"{bridge.identity}-{occupancy.revision}-{kind}"', **REVALIDATE}
+    headers = {"ETag": f'"{bridge.source.identity}-{occupancy.revision}-{kind}"', **REVALIDATE}
     if matches(request.headers.get("if-none-match"), headers["ETag"]):
         return Response(status_code=304, headers=headers)
     if kind == "json":

@@ -68,6 +68,10 @@ class TwinSource(Protocol):
         """Stop and release everything."""
 
     @property
+    def identity(self) -> str:
+        """Tells the counts of one process from another's; empty where revisions are digests."""
+
+    @property
     def is_alive(self) -> bool:
         """Whether the thread behind this source runs."""
 

@@ -48,6 +48,13 @@ SHARED_PARAMETERS: Final = (
 )
 
 
+def _digest_of_map(msg: Any) -> int:
+    """A map's revision: the same in all replicas, whichever of the twin's maps they have heard."""
+    digest = blake2b(repr((msg.header, msg.info)).encode("utf-8", "surrogatepass"), digest_size=6)
+    digest.update(msg.data)
+    return int.from_bytes(digest.digest())
+
+
 class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
     """Follows `/twin/state` and `/map`, and asks `/twin/get_field`.
 
@@ -98,9 +105,9 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     @property
     def revision(self) -> str:
-        """A digest of poses and readings, and the map's revision: the count is not on the wire."""
+        """Digests of poses and readings and of the map: the twin's count is not on the wire."""
         map_revision = 0 if self.occupancy_map is None else self.occupancy_map.revision
-        return f"{self.digest}-{map_revision}"
+        return f"{self.digest}-{map_revision:x}"
 
     def request_field(self, request: FieldRequest) -> Any:
         """Ask the twin; returns the rclpy Future of its response."""
@@ -146,9 +153,8 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 ("frame", 0), f"dropped a map: its frame is {frame_id[:64]!r}, not {expected!r}"
             )
             return
-        revision = 1 if self.occupancy_map is None else self.occupancy_map.revision + 1
         try:
-            self.occupancy_map = convert.map_of(msg, revision)
+            self.occupancy_map = convert.map_of(msg, _digest_of_map(msg))
         except ValueError as error:
             self._say(("map", 0), f"dropped a map: {error}; the last one stays")
             return

@@ -58,6 +58,11 @@ class WebTwin:
         await self._thread.stop()
 
     @property
+    def identity(self) -> str:
+        """None: all replicas, and a restarted one, give the same content the same ETag."""
+        return ""
+
+    @property
     def is_alive(self) -> bool:
         """Whether the ROS thread runs."""
         return self._thread.is_alive

@@ -177,3 +177,4 @@ def test_neither_a_client_that_does_not_read_nor_a_heavy_request_holds_up_the_en
         heavy.join()
         assert last_words(healthy) == ("shutting_down", 1012)
         assert "Traceback" not in running_bridge.process.output
+        assert "ERROR" not in running_bridge.process.output

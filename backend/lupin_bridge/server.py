@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import resource
 import socket
@@ -22,8 +23,10 @@ MAX_INBOUND_BYTES = 65_536
 PING_PERIOD_S = 20.0
 # Files open beside the clients' sockets: DDS, plain HTTP requests, those who are turned away.
 SPARE_FILES = 512
-# Ctrl-C ends within 2 s: this for the requests in flight, the rest for the ROS thread.
+# Ctrl-C ends within 2 s: this for the requests in flight, the rest for the ROS thread. A listener
+# whose socket is still full by then would use it all up.
 GRACEFUL_SHUTDOWN_S = 1
+GOODBYE_S = 0.5
 
 
 class BridgeServer(uvicorn.Server):
@@ -60,7 +63,13 @@ class BridgeServer(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Tell the clients, then close."""
         self._bridge.say_goodbye()
+        asyncio.get_running_loop().call_later(GOODBYE_S, self._cut_off_listeners)
         await super().shutdown(sockets)
+
+    def _cut_off_listeners(self) -> None:
+        for connection in list(self.server_state.connections):
+            if isinstance(connection, Connection):
+                connection.transport.abort()
 
 
 def listen(host: str, port: int) -> socket.socket:

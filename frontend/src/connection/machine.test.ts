@@ -174,6 +174,13 @@ describe('attempts', () => {
     expect(step(live, { type: 'tick', now: 25 + DEAD_MS, random: 1 }).command).toBe('drop');
   });
 
+  test('a connection that sends what cannot be used is replaced', () => {
+    const broken = step(live, { type: 'broken', now: 9_000, random: 1 });
+    expect(broken.command).toBe('drop');
+    expect(phaseOf(broken.connection, 9_001)).toBe('reconnecting');
+    expect(nextDeadline(broken.connection, 9_000)).toBe(9_500);
+  });
+
   test('each connection is an epoch of its own', () => {
     expect(live.epoch).toBe(1);
     const second = step(step(live, closed(50)).connection, { type: 'wake', now: 60 }).connection;

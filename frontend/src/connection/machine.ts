@@ -51,6 +51,8 @@ export type ConnectionEvent =
       readonly code: number | null;
       readonly random: number;
     }
+  /** What came cannot be used: the two sides have lost each other. */
+  | { readonly type: 'broken'; readonly now: number; readonly random: number }
   /** The tab became visible or the network returned. */
   | { readonly type: 'wake'; readonly now: number }
   /** A deadline of `nextDeadline` may have passed. */
@@ -99,6 +101,10 @@ export function step(connection: Connection, event: ConnectionEvent): Step {
     case 'closed':
       if (socket.kind === 'closed') return stay(connection);
       return { connection: fail(connection, now, event.code, event.random), command: null };
+    case 'broken':
+      return socket.kind === 'open'
+        ? { connection: fail(connection, now, null, event.random), command: 'drop' }
+        : stay(connection);
     case 'wake':
       if (socket.kind === 'closed') return open(connection, now);
       // After a sleep the socket often looks open and is not.

@@ -11,6 +11,8 @@ export interface ConnectionHandlers {
 export interface Link {
   /** Does not wait for the back-off any longer. */
   readonly retry: () => void;
+  /** Gives the present connection up, for what it sends cannot be used. */
+  readonly giveUp: () => void;
   readonly stop: () => void;
 }
 
@@ -63,6 +65,9 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
   const retry = (): void => {
     send({ type: 'wake', now: performance.now() });
   };
+  const giveUp = (): void => {
+    send({ type: 'broken', now: performance.now(), random: Math.random() });
+  };
   const wake = (): void => {
     if (document.visibilityState === 'visible') retry();
   };
@@ -79,5 +84,5 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
     clearTimeout(timer);
     drop();
   };
-  return { retry, stop };
+  return { retry, giveUp, stop };
 }

@@ -12,7 +12,7 @@ describe('addresses', () => {
   test('are relative to the page, behind any path prefix', () => {
     document.head.innerHTML = '<base href="https://farm.example/house-3/#x">';
     expect(route('api/map').href).toBe('https://farm.example/house-3/api/map');
-    expect(stateSocketUrl()).toBe('wss://farm.example/house-3/ws/state');
+    expect(stateSocketUrl()).toBe('wss://farm.example/house-3/ws/state?delta=1');
   });
 
   test('a tag’s id is written so that it stays one part of the path', async () => {

@@ -16,6 +16,13 @@ test('reads both kinds of frame', () => {
   expect(parseFrame(JSON.stringify(status))).toEqual(status);
 });
 
+test('reads a delta', () => {
+  const header = { stamp: { sec: 1, nanosec: 0 }, frame_id: 'map' };
+  const delta = { type: 'delta', seq: 2, base: 1, revision: 'r', header, changed: [], removed: [] };
+  expect(parseFrame(JSON.stringify(delta))).toEqual(delta);
+  expect(parseFrame(JSON.stringify({ ...delta, removed: null }))).toBeNull();
+});
+
 test.each([
   'no json',
   'null',

@@ -24,6 +24,16 @@ export function parseFrame(text: string): Frame | null {
   ) {
     return message as unknown as Frame;
   }
+  if (
+    message['type'] === 'delta' &&
+    typeof message['revision'] === 'string' &&
+    typeof message['base'] === 'number' &&
+    isObject(message['header']) &&
+    Array.isArray(message['changed']) &&
+    Array.isArray(message['removed'])
+  ) {
+    return message as unknown as Frame;
+  }
   return null;
 }
 

@@ -5,7 +5,8 @@ type Schemas = components['schemas'];
 
 export type StateFrame = Schemas['StateFrame'];
 export type StatusFrame = Schemas['StatusFrame'];
-export type Frame = StateFrame | StatusFrame;
+export type DeltaFrame = Schemas['DeltaFrame'];
+export type Frame = StateFrame | DeltaFrame | StatusFrame;
 export type TwinTagState = Schemas['TwinTagState'];
 export type OccupancyGrid = Schemas['OccupancyGrid'];
 export type FieldQuality = Schemas['FieldQuality'];

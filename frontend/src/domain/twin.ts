@@ -1,4 +1,5 @@
-import type { StateFrame, TwinTagState, WirePoint, WireTime } from '../contract/types';
+import type { Latest } from '../connection/latest';
+import type { TwinTagState, WirePoint, WireTime } from '../contract/types';
 import { mapPoint, type MapPoint } from '../geometry/coordinates';
 
 export interface Bloom {
@@ -119,27 +120,23 @@ function equal(a: unknown, b: unknown): boolean {
 }
 
 /**
- * The snapshot that a state frame makes. `arrivedAt` is when the frame came, less the state's
+ * The snapshot that a state makes. `arrivedAt` is when its frame came, less the state's
  * age if it was old then, ms on the monotonic clock.
  *
  * A frame that repeats the state before (a heartbeat of a bridge whose twin is gone) is not new:
  * it keeps the older `takenAt`, or every heartbeat would make the readings look fresh again.
  */
-export function snapshotOf(
-  frame: StateFrame,
-  arrivedAt: number,
-  before: Snapshot | null,
-): Snapshot {
-  const stamp = timeKey(frame.state.header.stamp);
+export function snapshotOf(latest: Latest, arrivedAt: number, before: Snapshot | null): Snapshot {
+  const stamp = timeKey(latest.state.header.stamp);
   const repeated = before?.stamp === stamp;
   const takenAt = repeated ? Math.min(before.takenAt, arrivedAt) : arrivedAt;
   const known = new Map(before?.tags.map((tag) => [tag.id, tag]));
-  const tags = frame.state.tags
+  const tags = latest.state.tags
     .map((wire) => sharedTag(known.get(wire.tag_id), wire, takenAt))
     .sort((a, b) => compareIds(a.id, b.id));
   return {
     tags,
-    revision: frame.revision,
+    revision: latest.revision,
     stamp,
     takenAt,
     fresh: before ? freshTags(known, tags) : [],

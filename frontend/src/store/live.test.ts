@@ -42,7 +42,7 @@ afterEach(() => {
 });
 
 test('goes to the server that the page came from', () => {
-  expect(FakeSocket.last.url).toBe('ws://localhost:3000/ws/state');
+  expect(FakeSocket.last.url).toBe('ws://localhost:3000/ws/state?delta=1');
 });
 
 test('the first state is taken at once, as old as the bridge says', () => {
@@ -65,6 +65,20 @@ test('of many frames the newest is taken, a few times a second', () => {
   expect(revision()).toBe('r19');
   expect(changes).toBeLessThanOrEqual(10);
   expect(changes).toBeGreaterThan(5);
+});
+
+test('deltas are put together; one that does not fit makes a new connection', () => {
+  const header = { stamp: { sec: 50, nanosec: 0 }, frame_id: 'map' };
+  const delta = { type: 'delta', revision: 'd', header, changed: [], removed: [] } as const;
+  FakeSocket.last.speak(stateFrame([wireTag()], { seq: 1, sec: 49 }));
+  FakeSocket.last.speak({ ...delta, seq: 2, base: 1 });
+  vi.advanceTimersByTime(300);
+  expect(revision()).toBe('d');
+  expect(store.get().twin.phase).toBe('live');
+  FakeSocket.last.speak({ ...delta, seq: 9, base: 8 });
+  expect(store.get().twin.phase).toBe('reconnecting');
+  vi.advanceTimersByTime(1_000);
+  expect(store.get().twin.connection.socket.kind).toBe('opening');
 });
 
 test('a large house is calmer', () => {

@@ -1,7 +1,7 @@
 /** The page's one connection, and what its frames do to the store. */
+import { latestAfter, type Latest } from '../connection/latest';
 import { connect } from '../connection/socket';
 import { stateSocketUrl } from '../contract/api';
-import type { StateFrame } from '../contract/types';
 import { receive } from './app';
 
 /**
@@ -21,7 +21,9 @@ export function retryConnection(): void {
 }
 
 export function startLive(): () => void {
-  let newest: { readonly frame: StateFrame; readonly now: number } | null = null;
+  let latest: Latest | null = null;
+  let arrivedAt = 0;
+  let isNew = false;
   let takenAt = -Infinity;
   let timer: ReturnType<typeof setTimeout> | undefined;
   let greeted = -1;
@@ -29,10 +31,10 @@ export function startLive(): () => void {
   const take = (stateAgeSeconds: number | null): void => {
     clearTimeout(timer);
     timer = undefined;
-    if (!newest) return;
+    if (!latest || !isNew) return;
+    isNew = false;
     takenAt = performance.now();
-    receive({ type: 'state', ...newest, stateAgeSeconds });
-    newest = null;
+    receive({ type: 'state', latest, now: arrivedAt, stateAgeSeconds });
   };
 
   const link = connect(stateSocketUrl(), {
@@ -40,21 +42,25 @@ export function startLive(): () => void {
       receive({ type: 'connection', connection, now: performance.now() });
     },
     onFrame: (frame, connection) => {
-      if (frame.type !== 'state') return;
-      const now = performance.now();
-      newest = { frame, now };
-      if (connection.epoch !== greeted) {
+      if (frame.type === 'status') return;
+      const isFirst = connection.epoch !== greeted;
+      const next = latestAfter(isFirst ? null : latest, frame);
+      if (!next) {
+        link.giveUp();
+        return;
+      }
+      latest = next;
+      isNew = true;
+      arrivedAt = performance.now();
+      if (isFirst) {
         // The first state may be an old one that the bridge kept; its status says how old.
         greeted = connection.epoch;
         take(connection.status?.state_age_seconds ?? null);
         return;
       }
-      const pause = pauseMs(frame.state.tags.length);
-      if (now - takenAt >= pause) {
-        take(null);
-      } else {
-        timer ??= setTimeout(take, pause - (now - takenAt), null);
-      }
+      const pause = pauseMs(latest.state.tags.length) - (arrivedAt - takenAt);
+      if (pause <= 0) take(null);
+      else timer ??= setTimeout(take, pause, null);
     },
   });
   retry = link.retry;

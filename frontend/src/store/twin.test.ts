@@ -8,7 +8,7 @@ const late = stateFrame([wireTag({ tag_id: 'a' }), wireTag({ tag_id: 'b' })], { 
 
 describe('state frames', () => {
   test('one frame is enough for a page that comes late', () => {
-    const { snapshot } = reduceTwin(NO_TWIN, { type: 'state', frame: late, now: 50 });
+    const { snapshot } = reduceTwin(NO_TWIN, { type: 'state', latest: late, now: 50 });
     expect(snapshot?.tags.map(({ id }) => id)).toEqual(['a', 'b']);
     expect(snapshot?.takenAt).toBe(50);
   });
@@ -16,7 +16,7 @@ describe('state frames', () => {
   test('an old state that the bridge kept is as old as the bridge says', () => {
     const { snapshot } = reduceTwin(NO_TWIN, {
       type: 'state',
-      frame: late,
+      latest: late,
       now: 100_000,
       stateAgeSeconds: 40,
     });
@@ -24,9 +24,9 @@ describe('state frames', () => {
   });
 
   test('a restarted server counts from one again and is believed', () => {
-    const before = reduceTwin(NO_TWIN, { type: 'state', frame: late, now: 50 });
-    const frame = stateFrame([wireTag({ tag_id: 'c' })], { seq: 1, sec: 3, revision: 'new' });
-    const after = reduceTwin(before, { type: 'state', frame, now: 60 });
+    const before = reduceTwin(NO_TWIN, { type: 'state', latest: late, now: 50 });
+    const latest = stateFrame([wireTag({ tag_id: 'c' })], { seq: 1, sec: 3, revision: 'new' });
+    const after = reduceTwin(before, { type: 'state', latest, now: 60 });
     expect(after.snapshot?.tags.map(({ id }) => id)).toEqual(['c']);
     expect(after.snapshot?.revision).toBe('new');
   });

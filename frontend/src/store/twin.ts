@@ -1,5 +1,6 @@
 /** What came from the server: the connection, the greenhouse, and what is fetched about it. */
-import type { FieldQuality, StateFrame, StatusFrame } from '../contract/types';
+import type { FieldQuality, StatusFrame } from '../contract/types';
+import type { Latest } from '../connection/latest';
 import { INITIAL, phaseOf, type Connection, type Phase } from '../connection/machine';
 import type { Field } from '../domain/field';
 import { snapshotOf, type Snapshot } from '../domain/twin';
@@ -37,7 +38,7 @@ export type TwinAction =
   | { readonly type: 'connection'; readonly connection: Connection; readonly now: number }
   | {
       readonly type: 'state';
-      readonly frame: StateFrame;
+      readonly latest: Latest;
       readonly now: number;
       /** Set on the first frame of a connection: how old the state was when it was sent. */
       readonly stateAgeSeconds?: number | null;
@@ -56,7 +57,7 @@ export function reduceTwin(state: TwinState, action: TwinAction): TwinState {
     case 'state': {
       // No comparison of seq: one socket delivers in order, and a restarted server counts anew.
       const arrivedAt = action.now - (action.stateAgeSeconds ?? 0) * 1000;
-      return { ...state, snapshot: snapshotOf(action.frame, arrivedAt, state.snapshot) };
+      return { ...state, snapshot: snapshotOf(action.latest, arrivedAt, state.snapshot) };
     }
     case 'field':
       return { ...state, field: action.field };

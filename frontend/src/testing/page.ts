@@ -27,8 +27,8 @@ export function showTags(tags: readonly TwinTagState[]): void {
   receive({ type: 'map', map: NOTHING });
   receive({ type: 'quality', quality: null });
   stamp += 1;
-  const frame = stateFrame(tags, { sec: stamp, revision: `r${stamp}` });
-  receive({ type: 'state', frame, now: performance.now() });
+  const latest = stateFrame(tags, { sec: stamp, revision: `r${stamp}` });
+  receive({ type: 'state', latest, now: performance.now() });
   goLive();
 }
 

@@ -1,0 +1,37 @@
+/**
+ * The newest state, put together from full frames and deltas. Pure.
+ *
+ * A delta names the frame that it builds on. Frames of one connection come in order, so a delta
+ * that builds on another frame than the last means that the two sides have lost each other.
+ */
+import type { DeltaFrame, StateFrame, TwinTagState, WireTime } from '../contract/types';
+
+export type Latest = Omit<StateFrame, 'type'>;
+
+/** The state after a frame; null where the frame does not build on what is there. */
+export function latestAfter(latest: Latest | null, frame: StateFrame | DeltaFrame): Latest | null {
+  if (frame.type === 'state') return frame;
+  if (latest?.seq !== frame.base) return null;
+  const changed = new Map(frame.changed.map((tag) => [tag.tag_id, tag]));
+  const removed = new Set(frame.removed);
+  const { stamp } = frame.header;
+  const tags = latest.state.tags.flatMap((tag) => {
+    const now = changed.get(tag.tag_id);
+    changed.delete(tag.tag_id);
+    if (now) return [now];
+    return removed.has(tag.tag_id) ? [] : [aged(tag, stamp)];
+  });
+  return {
+    seq: frame.seq,
+    revision: frame.revision,
+    state: { header: frame.header, tags: [...tags, ...changed.values()] },
+  };
+}
+
+/** An unchanged tag at a later moment; everything but its age is the very same. */
+function aged(tag: TwinTagState, stamp: WireTime): TwinTagState {
+  if (tag.stale_seconds === null) return tag;
+  const { sec, nanosec } = tag.last_observed;
+  const age = stamp.sec - sec + (stamp.nanosec - nanosec) / 1e9;
+  return { ...tag, stale_seconds: Math.max(0, age) };
+}

@@ -1,0 +1,64 @@
+"""The product with faults built in, for tests: nothing in the product knows of them.
+
+`python -m tests.support.sabotage [--raise MODULE:NAME:MARKER[:TIMES]] [--shadow-s S] PROGRAM ...`
+runs the module PROGRAM with the arguments behind it. `--raise`, as often as wanted, lets a function
+or method fail when the marker occurs in its arguments' text, TIMES times (1 without it), and work
+otherwise.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import runpy
+import sys
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import Any
+
+from tests.support.domains import ros_env
+from tests.support.processes import Process
+
+
+def sabotaged(domain: int, faults: Sequence[str], program: str, *args: str) -> Process:
+    """A process that runs a module with faults, each as it stands on the command line."""
+    command = [sys.executable, "-m", "tests.support.sabotage", *faults, program, *args]
+    return Process(command, ros_env(domain))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--raise", dest="faults", action="append", default=[])
+    parser.add_argument("--shadow-s", type=float)
+    parser.add_argument("program")
+    parser.add_argument("args", nargs=argparse.REMAINDER)
+    options = parser.parse_args()
+    for fault in options.faults:
+        module, path, marker, *times = fault.split(":")
+        sabotage(module, path, marker, int(times[0]) if times else 1)
+    if options.shadow_s is not None:
+        import_module("lupin_twin.twin_count").TwinCount.__init__.__defaults__ = (options.shadow_s,)
+    sys.argv = [options.program, *options.args]
+    runpy.run_module(options.program, run_name="__main__", alter_sys=True)
+
+
+def sabotage(module: str, path: str, marker: str, times: int) -> None:
+    """Let a function fail, the first `times` times that the marker is in its arguments."""
+    *owners, name = path.split(".")
+    owner = functools.reduce(getattr, owners, import_module(module))
+    function: Callable[..., Any] = getattr(owner, name)
+    left = times
+
+    @functools.wraps(function)
+    def failing(*args: Any, **kwargs: Any) -> Any:
+        nonlocal left
+        if left and marker in repr((args, kwargs)):
+            left -= 1
+            raise RuntimeError(f"sabotage of {path}")
+        return function(*args, **kwargs)
+
+    setattr(owner, name, failing)
+
+
+if __name__ == "__main__":
+    main()

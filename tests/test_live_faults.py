@@ -1,0 +1,329 @@
+"""Faults over real processes: clients are told the truth, and everything recovers by itself."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import httpx
+import pytest
+from websockets.exceptions import ConnectionClosed
+
+from lupin_bridge.source import Revised, TwinTimeoutError
+from lupin_bridge.web_twin import MAX_REQUESTS, WebTwin
+from lupin_twin.fields import FieldRequest
+from tests.support.domains import own_domain
+from tests.support.inprocess import run, until
+from tests.support.messages import discovered, look, occupancy_grid, pose, scan
+from tests.support.processes import Process, lupin_twin, twin_node, url_of
+from tests.support.ros import Peer
+from tests.support.sabotage import sabotaged
+from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.web import Bridge, Frame, Listener, bridge, listener, tag_ids
+
+FIELD: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.5}
+
+
+@contextmanager
+def web(process: Process, peer: Peer) -> Iterator[Bridge]:
+    """A `lupin-twin web` process and an HTTP client of it."""
+    with httpx.Client(base_url=url_of(process), timeout=PATIENCE_S, trust_env=False) as http:
+        yield Bridge(process, str(http.base_url).rstrip("/"), peer, http)
+
+
+def reason(client: Listener, expected: str) -> Frame:
+    """Read on to the status frame with this reason."""
+    return client.until("status", lambda frame: frame["reason"] == expected)
+
+
+def refuse_connections(live: Bridge) -> None:
+    with pytest.raises(httpx.ConnectError):
+        live.get("/healthz")
+
+
+# --- the twin goes ------------------------------------------------------------------------------
+
+
+def apply(known: list[str], frame: Frame) -> list[str]:
+    """The tags that a client of deltas knows after a frame."""
+    if frame["type"] == "state":
+        return tag_ids(frame["state"])
+    if frame["type"] == "delta":
+        kept = [tag_id for tag_id in known if tag_id not in frame["removed"]]
+        changed = [tag["tag_id"] for tag in frame["changed"]]
+        return kept + [tag_id for tag_id in changed if tag_id not in kept]
+    return known
+
+
+def test_a_twin_is_killed_and_its_successor_knows_fewer_tags(domain: int) -> None:
+    with (
+        lupin_twin(domain, "web") as process,
+        Peer(domain, "robot") as robot,
+        twin_node(domain) as twin,
+        web(process, robot) as live,
+    ):
+        with Peer(domain, "first_robot") as first_robot:
+            first_robot.observe(scan("a", {"co2": 1.0}, (0, 0)), scan("b", {"co2": 2.0}, (1, 0)))
+            live.tag("b")
+        with live.listen() as client, listener(live.url, delta=1) as delta:
+            client.until_tag("b")
+            known = apply([], delta.until("state"))
+            old = live.get("/api/field", **FIELD).headers["etag"]
+
+            twin.kill()
+            said = reason(client, "stale")
+            assert said["twin"] == "offline"
+            assert "silent" in said["message"]
+            assert live.get("/readyz").status_code == 503
+            assert live.json("/healthz")["ok"], "the bridge itself is well"
+            assert tag_ids(live.json("/api/state")) == ["a", "b"], "the last that is known"
+
+            with twin_node(domain):
+                robot.observe(scan("c", {"co2": 3.0}, (2, 0)))
+                reason(client, "live")
+                newest = client.until_tag("c")
+                assert tag_ids(newest["state"]) == ["c"]
+                while known != ["c"]:
+                    known = apply(known, delta.next())
+                assert live.get("/readyz").status_code == 200
+                field = live.get("/api/field", headers={"If-None-Match": old}, **FIELD)
+                assert field.status_code == 200
+                assert field.json()["sample_count"] == 1
+                assert live.get("/api/tags/a").status_code == 404
+
+
+def test_a_twin_is_stopped_and_goes_on(domain: int) -> None:
+    with (
+        lupin_twin(domain, "web", "--field-timeout-s", "1") as process,
+        Peer(domain) as robot,
+        twin_node(domain) as twin,
+        web(process, robot) as live,
+        live.listen() as client,
+    ):
+        robot.observe(scan("a", {"co2": 1.0}, (0, 0)))
+        client.until_tag("a")
+        assert live.get("/api/field", **FIELD).status_code == 200
+
+        twin.send(signal.SIGSTOP)
+        reason(client, "stale")
+        refused = live.get("/api/field", sensor_type="temperature")
+        assert refused.status_code == 504
+        assert "within 1 s (field_timeout_s)" in refused.json()["detail"]
+
+        twin.send(signal.SIGCONT)
+        reason(client, "live")
+        robot.observe(scan("b", {"co2": 2.0}, (1, 0)))
+        client.until_tag("b")
+        assert live.json("/api/field", **FIELD)["sample_count"] == 2
+
+
+def test_field_requests_to_a_twin_that_does_not_answer_are_bounded_and_forgotten(
+    domain: int,
+) -> None:
+    async def test() -> None:
+        source = WebTwin(ros_args=(), timeout_s=1.0)
+        states: list[Revised] = []
+        await source.start(states.append, lambda: None)
+        node = source._thread._require_node()
+        pending: dict[Any, Any] = node.field_client._pending_requests
+        try:
+            await until(lambda: states, "a state of the twin")
+            await until(node.field_client.service_is_ready, "the twin's service")
+            twin.send(signal.SIGSTOP)
+            asked = [
+                asyncio.create_task(source.field(FieldRequest(f"s{n}", 1.0, 0.0, 0.0, 1.0, 1.0)))
+                for n in range(50)
+            ]
+            await until(lambda: len(pending) == MAX_REQUESTS, "requests at the twin")
+            answers = await asyncio.gather(*asked, return_exceptions=True)
+            assert {type(answer) for answer in answers} == {TwinTimeoutError}
+            await until(lambda: not pending, "all requests to be forgotten")
+            assert not source._asking
+
+            twin.send(signal.SIGCONT)
+            grid = await source.field(FieldRequest("co2", 1.0, 0.0, 0.0, 1.0, 1.0))
+            assert grid.grid.sample_count == 0
+            await until(lambda: not pending, "this one to be forgotten too")
+        finally:
+            await source.stop()
+
+    with twin_node(domain) as twin:
+        run(domain, test())
+
+
+def test_a_twin_in_another_domain_is_never_seen_until_there_is_one_here(domain: int) -> None:
+    with (
+        own_domain() as elsewhere,
+        twin_node(elsewhere),
+        Peer(elsewhere) as far_robot,
+        lupin_twin(domain, "web") as process,
+        web(process, far_robot) as live,
+        live.listen() as client,
+    ):
+        far_robot.observe(scan("far", {"co2": 1.0}, (0, 0)))
+        far_robot.tag("far")
+        said = client.next()
+        assert (said["twin"], said["reason"]) == ("offline", "never_seen")
+        assert "ROS_DOMAIN_ID" in said["message"]
+        assert live.get("/readyz").status_code == 503
+        assert live.get("/api/state").status_code == 503
+        assert live.get("/api/field", **FIELD).status_code == 503
+        with twin_node(domain):
+            reason(client, "live")
+            assert client.until("state")["state"]["tags"] == []
+
+
+def test_a_second_twin_is_said_loudly_and_its_end_too(domain: int) -> None:
+    # A dead twin stays in the graph for 20 s, so a bridge believes in a second one only after 25 s.
+    with (
+        sabotaged(domain, ["--shadow-s", "1"], "lupin_bridge.cli", "web", "--port", "0") as process,
+        twin_node(domain),
+        Peer(domain) as robot,
+        web(process, robot) as live,
+        live.listen() as client,
+    ):
+        reason(client, "live")
+        with twin_node(domain) as second:
+            said = client.until("status", lambda frame: "2 twins" in frame["message"])
+            assert said["twin"] == "live"
+            assert "mixture" in said["message"]
+            assert "2 twins" in live.json("/readyz")["message"]
+            process.wait_for_output("2 nodes publish /twin/state")
+            second.stop()
+            client.until("status", lambda frame: frame["message"] == "The twin is live.")
+
+
+# --- the bridge goes ----------------------------------------------------------------------------
+
+
+def test_a_bridge_is_killed_and_its_successor_serves_the_same_address(domain: int) -> None:
+    with bridge(domain=domain) as first:
+        robot = first.peer
+        robot.observe(scan("a", {"co2": 1.0}, (0, 0)))
+        with first.listen() as client:
+            client.until_tag("a")
+            old = first.get("/api/field", **FIELD).headers["etag"]
+            first.process.kill()
+            with pytest.raises(ConnectionClosed):
+                client.until("never", lambda _: False)
+        refuse_connections(first)
+        port = str(httpx.URL(first.url).port)
+        with lupin_twin(domain, "serve", "--port", port) as process:
+            assert url_of(process) == first.url
+            with listener(first.url) as client:
+                # The robot has latched what it saw; nobody has to tell the new twin.
+                client.until_tag("a")
+            wait_for(lambda: first.json("/api/field", **FIELD)["sample_count"] == 1, "the field")
+            again = first.get("/api/field", headers={"If-None-Match": old}, **FIELD)
+            assert again.status_code == 200, "an ETag of the predecessor means nothing here"
+
+
+# --- an exception in a callback -----------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def sabotaged_serve() -> Iterator[Bridge]:
+    faults = (
+        "lupin_twin.state:TwinStore.record:boom-scan",
+        "lupin_twin.state:TwinStore.record_flower:boom-look",
+        "lupin_twin.state:TwinStore.pin:boom-find",
+        "lupin_twin.convert:map_of:width=13",
+        "lupin_twin.convert:field_request:boom-field",
+        "lupin_twin.convert:StateMessages.build:boom-state:2",
+        # Called for listeners, by the heartbeat and by the state's timer.
+        "lupin_twin.state:TwinStore.snapshot:boom-snapshot:5",
+    )
+    options = [part for fault in faults for part in ("--raise", fault)]
+    with (
+        own_domain() as domain,
+        sabotaged(domain, options, "lupin_bridge.cli", "serve", "--port", "0") as process,
+        Peer(domain) as robot,
+        web(process, robot) as live,
+    ):
+        robot.wait_for_twin()
+        yield live
+
+
+@pytest.fixture(scope="module")
+def sabotaged_web() -> Iterator[Bridge]:
+    faults = ("lupin_twin.convert:snapshot_of:boom-web", "lupin_twin.convert:map_of:width=13")
+    options = [part for fault in faults for part in ("--raise", fault)]
+    with (
+        own_domain() as domain,
+        twin_node(domain),
+        sabotaged(domain, options, "lupin_bridge.cli", "web", "--port", "0") as process,
+        Peer(domain) as robot,
+        web(process, robot) as live,
+    ):
+        robot.wait_for_twin()
+        wait_for(lambda: live.get("/readyz").status_code == 200, "the twin to be heard")
+        yield live
+
+
+def errors(live: Bridge) -> int:
+    """How many errors of callbacks the bridge has counted."""
+    return int(live.json("/healthz")["callback_errors"])
+
+
+def goes_on_after(live: Bridge, fault: Callable[[], object], counted: int) -> None:
+    """The fault is counted, and clients get what comes after it without having seen a break."""
+    before = errors(live)
+    with live.listen() as client:
+        client.until("state")
+        fault()
+        wait_for(lambda: errors(live) >= before + counted, f"{counted} counted errors")
+        after = f"after {before + counted}"
+        live.peer.observe(scan(after, {"co2": 1.0}))
+        while True:
+            frame = client.next()
+            if frame["type"] == "status":
+                assert frame["twin"] == "live"
+            elif after in tag_ids(frame["state"]):
+                break
+    assert live.json("/healthz")["ok"]
+    assert "sabotage of" in live.process.output, "the log has the trace"
+
+
+@pytest.mark.parametrize(
+    ("fault", "counted"),
+    [
+        pytest.param(lambda peer: peer.observe(scan("boom-scan")), 1, id="a scan"),
+        pytest.param(lambda peer: peer.observe(look("boom-look")), 1, id="a look at flowers"),
+        pytest.param(lambda peer: peer.discover(discovered({"boom-find": pose()})), 1, id="a find"),
+        pytest.param(lambda peer: peer.publish_map(occupancy_grid([[0] * 13])), 1, id="a map"),
+        pytest.param(lambda peer: peer.observe(scan("boom-state")), 2, id="the state's timer"),
+        pytest.param(lambda peer: peer.observe(scan("boom-snapshot")), 5, id="listeners"),
+    ],
+)
+def test_serve_goes_on_after_an_exception_in(
+    sabotaged_serve: Bridge, fault: Callable[[Peer], object], counted: int
+) -> None:
+    goes_on_after(sabotaged_serve, lambda: fault(sabotaged_serve.peer), counted)
+
+
+def test_serve_goes_on_after_an_exception_in_the_service(sabotaged_serve: Bridge) -> None:
+    request = {"sensor_type": "boom-field", "resolution": 1.0}
+
+    def ask() -> None:
+        answer = sabotaged_serve.peer.get_field(**request)
+        assert not answer.ok
+        assert "sabotage" in answer.error_message
+
+    goes_on_after(sabotaged_serve, ask, 1)
+    assert sabotaged_serve.peer.get_field(**request).ok
+
+
+@pytest.mark.parametrize(
+    ("fault", "counted"),
+    [
+        pytest.param(lambda peer: peer.observe(scan("boom-web")), 1, id="a state"),
+        pytest.param(lambda peer: peer.publish_map(occupancy_grid([[0] * 13])), 1, id="a map"),
+    ],
+)
+def test_web_goes_on_after_an_exception_in(
+    sabotaged_web: Bridge, fault: Callable[[Peer], object], counted: int
+) -> None:
+    goes_on_after(sabotaged_web, lambda: fault(sabotaged_web.peer), counted)

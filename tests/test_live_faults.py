@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import signal
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import httpx
@@ -17,21 +16,15 @@ from lupin_bridge.web_twin import MAX_REQUESTS, WebTwin
 from lupin_twin.fields import FieldRequest
 from tests.support.domains import own_domain
 from tests.support.inprocess import run, until
+from tests.support.live import attached, wait_until_ready
 from tests.support.messages import discovered, look, occupancy_grid, pose, scan
-from tests.support.processes import Process, lupin_twin, twin_node, url_of
+from tests.support.processes import lupin_twin, twin_node, url_of
 from tests.support.ros import Peer
 from tests.support.sabotage import sabotaged
-from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.waiting import wait_for
 from tests.support.web import Bridge, Frame, Listener, bridge, listener, tag_ids
 
 FIELD: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.5}
-
-
-@contextmanager
-def web(process: Process, peer: Peer) -> Iterator[Bridge]:
-    """A `lupin-twin web` process and an HTTP client of it."""
-    with httpx.Client(base_url=url_of(process), timeout=PATIENCE_S, trust_env=False) as http:
-        yield Bridge(process, str(http.base_url).rstrip("/"), peer, http)
 
 
 def reason(client: Listener, expected: str) -> Frame:
@@ -63,8 +56,9 @@ def test_a_twin_is_killed_and_its_successor_knows_fewer_tags(domain: int) -> Non
         lupin_twin(domain, "web") as process,
         Peer(domain, "robot") as robot,
         twin_node(domain) as twin,
-        web(process, robot) as live,
+        attached(process, robot) as live,
     ):
+        wait_until_ready(live)
         with Peer(domain, "first_robot") as first_robot:
             first_robot.observe(scan("a", {"co2": 1.0}, (0, 0)), scan("b", {"co2": 2.0}, (1, 0)))
             live.tag("b")
@@ -100,7 +94,7 @@ def test_a_twin_is_stopped_and_goes_on(domain: int) -> None:
         lupin_twin(domain, "web", "--field-timeout-s", "1") as process,
         Peer(domain) as robot,
         twin_node(domain) as twin,
-        web(process, robot) as live,
+        attached(process, robot) as live,
         live.listen() as client,
     ):
         robot.observe(scan("a", {"co2": 1.0}, (0, 0)))
@@ -160,7 +154,7 @@ def test_a_twin_in_another_domain_is_never_seen_until_there_is_one_here(domain: 
         twin_node(elsewhere),
         Peer(elsewhere) as far_robot,
         lupin_twin(domain, "web") as process,
-        web(process, far_robot) as live,
+        attached(process, far_robot) as live,
         live.listen() as client,
     ):
         far_robot.observe(scan("far", {"co2": 1.0}, (0, 0)))
@@ -182,7 +176,7 @@ def test_a_second_twin_is_said_loudly_and_its_end_too(domain: int) -> None:
         sabotaged(domain, ["--shadow-s", "1"], "lupin_bridge.cli", "web", "--port", "0") as process,
         twin_node(domain),
         Peer(domain) as robot,
-        web(process, robot) as live,
+        attached(process, robot) as live,
         live.listen() as client,
     ):
         reason(client, "live")
@@ -241,7 +235,7 @@ def sabotaged_serve() -> Iterator[Bridge]:
         own_domain() as domain,
         sabotaged(domain, options, "lupin_bridge.cli", "serve", "--port", "0") as process,
         Peer(domain) as robot,
-        web(process, robot) as live,
+        attached(process, robot) as live,
     ):
         robot.wait_for_twin()
         yield live
@@ -256,10 +250,10 @@ def sabotaged_web() -> Iterator[Bridge]:
         twin_node(domain),
         sabotaged(domain, options, "lupin_bridge.cli", "web", "--port", "0") as process,
         Peer(domain) as robot,
-        web(process, robot) as live,
+        attached(process, robot) as live,
     ):
         robot.wait_for_twin()
-        wait_for(lambda: live.get("/readyz").status_code == 200, "the twin to be heard")
+        wait_until_ready(live)
         yield live
 
 

@@ -1,0 +1,25 @@
+"""`lupin-twin web` processes, attached to twins in processes of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import httpx
+
+from tests.support.processes import Process, url_of
+from tests.support.ros import Peer
+from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.web import Bridge
+
+
+@contextmanager
+def attached(process: Process, peer: Peer) -> Iterator[Bridge]:
+    """A bridge's process with an HTTP client of it; whether it has a twin is another matter."""
+    with httpx.Client(base_url=url_of(process), timeout=PATIENCE_S, trust_env=False) as http:
+        yield Bridge(process, str(http.base_url).rstrip("/"), peer, http)
+
+
+def wait_until_ready(live: Bridge) -> None:
+    """Wait until the bridge has heard a twin."""
+    wait_for(lambda: live.get("/readyz").status_code == 200, f"a live twin behind {live.url}")

@@ -1,0 +1,106 @@
+"""Two bridges, one twin: the same answers from both, and the end of one is not the other's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from typing import Any
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+
+from tests.support.domains import own_domain
+from tests.support.live import attached, wait_until_ready
+from tests.support.messages import look, occupancy_grid, scan
+from tests.support.processes import lupin_twin, twin_node
+from tests.support.ros import Peer
+from tests.support.waiting import wait_for
+from tests.support.web import Bridge, tag_ids
+
+FIELD: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.25}
+CACHED = ("/api/field.json", "/api/field.npy", "/api/field.png")
+
+
+@pytest.fixture
+def replicas() -> Iterator[tuple[Bridge, Bridge]]:
+    """Two `lupin-twin web` processes; the second comes when the twin has already seen something."""
+    with ExitStack() as stack:
+        domain = stack.enter_context(own_domain())
+        stack.enter_context(twin_node(domain))
+        peer = stack.enter_context(Peer(domain))
+
+        def replica() -> Bridge:
+            process = stack.enter_context(lupin_twin(domain, "web"))
+            running = stack.enter_context(attached(process, peer))
+            wait_until_ready(running)
+            return running
+
+        first = replica()
+        # The second will never hear of the first of these maps, nor of the first reading of "a".
+        peer.publish_map(occupancy_grid([[0, 0], [0, 100]]))
+        peer.observe(scan("a", {"co2": 400.0}, (0, 0)))
+        first.tag("a")
+        wait_for(lambda: first.get("/api/map").status_code == 200, "the map")
+        peer.publish_map(occupancy_grid([[0, -1], [0, 100]]))
+        peer.observe(
+            scan("a", {"co2": 500.0}),
+            scan("b", {"co2": 700.0, "humidity": float("nan")}, (1, 0)),
+            look("a", "lupin", blooms=[(0.1, 0.1)], footprint=[(0, 0), (1, 0), (1, 1)]),
+        )
+        second = replica()
+        for running in (first, second):
+            running.tag("b")
+            running.tag("a", lambda tag: tag["flowers"])
+        wait_for(lambda: pictures_agree(first, second), "the newest map at both")
+        yield first, second
+
+
+def pictures_agree(first: Bridge, second: Bridge) -> bool:
+    """Whether both have the same map, which the second can only have from the newest."""
+    ours, theirs = first.get("/api/map.png"), second.get("/api/map.png")
+    return theirs.status_code == 200 and ours.content == theirs.content
+
+
+def without_ages(state: Any) -> Any:
+    """A state as it stays while nothing is observed."""
+    return [
+        {name: value for name, value in tag.items() if name != "stale_seconds"}
+        for tag in state["tags"]
+    ]
+
+
+def test_both_serve_the_same_and_the_end_of_one_is_not_the_others(
+    replicas: tuple[Bridge, Bridge],
+) -> None:
+    first, second = replicas
+    assert without_ages(first.json("/api/state")) == without_ages(second.json("/api/state"))
+    assert first.json("/api/map") == second.json("/api/map")
+    for path in CACHED:
+        ours, theirs = first.get(path, **FIELD), second.get(path, **FIELD)
+        assert ours.status_code == theirs.status_code == 200
+        assert ours.content == theirs.content
+    assert first.json("/api/field", **FIELD)["sample_count"] == 2
+
+    # Behind a load balancer, what one replica has given holds at the other.
+    for path, query in [
+        *((path, FIELD) for path in CACHED),
+        ("/api/map", {}),
+        ("/api/map.png", {}),
+    ]:
+        etag = first.get(path, **query).headers["etag"]
+        again = second.get(path, headers={"If-None-Match": etag}, **query)
+        assert (again.status_code, again.headers["etag"]) == (304, etag)
+
+    with first.listen() as of_first, second.listen() as of_second:
+        revisions = [client.until("state")["revision"] for client in (of_first, of_second)]
+        assert revisions[0] == revisions[1]
+        first.process.kill()
+        with pytest.raises(ConnectionClosed):
+            of_first.until("never", lambda _: False)
+        second.peer.observe(scan("after", {"co2": 1.0}, (2, 0)))
+        while True:
+            frame = of_second.next()
+            assert frame["type"] == "state", "no status: for this client nothing has happened"
+            if "after" in tag_ids(frame["state"]):
+                break
+        assert second.json("/api/field", **FIELD)["sample_count"] == 3

@@ -40,10 +40,16 @@ import numpy.typing as npt
 COINCIDENT_EPS_M: Final = 1e-3
 
 # So many pairs of a part are evaluated at once: two float64 arrays of that size stay in the
-# second-level cache, and numpy's work on them is several times the cost of calling it. A grid of
-# fewer cells takes parts as small, so that memory stays in proportion to it.
-_MAX_PAIRS: Final = 40_960
-_MIN_PAIRS: Final = 2_048
+# second-level cache, and numpy's work on them is several times the cost of calling it.
+_MAX_PAIRS: Final = 51_200
+_MIN_PAIRS: Final = 4_096
+# A small grid takes smaller parts, so that all of it stays within ten times the grid's own bytes:
+# 4 a cell, 25 a pair at most, and numpy's buffers whatever the size.
+_PAIR_BYTES: Final = 25
+_SPARE_BYTES_PER_CELL: Final = 10 * 4 - 4
+_BUFFER_BYTES: Final = 200_000
+# Parts are planned to come to this share of it, since samples never lie as evenly as assumed.
+_PLANNED_SHARE: Final = 0.8
 # With fewer points than this to a sample, numpy's loops are all overhead. It takes memory past
 # _MAX_PAIRS only where more than a thousand samples reach one part.
 _MIN_POINTS: Final = 32
@@ -236,7 +242,7 @@ def compute_idw_field(
         falloff_radius_m=falloff_radius_m,
         max_distance_m=max_distance_m,
         power=power,
-        max_pairs=min(max(width * height, _MIN_PAIRS), _MAX_PAIRS),
+        max_pairs=_pairs_at_once(width * height),
     )
     values = np.full((height, width), np.nan, dtype=np.float32)
     painter = _Painter(
@@ -263,6 +269,11 @@ def compute_idw_field(
         value_max=value_max,
         sample_count=len(samples),
     )
+
+
+def _pairs_at_once(cells: int) -> int:
+    within_memory = (_SPARE_BYTES_PER_CELL * cells - _BUFFER_BYTES) // _PAIR_BYTES
+    return min(max(within_memory, _MIN_PAIRS), _MAX_PAIRS)
 
 
 def _check_finite(name: str, number: float) -> None:
@@ -372,8 +383,9 @@ class PairwiseIdw:
     ) -> FloatArray:
         """Power 2: 1/d² needs no root, and the nearest sample is seldom asked for."""
         np.divide(1.0, square, out=weight, where=within)
-        total = np.ones(value.size) @ weight
-        points: FloatArray = (value @ weight) / total
+        total = np.ones(value.size).dot(weight)
+        points: FloatArray = value.dot(weight)
+        points /= total
         # With equal radii a point out of reach is 0/0 by now, and the nearest sample matters only
         # where the weights are so large that one may be coincident.
         if self._equal_radii and np.maximum.reduce(total) < _COINCIDENT_WEIGHT:
@@ -397,7 +409,8 @@ class PairwiseIdw:
         shortest = np.minimum.reduce(distance, axis=0)
         np.divide(shortest, distance, out=weight, where=within)
         np.power(weight, self.power, out=weight, where=within)
-        points: FloatArray = (value @ weight) / (np.ones(value.size) @ weight)
+        points: FloatArray = value.dot(weight)
+        points /= np.ones(value.size).dot(weight)
         special = np.flatnonzero((shortest < COINCIDENT_EPS_M) | (shortest > self.falloff_radius))
         if special.size:
             points[special] = value[distance[:, special].argmin(axis=0)]
@@ -468,7 +481,7 @@ class _Painter:
         for pieces in range(2, _MAX_PIECES + 1):
             rows, columns = part.rows / down, part.columns / across
             reaching = density * (rows + around) * (columns + around)
-            if reaching * rows * columns <= self.idw.max_pairs:
+            if reaching * rows * columns <= _PLANNED_SHARE * self.idw.max_pairs:
                 break
             side = max(part.rows, part.columns) / pieces
             down = min(part.rows, math.ceil(part.rows / side))
@@ -495,16 +508,14 @@ class _Painter:
 
     def _evaluate(self, part: _Part) -> None:
         cells = slice(part.top, part.bottom), slice(part.left, part.right)
-        dx = self.x.take(part.reaching)[:, None] - self.cell_x[part.left : part.right]
-        dy = self.y.take(part.reaching)[:, None] - self.cell_y[part.top : part.bottom]
-        square = self.idw.squares(part.reaching.size, part.rows * part.columns)
-        np.add(
-            (dy * dy)[:, :, None],
-            (dx * dx)[:, None, :],
-            out=square.reshape(-1, part.rows, part.columns),
-        )
-        points = self.idw.evaluate(square, self.value.take(part.reaching))
-        points = points.reshape(part.rows, part.columns)
+        rows, columns = part.rows, part.columns
+        dx = self.x.take(part.reaching)[:, None] - self.cell_x[cells[1]]
+        dy = self.y.take(part.reaching)[:, None] - self.cell_y[cells[0]]
+        dx *= dx
+        dy *= dy
+        square = self.idw.squares(part.reaching.size, rows * columns)
+        np.add(dy[:, :, None], dx[:, None, :], out=square.reshape(-1, rows, columns))
+        points = self.idw.evaluate(square, self.value.take(part.reaching)).reshape(rows, columns)
         if self.explored is not None:
             points[~self.explored[cells]] = np.nan
         self.values[cells] = points

@@ -1,13 +1,10 @@
-"""The command `lupin-twin` and its roles: `serve`, `demo` and `web`."""
+"""The command `lupin-twin`: its options, and one clear line where something is wrong with them."""
 
 from __future__ import annotations
 
 import argparse
-import asyncio
-import logging
 import os
-import socket
-import subprocess
+import signal
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -15,22 +12,9 @@ from dataclasses import fields
 from typing import Any, NoReturn
 
 from lupin_bridge import logs
-from lupin_bridge.access import exposure
-from lupin_bridge.access_middleware import Access
-from lupin_bridge.app import create_app
-from lupin_bridge.bridge import Bridge
-from lupin_bridge.local_twin import LocalTwin
-from lupin_bridge.ros_thread import RosStartError
-from lupin_bridge.server import BridgeServer, address_of, allow_connections, listen
 from lupin_bridge.settings import SettingError, Settings, option
-from lupin_bridge.tls import check_pair
-from lupin_bridge.web_twin import WebTwin
-from lupin_twin.parameters import ParameterError
-
-log = logging.getLogger("lupin_bridge")
 
 USAGE_ERROR = 2
-PATROL_STOP_S = 1.5
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -39,20 +23,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(own)
     try:
         settings = _settings_from(options)
+        # Before anything slow is imported, and before the first thread: Ctrl-C and SIGTERM wait
+        # until the server asks for them, so that neither can end in a traceback.
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+        _prepare_process()
+        logs.set_up(settings.log_format)
+        from lupin_bridge.roles import run  # noqa: PLC0415  # see above
+
         # Taken out of the environment: the processes that we start have no use for it.
-        access = Access.of(settings, os.environ.pop("LUPIN_TOKEN", None))
-        if settings.tls_cert:
-            check_pair(settings.tls_cert, settings.tls_key)
+        run(options.role, settings, os.environ.pop("LUPIN_TOKEN", None), ros_args)
     except SettingError as error:
         _fail(str(error))
-    _prepare_process()
-    logs.set_up(settings.log_format)
-    try:
-        return asyncio.run(_run(options.role, settings, access, ros_args))
-    except (ParameterError, RosStartError) as error:
-        _fail(str(error))
-    except KeyboardInterrupt:
-        return 0
+    return 0
 
 
 def split_ros_args(argv: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -76,32 +58,6 @@ ROLES = {
     "demo": "serve, plus a simulated patrol in a second process",
     "web": "the bridge alone, for a twin elsewhere; as many of these as needed",
 }
-
-
-async def _run(role: str, settings: Settings, access: Access, ros_args: Sequence[str]) -> int:
-    try:
-        listener = listen(settings.host, settings.port)
-    except OSError as error:
-        _fail(f"cannot listen on {settings.host} port {settings.port}: {error.strerror}")
-    _warn_of_exposure(listener, access)
-    allow_connections(settings.max_clients)
-    make_source = WebTwin if role == "web" else LocalTwin
-    source = make_source(ros_args=ros_args, timeout_s=settings.field_timeout_s)
-    bridge = Bridge(source, settings)
-    server = BridgeServer(create_app(bridge, access=access), bridge)
-    await bridge.start()
-    patrol = _start_patrol() if role == "demo" else None
-    url = address_of(listener, "https" if access.secure else "http")
-    print(f"lupin-twin: {url}", flush=True)  # noqa: T201  # for people and scripts
-    try:
-        await server.serve(sockets=[listener])
-    finally:
-        if patrol is not None:
-            patrol.terminate()
-        await bridge.stop()
-        if patrol is not None:
-            await asyncio.to_thread(_wait_or_kill, patrol)
-    return 0
 
 
 def _settings_from(options: argparse.Namespace) -> Settings:
@@ -142,28 +98,6 @@ def _prepare_process() -> None:
     # rcl wants a place for its logs; without a home directory it would refuse to start.
     if not (os.environ.get("ROS_LOG_DIR") or os.environ.get("HOME")):
         os.environ["ROS_LOG_DIR"] = tempfile.mkdtemp(prefix="lupin-twin-log-")
-
-
-def _warn_of_exposure(listener: socket.socket, access: Access) -> None:
-    for warning in exposure(
-        listener.getsockname()[0],
-        has_token=access.credentials is not None,
-        has_tls=access.secure,
-    ):
-        log.warning("%s", warning)
-
-
-def _start_patrol() -> subprocess.Popen[bytes]:
-    # The environment goes along whole: the ROS wheels' own variables only work together.
-    return subprocess.Popen([sys.executable, "-m", "lupin_patrol", "--end-with-parent"])
-
-
-def _wait_or_kill(patrol: subprocess.Popen[bytes]) -> None:
-    try:
-        patrol.wait(PATROL_STOP_S)
-    except subprocess.TimeoutExpired:
-        patrol.kill()
-        patrol.wait()
 
 
 def _fail(message: str) -> NoReturn:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import logging
 import resource
+import signal
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import uvicorn
 from fastapi import FastAPI
+from uvicorn.server import HANDLED_SIGNALS
 
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.http_protocol import HttpConnection
@@ -55,10 +57,17 @@ class BridgeServer(uvicorn.Server):
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Stop on SIGINT and SIGTERM, and return: raised again, they would kill the clean-up."""
+        """Stop on SIGINT and SIGTERM, and return: raised again, they would kill the clean-up.
+
+        The command holds both back from its first moment on; here, and only here, they get in.
+        """
         with super().capture_signals():
-            yield
-            self._captured_signals.clear()
+            held_back = signal.pthread_sigmask(signal.SIG_UNBLOCK, HANDLED_SIGNALS)
+            try:
+                yield
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, held_back)
+                self._captured_signals.clear()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Tell the clients, then close."""

@@ -10,7 +10,7 @@ from lupin_bridge.logs import FORMATS, TEXT
 
 
 class SettingError(ValueError):
-    """A setting out of its range; the message names it, its value and the limit."""
+    """A setting that cannot be; the message names it, its value and the limit."""
 
 
 def _setting(default: Any, help_text: str, low: float | None = None, high: float = 0.0) -> Any:

@@ -1,0 +1,91 @@
+"""What `serve`, `demo` and `web` run: a source, a bridge and a server around one event loop."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket
+import subprocess
+import sys
+from collections.abc import Sequence
+
+from lupin_bridge.access import exposure
+from lupin_bridge.access_middleware import Access
+from lupin_bridge.app import create_app
+from lupin_bridge.bridge import Bridge
+from lupin_bridge.local_twin import LocalTwin
+from lupin_bridge.ros_thread import RosStartError
+from lupin_bridge.server import BridgeServer, address_of, allow_connections, listen
+from lupin_bridge.settings import SettingError, Settings
+from lupin_bridge.tls import check_pair
+from lupin_bridge.web_twin import WebTwin
+from lupin_twin.parameters import ParameterError
+
+log = logging.getLogger("lupin_bridge")
+
+PATROL_STOP_S = 1.5
+
+
+def run(role: str, settings: Settings, token: str | None, ros_args: Sequence[str]) -> None:
+    """Run a role until a signal ends it; `token` is what clients have to know, if anything.
+
+    Raises:
+        SettingError: a setting, a parameter or an argument of ROS with which it cannot run.
+
+    """
+    access = Access.of(settings, token)
+    if settings.tls_cert:
+        check_pair(settings.tls_cert, settings.tls_key)
+    try:
+        asyncio.run(_run(role, settings, access, ros_args))
+    except (ParameterError, RosStartError) as error:
+        raise SettingError(str(error)) from error
+
+
+async def _run(role: str, settings: Settings, access: Access, ros_args: Sequence[str]) -> None:
+    try:
+        listener = listen(settings.host, settings.port)
+    except OSError as error:
+        raise SettingError(
+            f"cannot listen on {settings.host} port {settings.port}: {error.strerror}"
+        ) from error
+    _warn_of_exposure(listener, access)
+    allow_connections(settings.max_clients)
+    make_source = WebTwin if role == "web" else LocalTwin
+    source = make_source(ros_args=ros_args, timeout_s=settings.field_timeout_s)
+    bridge = Bridge(source, settings)
+    server = BridgeServer(create_app(bridge, access=access), bridge)
+    await bridge.start()
+    patrol = _start_patrol() if role == "demo" else None
+    url = address_of(listener, "https" if access.secure else "http")
+    print(f"lupin-twin: {url}", flush=True)  # noqa: T201  # for people and scripts
+    try:
+        await server.serve(sockets=[listener])
+    finally:
+        if patrol is not None:
+            patrol.terminate()
+        await bridge.stop()
+        if patrol is not None:
+            await asyncio.to_thread(_wait_or_kill, patrol)
+
+
+def _warn_of_exposure(listener: socket.socket, access: Access) -> None:
+    for warning in exposure(
+        listener.getsockname()[0],
+        has_token=access.credentials is not None,
+        has_tls=access.secure,
+    ):
+        log.warning("%s", warning)
+
+
+def _start_patrol() -> subprocess.Popen[bytes]:
+    # The environment goes along whole: the ROS wheels' own variables only work together.
+    return subprocess.Popen([sys.executable, "-m", "lupin_patrol", "--end-with-parent"])
+
+
+def _wait_or_kill(patrol: subprocess.Popen[bytes]) -> None:
+    try:
+        patrol.wait(PATROL_STOP_S)
+    except subprocess.TimeoutExpired:
+        patrol.kill()
+        patrol.wait()

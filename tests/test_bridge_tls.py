@@ -14,11 +14,12 @@ from cryptography.hazmat.primitives.serialization import (
     PrivateFormat,
     load_pem_private_key,
 )
+from websockets.sync.client import connect
 
 from lupin_bridge.tls import TlsError, check_pair
 from tests.support.access import BEARER, TOKEN, Served, refused_start, served
 from tests.support.tls import Certificate, certificate
-from tests.support.web import listener
+from tests.support.web import Listener, ws_url
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +103,9 @@ def test_https_and_wss_are_served_and_announced(secure: Served) -> None:
 
 
 def test_every_frame_comes_over_wss(secure: Served, ours: Certificate) -> None:
-    with listener(secure.url, additional_headers=BEARER, ssl=ours.trust) as frames:
+    url = ws_url(secure.url)
+    with connect(url, additional_headers=BEARER, ssl=ours.trust, proxy=None) as connection:
+        frames = Listener(connection)
         first = frames.until("state")["seq"]
         for number in range(1, 4):
             assert frames.until("state")["seq"] == first + number

@@ -163,7 +163,7 @@ def test_a_foreign_page_cannot_show_the_bridge_in_a_frame(page: Page, running: B
             running.url,
         )
         (frame,) = page.main_frame.child_frames
-        assert frame.url.startswith("chrome-error://")
+        frame.wait_for_url("chrome-error://**")
 
 
 def test_an_allowed_page_gets_what_it_names_itself_for(page: Page) -> None:

@@ -132,10 +132,10 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         for tag in snapshot.tags:
             if id(tag) not in known:
                 self._remember(tag)
-        if before is not None and len(snapshot.tags) < len(before.tags):
-            self._forget_all_but(snapshot.tags)
         self._newest = snapshot
         self.digest = self._digest_of(snapshot.tags)
+        if len(self._digests) > len(snapshot.tags):
+            self._forget_all_but(snapshot.tags)
         topic = self.parameters.state_topic
         if self.twins.see(int(self.count_publishers(topic)), time.monotonic()):
             self._say(

@@ -1,0 +1,83 @@
+"""Every module has its test file, every test file its module, and no file grows past a sitting."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+TESTS = ROOT / "tests"
+
+# Where a package is, and how the names of its tests begin.
+PACKAGES = {
+    "ros_node/lupin_twin/lupin_twin": "test_",
+    "ros_node/lupin_patrol/lupin_patrol": "test_patrol_",
+    "backend/lupin_bridge": "test_bridge_",
+}
+# These test what no single module does.
+ACROSS = ("test_docs", "test_live_", "test_roslib", "test_structure_")
+
+MAX_LINES = 450
+HAND_WRITTEN = {
+    "backend": ("*.py", "*.html", "*.css", "*.js"),
+    "ros_node": ("*.py",),
+    "tests": ("*.py", "*.mjs"),
+    "frontend/src": ("*.ts", "*.tsx", "*.css"),
+    "frontend/scripts": ("*.mjs",),
+}
+# Longer than that and waiting to be split; they must not grow past these.
+LONGER = {
+    "frontend/src/styles/table.css": 500,
+    "ros_node/lupin_twin/lupin_twin/idw.py": 560,
+    "tests/test_idw.py": 800,
+    "tests/test_node.py": 470,
+}
+# Generated, or built.
+NOT_BY_HAND = ("frontend/src/contract/openapi.gen.ts", "backend/lupin_bridge/static/")
+
+
+def modules() -> Iterator[tuple[str, str]]:
+    """(module, name of its test file without the suffix) of all modules."""
+    for folder, prefix in PACKAGES.items():
+        for file in sorted((ROOT / folder).glob("*.py")):
+            if file.stem not in ("__init__", "__main__"):
+                yield f"{folder}/{file.name}", f"{prefix}{file.stem}"
+
+
+MIRRORS = dict(modules())
+
+
+@pytest.mark.parametrize("module", MIRRORS)
+def test_a_module_has_its_test_file(module: str) -> None:
+    assert (TESTS / f"{MIRRORS[module]}.py").is_file(), f"{module} has no {MIRRORS[module]}.py"
+
+
+def test_a_test_file_has_its_module() -> None:
+    expected = set(MIRRORS.values())
+
+    def has_module(name: str) -> bool:
+        # A long test file may have a second part: test_<module>_<of what>.
+        return name in expected or any(name.startswith(f"{mirror}_") for mirror in expected)
+
+    orphans = [
+        file.name
+        for file in sorted(TESTS.glob("test_*.py"))
+        if not file.stem.startswith(ACROSS) and not has_module(file.stem)
+    ]
+    assert orphans == []
+
+
+def test_no_file_written_by_hand_is_too_long_to_read_at_one_sitting() -> None:
+    long = {}
+    for folder, patterns in HAND_WRITTEN.items():
+        for pattern in patterns:
+            for file in (ROOT / folder).rglob(pattern):
+                path = file.relative_to(ROOT).as_posix()
+                lines = len(file.read_text(encoding="utf-8").splitlines())
+                limit = LONGER.get(path, MAX_LINES)
+                if lines > limit and not path.startswith(NOT_BY_HAND):
+                    long[path] = lines
+    assert long == {}, f"more than {MAX_LINES} lines"
+    assert not [path for path in LONGER if not (ROOT / path).is_file()]

@@ -7,6 +7,13 @@ const here = (path: string): string => fileURLToPath(new URL(path, import.meta.u
 
 const BRIDGE = process.env['LUPIN_BRIDGE'] ?? 'http://127.0.0.1:8000';
 
+const RULES = [
+  'src/{domain,geometry}/**/*.test.ts',
+  'src/connection/{backoff,latest,machine}.test.ts',
+  'src/contract/{frames,npy}.test.ts',
+  'src/store/{create,permalink,twin,view}.test.ts',
+];
+
 export default defineConfig({
   root: here('.'),
   // Relative, so that the bridge may stand behind any path prefix.
@@ -31,10 +38,26 @@ export default defineConfig({
     },
   },
   test: {
-    environment: 'jsdom',
-    include: ['src/**/*.test.{ts,tsx}', 'scripts/**/*.test.{ts,mjs}'],
-    setupFiles: ['src/testing/setup.ts'],
     restoreMocks: true,
+    // A machine that builds and tests at once is slow; a test that hangs still fails.
+    testTimeout: 30_000,
     unstubGlobals: true,
+    projects: [
+      // Rules that need no page run without one: a jsdom takes longer than all their tests.
+      {
+        extends: true,
+        test: { name: 'rules', environment: 'node', include: RULES },
+      },
+      {
+        extends: true,
+        test: {
+          name: 'page',
+          environment: 'jsdom',
+          include: ['src/**/*.test.{ts,tsx}'],
+          exclude: RULES,
+          setupFiles: ['src/testing/setup.ts'],
+        },
+      },
+    ],
   },
 });

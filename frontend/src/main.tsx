@@ -13,17 +13,18 @@ import { startAddress } from './store/address';
 import { prefer, store } from './store/app';
 import { startLive } from './store/live';
 import { startLoaders } from './store/loaders';
-import { keepSettings, readSettings } from './store/settings';
+import { keepSettings, openStorage, readSettings } from './store/settings';
 import { startTheme } from './store/theme';
 import { App } from './ui/App';
 import { startShortcuts } from './ui/shortcuts';
 
-prefer(readSettings(window.localStorage));
+const storage = openStorage();
+prefer(readSettings(storage));
 let { settings } = store.get();
 store.subscribe(() => {
   if (store.get().settings === settings) return;
   ({ settings } = store.get());
-  keepSettings(window.localStorage, settings);
+  keepSettings(storage, settings);
 });
 
 const kiosk = new URLSearchParams(window.location.search).get('kiosk') === '1';

@@ -215,6 +215,9 @@ export function runMap(element: HTMLElement, canvases: Canvases): () => void {
     onThemeChange(() => {
       painter.setPalette(isDark() ? DARK : LIGHT);
       spoil('still', 'pins', 'overlay');
+      // Not with the next frame: a page on its way to the printer gets none.
+      cancelAnimationFrame(frame);
+      if (camera.size.width > 0) paint();
     }),
   ];
   element.addEventListener('pointermove', onPointerMove);

@@ -1,6 +1,6 @@
-import { expect, test } from 'vitest';
+import { expect, test, vi } from 'vitest';
 
-import { DEFAULT_SETTINGS, keepSettings, readSettings } from './settings';
+import { DEFAULT_SETTINGS, keepSettings, openStorage, readSettings } from './settings';
 
 const storage = (text: string | null): { getItem: () => string | null } => ({
   getItem: () => text,
@@ -19,6 +19,15 @@ test.each([null, '', '{', 'null', '7', '{"theme":"pink","unit":"K"}'])(
     expect(readSettings(storage(text))).toEqual(DEFAULT_SETTINGS);
   },
 );
+
+test('a forbidden storage keeps nothing and does no harm', () => {
+  vi.spyOn(window, 'localStorage', 'get').mockImplementation(() => {
+    throw new Error('SecurityError');
+  });
+  const storage = openStorage();
+  keepSettings(storage, DEFAULT_SETTINGS);
+  expect(readSettings(storage)).toEqual(DEFAULT_SETTINGS);
+});
 
 test('a full storage does no harm', () => {
   const full = {

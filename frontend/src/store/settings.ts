@@ -28,6 +28,15 @@ export function readSettings(storage: Pick<Storage, 'getItem'>): Settings {
   };
 }
 
+/** The browser's storage; where it is forbidden, one that keeps nothing. */
+export function openStorage(): Pick<Storage, 'getItem' | 'setItem'> {
+  try {
+    return window.localStorage;
+  } catch {
+    return { getItem: () => null, setItem: () => undefined };
+  }
+}
+
 export function keepSettings(storage: Pick<Storage, 'setItem'>, settings: Settings): void {
   try {
     storage.setItem(KEY, JSON.stringify(settings));

@@ -12,6 +12,11 @@ export class FakeContext {
   readonly calls: Call[] = [];
   readonly state: Record<string, unknown> = {};
 
+  /** What was drawn on a canvas of the page. */
+  static recordOf(canvas: HTMLCanvasElement): FakeContext | undefined {
+    return contexts.get(canvas);
+  }
+
   static of(canvas: HTMLCanvasElement): CanvasRenderingContext2D {
     let known = contexts.get(canvas);
     if (!known) {

@@ -19,3 +19,24 @@ Element.prototype.scrollIntoView = () => undefined;
 HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement) {
   return FakeContext.of(this);
 } as unknown as HTMLCanvasElement['getContext'];
+
+// Used as data only.
+globalThis.ImageData = class {
+  constructor(
+    readonly data: Uint8ClampedArray,
+    readonly width: number,
+    readonly height: number,
+  ) {}
+} as unknown as typeof ImageData;
+
+globalThis.ResizeObserver = class {
+  observe(): void {
+    // Nothing has a size here.
+  }
+  unobserve(): void {
+    // See above.
+  }
+  disconnect(): void {
+    // See above.
+  }
+};

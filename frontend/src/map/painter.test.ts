@@ -1,0 +1,113 @@
+import { beforeEach, describe, expect, test } from 'vitest';
+
+import { DARK, LIGHT } from '../draw/palette';
+import { act, receive, store } from '../store/app';
+import type { Layer } from '../store/view';
+import { FakeContext } from '../testing/canvas';
+import { showTags } from '../testing/page';
+import { readings, wireTag } from '../testing/tags';
+import { Painter, type Canvases } from './painter';
+
+const view = { x: 50, y: 350, scale: 40 };
+let canvases: Canvases;
+let painter: Painter;
+
+const calls = (canvas: HTMLCanvasElement): FakeContext['calls'] =>
+  FakeContext.recordOf(canvas)?.calls ?? [];
+const named = (canvas: HTMLCanvasElement, name: string): FakeContext['calls'] =>
+  calls(canvas).filter((call) => call.name === name);
+
+beforeEach(() => {
+  canvases = {
+    still: document.createElement('canvas'),
+    pins: document.createElement('canvas'),
+    overlay: document.createElement('canvas'),
+  };
+  painter = new Painter(canvases, LIGHT);
+  painter.resize({ width: 300, height: 400 }, 2);
+  showTags([
+    wireTag({ tag_id: '1', readings: readings({ temperature: 20 }) }),
+    wireTag({
+      tag_id: '2',
+      pose: { position: { x: 0, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 0 } },
+    }),
+  ]);
+  receive({
+    type: 'field',
+    field: {
+      state: 'ready',
+      message: '',
+      value: {
+        sensor: 'temperature',
+        width: 2,
+        height: 2,
+        originX: 0,
+        originY: 0,
+        resolution: 1,
+        valueMin: 1,
+        valueMax: 2,
+        sampleCount: 1,
+        values: Float32Array.of(1, 2, NaN, 2),
+      },
+    },
+  });
+});
+
+const show = (...layers: Layer[]): void => {
+  act({ type: 'look', view: { layers: new Set(layers) } });
+};
+
+describe('painter', () => {
+  test('the canvases have the screen’s pixels', () => {
+    expect([canvases.still.width, canvases.still.height]).toEqual([600, 800]);
+  });
+
+  test('the field is on the still canvas, the pins are on theirs', () => {
+    show('field', 'pins');
+    painter.paintStill(store.get(), view, 0, true);
+    expect(named(canvases.still, 'drawImage')).toHaveLength(1);
+    expect(calls(canvases.pins)).toHaveLength(0);
+    painter.paintPins(store.get(), view, 0, true);
+    expect(named(canvases.pins, 'drawImage')).toHaveLength(1);
+    expect(named(canvases.still, 'drawImage')).toHaveLength(1);
+  });
+
+  test('the field is coloured once, not with each frame', () => {
+    show('field');
+    painter.paintStill(store.get(), view, 0, true);
+    painter.paintStill(store.get(), { ...view, scale: 50 }, 16, false);
+    const [first, second] = named(canvases.still, 'drawImage').map(({ args }) => args[0]);
+    expect(first).toBe(second);
+  });
+
+  test('a pulse touches its own canvas alone', () => {
+    const pulses = [{ at: store.get().twin.snapshot?.tags[0]?.at, since: 0 }] as never;
+    painter.paintOverlay(store.get(), view, { pulses, now: 10, crosshair: false });
+    expect(named(canvases.overlay, 'arc')).toHaveLength(1);
+    expect(calls(canvases.still)).toHaveLength(0);
+    expect(calls(canvases.pins)).toHaveLength(0);
+  });
+
+  test('layers that are off are not drawn', () => {
+    show();
+    painter.paintStill(store.get(), view, 0, true);
+    painter.paintPins(store.get(), view, 0, true);
+    expect(named(canvases.still, 'drawImage')).toHaveLength(0);
+    expect(named(canvases.pins, 'drawImage')).toHaveLength(0);
+  });
+
+  test('the chosen and the hovered tag are marked', () => {
+    act({ type: 'select', tagId: '1' });
+    painter.paintOverlay(store.get(), view, { pulses: [], now: 0, crosshair: false });
+    expect(named(canvases.overlay, 'stroke').length).toBeGreaterThan(0);
+  });
+
+  test('the theme changes what is drawn', () => {
+    show();
+    painter.paintStill(store.get(), view, 0, true);
+    painter.setPalette(DARK);
+    painter.paintStill(store.get(), view, 0, true);
+    const grounds = named(canvases.still, 'fillRect').map(({ state }) => state['fillStyle']);
+    expect(new Set(grounds).size).toBe(2);
+  });
+});

@@ -53,9 +53,7 @@ class Status:
 
     def is_news_after(self, before: Status | None) -> bool:
         """Whether clients have to be told, who were told `before`."""
-        return (
-            before is None or self.says_more_than(before) or before.has_map is not self.has_map
-        )
+        return before is None or self.says_more_than(before) or before.has_map is not self.has_map
 
     def says_more_than(self, before: Status) -> bool:
         """Whether a person has to be told, who was told `before`."""

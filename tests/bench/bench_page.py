@@ -1,0 +1,217 @@
+"""The page: its size, its first paint, panning a large house, and memory over eight hours.
+
+Chromium draws without a GPU, one pixel a CSS pixel, on this machine beside the server.
+"""
+
+from __future__ import annotations
+
+import gzip
+import statistics
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from itertools import pairwise
+from pathlib import Path
+
+from playwright.sync_api import Browser, Page, ViewportSize, expect, sync_playwright
+
+import lupin_bridge
+from tests.bench.page_double import NETWORK, STEP_S
+from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
+from tests.support.messages import look, occupancy_grid, scan
+from tests.support.waiting import wait_for
+from tests.support.web import Bridge, bridge
+
+VIEWPORTS = ((1440, 900), (1920, 1080))
+NAVIGATIONS = 7
+PAN_S = 5
+HEAP_LOOKS_H = (0, 0.25, 0.5, 1, 2, 4, 6, 8)
+PATIENCE_MS = 120_000
+
+# Told to the page before its own scripts run: when the first row and the first heat map were there.
+WATCH_FIRST = """
+window.first = {};
+new MutationObserver(() => {
+  const note = (what) => requestAnimationFrame(() => { first[what] ??= performance.now(); });
+  if (document.querySelector('tr[data-tag-id]')) note('state');
+  const samples = document.querySelector('[data-testid=sample-count]')?.textContent;
+  if (/^[1-9]/.test(samples)) note('field');
+}).observe(document, { childList: true, subtree: true, characterData: true });
+"""
+
+# A mouse that holds the map and moves it in a circle, a step a frame.
+PAN = """
+async (seconds) => {
+  const map = document.getElementById('map-view');
+  const box = map.getBoundingClientRect();
+  const middle = { x: box.x + box.width / 2, y: box.y + box.height / 2 };
+  const send = (target, type, angle) => target.dispatchEvent(new MouseEvent(type, {
+    bubbles: true, cancelable: true, view: window, buttons: 1,
+    clientX: middle.x + 120 * Math.cos(angle), clientY: middle.y + 120 * Math.sin(angle),
+  }));
+  send(map, 'mousedown', 0);
+  const times = [];
+  await new Promise((resolve) => {
+    const frame = (now) => {
+      times.push(now);
+      send(window, 'mousemove', times.length / 20);
+      if (now - times[0] < seconds * 1000) requestAnimationFrame(frame);
+      else resolve();
+    };
+    requestAnimationFrame(frame);
+  });
+  send(window, 'mouseup', times.length / 20);
+  return times;
+}
+"""
+
+
+def main() -> None:
+    """Measure all four and print them."""
+    print_size()
+    expect.set_options(timeout=PATIENCE_MS)
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(
+            executable_path=CHROMIUM, args=list(CHROMIUM_ARGS), headless=True
+        )
+        with chromium:
+            print_first_paint(chromium)
+            print_panning(chromium)
+            print_memory(chromium)
+
+
+def print_size() -> None:
+    """Script and style as they travel to a browser that takes gzip."""
+    assets = Path(lupin_bridge.__file__).parent / "static/assets"
+    sizes = {
+        kind: sum(len(gzip.compress(path.read_bytes(), 6)) for path in assets.glob(f"*.{kind}"))
+        for kind in ("js", "css")
+    }
+    total = sum(sizes.values())
+    print(
+        f"size, gzip: script {sizes['js'] / 1e3:.1f} kB, style {sizes['css'] / 1e3:.1f} kB, ",
+        end="",
+    )
+    print(f"together {total / 1e3:.1f} kB (to reach: under 150)")
+
+
+@contextmanager
+def page_of(browser: Browser, width: int = 1440, height: int = 900) -> Iterator[Page]:
+    """A page with an empty cache."""
+    viewport: ViewportSize = {"width": width, "height": height}
+    with browser.new_context(viewport=viewport, device_scale_factor=1) as context:
+        page = context.new_page()
+        page.set_default_timeout(PATIENCE_MS)
+        yield page
+
+
+def fill(running: Bridge, tags: int, side_m: float, blooms: int) -> None:
+    """Spread tags evenly over a square house; each in a box with so many blooms."""
+    running.peer.wait_for_twin()
+    cells = round(side_m / 0.05)
+    running.peer.publish_map(occupancy_grid([[0] * cells] * cells, resolution=0.05))
+    columns = round(tags**0.5 * 1.1)
+    rows = -(-tags // columns)
+    for index in range(tags):
+        x = 1.5 + (side_m - 3) * (index % columns) / (columns - 1)
+        y = 1.5 + (side_m - 3) * (index // columns) / (rows - 1)
+        spots = [(x + 0.05 * spot, y + 0.1) for spot in range(blooms)]
+        species = ("lupin", "tomato", "basil", "chard")[index % 4]
+        tag_id = str(index + 1)
+        running.peer.observe(
+            scan(tag_id, {"temperature": 18.0 + index % 12, "humidity": 55.0}, at=(x, y)),
+            look(tag_id, species, blooms=spots, flower_count=blooms, anomaly=index % 50 == 0),
+        )
+        if index % 20 == 19:  # what the latch holds of the 50 that it may
+            wait_until_known(running, index + 1)
+    wait_until_known(running, tags)
+
+
+def wait_until_known(running: Bridge, count: int) -> None:
+    """Wait until the twin knows so many tags, with their flowers."""
+
+    def known() -> bool:
+        tags = running.json("/api/state")["tags"]
+        return len(tags) == count and all(tag["species"] for tag in tags)
+
+    wait_for(known, f"{count} tags")
+
+
+def print_first_paint(browser: Browser) -> None:
+    """From the start of the navigation, nothing cached, until the page has drawn."""
+    seen: dict[str, list[float]] = {"state": [], "field": []}
+    with bridge() as running:
+        fill(running, 29, 8.0, 4)
+        for _ in range(NAVIGATIONS):
+            with page_of(browser) as page:
+                page.add_init_script(WATCH_FIRST)
+                page.goto(running.url)
+                page.wait_for_function("() => first.state && first.field")
+                for what, times in seen.items():
+                    times.append(page.evaluate(f"first.{what}"))
+    for what, text in (("state", "first state painted"), ("field", "first heat map painted")):
+        times = seen[what]
+        print(
+            f"{text}: median {statistics.median(times):.0f} ms, slowest of {NAVIGATIONS} "
+            f"{max(times):.0f} ms after navigation" + " (to reach: under 1000)" * (what == "state")
+        )
+
+
+def print_panning(browser: Browser) -> None:
+    """Frames a second while the map is dragged, with 500 pins, 2,000 blooms, 200 x 200 cells."""
+    with bridge() as running:
+        fill(running, 500, 10.0, 4)
+        field = running.get("/api/field.npy", sensor_type="temperature", resolution="0.05")
+        cells = f"{field.headers['x-field-width']} x {field.headers['x-field-height']} cells"
+        for width, height in VIEWPORTS:
+            with page_of(browser, width, height) as page:
+                page.goto(running.url)
+                expect(page.get_by_test_id("sample-count")).to_have_text("500 tags contribute")
+                for what, zoom in (("all in sight", 0), ("zoomed in", 3)):
+                    for _ in range(zoom):
+                        page.get_by_role("button", name="Zoom in").click()
+                    print(
+                        f"panning {width} x {height}, 500 pins, 2,000 blooms, {cells}, {what}: "
+                        f"{frames_text(page.evaluate(PAN, PAN_S))} (to reach: 50)"
+                    )
+
+
+def frames_text(times: Sequence[float]) -> str:
+    """Frames a second, and the longest pauses between two of them."""
+    gaps = sorted(b - a for a, b in pairwise(times))
+    rate = 1000 * len(gaps) / (times[-1] - times[0])
+    late = gaps[int(0.99 * len(gaps))]
+    return f"{rate:.1f} frames/s, 99 % within {late:.0f} ms, longest {gaps[-1]:.0f} ms"
+
+
+def print_memory(browser: Browser) -> None:
+    """The heap while the page takes eight hours of frames, ten a second, by a clock that runs."""
+    with bridge() as running, page_of(browser, 1200, 700) as page:
+        page.emulate_media(reduced_motion="reduce")  # else it draws 60 times a second of that clock
+        page.clock.install()
+        page.add_init_script(NETWORK)
+        page.goto(running.url)
+        expect(page.locator("tr[data-tag-id]")).to_have_count(29)
+        session = page.context.new_cdp_session(page)
+
+        def heap_text() -> str:
+            for _ in range(2):  # once more for what the first collection let go
+                session.send("HeapProfiler.collectGarbage")
+            usage: dict[str, float] = session.send("Runtime.getHeapUsage")
+            script = usage["usedSize"] / 1e6
+            rest = (usage["embedderHeapUsedSize"] + usage["backingStorageSize"]) / 1e6
+            frames, fetches = page.evaluate("[network.frames, network.fetches]")
+            return f"{frames:>9,} {fetches:>9,} {script:>9.2f} {rest:>9.2f}"
+
+        print(
+            f"memory, MB after a collection: {'frames':>9} {'fetches':>9} {'script':>9} {'rest':>9}"
+        )
+        passed_s = 0
+        for hours in HEAP_LOOKS_H:
+            while passed_s < hours * 3600:
+                page.clock.run_for(STEP_S * 1000)
+                passed_s += STEP_S
+            print(f"{f'{hours:g} h':>30} {heap_text()}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

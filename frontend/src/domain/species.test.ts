@@ -1,19 +1,20 @@
 import { expect, test } from 'vitest';
 
-import { speciesColours } from './species';
+import { speciesLooks } from './species';
 
-test('each species has a colour of its own, whatever the order of arrival', () => {
+test('each species has a look of its own, whatever the order of arrival', () => {
   const names = ['rose', 'tulip', 'orchid', 'gerbera', 'lupin'];
-  const colours = speciesColours(names);
-  expect(new Set([...colours.values()].map(String)).size).toBe(names.length);
-  expect(speciesColours([...names].reverse())).toEqual(colours);
+  const looks = speciesLooks(names);
+  expect(new Set([...looks.values()].map(({ colour }) => String(colour))).size).toBe(names.length);
+  expect(new Set([...looks.values()].map(({ shape }) => shape)).size).toBe(3);
+  expect(speciesLooks([...names].reverse())).toEqual(looks);
 });
 
-test('beyond the palette colours repeat and nothing hangs', () => {
+test('beyond the list looks repeat and nothing hangs', () => {
   const names = Array.from({ length: 40 }, (_, i) => `species ${i}`);
-  expect(speciesColours(names).size).toBe(40);
+  expect(speciesLooks(names).size).toBe(40);
 });
 
-test('no name, no colour', () => {
-  expect(speciesColours(['', 'rose']).has('')).toBe(false);
+test('no name, no look', () => {
+  expect(speciesLooks(['', 'rose']).has('')).toBe(false);
 });

@@ -1,36 +1,44 @@
 import type { Rgb } from './ramp';
 
-/**
- * Okabe and Ito, "Color Universal Design" (2008): told apart with every common kind of colour
- * blindness. Their black is left out, as it is no colour on a dark map.
- */
-const PALETTE: readonly Rgb[] = [
-  [0, 114, 178],
-  [230, 159, 0],
-  [204, 121, 167],
-  [240, 228, 66],
-  [86, 180, 233],
-  [213, 94, 0],
-  [0, 158, 115],
-];
-export const UNKNOWN_SPECIES: Rgb = [140, 140, 140];
+/** How a species' blooms are drawn: colour and shape, so that colour is never alone. */
+export interface BloomLook {
+  readonly colour: Rgb;
+  readonly shape: 'circle' | 'square' | 'triangle';
+}
 
 /**
- * A colour for each species name. It starts from the name itself, so that a species keeps its
- * colour from one day to the next; where two want the same, the later in the alphabet takes the
- * next free one. Beyond the palette's size colours repeat.
+ * Colours: Okabe and Ito, "Color Universal Design" (2008), told apart with every common kind of
+ * colour blindness; their black is left out, as it is none on a dark map. Neighbours in this list
+ * have different shapes, and so have the two colours that come closest for red-green blindness.
  */
-export function speciesColours(names: Iterable<string>): ReadonlyMap<string, Rgb> {
-  const colours = new Map<string, Rgb>();
+const LOOKS: readonly BloomLook[] = [
+  { colour: [0, 114, 178], shape: 'circle' },
+  { colour: [230, 159, 0], shape: 'square' },
+  { colour: [204, 121, 167], shape: 'triangle' },
+  { colour: [240, 228, 66], shape: 'circle' },
+  { colour: [86, 180, 233], shape: 'square' },
+  { colour: [213, 94, 0], shape: 'triangle' },
+  { colour: [0, 158, 115], shape: 'circle' },
+];
+
+export const UNKNOWN_SPECIES: BloomLook = { colour: [140, 140, 140], shape: 'circle' };
+
+/**
+ * A look for each species name. It starts from the name itself, so that a species keeps its look
+ * from one day to the next; where two want the same, the later in the alphabet takes the next
+ * free one. Beyond the list's size looks repeat.
+ */
+export function speciesLooks(names: Iterable<string>): ReadonlyMap<string, BloomLook> {
+  const looks = new Map<string, BloomLook>();
   const taken = new Set<number>();
   for (const name of [...new Set(names)].sort()) {
     if (name === '') continue;
-    let index = hash(name) % PALETTE.length;
-    while (taken.has(index) && taken.size < PALETTE.length) index = (index + 1) % PALETTE.length;
+    let index = hash(name) % LOOKS.length;
+    while (taken.has(index) && taken.size < LOOKS.length) index = (index + 1) % LOOKS.length;
     taken.add(index);
-    colours.set(name, PALETTE[index] ?? UNKNOWN_SPECIES);
+    looks.set(name, LOOKS[index] ?? UNKNOWN_SPECIES);
   }
-  return colours;
+  return looks;
 }
 
 /** FNV-1a, 32 bit. */

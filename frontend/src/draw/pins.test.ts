@@ -97,7 +97,7 @@ test('blooms share a sprite a colour', () => {
   const surface = { context: copies.asContext(), size: { width: 400, height: 400 }, ratio: 1 };
   const dot = (x: number, red: number): Parameters<typeof drawBlooms>[2][number] => ({
     at: mapPoint(x, 1),
-    colour: [red, 0, 0],
+    look: { colour: [red, 0, 0], shape: 'circle' },
     anomaly: false,
   });
   drawBlooms(surface, view, [dot(1, 1), dot(2, 1), dot(3, 2)], new Sprites(1), LIGHT);

@@ -1,5 +1,6 @@
 /** Pins, blooms, pest rings and labels: what the data moves. All from cached sprites. */
 import { mix, rgbText, type Rgb } from '../domain/ramp';
+import type { BloomLook } from '../domain/species';
 import { toCanvas, type View } from '../geometry/coordinates';
 import type { LabelRequest, PlacedLabel } from '../geometry/declutter';
 import type { BloomDot, Pin } from './scene';
@@ -30,20 +31,42 @@ export function drawBlooms(
   palette: Palette,
 ): void {
   const radius = bloomRadius(view.scale);
-  const box = Math.ceil(radius + 1.5) * 2;
-  for (const { at, colour } of blooms) {
+  const box = Math.ceil(radius * 1.3 + 1.5) * 2;
+  for (const { at, look } of blooms) {
     const { x, y } = toCanvas(view, at);
     if (!inside(surface, x, y, box)) continue;
-    const sprite = sprites.get(`bloom ${radius} ${colour.join()}`, box, box, (context) => {
-      context.arc(box / 2, box / 2, radius, 0, 2 * Math.PI);
-      context.fillStyle = rgbText(colour);
-      context.fill();
-      context.strokeStyle = palette.bloomLine;
-      context.lineWidth = 0.75;
-      context.stroke();
+    const key = `bloom ${radius} ${look.shape} ${look.colour.join()}`;
+    const sprite = sprites.get(key, box, box, (context) => {
+      context.translate(box / 2, box / 2);
+      paintBloom(context, radius, look, palette);
     });
     sprites.draw(surface, sprite, x - box / 2, y - box / 2);
   }
+}
+
+/** A dot about the origin; the shapes have about the same area. */
+function paintBloom(
+  context: CanvasRenderingContext2D,
+  radius: number,
+  { colour, shape }: BloomLook,
+  palette: Palette,
+): void {
+  context.beginPath();
+  if (shape === 'circle') {
+    context.arc(0, 0, radius, 0, 2 * Math.PI);
+  } else if (shape === 'square') {
+    context.rect(-radius * 0.89, -radius * 0.89, radius * 1.78, radius * 1.78);
+  } else {
+    context.moveTo(0, -radius * 1.3);
+    context.lineTo(radius * 1.2, radius * 0.85);
+    context.lineTo(-radius * 1.2, radius * 0.85);
+    context.closePath();
+  }
+  context.fillStyle = rgbText(colour);
+  context.fill();
+  context.strokeStyle = palette.bloomLine;
+  context.lineWidth = 0.75;
+  context.stroke();
 }
 
 export function drawPins(

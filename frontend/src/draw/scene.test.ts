@@ -70,13 +70,13 @@ test('a box that several tags share is drawn once; a line is no box', () => {
   expect(scene(tags).boxes).toHaveLength(1);
 });
 
-test('blooms carry their species’ colour', () => {
+test('blooms carry their species’ look', () => {
   const bloom = (x: number, species: string): Parameters<typeof tag>[0] => ({
     tag_id: String(x),
     flowers: [{ position: { x, y: 0, z: 0 }, height_m: 0, species, confidence: 1, anomaly: false }],
   });
   const { blooms } = scene([tag(bloom(1, 'rose')), tag(bloom(2, 'tulip')), tag(bloom(3, 'rose'))]);
-  const [a, b, c] = blooms.map(({ colour }) => String(colour));
+  const [a, b, c] = blooms.map(({ look }) => String(look.colour));
   expect(a).toBe(c);
   expect(a).not.toBe(b);
 });

@@ -2,9 +2,9 @@
 import { ageSeconds, freshness } from '../domain/age';
 import { readingText } from '../domain/format';
 import type { HouseHealth } from '../domain/health';
-import { fraction, type Range, type Rgb } from '../domain/ramp';
+import { fraction, type Range } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
-import { speciesColours, UNKNOWN_SPECIES } from '../domain/species';
+import { speciesLooks, UNKNOWN_SPECIES, type BloomLook } from '../domain/species';
 import { shown } from '../domain/text';
 import type { Snapshot } from '../domain/twin';
 import type { TemperatureUnit } from '../domain/units';
@@ -35,7 +35,7 @@ export interface Pin {
 
 export interface BloomDot {
   readonly at: MapPoint;
-  readonly colour: Rgb;
+  readonly look: BloomLook;
   readonly anomaly: boolean;
 }
 
@@ -57,7 +57,7 @@ export interface SceneInput {
 
 export function buildScene(input: SceneInput): Scene {
   const { snapshot } = input;
-  const colours = speciesColours(snapshotSpecies(snapshot));
+  const looks = speciesLooks(snapshotSpecies(snapshot));
   const boxes = new Map<string, readonly MapPoint[]>();
   const blooms: BloomDot[] = [];
   const pins: Pin[] = [];
@@ -66,7 +66,7 @@ export function buildScene(input: SceneInput): Scene {
       boxes.set(tag.footprint.map(({ x, y }) => `${x},${y}`).join(' '), tag.footprint);
     }
     for (const { at, species, anomaly } of tag.blooms) {
-      blooms.push({ at, colour: colours.get(species) ?? UNKNOWN_SPECIES, anomaly });
+      blooms.push({ at, look: looks.get(species) ?? UNKNOWN_SPECIES, anomaly });
     }
     if (tag.at) pins.push(pinOf(tag, tag.at, input));
   }

@@ -20,13 +20,20 @@ export function App({ kiosk }: { kiosk: boolean }): JSX.Element {
   const selected = useApp((state) => state.view.selected);
   const message = useSelected(toast, (text) => text);
 
-  // The row of a tag that was chosen on the map comes into view.
+  const hasTags = useApp((state) => state.twin.snapshot !== null);
+
+  // The row of the chosen tag comes into view, once its card has taken its place.
   useEffect(() => {
-    if (selected === null) return;
-    document
-      .querySelector(`tr[data-tag-id="${CSS.escape(selected)}"]`)
-      ?.scrollIntoView({ block: 'nearest' });
-  }, [selected]);
+    if (selected === null || !hasTags) return undefined;
+    const frame = requestAnimationFrame(() => {
+      document
+        .querySelector(`tr[data-tag-id="${CSS.escape(selected)}"]`)
+        ?.scrollIntoView({ block: 'nearest' });
+    });
+    return () => {
+      cancelAnimationFrame(frame);
+    };
+  }, [selected, hasTags]);
 
   return (
     <div

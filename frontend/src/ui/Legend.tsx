@@ -4,7 +4,7 @@ import type { FieldQuality } from '../contract/types';
 import { numberText, readingText, valueText } from '../domain/format';
 import { fraction, rgbText, sensorColour, type Range } from '../domain/ramp';
 import { RAMP, sensorNamed, type Sensor } from '../domain/sensors';
-import { speciesColours, UNKNOWN_SPECIES } from '../domain/species';
+import { speciesLooks, UNKNOWN_SPECIES, type BloomLook } from '../domain/species';
 import { shown } from '../domain/text';
 import { differenceToShown, unitOf, type TemperatureUnit } from '../domain/units';
 import { snapshotSpecies } from '../draw/scene';
@@ -116,7 +116,7 @@ function Ramp({
 function Keys(): JSX.Element {
   const snapshot = useApp((state) => state.twin.snapshot);
   const species = useMemo(
-    () => (snapshot ? [...speciesColours(snapshotSpecies(snapshot))] : []),
+    () => (snapshot ? [...speciesLooks(snapshotSpecies(snapshot))] : []),
     [snapshot],
   );
   const unknown = snapshot?.tags.some((tag) => tag.blooms.some((bloom) => bloom.species === ''));
@@ -143,18 +143,30 @@ function Keys(): JSX.Element {
         </svg>
         {S.pinPest}
       </li>
-      {species.map(([name, colour]) => (
+      {species.map(([name, look]) => (
         <li key={name}>
-          <span className="dot" style={{ background: rgbText(colour) }} />
+          <BloomKey look={look} />
           <bdi>{shown(name, 24)}</bdi>
         </li>
       ))}
       {unknown && (
         <li>
-          <span className="dot" style={{ background: rgbText(UNKNOWN_SPECIES) }} />
+          <BloomKey look={UNKNOWN_SPECIES} />
           {S.legendUnknownSpecies}
         </li>
       )}
     </ul>
+  );
+}
+
+function BloomKey({ look: { colour, shape } }: { look: BloomLook }): JSX.Element {
+  return (
+    <svg viewBox="0 0 16 16" width="14" height="14" aria-hidden="true">
+      <g className="key-bloom" fill={rgbText(colour)}>
+        {shape === 'circle' && <circle cx="8" cy="8" r="5.5" />}
+        {shape === 'square' && <path d="M3 3h10v10H3Z" />}
+        {shape === 'triangle' && <path d="M8 1.500 14.500 13H1.500Z" />}
+      </g>
+    </svg>
   );
 }

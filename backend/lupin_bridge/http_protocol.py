@@ -1,17 +1,20 @@
-"""HTTP answers to slow readers: what waits for one is a piece, and who takes none is cut off.
+"""HTTP with slow clients: what waits for one is a piece, and who takes or asks nothing is cut off.
 
-uvicorn takes an answer whole and keeps what the socket does not take, for as long as the client
-likes. A few hundred connections that ask for a large field and never read would fill the memory.
+uvicorn takes an answer whole and keeps what the socket does not take, and it waits for the rest of
+a request, for as long as the client likes. A few hundred connections that ask for a large field and
+never read would fill the memory, and some thousand that never finish asking use up all sockets.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
-from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
+
+from lupin_bridge.transports import bound_unsent, tear_down
 
 log = logging.getLogger(__name__)
 
@@ -22,7 +25,11 @@ PIECE_BYTES: Final = 256 * 1024
 
 
 class HttpConnection(H11Protocol):
-    """uvicorn's protocol, that also puts itself into `scope["state"]["http_connection"]`."""
+    """uvicorn's protocol, that also puts itself into `scope["state"]["http_connection"]`.
+
+    A client has uvicorn's `timeout_keep_alive` for a whole request, from its connection or its last
+    answer on, however often it sends a byte.
+    """
 
     def __init__(
         self,
@@ -32,10 +39,47 @@ class HttpConnection(H11Protocol):
         _loop: asyncio.AbstractEventLoop | None = None,
     ) -> None:
         super().__init__(config, server_state, {**app_state, HTTP_CONNECTION_KEY: self}, _loop)
+        self._deadline: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: Any) -> None:
+        """Start to wait for a request."""
+        super().connection_made(transport)
+        bound_unsent(transport)
+        self._wait_for_request()
+
+    def on_response_complete(self) -> None:
+        """Start to wait for the next request."""
+        super().on_response_complete()
+        self._wait_for_request()
+
+    def handle_websocket_upgrade(self, event: Any) -> None:
+        """Hand the connection over: it is not ours any more."""
+        self._stop_waiting()
+        super().handle_websocket_upgrade(event)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget the connection."""
+        self._stop_waiting()
+        super().connection_lost(exc)
 
     def abort(self) -> None:
         """Tear the connection down and forget what was still to be sent."""
-        self.transport.abort()
+        tear_down(self.transport)
+
+    def _wait_for_request(self) -> None:
+        self._stop_waiting()
+        self._deadline = self.loop.call_later(self.timeout_keep_alive, self._look_for_request)
+
+    def _stop_waiting(self) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+            self._deadline = None
+
+    def _look_for_request(self) -> None:
+        self._deadline = None
+        cycle = cast("RequestResponseCycle | None", self.cycle)
+        if cycle is None or cycle.response_complete:
+            self.abort()
 
 
 class PieceByPiece:

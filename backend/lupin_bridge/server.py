@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import resource
 import signal
 import socket
@@ -44,6 +45,7 @@ class BridgeServer(uvicorn.Server):
                 ws_max_size=MAX_INBOUND_BYTES,
                 ws_ping_interval=PING_PERIOD_S,
                 ws_ping_timeout=PING_PERIOD_S,
+                timeout_keep_alive=math.ceil(bridge.settings.client_timeout_s),
                 access_log=False,
                 log_config=None,
                 server_header=False,

@@ -7,24 +7,35 @@ wait: it asks, and keeps the newest frame for the moment at which the client is 
 from __future__ import annotations
 
 import asyncio
-import socket
-import struct
 from collections.abc import Callable
 from typing import Any
 
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.frames import CloseCode
+from websockets.protocol import State
+
+from lupin_bridge.transports import bound_unsent, tear_down
 
 CONNECTION_KEY = "connection"
 
-# What the kernel may hold of a frame before the network takes it: what is under way does not count.
-UNSENT_BYTES = 128 * 1024
+# Clients have next to nothing to say, and everybody else waits while a frame of theirs is parsed:
+# 3 ms at a time, of the smallest frames, and a hundredth of a second at once.
+READ_BYTES = 8_192
+FRAMES_PER_S = 1_000
+FRAMES_AT_ONCE = 5_000
 
 # How long a client that is told to go has to read the reason before its socket is torn down.
 CLOSE_GRACE_S = 1.0
 
 
-class Connection(WebSocketsSansIOProtocol):
-    """uvicorn's protocol, that also puts itself into `scope["state"]["connection"]`."""
+_READ_BUFFER = memoryview(bytearray(READ_BYTES))
+
+
+class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
+    """uvicorn's protocol, that also puts itself into `scope["state"]["connection"]`.
+
+    Buffered, so that a client is heard in small helpings, each in its turn.
+    """
 
     def __init__(
         self,
@@ -35,6 +46,8 @@ class Connection(WebSocketsSansIOProtocol):
     ) -> None:
         super().__init__(config, server_state, {**app_state, CONNECTION_KEY: self}, _loop)
         self.on_writable: Callable[[], None] | None = None
+        # When all frames heard would be through at the allowed rate (ITU-T I.371).
+        self._frames_through_s = 0.0
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Stop at the first bytes that the socket does not take: what is queued is one frame.
@@ -42,12 +55,31 @@ class Connection(WebSocketsSansIOProtocol):
         Over TLS, asyncio keeps another 64 kB below the limit that can be set.
         """
         super().connection_made(transport)
-        # The kernel would take 4 MB more (tcp_wmem): for a slow reader, minutes of old states.
-        self.transport.get_extra_info("socket").setsockopt(
-            socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT_BYTES
-        )
+        bound_unsent(transport)
         # Not 0: asyncio's TLS transport stops at the limit, not past it, and would stop on nothing.
         self.transport.set_write_buffer_limits(high=1, low=0)
+
+    def get_buffer(self, sizehint: int) -> memoryview:  # noqa: ARG002  # asyncio's suggestion
+        """Where the next bytes go; shared by all connections, for they are read at once."""
+        return _READ_BUFFER
+
+    def buffer_updated(self, nbytes: int) -> None:
+        """Bytes have come."""
+        self.data_received(bytes(_READ_BUFFER[:nbytes]))
+
+    def handle_events(self) -> None:
+        """Handle the frames that a client has sent, unless it sends too many."""
+        now_s = self.loop.time()
+        heard_s = max(self._frames_through_s, now_s) + len(self.conn.events) / FRAMES_PER_S
+        if heard_s - now_s <= FRAMES_AT_ONCE / FRAMES_PER_S:
+            self._frames_through_s = heard_s
+            super().handle_events()
+        else:
+            self.transport.pause_reading()
+            self.dismiss(
+                CloseCode.POLICY_VIOLATION,
+                f"sent more than {FRAMES_PER_S} frames a second after {FRAMES_AT_ONCE} at once",
+            )
 
     def resume_writing(self) -> None:
         """The socket has taken everything: time for the newest frame."""
@@ -90,16 +122,8 @@ class Connection(WebSocketsSansIOProtocol):
 
     def dismiss(self, code: int, reason: str) -> None:
         """Send a close frame with the reason, and tear the socket down if nobody reads it."""
-        if not self.close_sent and not self.transport.is_closing():
+        if self.conn.state is State.OPEN and not self.transport.is_closing():
             self.conn.send_close(code, reason)
             self.transport.write(b"".join(self.conn.data_to_send()))
             self.close_sent = True
-        self.loop.call_later(CLOSE_GRACE_S, self._tear_down)
-
-    def _tear_down(self) -> None:
-        if self.transport.get_write_buffer_size() > 0:
-            # A reset: or the kernel would go on offering what nobody reads for four minutes more.
-            self.transport.get_extra_info("socket").setsockopt(
-                socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0)
-            )
-        self.transport.abort()
+        self.loop.call_later(CLOSE_GRACE_S, tear_down, self.transport)

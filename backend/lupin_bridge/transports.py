@@ -1,0 +1,30 @@
+"""What asyncio leaves to the socket: how much the kernel hoards for a reader, and a real end."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import struct
+from typing import Final
+
+# What the kernel may hold that the network has not taken; what is under way does not count. On its
+# own it would hold 4 MB (tcp_wmem): for a slow reader, minutes of old states.
+UNSENT_BYTES: Final = 128 * 1024
+
+
+def bound_unsent(transport: asyncio.BaseTransport) -> None:
+    """Let a connection's socket take no more than `UNSENT_BYTES` ahead of the network."""
+    connection: socket.socket = transport.get_extra_info("socket")
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT_BYTES)
+
+
+def tear_down(transport: asyncio.WriteTransport) -> None:
+    """End a connection now; one whose other side does not read is reset.
+
+    Closed, its socket would go on offering what nobody reads for another four minutes.
+    """
+    if transport.get_write_buffer_size() > 0:
+        no_lingering = struct.pack("ii", 1, 0)
+        connection: socket.socket = transport.get_extra_info("socket")
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, no_lingering)
+    transport.abort()

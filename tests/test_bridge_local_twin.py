@@ -193,17 +193,14 @@ def test_an_error_that_nobody_waits_for_any_more_is_no_warning(
     domain: int, stage_of: Callable[..., Any]
 ) -> None:
     async def test() -> None:
-        complaints: list[Any] = []
-        asyncio.get_running_loop().set_exception_handler(lambda _, what: complaints.append(what))
         async with stage_of() as stage:
             (task,) = await stage.waiting(REQUEST)
             task.cancel()
             stage.failure = MemoryError("too much")
             stage.gate.set()
             await until(lambda: not stage.twin._computing, "the end of the computation")
-        assert complaints == []
 
-    run(domain, test())
+    run(domain, test())  # fails on what the event loop has to log
 
 
 def test_a_refusal_is_get_fields_own(domain: int, stage_of: Callable[..., Any]) -> None:

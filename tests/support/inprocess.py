@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import os
 import time
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterator, Sequence
@@ -38,9 +39,21 @@ def ros_domain(domain: int) -> Iterator[None]:
 
 
 def run(domain: int, test: Coroutine[Any, Any, T]) -> T:
-    """Run a test's coroutine with its nodes in a ROS domain of its own."""
+    """Run a test's coroutine with its nodes in a ROS domain of its own.
+
+    An error that an event loop would only log fails the test.
+    """
+    errors: list[dict[str, Any]] = []
+
+    async def watched() -> T:
+        asyncio.get_running_loop().set_exception_handler(lambda _, error: errors.append(error))
+        return await test
+
     with ros_domain(domain):
-        return asyncio.run(test)
+        result = asyncio.run(watched())
+    gc.collect()  # a task complains of an error that nobody looked at when it is collected
+    assert errors == []
+    return result
 
 
 async def until(look: Callable[[], T], what: str, timeout_s: float = PATIENCE_S) -> T:

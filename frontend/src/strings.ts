@@ -83,6 +83,7 @@ export const S = {
 
   legend: 'Legend',
   legendTags: (count: number): string => counted(count, 'tag contributes', 'tags contribute'),
+  legendFetching: 'The heat map is on its way',
   legendNoTags: 'No tag contributes',
   legendError: (error: string): string => `leave-one-out error ${error}`,
   legendErrorHint:

@@ -67,6 +67,13 @@ describe('legend', () => {
     expect(at('sample-count')).toBe('No tag contributes');
   });
 
+  test('a heat map on its way does not deny the tags that it will show', () => {
+    showTags([wireTag({ readings: readings({ humidity: 60 }) })]);
+    act({ type: 'sensor', sensor: 'humidity' });
+    render(<Legend kiosk={false} />);
+    expect(at('sample-count')).toBe('The heat map is on its way');
+  });
+
   test('a fixed range stays while the data change, and can be typed', () => {
     render(<Legend kiosk={false} />);
     fireEvent.click(screen.getByRole('radio', { name: 'Fixed' }));

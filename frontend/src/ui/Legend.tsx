@@ -21,6 +21,11 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
   const quality = useApp((state) => state.twin.quality);
   const sensor = sensorNamed(name);
   const samples = field?.sensor === name ? field.sampleCount : 0;
+  const isFetching = useApp(
+    ({ twin }) =>
+      twin.field.value?.sensor !== name &&
+      twin.snapshot?.tags.some((tag) => tag.at && tag.readings.get(name) != null),
+  );
   return (
     <section className="legend" aria-label={S.legend} data-testid="legend">
       <div className="legend-scale">
@@ -31,7 +36,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
       </div>
       <div className="legend-facts">
         <span data-testid="sample-count">
-          {samples > 0 ? S.legendTags(samples) : S.legendNoTags}
+          {samples > 0 ? S.legendTags(samples) : isFetching ? S.legendFetching : S.legendNoTags}
         </span>
         {quality?.sensor_type === name && <Quality quality={quality} sensor={sensor} unit={unit} />}
         <span className="legend-note">{S.legendTransparent}</span>

@@ -28,3 +28,16 @@ def tcp_buffers_mb() -> float:
         if line.startswith("TCP:"):
             return int(line.split()[-1]) * _PAGE_BYTES / 1e6
     raise AssertionError("/proc/net/sockstat has no line TCP:")
+
+
+def reset_peak(pid: int) -> None:
+    """Let `peak_mb` start anew (proc_pid_clear_refs(5))."""
+    Path(f"/proc/{pid}/clear_refs").write_text("5", encoding="ascii")
+
+
+def peak_mb(pid: int) -> float:
+    """The most memory that was resident at any time, MB."""
+    for line in Path(f"/proc/{pid}/status").read_text(encoding="utf-8").splitlines():
+        if line.startswith("VmHWM:"):
+            return int(line.split()[1]) * 1_024 / 1e6
+    raise AssertionError(f"/proc/{pid}/status has no line VmHWM")

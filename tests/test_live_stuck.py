@@ -1,0 +1,243 @@
+"""Clients that do not read, are gone without a word, trickle, flood or are too many.
+
+Over real sockets and a real bridge with a robot that changes it at 50 Hz. Each time those clients
+are gone in the end, memory stays within a bound, and a healthy client gets every kind of frame as
+if nothing were.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import socket
+import struct
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+
+import httpx
+import pytest
+from websockets.exceptions import ConnectionClosed
+
+from lupin_bridge.server import MAX_INBOUND_BYTES
+from lupin_bridge.ws_protocol import FRAMES_AT_ONCE, FRAMES_PER_S
+from tests.bench.bench_live import Server, serving
+from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
+from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.web import Listener, bridge, deaf_client, listener
+
+CLIENTS = 20
+TIMEOUT_S = 2
+# For all of them together; a state of the robot's 30 tags has 23 kB, 1.1 MB a second for each.
+MEMORY_MB = 10.0
+
+PING = b"\x89\x80abcd"
+EMPTY_TEXT = b"\x81\x80abcd"
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Server]:
+    with serving(30, 50.0, "--client-timeout-s", str(TIMEOUT_S)) as running:
+        yield running
+
+
+@pytest.fixture
+def healthy(server: Server) -> Iterator[Listener]:
+    with listener(url(server)) as client:
+        client.until("state")
+        yield client
+        assert "Traceback" not in server.process.output
+
+
+def url(server: Server) -> str:
+    return f"http://127.0.0.1:{server.port}"
+
+
+def metric(server: Server, name: str) -> float:
+    """A metric without labels."""
+    for line in httpx.get(f"{url(server)}/metrics", trust_env=False).text.splitlines():
+        if line.startswith(f"{name} "):
+            return float(line.rpartition(" ")[2])
+    raise AssertionError(f"there is no metric {name}")
+
+
+def open_files(server: Server) -> int:
+    """How many descriptors the server has open."""
+    return len(list(Path(f"/proc/{server.process.pid}/fd").iterdir()))
+
+
+def is_over(client: socket.socket) -> bool:
+    """Whether the server has closed or reset a connection (tcp.h: 1 is ESTABLISHED)."""
+    return client.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 1)[0] != 1
+
+
+def vanish(client: socket.socket) -> None:
+    """Let a client's machine be gone: no packet gets in any more, so none is ever answered.
+
+    socket(7), SO_ATTACH_FILTER with the one instruction "return 0", which drops every packet.
+    """
+    instructions = ctypes.create_string_buffer(struct.pack("HBBI", 0x06, 0, 0, 0))
+    program = struct.pack("HL", 1, ctypes.addressof(instructions))
+    client.setsockopt(socket.SOL_SOCKET, 26, program)
+
+
+def trickle(client: socket.socket) -> None:
+    """Read one byte of what there is."""
+    client.settimeout(0)
+    with suppress(OSError):
+        client.recv(1)
+
+
+def wait_reading(healthy: Listener, look: Callable[[], bool], what: str) -> None:
+    """Wait on a condition, with the healthy client reading all the while."""
+
+    def read_and_look() -> bool:
+        healthy.rest()
+        return look()
+
+    wait_for(read_and_look, what)
+
+
+def newest(client: Listener) -> int:
+    """The number of the newest frame that is there."""
+    client.rest()
+    return int(client.until("state")["seq"])
+
+
+@contextmanager
+def gone_in_the_end(server: Server, healthy: Listener) -> Iterator[ExitStack]:
+    """What is connected inside is gone at the end, and has cost little meanwhile."""
+    clients, files = metric(server, "lupin_clients"), open_files(server)
+    memory = resident_mb(server.process.pid)
+    reset_peak(server.process.pid)
+    with ExitStack() as stack:
+        yield stack
+        wait_reading(healthy, lambda: metric(server, "lupin_clients") == clients, "the others' end")
+        wait_reading(healthy, lambda: open_files(server) <= files, "the end of their sockets")
+        assert peak_mb(server.process.pid) - memory < MEMORY_MB
+        seq = newest(healthy)
+        assert newest(healthy) > seq
+
+
+@pytest.mark.parametrize(
+    ("first", "meanwhile"),
+    [
+        pytest.param(lambda _: None, lambda _: None, id="never read"),
+        pytest.param(vanish, lambda _: None, id="are gone without a word"),
+        pytest.param(lambda _: None, trickle, id="read a byte now and then"),
+    ],
+)
+def test_gone_after_the_timeout_are_clients_that(
+    server: Server,
+    healthy: Listener,
+    first: Callable[[socket.socket], None],
+    meanwhile: Callable[[socket.socket], None],
+) -> None:
+    dismissed = metric(server, "lupin_clients_dismissed_total")
+    with gone_in_the_end(server, healthy) as stack:
+        stuck = [stack.enter_context(deaf_client(url(server))) for _ in range(CLIENTS)]
+        wait_reading(
+            healthy,
+            lambda: metric(server, "lupin_clients") == 1 + CLIENTS,
+            "all to be connected",
+        )
+        for client in stuck:
+            first(client)
+
+        def all_dismissed() -> bool:
+            for client in stuck:
+                meanwhile(client)
+            return metric(server, "lupin_clients_dismissed_total") == dismissed + CLIENTS
+
+        wait_reading(healthy, all_dismissed, "all to be dismissed")
+
+
+def half_request(client: socket.socket) -> None:
+    client.sendall(b"GET /ws/state HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: ")
+
+
+def answered_before(client: socket.socket) -> None:
+    client.sendall(b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+    while b"}" not in client.recv(4096):
+        pass
+    half_request(client)
+
+
+def half_body(client: socket.socket) -> None:
+    client.sendall(b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 9999\r\n\r\n")
+
+
+@pytest.mark.parametrize("begin", [lambda _: None, half_request, answered_before, half_body])
+def test_gone_after_the_timeout_is_a_request_that_comes_byte_by_byte(
+    server: Server, healthy: Listener, begin: Callable[[socket.socket], None]
+) -> None:
+    with gone_in_the_end(server, healthy) as stack:
+        slow = stack.enter_context(socket.create_connection(("127.0.0.1", server.port)))
+        slow.settimeout(PATIENCE_S)
+        begin(slow)
+
+        def send_a_byte() -> bool:
+            try:
+                slow.send(b"x")
+            except OSError:
+                return True
+            return is_over(slow)
+
+        wait_reading(healthy, send_a_byte, "the end of the connection")
+
+
+def wait_for_the_answer(client: socket.socket) -> None:
+    """Wait until the WebSocket is there; a client must not send before that."""
+    assert client.recv(1) == b"H"
+
+
+@pytest.mark.parametrize("frame", [PING, EMPTY_TEXT])
+def test_a_flood_ends_its_sender_alone(server: Server, healthy: Listener, frame: bytes) -> None:
+    with (
+        gone_in_the_end(server, healthy) as stack,
+        listener(url(server)) as reads,
+    ):
+        reads.until("state")
+        deaf = stack.enter_context(deaf_client(url(server)))
+        wait_for_the_answer(deaf)
+        for sender in (reads.connection.socket, deaf):
+            sender.sendall(frame * (FRAMES_AT_ONCE + FRAMES_PER_S))
+        with pytest.raises(ConnectionClosed) as closed:
+            reads.until("never", lambda _: False)
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1008
+        assert closed.value.rcvd.reason == "sent more than 1000 frames a second after 5000 at once"
+        wait_reading(healthy, lambda: is_over(deaf), "the end of the one that does not read")
+
+
+def test_a_message_past_the_limit_is_one_in_pieces_too(server: Server, healthy: Listener) -> None:
+    with gone_in_the_end(server, healthy), listener(url(server)) as loud:
+        pieces = MAX_INBOUND_BYTES // 10_000 + 1
+        loud.connection.send("x" * 10_000 for _ in range(pieces))
+        with pytest.raises(ConnectionClosed) as closed:
+            loud.until("never", lambda _: False)
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1009
+
+
+def test_one_client_too_many_is_told_so_and_may_come_when_another_has_gone() -> None:
+    with bridge("--max-clients", "3") as live, ExitStack() as stack:
+        inside = [stack.enter_context(live.listen()) for _ in range(3)]
+        for client in inside:
+            client.until("state")
+        with live.listen() as refused, pytest.raises(ConnectionClosed) as closed:
+            refused.next()
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1013
+        assert closed.value.rcvd.reason == "3 clients are connected, the limit"
+        inside[0].connection.close()
+
+        def is_let_in() -> bool:
+            with live.listen() as client:
+                try:
+                    return bool(client.next()["type"] == "status")
+                except ConnectionClosed:
+                    return False
+
+        wait_for(is_let_in, "the place that has become free")
+        for client in inside[1:]:
+            client.until("state")

@@ -42,10 +42,13 @@ def test_a_link_shows_the_same_view_to_somebody_else(house: Bridge, open_page: O
     expect(theirs.test_id("legend")).to_contain_text("Humidity %")
     expect(theirs.card("3")).to_be_visible()
     theirs.expect_samples(3)
-    before, after = mine.view(), theirs.view()
-    assert (after.x, after.y, after.scale) == pytest.approx(
-        (before.x, before.y, before.scale), abs=2
-    )
+
+    def same_view() -> bool:
+        before, after = mine.view(), theirs.view()
+        wanted = pytest.approx((before.x, before.y, before.scale), abs=2)
+        return (after.x, after.y, after.scale) == wanted
+
+    theirs.expect(same_view, "the same view")
     theirs.page.get_by_role("button", name="Layers").click()
     expect(theirs.page.get_by_role("checkbox", name="Metre grid")).not_to_be_checked()
     expect(theirs.page.get_by_role("checkbox", name="Smooth heat map")).to_be_checked()

@@ -12,7 +12,6 @@ import socket
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from pathlib import Path
 
 import httpx
 import pytest
@@ -21,7 +20,7 @@ from websockets.exceptions import ConnectionClosed
 from lupin_bridge.server import MAX_INBOUND_BYTES
 from lupin_bridge.ws_protocol import FRAMES_AT_ONCE, FRAMES_PER_S
 from tests.bench.bench_live import Server, serving
-from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
+from tests.support.proc_stat import open_files, peak_mb, reset_peak, resident_mb
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Listener, bridge, deaf_client, listener
 
@@ -58,11 +57,6 @@ def metric(server: Server, name: str) -> float:
         if line.startswith(f"{name} "):
             return float(line.rpartition(" ")[2])
     raise AssertionError(f"there is no metric {name}")
-
-
-def open_files(server: Server) -> int:
-    """How many descriptors the server has open."""
-    return len(list(Path(f"/proc/{server.process.pid}/fd").iterdir()))
 
 
 def is_over(client: socket.socket) -> bool:
@@ -106,13 +100,15 @@ def newest(client: Listener) -> int:
 @contextmanager
 def gone_in_the_end(server: Server, healthy: Listener) -> Iterator[ExitStack]:
     """What is connected inside is gone at the end, and has cost little meanwhile."""
-    clients, files = metric(server, "lupin_clients"), open_files(server)
+    clients, files = metric(server, "lupin_clients"), open_files(server.process.pid)
     memory = resident_mb(server.process.pid)
     reset_peak(server.process.pid)
     with ExitStack() as stack:
         yield stack
         wait_reading(healthy, lambda: metric(server, "lupin_clients") == clients, "the others' end")
-        wait_reading(healthy, lambda: open_files(server) <= files, "the end of their sockets")
+        wait_reading(
+            healthy, lambda: open_files(server.process.pid) <= files, "the end of their sockets"
+        )
         assert peak_mb(server.process.pid) - memory < MEMORY_MB
         seq = newest(healthy)
         assert newest(healthy) > seq

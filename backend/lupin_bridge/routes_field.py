@@ -26,6 +26,7 @@ from lupin_bridge.http_tools import (
 )
 from lupin_bridge.source import TwinTimeoutError, TwinUnavailableError
 from lupin_twin.fields import FieldRefused, check_request, default_box
+from lupin_twin.state import MAX_TEXT_LENGTH
 
 router = APIRouter()
 
@@ -44,11 +45,16 @@ def _parameter(name: str, schema_: dict[str, Any], description: str, required: b
 
 # Read by hand (field_query), so that a refusal is GetField's own body; documented here.
 _PARAMETERS = [
-    _parameter("sensor_type", {"type": "string"}, "name of a sensor, as in a reading", True),
+    _parameter(
+        "sensor_type",
+        {"type": "string", "minLength": 1, "maxLength": MAX_TEXT_LENGTH},
+        "name of a sensor, as in a reading",
+        True,
+    ),
     _parameter(
         "resolution",
-        {**_NUMBER, "default": field_query.DEFAULT_RESOLUTION_M},
-        "m, side of a square cell; greater than 0",
+        {**_NUMBER, "exclusiveMinimum": 0, "default": field_query.DEFAULT_RESOLUTION_M},
+        "m, side of a square cell",
     ),
     *(
         _parameter(name, _NUMBER, "m, map frame; without a box: all pinned tags and their reach")

@@ -22,6 +22,11 @@ def resident_mb(pid: int) -> float:
     return pages * _PAGE_BYTES / 1e6
 
 
+def open_files(pid: int) -> int:
+    """How many descriptors it has open."""
+    return len(list(Path(f"/proc/{pid}/fd").iterdir()))
+
+
 def tcp_buffers_mb() -> float:
     """What the kernel holds in the buffers of all TCP sockets of this machine, MB."""
     for line in Path("/proc/net/sockstat").read_text(encoding="ascii").splitlines():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 import socket
 from errno import ECONNRESET
@@ -11,6 +12,8 @@ import orjson
 from websockets.frames import CloseCode, Frame, Opcode
 from websockets.streams import StreamReader
 
+from lupin_bridge.ws_protocol import Connection
+from tests.support.inprocess import run, running, until
 from tests.support.messages import scan
 from tests.support.waiting import wait_for
 from tests.support.web import bridge, deaf_client, overfill
@@ -75,6 +78,32 @@ def test_a_slow_client_skips_to_the_newest_and_a_quick_one_gets_every_frame() ->
         live.peer.observe(scan("after", {"co2": 1.0}))
         quick.until_tag("after")
         assert "Traceback" not in live.process.output
+
+
+def test_a_socket_that_is_free_again_says_so_by_itself(domain: int) -> None:
+    async def test() -> None:
+        async with running(ros_args=SILENT) as served:
+            with deaf_client(served.url) as slow:
+                connections = served.server.server_state.connections
+                await until(lambda: connections, "the client")
+                (connection,) = connections
+                assert isinstance(connection, Connection)
+                await until(lambda: connection.on_writable is not None, "the client to have joined")
+                freed: list[bool] = []
+                connection.on_writable = lambda: freed.append(connection.can_take)
+                while connection.can_take:
+                    connection.write(b"x" * BLOCK)
+                taken = [connection.can_take]
+                await asyncio.to_thread(drain, slow, freed)
+                assert (taken, freed[0]) == ([False], True)
+
+    run(domain, test())
+
+
+def drain(client: socket.socket, freed: list[bool]) -> None:
+    """Read until the server's socket has become free."""
+    while not freed:
+        client.recv(BLOCK)
 
 
 def test_a_client_that_takes_nothing_is_closed_and_told_why_and_the_others_are_not() -> None:

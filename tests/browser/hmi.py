@@ -114,7 +114,8 @@ class Hmi:
 
     def expect(self, look: Callable[[], bool], what: str) -> None:
         """Wait until something holds that no locator can tell."""
-        wait_for(look, what)
+        # Not asleep: Playwright hands over what happened in the page only while it is called.
+        wait_for(look, what, meanwhile=lambda: self.page.wait_for_timeout(10))
 
     def test_id(self, name: str) -> Locator:
         return self.page.get_by_test_id(name)
@@ -155,7 +156,16 @@ class Hmi:
         return self.page.get_by_test_id("map")
 
     def view(self) -> View:
-        text = self.page.get_by_test_id("map-canvas").get_attribute("data-view") or ""
+        """Where the map lies now, in a layout that has its font and so its final size."""
+        text = self.page.get_by_test_id("map-canvas").evaluate(
+            """async (canvas) => {
+              await document.fonts.ready;
+              const frame = () => new Promise(requestAnimationFrame);
+              await frame();
+              await frame();
+              return canvas.dataset.view;
+            }"""
+        )
         return View(*(float(part) for part in text.split(",")))
 
     def picture(self, width: int | None = None) -> Image.Image:
@@ -193,7 +203,8 @@ class Hmi:
 
     def pixels(self, points: Sequence[tuple[float, float]]) -> list[Pixel]:
         """Colours on the screen at points of the map frame, m."""
-        picture, view = self.picture(), self.view()
+        view = self.view()
+        picture = self.picture()
         return [_rgb(picture, *view.pixel(x, y)) for x, y in points]
 
     def pixel(self, x: float, y: float) -> Pixel:

@@ -49,7 +49,7 @@ export class Sprites {
   readonly #ratio: number;
   readonly #limit: number;
 
-  constructor(ratio: number, limit = 2_000) {
+  constructor(ratio: number, limit = 1_000) {
     this.#ratio = ratio;
     this.#limit = limit;
   }

@@ -5,12 +5,20 @@ from __future__ import annotations
 import json
 import logging
 import sys
+import time
 from datetime import UTC, datetime
 from typing import Final
+
+from lupin_twin.throttle import Throttle
 
 TEXT: Final = "text"
 JSON: Final = "json"
 FORMATS: Final = (TEXT, JSON)
+
+WEB_SERVER_PERIOD_S: Final = 5.0
+
+# uvicorn's words, with a trace that tells nothing: the bytes were a stranger's.
+_NO_TEXT: Final = "Invalid UTF-8 sequence received from client."
 
 
 class JsonFormatter(logging.Formatter):
@@ -29,6 +37,29 @@ class JsonFormatter(logging.Formatter):
         return json.dumps(fields, ensure_ascii=False)
 
 
+class OnceInAWhile(logging.Filter):
+    """Lets a record through if none like it has come for `WEB_SERVER_PERIOD_S`.
+
+    For the web server's, some of which any stranger can cause as often as he likes.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._throttle = Throttle(WEB_SERVER_PERIOD_S)
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Whether to write the record; what it says of those before it is added."""
+        error = record.exc_info[0] if record.exc_info else None
+        held_back = self._throttle.ask((record.msg, error), time.monotonic())
+        if held_back is None:
+            return False
+        if record.msg == _NO_TEXT:
+            record.exc_info = None
+        if held_back:
+            record.msg = f"{record.msg} ({held_back} more since the last time)"
+        return True
+
+
 def set_up(log_format: str) -> None:
     """Send the log to standard error in this format."""
     handler = logging.StreamHandler(sys.stderr)
@@ -40,3 +71,4 @@ def set_up(log_format: str) -> None:
     logging.root.setLevel(logging.INFO)
     # Its news (started, waiting, connection open) are ours to tell, once.
     logging.getLogger("uvicorn").setLevel(logging.WARNING)
+    logging.getLogger("uvicorn.error").addFilter(OnceInAWhile())

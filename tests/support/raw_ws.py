@@ -1,0 +1,90 @@
+"""A WebSocket client that can say what no proper client would: bytes in, bytes out."""
+
+from __future__ import annotations
+
+import random
+import socket
+import struct
+from collections.abc import Iterator
+from contextlib import suppress
+from types import TracebackType
+from typing import Self
+from urllib.parse import urlsplit
+
+from tests.support.waiting import PATIENCE_S
+
+CONT, TEXT, BINARY, CLOSE, PING, PONG = 0x0, 0x1, 0x2, 0x8, 0x9, 0xA
+
+
+def masked(opcode: int, payload: bytes, *, fin: bool = True, rsv: int = 0) -> bytes:
+    """A client's frame (RFC 6455, section 5.2), masked with zeros, which changes nothing."""
+    length = len(payload)
+    if length < 126:
+        size = bytes([0x80 | length])
+    elif length < 65_536:
+        size = b"\xfe" + struct.pack("!H", length)
+    else:
+        size = b"\xff" + struct.pack("!Q", length)
+    return bytes([fin << 7 | rsv << 4 | opcode]) + size + bytes(4) + payload
+
+
+def frames_of(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """(opcode, payload) of a server's frames; an unfinished one at the end is left out."""
+    start = 0
+    while len(data) - start >= 2:
+        length = data[start + 1]
+        header = 2 if length < 126 else 4 if length == 126 else 10
+        if header > 2:
+            length = int.from_bytes(data[start + 2 : start + header])
+        end = start + header + length
+        if end > len(data):
+            return
+        yield data[start] & 0x0F, data[start + header : end]
+        start = end
+
+
+class RawClient:
+    """A connection after its handshake."""
+
+    def __init__(self, url: str, path: str) -> None:
+        address = urlsplit(url)
+        assert address.hostname is not None
+        self.socket = socket.create_connection((address.hostname, address.port), PATIENCE_S)
+        self.socket.sendall(
+            f"GET {path} HTTP/1.1\r\nHost: {address.netloc}\r\nUpgrade: websocket\r\n"
+            "Connection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+            "Sec-WebSocket-Version: 13\r\n\r\n".encode()
+        )
+        self.received = b""
+        while b"\r\n\r\n" not in self.received:
+            self.received += self.socket.recv(65_536)
+        head, _, self.received = self.received.partition(b"\r\n\r\n")
+        assert head.startswith(b"HTTP/1.1 101 "), head
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        _type: type[BaseException] | None,
+        _error: BaseException | None,
+        _trace: TracebackType | None,
+    ) -> None:
+        self.socket.close()
+
+    def say(self, data: bytes) -> list[tuple[int, bytes]]:
+        """Say this and no more, and return all frames up to the end of the connection."""
+        blocks = [self.received]
+        # An error: the server had enough, and reset the connection before it had read all.
+        with suppress(OSError):
+            self.socket.sendall(data)
+            self.socket.shutdown(socket.SHUT_WR)
+        with suppress(ConnectionError):
+            while block := self.socket.recv(1 << 18):
+                blocks.append(block)
+        return list(frames_of(b"".join(blocks)))
+
+
+def random_payload(chance: random.Random, longest: int) -> bytes:
+    """Some bytes; short ones more often."""
+    return chance.randbytes(int(longest * chance.random() ** 4))

@@ -779,7 +779,7 @@ export interface operations {
             readonly query: {
                 /** @description name of a sensor, as in a reading */
                 readonly sensor_type: string;
-                /** @description m, side of a square cell; greater than 0 */
+                /** @description m, side of a square cell */
                 readonly resolution?: number;
                 /** @description m, map frame; without a box: all pinned tags and their reach */
                 readonly bbox_min_x?: number;
@@ -868,7 +868,7 @@ export interface operations {
             readonly query: {
                 /** @description name of a sensor, as in a reading */
                 readonly sensor_type: string;
-                /** @description m, side of a square cell; greater than 0 */
+                /** @description m, side of a square cell */
                 readonly resolution?: number;
                 /** @description m, map frame; without a box: all pinned tags and their reach */
                 readonly bbox_min_x?: number;
@@ -946,7 +946,7 @@ export interface operations {
             readonly query: {
                 /** @description name of a sensor, as in a reading */
                 readonly sensor_type: string;
-                /** @description m, side of a square cell; greater than 0 */
+                /** @description m, side of a square cell */
                 readonly resolution?: number;
                 /** @description m, map frame; without a box: all pinned tags and their reach */
                 readonly bbox_min_x?: number;
@@ -1024,7 +1024,7 @@ export interface operations {
             readonly query: {
                 /** @description name of a sensor, as in a reading */
                 readonly sensor_type: string;
-                /** @description m, side of a square cell; greater than 0 */
+                /** @description m, side of a square cell */
                 readonly resolution?: number;
                 /** @description m, map frame; without a box: all pinned tags and their reach */
                 readonly bbox_min_x?: number;
@@ -1102,7 +1102,7 @@ export interface operations {
             readonly query: {
                 /** @description name of a sensor, as in a reading */
                 readonly sensor_type: string;
-                /** @description m, side of a square cell; greater than 0 */
+                /** @description m, side of a square cell */
                 readonly resolution?: number;
                 /** @description m, map frame; without a box: all pinned tags and their reach */
                 readonly bbox_min_x?: number;

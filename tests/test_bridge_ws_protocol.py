@@ -21,6 +21,7 @@ from tests.support.web import bridge, deaf_client, overfill
 # Silent by itself: every frame is one that the test has caused, or a heartbeat of the bridge.
 SILENT = ("--ros-args", "-p", "state_publish_rate_hz:=0.01")
 BLOCK = 65_536
+SMALL_FRAME = b"x" * 1_000
 
 
 def read_all(client: socket.socket, until: Any) -> list[Frame]:
@@ -92,8 +93,10 @@ def test_a_socket_that_is_free_again_says_so_by_itself(domain: int) -> None:
                 freed: list[bool] = []
                 connection.on_writable = lambda: freed.append(connection.can_take)
                 while connection.can_take:
-                    connection.write(b"x" * BLOCK)
+                    connection.write(SMALL_FRAME)
                 taken = [connection.can_take]
+                queued = connection.transport.get_write_buffer_size()
+                assert 0 < queued <= len(SMALL_FRAME), "of what the socket does not take, one frame"
                 await asyncio.to_thread(drain, slow, freed)
                 assert (taken, freed[0]) == ([False], True)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from urllib.parse import urlsplit
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect
@@ -122,3 +123,16 @@ def test_over_tls_the_cookie_is_secure(
         (cookie,) = context.cookies()
         assert cookie["secure"]
         assert page.evaluate("isSecureContext")
+
+
+def test_a_page_whose_session_has_ended_leaves_for_the_sign_in(page: Page) -> None:
+    """Its next connection is refused, which a WebSocket does not tell a page."""
+    with served(LUPIN_TOKEN=TOKEN) as first:
+        page.goto(first.url + "/signin")
+        sign_in(page, TOKEN)
+        expect_live(page)
+        page.context.clear_cookies()
+        port = str(urlsplit(first.url).port)
+    with served("--port", port, LUPIN_TOKEN=TOKEN) as second:
+        assert second.url == first.url
+        expect(page).to_have_url(second.url + "/signin")

@@ -28,6 +28,7 @@ class FakeSocket {
 let link: Link;
 let frames: Frame[];
 let phases: Phase[];
+let refusals: number;
 const socket = (index: number): FakeSocket => {
   const made = FakeSocket.made.at(index);
   if (!made) throw new Error(`no socket ${index}`);
@@ -40,12 +41,14 @@ beforeEach(() => {
   FakeSocket.made.length = 0;
   frames = [];
   phases = [];
+  refusals = 0;
   link = connect('ws://test/ws/state', {
     onConnection: (connection: Connection) => {
       const phase = phaseOf(connection, performance.now());
       if (phases.at(-1) !== phase) phases.push(phase);
     },
     onFrame: (frame) => frames.push(frame),
+    onRefused: () => (refusals += 1),
   });
 });
 
@@ -65,6 +68,15 @@ describe('socket shell', () => {
     expect(phases.at(-1)).toBe('reconnecting');
     expect(FakeSocket.made.length).toBeGreaterThan(1);
     expect(socket(0).closed).toBe(true);
+  });
+
+  test('only a socket that never opened was refused', () => {
+    socket(0).onclose?.({ code: 1006 });
+    expect(refusals).toBe(1);
+    vi.advanceTimersByTime(30_000);
+    socket(-1).onopen?.();
+    socket(-1).onclose?.({ code: 1006 });
+    expect(refusals).toBe(1);
   });
 
   test('a dropped socket is not heard any more', () => {

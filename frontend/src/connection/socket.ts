@@ -6,6 +6,8 @@ export interface ConnectionHandlers {
   /** The connection changed, or a deadline passed and its phase may have. */
   readonly onConnection: (connection: Connection) => void;
   readonly onFrame: (frame: Frame, connection: Connection) => void;
+  /** A socket closed that never opened: the server is away, or it wants to know who is there. */
+  readonly onRefused: () => void;
 }
 
 export interface Link {
@@ -45,13 +47,16 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
   };
 
   const open = (): void => {
+    let isOpened = false;
     socket = new WebSocket(url);
     socket.onopen = () => {
+      isOpened = true;
       send({ type: 'opened', now: performance.now() });
     };
     socket.onclose = ({ code }) => {
       socket = null;
       send({ type: 'closed', now: performance.now(), code, random: Math.random() });
+      if (!isOpened) handlers.onRefused();
     };
     socket.onmessage = ({ data }) => {
       const frame = typeof data === 'string' ? parseFrame(data) : null;

@@ -1,5 +1,6 @@
 /** The page's one connection, and what its frames do to the store. */
 import { latestAfter, type Latest } from '../connection/latest';
+import { signInIfAsked } from '../connection/session';
 import { connect } from '../connection/socket';
 import { stateSocketUrl } from '../contract/api';
 import { receive } from './app';
@@ -41,6 +42,7 @@ export function startLive(): () => void {
     onConnection: (connection) => {
       receive({ type: 'connection', connection, now: performance.now() });
     },
+    onRefused: () => void signInIfAsked(),
     onFrame: (frame, connection) => {
       if (frame.type === 'status') return;
       const isFirst = connection.epoch !== greeted;

@@ -197,7 +197,14 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 )
                 return
             try:
-                callback(deserialize_message(data, message_type))
+                message = deserialize_message(data, message_type)
+            except Exception as error:  # noqa: BLE001  # rclpy raises several kinds
+                self._say(
+                    ("unreadable", topic), f"dropped an unreadable message on {topic}: {error}"
+                )
+                return
+            try:
+                callback(message)
             except Exception as error:  # noqa: BLE001  # one bad message must not end the node
                 self.report(topic, error)
 

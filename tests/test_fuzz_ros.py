@@ -1,0 +1,237 @@
+"""Hostile ROS messages over DDS: a twin with its bridge, and a bridge apart, go on as before.
+
+After each lot the state is still served and valid, by both bridges, and no field ends in an error.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from lupin_msgs.msg import SensorReading, TwinState
+
+from lupin_bridge import schema
+from lupin_twin.state import MAX_BLOOMS_PER_TAG, MAX_SENSORS_PER_TAG, MAX_TAGS, MAX_TEXT_LENGTH
+from tests.support.domains import own_domain
+from tests.support.hostile import (
+    ANY,
+    MEGABYTE,
+    NAN,
+    TEXTS,
+    any_state,
+    damaged,
+)
+from tests.support.live import attached, wait_until_ready
+from tests.support.messages import discovered, look, pose, scan
+from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
+from tests.support.processes import lupin_twin
+from tests.support.ros import Peer
+from tests.support.waiting import wait_for
+from tests.support.web import Bridge, bridge
+
+# Of the twin, at any time, for all that is sent here: what is kept of it is bounded tag by tag.
+MEMORY_MB = 150.0
+NO_LIMITS = ("--field-rate-hz", "10000")
+# So that the bridge apart has not to be waited for.
+OFTEN = ("-p", "state_publish_rate_hz:=20.0")
+# A topic holds 50 messages; a lot that was waited for has lost none.
+LOT = 40
+LOTS = 25
+
+
+@pytest.fixture(scope="module")
+def both() -> Iterator[tuple[Bridge, Bridge]]:
+    """`serve` with the twin, and a `web` that hears of it all over `/twin/state`."""
+    with (
+        own_domain() as domain,
+        bridge(*NO_LIMITS, "--ros-args", *OFTEN, domain=domain) as twin,
+        lupin_twin(domain, "web", *NO_LIMITS) as process,
+        attached(process, twin.peer) as apart,
+    ):
+        twin.peer.observe(scan("first", {"co2": 400.0}, (0, 0)))
+        for live in (twin, apart):
+            wait_until_ready(live)
+            live.tag("first")
+        yield twin, apart
+
+
+_marks = iter(range(1_000_000))
+
+
+def survive(both: tuple[Bridge, Bridge], hostile: Callable[[Peer], object]) -> None:
+    """Both bridges serve valid states and fields after what `hostile` publishes."""
+    twin, _ = both
+    memory = resident_mb(twin.process.pid)
+    reset_peak(twin.process.pid)
+    hostile(twin.peer)
+    mark = f"mark {next(_marks)}"
+    twin.peer.observe(scan(mark, {"co2": 500.0}, (1, 1)))
+    for live in both:
+        live.tag(mark)
+        check(live)
+    assert peak_mb(twin.process.pid) - memory < MEMORY_MB
+
+
+def check(live: Bridge) -> None:
+    """All that the bridge serves is of the contract's types."""
+    answer = live.get("/api/state")
+    assert answer.status_code == 200
+    state = schema.TwinState.model_validate(json.loads(answer.content, parse_constant=refuse))
+    for tag in state.tags:
+        assert len(tag.readings) <= MAX_SENSORS_PER_TAG
+        assert len(tag.flowers) <= MAX_BLOOMS_PER_TAG
+        assert 0 < len(tag.tag_id) <= MAX_TEXT_LENGTH
+    for sensor in ("co2", "nan", TEXTS[5]):
+        # Where the tags are 1e300 m apart there is no grid, and it is said; else there is one.
+        assert live.get("/api/field", sensor_type=sensor).status_code in (200, 400)
+        box: dict[str, Any] = {"bbox_min_x": 0, "bbox_min_y": 0, "bbox_max_x": 2, "bbox_max_y": 2}
+        assert live.get("/api/field", sensor_type=sensor, **box).status_code == 200
+    assert live.get("/api/map").status_code in (200, 404)
+    assert live.get("/api/map.png").status_code in (200, 404)
+    health = live.json("/healthz")
+    assert (health["ok"], health["callback_errors"]) == (True, 0)
+
+
+def refuse(constant: str) -> None:
+    raise AssertionError(f"{constant} is no JSON")
+
+
+def many_readings(count: int, name: str) -> Any:
+    msg = scan("many readings")
+    msg.tag_reading.readings = [SensorReading(name=name, value=1.0) for _ in range(count)]
+    return msg
+
+
+def different_readings(count: int) -> Any:
+    return scan("different readings", {f"s{n}": 1.0 for n in range(count)})
+
+
+def of_a_megabyte(where: str) -> Any:
+    if where == "tag_id":
+        return scan(MEGABYTE, {"co2": 1.0})
+    if where == "reading":
+        return scan("megabyte", {MEGABYTE: 1.0})
+    if where == "species":
+        return look("megabyte", species=MEGABYTE)
+    msg = scan("megabyte")
+    setattr(msg, where, MEGABYTE)
+    return msg
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        pytest.param(lambda: many_readings(100_000, ""), id="100,000 readings"),
+        pytest.param(lambda: many_readings(40_000, "same"), id="40,000 readings of one name"),
+        pytest.param(lambda: different_readings(MAX_SENSORS_PER_TAG + 1), id="65 sensors"),
+        *(
+            pytest.param(lambda where=where: of_a_megabyte(where), id=f"a megabyte of {where}")
+            for where in ("tag_id", "reading", "species", "status_detail", "mission_id")
+        ),
+        pytest.param(lambda: look("blooms", blooms=[(0, 0)] * 20_000), id="20,000 flowers"),
+        pytest.param(lambda: look("outline", footprint=[(0, 0)] * 5_000), id="5,000 corners"),
+        pytest.param(lambda: scan("", {"co2": 1.0}), id="no tag_id"),
+        pytest.param(lambda: scan("far", {"co2": 1.0}, (1e300, -1e300)), id="10^300 m away"),
+        pytest.param(lambda: scan("nan", {"co2": NAN, "": NAN}, (NAN, 0)), id="no numbers"),
+    ],
+)
+def test_an_observation_past_every_bound_is_survived(
+    both: tuple[Bridge, Bridge], message: Callable[[], Any]
+) -> None:
+    survive(both, lambda peer: peer.observe(message()))
+
+
+def test_a_discovery_of_more_tags_than_there_can_be_is_survived(
+    both: tuple[Bridge, Bridge],
+) -> None:
+    # As a lot, and as one message that is too large: 30,000 tags of long names have 11 MB.
+    survive(both, lambda peer: peer.discover(discovered({"": pose(), "twice": pose(NAN)})))
+    too_large = {f"{number}-{'x' * 250}": pose() for number in range(MAX_TAGS + 10_000)}
+    survive(both, lambda peer: peer.discover(discovered(too_large)))
+    assert len(both[0].json("/api/state")["tags"]) < 100
+
+
+@pytest.mark.parametrize("topic", ANY)
+def test_anything_at_all_is_survived(both: tuple[Bridge, Bridge], topic: str) -> None:
+    chance = random.Random(topic)
+    for _ in range(LOTS):
+        lot = [ANY[topic](chance) for _ in range(LOT)]
+        survive(both, lambda peer, lot=lot: [peer.publish(topic, message) for message in lot])  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("topic", ANY)
+def test_bytes_that_are_no_message_are_survived(both: tuple[Bridge, Bridge], topic: str) -> None:
+    chance = random.Random(topic)
+
+    def publish(peer: Peer) -> None:
+        whole = ANY[topic](chance)
+        publisher = peer.publisher(topic, type(whole))
+        for _ in range(LOT):
+            publisher.publish(damaged(ANY[topic](chance), chance))
+
+    for _ in range(LOTS):
+        survive(both, publish)
+
+
+def test_requests_for_fields_of_any_numbers_are_answered(both: tuple[Bridge, Bridge]) -> None:
+    chance = random.Random(3)
+    numbers = (NAN, float("inf"), -1.0, 0.0, 1e-45, 0.1, 3e38, -3e38)
+    names = ("resolution", "bbox_min_x", "bbox_min_y", "bbox_max_x", "bbox_max_y")
+
+    def ask(peer: Peer) -> None:
+        for _ in range(LOT):
+            answer = peer.get_field(
+                sensor_type=chance.choice((*TEXTS, MEGABYTE)),
+                **{name: chance.choice(numbers) for name in names},
+            )
+            assert answer.ok or answer.error_message
+
+    survive(both, ask)
+
+
+def test_a_bridge_apart_survives_a_twin_that_is_none() -> None:
+    chance = random.Random(11)
+    with (
+        own_domain() as domain,
+        lupin_twin(domain, "web") as process,
+        Peer(domain) as peer,
+        attached(process, peer) as live,
+    ):
+        topic = "/twin/state"
+        peer.until(lambda: peer.node.count_subscribers(topic), "the bridge")
+        memory = None
+        for number in range(LOTS * LOT):
+            state = any_state(chance)
+            if number % 2:
+                peer.publisher(topic, TwinState, depth=1).publish(damaged(state, chance))
+            else:
+                peer.publish(topic, state, depth=1)
+            if number % LOT == LOT - 1:
+                sane = TwinState()
+                sane.header.stamp.sec = number
+                peer.publish(topic, sane, depth=1)
+                wait_for(lambda number=number: has_stamp(live, number), "the sane state")  # type: ignore[misc]
+                if memory is None:
+                    memory = resident_mb(process.pid)
+                    reset_peak(process.pid)
+        assert memory is not None
+        assert peak_mb(process.pid) - memory < MEMORY_MB
+        assert live.json("/healthz")["ok"]
+
+
+def has_stamp(live: Bridge, seconds: int) -> bool:
+    answer = live.get("/api/state")
+    if answer.status_code != 200:
+        return False
+    state = json.loads(answer.content, parse_constant=refuse)
+    schema.TwinState.model_validate(state)
+    return bool(state["header"]["stamp"]["sec"] == seconds)
+
+
+def test_the_log_of_it_all_is_short(both: tuple[Bridge, Bridge]) -> None:
+    for live in both:
+        assert "Traceback" not in live.process.output
+        assert live.process.output.count("\n") < 500

@@ -93,7 +93,7 @@ class Hmi:
         noise = [
             line for line in self.console if not any(re.search(p, line) for p in self.allowed_noise)
         ]
-        assert noise == []
+        assert not noise, "the console says:\n" + "\n".join(noise)
         assert self.dialogs == []
         own = urlsplit(self.url).netloc
         assert [

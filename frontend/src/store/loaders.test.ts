@@ -127,12 +127,13 @@ describe('loaders', () => {
     expect(store.get().twin.field).toMatchObject({ state: 'failed', message: 'resolution is 0' });
   });
 
-  test('without a connection nothing is fetched', async () => {
+  test('without a connection nothing is fetched, nor what had failed tried again', async () => {
     showTags(tags);
     await settle();
+    expect(store.get().twin.map.state).toBe('failed');
     goLost();
     asked.length = 0;
     await vi.advanceTimersByTimeAsync(60_000);
-    expect(count('field.npy')).toBe(0);
+    expect(asked).toEqual([]);
   });
 });

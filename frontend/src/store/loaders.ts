@@ -65,8 +65,12 @@ export function startLoaders(): () => void {
       receive({ type: 'field', field: NOTHING });
       receive({ type: 'quality', quality: null });
     }
-    if (base === null) return;
     field.want(wanted);
+    if (base === null) {
+      map.want(null);
+      quality.want(null);
+      return;
+    }
     if (state.twin.map.value && !status?.has_map) receive({ type: 'map', map: NOTHING });
     map.want(status?.has_map ? { key: base, group: 'map', run: loadMap } : null);
     quality.want(
@@ -91,10 +95,11 @@ export function startLoaders(): () => void {
 
 /**
  * Changes with the revision, and with each connection: another server may sit behind it. Null
- * until the bridge has said on this connection what there is to ask for.
+ * while there is none, and until the bridge has said on it what there is to ask for.
  */
 function baseKey({ twin: { snapshot, connection } }: AppState): string | null {
-  return snapshot && connection.status ? `${connection.epoch}|${snapshot.revision}` : null;
+  const { epoch, socket, status } = connection;
+  return snapshot && status && socket.kind === 'open' ? `${epoch}|${snapshot.revision}` : null;
 }
 
 function fieldTask(base: string, sensor: string, snapshot: Snapshot | null): Task<Field> | null {

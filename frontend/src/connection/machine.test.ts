@@ -154,6 +154,16 @@ describe('attempts', () => {
     expect(step(lost, { type: 'wake', now: 101 }).command).toBe('reopen');
   });
 
+  test('a network that returns starts an attempt anew that began without it', () => {
+    const { connection } = run({ type: 'start', now: 0 });
+    expect(step(connection, { type: 'wake', now: 5 }).command).toBeNull();
+    expect(step(connection, { type: 'online', now: 5 }).command).toBe('reopen');
+    expect(step(live, { type: 'online', now: 500 }).command).toBeNull();
+    expect(step(step(live, closed(100)).connection, { type: 'online', now: 101 }).command).toBe(
+      'reopen',
+    );
+  });
+
   test('waking up leaves a living connection alone, and replaces a silent one', () => {
     expect(step(live, { type: 'wake', now: 500 }).command).toBeNull();
     expect(step(live, { type: 'wake', now: 25 + SILENCE_MS }).command).toBe('reopen');

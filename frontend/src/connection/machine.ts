@@ -53,8 +53,10 @@ export type ConnectionEvent =
     }
   /** What came cannot be used: the two sides have lost each other. */
   | { readonly type: 'broken'; readonly now: number; readonly random: number }
-  /** The tab became visible or the network returned. */
+  /** The tab became visible, or the operator does not want to wait. */
   | { readonly type: 'wake'; readonly now: number }
+  /** The network returned: an attempt that is under way began without it. */
+  | { readonly type: 'online'; readonly now: number }
   /** A deadline of `nextDeadline` may have passed. */
   | { readonly type: 'tick'; readonly now: number; readonly random: number };
 
@@ -105,6 +107,10 @@ export function step(connection: Connection, event: ConnectionEvent): Step {
       return socket.kind === 'open'
         ? { connection: fail(connection, now, null, event.random), command: 'drop' }
         : stay(connection);
+    case 'online':
+      return socket.kind === 'opening'
+        ? open(connection, now)
+        : step(connection, { type: 'wake', now });
     case 'wake':
       if (socket.kind === 'closed') return open(connection, now);
       // After a sleep the socket often looks open and is not.

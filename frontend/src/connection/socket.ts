@@ -76,15 +76,18 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
   const wake = (): void => {
     if (document.visibilityState === 'visible') retry();
   };
+  const online = (): void => {
+    send({ type: 'online', now: performance.now() });
+  };
   document.addEventListener('visibilitychange', wake);
-  window.addEventListener('online', wake);
+  window.addEventListener('online', online);
   window.addEventListener('pageshow', wake);
 
   send({ type: 'start', now: performance.now() });
 
   const stop = (): void => {
     document.removeEventListener('visibilitychange', wake);
-    window.removeEventListener('online', wake);
+    window.removeEventListener('online', online);
     window.removeEventListener('pageshow', wake);
     clearTimeout(timer);
     drop();

@@ -10,7 +10,7 @@ from typing import Final
 # What the page's clock runs in one go.
 STEP_S: Final = 60
 
-# 29 tags; ten frames a second, of which every third brings an observation, as deltas. Now and
+# 29 tags; ten frames a second, of which every tenth brings an observation, as deltas. Now and
 # then a pest, a new species, a broken sensor, and every quarter of an hour a lost connection.
 NETWORK: Final = """
 window.network = { frames: 0, fetches: 0 };
@@ -74,7 +74,7 @@ window.network = { frames: 0, fetches: 0 };
         return;
       }
       const changed = [];
-      if (this.age % 3 === 0) {
+      if (this.age % 10 === 0) {
         const index = ++observations % tags.length;
         tags[index] = tag(index);
         changed.push(tags[index]);

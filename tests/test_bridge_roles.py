@@ -17,7 +17,6 @@ from tests.support.web import bridge, listener, tag_ids
 
 ROLES = ["serve", "demo", "web"]
 ALL_TAGS = 29
-END_S = 2.0
 
 
 # --- what is wrong is said in one line ------------------------------------------------------------
@@ -89,7 +88,7 @@ def test_the_role_web_shows_a_twin_elsewhere(domain: int) -> None:
 def test_the_web_role_ends_at_once_and_quietly(domain: int, number: signal.Signals) -> None:
     with lupin_twin(domain, "web") as process:
         url_of(process)
-        assert process.stop(number, timeout_s=END_S) == 0
+        assert process.stop(number) == 0
         assert "Traceback" not in process.output
 
 
@@ -113,7 +112,10 @@ def is_running(pid: int) -> bool:
 
 
 def test_the_demo_shows_the_whole_greenhouse_and_ends_with_its_patrol(domain: int) -> None:
-    with lupin_twin(domain, "demo") as demo, listener(url_of(demo)) as screen:
+    with (
+        lupin_twin(domain, "demo", "--speed", "10", "--seed", "3") as demo,
+        listener(url_of(demo)) as screen,
+    ):
         (patrol,) = wait_for(lambda: children_of(demo.pid), "the patrol")
         ids: set[str] = set()
 
@@ -123,9 +125,9 @@ def test_the_demo_shows_the_whole_greenhouse_and_ends_with_its_patrol(domain: in
                 ids.update(tag_ids(frame["state"]))
             return len(ids) == ALL_TAGS
 
-        wait_for(look, f"all {ALL_TAGS} tags", 100.0, meanwhile=lambda: None)
+        wait_for(look, f"all {ALL_TAGS} tags", meanwhile=lambda: None)
         assert is_running(patrol)
-        assert demo.stop(signal.SIGINT, timeout_s=END_S) == 0
+        assert demo.stop(signal.SIGINT) == 0
         assert not is_running(patrol)
         assert "Traceback" not in demo.output
 
@@ -148,3 +150,11 @@ def test_ipv6_is_served_too(domain: int) -> None:
         with socket.create_connection(("::1", port)) as client:
             client.sendall(b"GET /healthz HTTP/1.1\r\nHost: [::1]\r\nConnection: close\r\n\r\n")
             assert client.recv(12) == b"HTTP/1.1 200"
+
+
+def test_a_patrol_that_ends_by_itself_is_told(domain: int) -> None:
+    with lupin_twin(domain, "demo", "--speed", "0") as demo:
+        url_of(demo)
+        demo.wait_for_output("the patrol has ended with code 2")
+        assert "argument --speed" in demo.output
+        assert demo.stop() == 0

@@ -31,7 +31,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         from lupin_bridge.roles import run  # noqa: PLC0415  # see above
 
         # Taken out of the environment: the processes that we start have no use for it.
-        run(options.role, settings, os.environ.pop("LUPIN_TOKEN", None), ros_args)
+        token = os.environ.pop("LUPIN_TOKEN", None)
+        run(options.role, settings, token, ros_args, _patrol_args(options))
     except SettingError as error:
         _fail(str(error))
     return 0
@@ -58,6 +59,18 @@ ROLES = {
     "demo": "serve, plus a simulated patrol in a second process",
     "web": "the bridge alone, for a twin elsewhere; as many of these as needed",
 }
+
+
+# Handed on to the patrol as they are: it checks them.
+PATROL_OPTIONS = {
+    "speed": "how fast the patrol goes, patrol seconds a second (default: 1)",
+    "seed": "another seed, another patrol (default: 0)",
+}
+
+
+def _patrol_args(options: argparse.Namespace) -> list[str]:
+    given = {name: getattr(options, name, None) for name in PATROL_OPTIONS}
+    return [f"--{name}={value}" for name, value in given.items() if value is not None]
 
 
 def _settings_from(options: argparse.Namespace) -> Settings:
@@ -90,7 +103,12 @@ def _parser() -> argparse.ArgumentParser:
         )
     for role, text in ROLES.items():
         # No abbreviations: what one means would change with the next setting.
-        roles.add_parser(role, parents=[common], help=text, description=text, allow_abbrev=False)
+        own = roles.add_parser(
+            role, parents=[common], help=text, description=text, allow_abbrev=False
+        )
+        if role == "demo":
+            for name, help_text in PATROL_OPTIONS.items():
+                own.add_argument(f"--{name}", metavar=name.upper(), help=help_text)
     return parser
 
 

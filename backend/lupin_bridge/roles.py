@@ -26,8 +26,16 @@ log = logging.getLogger("lupin_bridge")
 PATROL_STOP_S = 1.5
 
 
-def run(role: str, settings: Settings, token: str | None, ros_args: Sequence[str]) -> None:
+def run(
+    role: str,
+    settings: Settings,
+    token: str | None,
+    ros_args: Sequence[str],
+    patrol_args: Sequence[str] = (),
+) -> None:
     """Run a role until a signal ends it; `token` is what clients have to know, if anything.
+
+    `patrol_args` are the options of the patrol, in the role `demo`.
 
     Raises:
         SettingError: a setting, a parameter or an argument of ROS with which it cannot run.
@@ -37,12 +45,18 @@ def run(role: str, settings: Settings, token: str | None, ros_args: Sequence[str
     if settings.tls_cert:
         check_pair(settings.tls_cert, settings.tls_key)
     try:
-        asyncio.run(_run(role, settings, access, ros_args))
+        asyncio.run(_run(role, settings, access, ros_args, patrol_args))
     except (ParameterError, RosStartError) as error:
         raise SettingError(str(error)) from error
 
 
-async def _run(role: str, settings: Settings, access: Access, ros_args: Sequence[str]) -> None:
+async def _run(
+    role: str,
+    settings: Settings,
+    access: Access,
+    ros_args: Sequence[str],
+    patrol_args: Sequence[str],
+) -> None:
     try:
         listener = listen(settings.host, settings.port)
     except OSError as error:
@@ -56,7 +70,7 @@ async def _run(role: str, settings: Settings, access: Access, ros_args: Sequence
     bridge = Bridge(source, settings)
     server = BridgeServer(create_app(bridge, access=access), bridge)
     await bridge.start()
-    patrol = _start_patrol() if role == "demo" else None
+    patrol = Patrol(patrol_args) if role == "demo" else None
     url = address_of(listener, "https" if access.secure else "http")
     print(f"lupin-twin: {url}", flush=True)  # noqa: T201  # for people and scripts
     try:
@@ -66,7 +80,7 @@ async def _run(role: str, settings: Settings, access: Access, ros_args: Sequence
             patrol.terminate()
         await bridge.stop()
         if patrol is not None:
-            await asyncio.to_thread(_wait_or_kill, patrol)
+            await patrol.wait()
 
 
 def _warn_of_exposure(listener: socket.socket, access: Access) -> None:
@@ -78,14 +92,31 @@ def _warn_of_exposure(listener: socket.socket, access: Access) -> None:
         log.warning("%s", warning)
 
 
-def _start_patrol() -> subprocess.Popen[bytes]:
-    # The environment goes along whole: the ROS wheels' own variables only work together.
-    return subprocess.Popen([sys.executable, "-m", "lupin_patrol", "--end-with-parent"])
+class Patrol:
+    """The simulated robot, in a process of its own so that its data crosses DDS."""
 
+    def __init__(self, options: Sequence[str]) -> None:
+        # The environment goes along whole: the ROS wheels' own variables only work together.
+        self._process = subprocess.Popen(  # noqa: S603  # the operator's own words, no shell
+            [sys.executable, "-m", "lupin_patrol", "--end-with-parent", *options]
+        )
+        self._is_stopping = False
+        self._watch = asyncio.create_task(asyncio.to_thread(self._tell_the_end))
 
-def _wait_or_kill(patrol: subprocess.Popen[bytes]) -> None:
-    try:
-        patrol.wait(PATROL_STOP_S)
-    except subprocess.TimeoutExpired:
-        patrol.kill()
-        patrol.wait()
+    def terminate(self) -> None:
+        """Ask it to end."""
+        self._is_stopping = True
+        self._process.terminate()
+
+    async def wait(self) -> None:
+        """Wait for its end; kill it if that does not come."""
+        try:
+            await asyncio.wait_for(asyncio.shield(self._watch), PATROL_STOP_S)
+        except TimeoutError:
+            self._process.kill()
+            await self._watch
+
+    def _tell_the_end(self) -> None:
+        code = self._process.wait()
+        if not self._is_stopping:
+            log.error("the patrol has ended with code %d; the twin goes on without it", code)

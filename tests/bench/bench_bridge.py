@@ -133,12 +133,15 @@ def end() -> None:
     """From Ctrl-C to the end of the process, a WebSocket client connected; to stay under 2 s."""
     took = []
     for _ in range(5):
-        with own_domain() as domain, lupin_twin(domain, "serve") as process:
-            with connect(url_of(process).replace("http", "ws") + "/ws/state") as client:
-                client.recv()
-                start = time.perf_counter()
-                process.stop()
-                took.append(time.perf_counter() - start)
+        with (
+            own_domain() as domain,
+            lupin_twin(domain, "serve") as process,
+            connect(url_of(process).replace("http", "ws") + "/ws/state") as client,
+        ):
+            client.recv()
+            start = time.perf_counter()
+            process.stop()
+            took.append(time.perf_counter() - start)
     row("Ctrl-C, one client connected -> the process has ended", took)
 
 

@@ -55,6 +55,8 @@ class HttpConnection(H11Protocol):
     def handle_websocket_upgrade(self, event: Any) -> None:
         """Hand the connection over: it is not ours any more."""
         self._stop_waiting()
+        # Or this object, and all it was parsed with, would live on in the WebSocket's scope.
+        del self.app_state[HTTP_CONNECTION_KEY]
         super().handle_websocket_upgrade(event)
 
     def connection_lost(self, exc: Exception | None) -> None:

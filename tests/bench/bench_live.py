@@ -31,6 +31,7 @@ from dataclasses import dataclass
 from typing import Any, Self
 from urllib.parse import urlsplit
 
+from tests.bench.live_outages import measure_outages
 from tests.support.domains import own_domain, ros_env
 from tests.support.proc_stat import cpu_s, resident_mb, tcp_buffers_mb
 from tests.support.processes import Process, lupin_twin, url_of
@@ -291,7 +292,10 @@ def main() -> None:
                     print(as_row(measure_load(server, load)), flush=True)
     if options.only is None:
         print()
-        print(measure_stuck(20, 10.0, 3.0) if options.quick else measure_stuck(20, 60.0, 30.0))
+        if options.quick:
+            print(measure_stuck(20, 10.0, 3.0))
+        else:
+            print(measure_stuck(20, 60.0, 30.0), measure_outages(), sep="\n\n")
 
 
 if __name__ == "__main__":

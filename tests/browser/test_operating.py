@@ -316,3 +316,15 @@ def test_single_keys_can_be_switched_off(hmi: Hmi) -> None:
     hmi.page.keyboard.press("n")
     expect(hmi.test_id("tag-card")).to_have_count(0)
     expect(hmi.test_id("legend")).to_contain_text("Temperature")
+
+
+@pytest.mark.parametrize("width", [360, 820, 1280, 1440, 1920])
+def test_no_column_of_the_table_is_out_of_sight(
+    house: Bridge, open_page: OpenPage, width: int
+) -> None:
+    hmi = open_page(house.url, viewport={"width": width, "height": 800})
+    if width == 360:
+        hmi.page.get_by_role("navigation").get_by_role("button", name="Tags").click()
+    expect(hmi.row("1")).to_be_visible()
+    table = hmi.page.locator(".table-scroll")
+    assert table.evaluate("table => table.scrollWidth - table.clientWidth") == 0

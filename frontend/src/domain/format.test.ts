@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest';
 
-import { ageText, metresText, numberText, percentText, readingText } from './format';
+import { ageText, metresText, numberText, percentText, readingText, shortAgeText } from './format';
 import { sensorNamed } from './sensors';
 
 test.each([
@@ -31,6 +31,16 @@ test.each([
   [90_061, '1\u00a0d 1\u00a0h'],
 ])('%d s is %s old', (seconds, text) => {
   expect(ageText(seconds)).toBe(text);
+});
+
+test('a short age is in one unit', () => {
+  expect([59, 3_599, 3_600, 82_740, 90_061].map(shortAgeText)).toEqual([
+    '59\u00a0s',
+    '59\u00a0min',
+    '1\u00a0h',
+    '22\u00a0h',
+    '1\u00a0d',
+  ]);
 });
 
 test('shares and lengths', () => {

@@ -32,6 +32,11 @@ export function ageText(seconds: number): string {
   return `${Math.floor(hours / 24)}\u00a0d ${hours % 24}\u00a0h`;
 }
 
+/** An age in its largest unit alone, for a narrow column. */
+export function shortAgeText(seconds: number): string {
+  return ageText(seconds).replace(/^(\d+\u00a0\w+) .*$/, '$1');
+}
+
 const clock = new Intl.DateTimeFormat('en-GB', {
   hour: '2-digit',
   minute: '2-digit',

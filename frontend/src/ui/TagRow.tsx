@@ -1,7 +1,7 @@
 import { memo, type JSX } from 'react';
 
 import { ageSeconds } from '../domain/age';
-import { ageText, percentText, valueText } from '../domain/format';
+import { ageText, percentText, valueText, shortAgeText } from '../domain/format';
 import { deviation, sideOf, statusOf, type TagHealth } from '../domain/health';
 import type { Sensor } from '../domain/sensors';
 import { shown } from '../domain/text';
@@ -55,7 +55,7 @@ export const TagRow = memo(function TagRow({
         <HealthMark status={health.status} />
       </td>
       <td className="number cell-age">
-        <Age observedAt={tag.observedAt} />
+        <Age observedAt={tag.observedAt} format={shortAgeText} />
       </td>
       {sensors.map((sensor) => (
         <td
@@ -100,10 +100,16 @@ export function PestMark({ count }: { count: number }): JSX.Element {
 }
 
 /** Seconds tick here alone, so that a table of hundreds is not rendered anew each second. */
-export function Age({ observedAt }: { observedAt: number | null }): JSX.Element {
+export function Age({
+  observedAt,
+  format = ageText,
+}: {
+  observedAt: number | null;
+  format?: (seconds: number) => string;
+}): JSX.Element {
   const text = useTicking((now) => {
     const age = ageSeconds(observedAt, now);
-    return age === null ? null : ageText(age);
+    return age === null ? null : format(age);
   });
   return text === null ? (
     <span className="age faint" title={S.neverObservedLong}>

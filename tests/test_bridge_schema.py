@@ -82,6 +82,14 @@ def live() -> Iterator[Bridge]:
         running.tag("full", lambda tag: tag["species"])
         running.tag("discovered")
         running.tag("no pose")
+        # Frames are paced: the one that new listeners get may be a moment older than the state.
+        with running.listen() as listener:
+            listener.until(
+                "state",
+                lambda frame: any(
+                    tag["tag_id"] == "full" and tag["flowers"] for tag in frame["state"]["tags"]
+                ),
+            )
         yield running
 
 

@@ -1,6 +1,7 @@
 import type { JSX } from 'react';
 
 import { MapView } from '../map/MapView';
+import { useApp } from '../store/app';
 import { S } from '../strings';
 import { Legend } from './Legend';
 import { MapControls } from './MapControls';
@@ -9,8 +10,9 @@ import { Readout, ScaleBar } from './Readout';
 import { SensorPicker } from './SensorPicker';
 
 export function MapPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
+  const mapState = useApp((state) => state.twin.map.state);
   return (
-    <section className="map-panel" aria-label={S.mapRegion}>
+    <section className="map-panel" aria-label={S.mapRegion} data-map-state={mapState}>
       <SensorPicker />
       <div className="map-frame">
         <MapView />

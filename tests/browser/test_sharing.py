@@ -23,7 +23,6 @@ OpenPage = Callable[..., Hmi]
 def test_a_link_shows_the_same_view_to_somebody_else(house: Bridge, open_page: OpenPage) -> None:
     mine = open_page(house.url)
     mine.expect_rows(*TAGS)
-    mine.expect_map()
     mine.choose_sensor("Humidity")
     mine.expect_samples(3)
     mine.click_map(3, 3)
@@ -143,7 +142,6 @@ def test_the_map_as_png_is_what_is_on_the_screen(house: Bridge, open_page: OpenP
     for options, ratio in (({}, 1), ({"device_scale_factor": 2, "viewport": PHONE}, 2)):
         hmi = open_page(house.url, "layers=map,field,boxes", **options)
         hmi.expect_samples(3)
-        hmi.expect_map()
         hmi.settled_picture()
         download = save(hmi, "Save map as PNG")
         assert download.suggested_filename.endswith(".png")

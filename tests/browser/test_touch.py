@@ -18,7 +18,8 @@ OpenPage = Callable[..., Hmi]
 def phone(house: Bridge, open_page: OpenPage) -> Hmi:
     hmi = open_page(house.url, viewport=PHONE, has_touch=True, is_mobile=True)
     hmi.expect_samples(3)
-    hmi.expect_map()
+    # The map comes last, and the first view is to show all of it.
+    hmi.settled_picture()
     return hmi
 
 

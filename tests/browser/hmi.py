@@ -146,6 +146,10 @@ class Hmi:
         """Wait for a field that so many tags contribute to."""
         expect(self.test_id("sample-count")).to_have_text(re.compile(rf"^{count} tags? contribut"))
 
+    def expect_map(self) -> None:
+        """Wait for the SLAM map, which is part of what a view of everything shows."""
+        expect(self.page.locator(".map-panel")).to_have_attribute("data-map-state", "ready")
+
     def choose_sensor(self, label: str) -> None:
         self.page.locator(".sensors label", has_text=label).click()
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
 from geometry_msgs.msg import Point, Pose, Quaternion
 from playwright.sync_api import expect
 
@@ -265,3 +266,31 @@ def test_without_a_chosen_view_all_of_it_is_in_sight(domain: int, open_page: Ope
             return all_in_sight() and 0 < x < box["width"] and 0 < y < box["height"]
 
         hmi.expect(later_too, "the late tag in sight")
+
+
+def test_nothing_that_arrives_takes_the_map_out_of_the_operators_hand(
+    domain: int, open_page: OpenPage
+) -> None:
+    with bridge(domain=domain) as running:
+        running.peer.publish_map(floor(6, 6))
+        running.peer.observe(scan("a", {"co2": 1.0}, at=(1, 1)))
+        hmi = open_page(running.url)
+        expect(hmi.row("a")).to_be_visible()
+        hmi.expect_map()
+        start = hmi.view()
+        hmi.point_at(3, 3)
+        hmi.page.mouse.down()
+        box = hmi.map.bounding_box()
+        assert box is not None
+        x, y = start.pixel(3, 3)
+        hmi.page.mouse.move(box["x"] + x + 30, box["y"] + y + 20)
+        # Without a hand on it, the view would grow to show the new tag.
+        running.peer.observe(scan("far", {"co2": 2.0}, at=(20, 20)))
+        expect(hmi.row("far")).to_be_visible()
+        held = hmi.view()
+        assert (held.x - start.x, held.y - start.y) == pytest.approx((30, 20))
+        assert held.scale == start.scale
+        hmi.page.mouse.up()
+        running.peer.observe(scan("later", {"co2": 2.0}, at=(30, 20)))
+        expect(hmi.row("later")).to_be_visible()
+        assert hmi.view() == held

@@ -8,11 +8,13 @@ const bounds = { minX: 0, minY: 0, maxX: 4, maxY: 8 };
 let onView: Mock<(view: View) => void>;
 let onCamera: Mock<(camera: Camera) => void>;
 let camera: MapCamera;
+let element: HTMLElement;
 
 beforeEach(() => {
   onView = vi.fn<(view: View) => void>();
   onCamera = vi.fn<(camera: Camera) => void>();
-  camera = new MapCamera(document.createElement('div'), { onView, onCamera });
+  element = document.createElement('div');
+  camera = new MapCamera(element, { onView, onCamera });
   camera.resize(size);
 });
 
@@ -77,5 +79,32 @@ describe('camera', () => {
     camera.goTo({ x: 2, y: 4, span: 8 }, null);
     camera.show(mapPoint(2, 2), 200);
     expect(toCanvas(camera.view, mapPoint(2, 2)).y).toBeCloseTo(100);
+  });
+
+  const mouse = (target: EventTarget, type: string, x: number): void => {
+    const event = new MouseEvent(type, { clientX: x, clientY: 0, bubbles: true });
+    // Which the constructor does not take: in a test, `window` is a stand-in for jsdom's own.
+    Object.defineProperty(event, 'view', { value: window });
+    target.dispatchEvent(event);
+  };
+
+  test('nothing that arrives takes the map out of the operator’s hand', () => {
+    camera.goTo(null, bounds);
+    const before = camera.view;
+    mouse(element, 'mousedown', 100);
+    mouse(window, 'mousemove', 140);
+    camera.goTo(null, { ...bounds, maxX: 40 });
+    expect(camera.view).toEqual({ ...before, x: before.x + 40 });
+    mouse(window, 'mouseup', 140);
+    expect(onCamera).toHaveBeenCalledTimes(1);
+  });
+
+  test('a click is no choice of a view', () => {
+    camera.goTo(null, bounds);
+    mouse(element, 'mousedown', 100);
+    mouse(window, 'mouseup', 100);
+    expect(onCamera).not.toHaveBeenCalled();
+    camera.goTo(null, { ...bounds, maxX: 40 });
+    expect(onView).toHaveBeenCalledTimes(2);
   });
 });

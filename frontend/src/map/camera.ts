@@ -39,6 +39,8 @@ export class MapCamera {
   #view: View = { x: 0, y: 0, scale: 50 };
   /** A move of the program's own is no choice of the operator's. */
   #programmed = false;
+  /** The view that a gesture under way began with. */
+  #held: View | null = null;
 
   constructor(element: HTMLElement, handlers: CameraHandlers) {
     this.#selection = select<HTMLElement, unknown>(element);
@@ -54,8 +56,15 @@ export class MapCamera {
         this.#view = toView(event.transform);
         handlers.onView(this.#view);
       })
+      .on('start', () => {
+        if (!this.#programmed) this.#held = this.#view;
+      })
       .on('end', () => {
-        if (!this.#programmed) handlers.onCamera(cameraOf(this.#view, this.#size));
+        if (this.#programmed) return;
+        // A click is a gesture too, and moves nothing.
+        const hasMoved = this.#held !== this.#view;
+        this.#held = null;
+        if (hasMoved) handlers.onCamera(cameraOf(this.#view, this.#size));
       });
     this.#selection.call(this.#zoom);
   }
@@ -72,8 +81,12 @@ export class MapCamera {
     this.#size = size;
   }
 
-  /** Shows a camera, or everything within `bounds`. Not told to `onCamera`. */
+  /**
+   * Shows a camera, or everything within `bounds`. Not told to `onCamera`. While the operator has
+   * hold of the map it stays with the operator, whatever else arrives.
+   */
   goTo(camera: Camera | null, bounds: Bounds | null): void {
+    if (this.#held !== null) return;
     if (this.#size.width === 0 || this.#size.height === 0) return;
     const view = camera
       ? viewOf(camera, this.#size)

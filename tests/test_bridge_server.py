@@ -7,21 +7,23 @@ import signal
 import socket
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from itertools import count
 from pathlib import Path
 
+import httpx
 import pytest
 from websockets.exceptions import ConnectionClosed
 
 from lupin_bridge.server import MAX_INBOUND_BYTES, address_of, allow_connections, listen
 from tests.support.inprocess import run, running
+from tests.support.waiting import wait_for
 from tests.support.web import Bridge, Listener, bridge, deaf_client, overfill
 
 MILLION_CELLS = (
     "/api/field?sensor_type=co2&resolution=0.001"
     "&bbox_min_x=0&bbox_min_y=0&bbox_max_x=1&bbox_max_y=1"
 )
-
-# What the contract promises of Ctrl-C and SIGTERM.
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +96,28 @@ def test_a_small_write_leaves_at_once(domain: int) -> None:
             assert client.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY) == 1
 
     run(domain, test())
+
+
+@contextmanager
+def asked_heavily(running_bridge: Bridge) -> Iterator[None]:
+    """One million-cell field after the other is asked for, until the server is gone."""
+    answered = threading.Event()
+
+    def ask() -> None:
+        # Answered, cut off or turned away: that is for the moment of the end to decide.
+        with suppress(httpx.TransportError):
+            for number in count(1):
+                running_bridge.get(f"{MILLION_CELLS}&power={1 + number / 100}")
+                answered.set()
+
+    client = threading.Thread(target=ask)
+    client.start()
+    try:
+        wait_for(answered.is_set, "a first million-cell field")
+        yield
+    finally:
+        running_bridge.process.kill()
+        client.join()
 
 
 def last_words(listener: Listener) -> tuple[str, int]:
@@ -170,10 +194,8 @@ def test_neither_a_client_that_does_not_read_nor_a_heavy_request_holds_up_the_en
         deaf_client(running_bridge.url),
     ):
         overfill(running_bridge, healthy)
-        heavy = threading.Thread(target=lambda: running_bridge.get(MILLION_CELLS))
-        heavy.start()
-        assert running_bridge.process.stop(signal.SIGTERM) == 0
-        heavy.join()
+        with asked_heavily(running_bridge):
+            assert running_bridge.process.stop(signal.SIGTERM) == 0
         assert last_words(healthy) == ("shutting_down", 1012)
         assert "Traceback" not in running_bridge.process.output
         assert "ERROR" not in running_bridge.process.output

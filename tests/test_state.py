@@ -212,6 +212,53 @@ def test_one_tag_too_many_is_refused_and_the_known_ones_go_on(
     assert tag(store, "1").readings[0].value == 2.0
 
 
+def test_what_all_tags_hold_is_bounded_and_what_is_known_goes_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(state, "MAX_ITEMS", 4)
+    bloom = Bloom(0.0, 0.0, 0.0, 0.1, "rose", 0.9, anomaly=False)
+    store = TwinStore()
+    store.record(scan("1", co2=1.0))
+    store.record_flower(look("2", blooms=(bloom, bloom), footprint=((0.0, 0.0, 0.0),)))
+    for one_too_many in (scan("1", light=1.0), scan("3", co2=1.0), look("1", blooms=(bloom,))):
+        with pytest.raises(Rejected, match="of all tags: 5, the limit is 4"):
+            write(store, one_too_many)
+    assert [t.tag_id for t in store.snapshot(0, "map").tags] == ["1", "2"]
+    store.record(scan("1", co2=2.0))
+    assert tag(store, "1").readings[0].value == 2.0
+    store.pin("3", at(1.0))
+    # A look with one flower less makes room for one reading more.
+    store.record_flower(look("2", blooms=(bloom,), footprint=((0.0, 0.0, 0.0),)))
+    store.record(scan("3", co2=3.0))
+    assert tag(store, "3").readings[0].value == 3.0
+
+
+def test_the_histories_of_all_tags_are_bounded_and_the_latest_readings_are_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(state, "MAX_HISTORY_READINGS", 5)
+    store = TwinStore()
+    first, second, third = (scan("1", at_s=i, co2=i, light=i) for i in (1.0, 2.0, 3.0))
+    for each in (first, second):
+        store.record(each)
+    other = scan("2", co2=4.0)
+    store.record(other)
+    store.record(third)
+    assert store.history("1") == (second, third)
+    store.record(scan("3", co2=5.0))
+    assert store.history("3") == ()
+    assert tag(store, "3").readings[0].value == 5.0
+    assert store.history("2") == (other,)
+
+
+def test_a_sensor_that_a_scan_names_many_times_is_kept_once() -> None:
+    store = TwinStore()
+    store.record(Observation("1", S, tuple(Reading("co2", float(i)) for i in range(1_000))))
+    kept = (Reading("co2", 999.0),)
+    assert tag(store, "1").readings == kept
+    assert store.history("1") == (Observation("1", S, kept),)
+
+
 def test_a_snapshot_stays_as_it_was() -> None:
     store = TwinStore()
     store.record(scan("1", co2=1.0))

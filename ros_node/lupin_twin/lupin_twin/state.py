@@ -25,6 +25,11 @@ MAX_SENSORS_PER_TAG = 64
 MAX_TEXT_LENGTH = 256
 MAX_BLOOMS_PER_TAG = 2_000
 MAX_FOOTPRINT_POINTS = 64
+# And on all of it together, for those multiply. What the tags hold now, each reading, flower and
+# footprint point counted: 20,000 tags with ten sensors and forty flowers. What the histories hold:
+# 20,000 tags with three sensors and 32 scans. A reading with its name is some hundred bytes.
+MAX_ITEMS = 1_000_000
+MAX_HISTORY_READINGS = 2_000_000
 
 
 class Rejected(ValueError):
@@ -152,13 +157,16 @@ class Snapshot:
 class TwinStore:
     """The latest of everything, per tag, and a short history of readings.
 
-    `buffer_len` bounds the history: that many scans per tag.
+    `buffer_len` bounds the history: that many scans per tag, and fewer once all tags together have
+    `MAX_HISTORY_READINGS`. What a tag is now is never given up for what others were.
     """
 
     buffer_len: int = 32
     observation_count: int = field(default=0, init=False)
     _tags: dict[str, TagState] = field(default_factory=dict, init=False)
+    _items: int = field(default=0, init=False)
     _history: dict[str, deque[Observation]] = field(default_factory=dict, init=False)
+    _history_readings: int = field(default=0, init=False)
 
     def record(self, observation: Observation) -> None:
         """Keep a scan: its readings (latest per name), its time, its pose if the tag has none.
@@ -178,12 +186,11 @@ class TwinStore:
         brought_something = observation.succeeded or bool(observation.readings)
         if brought_something or tag.last_observed_ns is None:
             tag = replace(tag, last_observed_ns=observation.stamp_ns)
-        self._tags[tag.tag_id] = replace(
-            tag, readings=tuple(readings.values()), pose=tag.pose or observation.pose
+        self._keep(
+            replace(tag, readings=tuple(readings.values()), pose=tag.pose or observation.pose)
         )
         if observation.readings:
-            history = self._history.setdefault(tag.tag_id, deque(maxlen=self.buffer_len))
-            history.append(observation)
+            self._remember(observation)
         self.observation_count += 1
 
     def record_flower(self, observation: FlowerObservation) -> None:
@@ -198,11 +205,13 @@ class TwinStore:
         check_length("flowers of a tag", len(flower.blooms), MAX_BLOOMS_PER_TAG)
         check_length("box_footprint points", len(flower.footprint), MAX_FOOTPRINT_POINTS)
         tag = self._tag(observation.tag_id)
-        self._tags[tag.tag_id] = replace(
-            tag,
-            flower=flower,
-            last_observed_ns=observation.stamp_ns,
-            pose=tag.pose or observation.pose,
+        self._keep(
+            replace(
+                tag,
+                flower=flower,
+                last_observed_ns=observation.stamp_ns,
+                pose=tag.pose or observation.pose,
+            )
         )
         self.observation_count += 1
 
@@ -220,7 +229,7 @@ class TwinStore:
         tag = self._tag(tag_id)
         if tag.pose is not None:
             return False
-        self._tags[tag_id] = replace(tag, pose=pose)
+        self._keep(replace(tag, pose=pose))
         self.observation_count += 1
         return True
 
@@ -253,6 +262,30 @@ class TwinStore:
             return known
         check_length("tags", len(self._tags) + 1, MAX_TAGS)
         return TagState(tag_id=tag_id)
+
+    def _keep(self, tag: TagState) -> None:
+        """Put a tag in the place of what it was, if there is room for what it grew by."""
+        known = self._tags.get(tag.tag_id)
+        items = self._items + items_of(tag) - (0 if known is None else items_of(known))
+        check_length("readings, flowers and footprint points of all tags", items, MAX_ITEMS)
+        self._items = items
+        self._tags[tag.tag_id] = tag
+
+    def _remember(self, scan: Observation) -> None:
+        """Put a scan in its tag's history, each sensor once, and let the tag's oldest ones go."""
+        latest = {reading.name: reading for reading in scan.readings}
+        history = self._history.setdefault(scan.tag_id, deque())
+        history.append(replace(scan, readings=tuple(latest.values())))
+        self._history_readings += len(latest)
+        while len(history) > self.buffer_len or (
+            history and self._history_readings > MAX_HISTORY_READINGS
+        ):
+            self._history_readings -= len(history.popleft().readings)
+
+
+def items_of(tag: TagState) -> int:
+    """How many readings, flowers and footprint points are kept for a tag."""
+    return len(tag.readings) + len(tag.flower.blooms) + len(tag.flower.footprint)
 
 
 def samples_of(

@@ -9,12 +9,15 @@ from errno import ECONNRESET
 from typing import Any
 
 import orjson
+import pytest
 from websockets.frames import CloseCode, Frame, Opcode
 from websockets.streams import StreamReader
 
+from lupin_bridge.server import MAX_INBOUND_BYTES
 from lupin_bridge.ws_protocol import Connection
 from tests.support.inprocess import run, running, until
 from tests.support.messages import scan
+from tests.support.raw_ws import BINARY, CLOSE, TEXT, RawClient, frames_of, masked
 from tests.support.waiting import wait_for
 from tests.support.web import bridge, deaf_client, overfill
 
@@ -133,6 +136,27 @@ def test_a_client_that_takes_nothing_is_closed_and_told_why_and_the_others_are_n
 
         live.peer.observe(scan("after", {"co2": 1.0}))
         healthy.until_tag("after")
+        assert "Traceback" not in live.process.output
+
+
+@pytest.mark.parametrize(
+    ("said", "code"),
+    [
+        (masked(BINARY, bytes(MAX_INBOUND_BYTES + 1)), CloseCode.MESSAGE_TOO_BIG),
+        (masked(TEXT, b"\xff"), CloseCode.INVALID_DATA),
+        (masked(TEXT, b"", rsv=1), CloseCode.PROTOCOL_ERROR),
+    ],
+)
+def test_who_is_cut_short_can_read_why(said: bytes, code: CloseCode) -> None:
+    with bridge(*SILENT) as live, RawClient(live.url, "/ws/state") as client:
+        client.socket.sendall(said + masked(BINARY, bytes(1_000)) * 200)
+        heard = client.received
+        # No reset: the system would throw away what was not read by then.
+        while block := client.socket.recv(BLOCK):
+            heard += block
+        frames = list(frames_of(heard))
+        assert frames[-1][0] == CLOSE
+        assert int.from_bytes(frames[-1][1][:2]) == code
         assert "Traceback" not in live.process.output
 
 

@@ -24,7 +24,8 @@ READ_BYTES = 8_192
 FRAMES_PER_S = 1_000
 FRAMES_AT_ONCE = 5_000
 
-# How long a client that is told to go has to read the reason before its socket is torn down.
+# How long a client that is told to go has to read the reason before its socket is torn down. Closed
+# at once, with more of the client's still on its way, it would be reset, and the reason lost.
 CLOSE_GRACE_S = 1.0
 
 
@@ -102,6 +103,16 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         if self.writable.is_set():
             self.transport.write(pong)
 
+    def handle_parser_exception(self) -> None:
+        """Answer what breaks the protocol or a limit with the reason; the rest is thrown away."""
+        close = self.conn.close_sent
+        if close is None or self.close_sent:
+            return  # the parser repeats its complaint with whatever else comes
+        self.queue.put_nowait(
+            {"type": "websocket.disconnect", "code": close.code, "reason": close.reason}
+        )
+        self._say_last_words()
+
     @property
     def can_take(self) -> bool:
         """Whether everything written so far has gone out, and more may follow."""
@@ -124,6 +135,13 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         """Send a close frame with the reason, and tear the socket down if nobody reads it."""
         if self.conn.state is State.OPEN and not self.transport.is_closing():
             self.conn.send_close(code, reason)
-            self.transport.write(b"".join(self.conn.data_to_send()))
-            self.close_sent = True
-        self.loop.call_later(CLOSE_GRACE_S, tear_down, self.transport)
+            self._say_last_words()
+        else:
+            self.loop.call_later(CLOSE_GRACE_S, tear_down, self.transport)
+
+    def _say_last_words(self) -> None:
+        """Write the close frame that the protocol has ready, and end after the grace."""
+        self.transport.write(b"".join(self.conn.data_to_send()))
+        self.close_sent = True
+        # uvicorn's own: with it, the end of the application is not yet that of the connection.
+        self.close_timer = self.loop.call_later(CLOSE_GRACE_S, tear_down, self.transport)

@@ -208,8 +208,9 @@ def test_a_flood_ends_its_sender_alone(server: Server, healthy: Listener, frame:
 def test_a_message_past_the_limit_is_one_in_pieces_too(server: Server, healthy: Listener) -> None:
     with gone_in_the_end(server, healthy), listener(url(server)) as loud:
         pieces = MAX_INBOUND_BYTES // 10_000 + 1
-        with pytest.raises(ConnectionClosed) as closed:
+        with suppress(ConnectionClosed):  # it may hear the answer before it has said all
             loud.connection.send("x" * 10_000 for _ in range(pieces))
+        with pytest.raises(ConnectionClosed) as closed:
             loud.until("never", lambda _: False)
         assert closed.value.rcvd is not None
         assert closed.value.rcvd.code == 1009

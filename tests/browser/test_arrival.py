@@ -49,6 +49,19 @@ def test_a_late_page_shows_every_tag_at_once_while_the_twin_is_silent(
     assert [tag["tag_id"] for tag in hmi.frames[1]["state"]["tags"]] == ids
 
 
+def test_the_table_stays_where_it_is_while_tags_arrive(domain: int, open_page: OpenPage) -> None:
+    with bridge(domain=domain) as running:
+        hmi = open_page(running.url)
+        table = hmi.page.locator(".table-scroll")
+        # Each comes above those that are there, as the robot meets them in no order.
+        for first in range(60, 0, -20):
+            ids = [str(first + i) for i in range(20)]
+            running.peer.observe(*(scan(i, {"temperature": 20.0}, at=(1, 1)) for i in ids))
+            expect(hmi.row(ids[-1])).to_be_attached()
+            assert table.evaluate("table => table.scrollTop") == 0
+        expect(hmi.row("20")).to_be_in_viewport()
+
+
 def test_the_page_says_what_is_missing_until_it_comes(domain: int, open_page: OpenPage) -> None:
     with bridge(domain=domain) as running:
         hmi = open_page(running.url)

@@ -207,6 +207,22 @@ def test_a_state_that_breaks_the_callback_is_counted_and_the_next_one_is_taken(
     assert stage.take(peer, tag("2")).tags[0].tag_id == "2"
 
 
-def test_a_parameter_out_of_its_range_is_named(domain: int) -> None:
-    with pytest.raises(ParameterError, match="parameter buffer_len is 0"):
-        Stage(domain, "--ros-args", "-p", "buffer_len:=0")
+@pytest.mark.parametrize(
+    ("override", "complaint"),
+    [
+        ("buffer_len:=0", "parameter buffer_len is 0"),
+        ("state_topic:='a b'", "parameter state_topic is 'a b'"),
+        ("map_topic:='a b'", "parameter map_topic is 'a b'"),
+        ("field_service_name:='a b'", "parameter field_service_name is 'a b'"),
+        ("use_sim_time:=5", "parameter use_sim_time is no bool"),
+    ],
+)
+def test_a_parameter_that_cannot_be_is_named(domain: int, override: str, complaint: str) -> None:
+    with pytest.raises(ParameterError, match=complaint):
+        Stage(domain, "--ros-args", "-p", override)
+
+
+def test_parameters_are_read_as_the_twin_reads_them(domain: int) -> None:
+    with stage_in(domain, "--ros-args", "-p", "idw_power:=3") as stage:
+        assert stage.node.rules.idw_power == 3.0
+        assert isinstance(stage.node.rules.idw_power, float)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import signal
 from collections.abc import Iterator
 from typing import Any
 
@@ -114,14 +113,6 @@ def test_fifty_observations_latched_before_the_twin_started_are_all_heard(domain
             state = producer.state(lambda s: len(s.tags) == 50, "all 50 tags")
     assert [tag.tag_id for tag in state.tags] == [f"t{i}" for i in range(50)]
     assert [tag.readings[0].value for tag in state.tags] == [400.0 + i for i in range(50)]
-
-
-def test_sigint_and_sigterm_end_the_node_at_once_and_quietly(domain: int) -> None:
-    for number in (signal.SIGINT, signal.SIGTERM):
-        with twin_node(domain, *FAST) as process, Peer(domain) as peer:
-            peer.state(lambda _: True, "a state")
-            assert process.stop(number) == 0
-            assert "Traceback" not in process.output
 
 
 # --- ingestion, rule by rule --------------------------------------------------------------------
@@ -451,6 +442,13 @@ def test_a_parameter_out_of_its_range_stops_the_node_and_is_named(
         assert process.wait() == 2
         assert f"parameter {parameter} is" in process.output
         assert "Traceback" not in process.output
+
+
+def test_a_parameter_that_does_not_exist_is_warned_of_by_name(domain: int) -> None:
+    with twin_node(domain, "--ros-args", "-p", "idw_pwoer:=3.0") as process:
+        line = process.wait_for_output("idw_pwoer")
+    assert "WARN" in line
+    assert "unknown" in line
 
 
 def test_the_shipped_parameter_file_starts_the_node(domain: int) -> None:

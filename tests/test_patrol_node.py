@@ -197,6 +197,7 @@ def test_a_signal_ends_it_cleanly_while_nobody_listens(domain: int, number: sign
         (["--speed", "0"], "--speed: '0' is out of range, expected a number from 0.1 to 50"),
         (["--ros-args", "-p", "frame_id:=''"], "parameter frame_id is empty"),
         (["--ros-args", "-p", "frame_id:=5"], "parameter frame_id"),
+        (["--ros-args", "-p", "use_sim_time:=5"], "parameter use_sim_time is no bool"),
         (["--ros-args", "-p", "map_topic:=a//b"], "parameter map_topic is 'a//b'"),
         (["--ros-args", "--bogus"], "--bogus"),
     ],

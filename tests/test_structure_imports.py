@@ -33,7 +33,7 @@ ROS = frozenset(
 )
 # The modules that know ROS; all others have to run, and be tested, without it.
 KNOW_ROS = {
-    "lupin_twin": {"convert", "node", "spinning"},
+    "lupin_twin": {"cli", "convert", "node", "ros_parameters", "spinning"},
     "lupin_patrol": {"cli", "messages", "node"},
     "lupin_bridge": {"ros_thread", "web_node"},
 }
@@ -78,17 +78,19 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
         "field_quality": {"state", "idw"},
         "fields": {"state", "idw", "explored", "field_cache"},
         "convert": {"state", "idw", "explored", "fields"},
+        "ros_parameters": {"parameters"},
         "node": {
             "convert",
             "explored",
             "field_cache",
             "fields",
             "parameters",
-            "spinning",
+            "ros_parameters",
             "state",
             "throttle",
             "twin_count",
         },
+        "cli": {"node", "parameters", "spinning"},
     },
     "lupin_patrol": {
         "chance": set(),

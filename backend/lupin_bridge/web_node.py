@@ -20,7 +20,7 @@ from lupin_twin import convert
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRequest
 from lupin_twin.node import field_rules, latched
-from lupin_twin.parameters import TwinParameters
+from lupin_twin.ros_parameters import declare, naming, naming_use_sim_time
 from lupin_twin.state import Observation, Snapshot, TagState
 from lupin_twin.throttle import Throttle
 from lupin_twin.twin_count import TwinCount
@@ -67,14 +67,9 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
     """
 
     def __init__(self, on_state: Callable[[Snapshot], None], *, context: Any = None) -> None:
-        super().__init__(NODE_NAME, context=context)
-        defaults = TwinParameters()
-        self.parameters = TwinParameters(
-            **{
-                name: self.declare_parameter(name, getattr(defaults, name)).value
-                for name in SHARED_PARAMETERS
-            }
-        )
+        with naming_use_sim_time():
+            super().__init__(NODE_NAME, context=context)
+        self.parameters = declare(self, SHARED_PARAMETERS)
         self.rules = field_rules(self.parameters)
         self.callback_errors = 0
         self.twins = TwinCount()
@@ -87,19 +82,20 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._throttle = Throttle(WARNING_PERIOD_S)
         group = MutuallyExclusiveCallbackGroup()
         p = self.parameters
-        for message_type, topic, max_bytes, callback in (
-            (TwinState, p.state_topic, MAX_STATE_BYTES, self._take_state),
-            (OccupancyGrid, p.map_topic, MAX_MAP_BYTES, self._take_map),
+        for parameter, message_type, max_bytes, callback in (
+            ("state_topic", TwinState, MAX_STATE_BYTES, self._take_state),
+            ("map_topic", OccupancyGrid, MAX_MAP_BYTES, self._take_map),
         ):
-            self.create_subscription(
-                message_type,
-                topic,
-                self._reader(topic, message_type, max_bytes, callback),
-                latched(1),
-                callback_group=group,
-                raw=True,
+            topic = getattr(p, parameter)
+            read = self._reader(topic, message_type, max_bytes, callback)
+            with naming(parameter, topic):
+                self.create_subscription(
+                    message_type, topic, read, latched(1), callback_group=group, raw=True
+                )
+        with naming("field_service_name", p.field_service_name):
+            self.field_client = self.create_client(
+                GetField, p.field_service_name, callback_group=group
             )
-        self.field_client = self.create_client(GetField, p.field_service_name, callback_group=group)
 
     # --- for the source, on this node's thread ------------------------------------------------
 

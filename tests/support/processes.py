@@ -94,7 +94,7 @@ class Process:
 
 def twin_node(domain: int, *ros_args: str) -> Process:
     """The twin alone, as the executable `twin_node`."""
-    command = [sys.executable, "-m", "lupin_twin.node", *ros_args]
+    command = [sys.executable, "-m", "lupin_twin.cli", *ros_args]
     return Process(command, ros_env(domain))
 
 

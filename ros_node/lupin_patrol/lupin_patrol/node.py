@@ -61,7 +61,10 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
     """Publishes observations, discovered tags and the map, all of them latched."""
 
     def __init__(self) -> None:
-        super().__init__("lupin_patrol")
+        try:
+            super().__init__("lupin_patrol")
+        except InvalidParameterTypeException as error:
+            raise ParameterError(f"parameter use_sim_time is no bool: {error}") from error
         self._frame_id = self._name("frame_id", "map")
         self.observations = self._latched(
             Observation, "observations_topic", "/floranova/observations", OBSERVATIONS_DEPTH

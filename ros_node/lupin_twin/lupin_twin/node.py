@@ -6,24 +6,17 @@ group; so the store and the cache need no lock.
 
 from __future__ import annotations
 
-import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import fields as dataclass_fields
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Final
 
-import rclpy
 from lupin_msgs.msg import DiscoveredTags, Observation, TwinState
 from lupin_msgs.srv import GetField
 from nav_msgs.msg import OccupancyGrid
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
-from rclpy.exceptions import InvalidServiceNameException, InvalidTopicNameException
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
@@ -32,8 +25,8 @@ from lupin_twin import convert
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.field_cache import FieldCache
 from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused, FieldRules
-from lupin_twin.parameters import ParameterError, TwinParameters, describe
-from lupin_twin.spinning import spin_until_shutdown
+from lupin_twin.parameters import TwinParameters
+from lupin_twin.ros_parameters import declare, naming, naming_use_sim_time
 from lupin_twin.state import Rejected, Snapshot, TwinStore
 from lupin_twin.throttle import Throttle
 from lupin_twin.twin_count import TwinCount
@@ -83,8 +76,9 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
     """
 
     def __init__(self, *, context: Any = None, cli_args: Sequence[str] | None = None) -> None:
-        super().__init__(NODE_NAME, context=context, cli_args=cli_args)
-        self.parameters = self._read_parameters()
+        with naming_use_sim_time():
+            super().__init__(NODE_NAME, context=context, cli_args=cli_args)
+        self.parameters = declare(self)
         self.store = TwinStore(buffer_len=self.parameters.buffer_len)
         self.fields = FieldEngine(
             field_rules(self.parameters),
@@ -124,23 +118,6 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     # --- set-up -----------------------------------------------------------------------------
 
-    def _read_parameters(self) -> TwinParameters:
-        values = {}
-        for spec in dataclass_fields(TwinParameters):
-            description, limits = describe(spec.name)
-            values[spec.name] = self.declare_parameter(
-                spec.name,
-                spec.default,
-                # dynamic_typing: `idw_power: 2` is an integer to YAML; the range check takes it.
-                ParameterDescriptor(
-                    description=description,
-                    additional_constraints=limits,
-                    read_only=True,
-                    dynamic_typing=True,
-                ),
-            ).value
-        return TwinParameters(**values)
-
     def _connect(self) -> None:
         p = self.parameters
         group = self._group
@@ -159,13 +136,13 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         for parameter, message_type, depth, max_bytes, callback in subscriptions:
             topic = getattr(p, parameter)
             take = partial(self._take, topic, message_type, max_bytes, callback)
-            with _naming(parameter, topic):
+            with naming(parameter, topic):
                 self.create_subscription(
                     message_type, topic, take, latched(depth), callback_group=group, raw=True
                 )
-        with _naming("state_topic", p.state_topic):
+        with naming("state_topic", p.state_topic):
             self._state_publisher = self.create_publisher(TwinState, p.state_topic, latched(1))
-        with _naming("field_service_name", p.field_service_name):
+        with naming("field_service_name", p.field_service_name):
             self.create_service(
                 GetField, p.field_service_name, self._on_get_field, callback_group=group
             )
@@ -353,39 +330,3 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         if self._throttle.ask(("error", what), time.monotonic()) is not None:
             trace = "".join(traceback.format_exception(error))
             self.get_logger().error(f"error number {self.callback_errors}, in {what}:\n{trace}")
-
-
-@contextmanager
-def _naming(parameter: str, value: str) -> Iterator[None]:
-    """Turn rclpy's complaint about a topic's name into one that names the parameter."""
-    try:
-        yield
-    except (InvalidTopicNameException, InvalidServiceNameException) as error:
-        reason = " ".join(str(error).split())
-        raise ParameterError(f"parameter {parameter} is {value!r}: {reason}") from error
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the twin alone: the executable `twin_node`. Returns the process's exit code."""
-    rclpy.init(args=args)
-    try:
-        node = TwinNode()
-    except ParameterError as error:
-        print(f"lupin_twin: {error}", file=sys.stderr)  # noqa: T201  # there is no logger yet
-        rclpy.try_shutdown()
-        return 2
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    try:
-        spin_until_shutdown(executor, node.report)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        executor.shutdown(timeout_sec=2)
-        node.destroy_node()
-        rclpy.try_shutdown()
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

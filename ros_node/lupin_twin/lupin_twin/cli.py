@@ -1,0 +1,65 @@
+"""The command `twin_node`: the twin alone, from its first moment to a clean end."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Sequence
+from threading import Thread
+
+STOP_SIGNALS = {signal.SIGINT, signal.SIGTERM}
+USAGE_ERROR = 2
+
+# A stop signal is seen at once; this often it is looked whether the ROS thread still lives.
+_LOOK_S = 1.0
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the twin until a signal ends it; returns the exit code, 1 if its thread has died."""
+    # First of all, before anything slow is imported and before ROS starts its threads: Ctrl-C
+    # and SIGTERM wait until they are asked for, so neither can end in a traceback.
+    signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
+    import rclpy  # noqa: PLC0415  # see above
+    from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
+
+    from lupin_twin.parameters import ParameterError  # noqa: PLC0415
+
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # the parent of all that rclpy raises for bad arguments
+        return _refuse(f"cannot start ROS: {error}")
+    try:
+        return _run()
+    except ParameterError as error:
+        return _refuse(str(error))
+    finally:
+        rclpy.try_shutdown()
+
+
+def _run() -> int:
+    from rclpy.executors import SingleThreadedExecutor  # noqa: PLC0415
+
+    from lupin_twin.node import TwinNode  # noqa: PLC0415
+    from lupin_twin.spinning import spin_until_shutdown  # noqa: PLC0415
+
+    node = TwinNode()
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    thread = Thread(target=spin_until_shutdown, args=(executor, node.report), name="ros")
+    thread.start()
+    stopped = False
+    while thread.is_alive() and not stopped:
+        stopped = signal.sigtimedwait(STOP_SIGNALS, _LOOK_S) is not None
+    executor.shutdown(timeout_sec=2.0)
+    thread.join()
+    node.destroy_node()
+    return 0 if stopped else 1
+
+
+def _refuse(reason: str) -> int:
+    sys.stderr.write(f"lupin_twin: {' '.join(reason.split())}\n")
+    return USAGE_ERROR
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,94 @@
+"""The command `twin_node`: a clean end at every moment, and one line for impossible arguments."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.support.domains import ros_env
+from tests.support.processes import Process, twin_node
+from tests.support.ros import Peer
+from tests.support.waiting import wait_for
+
+# A moment of the start, told from outside by what the process has in its memory by then.
+MOMENTS = {
+    "signals held back": "python",
+    "rclpy is being imported": "_rclpy_pybind11",
+    "messages are being imported": "std_msgs_s__rosidl",
+    "fields are being imported": "_multiarray_umath",
+    "the middleware is being loaded": "librmw_fastrtps",
+    "the node is being made": "/dev/shm/",
+}
+
+
+def holds_back(process: Process) -> bool:
+    """Whether SIGINT and SIGTERM are blocked, as Linux tells it."""
+    status = Path(f"/proc/{process.pid}/status").read_text()
+    blocked = int(status.split("SigBlk:")[1].split()[0], 16)
+    return all(blocked >> (number - 1) & 1 for number in (signal.SIGINT, signal.SIGTERM))
+
+
+def has_mapped(process: Process, name: str) -> Callable[[], bool]:
+    maps = Path(f"/proc/{process.pid}/maps")
+    return lambda: name in maps.read_text()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("moment", MOMENTS)
+def test_a_signal_during_the_start_ends_it_quietly(
+    domain: int, moment: str, number: signal.Signals
+) -> None:
+    with twin_node(domain) as process:
+        wait_for(lambda: holds_back(process), "signals to be held back")
+        wait_for(has_mapped(process, MOMENTS[moment]), moment)
+        assert process.stop(number) == 0
+        assert process.output == ""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_between_many_callbacks_ends_it_quietly(
+    domain: int, number: signal.Signals
+) -> None:
+    fast = ("--ros-args", "-p", "state_publish_rate_hz:=100.0")
+    with twin_node(domain, *fast) as process, Peer(domain) as peer:
+        peer.state(lambda _: True, "a state")
+        assert process.stop(number) == 0
+        assert process.output == ""
+
+
+def test_it_ends_with_1_when_its_thread_dies(domain: int) -> None:
+    program = (
+        "import lupin_twin.spinning as spinning, lupin_twin.cli as cli, sys; "
+        "spinning.spin_until_shutdown = lambda *_: None; "
+        "sys.exit(cli.main())"
+    )
+    with Process([sys.executable, "-c", program], ros_env(domain)) as process:
+        assert process.wait() == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["-p"], "Couldn't parse trailing -p flag"),
+        (["-p", "bad name:=5"], "bad name:=5"),
+        (["-r", "__node:=bad name"], "__node:=bad name"),
+        (["-r", "__ns:=bad"], "__ns:=bad"),
+        (["--params-file", "/nonexistent.yaml"], "/nonexistent.yaml"),
+        (["--unknown-thing"], "--unknown-thing"),
+        (["--log-level", "nonsense"], "nonsense"),
+        (["-p", "use_sim_time:=5"], "parameter use_sim_time is no bool"),
+        (["-p", "idw_power:=-1.0"], "parameter idw_power is -1.0"),
+    ],
+)
+def test_arguments_that_cannot_be_are_refused_in_one_line(
+    domain: int, arguments: list[str], said: str
+) -> None:
+    with twin_node(domain, "--ros-args", *arguments) as process:
+        assert process.wait() == 2
+        [line] = [line for line in process.output.splitlines() if line.startswith("lupin_twin: ")]
+        assert said in line
+        assert "Traceback" not in process.output

@@ -52,7 +52,9 @@ class Stage:
     """A hub, and frames for it."""
 
     def __init__(self, max_clients: int = 10) -> None:
-        self.hub = Hub(max_clients, TIMEOUT_S)
+        self.hub = Hub(max_clients, TIMEOUT_S, self.status_at)
+        self.reason: Reason = "live"
+        self.since_s = 0.0
         self.writer = FrameWriter()
 
     def publish(self, now_s: float = 0.0) -> int:
@@ -61,8 +63,12 @@ class Stage:
         self.hub.publish(frame, now_s)
         return frame.seq
 
+    def status_at(self, now_s: float) -> Status:
+        return Status(self.reason, now_s - self.since_s)
+
     def announce(self, reason: Reason, now_s: float = 0.0) -> None:
-        self.hub.announce(Status(reason, 0.0), now_s)
+        self.reason = reason
+        self.hub.announce(now_s)
 
     def join(self, socket: Socket, now_s: float = 0.0, **asked: Any) -> Client:
         client = Client(socket, **asked)
@@ -96,11 +102,23 @@ def test_who_joins_before_there_is_a_state_gets_the_status_alone(stage: Stage) -
     assert early.got == ["never_seen", 1]
 
 
+def test_a_status_tells_the_age_of_the_moment_at_which_a_client_gets_it(stage: Stage) -> None:
+    stage.announce("stale", 3.0)
+    sockets = [Socket(), Socket(), Socket(room=0)]
+    clients = [stage.join(socket, 3_600.0) for socket in sockets]
+    sockets[2].room = 1
+    stage.hub.serve(clients[2], 3_700.0)
+    ages = [
+        json.loads(bytes(received(socket.wires[0]).data))["state_age_seconds"] for socket in sockets
+    ]
+    assert ages == [3_600.0, 3_600.0, 3_700.0]
+    assert sockets[0].wires[0] is sockets[1].wires[0], "one serialisation serves all"
+
+
 def test_everyone_gets_every_frame_and_every_status_once(stage: Stage) -> None:
     sockets = [Socket(), Socket()]
     for socket in sockets:
         stage.join(socket)
-    stage.announce("live")
     stage.publish()
     stage.publish(0.1)
     stage.announce("stale", 4.0)
@@ -114,9 +132,9 @@ def test_who_wants_no_status_or_no_state_gets_none(stage: Stage) -> None:
     no_status, no_state = Socket(), Socket()
     stage.join(no_status, wants_status=False)
     stage.join(no_state, wants_state=False)
-    stage.announce("live")
     stage.publish()
-    assert (no_status.got, no_state.got) == ([1], ["live"])
+    stage.announce("stale")
+    assert (no_status.got, no_state.got) == ([1], ["live", "stale"])
 
 
 def test_who_has_left_gets_nothing_more(stage: Stage) -> None:
@@ -125,7 +143,7 @@ def test_who_has_left_gets_nothing_more(stage: Stage) -> None:
     stage.hub.leave(client)
     stage.hub.leave(client)
     stage.publish()
-    assert socket.got == []
+    assert socket.got == ["live"]
 
 
 def test_the_hub_is_full_at_its_limit_and_has_room_when_somebody_leaves() -> None:
@@ -144,8 +162,8 @@ def test_the_hub_is_full_at_its_limit_and_has_room_when_somebody_leaves() -> Non
 
 def test_a_slow_client_is_never_queued_for_and_gets_the_newest(stage: Stage) -> None:
     slow, quick = Socket(room=1), Socket()
-    client = stage.join(slow)
-    stage.join(quick)
+    client = stage.join(slow, wants_status=False)
+    stage.join(quick, wants_status=False)
     for number in range(8):
         stage.publish(number / 10)
     assert slow.got == [1]
@@ -175,7 +193,7 @@ def test_a_slow_client_is_told_the_newest_status_before_the_newest_state(stage: 
 
 def test_a_client_that_takes_nothing_for_too_long_is_closed_and_forgotten(stage: Stage) -> None:
     stuck, quick = Socket(room=0), Socket()
-    stage.join(stuck)
+    stage.join(stuck, wants_status=False)
     stage.join(quick)
     stage.publish(10.0)
     stage.publish(20.0)
@@ -189,7 +207,7 @@ def test_a_client_that_takes_nothing_for_too_long_is_closed_and_forgotten(stage:
 
 def test_the_time_counts_from_the_first_frame_that_was_not_taken(stage: Stage) -> None:
     slow = Socket(room=1)
-    client = stage.join(slow)
+    client = stage.join(slow, wants_status=False)
     stage.publish(1.0)
     assert stage.hub.dismiss_stuck(500.0) == 0, "a silent twin makes nobody stuck"
     stage.publish(500.0)
@@ -207,8 +225,8 @@ def test_the_time_counts_from_the_first_frame_that_was_not_taken(stage: Stage) -
 def test_deltas_go_to_who_asked_and_has_the_frame_before(stage: Stage) -> None:
     socket, whole = Socket(), Socket()
     stage.publish()
-    client = stage.join(socket, delta=True)
-    stage.join(whole)
+    client = stage.join(socket, delta=True, wants_status=False)
+    stage.join(whole, wants_status=False)
     stage.publish()
     stage.publish()
     assert socket.got == [1, (1, 2), (2, 3)]
@@ -235,6 +253,7 @@ def test_cbor_goes_to_who_asked(stage: Stage) -> None:
 def test_a_rate_holds_on_average_and_a_status_does_not_wait_for_it(stage: Stage) -> None:
     socket = Socket()
     stage.join(socket, min_interval_s=1.0)
+    socket.wires.clear()
     for tenth in range(55):
         stage.publish(tenth / 10)
     # The first of each second: 0.0, 1.0, 2.0 …
@@ -251,8 +270,8 @@ def test_a_late_frame_does_not_delay_those_after_it_unless_the_interval_is_stric
     stage: Stage,
 ) -> None:
     on_average, strict = Socket(), Socket()
-    stage.join(on_average, min_interval_s=1.0)
-    stage.join(strict, min_interval_s=1.0, strict_interval=True)
+    stage.join(on_average, min_interval_s=1.0, wants_status=False)
+    stage.join(strict, min_interval_s=1.0, strict_interval=True, wants_status=False)
     for now_s in (0.0, 1.2, 2.0, 2.2, 3.0, 3.2):
         stage.publish(now_s)
     assert on_average.got == [1, 2, 3, 5]
@@ -261,7 +280,7 @@ def test_a_late_frame_does_not_delay_those_after_it_unless_the_interval_is_stric
 
 def test_a_pause_is_not_made_up_for_by_a_burst(stage: Stage) -> None:
     socket = Socket()
-    stage.join(socket, min_interval_s=1.0)
+    stage.join(socket, min_interval_s=1.0, wants_status=False)
     stage.publish(0.0)
     for now_s in (100.0, 100.1, 100.2, 100.3):
         stage.publish(now_s)

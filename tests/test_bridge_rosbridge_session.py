@@ -23,6 +23,7 @@ from lupin_bridge.rosbridge_session import (
     TooManyMessages,
 )
 from lupin_bridge.source import TwinNames
+from lupin_bridge.status import Liveness
 from lupin_twin.state import Snapshot, TagState
 
 TOPIC = "/twin/state"
@@ -217,17 +218,18 @@ class Socket:
 
 
 def test_who_has_not_subscribed_is_closed_when_its_socket_stays_full(session: Session) -> None:
-    hub, full, free = Hub(2, 30.0), Socket(can_take=False), Socket()
+    hub, full, free = Hub(2, 30.0, Liveness().status), Socket(can_take=False), Socket()
     for socket in (full, free):
-        hub.join(Client(socket, wants_state=False, wire=lambda _client, f: session.wire(f)), 0.0)
+        hub.join(Client(socket, wants_status=False, wants_state=False), 0.0)
     assert hub.dismiss_stuck(29.9) == 0
     assert hub.dismiss_stuck(30.0) == 1
     assert (full.dismissed, free.dismissed) == (True, False)
 
 
 def test_a_throttled_client_gets_no_two_states_closer_than_it_asked(session: Session) -> None:
-    hub, writer, socket = Hub(1, 30.0), FrameWriter(), Socket()
-    client = Client(socket, strict_interval=True, wire=lambda _client, f: session.wire(f))
+    hub, writer, socket = Hub(1, 30.0, Liveness().status), FrameWriter(), Socket()
+    client = Client(socket, strict_interval=True, wants_status=False)
+    client.wire = lambda _client, f: session.wire(f)
     subscribe(session, throttle_rate=250)
     client.min_interval_s = session.min_interval_s
     hub.join(client, 0.0)

@@ -12,6 +12,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 from lupin_bridge.source import Revised, TwinTimeoutError
+from lupin_bridge.status import STALE_AFTER_S
 from lupin_bridge.web_twin import MAX_REQUESTS, WebTwin
 from lupin_twin.fields import FieldRequest
 from tests.support.domains import own_domain
@@ -116,6 +117,36 @@ def test_a_twin_is_stopped_and_goes_on(domain: int) -> None:
             lambda: live.get("/api/field", **FIELD).json().get("sample_count") == 2,
             "a field with both tags",
         )
+
+
+def test_who_joins_a_silent_twin_is_told_how_long_it_has_been_silent(domain: int) -> None:
+    with (
+        lupin_twin(domain, "web") as process,
+        Peer(domain) as robot,
+        twin_node(domain) as twin,
+        attached(process, robot) as live,
+    ):
+        wait_until_ready(live)
+        robot.observe(scan("a", {"co2": 1.0}, (0, 0)))
+        live.tag("a")
+        twin.kill()
+
+        def silent_s() -> float:
+            return float(live.get("/readyz").json()["state_age_seconds"])
+
+        wait_for(lambda: silent_s() > STALE_AFTER_S, "silence")
+        tag_s, first_s = live.tag("a")["stale_seconds"], silent_s()
+        # Past the moment at which those who were there were told.
+        wait_for(lambda: silent_s() > first_s + 2.0, "a longer silence")
+        before_s = silent_s()
+        for query in ({}, {"encoding": "cbor"}):
+            with live.listen(**query) as late:
+                status, state = late.next(), late.next()
+            assert status["reason"] == "stale"
+            assert status["state_age_seconds"] >= before_s
+            assert tag_ids(state["state"]) == ["a"]
+        for answer in (live.tag("a"), live.json("/api/tags/a")):
+            assert answer["stale_seconds"] >= tag_s + before_s - first_s - 0.01  # rounded
 
 
 def test_field_requests_to_a_twin_that_does_not_answer_are_bounded_and_forgotten(

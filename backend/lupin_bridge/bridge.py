@@ -17,6 +17,7 @@ from lupin_bridge.metrics import Metrics, Sample
 from lupin_bridge.settings import Settings
 from lupin_bridge.source import Revised, TwinSource
 from lupin_bridge.status import Liveness, Status
+from lupin_twin.state import NANOSECONDS_PER_SECOND
 
 log = logging.getLogger(__name__)
 
@@ -38,13 +39,13 @@ class Bridge:
         self.settings = settings
         # Large fields and pictures are written off the loop.
         self.pool = ThreadPoolExecutor(max_workers=2, thread_name_prefix="encode")
-        self.hub = Hub(settings.max_clients, settings.client_timeout_s)
+        self._liveness = Liveness()
+        self.hub = Hub(settings.max_clients, settings.client_timeout_s, self._liveness.status)
         self.field_limits = FieldLimits(
             settings.field_rate_hz, settings.field_concurrency, settings.field_total_concurrency
         )
         self.frames = FrameWriter()
         self.metrics = Metrics(self._measure)
-        self._liveness = Liveness()
         self._latest: Revised | None = None
         self._told: Status | None = None
         self._pushed: Revised | None = None
@@ -92,8 +93,17 @@ class Bridge:
         """The status now."""
         return self._liveness.status(time.monotonic())
 
+    @property
+    def ros_time_ns(self) -> int:
+        """ROS time now, as far as it is known: the newest state's, and the time since it came."""
+        if self._latest is None or self._liveness.last_state_s is None:
+            return 0
+        since_s = time.monotonic() - self._liveness.last_state_s
+        return self._latest.snapshot.stamp_ns + int(since_s * NANOSECONDS_PER_SECOND)
+
     def join(self, client: Client) -> None:
         """Add a listener; it has the status and the current state when this returns."""
+        self._tell_status()  # so that nobody hears of it before the others
         self.hub.join(client, time.monotonic())
 
     def serve(self, client: Client) -> None:
@@ -187,7 +197,7 @@ class Bridge:
         if (first and not is_good) or (self._told and status.says_more_than(self._told)):
             log.log(logging.INFO if is_good else logging.WARNING, "%s", status.message)
         self._told = status
-        self.hub.announce(status, time.monotonic())
+        self.hub.announce(time.monotonic())
 
     async def _keep_watch(self) -> None:
         while True:

@@ -70,7 +70,9 @@ class Client:
 class Hub:
     """Every client and the newest frame. Belongs to the event loop."""
 
-    def __init__(self, max_clients: int, client_timeout_s: float) -> None:
+    def __init__(
+        self, max_clients: int, client_timeout_s: float, status_at: Callable[[float], Status]
+    ) -> None:
         self.max_clients = max_clients
         self.frames_sent = 0
         self.frames_skipped = 0
@@ -79,8 +81,8 @@ class Hub:
         self._client_timeout_s = client_timeout_s
         self._clients: set[Client] = set()
         self._frame: StateFrame | None = None
-        self._status: Status | None = None
-        self._status_wires: dict[str, bytes] = {}
+        self._status_at = status_at
+        self._status_wires: dict[tuple[str, float], bytes] = {}
 
     def __len__(self) -> int:
         return len(self._clients)
@@ -109,9 +111,8 @@ class Hub:
         self._frame = frame
         self.serve_all(now_s)
 
-    def announce(self, status: Status, now_s: float) -> None:
-        """Make this the status and give it to everyone who can take it."""
-        self._status = status
+    def announce(self, now_s: float) -> None:
+        """The status is another one: give it to everyone who can take it."""
         self._status_wires.clear()
         for client in self._clients:
             client.status_due = True
@@ -124,8 +125,8 @@ class Hub:
 
     def serve(self, client: Client, now_s: float) -> None:
         """Give a client what it lacks, as far as its socket takes it and its rate allows."""
-        if client.status_due and client.wants_status and self._status is not None:
-            if not self._write(client, self._status_wire(client.encoding), now_s):
+        if client.status_due and client.wants_status:
+            if not self._write(client, self._status_wire(client.encoding, now_s), now_s):
                 return
             client.status_due = False
         if not client.wants_state:
@@ -165,11 +166,16 @@ class Hub:
         self.clients_dismissed += len(stuck)
         return len(stuck)
 
-    def _status_wire(self, encoding: str) -> bytes:
-        assert self._status is not None  # `serve` has looked
-        if encoding not in self._status_wires:
-            self._status_wires[encoding] = status_frame(self._status, encoding)
-        return self._status_wires[encoding]
+    def _status_wire(self, encoding: str, now_s: float) -> bytes:
+        # Written once for all who get it at the same moment, and never kept for later: it tells an
+        # age, and who joins a twin long dead must not take its tags for seconds old.
+        key = (encoding, now_s)
+        if key not in self._status_wires:
+            self._status_wires = {
+                other: wire for other, wire in self._status_wires.items() if other[1] == now_s
+            }
+            self._status_wires[key] = status_frame(self._status_at(now_s), encoding)
+        return self._status_wires[key]
 
     def _write(self, client: Client, wire: bytes, now_s: float) -> bool:
         if not client.connection.can_take:

@@ -60,12 +60,12 @@ async def ws_state(websocket: WebSocket) -> None:
     responses={200: {"model": schema.TwinState}, **_UNAVAILABLE},
 )
 async def state(request: Request) -> Response:
-    """The newest TwinState with the message's own field names."""
+    """The newest TwinState with the message's own field names, and ages as of this answer."""
     bridge = bridge_of(request)
     latest = bridge.latest
     if latest is None:
         return error_response(_NO_TWIN, 503)
-    return json_response(bridge.frames.json.state(latest.snapshot))
+    return json_response(bridge.frames.json.state(latest.snapshot, bridge.ros_time_ns))
 
 
 # An id may hold a slash, which is decoded before the routes are tried: hence :path, and the longer
@@ -103,7 +103,7 @@ async def tag(request: Request, tag_id: str) -> Response:
         return error_response(_NO_TWIN, 503)
     for candidate in latest.snapshot.tags:
         if candidate.tag_id == tag_id:
-            return json_response(bridge.frames.json.tag(candidate, latest.snapshot.stamp_ns))
+            return json_response(bridge.frames.json.tag(candidate, bridge.ros_time_ns))
     return _no_such_tag(tag_id, len(latest.snapshot.tags))
 
 

@@ -90,7 +90,8 @@ class TwinTagState(Contract):
     readings: list[SensorReading]
     last_observed: Time = Field(description="ROS time; 0: discovered and never observed")
     stale_seconds: float | None = Field(
-        description="s since last_observed at header.stamp, never negative; null: never observed"
+        description="s since last_observed, at header.stamp in a frame and now in an HTTP answer; "
+        "never negative; null: never observed"
     )
     species: str
     species_confidence: float | None

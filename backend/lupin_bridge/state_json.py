@@ -32,11 +32,13 @@ class StateJson:
     def __init__(self) -> None:
         self._kept: dict[str, tuple[TagState, bytes, bytes]] = {}
 
-    def state(self, snapshot: Snapshot) -> bytes:
-        """The snapshot as JSON of `schema.TwinState`."""
+    def state(self, snapshot: Snapshot, now_ns: int | None = None) -> bytes:
+        """The snapshot as JSON of `schema.TwinState`, ages as of `now_ns`, or of its own time."""
+        if now_ns is None:
+            now_ns = snapshot.stamp_ns
         return b'{"header":%b,"tags":[%b]}' % (
             orjson.dumps(header(snapshot.stamp_ns, snapshot.frame_id)),
-            b",".join([self.tag(tag, snapshot.stamp_ns) for tag in snapshot.tags]),
+            b",".join([self.tag(tag, now_ns) for tag in snapshot.tags]),
         )
 
     def tag(self, tag: TagState, now_ns: int) -> bytes:

@@ -10,7 +10,7 @@ export interface paths {
         };
         /**
          * The current state of every tag
-         * @description The newest TwinState with the message's own field names.
+         * @description The newest TwinState with the message's own field names, and ages as of this answer.
          */
         readonly get: operations["state_api_state_get"];
         readonly put?: never;
@@ -557,7 +557,7 @@ export interface components {
             readonly last_observed: components["schemas"]["Time"];
             /**
              * Stale Seconds
-             * @description s since last_observed at header.stamp, never negative; null: never observed
+             * @description s since last_observed, at header.stamp in a frame and now in an HTTP answer; never negative; null: never observed
              */
             readonly stale_seconds: number | null;
             /** Species */

@@ -9,6 +9,7 @@ import './styles/legend.css';
 import './styles/health.css';
 import './styles/table.css';
 import './styles/card.css';
+import './styles/hover.css';
 import './styles/kiosk.css';
 import './styles/frozen.css';
 import './styles/print.css';

@@ -140,8 +140,8 @@ export const S = {
   card: (tag: string): string => `Tag ${tag}`,
   cardClose: 'Close',
   cardGone: 'The twin does not list this tag (any more).',
-  cardAge: (age: string): string => `Observed ${age} ago`,
   cardShow: 'Show on map',
+  cardMore: (count: number): string => `${count} more`,
   cardNoReadings: 'No readings yet.',
   cardHistory: (count: number, from: string, to: string): string =>
     `Last ${count} readings, between ${from} and ${to}`,

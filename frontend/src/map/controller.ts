@@ -1,9 +1,12 @@
 /** Ties the map's canvases to the store: draws what changed, once a frame, and nothing else. */
 import { DARK, LIGHT } from '../draw/palette';
 import { PULSE_MS, type Pulse } from '../draw/overlay';
+import { pinRadius } from '../draw/pins';
+import type { Pin } from '../draw/scene';
 import {
   boundsOf,
   canvasPoint,
+  toCanvas,
   toMap,
   type Bounds,
   type CanvasPoint,
@@ -17,7 +20,7 @@ import { isDark, onThemeChange } from '../store/theme';
 import { MapCamera } from './camera';
 import { onMapCommand, type MapCommand } from './commands';
 import { Painter, type Canvases } from './painter';
-import { pointedAt } from './pointer';
+import { pinUnderMouse, pointedAt } from './pointer';
 
 /** A finger hits a pin from this far, a mouse from a bit less; CSS pixels. */
 const TOUCH_REACH = 26;
@@ -38,6 +41,8 @@ export function runMap(element: HTMLElement, canvases: Canvases): () => void {
   const camera = new MapCamera(element, {
     onView: (view) => {
       publish(view);
+      // The pin has moved away from under the mouse.
+      pinUnderMouse.dispatch(null);
       spoil('view');
     },
     onCamera: (chosen) => {
@@ -112,10 +117,23 @@ export function runMap(element: HTMLElement, canvases: Canvases): () => void {
     }
   };
 
-  const tagAt = (point: CanvasPoint, reach: number): string | null => {
+  const pinAt = (point: CanvasPoint, reach: number): Pin | null => {
     if (!store.get().view.layers.has('pins')) return null;
     const { pins } = painter.scene(store.get(), performance.now());
-    return nearest(pins, camera.view, point, reach)?.id ?? null;
+    return nearest(pins, camera.view, point, reach);
+  };
+
+  const hover = (pin: Pin | null): void => {
+    act({ type: 'hover', tagId: pin?.id ?? null });
+    const { view, size } = camera;
+    pinUnderMouse.dispatch(
+      pin && {
+        tagId: pin.id,
+        at: toCanvas(view, pin.at),
+        reach: pinRadius(view.scale),
+        within: size,
+      },
+    );
   };
 
   const pointOf = (event: PointerEvent | MouseEvent): CanvasPoint => {
@@ -127,20 +145,20 @@ export function runMap(element: HTMLElement, canvases: Canvases): () => void {
     if (event.pointerType === 'touch') return;
     const point = pointOf(event);
     pointedAt.dispatch(toMap(camera.view, point));
-    const hovered = event.buttons === 0 ? tagAt(point, MOUSE_REACH) : null;
-    act({ type: 'hover', tagId: hovered });
-    const hand = hovered === null ? 'grab' : 'point';
+    const pin = event.buttons === 0 ? pinAt(point, MOUSE_REACH) : null;
+    hover(pin);
+    const hand = pin === null ? 'grab' : 'point';
     if (element.dataset['hand'] !== hand) element.dataset['hand'] = hand;
   };
   const onPointerLeave = (): void => {
     pointedAt.dispatch(crosshair ? centre() : null);
-    act({ type: 'hover', tagId: null });
+    hover(null);
   };
   const onClick = (event: MouseEvent): void => {
     const isTouch = event instanceof PointerEvent && event.pointerType === 'touch';
     const point = pointOf(event);
     if (isTouch) pointedAt.dispatch(toMap(camera.view, point));
-    act({ type: 'select', tagId: tagAt(point, isTouch ? TOUCH_REACH : MOUSE_REACH) });
+    act({ type: 'select', tagId: pinAt(point, isTouch ? TOUCH_REACH : MOUSE_REACH)?.id ?? null });
   };
   const setCrosshair = (on: boolean): void => {
     crosshair = on;
@@ -158,7 +176,7 @@ export function runMap(element: HTMLElement, canvases: Canvases): () => void {
     if (!crosshair) setCrosshair(true);
     if (event.key === 'Enter' || event.key === ' ') {
       const { width, height } = camera.size;
-      act({ type: 'select', tagId: tagAt(canvasPoint(width / 2, height / 2), 60) });
+      act({ type: 'select', tagId: pinAt(canvasPoint(width / 2, height / 2), 60)?.id ?? null });
       event.preventDefault();
       return;
     }

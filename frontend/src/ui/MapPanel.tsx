@@ -3,6 +3,7 @@ import type { JSX } from 'react';
 import { MapView } from '../map/MapView';
 import { useApp } from '../store/app';
 import { S } from '../strings';
+import { HoverCard } from './HoverCard';
 import { Legend } from './Legend';
 import { MapControls } from './MapControls';
 import { Notices } from './Notices';
@@ -20,6 +21,7 @@ export function MapPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
         {!kiosk && <MapControls />}
         <ScaleBar />
         <Readout />
+        <HoverCard />
       </div>
       <Legend kiosk={kiosk} />
     </section>

@@ -1,0 +1,86 @@
+import { act as flush, render, screen } from '@testing-library/react';
+import { beforeEach, describe, expect, test, vi } from 'vitest';
+
+import { canvasPoint } from '../geometry/coordinates';
+import { pinUnderMouse } from '../map/pointer';
+import { act } from '../store/app';
+import { showTags } from '../testing/page';
+import { readings, wireTag } from '../testing/tags';
+import { HoverCard } from './HoverCard';
+
+const point = (tagId: string | null, x = 100): void => {
+  flush(() => {
+    pinUnderMouse.dispatch(
+      tagId === null
+        ? null
+        : { tagId, at: canvasPoint(x, 80), reach: 9, within: { width: 600, height: 400 } },
+    );
+  });
+};
+const card = (): HTMLElement | null => screen.queryByTestId('hover-card');
+
+beforeEach(() => {
+  point(null);
+  showTags([
+    wireTag({
+      tag_id: '7',
+      readings: readings({ humidity: 60, co2: null, temperature: 40 }),
+      species: 'lupin',
+      anomaly: true,
+      bug_count: 2,
+    }),
+    wireTag({
+      tag_id: 'many',
+      readings: readings(Object.fromEntries(Array.from({ length: 11 }, (_, i) => [`s${i}`, i]))),
+    }),
+  ]);
+});
+
+describe('card of the pin under the mouse', () => {
+  test('tells in short what the tag’s card tells, the chosen sensor first', () => {
+    render(<HoverCard />);
+    expect(card()).toBeNull();
+    point('7');
+    const text = card()?.textContent;
+    expect(text).toContain('Tag 7Critical');
+    expect(text).toContain('Pest2 bugs');
+    expect(text).toMatch(/Temperature40\.0\u00a0°CHumidity60\.0\u00a0%CO₂failedAge\d\u00a0s/);
+    expect(text).toContain('lupin');
+    point(null);
+    expect(card()).toBeNull();
+  });
+
+  test('is for the eyes alone, and stands beside the pin', () => {
+    render(<HoverCard />);
+    point('7');
+    expect(card()?.getAttribute('aria-hidden')).toBe('true');
+    expect(card()?.style.transform).toBe('translate(119px, 80px)');
+    point('7', 200);
+    expect(card()?.style.transform).toBe('translate(219px, 80px)');
+  });
+
+  test('a tag of many sensors does not grow out of the map', () => {
+    render(<HoverCard />);
+    point('many');
+    expect(card()?.querySelectorAll('[data-sensor]')).toHaveLength(8);
+    expect(card()?.textContent).toContain('3 more');
+  });
+
+  test('the chosen tag has its own card already', () => {
+    render(<HoverCard />);
+    act({ type: 'select', tagId: '7' });
+    point('7');
+    expect(card()).toBeNull();
+  });
+
+  test('a mouse that moves about on one pin changes nothing', () => {
+    point('7');
+    const listener = vi.fn();
+    const stop = pinUnderMouse.subscribe(listener);
+    point('7');
+    expect(listener).not.toHaveBeenCalled();
+    point('7', 101);
+    expect(listener).toHaveBeenCalledTimes(1);
+    stop();
+  });
+});

@@ -1,0 +1,89 @@
+import { useLayoutEffect, useRef, type JSX } from 'react';
+
+import { readingText } from '../domain/format';
+import { sensorNamed } from '../domain/sensors';
+import { shown } from '../domain/text';
+import type { Tag } from '../domain/twin';
+import { beside } from '../geometry/beside';
+import { pinUnderMouse, type PinUnderMouse } from '../map/pointer';
+import { useApp } from '../store/app';
+import { useSelected } from '../store/create';
+import { selectHealth } from '../store/derived';
+import { S } from '../strings';
+import { HealthMark } from './HealthMark';
+import { Age, PestMark } from './TagRow';
+
+/** A tag may carry any number of sensors; the card that opens with a click has them all. */
+const MOST_READINGS = 8;
+
+/**
+ * A tag in short, beside the pin that the mouse is on. For eyes alone: card and table tell the
+ * same to everybody, and a mouse on its way to somewhere else is not to be held up.
+ */
+export function HoverCard(): JSX.Element | null {
+  const pin = useSelected(pinUnderMouse, (under) => under);
+  const selected = useApp((state) => state.view.selected);
+  const tag = useApp((state) =>
+    pin ? state.twin.snapshot?.tags.find(({ id }) => id === pin.tagId) : undefined,
+  );
+  // The chosen tag's own card is open already.
+  if (!pin || !tag || pin.tagId === selected) return null;
+  return <Brief key={tag.id} pin={pin} tag={tag} />;
+}
+
+function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
+  const root = useRef<HTMLDivElement>(null);
+  const health = useApp((state) => selectHealth(state).byTag.get(tag.id));
+  const unit = useApp((state) => state.settings.unit);
+  const chosen = useApp((state) => state.view.sensor);
+  // Where it fits depends on its size, which is known once it is there and before it is seen.
+  useLayoutEffect(() => {
+    const card = root.current;
+    if (!card) return;
+    const size = { width: card.offsetWidth, height: card.offsetHeight };
+    const { x, y } = beside(pin.at, pin.reach, size, pin.within);
+    card.style.transform = `translate(${Math.round(x)}px, ${Math.round(y)}px)`;
+  });
+  const names = [...tag.readings.keys()].sort(
+    (a, b) => Number(b === chosen) - Number(a === chosen),
+  );
+  const hidden = names.length - MOST_READINGS;
+  return (
+    <div
+      ref={root}
+      className="hover-card"
+      aria-hidden="true"
+      data-testid="hover-card"
+      data-tag-id={tag.id}
+    >
+      <header>
+        <strong>
+          <bdi>{S.card(shown(tag.id, 20))}</bdi>
+        </strong>
+        {health && <HealthMark status={health.status} />}
+      </header>
+      {tag.anomaly && <PestMark count={tag.bugCount} />}
+      <dl>
+        {names.slice(0, MOST_READINGS).map((name) => {
+          const sensor = sensorNamed(name);
+          const value = tag.readings.get(name);
+          return (
+            <div key={name} data-sensor={name} data-chosen={name === chosen}>
+              <dt>{shown(sensor.label, 20)}</dt>
+              <dd>{value == null ? S.sensorFailed : readingText(sensor, value, unit)}</dd>
+            </div>
+          );
+        })}
+        <div>
+          <dt>{S.columns.age}</dt>
+          <dd>
+            <Age observedAt={tag.observedAt} />
+          </dd>
+        </div>
+      </dl>
+      {hidden > 0 && <p className="faint">{S.cardMore(hidden)}</p>}
+      {names.length === 0 && <p className="faint">{S.cardNoReadings}</p>}
+      <p className="faint">{tag.species ? <bdi>{shown(tag.species, 28)}</bdi> : S.unclassified}</p>
+    </div>
+  );
+}

@@ -1,0 +1,101 @@
+"""The mouse on a pin: a card in short, which is never in the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import Locator, expect
+
+from tests.browser.hmi import PHONE, Hmi
+from tests.browser.house import TAGS
+from tests.support.web import Bridge
+
+OpenPage = Callable[..., Hmi]
+# Where the pins of `house.py` are.
+PINS = {"10": (1, 3), "1": (1, 1), "2": (3, 1), "3": (3, 3), "seen": (4, 2)}
+
+
+def hover_card(hmi: Hmi) -> Locator:
+    return hmi.test_id("hover-card")
+
+
+@pytest.fixture
+def hmi(house: Bridge, open_page: OpenPage) -> Hmi:
+    page = open_page(house.url)
+    page.expect_rows(*TAGS)
+    page.expect_samples(3)
+    page.settled_picture()
+    return page
+
+
+def test_the_mouse_on_a_pin_shows_its_card_in_short(hmi: Hmi) -> None:
+    hmi.point_at(1, 3)
+    card = hover_card(hmi)
+    expect(card).to_have_attribute("data-tag-id", "10")
+    for text in ("Tag 10", "Stressed", "31.0\u00a0°C", "40.0\u00a0%", "Age", "lupin", "3 bugs"):
+        expect(card).to_contain_text(text)
+    assert card.locator("[data-health=stressed] svg").count() == 1
+    # Table and card carry the same for those who do not see it.
+    expect(card).to_have_attribute("aria-hidden", "true")
+    hmi.point_at(2, 2.4)
+    expect(card).to_have_count(0)
+    hmi.point_at(1, 3)
+    expect(card).to_be_visible()
+    hmi.page.get_by_role("searchbox").hover()
+    expect(card).to_have_count(0)
+
+
+@pytest.mark.parametrize("fragment", ["", "view=1,2,2.2", "view=3,2,2.2"])
+def test_it_stands_inside_the_map_and_off_its_pin(hmi: Hmi, fragment: str) -> None:
+    if fragment:
+        hmi.go(fragment)
+        hmi.expect_samples(3)
+        hmi.settled_picture()
+    frame = hmi.map.bounding_box()
+    assert frame is not None
+    view, seen = hmi.view(), 0
+    for tag_id, at in PINS.items():
+        x, y = view.pixel(*at)
+        under = "([x, y]) => !!document.elementFromPoint(x, y)?.closest('#map-view')"
+        if not hmi.page.evaluate(under, [frame["x"] + x, frame["y"] + y]):
+            continue  # out of sight, or under a button
+        hmi.point_at(*at)
+        expect(hover_card(hmi)).to_have_attribute("data-tag-id", tag_id)
+        box = hover_card(hmi).bounding_box()
+        assert box is not None
+        left, top = box["x"] - frame["x"], box["y"] - frame["y"]
+        assert left >= 0
+        assert top >= 0
+        assert left + box["width"] <= frame["width"]
+        assert top + box["height"] <= frame["height"]
+        covers = left <= x <= left + box["width"] and top <= y <= top + box["height"]
+        assert not covers
+        seen += 1
+    assert seen >= 2
+
+
+def test_it_goes_when_the_map_moves_and_lets_every_click_through(hmi: Hmi) -> None:
+    hmi.point_at(1, 3)
+    expect(hover_card(hmi)).to_be_visible()
+    assert hover_card(hmi).evaluate("card => getComputedStyle(card).pointerEvents") == "none"
+    hmi.page.mouse.wheel(0, -120)
+    expect(hover_card(hmi)).to_have_count(0)
+    hmi.point_at(1, 3)
+    expect(hover_card(hmi)).to_be_visible()
+    # The tag's own card says it all.
+    hmi.click_map(1, 3)
+    expect(hmi.card("10")).to_be_visible()
+    expect(hover_card(hmi)).to_have_count(0)
+
+
+def test_a_finger_gets_the_tags_card_alone(house: Bridge, open_page: OpenPage) -> None:
+    phone = open_page(house.url, viewport=PHONE, has_touch=True, is_mobile=True)
+    phone.expect_samples(3)
+    phone.settled_picture()
+    x, y = phone.view().pixel(1, 3)
+    phone.map.tap(position={"x": x, "y": y})
+    expect(phone.card("10")).to_be_visible()
+    phone.page.get_by_role("button", name="Close").first.tap()
+    expect(phone.card("10")).to_have_count(0)
+    expect(hover_card(phone)).to_have_count(0)

@@ -92,6 +92,7 @@ export const S = {
   legendTransparent:
     'Colour grows from the minimum to the maximum. No colour: the minimum, or not known; ' +
     'point at the map to tell.',
+  legendTransparentShort: 'No colour: the minimum, or not known',
   legendIdeal: (low: string, high: string): string => `ideal ${low} to ${high}`,
   legendSpecies: 'Species',
   legendUnknownSpecies: 'Not classified',

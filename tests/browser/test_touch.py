@@ -96,15 +96,16 @@ def test_a_narrow_screen_shows_one_half_at_a_time_and_nothing_sticks_out(phone: 
 
 
 def test_what_a_finger_has_to_hit_is_large_enough(phone: Hmi) -> None:
+    phone.page.get_by_role("radio", name="Fixed").check()
     for pane in ("Map", "Tags"):
         phone.page.get_by_role("navigation").get_by_role("button", name=pane).tap()
-        # WCAG 2.2, 2.5.8: 24 pixels at least.
+        # WCAG 2.2, 2.5.5, and what phones ask for; text that is a link among them is as high.
         small = phone.page.evaluate(
             """() => [...document.querySelectorAll('button, a, label, select, input')]
               .filter((e) => e.checkVisibility() && !e.closest('.unseen, .skip, .row-button'))
               .filter((e) => !(e.tagName === 'INPUT' && e.closest('label')))
               .map((e) => [e, e.getBoundingClientRect()])
-              .filter(([, box]) => box.width > 0 && (box.width < 24 || box.height < 24))
+              .filter(([, box]) => box.width > 0 && (box.width < 44 || box.height < 44))
               .map(([e, box]) => `${e.textContent || e.ariaLabel} ${box.width}x${box.height}`)"""
         )
         assert small == []

@@ -39,7 +39,9 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
           {samples > 0 ? S.legendTags(samples) : isFetching ? S.legendFetching : S.legendNoTags}
         </span>
         {quality?.sensor_type === name && <Quality quality={quality} sensor={sensor} unit={unit} />}
+        {/* One of the two is displayed. */}
         <span className="legend-note">{S.legendTransparent}</span>
+        <span className="legend-note short">{S.legendTransparentShort}</span>
       </div>
       <Keys />
       {!kiosk && <RangeControl sensor={sensor} range={range} />}

@@ -19,7 +19,7 @@ export function RangeControl({
   const unit = useApp((state) => state.settings.unit);
   const { ideal } = sensor;
   return (
-    <div className="range">
+    <div className="range" data-fixed={fixed !== null}>
       <Segmented
         legend={S.range}
         value={fixed ? 'fixed' : 'auto'}

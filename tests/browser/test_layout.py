@@ -1,0 +1,113 @@
+"""Every size of window, every setting of the eye: all is there, in its place, and can be hit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.hmi import PHONE, Hmi
+from tests.support.web import Bridge
+
+OpenPage = Callable[..., Hmi]
+Size = tuple[int, int]
+
+# A laptop of 1440 × 900 zoomed to 200 %; a phone on its side.
+ZOOMED, LANDSCAPE = (720, 450), (740, 360)
+LOW = (ZOOMED, LANDSCAPE, (1280, 540))
+SIZES = ((360, 740), (820, 1180), (1440, 900), (1920, 1080), *LOW)
+
+CONTROLS = "button, a[href]:not(.skip), input, .legend li, .legend-title, .legend-facts span"
+
+# What somebody could not hit of all that matches: it lies below something else, or out of sight.
+_OUT_OF_REACH = """(selector) => [...document.querySelectorAll(selector)]
+  .filter((e) => e.checkVisibility())
+  .filter((e) => {
+    e.scrollIntoView({ block: 'nearest', inline: 'nearest' });
+    const box = e.getBoundingClientRect();
+    const hit = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+    const thing = 'label, button, a, li, tr';
+    return !(hit && (e.contains(hit) || e.closest(thing) === (hit.closest(thing) ?? hit)));
+  })
+  .map((e) => e.ariaLabel || e.textContent || e.outerHTML)"""
+
+
+def out_of_reach(hmi: Hmi, selector: str) -> list[str]:
+    found = hmi.page.evaluate(_OUT_OF_REACH, selector)
+    assert isinstance(found, list)
+    return found
+
+
+@pytest.fixture
+def open_at(house: Bridge, open_page: OpenPage) -> Callable[..., Hmi]:
+    """`open_at(size, fragment, query, **options)`: the house in a window of that size."""
+
+    def open_one(size: Size, fragment: str = "", query: str = "", **options: object) -> Hmi:
+        viewport = {"width": size[0], "height": size[1]}
+        hmi = open_page(house.url, fragment, query, viewport=viewport, **options)
+        expect(hmi.test_id("sample-count")).to_contain_text("contribut")
+        return hmi
+
+    return open_one
+
+
+def show_tags(hmi: Hmi) -> None:
+    """Go to the table, where the window shows one of the two."""
+    tabs = hmi.page.locator(".pane-tabs")
+    if tabs.is_visible():
+        tabs.get_by_role("button", name="Tags").click()
+    expect(hmi.row("1")).to_be_visible()
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_everything_can_be_hit(open_at: Callable[..., Hmi], size: Size) -> None:
+    hmi = open_at(size)
+    for mode in ("Auto", "Fixed"):
+        hmi.page.get_by_role("radio", name=mode).check()
+        # A house of ten metres is not told from a stamp.
+        assert hmi.map.evaluate("map => map.clientHeight") >= 200
+        assert out_of_reach(hmi, CONTROLS) == []
+    hmi.page.get_by_role("button", name="Layers").click()
+    assert out_of_reach(hmi, ".layers .check") == []
+    assert len(hmi.page.locator(".layers .check").all()) == 8
+    hmi.page.keyboard.press("Escape")
+    show_tags(hmi)
+    assert out_of_reach(hmi, "tbody tr, .filter-bar *:not(.unseen), .health button") == []
+
+
+def test_each_layer_is_switched_by_touch_on_a_phone(open_at: Callable[..., Hmi]) -> None:
+    hmi = open_at((PHONE["width"], PHONE["height"]), has_touch=True, is_mobile=True)
+    hmi.page.get_by_role("button", name="Layers").tap()
+    for box in hmi.page.get_by_role("checkbox").all():
+        was_on = box.is_checked()
+        box.locator("..").tap()
+        expect(box).to_be_checked(checked=not was_on)
+
+
+@pytest.mark.parametrize("size", LOW, ids=str)
+def test_a_low_window_has_the_legend_beside_the_map(
+    open_at: Callable[..., Hmi], size: Size
+) -> None:
+    hmi = open_at(size)
+    legend, frame = hmi.test_id("legend").bounding_box(), hmi.map.bounding_box()
+    assert legend is not None
+    assert frame is not None
+    assert legend["x"] >= frame["x"] + frame["width"]
+
+
+def test_a_phone_has_the_facts_as_well(open_at: Callable[..., Hmi]) -> None:
+    hmi = open_at((PHONE["width"], PHONE["height"]))
+    legend = hmi.test_id("legend")
+    expect(legend.get_by_text("not known", exact=False).locator("visible=true")).to_have_count(1)
+    expect(legend).to_contain_text("3 tags contribute")
+
+
+def test_a_fixed_range_leaves_the_title_alone_on_a_phone(open_at: Callable[..., Hmi]) -> None:
+    hmi = open_at((PHONE["width"], PHONE["height"]), "sensor=soil_moisture")
+    hmi.page.get_by_role("radio", name="Fixed").check()
+    title = hmi.page.locator(".legend-title").bounding_box()
+    control = hmi.page.locator(".range").bounding_box()
+    assert title is not None
+    assert control is not None
+    assert title["y"] + title["height"] <= control["y"]

@@ -10,6 +10,7 @@ import './styles/health.css';
 import './styles/table.css';
 import './styles/card.css';
 import './styles/hover.css';
+import './styles/bound.css';
 import './styles/kiosk.css';
 import './styles/frozen.css';
 import './styles/print.css';

@@ -106,6 +106,9 @@ export const S = {
   rangeLow: 'Lowest',
   rangeHigh: 'Highest',
   rangeIdeal: 'Use ideal range',
+  rangeNotBelow: (high: string): string => `Not below ${high}: not in use`,
+  rangeNotAbove: (low: string): string => `Not above ${low}: not in use`,
+  rangeNoNumber: 'No number: not in use',
   fieldFailed: (reason: string): string => `The heat map could not be fetched: ${reason}`,
 
   tags: 'Tags',

@@ -78,6 +78,24 @@ def test_a_fixed_range_stays_when_the_data_would_have_another(hmi: Hmi) -> None:
     expect(hmi.test_id("range-high")).to_have_text("31.0\u00a0°C")
 
 
+def test_a_bound_that_cannot_be_says_so_and_does_not_stay(hmi: Hmi) -> None:
+    hmi.page.get_by_role("radio", name="Fixed").check()
+    low, legend = hmi.page.get_by_label("Lowest °C"), hmi.test_id("range-low")
+    high = hmi.test_id("range-high").inner_text()
+    was, in_force = low.input_value(), legend.inner_text()
+    low.fill("99")
+    expect(low).to_have_attribute("aria-invalid", "true")
+    expect(hmi.page.get_by_role("alert")).to_have_text(f"Not below {high}: not in use")
+    low.press("Escape")
+    expect(low).to_have_value(was)
+    low.fill("")
+    expect(low).to_have_attribute("aria-invalid", "true")
+    low.blur()
+    expect(low).to_have_value(was)
+    expect(low).to_have_attribute("aria-invalid", "false")
+    expect(legend).to_have_text(in_force)
+
+
 # --- table --------------------------------------------------------------------------------------
 
 

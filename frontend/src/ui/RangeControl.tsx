@@ -1,10 +1,11 @@
-import { useId, type JSX } from 'react';
+import type { JSX } from 'react';
 
+import { readingText } from '../domain/format';
 import type { Range } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
-import { fromShown, toShown, unitOf, type TemperatureUnit } from '../domain/units';
 import { act, useApp } from '../store/app';
 import { S } from '../strings';
+import { Bound } from './Bound';
 import { Segmented } from './Segmented';
 
 /** Automatic colours follow the data; a fixed range lets two moments be compared. */
@@ -38,8 +39,11 @@ export function RangeControl({
             sensor={sensor}
             unit={unit}
             value={fixed.low}
+            refusal={(low) =>
+              low < fixed.high ? null : S.rangeNotBelow(readingText(sensor, fixed.high, unit))
+            }
             onChange={(low) => {
-              if (low < fixed.high) act({ type: 'range', range: { ...fixed, low } });
+              act({ type: 'range', range: { ...fixed, low } });
             }}
           />
           <Bound
@@ -47,8 +51,11 @@ export function RangeControl({
             sensor={sensor}
             unit={unit}
             value={fixed.high}
+            refusal={(high) =>
+              high > fixed.low ? null : S.rangeNotAbove(readingText(sensor, fixed.low, unit))
+            }
             onChange={(high) => {
-              if (high > fixed.low) act({ type: 'range', range: { ...fixed, high } });
+              act({ type: 'range', range: { ...fixed, high } });
             }}
           />
           {ideal && (
@@ -81,44 +88,4 @@ export function startingRange({ ideal }: Sensor, range: Range | null): Range {
   }
   if (ideal) return { low: ideal[0], high: ideal[1] };
   return range ? { low: range.low - 1, high: range.high + 1 } : { low: 0, high: 1 };
-}
-
-function Bound({
-  label,
-  sensor,
-  unit,
-  value,
-  onChange,
-}: {
-  label: string;
-  sensor: Sensor;
-  unit: TemperatureUnit;
-  value: number;
-  onChange: (value: number) => void;
-}): JSX.Element {
-  const id = useId();
-  const text = String(Number(toShown(sensor, value, unit).toFixed(2)));
-  return (
-    <span className="bound">
-      <label htmlFor={id}>
-        {label}
-        <span className="unseen"> {unitOf(sensor, unit)}</span>
-      </label>
-      <input
-        id={id}
-        // A new value from outside replaces what was being typed.
-        key={text}
-        type="number"
-        step="any"
-        defaultValue={text}
-        onBlur={(event) => {
-          const typed = event.target.valueAsNumber;
-          if (Number.isFinite(typed)) onChange(fromShown(sensor, typed, unit));
-        }}
-        onKeyDown={(event) => {
-          if (event.key === 'Enter') event.currentTarget.blur();
-        }}
-      />
-    </span>
-  );
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -56,7 +57,7 @@ def test_the_same_file_means_the_same_to_both(
         web.tag("c")
         wait_for(lambda: web.get("/api/map").status_code == 200, "the map")
 
-        asked = {"sensor_type": "co2", "resolution": 0.25}
+        asked: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.25}
         # The box is web's, the values are the twin's.
         field = web.get("/api/field", **asked).json()
         assert (field["origin_x"], field["origin_y"]) == (-REACH_M, -REACH_M)

@@ -3,15 +3,15 @@
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
-from launch.actions import DeclareLaunchArgument
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from launch import LaunchDescription
+from launch import LaunchContext, LaunchDescription
 
 
 def generate_launch_description() -> LaunchDescription:
-    """One node, its parameters from a file, and the clock to go by."""
+    """One node, its parameters from a file, and the clock to go by where it is given here."""
     default_params = Path(get_package_share_directory("lupin_twin")) / "config" / "twin.yaml"
     return LaunchDescription(
         [
@@ -19,17 +19,26 @@ def generate_launch_description() -> LaunchDescription:
                 "params_file", default_value=str(default_params), description="parameters, YAML"
             ),
             DeclareLaunchArgument(
-                "use_sim_time", default_value="false", description="follow /clock"
+                "use_sim_time",
+                default_value="",
+                description="true follows /clock; not given: what the file says",
             ),
-            Node(
-                package="lupin_twin",
-                executable="twin_node",
-                name="lupin_twin",
-                output="screen",
-                parameters=[
-                    LaunchConfiguration("params_file"),
-                    {"use_sim_time": LaunchConfiguration("use_sim_time")},
-                ],
-            ),
+            OpaqueFunction(function=twin),
         ]
     )
+
+
+def twin(context: LaunchContext) -> list[Node]:
+    """The node. What stands after the file overrides it, so only what was given stands there."""
+    parameters = [LaunchConfiguration("params_file")]
+    if LaunchConfiguration("use_sim_time").perform(context):
+        parameters.append({"use_sim_time": LaunchConfiguration("use_sim_time")})
+    return [
+        Node(
+            package="lupin_twin",
+            executable="twin_node",
+            name="lupin_twin",
+            output="screen",
+            parameters=parameters,
+        )
+    ]

@@ -1,0 +1,94 @@
+"""The wire format: names, types and order are shared with the robot's own packages, for good."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "ros_node" / "lupin_msgs"
+
+# Written from the contract, not from the files. `---` parts request and response.
+WIRE_FORMAT = {
+    "msg/SensorReading.msg": "string name · float64 value",
+    "msg/TagReading.msg": (
+        "string tag_id · builtin_interfaces/Time stamp · float64 sim_time_of_day_seconds · "
+        "SensorReading[] readings"
+    ),
+    "msg/FlowerPoint.msg": (
+        "geometry_msgs/Point position · float32 height_m · string species · float32 confidence · "
+        "bool anomaly"
+    ),
+    "msg/FlowerObservation.msg": (
+        "string tag_id · geometry_msgs/PoseStamped pose · string species · float32 confidence · "
+        "bool anomaly · uint16 flower_count · uint16 bug_count · FlowerPoint[] flowers · "
+        "geometry_msgs/Polygon box_footprint"
+    ),
+    "msg/AnomalyReport.msg": (
+        "geometry_msgs/PoseStamped pose · string description · uint8 severity"
+    ),
+    "msg/Observation.msg": (
+        "std_msgs/Header header · string mission_id · string source · "
+        "uint8 KIND_TAG_READING=0 · uint8 KIND_FLOWER=1 · uint8 KIND_ANOMALY=2 · uint8 kind · "
+        "uint8 STATUS_OK=0 · uint8 STATUS_UNREACHABLE=1 · uint8 STATUS_SCAN_FAILED=2 · "
+        "uint8 STATUS_SKIPPED=3 · uint8 status · string status_detail · "
+        "TagReading tag_reading · FlowerObservation flower · AnomalyReport anomaly · "
+        "geometry_msgs/Pose tag_pose_in_map"
+    ),
+    "msg/DiscoveredTag.msg": (
+        "string tag_id · geometry_msgs/Pose pose_in_map · string species · "
+        "float32 species_confidence · bool anomaly · uint32 sightings"
+    ),
+    "msg/DiscoveredTags.msg": "std_msgs/Header header · DiscoveredTag[] tags",
+    "msg/TwinTagState.msg": (
+        "string tag_id · geometry_msgs/Pose pose · SensorReading[] readings · "
+        "builtin_interfaces/Time last_observed · float32 stale_seconds · string species · "
+        "float32 species_confidence · bool anomaly · uint16 flower_count · uint16 bug_count · "
+        "FlowerPoint[] flowers · geometry_msgs/Polygon box_footprint"
+    ),
+    "msg/TwinState.msg": "std_msgs/Header header · TwinTagState[] tags",
+    "srv/GetField.srv": (
+        "string sensor_type · float32 resolution · float32 bbox_min_x · float32 bbox_min_y · "
+        "float32 bbox_max_x · float32 bbox_max_y · --- · bool ok · string error_message · "
+        "float32[] values · uint32 width · uint32 height · float32 origin_x · float32 origin_y · "
+        "float32 resolution_used · float32 value_min · float32 value_max · uint32 sample_count"
+    ),
+}
+
+
+_KINDS = (".msg", ".srv", ".action")
+
+
+def lines_of(name: str) -> list[str]:
+    return (PACKAGE / name).read_text(encoding="utf-8").splitlines()
+
+
+def test_there_are_these_interfaces_and_no_others_and_all_are_built() -> None:
+    files = {p.relative_to(PACKAGE).as_posix() for p in PACKAGE.glob("*/*") if p.suffix in _KINDS}
+    assert files == set(WIRE_FORMAT)
+    cmake = (PACKAGE / "CMakeLists.txt").read_text(encoding="utf-8")
+    built = re.findall(r"^ +((?:msg|srv|action)/\w+\.\w+)$", cmake, re.MULTILINE)
+    assert sorted(built) == sorted(WIRE_FORMAT)
+
+
+@pytest.mark.parametrize("name", WIRE_FORMAT)
+def test_names_types_order_and_constants_are_the_contracts(name: str) -> None:
+    declared = [" ".join(line.partition("#")[0].split()) for line in lines_of(name)]
+    assert [line for line in declared if line] == WIRE_FORMAT[name].split(" · ")
+
+
+@pytest.mark.parametrize("name", WIRE_FORMAT)
+def test_every_field_has_a_comment_and_so_has_the_whole(name: str) -> None:
+    lines = lines_of(name)
+    assert lines[0].startswith("# ")
+    bare = [
+        line
+        for before, line in zip(["", *lines], lines, strict=False)
+        if line
+        and "=" not in line.partition("#")[0]
+        and line != "---"
+        and "#" not in line
+        and not before.startswith("#")
+    ]
+    assert bare == []

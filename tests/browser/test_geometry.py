@@ -294,3 +294,30 @@ def test_nothing_that_arrives_takes_the_map_out_of_the_operators_hand(
         running.peer.observe(scan("later", {"co2": 2.0}, at=(30, 20)))
         expect(hmi.row("later")).to_be_visible()
         assert hmi.view() == held
+
+
+# Tells of each label what its picture's width is, and how wide its text came out in it.
+WATCH_LABELS = """
+  const paint = CanvasRenderingContext2D.prototype.fillText;
+  window.labels = [];
+  CanvasRenderingContext2D.prototype.fillText = function (text, ...place) {
+    const isLabel = this.font.includes('11.5px');
+    if (isLabel) labels.push([text, this.canvas.width, this.measureText(text).width]);
+    return paint.call(this, text, ...place);
+  };
+"""
+
+
+def test_a_label_is_as_wide_as_its_text(house: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(house.url, go=False)
+    hmi.page.add_init_script(WATCH_LABELS)
+    hmi.go()
+    hmi.expect_samples(3)
+    hmi.settled_picture()
+    # Once more, with the font that has come meanwhile.
+    hmi.page.evaluate("labels.length = 0")
+    hmi.page.emulate_media(color_scheme="dark")
+    hmi.expect(lambda: hmi.page.evaluate("labels.length") >= 5, "all labels painted anew")
+    for text, picture, wide in hmi.page.evaluate("labels"):
+        # 5 pixels of padding on each side, and all of it in whole pixels.
+        assert picture == math.ceil(wide) + 10, text

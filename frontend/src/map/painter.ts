@@ -25,7 +25,14 @@ import {
   fieldPlacement,
   tintMap,
 } from '../draw/still';
-import { canvasOfPixels, clear, contextOf, Sprites, type Surface } from '../draw/surface';
+import {
+  canvasOfPixels,
+  clear,
+  contextOf,
+  newCanvas,
+  Sprites,
+  type Surface,
+} from '../draw/surface';
 import type { Size, View } from '../geometry/coordinates';
 import { placeLabels } from '../geometry/declutter';
 import type { AppState } from '../store/app';
@@ -54,7 +61,9 @@ export class Painter {
   #ratio = 1;
   #palette: Palette;
   #sprites = new Sprites(1);
-  readonly #measure = new Map<string, number>();
+  #widths = new Map<string, number>();
+  // Like those of the sprites: a canvas in the page inherits the style sheet's font features.
+  readonly #ruler = contextOf(newCanvas(1, 1));
   readonly #stillBuffer = new PanBuffer();
   readonly #pinBuffer = new PanBuffer();
 
@@ -83,7 +92,7 @@ export class Painter {
     this.#stillBuffer.spoil();
     this.#pinBuffer.spoil();
     this.#sprites = new Sprites(this.#ratio);
-    this.#measure.clear();
+    this.#widths = new Map();
   }
 
   #surface(canvas: HTMLCanvasElement): Surface {
@@ -136,7 +145,8 @@ export class Painter {
     const colour = sensorColour(sensorNamed(state.view.sensor));
     drawPins(surface, view, scene.pins, colour, this.#sprites, this.#palette);
     if (!layers.has('labels')) return;
-    const labels = this.#labels(scene, view.scale, state.view.selected ?? state.view.hovered);
+    const first = state.view.selected ?? state.view.hovered;
+    const labels = this.#labels(scene, view.scale, first, this.#widths);
     drawLabels(surface, view, labels, this.#sprites, this.#palette);
   }
 
@@ -191,21 +201,21 @@ export class Painter {
       }),
   );
 
-  readonly #labels = memoLast((scene: Scene, scale: number, first: string | null) =>
-    placeLabels(
-      labelRequests(scene.pins, scale, first, (text) => this.#widthOf(text)),
-      LABEL_HEIGHT,
-    ),
+  readonly #labels = memoLast(
+    (scene: Scene, scale: number, first: string | null, widths: Map<string, number>) =>
+      placeLabels(
+        labelRequests(scene.pins, scale, first, (text) => this.#widthOf(text, widths)),
+        LABEL_HEIGHT,
+      ),
   );
 
-  #widthOf(text: string): number {
-    const known = this.#measure.get(text);
+  #widthOf(text: string, widths: Map<string, number>): number {
+    const known = widths.get(text);
     if (known !== undefined) return known;
-    if (this.#measure.size > 5_000) this.#measure.clear();
-    const context = contextOf(this.#canvases.pins);
-    context.font = LABEL_FONT;
-    const width = Math.ceil(context.measureText(text).width);
-    this.#measure.set(text, width);
+    if (widths.size > 5_000) widths.clear();
+    this.#ruler.font = LABEL_FONT;
+    const width = Math.ceil(this.#ruler.measureText(text).width);
+    widths.set(text, width);
     return width;
   }
 

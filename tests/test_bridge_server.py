@@ -5,21 +5,35 @@ from __future__ import annotations
 import resource
 import signal
 import socket
-import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from itertools import count
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from lupin_bridge.server import MAX_INBOUND_BYTES, address_of, allow_connections, listen
+from lupin_bridge.cli import IDLE_WORKERS_END_S
+from lupin_bridge.roles import PATROL_STOP_S
+from lupin_bridge.ros_thread import STOP_TIMEOUT_S
+from lupin_bridge.server import (
+    GOODBYE_S,
+    GRACEFUL_SHUTDOWN_S,
+    MAX_INBOUND_BYTES,
+    address_of,
+    allow_connections,
+    listen,
+)
 from tests.support.inprocess import run, running
-from tests.support.waiting import wait_for
-from tests.support.web import Bridge, Listener, bridge, deaf_client, overfill
+from tests.support.live import attached, wait_until_ready
+from tests.support.processes import Process, lupin_twin, twin_node, url_of
+from tests.support.ros import Peer
+from tests.support.sabotage import sabotaged
+from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.web import Bridge, Listener, bridge, deaf_client, listener, overfill
 
+FIELD = "/api/field?sensor_type=co2&resolution=0.5"
 MILLION_CELLS = (
     "/api/field?sensor_type=co2&resolution=0.001"
     "&bbox_min_x=0&bbox_min_y=0&bbox_max_x=1&bbox_max_y=1"
@@ -99,25 +113,27 @@ def test_a_small_write_leaves_at_once(domain: int) -> None:
 
 
 @contextmanager
-def asked_heavily(running_bridge: Bridge) -> Iterator[None]:
-    """One million-cell field after the other is asked for, until the server is gone."""
-    answered = threading.Event()
+def waiting_for(url: str, path: str) -> Iterator[Future[httpx.Response]]:
+    """A client that asks and waits; its answer comes when it comes."""
 
-    def ask() -> None:
-        # Answered, cut off or turned away: that is for the moment of the end to decide.
-        with suppress(httpx.TransportError):
-            for number in count(1):
-                running_bridge.get(f"{MILLION_CELLS}&power={1 + number / 100}")
-                answered.set()
+    def ask() -> httpx.Response:
+        return httpx.get(f"{url}{path}", timeout=PATIENCE_S, trust_env=False)
 
-    client = threading.Thread(target=ask)
-    client.start()
-    try:
-        wait_for(answered.is_set, "a first million-cell field")
-        yield
-    finally:
-        running_bridge.process.kill()
-        client.join()
+    with ThreadPoolExecutor(1) as client:
+        yield client.submit(ask)
+
+
+def assert_sent_away(answer: Future[httpx.Response]) -> None:
+    """Whoever waited for a field at the good-bye knows why it does not come, and what to do."""
+    response = answer.result(PATIENCE_S)
+    assert response.status_code == 503
+    assert response.json() == {"detail": "the bridge is shutting down"}
+    assert response.headers["retry-after"] == "3"
+
+
+def assert_quiet(process: Process) -> None:
+    for word in ("Traceback", "ERROR", "Exception"):
+        assert word not in process.output
 
 
 def last_words(listener: Listener) -> tuple[str, int]:
@@ -187,15 +203,65 @@ def test_a_second_signal_does_no_harm() -> None:
         assert "Traceback" not in running_bridge.process.output
 
 
-def test_neither_a_client_that_does_not_read_nor_a_heavy_request_holds_up_the_end() -> None:
+def test_clients_that_do_not_read_do_not_hold_up_the_end() -> None:
     with (
         bridge() as running_bridge,
         running_bridge.listen() as healthy,
         deaf_client(running_bridge.url),
+        deaf_client(running_bridge.url, MILLION_CELLS),
     ):
         overfill(running_bridge, healthy)
-        with asked_heavily(running_bridge):
-            assert running_bridge.process.stop(signal.SIGTERM) == 0
+        assert running_bridge.process.stop(signal.SIGTERM) == 0
         assert last_words(healthy) == ("shutting_down", 1012)
-        assert "Traceback" not in running_bridge.process.output
-        assert "ERROR" not in running_bridge.process.output
+        assert_quiet(running_bridge.process)
+
+
+# What of a request for a field never comes back: a worker that computes it, one that writes it,
+# the ROS thread.
+HANGS = (
+    "lupin_twin.fields:FieldJob.compute:co2",
+    "lupin_bridge.field_formats:write:co2",
+    "lupin_twin.fields:FieldEngine.lookup:co2",
+)
+
+
+@pytest.mark.parametrize("hang", HANGS)
+def test_a_field_that_takes_for_ever_does_not_hold_up_the_end(domain: int, hang: str) -> None:
+    with (
+        sabotaged(domain, ["--hang", hang], "lupin_bridge.cli", "serve", "--port", "0") as process,
+        listener(url_of(process)) as healthy,
+        waiting_for(url_of(process), FIELD) as answer,
+    ):
+        healthy.until("state")
+        process.wait_for_output(f"{hang.split(':')[1]} hangs")
+        assert process.stop(signal.SIGINT) == 0
+        assert_sent_away(answer)
+        assert last_words(healthy) == ("shutting_down", 1012)
+        assert_quiet(process)
+
+
+def test_nor_does_a_twin_elsewhere_that_does_not_answer(domain: int) -> None:
+    with (
+        twin_node(domain) as twin,
+        lupin_twin(domain, "web") as process,
+        Peer(domain) as peer,
+        attached(process, peer) as live,
+        live.listen() as healthy,
+    ):
+        wait_until_ready(live)
+        wait_for(lambda: live.get(FIELD).status_code == 200, "the twin's service")
+        twin.send(signal.SIGSTOP)
+        with waiting_for(live.url, FIELD.replace("co2", "light")) as answer:
+            wait_for(
+                lambda: "\nlupin_fields_computing 1.0" in live.get("/metrics").text,
+                "the request to be under way",
+            )
+            assert process.stop(signal.SIGINT) == 0
+            assert_sent_away(answer)
+        assert last_words(healthy) == ("shutting_down", 1012)
+        assert_quiet(process)
+
+
+def test_the_times_of_the_end_add_up_to_what_is_promised() -> None:
+    assert GOODBYE_S < GRACEFUL_SHUTDOWN_S
+    assert GRACEFUL_SHUTDOWN_S + max(STOP_TIMEOUT_S, PATROL_STOP_S) + IDLE_WORKERS_END_S <= 2.0

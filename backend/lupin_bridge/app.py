@@ -19,6 +19,7 @@ from lupin_bridge import (
 )
 from lupin_bridge.access_middleware import Access, AccessControl
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.goodbye import EndsWithTheBridge
 from lupin_bridge.http_protocol import PieceByPiece
 from lupin_bridge.http_tools import error_response
 from lupin_bridge.security import ReadOnly
@@ -59,6 +60,7 @@ def create_app(
     # The last one added is the first to be asked.
     if bridge is not None:
         app.add_middleware(PieceByPiece, timeout_s=bridge.settings.client_timeout_s)
+        app.add_middleware(EndsWithTheBridge, goodbye=bridge.goodbye)
     app.add_middleware(ReadOnly)
     app.add_middleware(AccessControl, access=access)
     app.add_exception_handler(404, _not_found)

@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from lupin_bridge.field_limits import FieldLimits
 from lupin_bridge.frames import FrameWriter
+from lupin_bridge.goodbye import Goodbye
 from lupin_bridge.hub import Client, Hub
 from lupin_bridge.metrics import Metrics, Sample
 from lupin_bridge.settings import Settings
@@ -44,6 +45,7 @@ class Bridge:
         self.field_limits = FieldLimits(
             settings.field_rate_hz, settings.field_concurrency, settings.field_total_concurrency
         )
+        self.goodbye = Goodbye()
         self.frames = FrameWriter()
         self.metrics = Metrics(self._measure)
         self._latest: Revised | None = None
@@ -77,9 +79,10 @@ class Bridge:
         self.pool.shutdown(wait=False, cancel_futures=True)
 
     def say_goodbye(self) -> None:
-        """Tell every client that the bridge is about to go."""
+        """Tell every client that the bridge is about to go, those who wait for an answer too."""
         self._liveness.shutting_down = True
         self._tell_status()
+        self.goodbye.say()
 
     # --- for the routes -----------------------------------------------------------------------
 
@@ -131,6 +134,7 @@ class Bridge:
         )
         yield "lupin_tags", len(tags)
         yield "lupin_tags_pinned", sum(tag.pose is not None for tag in tags)
+        yield "lupin_fields_computing", self.field_limits.being_computed
         yield "lupin_field_cache_hits", cache.hits
         yield "lupin_field_cache_misses", cache.misses
         yield "lupin_field_cache_entries", cache.entries

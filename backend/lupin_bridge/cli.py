@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 import signal
 import sys
 import tempfile
+import threading
+import time
 from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any, NoReturn
@@ -15,6 +18,8 @@ from lupin_bridge import logs
 from lupin_bridge.settings import SettingError, Settings, option
 
 USAGE_ERROR = 2
+# An idle worker ends at once when it is told to; who takes longer is at work.
+IDLE_WORKERS_END_S = 0.1
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -36,6 +41,30 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SettingError as error:
         _fail(str(error))
     return 0
+
+
+def command() -> NoReturn:
+    """`main` as a process of its own."""
+    leave(main())
+
+
+def leave(code: int) -> NoReturn:
+    """End the process, whatever its other threads are computing.
+
+    Python waits at its end for every worker of a pool, daemon or not, and numpy cannot be
+    interrupted: a large field would hold up Ctrl-C for as long as it takes. So where, and only
+    where, a thread is still at work, the process ends without Python's (and DDS's) tidying up.
+    """
+    deadline_s = time.monotonic() + IDLE_WORKERS_END_S
+    others = [thread for thread in threading.enumerate() if thread is not threading.main_thread()]
+    for thread in others:
+        thread.join(max(0.0, deadline_s - time.monotonic()))
+    if any(thread.is_alive() for thread in others):
+        logging.shutdown()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)
 
 
 def split_ros_args(argv: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -124,4 +153,4 @@ def _fail(message: str) -> NoReturn:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    command()

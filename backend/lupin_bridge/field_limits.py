@@ -51,6 +51,11 @@ class FieldLimits:
         self._in_flight: Counter[str] = Counter()
         self._computing = 0
 
+    @property
+    def being_computed(self) -> int:
+        """How many requests keep the twin and the encoders busy now."""
+        return self._computing
+
     @contextmanager
     def request(self, client: str, now_s: float) -> Iterator[None]:
         """A client's request, from its arrival until its answer is taken.

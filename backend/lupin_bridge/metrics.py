@@ -23,6 +23,7 @@ GAUGES: Final = {
     "lupin_state_age_seconds": "seconds since the last state came; infinite: none has",
     "lupin_tags": "tags that the twin knows",
     "lupin_tags_pinned": "tags that have a pose",
+    "lupin_fields_computing": "field requests being computed now",
     "lupin_field_cache_entries": "fields in the cache",
     "lupin_field_cache_bytes": "memory of the fields in the cache",
 }

@@ -24,7 +24,7 @@ from lupin_twin.parameters import ParameterError
 
 log = logging.getLogger("lupin_bridge")
 
-PATROL_STOP_S = 1.5
+PATROL_STOP_S = 0.9
 
 
 def run(
@@ -83,9 +83,7 @@ async def _run(
     finally:
         if patrol is not None:
             patrol.terminate()
-        await bridge.stop()
-        if patrol is not None:
-            await patrol.wait()
+        await asyncio.gather(bridge.stop(), *([] if patrol is None else [patrol.wait()]))
 
 
 def _warn_of_exposure(listener: socket.socket, access: Access) -> None:

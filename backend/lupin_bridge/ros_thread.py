@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import threading
+import time
 from collections.abc import Callable, Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -22,8 +23,9 @@ from lupin_twin.spinning import spin_until_shutdown
 
 log = logging.getLogger(__name__)
 
-# A stop waits this long for the ROS thread; a callback that computes a large field takes less.
-STOP_TIMEOUT_S = 1.5
+# A stop waits this long for the ROS thread. A callback that computes a huge field takes longer
+# and cannot be interrupted: it is left behind, and the process ends without it (`cli.leave`).
+STOP_TIMEOUT_S = 0.9
 
 
 class RosStartError(RuntimeError):
@@ -96,13 +98,16 @@ class RosThread(Generic[NodeT, EventT]):
     async def stop(self) -> None:
         """Stop the node and join the thread."""
         self._is_stopping = True
-        if self._executor is not None:
-            executor = self._executor
-            # Both wait for the callback that is running: not on the loop.
-            await asyncio.to_thread(executor.shutdown, STOP_TIMEOUT_S)
-        await asyncio.to_thread(self._thread.join, STOP_TIMEOUT_S)
+        # It waits for the callback that is running: not on the loop.
+        await asyncio.to_thread(self._stop)
         if self._thread.is_alive():
-            log.error("the ROS thread did not end within %s s", STOP_TIMEOUT_S)
+            log.warning("the ROS thread did not end within %s s: left behind", STOP_TIMEOUT_S)
+
+    def _stop(self) -> None:
+        deadline_s = time.monotonic() + STOP_TIMEOUT_S
+        if self._executor is not None:
+            self._executor.shutdown(STOP_TIMEOUT_S)
+        self._thread.join(max(0.0, deadline_s - time.monotonic()))
 
     @property
     def is_alive(self) -> bool:
@@ -183,7 +188,7 @@ class RosThread(Generic[NodeT, EventT]):
         try:
             return await result
         except asyncio.CancelledError:
-            if self._executor is not None:
+            if self._executor is not None and not self._is_stopping:
                 self._executor.create_task(lambda: give_up(self._require_node(), future))
             raise
 

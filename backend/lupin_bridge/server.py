@@ -17,6 +17,7 @@ from uvicorn.server import HANDLED_SIGNALS
 
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.http_protocol import HttpConnection
+from lupin_bridge.transports import tear_down
 from lupin_bridge.ws_protocol import Connection
 
 log = logging.getLogger(__name__)
@@ -26,10 +27,11 @@ MAX_INBOUND_BYTES = 65_536
 PING_PERIOD_S = 20.0
 # Files open beside the clients' sockets: DDS, plain HTTP requests, those who are turned away.
 SPARE_FILES = 512
-# Ctrl-C ends within 2 s: this for the requests in flight, the rest for the ROS thread. A listener
-# whose socket is still full by then would use it all up.
-GRACEFUL_SHUTDOWN_S = 1
+# Ctrl-C ends within 2 s: so much for the clients to take what they are told and what they are being
+# sent, the rest for the ROS thread (`ros_thread.STOP_TIMEOUT_S`). Should a request outlive even its
+# connection, uvicorn cancels it.
 GOODBYE_S = 0.5
+GRACEFUL_SHUTDOWN_S = 1
 
 
 class BridgeServer(uvicorn.Server):
@@ -74,13 +76,12 @@ class BridgeServer(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Tell the clients, then close."""
         self._bridge.say_goodbye()
-        asyncio.get_running_loop().call_later(GOODBYE_S, self._cut_off_listeners)
+        asyncio.get_running_loop().call_later(GOODBYE_S, self._cut_off_clients)
         await super().shutdown(sockets)
 
-    def _cut_off_listeners(self) -> None:
+    def _cut_off_clients(self) -> None:
         for connection in list(self.server_state.connections):
-            if isinstance(connection, Connection):
-                connection.transport.abort()
+            tear_down(connection.transport)
 
 
 def listen(host: str, port: int) -> socket.socket:

@@ -1,9 +1,9 @@
 """The product with faults built in, for tests: nothing in the product knows of them.
 
-`python -m tests.support.sabotage [--raise MODULE:NAME:MARKER[:TIMES]] [--shadow-s S] PROGRAM ...`
-runs the module PROGRAM with the arguments behind it. `--raise`, as often as wanted, lets a function
-or method fail when the marker occurs in its arguments' text, TIMES times (1 without it), and work
-otherwise.
+`python -m tests.support.sabotage [--raise MODULE:NAME:MARKER[:TIMES]] [--hang MODULE:NAME:MARKER]
+[--shadow-s S] PROGRAM ...` runs the module PROGRAM with the arguments behind it. `--raise`, as
+often as wanted, lets a function or method fail when the marker occurs in its arguments' text, TIMES
+times (1 without it), and work otherwise; with `--hang` it says "hangs" and never comes back.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import argparse
 import functools
 import runpy
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import Any
@@ -29,6 +30,7 @@ def sabotaged(domain: int, faults: Sequence[str], program: str, *args: str) -> P
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--raise", dest="faults", action="append", default=[])
+    parser.add_argument("--hang", dest="hangs", action="append", default=[])
     parser.add_argument("--shadow-s", type=float)
     parser.add_argument("program")
     parser.add_argument("args", nargs=argparse.REMAINDER)
@@ -36,14 +38,33 @@ def main() -> None:
     for fault in options.faults:
         module, path, marker, *times = fault.split(":")
         sabotage(module, path, marker, int(times[0]) if times else 1)
+    for hang in options.hangs:
+        module, path, marker = hang.split(":")
+        sabotage(module, path, marker, 1, never_come_back)
     if options.shadow_s is not None:
         import_module("lupin_twin.twin_count").TwinCount.__init__.__defaults__ = (options.shadow_s,)
     sys.argv = [options.program, *options.args]
     runpy.run_module(options.program, run_name="__main__", alter_sys=True)
 
 
-def sabotage(module: str, path: str, marker: str, times: int) -> None:
-    """Let a function fail, the first `times` times that the marker is in its arguments."""
+def fail(path: str) -> None:
+    """Raise."""
+    raise RuntimeError(f"sabotage of {path}")
+
+
+def never_come_back(path: str) -> None:
+    """Wait for ever."""
+    print(f"{path} hangs", flush=True)
+    threading.Event().wait()
+
+
+def sabotage(
+    module: str, path: str, marker: str, times: int, do: Callable[[str], None] = fail
+) -> None:
+    """Let a function `do(path)` first, the first `times` times that the marker is in its arguments.
+
+    By default it fails.
+    """
     *owners, name = path.split(".")
     owner = functools.reduce(getattr, owners, import_module(module))
     function: Callable[..., Any] = getattr(owner, name)
@@ -54,7 +75,7 @@ def sabotage(module: str, path: str, marker: str, times: int) -> None:
         nonlocal left
         if left and marker in repr((args, kwargs)):
             left -= 1
-            raise RuntimeError(f"sabotage of {path}")
+            do(path)
         return function(*args, **kwargs)
 
     setattr(owner, name, failing)

@@ -157,20 +157,25 @@ def bridge(*options: str, domain: int | None = None, **env: str) -> Iterator[Bri
 # --- clients that do not read -------------------------------------------------------------------
 
 _UPGRADE = (
-    b"GET /ws/state HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-    b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n"
+    "Upgrade: websocket\r\nConnection: Upgrade\r\n"
+    "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"
 )
 
 
 @contextmanager
-def deaf_client(url: str) -> Iterator[socket.socket]:
-    """A WebSocket client that asks for frames and reads none, with little room for them."""
+def deaf_client(url: str, *paths: str) -> Iterator[socket.socket]:
+    """A client that asks for all of the paths at once, and reads nothing; it has little room.
+
+    Without a path it is a WebSocket client that asks for frames.
+    """
     host, port = url.removeprefix("http://").split(":")
     with socket.socket() as client:
         client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         client.settimeout(PATIENCE_S)
         client.connect((host, int(port)))
-        client.sendall(_UPGRADE)
+        head = "Host: localhost\r\n" if paths else f"Host: localhost\r\n{_UPGRADE}"
+        for path in paths or ("/ws/state",):
+            client.sendall(f"GET {path} HTTP/1.1\r\n{head}\r\n".encode())
         yield client
 
 

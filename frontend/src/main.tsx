@@ -13,6 +13,7 @@ import './styles/hover.css';
 import './styles/bound.css';
 import './styles/kiosk.css';
 import './styles/frozen.css';
+import './styles/forced.css';
 import './styles/print.css';
 import { startAddress } from './store/address';
 import { prefer, store } from './store/app';

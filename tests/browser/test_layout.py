@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
 
 import pytest
-from playwright.sync_api import expect
+from PIL import Image
+from playwright.sync_api import Locator, expect
 
-from tests.browser.hmi import PHONE, Hmi
-from tests.support.web import Bridge
+from tests.browser.hmi import PHONE, Hmi, Pixel
+from tests.support.messages import scan
+from tests.support.web import Bridge, bridge
 
 OpenPage = Callable[..., Hmi]
 Size = tuple[int, int]
@@ -111,3 +114,61 @@ def test_a_fixed_range_leaves_the_title_alone_on_a_phone(open_at: Callable[..., 
     assert title is not None
     assert control is not None
     assert title["y"] + title["height"] <= control["y"]
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_a_longer_word_about_the_house_does_not_move_the_table(
+    domain: int, open_page: OpenPage, size: Size
+) -> None:
+    with bridge(domain=domain) as running:
+        running.peer.observe(scan("1", {"temperature": 22.0}, at=(1, 1)))
+        viewport = {"width": size[0], "height": size[1]}
+        hmi = open_page(running.url, viewport=viewport)
+        show_tags(hmi)
+        driver, table = hmi.test_id("health-driver"), hmi.page.locator(".filter-bar")
+        expect(driver).to_have_text("Every judged reading lies within its ideal range")
+        before = table.bounding_box()
+        long = "a-tag-with-no-short-name"
+        running.peer.observe(scan(long, {"temperature": 99.0}, at=(2, 1)))
+        expect(driver).to_contain_text(long)
+        assert table.bounding_box() == before
+        # The rest is to be had by pointing at it, and to be heard anyway.
+        expect(driver).to_have_attribute(
+            "title", f"Tag {long}: Temperature 99.0\u00a0°C, ideal 18.0 to 26.0"
+        )
+
+
+def colours(thing: Locator) -> set[Pixel]:
+    """All that it is made of on the screen, without the edge that it shares with its neighbour."""
+    picture = Image.open(io.BytesIO(thing.screenshot())).convert("RGB")
+    picture = picture.crop((1, 1, picture.width - 1, picture.height - 1))
+    return {pixel for _, pixel in picture.getcolors(picture.width * picture.height) or []}
+
+
+def test_high_contrast_still_tells_what_is_chosen_and_what_a_colour_means(
+    open_at: Callable[..., Hmi],
+) -> None:
+    hmi = open_at((1440, 900), "tag=2", forced_colors="active")
+    expect(hmi.row("2")).to_have_attribute("data-selected", "true")
+    hmi.page.locator(".health-counts [data-health=healthy]").first.click()
+    hmi.page.evaluate(
+        """() => {
+          const probe = document.body.appendChild(document.createElement('i'));
+          probe.id = 'probe';
+          probe.style = 'position: fixed; inset: 0 auto auto 0; width: 3px; height: 3px;' +
+            'background: Highlight; z-index: 99';
+        }"""
+    )
+    (highlight,) = colours(hmi.page.locator("#probe"))
+    for one, other in (
+        (".sensors label:has(:checked)", ".sensors label:not(:has(:checked))"),
+        (".range label:has(:checked)", ".range label:not(:has(:checked))"),
+        (".health-counts [aria-pressed=true]", ".health-counts [aria-pressed=false]"),
+        ("tr[data-selected=true]", "tr[data-selected=false]"),
+        ("td.chosen", "td.other"),
+    ):
+        assert highlight in colours(hmi.page.locator(one).first), one
+        assert highlight not in colours(hmi.page.locator(other).last), other
+    swatches = [colours(swatch) for swatch in hmi.page.locator(".sensors .swatch").all()]
+    assert len({frozenset(each) for each in swatches}) == len(swatches)
+    assert len(colours(hmi.page.locator(".ramp-bar"))) > 100

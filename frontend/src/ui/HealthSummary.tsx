@@ -37,6 +37,7 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
             className="health-driver"
             data-testid="health-driver"
             data-tag-id={worst.tagId}
+            title={driver}
             onClick={() => {
               act({ type: 'select', tagId: worst.tagId });
             }}
@@ -44,7 +45,7 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
             {driver}
           </button>
         ) : (
-          <p className="health-driver" data-testid="health-driver">
+          <p className="health-driver" data-testid="health-driver" title={driver}>
             {driver}
           </p>
         )}

@@ -11,6 +11,7 @@ import './styles/table.css';
 import './styles/card.css';
 import './styles/hover.css';
 import './styles/bound.css';
+import './styles/paper.css';
 import './styles/kiosk.css';
 import './styles/frozen.css';
 import './styles/forced.css';

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
@@ -183,11 +184,40 @@ def test_the_theme_is_kept_and_follows_the_system_by_default(
     expect(root).to_have_attribute("data-theme", "dark")
 
 
-def test_paper_has_every_row_and_is_light(house: Bridge, open_page: OpenPage) -> None:
+def luminance(pixel: object) -> float:
+    assert isinstance(pixel, tuple)
+    return float(sum(pixel) / len(pixel))
+
+
+def test_paper_has_every_row_says_when_and_is_light(house: Bridge, open_page: OpenPage) -> None:
     hmi = open_page(house.url, color_scheme="dark")
     hmi.expect_rows(*TAGS)
-    pdf = hmi.page.pdf(format="A4")
-    assert len(pdf) > 10_000
+    hmi.expect_samples(3)
+    hmi.expect_map()
+    line = hmi.test_id("paper-line")
+    expect(line).to_be_hidden()
+    # The corner of the map that nothing lies on: dark on the screen.
+    assert luminance(hmi.settled_picture().getpixel((5, 200))) < 60
+
+    # What a browser does on its way to the printer.
     hmi.page.emulate_media(media="print")
+    hmi.page.evaluate("dispatchEvent(new Event('beforeprint'))")
     expect(hmi.row("seen")).to_be_visible()
     expect(hmi.page.get_by_role("button", name="Menu")).to_be_hidden()
+    expect(hmi.page.locator(".connection")).to_be_hidden()
+    moment = r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d"
+    expect(line).to_have_text(
+        re.compile(rf"^As of {moment}, printed {moment} ?Temperature 20\.0 – 31\.0\s°C$")
+    )
+    expect(line).to_be_visible()
+    ground = hmi.page.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert luminance(tuple(int(part) for part in re.findall(r"\d+", ground))) > 200
+    # Lengthways and across: all of the map, and not only its frame, is light.
+    picture = hmi.settled_picture()
+    light = [luminance(picture.getpixel((x, 200))) for x in range(5, picture.width - 5, 40)]
+    assert sorted(light)[len(light) // 2] > 200
+
+    hmi.page.evaluate("dispatchEvent(new Event('afterprint'))")
+    hmi.page.emulate_media(media="screen")
+    expect(hmi.page.locator("html")).to_have_attribute("data-theme", "dark")
+    assert len(hmi.page.pdf(format="A4")) > 10_000

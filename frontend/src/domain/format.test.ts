@@ -1,6 +1,15 @@
 import { expect, test } from 'vitest';
 
-import { ageText, metresText, numberText, percentText, readingText, shortAgeText } from './format';
+import {
+  ageText,
+  metresText,
+  momentText,
+  numberText,
+  percentText,
+  rangeText,
+  readingText,
+  shortAgeText,
+} from './format';
 import { sensorNamed } from './sensors';
 
 test.each([
@@ -46,4 +55,14 @@ test('a short age is in one unit', () => {
 test('shares and lengths', () => {
   expect(percentText(0.847)).toBe('85\u00a0%');
   expect(metresText(-1.456)).toBe('\u22121.46');
+});
+
+test('a range has its unit once, and none is a dash', () => {
+  const sensor = sensorNamed('temperature');
+  expect(rangeText(sensor, { low: -1, high: 30 }, 'C')).toBe('\u22121.0 – 30.0\u00a0°C');
+  expect(rangeText(sensor, null, 'C')).toBe('–');
+});
+
+test('a moment has its date, in an order that sorts', () => {
+  expect(momentText(new Date(2026, 4, 1, 9, 3, 2).getTime())).toBe('2026-05-01 09:03:02');
 });

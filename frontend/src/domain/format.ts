@@ -1,3 +1,4 @@
+import type { Range } from './ramp';
 import type { Sensor } from './sensors';
 import { toShown, unitOf, type TemperatureUnit } from './units';
 
@@ -19,6 +20,12 @@ export function readingText(sensor: Sensor, value: number, unit: TemperatureUnit
   const suffix = unitOf(sensor, unit);
   const number = valueText(sensor, value, unit);
   return suffix ? `${number}\u00a0${suffix}` : number;
+}
+
+/** A range with its unit; an en dash where there is none. */
+export function rangeText(sensor: Sensor, range: Range | null, unit: TemperatureUnit): string {
+  if (!range) return '–';
+  return `${valueText(sensor, range.low, unit)} – ${readingText(sensor, range.high, unit)}`;
 }
 
 /** An age in its two largest units at most. */
@@ -46,6 +53,11 @@ const clock = new Intl.DateTimeFormat('en-GB', {
 /** Time of day on the operator's own clock. */
 export function clockText(epochMs: number): string {
   return clock.format(epochMs);
+}
+
+/** Date and time of day on the operator's own clock: 2026-05-01 14:03:22. */
+export function momentText(epochMs: number): string {
+  return `${new Date(epochMs).toLocaleDateString('en-CA')} ${clockText(epochMs)}`;
 }
 
 export function percentText(share: number): string {

@@ -16,7 +16,7 @@ import {
 import { nearest } from '../geometry/nearest';
 import { act, store, type AppState } from '../store/app';
 import { selectRange } from '../store/derived';
-import { isDark, onThemeChange } from '../store/theme';
+import { isDark, isPrinting, onThemeChange } from '../store/theme';
 import { MapCamera } from './camera';
 import { onMapCommand, type MapCommand } from './commands';
 import { Painter, type Canvases } from './painter';
@@ -75,7 +75,11 @@ export function runMap(element: HTMLElement, canvases: Canvases): () => void {
     }
     if (parts.has('overlay') || parts.has('view')) {
       pulses = pulses.filter(({ since }) => now - since < PULSE_MS);
-      painter.paintOverlay(state, camera.view, { pulses, now, crosshair });
+      painter.paintOverlay(state, camera.view, {
+        pulses: isPrinting() ? [] : pulses,
+        now,
+        crosshair: crosshair && !isPrinting(),
+      });
     }
     if (pulses.length > 0) spoil('overlay');
   };

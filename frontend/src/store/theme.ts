@@ -3,6 +3,11 @@ import { store } from './app';
 const system = window.matchMedia('(prefers-color-scheme: dark)');
 let printing = false;
 
+/** Paper gets what holds still: nothing that pulses, and no mark of the mouse. */
+export function isPrinting(): boolean {
+  return printing;
+}
+
 export function isDark(): boolean {
   if (printing) return false;
   const { theme } = store.get().settings;

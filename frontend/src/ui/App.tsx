@@ -9,6 +9,7 @@ import { Header } from './Header';
 import { HelpDialog } from './HelpDialog';
 import { HealthMark } from './HealthMark';
 import { Icon } from './Icon';
+import { PaperLine } from './PaperLine';
 import { MapPanel } from './MapPanel';
 import { TagCard } from './TagCard';
 import { TagsPanel } from './TagsPanel';
@@ -50,6 +51,7 @@ export function App({ kiosk }: { kiosk: boolean }): JSX.Element {
       )}
       <Header kiosk={kiosk} />
       <FrozenBanner />
+      <PaperLine />
       <main className="panels">
         <MapPanel kiosk={kiosk} />
         <TagsPanel kiosk={kiosk} />

@@ -1,0 +1,178 @@
+import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
+
+import { canvasPoint, mapPoint, toCanvas, type View } from '../geometry/coordinates';
+import { act, receive, store } from '../store/app';
+import { FakeContext } from '../testing/canvas';
+import { showTags } from '../testing/page';
+import { readings, stateFrame, wireTag } from '../testing/tags';
+import { runMap } from './controller';
+import { pinUnderMouse, pointedAt } from './pointer';
+
+let element: HTMLElement;
+let overlay: HTMLCanvasElement;
+let stop: () => void;
+let frames: FrameRequestCallback[];
+let calm: boolean;
+
+const SIZE = { width: 600, height: 400 };
+const tagAt = (id: string, x: number, y: number, sec = 100): ReturnType<typeof wireTag> =>
+  wireTag({
+    tag_id: id,
+    pose: { position: { x, y, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } },
+    last_observed: { sec, nanosec: 0 },
+    readings: readings({ temperature: 20 }),
+  });
+
+const start = (): void => {
+  const canvas = (): HTMLCanvasElement => document.createElement('canvas');
+  overlay = canvas();
+  stop = runMap(element, { still: canvas(), pins: canvas(), overlay });
+  paint();
+};
+/** Runs what waits for the next frame. */
+const paint = (): void => {
+  for (const frame of frames.splice(0)) frame(performance.now());
+};
+const view = (): View => {
+  const [x = 0, y = 0, scale = 0] = (overlay.dataset['view'] ?? '').split(',').map(Number);
+  return { x, y, scale };
+};
+const drawn = (name: string): number => FakeContext.recordOf(overlay)?.named(name).length ?? 0;
+
+/** jsdom has no PointerEvent of its own in every version; a mouse event carries all that counts. */
+const pointer = (type: string, x: number, y: number, pointerType = 'mouse'): void => {
+  const event = new MouseEvent(type, { clientX: x, clientY: y, bubbles: true });
+  Object.defineProperty(event, 'pointerType', { value: pointerType });
+  if (pointerType === 'touch') Object.setPrototypeOf(event, PointerEvent.prototype);
+  element.dispatchEvent(event);
+};
+const press = (key: string): void => {
+  element.dispatchEvent(new KeyboardEvent('keydown', { key, bubbles: true, cancelable: true }));
+};
+
+beforeEach(() => {
+  frames = [];
+  calm = false;
+  vi.stubGlobal('requestAnimationFrame', (frame: FrameRequestCallback) => frames.push(frame));
+  vi.stubGlobal('cancelAnimationFrame', () => {
+    frames.splice(0);
+  });
+  vi.stubGlobal(
+    'ResizeObserver',
+    class {
+      readonly #tell: ResizeObserverCallback;
+      constructor(tell: ResizeObserverCallback) {
+        this.#tell = tell;
+      }
+      observe(): void {
+        this.#tell([{ contentRect: SIZE }] as never, this as never);
+      }
+      disconnect(): void {
+        // Told once, and never again.
+      }
+    },
+  );
+  const matchMedia = window.matchMedia.bind(window);
+  vi.spyOn(window, 'matchMedia').mockImplementation((query) =>
+    Object.assign(matchMedia(query), { matches: query.includes('reduced-motion') && calm }),
+  );
+  Object.defineProperty(document, 'fonts', {
+    configurable: true,
+    value: { ready: Promise.resolve() },
+  });
+  element = document.createElement('div');
+  document.body.append(element);
+  showTags([tagAt('a', 1, 1), tagAt('b', 3, 2)]);
+});
+afterEach(() => {
+  stop();
+  element.remove();
+});
+
+const place = (x: number, y: number): readonly [number, number] => {
+  const at = toCanvas(view(), mapPoint(x, y));
+  return [at.x, at.y];
+};
+
+const observeAgain = (): void => {
+  const tags = [tagAt('a', 1, 1, 200), tagAt('b', 3, 2)];
+  const latest = stateFrame(tags, { sec: 5_000, revision: 'later' });
+  receive({ type: 'state', latest, now: performance.now() });
+  paint();
+};
+
+describe('pulses', () => {
+  test('a fresh observation sends out a ring', () => {
+    start();
+    observeAgain();
+    expect(drawn('arc')).toBe(1);
+  });
+
+  test('not for those who want less motion', () => {
+    calm = true;
+    start();
+    observeAgain();
+    expect(drawn('arc')).toBe(0);
+  });
+
+  test('not on paper', () => {
+    start();
+    window.dispatchEvent(new Event('beforeprint'));
+    observeAgain();
+    expect(drawn('arc')).toBe(0);
+    window.dispatchEvent(new Event('afterprint'));
+    expect(drawn('arc')).toBe(1);
+  });
+});
+
+describe('mouse and finger', () => {
+  test('the mouse on a pin marks the tag and tells where the pin is, until it leaves', () => {
+    start();
+    const [x, y] = place(3, 2);
+    pointer('pointermove', x + 3, y - 2);
+    expect(store.get().view.hovered).toBe('b');
+    expect(pinUnderMouse.get()).toMatchObject({ tagId: 'b', at: canvasPoint(x, y) });
+    pointer('pointerleave', 0, 0);
+    expect(store.get().view.hovered).toBeNull();
+    expect(pinUnderMouse.get()).toBeNull();
+  });
+
+  test('a map that moves takes its pins away from under the mouse', () => {
+    start();
+    pointer('pointermove', ...place(3, 2));
+    press('ArrowLeft');
+    expect(pinUnderMouse.get()).toBeNull();
+  });
+
+  test('a finger points at nothing while it moves', () => {
+    start();
+    pointer('pointermove', ...place(3, 2), 'touch');
+    expect(store.get().view.hovered).toBeNull();
+    expect(pinUnderMouse.get()).toBeNull();
+  });
+
+  test('a finger reaches farther than a mouse', () => {
+    start();
+    const [x, y] = place(3, 2);
+    pointer('click', x + 22, y);
+    expect(store.get().view.selected).toBeNull();
+    pointer('click', x + 22, y, 'touch');
+    expect(store.get().view.selected).toBe('b');
+    pointer('click', x + 40, y, 'touch');
+    expect(store.get().view.selected).toBeNull();
+  });
+
+  test('pins that are switched off are not hit', () => {
+    start();
+    act({ type: 'layer', layer: 'pins', on: false });
+    pointer('click', ...place(3, 2));
+    expect(store.get().view.selected).toBeNull();
+  });
+});
+
+test('the read-out follows the mouse', () => {
+  start();
+  pointer('pointermove', ...place(2, 1.5));
+  expect(pointedAt.get()?.x).toBeCloseTo(2);
+  expect(pointedAt.get()?.y).toBeCloseTo(1.5);
+});

@@ -1,0 +1,35 @@
+import { act as flush, render, screen } from '@testing-library/react';
+import { afterEach, beforeEach, expect, test, vi } from 'vitest';
+
+import { act, prefer } from '../store/app';
+import { showTags } from '../testing/page';
+import { readings, wireTag } from '../testing/tags';
+import { PaperLine } from './PaperLine';
+
+beforeEach(() => {
+  vi.useFakeTimers({ toFake: ['Date', 'performance'] });
+  vi.setSystemTime(new Date(2026, 4, 1, 14, 3, 22));
+  showTags([
+    wireTag({ readings: readings({ temperature: 20 }) }),
+    wireTag({ tag_id: '2', readings: readings({ temperature: 30 }) }),
+  ]);
+});
+afterEach(() => {
+  vi.useRealTimers();
+});
+
+test('paper says when it was, when it was printed, and what is on it', () => {
+  render(<PaperLine />);
+  vi.advanceTimersByTime(65_000);
+  flush(() => {
+    window.dispatchEvent(new Event('beforeprint'));
+  });
+  expect(screen.getByTestId('paper-line').textContent).toBe(
+    'As of 2026-05-01 14:03:22, printed 2026-05-01 14:04:27 Temperature 20.0 – 30.0\u00a0°C',
+  );
+  flush(() => {
+    prefer({ unit: 'F' });
+    act({ type: 'range', range: { low: 0, high: 100 } });
+  });
+  expect(screen.getByTestId('paper-line').textContent).toMatch(/Temperature 32\.0 – 212\u00a0°F$/);
+});

@@ -58,26 +58,26 @@ class Script:
 
 
 class Ear:
-    """A connection that always takes a frame, and notes when."""
+    """A connection that always takes a frame."""
 
     can_take = True
 
     def __init__(self) -> None:
-        self.heard: list[tuple[float, dict[str, Any]]] = []
+        self.heard: list[dict[str, Any]] = []
 
     def write(self, wire: bytes) -> None:
-        self.heard.append((time.monotonic(), json.loads(bytes(received(wire).data))))
+        self.heard.append(json.loads(bytes(received(wire).data)))
 
     def dismiss(self, code: int, reason: str) -> None:
         raise AssertionError(f"dismissed: {code} {reason}")
 
     @property
     def states(self) -> list[dict[str, Any]]:
-        return [frame for _, frame in self.heard if frame["type"] == "state"]
+        return [frame for frame in self.heard if frame["type"] == "state"]
 
     @property
     def reasons(self) -> list[str]:
-        return [frame["reason"] for _, frame in self.heard if frame["type"] == "status"]
+        return [frame["reason"] for frame in self.heard if frame["type"] == "status"]
 
 
 def state(number: int) -> Revised:
@@ -88,9 +88,9 @@ def state(number: int) -> Revised:
 class Stage:
     """A bridge between a script and an ear."""
 
-    def __init__(self, **settings: Any) -> None:
+    def __init__(self, clock: Callable[[], float] = time.monotonic, **settings: Any) -> None:
         self.script, self.ear = Script(), Ear()
-        self.bridge = Bridge(self.script, Settings(**settings))  # type: ignore[arg-type]
+        self.bridge = Bridge(self.script, Settings(**settings), clock)  # type: ignore[arg-type]
 
     async def __aenter__(self) -> Self:
         await self.bridge.start()
@@ -104,25 +104,44 @@ class Stage:
 # --- pace ---------------------------------------------------------------------------------------
 
 
-def test_a_change_goes_out_at_once_and_many_as_often_as_is_allowed_and_no_oftener() -> None:
+def test_a_change_goes_out_at_once_and_the_next_by_the_beat(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now_s, waits_s = 100.0, list[float]()
+
     async def test() -> None:
-        async with Stage(max_rate_hz=20.0) as stage:
-            stage.script.tell(state(1))
-            assert [frame["seq"] for frame in stage.ear.states] == [1]
-            number, end = 1, time.monotonic() + 0.5
-            while time.monotonic() < end:
-                number += 1
-                stage.script.tell(state(number))
-                await asyncio.sleep(0.001)
-            await until(lambda: stage.ear.states[-1]["revision"] == f"r{number}", "the newest")
-        times = [when for when, frame in stage.ear.heard if frame["type"] == "state"]
-        assert len(times) < number
-        # By a beat of 20 a second: n frames take n - 2 beats at the least, however they fall.
-        for first, when in enumerate(times):
-            for last in range(first + 2, len(times)):
-                assert times[last] - when > (last - first - 1) / 20.0 - 0.002
-        numbers = [frame["seq"] for frame in stage.ear.states]
-        assert numbers == list(range(1, len(numbers) + 1))
+        nonlocal now_s
+        loop = asyncio.get_running_loop()
+        call_later = loop.call_later
+        async with Stage(clock=lambda: now_s, max_rate_hz=20.0) as stage:
+
+            def noting(delay_s: float, callback: Any, *args: Any, **more: Any) -> Any:
+                if callback == stage.bridge._push:
+                    waits_s.append(delay_s)
+                    delay_s = 1_000_000.0  # the test lets it happen
+                return call_later(delay_s, callback, *args, **more)
+
+            monkeypatch.setattr(loop, "call_later", noting)
+            number = 0
+            # (when changes come, how long they have to wait)
+            for comes_s, wait_s in (
+                (100.0, None),
+                (100.01, 0.035),  # a tenth of the interval is forgiven
+                (100.06, 0.035),  # the one before went out at 100.045
+                (200.0, None),
+                (200.02, 0.025),  # a pause is not made up for
+            ):
+                now_s = comes_s
+                for _ in range(3 if wait_s else 1):
+                    number += 1
+                    stage.script.tell(state(number))
+                assert (stage.ear.states[-1]["revision"] == f"r{number}") == (wait_s is None)
+                if wait_s is not None:
+                    assert waits_s == [pytest.approx(wait_s)], "one wait for all three"
+                    now_s += waits_s.pop()
+                    stage.bridge._push()
+                    assert stage.ear.states[-1]["revision"] == f"r{number}"
+        assert [frame["seq"] for frame in stage.ear.states] == [1, 2, 3, 4, 5]
 
     asyncio.run(test())
 
@@ -187,9 +206,9 @@ def test_a_second_twin_is_told_of(caplog: pytest.LogCaptureFixture) -> None:
             stage.script.tell(state(1))
             stage.script.twins = 2
             stage.script.tell(state(2))
-            told = stage.ear.heard[-1][1] if stage.ear.reasons[-1] == "live" else {}
+            told = stage.ear.heard[-1] if stage.ear.reasons[-1] == "live" else {}
             await until(
-                lambda: any("2 twins" in f.get("message", "") for _, f in stage.ear.heard), "it"
+                lambda: any("2 twins" in f.get("message", "") for f in stage.ear.heard), "it"
             )
             assert told
             assert "2 twins publish on the same topic" in caplog.text
@@ -220,16 +239,21 @@ def test_the_watch_outlives_an_error(
 
 
 def test_who_asked_for_a_low_rate_gets_the_newest_although_nothing_more_happens() -> None:
+    now_s = 100.0
+
     async def test() -> None:
-        async with Stage(max_rate_hz=100.0) as stage:
+        nonlocal now_s
+        async with Stage(clock=lambda: now_s, max_rate_hz=100.0) as stage:
             stage.bridge._liveness.stale_after_s = math.inf  # no status takes it along
             rare = Ear()
             stage.bridge.join(Client(rare, min_interval_s=0.3))
             for number in range(1, 6):
                 stage.script.tell(state(number))
+            await until(lambda: stage.ear.states[-1]["revision"] == "r5", "the newest")
+            assert [frame["revision"] for frame in rare.states] == ["r1"]
+            now_s += 0.3
             await until(lambda: rare.states[-1]["revision"] == "r5", "the newest in its time")
-            assert len(rare.states) <= 3
-            assert rare.heard[-1][0] - rare.heard[1][0] > 0.3 - 0.002
+            assert [frame["revision"] for frame in rare.states] == ["r1", "r5"]
 
     asyncio.run(test())
 

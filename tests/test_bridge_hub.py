@@ -272,16 +272,35 @@ def test_a_late_frame_does_not_delay_those_after_it_unless_the_interval_is_stric
     on_average, strict = Socket(), Socket()
     stage.join(on_average, min_interval_s=1.0, wants_status=False)
     stage.join(strict, min_interval_s=1.0, strict_interval=True, wants_status=False)
-    for now_s in (0.0, 1.2, 2.0, 2.2, 3.0, 3.2):
+    for now_s in (0.0, 1.05, 2.0, 2.05, 3.0, 3.05):
         stage.publish(now_s)
     assert on_average.got == [1, 2, 3, 5]
     assert strict.got == [1, 2, 4, 6]
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.05, 0.099])
+def test_of_a_source_that_keeps_to_the_rate_nothing_is_missed(stage: Stage, late_s: float) -> None:
+    socket = Socket()
+    stage.join(socket, min_interval_s=1.0, wants_status=False)
+    for second in range(100):
+        stage.publish(second + (late_s if second % 3 == 0 else 0.0))
+    assert len(socket.got) == 100
 
 
 def test_a_pause_is_not_made_up_for_by_a_burst(stage: Stage) -> None:
     socket = Socket()
     stage.join(socket, min_interval_s=1.0, wants_status=False)
     stage.publish(0.0)
-    for now_s in (100.0, 100.1, 100.2, 100.3):
+    for now_s in (100.0, 100.1, 100.85, 100.95, 101.85, 101.95):
         stage.publish(now_s)
-    assert len(socket.got) <= 3
+    # One as soon as there is something, and the next a beat later, a tenth of it forgiven.
+    assert socket.got == [1, 2, 5, 7]
+
+
+def test_nor_is_the_time_before_a_client_came(stage: Stage) -> None:
+    socket = Socket()
+    stage.publish(100.0)
+    stage.join(socket, 100.3, min_interval_s=1.0, wants_status=False)
+    for now_s in (100.5, 101.1, 101.25, 102.15, 102.25):
+        stage.publish(now_s)
+    assert socket.got == [1, 4, 6]

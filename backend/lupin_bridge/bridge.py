@@ -7,13 +7,13 @@ import contextlib
 import logging
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 from lupin_bridge.field_limits import FieldLimits
 from lupin_bridge.frames import FrameWriter
 from lupin_bridge.goodbye import Goodbye
-from lupin_bridge.hub import Client, Hub
+from lupin_bridge.hub import Client, Hub, next_beat_s
 from lupin_bridge.metrics import Metrics, Sample
 from lupin_bridge.settings import Settings
 from lupin_bridge.source import Revised, TwinSource
@@ -33,9 +33,15 @@ HEARTBEAT_SPARED_S = 0.8
 
 
 class Bridge:
-    """Everything between a source and its listeners. Belongs to the event loop."""
+    """Everything between a source and its listeners. Belongs to the event loop.
 
-    def __init__(self, source: TwinSource, settings: Settings) -> None:
+    `clock` tells seconds and never jumps.
+    """
+
+    def __init__(
+        self, source: TwinSource, settings: Settings, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._clock = clock
         self.source = source
         self.settings = settings
         # Large fields and pictures are written off the loop.
@@ -94,24 +100,24 @@ class Bridge:
     @property
     def status(self) -> Status:
         """The status now."""
-        return self._liveness.status(time.monotonic())
+        return self._liveness.status(self._clock())
 
     @property
     def ros_time_ns(self) -> int:
         """ROS time now, as far as it is known: the newest state's, and the time since it came."""
         if self._latest is None or self._liveness.last_state_s is None:
             return 0
-        since_s = time.monotonic() - self._liveness.last_state_s
+        since_s = self._clock() - self._liveness.last_state_s
         return self._latest.snapshot.stamp_ns + int(since_s * NANOSECONDS_PER_SECOND)
 
     def join(self, client: Client) -> None:
         """Add a listener; it has the status and the current state when this returns."""
         self._tell_status()  # so that nobody hears of it before the others
-        self.hub.join(client, time.monotonic())
+        self.hub.join(client, self._clock())
 
     def serve(self, client: Client) -> None:
         """A listener's socket is free again."""
-        self.hub.serve(client, time.monotonic())
+        self.hub.serve(client, self._clock())
 
     def _measure(self) -> Iterator[Sample]:
         hub, source, status = self.hub, self.source, self.status
@@ -144,7 +150,7 @@ class Bridge:
 
     def _on_state(self, state: Revised) -> None:
         self._latest = state
-        now_s = time.monotonic()
+        now_s = self._clock()
         self._liveness.last_state_s = now_s
         self._liveness.twin_count = self.source.twin_count()
         self._liveness.has_map = self.source.occupancy_map() is not None
@@ -176,12 +182,9 @@ class Bridge:
         state = self._latest
         if state is None:
             return
-        now_s = time.monotonic()
+        now_s = self._clock()
         self._pushed, self._pushed_s = state, now_s
-        # A beat, not a distance from this frame on: or after one late change all that follow would
-        # be as late.
-        interval_s = 1.0 / self.settings.max_rate_hz
-        self._next_push_s = max(self._next_push_s, now_s - interval_s) + interval_s
+        self._next_push_s = next_beat_s(self._next_push_s, now_s, 1.0 / self.settings.max_rate_hz)
         self._tell_status()
         self.hub.publish(self.frames.state(state.snapshot, state.revision), now_s)
         self.metrics.push_seconds.observe(time.monotonic() - state.made_s)
@@ -201,14 +204,14 @@ class Bridge:
         if (first and not is_good) or (self._told and status.says_more_than(self._told)):
             log.log(logging.INFO if is_good else logging.WARNING, "%s", status.message)
         self._told = status
-        self.hub.announce(time.monotonic())
+        self.hub.announce(self._clock())
 
     async def _keep_watch(self) -> None:
         while True:
             await asyncio.sleep(WATCH_PERIOD_S)
             try:
                 self._tell_status()
-                now_s = time.monotonic()
+                now_s = self._clock()
                 self.hub.serve_all(now_s)  # who asked for a low rate may be due by now
                 stuck = self.hub.dismiss_stuck(now_s)
             except Exception:

@@ -23,6 +23,20 @@ CLOSE_POLICY: Final = 1008
 CLOSE_TRY_AGAIN_LATER: Final = 1013
 
 
+# Frames come a little early or late; so much of an interval is forgiven.
+BEAT_SLACK: Final = 0.1
+
+
+def next_beat_s(due_s: float, now_s: float, interval_s: float) -> float:
+    """When the next frame is due after one at `now_s`, that was due at `due_s`.
+
+    A beat, not a distance from this frame on: or of a source that keeps to the rate, a client would
+    miss the frame after each one that was a little late. After a pause the beat begins anew: what
+    was not sent then is not made up for.
+    """
+    return max(due_s, now_s - BEAT_SLACK * interval_s) + interval_s
+
+
 class Writable(Protocol):
     """What the hub needs of a connection; `ws_protocol.Connection` is one."""
 
@@ -49,8 +63,8 @@ def plain_wire(client: Client, frame: StateFrame) -> bytes:
 class Client:
     """One listener: what it asked for, what it has got, and since when its socket is full.
 
-    `min_interval_s` is the time between two frames, on average at least, or between any two where
-    `strict_interval`; `wire` writes a frame as this client reads it.
+    `min_interval_s` is the time between two frames: now and then a tenth less, on average right;
+    never less where `strict_interval`. `wire` writes a frame as this client reads it.
     """
 
     connection: Writable
@@ -144,11 +158,10 @@ class Hub:
                 self.frames_skipped += frame.seq - client.sent_seq - 1
             self.frames_sent += 1
             client.sent_seq = frame.seq
-            beat_s = now_s
-            if not client.strict_interval:
-                # The client's own beat, not from this frame on: frames come a little early or late.
-                beat_s = max(client.next_due_s, now_s - client.min_interval_s)
-            client.next_due_s = beat_s + client.min_interval_s
+            if client.strict_interval:
+                client.next_due_s = now_s + client.min_interval_s
+            else:
+                client.next_due_s = next_beat_s(client.next_due_s, now_s, client.min_interval_s)
 
     def dismiss_stuck(self, now_s: float) -> int:
         """Close every client that has not taken a frame for too long; returns how many."""

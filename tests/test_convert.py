@@ -111,7 +111,7 @@ def test_a_discoverys_w_zero_is_taken_as_one() -> None:
         (130.0, 100.0, 100.0),  # from the future: no younger than now
         (0.0, 100.0, 100.0),  # no stamp: now
         (60.0, 0.0, 60.0),  # simulated time has not started
-        (0.0, 0.0, 0.0),
+        (0.0, 0.0, 1e-9),  # of neither: not 0, which stands for never
     ],
 )
 def test_when_an_observation_was_made(stamp_s: float, now_s: float, expected_s: float) -> None:
@@ -127,6 +127,14 @@ def test_a_scan_that_is_not_ok_has_no_pose() -> None:
     assert convert.scan(failed, S).pose is None
     assert not convert.scan(failed, S).succeeded
     assert convert.scan(failed, S).readings == (Reading("co2", 1.0),)
+
+
+def test_a_scan_without_a_stamp_was_made_when_its_sensors_were_read() -> None:
+    msg = messages.scan("1", {"co2": 1.0})
+    msg.tag_reading.stamp.sec = 3
+    assert convert.scan(msg, 10 * S).stamp_ns == 3 * S
+    messages.set_stamp(msg.header, 4.0)
+    assert convert.scan(msg, 10 * S).stamp_ns == 4 * S
 
 
 def test_a_look_carries_everything() -> None:

@@ -142,8 +142,8 @@ def test_error_is_the_definitions(
 
 
 def test_broken_sensors_error_is_large_and_finite() -> None:
-    quality = quality_of([(0.0, 0.0, 1e200), (1.0, 0.0, -1e200)])
-    assert quality.rmse == pytest.approx(2e200)
+    quality = quality_of([(0.0, 0.0, 3e38), (1.0, 0.0, -3e38)])
+    assert quality.rmse == pytest.approx(6e38)
 
 
 def test_memory_does_not_grow_with_the_square_of_the_tags() -> None:

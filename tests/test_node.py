@@ -408,7 +408,8 @@ def test_a_bad_request_is_refused_with_everything_else_zeroed(
 
 
 def test_stamps_and_staleness_follow_the_simulated_clock(domain: int) -> None:
-    with twin_node(domain, *FAST, "-p", "use_sim_time:=true"), Peer(domain) as peer:
+    clock = (*FAST, "-p", "use_sim_time:=true")
+    with twin_node(domain, *clock) as process, Peer(domain) as peer:
         peer.wait_for_twin()
         peer.set_clock(100.0)
         peer.observe(scan("now", {"co2": 1.0}), scan("before", {"co2": 1.0}, stamp_s=60.0))
@@ -419,6 +420,12 @@ def test_stamps_and_staleness_follow_the_simulated_clock(domain: int) -> None:
         assert peer.tag("now", lambda t: t.stale_seconds > 0.0).stale_seconds == 30.5
         peer.set_clock(50.0)
         assert [tag.stale_seconds for tag in peer.states[-1].tags] == [0.0, 0.0]
+        process.wait_for_output("ROS time has gone back")
+        # Both age from the jump on, and what is observed now is the latest.
+        peer.set_clock(60.0)
+        assert [tag.stale_seconds for tag in peer.states[-1].tags] == [10.0, 10.0]
+        peer.observe(scan("now", {"co2": 2.0}, stamp_s=55.0))
+        assert peer.tag("now", lambda t: t.readings[0].value == 2.0).stale_seconds == 5.0
 
 
 # --- parameters ---------------------------------------------------------------------------------

@@ -62,12 +62,13 @@ def observed_at(stamp: Any, now_ns: int) -> int:
 
     An observation that was latched before the twin started is as old as it says, not as young as
     its arrival. A stamp from the future (a robot's clock that runs ahead) cannot be older than
-    now. While simulated time has not started (now is 0), the stamp is all there is.
+    now. While simulated time has not started (now is 0), the stamp is all there is; without one it
+    was at the first moment of that time, for 0 stands for never.
     """
     stamp_ns = nanoseconds(stamp)
     if stamp_ns > 0 and (stamp_ns <= now_ns or now_ns == 0):
         return stamp_ns
-    return now_ns
+    return max(now_ns, 1)
 
 
 # --- numbers --------------------------------------------------------------------------------
@@ -114,11 +115,15 @@ def _pose(pose: Any, qw: float) -> Pose:
 
 
 def scan(msg: Any, now_ns: int) -> Observation:
-    """A tag reading out of lupin_msgs/Observation; the pose counts only when the status is OK."""
+    """A tag reading out of lupin_msgs/Observation; the pose counts only when the status is OK.
+
+    Without a stamp in the header it was made when the sensors were read.
+    """
     succeeded = msg.status == msg.STATUS_OK
+    stamp = msg.header.stamp if nanoseconds(msg.header.stamp) else msg.tag_reading.stamp
     return Observation(
         tag_id=msg.tag_reading.tag_id,
-        stamp_ns=observed_at(msg.header.stamp, now_ns),
+        stamp_ns=observed_at(stamp, now_ns),
         readings=tuple(
             Reading(reading.name, float(reading.value)) for reading in msg.tag_reading.readings
         ),

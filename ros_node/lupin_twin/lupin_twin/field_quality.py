@@ -91,7 +91,6 @@ def leave_one_out(
         sensor_type=sensor_type,
         judged=judged.size,
         unjudged=len(samples) - judged.size,
-        # hypot, because a broken sensor's error may be too large to square.
         rmse=math.hypot(*errors.tolist()) / math.sqrt(judged.size),
         worst=TagError(
             tag_id=tag_ids[index],

@@ -307,7 +307,13 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         return False
 
     def _now_ns(self) -> int:
-        return int(self.get_clock().now().nanoseconds)
+        now_ns = int(self.get_clock().now().nanoseconds)
+        if self.store.hold_to(now_ns):
+            self._warn(
+                ("clock", 0),
+                "ROS time has gone back: all observations from later than now age from here on",
+            )
+        return now_ns
 
     def _warn(self, key: tuple[str, object], text: str) -> None:
         held_back = self._throttle.ask(key, time.monotonic())

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 NANOSECONDS_PER_SECOND = 1_000_000_000
@@ -30,6 +30,9 @@ MAX_FOOTPRINT_POINTS = 64
 # 20,000 tags with three sensors and 32 scans. A reading with its name is some hundred bytes.
 MAX_ITEMS = 1_000_000
 MAX_HISTORY_READINGS = 2_000_000
+
+# The largest number that a field, which is float32, can hold.
+FLOAT32_MAX = 3.4028234663852886e38
 
 
 class Rejected(ValueError):
@@ -136,8 +139,7 @@ class TagState:
     def stale_seconds(self, now_ns: int) -> float:
         """Seconds since the last observation: never negative, infinite for a tag never observed.
 
-        A clock that jumps back (a restarted simulation, a looped bag) leaves observations in the
-        future; their age is 0, not a negative number.
+        What was observed after `now_ns` has the age 0; `TwinStore.hold_to` leaves no such thing.
         """
         if self.last_observed_ns is None:
             return math.inf
@@ -153,9 +155,34 @@ class Snapshot:
     tags: tuple[TagState, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class _Stamps:
+    """When what is kept of a tag was observed (ROS time, ns): each reading, the flowers, anything.
+
+    `anything` leaves out scans that brought nothing.
+    """
+
+    readings: Mapping[str, int] = field(default_factory=dict)
+    flower: int | None = None
+    anything: int | None = None
+
+    def held_to(self, now_ns: int) -> _Stamps:
+        return _Stamps(
+            {name: min(stamp_ns, now_ns) for name, stamp_ns in self.readings.items()},
+            None if self.flower is None else min(self.flower, now_ns),
+            None if self.anything is None else min(self.anything, now_ns),
+        )
+
+
+_NO_STAMPS = _Stamps()
+
+
 @dataclass(slots=True)
 class TwinStore:
     """The latest of everything, per tag, and a short history of readings.
+
+    Latest is what has the latest stamp, whatever came first: of two producers whose messages were
+    latched, either may be heard first. Of equal stamps the later arrival counts.
 
     `buffer_len` bounds the history: that many scans per tag, and fewer once all tags together have
     `MAX_HISTORY_READINGS`. What a tag is now is never given up for what others were.
@@ -164,6 +191,8 @@ class TwinStore:
     buffer_len: int = 32
     observation_count: int = field(default=0, init=False)
     _tags: dict[str, TagState] = field(default_factory=dict, init=False)
+    _stamps: dict[str, _Stamps] = field(default_factory=dict, init=False)
+    _newest_ns: int = field(default=0, init=False)
     _items: int = field(default=0, init=False)
     _history: dict[str, deque[Observation]] = field(default_factory=dict, init=False)
     _history_readings: int = field(default=0, init=False)
@@ -172,29 +201,40 @@ class TwinStore:
         """Keep a scan: its readings (latest per name), its time, its pose if the tag has none.
 
         A scan that failed and brought nothing does not make what is known look younger: its time
-        counts only where the tag was never observed.
+        counts only as long as nothing else was observed at the tag.
 
         Raises:
             Rejected: a text or a list past its bound; nothing is kept then.
 
         """
         check_texts(observation.tag_id, *(reading.name for reading in observation.readings))
-        tag = self._tag(observation.tag_id)
-        readings = {reading.name: reading for reading in tag.readings}
-        readings.update((reading.name, reading) for reading in observation.readings)
+        tag, stamps = self._tag(observation.tag_id)
+        at_ns, kept_ns = observation.stamp_ns, stamps.readings
+        latest = {r.name: r for r in observation.readings if at_ns >= kept_ns.get(r.name, at_ns)}
+        readings = {reading.name: reading for reading in tag.readings} | latest
         check_length("readings of a tag", len(readings), MAX_SENSORS_PER_TAG)
-        brought_something = observation.succeeded or bool(observation.readings)
-        if brought_something or tag.last_observed_ns is None:
-            tag = replace(tag, last_observed_ns=observation.stamp_ns)
+        if observation.succeeded or observation.readings:
+            stamps = replace(
+                stamps,
+                readings={**kept_ns, **dict.fromkeys(latest, at_ns)},
+                anything=_later(stamps.anything, at_ns),
+            )
+        tried_ns = at_ns if tag.last_observed_ns is None else tag.last_observed_ns
         self._keep(
-            replace(tag, readings=tuple(readings.values()), pose=tag.pose or observation.pose)
+            replace(
+                tag,
+                readings=tuple(readings.values()),
+                last_observed_ns=tried_ns if stamps.anything is None else stamps.anything,
+                pose=tag.pose or observation.pose,
+            ),
+            stamps,
         )
         if observation.readings:
             self._remember(observation)
         self.observation_count += 1
 
     def record_flower(self, observation: FlowerObservation) -> None:
-        """Keep a look at the flowers: all of it replaces what was known; readings stay.
+        """Keep a look at the flowers: all of it replaces an earlier look; readings stay.
 
         Raises:
             Rejected: a text or a list past its bound; nothing is kept then.
@@ -204,14 +244,23 @@ class TwinStore:
         check_texts(observation.tag_id, flower.species, *(b.species for b in flower.blooms))
         check_length("flowers of a tag", len(flower.blooms), MAX_BLOOMS_PER_TAG)
         check_length("box_footprint points", len(flower.footprint), MAX_FOOTPRINT_POINTS)
-        tag = self._tag(observation.tag_id)
+        tag, stamps = self._tag(observation.tag_id)
+        at_ns = observation.stamp_ns
+        if at_ns < _later(stamps.flower, at_ns):
+            flower = tag.flower
+        stamps = replace(
+            stamps,
+            flower=_later(stamps.flower, at_ns),
+            anything=_later(stamps.anything, at_ns),
+        )
         self._keep(
             replace(
                 tag,
                 flower=flower,
-                last_observed_ns=observation.stamp_ns,
+                last_observed_ns=stamps.anything,
                 pose=tag.pose or observation.pose,
-            )
+            ),
+            stamps,
         )
         self.observation_count += 1
 
@@ -226,11 +275,31 @@ class TwinStore:
 
         """
         check_texts(tag_id)
-        tag = self._tag(tag_id)
+        tag, stamps = self._tag(tag_id)
         if tag.pose is not None:
             return False
-        self._keep(replace(tag, pose=pose))
+        self._keep(replace(tag, pose=pose), stamps)
         self.observation_count += 1
+        return True
+
+    def hold_to(self, now_ns: int) -> bool:
+        """Follow a clock that has gone back: whatever was observed after `now_ns` was, now.
+
+        It ages from here on, and new observations count as new. Otherwise a restarted simulation
+        or a looped bag would look fresh, and stand still, for as long as the old time had lasted.
+        Returns whether there was anything like that. 0 is a simulated clock that has not started.
+        """
+        if not 0 < now_ns < self._newest_ns:
+            return False
+        self._newest_ns = now_ns
+        for tag_id, tag in self._tags.items():
+            if tag.last_observed_ns is not None and tag.last_observed_ns > now_ns:
+                self._tags[tag_id] = replace(tag, last_observed_ns=now_ns)
+                self._stamps[tag_id] = self._stamps[tag_id].held_to(now_ns)
+                self._history[tag_id] = deque(
+                    replace(scan, stamp_ns=min(scan.stamp_ns, now_ns))
+                    for scan in self._history.get(tag_id, ())
+                )
         return True
 
     def is_pinned(self, tag_id: str) -> bool:
@@ -256,31 +325,42 @@ class TwinStore:
             return None
         return tuple(self._history.get(tag_id, ()))
 
-    def _tag(self, tag_id: str) -> TagState:
+    def _tag(self, tag_id: str) -> tuple[TagState, _Stamps]:
         known = self._tags.get(tag_id)
         if known is not None:
-            return known
+            return known, self._stamps[tag_id]
         check_length("tags", len(self._tags) + 1, MAX_TAGS)
-        return TagState(tag_id=tag_id)
+        return TagState(tag_id=tag_id), _NO_STAMPS
 
-    def _keep(self, tag: TagState) -> None:
+    def _keep(self, tag: TagState, stamps: _Stamps) -> None:
         """Put a tag in the place of what it was, if there is room for what it grew by."""
         known = self._tags.get(tag.tag_id)
         items = self._items + items_of(tag) - (0 if known is None else items_of(known))
         check_length("readings, flowers and footprint points of all tags", items, MAX_ITEMS)
         self._items = items
         self._tags[tag.tag_id] = tag
+        self._stamps[tag.tag_id] = stamps
+        # No stamp of a tag is later than its last observation.
+        self._newest_ns = _later(tag.last_observed_ns, self._newest_ns)
 
     def _remember(self, scan: Observation) -> None:
-        """Put a scan in its tag's history, each sensor once, and let the tag's oldest ones go."""
+        """Put a scan in its tag's history by time, each sensor once; let the oldest ones go."""
         latest = {reading.name: reading for reading in scan.readings}
         history = self._history.setdefault(scan.tag_id, deque())
+        after = []
+        while history and history[-1].stamp_ns > scan.stamp_ns:
+            after.append(history.pop())
         history.append(replace(scan, readings=tuple(latest.values())))
+        history.extend(reversed(after))
         self._history_readings += len(latest)
         while len(history) > self.buffer_len or (
             history and self._history_readings > MAX_HISTORY_READINGS
         ):
             self._history_readings -= len(history.popleft().readings)
+
+
+def _later(one_ns: int | None, other_ns: int) -> int:
+    return other_ns if one_ns is None else max(one_ns, other_ns)
 
 
 def items_of(tag: TagState) -> int:
@@ -291,13 +371,16 @@ def items_of(tag: TagState) -> int:
 def samples_of(
     tags: Iterable[TagState], sensor_type: str
 ) -> tuple[tuple[float, float, float], ...]:
-    """(x, y, value) of the tags with a pose and a finite reading of `sensor_type`, in order."""
+    """(x, y, value) of the tags with a pose and a finite reading of `sensor_type`, in order.
+
+    Finite in the field's own type: a number past float32 would paint its neighbourhood infinite.
+    """
     return tuple(
         (tag.pose.x, tag.pose.y, reading.value)
         for tag in tags
         if tag.pose is not None
         for reading in tag.readings
-        if reading.name == sensor_type and math.isfinite(reading.value)
+        if reading.name == sensor_type and abs(reading.value) <= FLOAT32_MAX  # false for NaN
     )
 
 

@@ -274,14 +274,24 @@ def etag(running: Bridge, path: str = "/api/field.json", **query: Any) -> str:
     return answer.headers["etag"]
 
 
+def work_done(running: Bridge) -> list[str]:
+    """What the metrics say of the fields that were computed, looked up or waited for so far."""
+    names = ("field_cache_hits_total", "field_cache_misses_total", "field_seconds_count")
+    lines = running.get("/metrics").text.splitlines()
+    found = [line for line in lines if line.startswith(tuple(f"lupin_{name} " for name in names))]
+    assert len(found) == len(names)
+    return found
+
+
 @pytest.mark.parametrize("path", ["/api/field", "/api/field.png", "/api/field/quality"])
 def test_the_same_field_is_not_sent_twice(live: Bridge, path: str) -> None:
-    tag = etag(live, path)
+    tag, before = etag(live, path), work_done(live)
     for known in (tag, f"W/{tag}", f'"other", {tag}', "*"):
         again = live.get(path, {"If-None-Match": known}, **QUERY)
         assert (again.status_code, again.content) == (304, b"")
         assert again.headers["etag"] == tag
         assert again.headers["cache-control"] == "no-cache"
+    assert work_done(live) == before, "neither computed nor looked up"
     assert live.get(path, {"If-None-Match": '"other"'}, **QUERY).status_code == 200
 
 

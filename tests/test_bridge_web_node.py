@@ -131,6 +131,26 @@ def test_all_replicas_have_the_same_revision_of_the_same_state(domain: int, peer
         assert one.node.revision == two.node.revision
 
 
+def test_a_twin_that_was_started_anew_is_another_revision_for_all_replicas(domain: int) -> None:
+    with stage_in(domain) as one, stage_in(domain) as two:
+        replicas, revisions = (one, two), set[str]()
+        for _ in range(2):
+            with Peer(domain) as twin:
+
+                def revision(twin: Peer = twin) -> str | None:
+                    for replica in replicas:
+                        replica.take(twin, tag("1"))
+                    ours, theirs = (replica.node.revision for replica in replicas)
+                    return ours if ours == theirs and ours not in revisions else None
+
+                revisions.add(wait_for(revision, "one new revision of both", meanwhile=spare) or "")
+        assert len(revisions) == 2
+
+
+def spare() -> None:
+    """What has been waited for comes with the next state."""
+
+
 # --- history ------------------------------------------------------------------------------------
 
 

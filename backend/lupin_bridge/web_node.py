@@ -75,6 +75,7 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.twins = TwinCount()
         self.occupancy_map: OccupancyMap | None = None
         self.digest = ""
+        self.publishers_digest = ""
         self._on_state = on_state
         self._newest: Snapshot | None = None
         self._history: dict[str, deque[Observation]] = {}
@@ -101,9 +102,13 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     @property
     def revision(self) -> str:
-        """Digests of poses and readings and of the map: the twin's count is not on the wire."""
+        """Digests of who publishes the state, of poses and readings, and of the map.
+
+        The twin's count is not on the wire, nor are its parameters: but one that was started with
+        others is another publisher.
+        """
         map_revision = 0 if self.occupancy_map is None else self.occupancy_map.revision
-        return f"{self.digest}-{map_revision:x}"
+        return f"{self.publishers_digest}-{self.digest}-{map_revision:x}"
 
     def request_field(self, request: FieldRequest) -> Any:
         """Ask the twin; returns the rclpy Future of its response."""
@@ -133,6 +138,7 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         if len(self._digests) > len(snapshot.tags):
             self._forget_all_but(snapshot.tags)
         topic = self.parameters.state_topic
+        self.publishers_digest = self._digest_of_publishers(topic)
         if self.twins.see(int(self.count_publishers(topic)), time.monotonic()):
             self._say(
                 ("twins", 0),
@@ -169,6 +175,11 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         for kept in (self._history, self._digests):
             for tag_id in [tag_id for tag_id in kept if tag_id not in ids]:
                 del kept[tag_id]
+
+    def _digest_of_publishers(self, topic: str) -> str:
+        """The same in all replicas: DDS gives a publisher one id for all who see it."""
+        ids = sorted(bytes(info.endpoint_gid) for info in self.get_publishers_info_by_topic(topic))
+        return blake2b(b"".join(ids), digest_size=6).hexdigest()
 
     def _digest_of(self, tags: Sequence[TagState]) -> str:
         total = blake2b(digest_size=12)

@@ -37,7 +37,7 @@ store.subscribe(() => {
 const kiosk = new URLSearchParams(window.location.search).get('kiosk') === '1';
 
 startTheme();
-startAddress();
+startAddress(kiosk);
 startLoaders();
 startLive();
 if (!kiosk) startShortcuts();

@@ -60,6 +60,7 @@ export const S = {
 
   sensors: 'Sensor',
   mapRegion: 'Map',
+  mapPicture: 'Map of the greenhouse. The list beside it names the tags that need somebody.',
   mapLabel:
     'Map of the greenhouse. Arrow keys move it, plus and minus zoom, 0 shows everything, ' +
     'Enter opens the tag nearest to the crosshair. The table lists the same tags.',

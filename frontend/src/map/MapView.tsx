@@ -4,19 +4,16 @@ import { S } from '../strings';
 import { runMap } from './controller';
 
 /** The three canvases; everything on them is drawn outside React. */
-export function MapView(): JSX.Element {
+export function MapView({ kiosk }: { kiosk: boolean }): JSX.Element {
   const element = useRef<HTMLDivElement>(null);
   const still = useRef<HTMLCanvasElement>(null);
   const pins = useRef<HTMLCanvasElement>(null);
   const overlay = useRef<HTMLCanvasElement>(null);
   useEffect(() => {
     if (!element.current || !still.current || !pins.current || !overlay.current) return undefined;
-    return runMap(element.current, {
-      still: still.current,
-      pins: pins.current,
-      overlay: overlay.current,
-    });
-  }, []);
+    const canvases = { still: still.current, pins: pins.current, overlay: overlay.current };
+    return runMap(element.current, canvases, kiosk);
+  }, [kiosk]);
   return (
     <div
       ref={element}
@@ -24,10 +21,9 @@ export function MapView(): JSX.Element {
       id="map-view"
       data-testid="map"
       // An application: the arrow keys are the map's own while it has the focus.
-      role="application"
-      aria-label={S.mapLabel}
-      // eslint-disable-next-line jsx-a11y/no-noninteractive-tabindex -- it is interactive, see role
-      tabIndex={0}
+      role={kiosk ? 'img' : 'application'}
+      aria-label={kiosk ? S.mapPicture : S.mapLabel}
+      tabIndex={kiosk ? undefined : 0}
     >
       <canvas ref={still} data-layer="still" aria-hidden="true" />
       <canvas ref={pins} data-layer="pins" aria-hidden="true" />

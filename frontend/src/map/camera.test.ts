@@ -107,4 +107,20 @@ describe('camera', () => {
     camera.goTo(null, { ...bounds, maxX: 40 });
     expect(onView).toHaveBeenCalledTimes(2);
   });
+
+  test('a fixed one is moved by the program alone', () => {
+    const wall = document.createElement('div');
+    const fixed = new MapCamera(wall, { onView, onCamera }, true);
+    fixed.resize(size);
+    fixed.goTo(null, bounds);
+    const { view } = fixed;
+    mouse(wall, 'mousedown', 100);
+    mouse(window, 'mousemove', 140);
+    mouse(window, 'mouseup', 140);
+    wall.dispatchEvent(new WheelEvent('wheel', { deltaY: -200 }));
+    expect(fixed.view).toEqual(view);
+    expect(onCamera).not.toHaveBeenCalled();
+    fixed.goTo(null, { ...bounds, maxX: 40 });
+    expect(fixed.view).not.toEqual(view);
+  });
 });

@@ -42,7 +42,8 @@ export class MapCamera {
   /** The view that a gesture under way began with. */
   #held: View | null = null;
 
-  constructor(element: HTMLElement, handlers: CameraHandlers) {
+  /** `isFixed`: the program alone moves it; no wheel, finger or mouse does. */
+  constructor(element: HTMLElement, handlers: CameraHandlers, isFixed = false) {
     this.#selection = select<HTMLElement, unknown>(element);
     this.#zoom = zoom<HTMLElement, unknown>()
       .scaleExtent([MIN_SCALE, MAX_SCALE])
@@ -66,6 +67,7 @@ export class MapCamera {
         this.#held = null;
         if (hasMoved) handlers.onCamera(cameraOf(this.#view, this.#size));
       });
+    if (isFixed) this.#zoom.filter(() => false);
     this.#selection.call(this.#zoom);
   }
 

@@ -23,10 +23,10 @@ const tagAt = (id: string, x: number, y: number, sec = 100): ReturnType<typeof w
     readings: readings({ temperature: 20 }),
   });
 
-const start = (): void => {
+const start = (isFixed = false): void => {
   const canvas = (): HTMLCanvasElement => document.createElement('canvas');
   overlay = canvas();
-  stop = runMap(element, { still: canvas(), pins: canvas(), overlay });
+  stop = runMap(element, { still: canvas(), pins: canvas(), overlay }, isFixed);
   paint();
 };
 /** Runs what waits for the next frame. */
@@ -175,4 +175,20 @@ test('the read-out follows the mouse', () => {
   pointer('pointermove', ...place(2, 1.5));
   expect(pointedAt.get()?.x).toBeCloseTo(2);
   expect(pointedAt.get()?.y).toBeCloseTo(1.5);
+});
+
+test('a wall screen is for looking: nothing chooses a tag or moves the map', () => {
+  start(true);
+  const before = view();
+  const { view: chosen } = store.get();
+  pointer('click', ...place(3, 2));
+  pointer('click', ...place(3, 2), 'touch');
+  for (const key of ['Enter', 'ArrowLeft', '+']) press(key);
+  element.dispatchEvent(new WheelEvent('wheel', { deltaY: -240, bubbles: true }));
+  expect(view()).toEqual(before);
+  expect(store.get().view).toBe(chosen);
+  // Where the mouse is may be told; it is forgotten with the mouse.
+  pointer('pointermove', ...place(3, 2));
+  expect(pinUnderMouse.get()?.tagId).toBe('b');
+  expect(element.dataset['hand']).toBe('grab');
 });

@@ -29,7 +29,8 @@ const MOUSE_REACH = 16;
 /** What is to be drawn anew; "view": nothing but the place and the scale changed. */
 type Part = 'still' | 'pins' | 'overlay' | 'view';
 
-export function runMap(element: HTMLElement, canvases: Canvases): () => void {
+/** `isFixed`: a wall screen, where nobody who brushes past chooses a tag or moves the map. */
+export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false): () => void {
   const painter = new Painter(canvases, isDark() ? DARK : LIGHT);
   const calm = window.matchMedia('(prefers-reduced-motion: reduce)');
   const dirty = new Set<Part>();
@@ -38,17 +39,21 @@ export function runMap(element: HTMLElement, canvases: Canvases): () => void {
   let crosshair = false;
   let shown = store.get();
 
-  const camera = new MapCamera(element, {
-    onView: (view) => {
-      publish(view);
-      // The pin has moved away from under the mouse.
-      pinUnderMouse.dispatch(null);
-      spoil('view');
+  const camera = new MapCamera(
+    element,
+    {
+      onView: (view) => {
+        publish(view);
+        // The pin has moved away from under the mouse.
+        pinUnderMouse.dispatch(null);
+        spoil('view');
+      },
+      onCamera: (chosen) => {
+        act({ type: 'camera', camera: chosen });
+      },
     },
-    onCamera: (chosen) => {
-      act({ type: 'camera', camera: chosen });
-    },
-  });
+    isFixed,
+  );
 
   const publish = ({ x, y, scale }: View): void => {
     canvases.overlay.dataset['view'] = [x, y, scale].map((n) => n.toFixed(4)).join(',');
@@ -151,7 +156,7 @@ export function runMap(element: HTMLElement, canvases: Canvases): () => void {
     pointedAt.dispatch(toMap(camera.view, point));
     const pin = event.buttons === 0 ? pinAt(point, MOUSE_REACH) : null;
     hover(pin);
-    const hand = pin === null ? 'grab' : 'point';
+    const hand = pin === null || isFixed ? 'grab' : 'point';
     if (element.dataset['hand'] !== hand) element.dataset['hand'] = hand;
   };
   const onPointerLeave = (): void => {
@@ -242,24 +247,23 @@ export function runMap(element: HTMLElement, canvases: Canvases): () => void {
       if (camera.size.width > 0) paint();
     }),
   ];
-  element.addEventListener('pointermove', onPointerMove);
-  element.addEventListener('pointerleave', onPointerLeave);
-  element.addEventListener('click', onClick);
-  element.addEventListener('focus', onFocus);
-  element.addEventListener('blur', onBlur);
-  element.addEventListener('keydown', onKeyDown);
+  const gone = new AbortController();
+  const { signal } = gone;
+  element.addEventListener('pointermove', onPointerMove, { signal });
+  element.addEventListener('pointerleave', onPointerLeave, { signal });
+  if (!isFixed) {
+    element.addEventListener('click', onClick, { signal });
+    element.addEventListener('focus', onFocus, { signal });
+    element.addEventListener('blur', onBlur, { signal });
+    element.addEventListener('keydown', onKeyDown, { signal });
+  }
   return () => {
     for (const stop of stops) stop();
+    gone.abort();
     resize.disconnect();
     clearInterval(fading);
     cancelAnimationFrame(frame);
     camera.destroy();
-    element.removeEventListener('pointermove', onPointerMove);
-    element.removeEventListener('pointerleave', onPointerLeave);
-    element.removeEventListener('click', onClick);
-    element.removeEventListener('focus', onFocus);
-    element.removeEventListener('blur', onBlur);
-    element.removeEventListener('keydown', onKeyDown);
   };
 }
 

@@ -4,13 +4,22 @@ import { fromFragment, toFragment } from './permalink';
 /** Browsers refuse more than about a hundred changes of the address in half a minute. */
 const SETTLE_MS = 400;
 
-/** Keeps the address a link to what is on the screen, and follows a link that is opened. */
-export function startAddress(): () => void {
+/** A wall screen that somebody has changed shows again what its link says after this long. */
+const RETURN_MS = 120_000;
+
+/**
+ * Keeps the address a link to what is on the screen, and follows a link that is opened. On a
+ * wall screen the address is the law: it is never rewritten, and no tag is chosen.
+ */
+export function startAddress(kiosk = false): () => void {
   let timer: ReturnType<typeof setTimeout> | undefined;
   let { view } = store.get();
 
   const follow = (): void => {
-    act({ type: 'look', view: fromFragment(window.location.hash) });
+    const linked = fromFragment(window.location.hash);
+    act({ type: 'look', view: kiosk ? { ...linked, selected: null } : linked });
+    // What the link says needs no return to it.
+    if (kiosk) clearTimeout(timer);
   };
   const write = (): void => {
     const fragment = toFragment(store.get().view);
@@ -22,7 +31,7 @@ export function startAddress(): () => void {
     if (store.get().view === view) return;
     ({ view } = store.get());
     clearTimeout(timer);
-    timer = setTimeout(write, SETTLE_MS);
+    timer = kiosk ? setTimeout(follow, RETURN_MS) : setTimeout(write, SETTLE_MS);
   };
 
   follow();

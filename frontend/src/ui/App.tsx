@@ -55,7 +55,7 @@ export function App({ kiosk }: { kiosk: boolean }): JSX.Element {
       <main className="panels">
         <MapPanel kiosk={kiosk} />
         <TagsPanel kiosk={kiosk} />
-        {selected !== null && <TagCard key={selected} tagId={selected} />}
+        {selected !== null && !kiosk && <TagCard key={selected} tagId={selected} />}
       </main>
       {!kiosk && <PaneTabs />}
       <HelpDialog />

@@ -16,7 +16,7 @@ export function MapPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
     <section className="map-panel" aria-label={S.mapRegion} data-map-state={mapState}>
       <SensorPicker />
       <div className="map-frame">
-        <MapView />
+        <MapView kiosk={kiosk} />
         <Notices />
         {!kiosk && <MapControls />}
         <ScaleBar />

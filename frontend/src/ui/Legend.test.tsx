@@ -1,4 +1,4 @@
-import { fireEvent, render, screen } from '@testing-library/react';
+import { fireEvent, render, screen, within } from '@testing-library/react';
 import { beforeEach, describe, expect, test } from 'vitest';
 
 import { act, prefer, receive, store } from '../store/app';
@@ -89,5 +89,18 @@ describe('legend', () => {
   test('a wall screen has no controls', () => {
     render(<Legend kiosk />);
     expect(screen.queryByRole('radio')).toBeNull();
+  });
+
+  test('has a key for every look of a pin', () => {
+    render(<Legend kiosk={false} />);
+    const keys = within(screen.getByRole('list')).getAllByRole('listitem');
+    expect(keys.slice(0, 4).map((key) => key.textContent)).toEqual([
+      'reading',
+      'has no such sensor',
+      'sensor failed',
+      'pest seen',
+    ]);
+    // As on the map: an outline with a stroke through it, and neither filled nor dashed.
+    expect(keys[2]?.querySelector('path')?.getAttribute('class')).toBe('key-pin failed');
   });
 });

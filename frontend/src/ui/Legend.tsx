@@ -145,6 +145,12 @@ function Keys(): JSX.Element {
       </li>
       <li>
         <svg viewBox="0 0 16 16" width="16" height="16" aria-hidden="true">
+          <path d="M8 1.5 14.5 8 8 14.5 1.5 8ZM5 11 11 5" className="key-pin failed" />
+        </svg>
+        {S.pinFailed}
+      </li>
+      <li>
+        <svg viewBox="0 0 16 16" width="16" height="16" aria-hidden="true">
           <circle cx="8" cy="8" r="6.2" className="key-pest" />
           <path d="M8 4.6v4M8 11v.01" className="key-pest-mark" />
         </svg>

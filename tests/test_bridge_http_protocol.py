@@ -38,6 +38,7 @@ class Reader:
     async def send(self, message: Any) -> None:
         if self._takes is not None and len(self.messages) >= self._takes:
             await self.gone.wait()
+            return
         self.messages.append(message)
 
     def abort(self) -> None:
@@ -94,6 +95,13 @@ def test_who_takes_nothing_is_torn_off_and_the_answer_returns() -> None:
     answer(reader, b"x" * (10 * PIECE_BYTES), timeout_s=0.05)
     assert reader.gone.is_set()
     assert len(reader.body) == 2 * PIECE_BYTES
+
+
+def test_who_takes_none_of_many_small_answers_is_torn_off_too() -> None:
+    reader = Reader(takes=0)
+    answer(reader, b"small", timeout_s=0.05)
+    assert reader.gone.is_set()
+    assert reader.messages == []
 
 
 def test_websockets_pass_through() -> None:

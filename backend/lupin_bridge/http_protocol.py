@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Iterator
 from typing import Any, Final, cast
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -84,6 +85,18 @@ class HttpConnection(H11Protocol):
             self.abort()
 
 
+def pieces_of(message: Message) -> Iterator[Message]:
+    """A message of an answer as messages with no more than `PIECE_BYTES` of body."""
+    body = message.get("body", b"")
+    if len(body) <= PIECE_BYTES:
+        yield message
+        return
+    for start in range(0, len(body), PIECE_BYTES):
+        yield {**message, "body": body[start : start + PIECE_BYTES], "more_body": True}
+    # uvicorn waits before it writes: the empty end waits for the last piece.
+    yield {**message, "body": b""}
+
+
 class PieceByPiece:
     """ASGI middleware: an answer returns when its reader has taken all but the last piece."""
 
@@ -97,24 +110,18 @@ class PieceByPiece:
             await self._app(scope, receive, send)
             return
 
-        async def send_in_pieces(message: Message) -> None:
-            body = message.get("body", b"")
-            if len(body) <= PIECE_BYTES:
-                await send(message)
-                return
-            pieces = [
-                {**message, "body": body[start : start + PIECE_BYTES], "more_body": True}
-                for start in range(0, len(body), PIECE_BYTES)
-            ]
-            # uvicorn waits before it writes: the empty end waits for the last piece.
-            end = {**message, "body": b""}
+        async def send_in_time(message: Message) -> None:
+            # Small ones too: one behind the other, they are as much.
             try:
-                for piece in (*pieces, end):
-                    async with asyncio.timeout(self._timeout_s):
-                        await send(piece)
+                async with asyncio.timeout(self._timeout_s):
+                    await send(message)
             except TimeoutError:
                 log.warning("cut off a reader that took nothing for %g s", self._timeout_s)
                 scope["state"][HTTP_CONNECTION_KEY].abort()
-                await send(end)  # returns when the connection is gone
+                await send(message)  # returns when the connection is gone
+
+        async def send_in_pieces(message: Message) -> None:
+            for piece in pieces_of(message):
+                await send_in_time(piece)
 
         await self._app(scope, receive, send_in_pieces)

@@ -35,7 +35,7 @@ ROS = frozenset(
 KNOW_ROS = {
     "lupin_twin": {"cli", "convert", "node", "ros_parameters", "spinning"},
     "lupin_patrol": {"cli", "messages", "node"},
-    "lupin_bridge": {"ros_thread", "web_node"},
+    "lupin_bridge": {"ros_logs", "ros_thread", "web_node"},
 }
 # What else a package may use, and in which modules: None is all of them. The bridge may use what
 # its own dependencies list.

@@ -18,6 +18,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
+from lupin_bridge import ros_logs
 from lupin_bridge.source import TwinUnavailableError
 from lupin_twin.spinning import spin_until_shutdown
 
@@ -217,9 +218,10 @@ class RosThread(Generic[NodeT, EventT]):
             self._end(error)
 
     def _init_ros(self) -> None:
+        ros_logs.forward()
         try:
             rclpy.init(
-                args=self._ros_args,
+                args=[*self._ros_args, *ros_logs.QUIET],
                 context=self._context,
                 # The web server owns the signals.
                 signal_handler_options=SignalHandlerOptions.NO,

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Locator, expect
 
-from tests.browser.hmi import PHONE, Hmi, Pixel
+from tests.browser.hmi import PHONE, Box, Hmi, Pixel
 from tests.support.messages import scan
 from tests.support.web import Bridge, bridge
 
@@ -34,6 +34,14 @@ _OUT_OF_REACH = """(selector) => [...document.querySelectorAll(selector)]
     return !(hit && (e.contains(hit) || e.closest(thing) === (hit.closest(thing) ?? hit)));
   })
   .map((e) => e.ariaLabel || e.textContent || e.outerHTML)"""
+
+
+def place(thing: Locator) -> Box:
+    """Where it is in the window, pixels."""
+    box = thing.bounding_box()
+    assert box is not None
+    left, top = round(box["x"]), round(box["y"])
+    return Box(left, top, left + round(box["width"]), top + round(box["height"]))
 
 
 def out_of_reach(hmi: Hmi, selector: str) -> list[str]:
@@ -93,10 +101,7 @@ def test_a_low_window_has_the_legend_beside_the_map(
     open_at: Callable[..., Hmi], size: Size
 ) -> None:
     hmi = open_at(size)
-    legend, frame = hmi.test_id("legend").bounding_box(), hmi.map.bounding_box()
-    assert legend is not None
-    assert frame is not None
-    assert legend["x"] >= frame["x"] + frame["width"]
+    assert place(hmi.test_id("legend")).left >= place(hmi.map).right
 
 
 def test_a_phone_has_the_facts_as_well(open_at: Callable[..., Hmi]) -> None:
@@ -109,11 +114,8 @@ def test_a_phone_has_the_facts_as_well(open_at: Callable[..., Hmi]) -> None:
 def test_a_fixed_range_leaves_the_title_alone_on_a_phone(open_at: Callable[..., Hmi]) -> None:
     hmi = open_at((PHONE["width"], PHONE["height"]), "sensor=soil_moisture")
     hmi.page.get_by_role("radio", name="Fixed").check()
-    title = hmi.page.locator(".legend-title").bounding_box()
-    control = hmi.page.locator(".range").bounding_box()
-    assert title is not None
-    assert control is not None
-    assert title["y"] + title["height"] <= control["y"]
+    title, control = place(hmi.page.locator(".legend-title")), place(hmi.page.locator(".range"))
+    assert title.bottom <= control.top
 
 
 @pytest.mark.parametrize("size", SIZES, ids=str)
@@ -173,3 +175,49 @@ def test_high_contrast_still_tells_what_is_chosen_and_what_a_colour_means(
     swatches = [colours(swatch) for swatch in hmi.page.locator(".sensors .swatch").all()]
     assert len({frozenset(each) for each in swatches}) == len(swatches)
     assert len(colours(hmi.page.locator(".ramp-bar"))) > 100
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_an_empty_house_says_what_to_do_beside_the_controls_and_in_the_table(
+    domain: int, open_page: OpenPage, size: Size
+) -> None:
+    with bridge(domain=domain) as running:
+        viewport = {"width": size[0], "height": size[1]}
+        hmi = open_page(running.url, viewport=viewport)
+        expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-tags")
+        assert out_of_reach(hmi, ".map-controls button") == []
+        notice, controls = place(hmi.test_id("notice")), place(hmi.page.locator(".map-controls"))
+        assert notice.right <= controls.left or notice.top >= controls.bottom
+        frame = place(hmi.map)
+        assert frame.top <= notice.top
+        assert notice.bottom <= frame.bottom
+        tabs = hmi.page.locator(".pane-tabs")
+        if tabs.is_visible():
+            tabs.get_by_role("button", name="Tags").click()
+        expect(hmi.test_id("empty-table")).to_contain_text("lupin-twin demo")
+        running.peer.observe(scan("1", {"temperature": 22.0}, at=(1, 1)))
+        expect(hmi.row("1")).to_be_visible()
+        expect(hmi.test_id("empty-table")).to_have_count(0)
+
+
+def test_a_missing_reading_is_told_at_the_edge_of_the_map(open_at: Callable[..., Hmi]) -> None:
+    hmi = open_at((PHONE["width"], PHONE["height"]))
+    hmi.go("sensor=radiation")
+    expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-reading")
+    notice, frame = place(hmi.test_id("notice")), place(hmi.map)
+    assert notice.bottom == pytest.approx(frame.bottom, abs=1)
+    assert notice.top > frame.bottom - (frame.bottom - frame.top) / 4
+
+
+def test_all_text_grows_with_the_text_of_the_browser(open_at: Callable[..., Hmi]) -> None:
+    for size in ((1440, 900), (PHONE["width"], PHONE["height"])):
+        hmi = open_at(size)
+        texts = """() => [...document.querySelectorAll('.app *')]
+          .filter((e) => e.checkVisibility() && !e.closest('.unseen'))
+          .map((e) => parseFloat(getComputedStyle(e).fontSize))"""
+        usual = hmi.page.evaluate(texts)
+        hmi.page.evaluate("document.documentElement.style.fontSize = '200%'")
+        assert hmi.page.evaluate(texts) == pytest.approx([2 * each for each in usual])
+        assert out_of_reach(hmi, CONTROLS) == []
+        show_tags(hmi)
+        assert out_of_reach(hmi, ".row-button, .filter-bar *:not(.unseen), .health button") == []

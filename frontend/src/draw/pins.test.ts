@@ -120,6 +120,14 @@ test('labels are copied relative to the map’s origin', () => {
   expect(copies.named('drawImage')[0]?.args.slice(1, 3)).toEqual([50, 300]);
 });
 
+test('labels are as high as their text asks for', () => {
+  const copies = new FakeContext();
+  const surface = { context: copies.asContext(), size: { width: 400, height: 400 }, ratio: 1 };
+  const label = { id: '1', text: '1', x: 50, y: -100, width: 20 };
+  drawLabels(surface, view, [label], new Sprites(1), LIGHT, 2);
+  expect(copies.named('drawImage')[0]?.args[4]).toBe(36);
+});
+
 test('pins and blooms shrink with the map, within limits', () => {
   expect(pinRadius(1)).toBe(5);
   expect(pinRadius(5000)).toBe(11);

@@ -7,8 +7,10 @@ import type { BloomDot, Pin } from './scene';
 import type { Palette } from './palette';
 import type { Sprites, Surface } from './surface';
 
-export const LABEL_HEIGHT = 18;
-export const LABEL_FONT = '600 11.5px "Inter Variable", system-ui, sans-serif';
+/** `text`: how large the page's text is, 1 as usual. */
+export const labelHeight = (text: number): number => Math.round(18 * text);
+export const labelFont = (text: number): string =>
+  `600 ${11.5 * text}px "Inter Variable", system-ui, sans-serif`;
 const LABEL_PADDING = 5;
 
 /** Half the diagonal of a pin in pixels: smaller when far away, so that pins stay apart. */
@@ -31,7 +33,7 @@ export function drawBlooms(
   palette: Palette,
 ): void {
   const radius = bloomRadius(view.scale);
-  const box = Math.ceil(radius * 1.3 + 1.5) * 2;
+  const box = Math.ceil(radius * 1.3 + 2) * 2;
   for (const { at, look } of blooms) {
     const { x, y } = toCanvas(view, at);
     if (!inside(surface, x, y, box)) continue;
@@ -62,6 +64,10 @@ function paintBloom(
     context.lineTo(-radius * 1.2, radius * 0.85);
     context.closePath();
   }
+  // Its colour alone would not stand out from a heat map over a planter.
+  context.strokeStyle = palette.halo;
+  context.lineWidth = 2.5;
+  context.stroke();
   context.fillStyle = rgbText(colour);
   context.fill();
   context.strokeStyle = palette.bloomLine;
@@ -211,18 +217,20 @@ export function drawLabels(
   labels: readonly PlacedLabel[],
   sprites: Sprites,
   palette: Palette,
+  textScale = 1,
 ): void {
+  const height = labelHeight(textScale);
   for (const { text, x, y, width } of labels) {
-    if (!inside(surface, view.x + x, view.y + y, width + LABEL_HEIGHT)) continue;
-    const sprite = sprites.get(`label ${text}`, width, LABEL_HEIGHT, (context) => {
+    if (!inside(surface, view.x + x, view.y + y, width + height)) continue;
+    const sprite = sprites.get(`label ${text}`, width, height, (context) => {
       context.fillStyle = palette.labelFill;
       context.beginPath();
-      context.roundRect(0, 0, width, LABEL_HEIGHT, 5);
+      context.roundRect(0, 0, width, height, 5);
       context.fill();
-      context.font = LABEL_FONT;
+      context.font = labelFont(textScale);
       context.fillStyle = palette.labelText;
       context.textBaseline = 'middle';
-      context.fillText(text, LABEL_PADDING, LABEL_HEIGHT / 2 + 0.5);
+      context.fillText(text, LABEL_PADDING, height / 2 + 0.5);
     });
     sprites.draw(surface, sprite, view.x + x, view.y + y);
   }

@@ -104,11 +104,16 @@ export function drawGridLines(surface: Surface, view: View, palette: Palette): v
 }
 
 /** The grid's numbers, along the left and the upper edge of the view. */
-export function drawGridLabels(surface: Surface, view: View, palette: Palette): void {
+export function drawGridLabels(
+  surface: Surface,
+  view: View,
+  palette: Palette,
+  textScale = 1,
+): void {
   const { context, size } = surface;
   const { columns, rows } = gridTicks(surface, view);
   context.fillStyle = palette.gridText;
-  context.font = '500 10.5px "Inter Variable", system-ui, sans-serif';
+  context.font = `500 ${10.5 * textScale}px "Inter Variable", system-ui, sans-serif`;
   context.textBaseline = 'top';
   context.textAlign = 'left';
   for (const x of columns) {

@@ -25,6 +25,8 @@ import { pinUnderMouse, pointedAt } from './pointer';
 /** A finger hits a pin from this far, a mouse from a bit less; CSS pixels. */
 const TOUCH_REACH = 26;
 const MOUSE_REACH = 16;
+/** Usual size of the page's text, px (`font` of the body in `styles/base.css`). */
+const TEXT_PX = 14;
 
 /** What is to be drawn anew; "view": nothing but the place and the scale changed. */
 type Part = 'still' | 'pins' | 'overlay' | 'view';
@@ -220,7 +222,9 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
     const { width, height } = entry.contentRect;
     camera.resize({ width, height });
     if (width === 0 || height === 0) return;
-    painter.resize({ width, height }, window.devicePixelRatio);
+    // Its labels grow with the page's text: on a wall screen, and as the browser is set.
+    const textScale = parseFloat(getComputedStyle(element).fontSize) / TEXT_PX || 1;
+    painter.resize({ width, height }, window.devicePixelRatio, textScale);
     const state = store.get();
     camera.goTo(state.view.camera, contentBounds(state));
     spoil('still', 'pins', 'overlay');

@@ -102,6 +102,13 @@ describe('painter', () => {
     expect(named(canvases.overlay, 'stroke').length).toBeGreaterThan(0);
   });
 
+  test('text on the map grows with that of the page', () => {
+    show('grid');
+    painter.resize({ width: 300, height: 400 }, 2, 2);
+    painter.paintStill(store.get(), view, 0, true);
+    expect(named(canvases.still, 'fillText')[0]?.state['font']).toContain('500 21px');
+  });
+
   test('the theme changes what is drawn', () => {
     show();
     painter.paintStill(store.get(), view, 0, true);

@@ -10,8 +10,8 @@ import {
   drawBlooms,
   drawLabels,
   drawPins,
-  LABEL_FONT,
-  LABEL_HEIGHT,
+  labelFont,
+  labelHeight,
   labelRequests,
 } from '../draw/pins';
 import { PanBuffer } from '../draw/panbuffer';
@@ -59,6 +59,7 @@ export class Painter {
   readonly #canvases: Canvases;
   #size: Size = { width: 0, height: 0 };
   #ratio = 1;
+  #textScale = 1;
   #palette: Palette;
   #sprites = new Sprites(1);
   #widths = new Map<string, number>();
@@ -72,9 +73,11 @@ export class Painter {
     this.#palette = palette;
   }
 
-  resize(size: Size, ratio: number): void {
+  /** `textScale`: how large the page's text is there, 1 as usual. */
+  resize(size: Size, ratio: number, textScale = 1): void {
     this.#size = size;
     this.#ratio = ratio;
+    this.#textScale = textScale;
     for (const canvas of Object.values(this.#canvases) as HTMLCanvasElement[]) {
       canvas.width = Math.round(size.width * ratio);
       canvas.height = Math.round(size.height * ratio);
@@ -108,7 +111,8 @@ export class Painter {
     this.#stillBuffer.draw(surface, view, (target, seen) => {
       this.#drawStill(target, seen, state, now);
     });
-    if (state.view.layers.has('grid')) drawGridLabels(surface, view, this.#palette);
+    if (state.view.layers.has('grid'))
+      drawGridLabels(surface, view, this.#palette, this.#textScale);
   }
 
   #drawStill(surface: Surface, view: View, state: AppState, now: number): void {
@@ -147,7 +151,7 @@ export class Painter {
     if (!layers.has('labels')) return;
     const first = state.view.selected ?? state.view.hovered;
     const labels = this.#labels(scene, view.scale, first, this.#widths);
-    drawLabels(surface, view, labels, this.#sprites, this.#palette);
+    drawLabels(surface, view, labels, this.#sprites, this.#palette, this.#textScale);
   }
 
   paintOverlay(
@@ -205,7 +209,7 @@ export class Painter {
     (scene: Scene, scale: number, first: string | null, widths: Map<string, number>) =>
       placeLabels(
         labelRequests(scene.pins, scale, first, (text) => this.#widthOf(text, widths)),
-        LABEL_HEIGHT,
+        labelHeight(this.#textScale),
       ),
   );
 
@@ -213,7 +217,7 @@ export class Painter {
     const known = widths.get(text);
     if (known !== undefined) return known;
     if (widths.size > 5_000) widths.clear();
-    this.#ruler.font = LABEL_FONT;
+    this.#ruler.font = labelFont(this.#textScale);
     const width = Math.ceil(this.#ruler.measureText(text).width);
     widths.set(text, width);
     return width;

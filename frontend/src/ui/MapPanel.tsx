@@ -17,10 +17,13 @@ export function MapPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
       <SensorPicker />
       <div className="map-frame">
         <MapView kiosk={kiosk} />
-        <Notices />
+        <Notices place="middle" />
         {!kiosk && <MapControls />}
-        <ScaleBar />
-        <Readout />
+        <div className="map-foot">
+          <Readout />
+          <ScaleBar />
+          <Notices place="edge" />
+        </div>
         <HoverCard />
       </div>
       <Legend kiosk={kiosk} />

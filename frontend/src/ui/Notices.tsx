@@ -49,16 +49,31 @@ export function noticeFor({ twin, view }: AppState): Notice | null {
   return null;
 }
 
-export function Notices(): JSX.Element | null {
+/** In the middle of an empty map, or at the edge of one that has something to show. */
+export function Notices({ place }: { place: 'middle' | 'edge' }): JSX.Element | null {
   const id = useApp((state) => noticeFor(state)?.id);
   const title = useApp((state) => noticeFor(state)?.title);
   const hint = useApp((state) => noticeFor(state)?.hint);
-  const large = useApp((state) => noticeFor(state)?.large);
-  if (!id) return null;
+  const large = useApp((state) => noticeFor(state)?.large ?? false);
+  if (!id || large !== (place === 'middle')) return null;
   return (
     <div className={large ? 'notice notice-large' : 'notice'} data-testid="notice" data-notice={id}>
       <strong>{title}</strong>
       {hint && <span>{hint}</span>}
+    </div>
+  );
+}
+
+/** In place of the rows of a table that has none. */
+export function EmptyTable(): JSX.Element | null {
+  const isEmpty = useApp((state) => !state.twin.snapshot?.tags.length);
+  const title = useApp((state) => noticeFor(state)?.title);
+  const hint = useApp((state) => noticeFor(state)?.hint);
+  if (!isEmpty) return null;
+  return (
+    <div className="empty-table" data-testid="empty-table">
+      <strong>{title}</strong>
+      <p>{hint}</p>
     </div>
   );
 }

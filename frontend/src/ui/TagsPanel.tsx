@@ -8,6 +8,7 @@ import { S } from '../strings';
 import { AttentionList } from './AttentionList';
 import { HealthSummary } from './HealthSummary';
 import { Icon } from './Icon';
+import { EmptyTable } from './Notices';
 import { TagTable } from './TagTable';
 
 export const FILTER_ID = 'tag-filter';
@@ -25,6 +26,7 @@ export function TagsPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
           {/* eslint-disable-next-line jsx-a11y/no-noninteractive-tabindex */}
           <div className="table-scroll" role="region" aria-label={S.tableCaption} tabIndex={0}>
             <TagTable />
+            <EmptyTable />
           </div>
         </>
       )}

@@ -74,6 +74,11 @@ def test_a_fixed_range_stays_when_the_data_would_have_another(hmi: Hmi) -> None:
     hmi.page.get_by_role("button", name="Use ideal range").click()
     expect(hmi.test_id("range-low")).to_have_text("18.0")
     expect(hmi.test_id("range-high")).to_have_text("26.0\u00a0°C")
+    # A look at another sensor and back is what it is for.
+    hmi.page.keyboard.press("2")
+    expect(hmi.test_id("range-high")).to_have_text("70.0\u00a0%")
+    hmi.page.keyboard.press("1")
+    expect(hmi.test_id("range-high")).to_have_text("26.0\u00a0°C")
     hmi.page.get_by_role("radio", name="Auto").check()
     expect(hmi.test_id("range-high")).to_have_text("31.0\u00a0°C")
 

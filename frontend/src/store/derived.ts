@@ -4,6 +4,7 @@ import { rangeOf, type Range } from '../domain/ramp';
 import { sensorsIn, type Sensor } from '../domain/sensors';
 import type { Snapshot } from '../domain/twin';
 import type { AppState } from './app';
+import { fixedRange } from './view';
 
 /** The same function, but the same arguments as last time give the same object back. */
 export function memoLast<Args extends readonly unknown[], Result>(
@@ -39,7 +40,8 @@ const range = memoLast((low: number, high: number): Range => ({ low, high }));
 
 /** The range of the colours in use: the fixed one, else the field's, else the readings'. */
 export function selectRange({ twin, view }: AppState): Range | null {
-  if (view.range) return view.range;
+  const fixed = fixedRange(view);
+  if (fixed) return fixed;
   const field = twin.field.value;
   if (field?.sensor === view.sensor && field.sampleCount > 0) {
     return range(field.valueMin, field.valueMax);

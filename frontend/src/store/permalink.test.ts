@@ -14,10 +14,19 @@ describe('permalink', () => {
       sensor: 'soil_moisture',
       selected: 'tag 7/ä&#',
       camera: { x: -1.25, y: 4.5, span: 6.75 },
-      range: { low: -3, high: 12.5 },
+      ranges: new Map([
+        ['soil_moisture', { low: -3, high: 12.5 }],
+        ['a,b=&c', { low: 400, high: 1200 }],
+      ]),
       layers: new Set(['map', 'field', 'smooth', 'pins']),
     };
     expect(fromFragment(`#${toFragment(view)}`)).toEqual(view);
+  });
+
+  test('the range of the sensor in view has the short name', () => {
+    const ranges = new Map([['co2', { low: 1, high: 2 }]]);
+    expect(toFragment({ ...DEFAULT_VIEW, sensor: 'co2', ranges })).toBe('sensor=co2&range=1,2');
+    expect(toFragment({ ...DEFAULT_VIEW, ranges })).toBe('range.co2=1,2');
   });
 
   test('no layer at all is a choice too', () => {
@@ -34,6 +43,8 @@ describe('permalink', () => {
     'range=5,5',
     'range=9,1',
     'range=1,Infinity',
+    'range.co2=9,1',
+    'range.=1,9',
     'sensor=&tag=',
     'nonsense',
   ])('%s is passed over', (fragment) => {
@@ -41,7 +52,7 @@ describe('permalink', () => {
       sensor: DEFAULT_VIEW.sensor,
       selected: null,
       camera: null,
-      range: null,
+      ranges: new Map(),
       layers: DEFAULT_LAYERS,
     });
   });

@@ -1,8 +1,9 @@
 /** The part of the view that a link carries, in the URL's fragment: it never reaches a server. */
+import type { Range } from '../domain/ramp';
 import type { Camera } from '../geometry/coordinates';
 import { DEFAULT_LAYERS, DEFAULT_VIEW, LAYERS, type Layer, type ViewState } from './view';
 
-export type Linked = Pick<ViewState, 'sensor' | 'selected' | 'layers' | 'range' | 'camera'>;
+export type Linked = Pick<ViewState, 'sensor' | 'selected' | 'layers' | 'ranges' | 'camera'>;
 
 /** The fragment, without "#"; what is as by default is left out. */
 export function toFragment(view: Linked): string {
@@ -13,7 +14,9 @@ export function toFragment(view: Linked): string {
     const { x, y, span } = view.camera;
     parts.set('view', [x, y, span].map((metres) => metres.toFixed(2)).join(','));
   }
-  if (view.range) parts.set('range', `${short(view.range.low)},${short(view.range.high)}`);
+  for (const [sensor, { low, high }] of view.ranges) {
+    parts.set(rangeKey(sensor, view.sensor), `${short(low)},${short(high)}`);
+  }
   if (!sameLayers(view.layers, DEFAULT_LAYERS)) {
     parts.set('layers', LAYERS.filter((layer) => view.layers.has(layer)).join(','));
   }
@@ -23,18 +26,30 @@ export function toFragment(view: Linked): string {
 /** Reads a fragment; a part that makes no sense counts as left out. */
 export function fromFragment(fragment: string): Linked {
   const parts = new URLSearchParams(fragment.replace(/^#/, ''));
-  const range = numbers(parts.get('range'), 2);
   const layers = parts.get('layers');
+  const sensor = parts.get('sensor') || DEFAULT_VIEW.sensor;
   return {
-    sensor: parts.get('sensor') || DEFAULT_VIEW.sensor,
+    sensor,
     selected: parts.get('tag') || null,
     camera: cameraOf(numbers(parts.get('view'), 3)),
-    range:
-      range?.[0] !== undefined && range[1] !== undefined && range[0] < range[1]
-        ? { low: range[0], high: range[1] }
-        : null,
+    ranges: rangesOf(parts, sensor),
     layers: layers === null ? DEFAULT_LAYERS : new Set(layers.split(',').filter(isLayer)),
   };
+}
+
+/** "range" is that of the sensor in view, "range.co2" that of another. */
+const rangeKey = (sensor: string, inView: string): string =>
+  sensor === inView ? 'range' : `range.${sensor}`;
+
+function rangesOf(parts: URLSearchParams, inView: string): ReadonlyMap<string, Range> {
+  const ranges = new Map<string, Range>();
+  for (const [key, text] of parts) {
+    const sensor = key === 'range' ? inView : key.startsWith('range.') ? key.slice(6) : '';
+    const [low, high] = numbers(text, 2) ?? [];
+    if (sensor === '' || low === undefined || high === undefined || low >= high) continue;
+    ranges.set(sensor, { low, high });
+  }
+  return ranges;
 }
 
 function cameraOf(values: readonly number[] | null): Camera | null {

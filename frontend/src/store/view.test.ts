@@ -1,11 +1,23 @@
 import { expect, test } from 'vitest';
 
-import { DEFAULT_VIEW, reduceView } from './view';
+import { DEFAULT_VIEW, fixedRange, reduceView } from './view';
 
-test('another sensor lets go of a fixed range, the same one keeps it', () => {
-  const fixed = reduceView(DEFAULT_VIEW, { type: 'range', range: { low: 1, high: 2 } });
-  expect(reduceView(fixed, { type: 'sensor', sensor: 'co2' }).range).toBeNull();
-  expect(reduceView(fixed, { type: 'sensor', sensor: DEFAULT_VIEW.sensor })).toBe(fixed);
+test('each sensor keeps its own fixed range', () => {
+  const range = { low: 1, high: 2 };
+  const fixed = reduceView(DEFAULT_VIEW, { type: 'range', range });
+  const other = reduceView(fixed, { type: 'sensor', sensor: 'co2' });
+  expect(fixedRange(other)).toBeNull();
+  const both = reduceView(other, { type: 'range', range: { low: 400, high: 900 } });
+  const back = reduceView(both, { type: 'sensor', sensor: DEFAULT_VIEW.sensor });
+  expect(fixedRange(back)).toEqual(range);
+  const free = reduceView(back, { type: 'range', range: null });
+  expect([...free.ranges.keys()]).toEqual(['co2']);
+  expect(DEFAULT_VIEW.ranges.size).toBe(0);
+});
+
+test('the sensor that is in view already changes nothing', () => {
+  const same = { type: 'sensor', sensor: DEFAULT_VIEW.sensor } as const;
+  expect(reduceView(DEFAULT_VIEW, same)).toBe(DEFAULT_VIEW);
 });
 
 test('a column sorts upwards first, then downwards, then upwards', () => {

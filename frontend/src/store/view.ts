@@ -29,8 +29,8 @@ export interface ViewState {
   /** Id of the tag under the pointer, on the map or in the table. */
   readonly hovered: string | null;
   readonly layers: ReadonlySet<Layer>;
-  /** Colour scale; null: that of the field itself. */
-  readonly range: Range | null;
+  /** Fixed colour scales by sensor; one without follows its data. */
+  readonly ranges: ReadonlyMap<string, Range>;
   /** null: everything, and still so when the map grows. */
   readonly camera: Camera | null;
   readonly sort: Sort;
@@ -49,13 +49,18 @@ export const DEFAULT_VIEW: ViewState = {
   selected: null,
   hovered: null,
   layers: DEFAULT_LAYERS,
-  range: null,
+  ranges: new Map(),
   camera: null,
   sort: { column: 'tag', descending: false },
   filter: '',
   health: null,
   pane: 'map',
 };
+
+/** The fixed colour scale of the sensor in view; null: that of the field itself. */
+export function fixedRange({ ranges, sensor }: ViewState): Range | null {
+  return ranges.get(sensor) ?? null;
+}
 
 export type ViewAction =
   /** Part of the view set from outside: a permalink. */
@@ -64,6 +69,7 @@ export type ViewAction =
   | { readonly type: 'select'; readonly tagId: string | null }
   | { readonly type: 'hover'; readonly tagId: string | null }
   | { readonly type: 'layer'; readonly layer: Layer; readonly on: boolean }
+  /** Of the sensor in view; null: as its data are. */
   | { readonly type: 'range'; readonly range: Range | null }
   | { readonly type: 'camera'; readonly camera: Camera | null }
   | { readonly type: 'sort'; readonly column: string }
@@ -76,8 +82,7 @@ export function reduceView(view: ViewState, action: ViewAction): ViewState {
     case 'look':
       return { ...view, ...action.view };
     case 'sensor':
-      // A fixed range belongs to one sensor's unit.
-      return action.sensor === view.sensor ? view : { ...view, sensor: action.sensor, range: null };
+      return action.sensor === view.sensor ? view : { ...view, sensor: action.sensor };
     case 'select':
       return { ...view, selected: action.tagId };
     case 'hover':
@@ -88,8 +93,12 @@ export function reduceView(view: ViewState, action: ViewAction): ViewState {
       else layers.delete(action.layer);
       return { ...view, layers };
     }
-    case 'range':
-      return { ...view, range: action.range };
+    case 'range': {
+      const ranges = new Map(view.ranges);
+      if (action.range) ranges.set(view.sensor, action.range);
+      else ranges.delete(view.sensor);
+      return { ...view, ranges };
+    }
     case 'camera':
       return { ...view, camera: action.camera };
     case 'sort': {

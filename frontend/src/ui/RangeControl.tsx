@@ -4,6 +4,7 @@ import { readingText } from '../domain/format';
 import type { Range } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
 import { act, useApp } from '../store/app';
+import { fixedRange } from '../store/view';
 import { S } from '../strings';
 import { Bound } from './Bound';
 import { Segmented } from './Segmented';
@@ -16,7 +17,7 @@ export function RangeControl({
   sensor: Sensor;
   range: Range | null;
 }): JSX.Element {
-  const fixed = useApp((state) => state.view.range);
+  const fixed = useApp((state) => fixedRange(state.view));
   const unit = useApp((state) => state.settings.unit);
   const { ideal } = sensor;
   return (

@@ -103,6 +103,20 @@ def test_a_discoverys_w_zero_is_taken_as_one() -> None:
         assert pose.qw == expected
 
 
+@pytest.mark.parametrize("length", [1.0, 2.5])
+def test_a_discoverys_half_turn_stays_one_and_is_told_from_no_pose(length: float) -> None:
+    msg = messages.pose(1.0, 2.0)
+    msg.orientation = Quaternion(x=0.6 * length, y=0.0, z=-0.8 * length, w=0.0)
+    pose = convert.discovered_pose(msg)
+    assert pose is not None
+    assert (pose.qx, pose.qy, pose.qz) == pytest.approx((0.6, 0.0, -0.8), abs=1e-15)
+    assert 0.0 < pose.qw < 1e-8
+    published = convert.pose_message(pose)
+    assert (
+        convert.scanned_pose(deserialize_message(serialize_message(published), type(msg))) == pose
+    )
+
+
 @pytest.mark.parametrize(
     ("stamp_s", "now_s", "expected_s"),
     [

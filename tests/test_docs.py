@@ -12,7 +12,7 @@ from lupin_bridge.app import create_app
 from lupin_bridge.cli import ROLES
 from lupin_bridge.settings import Settings, option
 from lupin_patrol import cli as patrol_cli
-from lupin_twin.parameters import TwinParameters
+from lupin_twin.parameters import TwinParameters, describe
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -35,6 +35,13 @@ def test_every_parameter_is_named_with_its_default() -> None:
         else str(spec.default)
         for spec in fields(TwinParameters)
     }
+
+
+def test_every_parameter_is_given_with_its_range() -> None:
+    documented = rows("Parameters of the twin")
+    documented.pop("use_sim_time")
+    for name, cells in documented.items():
+        assert cells[1] == describe(name)[1], name
 
 
 def test_every_setting_is_named_with_its_default() -> None:

@@ -212,6 +212,27 @@ def test_map_keeps_what_it_was_given() -> None:
         occupancy.revision = 10  # type: ignore[misc]
 
 
+def test_a_map_published_again_shows_the_same() -> None:
+    first = map_of([[0, 100]])
+    assert first.shows_the_same_as(map_of([[0, 100]], stamp_ns=9, revision=8))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"frame_id": "other"},
+        {"width": 1, "height": 2},
+        {"resolution": 2.0},
+        {"origin_x": 1.0},
+        {"origin_y": 1.0},
+        {"origin_yaw": 1.0},
+        {"data": [0, 99]},
+    ],
+)
+def test_a_map_that_differs_in_anything_does_not_show_the_same(changes: dict[str, Any]) -> None:
+    assert not map_of([[0, 100]]).shows_the_same_as(map_of([[0, 100]], **changes))
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -346,6 +346,11 @@ def test_coincident_sample_is_taken_exactly(power: float, falloff: float) -> Non
     assert field_at_origin(samples, falloff_radius_m=falloff, power=power) == 7.0
 
 
+def test_sample_a_little_closer_than_that_is_exact_beside_a_very_large_one() -> None:
+    # Its weight is hardly above that at the distance itself; averaged it would be 3.8.
+    assert field_at_origin([(0.97 * COINCIDENT_EPS_M, 0.0, 0.0), (0.5, 0.0, 1e6)]) == 0.0
+
+
 @pytest.mark.parametrize(("power", "weights"), [(2.0, (1e6, 4.0)), (3.0, (1e9, 8.0))])
 def test_sample_at_the_coincidence_distance_is_averaged(
     power: float, weights: tuple[float, float]

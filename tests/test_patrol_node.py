@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rclpy
 from builtin_interfaces.msg import Time
 from greenhouse_sim.simulator import GreenhouseSimulator
 from lupin_msgs.msg import DiscoveredTags, Observation
@@ -20,7 +21,9 @@ from rosgraph_msgs.msg import Clock
 
 from lupin_patrol import node
 from lupin_patrol.events import PassCompleted
+from lupin_patrol.node import PatrolNode
 from tests.support.domains import ros_env
+from tests.support.inprocess import ros_domain
 from tests.support.processes import Process
 from tests.support.ros import Peer, latched
 from tests.support.waiting import PATIENCE_S
@@ -210,3 +213,19 @@ def test_a_bad_argument_is_refused_in_one_line(
         [line] = process.output.splitlines()
         assert line.startswith("patrol_node: error: ")
         assert named in line
+
+
+def test_what_it_latches_is_as_deep_as_the_contract_says(domain: int) -> None:
+    with ros_domain(domain):
+        rclpy.init(args=[])
+        try:
+            node = PatrolNode()
+            depths = {
+                publisher.topic_name: publisher.qos_profile.depth
+                for publisher in node.publishers
+                if publisher.topic_name in (OBSERVATIONS, DISCOVERED_TAGS, MAP)
+            }
+            node.destroy_node()
+        finally:
+            rclpy.try_shutdown()
+    assert depths == {OBSERVATIONS: 50, DISCOVERED_TAGS: 1, MAP: 1}

@@ -11,6 +11,7 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 
+from lupin_twin import spinning as spinning_module
 from lupin_twin.spinning import spin_until_shutdown
 from tests.support.waiting import wait_for
 
@@ -55,6 +56,21 @@ def test_a_callback_that_raises_is_reported_and_the_next_one_runs(spinning: Spin
     spinning.thread.start()
     wait_for(lambda: len(spinning.errors) >= 3, "three errors")
     assert [str(error) for _, error in spinning.errors[:3]] == ["call 1", "call 2", "call 3"]
+
+
+def test_between_an_error_and_the_next_try_it_rests(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An executor that fails at once, again and again, must not take a whole core."""
+    happened: list[str] = []
+
+    class Broken:
+        def spin(self) -> None:
+            happened.append("spin")
+            if len(happened) < 5:
+                raise RuntimeError("broken")
+
+    monkeypatch.setattr(spinning_module, "sleep", lambda seconds: happened.append("rest"))
+    spin_until_shutdown(Broken(), lambda *_: None)
+    assert happened == ["spin", "rest", "spin", "rest", "spin"]
 
 
 def test_it_ends_with_the_executor(spinning: Spinning) -> None:

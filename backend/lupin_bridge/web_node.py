@@ -80,6 +80,7 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._newest: Snapshot | None = None
         self._history: dict[str, deque[Observation]] = {}
         self._digests: dict[str, tuple[TagState, bytes]] = {}
+        self._topics: dict[str, str] = {}
         self._throttle = Throttle(WARNING_PERIOD_S)
         group = MutuallyExclusiveCallbackGroup()
         p = self.parameters
@@ -88,11 +89,13 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
             ("map_topic", OccupancyGrid, MAX_MAP_BYTES, self._take_map),
         ):
             topic = getattr(p, parameter)
-            read = self._reader(topic, message_type, max_bytes, callback)
+            read = self._reader(parameter, message_type, max_bytes, callback)
             with naming(parameter, topic):
-                self.create_subscription(
+                subscription = self.create_subscription(
                     message_type, topic, read, latched(1), callback_group=group, raw=True
                 )
+            # As ROS has resolved and remapped it: that is the name in its graph, and in warnings.
+            self._topics[parameter] = subscription.topic_name
         with naming("field_service_name", p.field_service_name):
             self.field_client = self.create_client(
                 GetField, p.field_service_name, callback_group=group
@@ -137,7 +140,7 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.digest = self._digest_of(snapshot.tags)
         if len(self._digests) > len(snapshot.tags):
             self._forget_all_but(snapshot.tags)
-        topic = self.parameters.state_topic
+        topic = self._topics["state_topic"]
         self.publishers_digest = self._digest_of_publishers(topic)
         if self.twins.see(int(self.count_publishers(topic)), time.monotonic()):
             self._say(
@@ -194,9 +197,10 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         return total.hexdigest()
 
     def _reader(
-        self, topic: str, message_type: Any, max_bytes: int, callback: Callable[[Any], None]
+        self, parameter: str, message_type: Any, max_bytes: int, callback: Callable[[Any], None]
     ) -> Callable[[bytes], None]:
         def read(data: bytes) -> None:
+            topic = self._topics[parameter]
             if len(data) > max_bytes:
                 self._say(
                     ("size", topic),

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -40,6 +41,8 @@ from lupin_twin.state import (
 )
 
 UINT16_MAX: Final = 65_535
+# The `w` of half a turn, which is 0, kept apart from the 0 that stands for no pose.
+HALF_TURN_W: Final = 1e-9
 INT32_MAX: Final = 2_147_483_647
 
 
@@ -96,9 +99,26 @@ def scanned_pose(pose: Any) -> Pose | None:
 
 
 def discovered_pose(pose: Any) -> Pose | None:
-    """The pose of a discovery: `w == 0` is taken as 1; None where a coordinate is not finite."""
-    result = _pose(pose, qw=float(pose.orientation.w) or 1.0)
-    return result if result.is_finite else None
+    """The pose of a discovery; None where a coordinate is not finite.
+
+    `w == 0` is taken as 1 where nothing else of the orientation is set. Where something is, it is
+    half a turn; published as it is it would mean "no pose", so its `w` becomes the next to nothing
+    that can be told from 0, and the pose is 2e-9 rad from what was said.
+    """
+    w = float(pose.orientation.w)
+    result = _pose(pose, qw=w or 1.0)
+    if not result.is_finite:
+        return None
+    length = math.hypot(result.qx, result.qy, result.qz)
+    if w or not length:
+        return result
+    return replace(
+        result,
+        qx=result.qx / length,
+        qy=result.qy / length,
+        qz=result.qz / length,
+        qw=HALF_TURN_W,
+    )
 
 
 def _pose(pose: Any, qw: float) -> Pose:

@@ -51,6 +51,14 @@ class OccupancyMap:
     cells: npt.NDArray[np.int8]
     revision: int
 
+    def shows_the_same_as(self, other: OccupancyMap) -> bool:
+        """Whether place and cells are the same, whenever and however often it was published."""
+        ours, theirs = (
+            (m.frame_id, m.width, m.height, m.resolution, m.origin_x, m.origin_y, m.origin_yaw)
+            for m in (self, other)
+        )
+        return ours == theirs and np.array_equal(self.cells, other.cells)
+
 
 def occupancy_map(
     *,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -30,8 +30,8 @@ class FieldRequest:
     """What to reconstruct: a sensor over a box (m, map frame) in cells of `resolution` (m).
 
     The numbers are rounded to float32, GetField's wire type: a request over HTTP and the same one
-    over ROS are the same request then, with the same field. A number past float32 becomes
-    infinite, which `check_request` refuses.
+    over ROS are the same request then, with the same field. `past_float32` names the first number
+    that float32 does not hold, as it was sent; `check_request` refuses it.
     """
 
     sensor_type: str
@@ -40,11 +40,17 @@ class FieldRequest:
     bbox_min_y: float
     bbox_max_x: float
     bbox_max_y: float
+    past_float32: str = field(default="", init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         with np.errstate(over="ignore", under="ignore"):
             for name in ("resolution", "bbox_min_x", "bbox_min_y", "bbox_max_x", "bbox_max_y"):
-                object.__setattr__(self, name, float(np.float32(getattr(self, name))))
+                sent = getattr(self, name)
+                rounded = float(np.float32(sent))
+                object.__setattr__(self, name, rounded)
+                is_lost = name == "resolution" and sent != 0.0 and rounded == 0.0
+                if (is_lost or math.isinf(rounded) > math.isinf(sent)) and not self.past_float32:
+                    object.__setattr__(self, "past_float32", f"{name} is {sent}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +92,8 @@ def check_request(request: FieldRequest, max_grid_cells: int) -> tuple[int, int]
             f"sensor_type {request.sensor_type[:24]!r}… has {len(request.sensor_type)} characters, "
             f"the limit is {MAX_TEXT_LENGTH}"
         )
+    if request.past_float32:
+        raise FieldRefused(f"{request.past_float32} m, must fit into float32 (1.4e-45 to 3.4e38)")
     try:
         width, height = grid_dimensions(
             request.bbox_min_x,

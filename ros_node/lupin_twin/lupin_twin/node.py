@@ -88,6 +88,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.callback_errors = 0
         self.twins = TwinCount()
         self._map_revision = 0
+        self._topics: dict[str, str] = {}
         self._listeners: list[Callable[[Snapshot], None]] = []
         self._messages = convert.StateMessages()
         self._throttle = Throttle(WARNING_PERIOD_S)
@@ -135,11 +136,13 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         )
         for parameter, message_type, depth, max_bytes, callback in subscriptions:
             topic = getattr(p, parameter)
-            take = partial(self._take, topic, message_type, max_bytes, callback)
+            take = partial(self._take, parameter, message_type, max_bytes, callback)
             with naming(parameter, topic):
-                self.create_subscription(
+                subscription = self.create_subscription(
                     message_type, topic, take, latched(depth), callback_group=group, raw=True
                 )
+            # As ROS has resolved and remapped it: that is the name in its graph, and in warnings.
+            self._topics[parameter] = subscription.topic_name
         with naming("state_topic", p.state_topic):
             self._state_publisher = self.create_publisher(TwinState, p.state_topic, latched(1))
         with naming("field_service_name", p.field_service_name):
@@ -162,12 +165,13 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _take(
         self,
-        topic: str,
+        parameter: str,
         message_type: Any,
         max_bytes: int,
         callback: Callable[[Any], None],
         data: bytes,
     ) -> None:
+        topic = self._topics[parameter]
         if len(data) > max_bytes:
             self._warn(
                 ("size", topic),
@@ -182,7 +186,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._guarded(topic, callback)(message)
 
     def _on_observation(self, msg: Any) -> None:
-        topic = self.parameters.observations_topic
+        topic = self._topics["observations_topic"]
         if msg.kind == msg.KIND_FLOWER:
             self._on_flower(msg, topic)
             return
@@ -211,7 +215,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self._write(topic, lambda: self.store.record(convert.failed_look(msg, now_ns)))
 
     def _on_discovered_tags(self, msg: Any) -> None:
-        topic = self.parameters.discovered_tags_topic
+        topic = self._topics["discovered_tags_topic"]
         if not self._frame_fits(msg.header.frame_id, topic):
             return
         before = self.store.observation_count
@@ -230,14 +234,17 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self._tell_listeners()
 
     def _on_map(self, msg: Any) -> None:
-        topic = self.parameters.map_topic
+        topic = self._topics["map_topic"]
         if not self._frame_fits(msg.header.frame_id, topic):
             return
         try:
-            self.occupancy_map = convert.map_of(msg, self._map_revision + 1)
+            new = convert.map_of(msg, self._map_revision + 1)
         except ValueError as error:
             self._warn(("map", topic), f"dropped a map on {topic}: {error}; the last one stays")
             return
+        if self.occupancy_map is not None and new.shows_the_same_as(self.occupancy_map):
+            return
+        self.occupancy_map = new
         self._map_revision += 1
         self._tell_listeners()
 
@@ -262,7 +269,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def _publish_state(self) -> None:
         snapshot = self.snapshot()
         self._state_publisher.publish(self._messages.build(snapshot))
-        topic = self.parameters.state_topic
+        topic = self._state_publisher.topic_name
         if self.twins.see(int(self.count_publishers(topic)), time.monotonic()):
             self._warn(
                 ("twins", 0),

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from time import sleep
+from typing import Any, Final
 
 from rclpy.executors import ExternalShutdownException
+
+# Between an error and the next try: an executor that fails at once must not take a whole core.
+PAUSE_S: Final = 0.05
 
 
 def spin_until_shutdown(executor: Any, on_error: Callable[[str, Exception], None]) -> None:
@@ -21,5 +25,6 @@ def spin_until_shutdown(executor: Any, on_error: Callable[[str, Exception], None
             return
         except Exception as error:  # noqa: BLE001  # whatever it is
             on_error("a callback", error)
+            sleep(PAUSE_S)
         else:
             return

@@ -60,6 +60,15 @@ def test_a_signal_between_many_callbacks_ends_it_quietly(
         assert process.output == ""
 
 
+def test_it_goes_on_after_it_was_stopped_for_a_while(domain: int) -> None:
+    with twin_node(domain) as process, Peer(domain) as peer:
+        peer.state(lambda _: True, "a state")
+        process.stand_still()
+        before = peer.states[-1].header.stamp.sec
+        peer.state(lambda state: state.header.stamp.sec > before + 1, "two more seconds of it")
+        assert process.stop() == 0
+
+
 def test_it_ends_with_1_when_its_thread_dies(domain: int) -> None:
     program = (
         "import lupin_twin.spinning as spinning, lupin_twin.cli as cli, sys; "

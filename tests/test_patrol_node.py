@@ -186,6 +186,16 @@ def test_a_signal_ends_it_cleanly_even_while_it_waits_for_long(
         assert "Traceback" not in process.output
 
 
+def test_it_goes_on_after_it_was_stopped_for_a_while(domain: int) -> None:
+    with Peer(domain) as peer, patrol(domain, "--speed", "5") as process:
+        heard = Heard().listen(peer)
+        peer.until(lambda: heard.maps, "the first look around")
+        process.stand_still()
+        before = len(heard.observations)
+        peer.until(lambda: len(heard.observations) > before + 1, "more observations")
+        assert process.stop() == 0
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_cleanly_while_nobody_listens(domain: int, number: signal.Signals) -> None:
     with patrol(domain) as process:

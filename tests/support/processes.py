@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -75,6 +76,13 @@ class Process:
     def send(self, number: signal.Signals) -> None:
         """Send a signal to the process alone."""
         self._process.send_signal(number)
+
+    def stand_still(self, seconds: float = 1.5) -> None:
+        """Stop the process for so long, as Ctrl-Z does, and let it go on."""
+        until = time.monotonic() + seconds
+        self.send(signal.SIGSTOP)
+        wait_for(lambda: time.monotonic() > until, "the time to pass")
+        self.send(signal.SIGCONT)
 
     def wait(self, timeout_s: float = PATIENCE_S) -> int:
         """Wait for its end and return the exit code."""

@@ -1,8 +1,8 @@
 """The ROS node: plays a mission's events on the topics of DESIGN.md.
 
 Stamps are ROS time (`use_sim_time` included); the pace is the process's steady clock. Signals are
-waited for, never handled asynchronously: whoever calls `play` has blocked STOP_SIGNALS in this
-thread before the first other thread was started.
+waited for in a thread, never handled asynchronously: whoever calls `play` has blocked STOP_SIGNALS
+before the first other thread was started.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from threading import Event as Flag
 from threading import Thread
 from time import monotonic
 from typing import Any
@@ -136,19 +137,20 @@ def play(events: Iterator[Event], *, speed: float, once: bool, ros_arguments: li
     `speed` is patrol seconds per second. `ros_arguments` is the whole command line.
     Raises ParameterError, before anything was published.
     """
+    stop = _stop_flag()
     with _running_node(ros_arguments) as node:
         node.get_logger().info(f"patrol starts at speed {speed:g}")
-        if _stopped_before(lambda: node.observations.get_subscription_count() > 0, _LISTENERS_S):
+        listened_to = node.observations.get_subscription_count
+        if _stopped_before(stop, lambda: listened_to() > 0, _LISTENERS_S):
             return
         start = monotonic()
         for event in events:
-            if _stopped_within(start + event.at_s / speed - monotonic()):
+            if stop.wait(max(0.0, start + event.at_s / speed - monotonic())):
                 return
             node.publish(event)
             if once and isinstance(event, PassCompleted):
                 break
-        if _stopped_before(lambda: node.wait_for_delivery(0.0), _DELIVERY_S):
-            return
+        _stopped_before(stop, lambda: node.wait_for_delivery(0.0), _DELIVERY_S)
 
 
 @contextmanager
@@ -176,15 +178,25 @@ def _spin(executor: SingleThreadedExecutor) -> None:
         executor.spin()
 
 
-def _stopped_within(seconds: float) -> bool:
-    """Sleep, but wake at once for a stop signal; returns whether there was one."""
-    return signal.sigtimedwait(STOP_SIGNALS, max(0.0, seconds)) is not None
+def _stop_flag() -> Flag:
+    """A flag that a stop signal sets.
+
+    Not sigtimedwait: after a SIGSTOP and a SIGCONT, CPython returns from it without a signal.
+    """
+    flag = Flag()
+
+    def wait() -> None:
+        signal.sigwait(STOP_SIGNALS)
+        flag.set()
+
+    Thread(target=wait, name="signals", daemon=True).start()
+    return flag
 
 
-def _stopped_before(condition: Callable[[], bool], timeout_s: float) -> bool:
+def _stopped_before(stop: Flag, condition: Callable[[], bool], timeout_s: float) -> bool:
     """Wait for a condition, no longer than the time-out; returns whether a stop signal came."""
     deadline = monotonic() + timeout_s
     while not condition() and monotonic() < deadline:
-        if _stopped_within(_POLL_S):
+        if stop.wait(_POLL_S):
             return True
     return False

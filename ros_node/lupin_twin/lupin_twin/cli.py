@@ -5,13 +5,10 @@ from __future__ import annotations
 import signal
 import sys
 from collections.abc import Sequence
-from threading import Thread
+from threading import Event, Thread, main_thread
 
 STOP_SIGNALS = {signal.SIGINT, signal.SIGTERM}
 USAGE_ERROR = 2
-
-# A stop signal is seen at once; this often it is looked whether the ROS thread still lives.
-_LOOK_S = 1.0
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -45,15 +42,24 @@ def _run() -> int:
     node = TwinNode()
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    thread = Thread(target=spin_until_shutdown, args=(executor, node.report), name="ros")
+    ended = Event()
+
+    def spin() -> None:
+        try:
+            spin_until_shutdown(executor, node.report)
+        finally:
+            ended.set()
+            signal.pthread_kill(main_thread().ident or 0, signal.SIGTERM)  # it waits, see below
+
+    thread = Thread(target=spin, name="ros")
     thread.start()
-    stopped = False
-    while thread.is_alive() and not stopped:
-        stopped = signal.sigtimedwait(STOP_SIGNALS, _LOOK_S) is not None
+    # Not sigtimedwait: after a SIGSTOP and a SIGCONT, CPython returns from it without a signal.
+    signal.sigwait(STOP_SIGNALS)
+    exit_code = 1 if ended.is_set() else 0
     executor.shutdown(timeout_sec=2.0)
     thread.join()
     node.destroy_node()
-    return 0 if stopped else 1
+    return exit_code
 
 
 def _refuse(reason: str) -> int:

@@ -8,6 +8,7 @@ import './styles/map.css';
 import './styles/legend.css';
 import './styles/health.css';
 import './styles/table.css';
+import './styles/table-sizes.css';
 import './styles/card.css';
 import './styles/hover.css';
 import './styles/bound.css';

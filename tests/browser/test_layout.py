@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Callable
 
 import pytest
@@ -221,3 +222,34 @@ def test_all_text_grows_with_the_text_of_the_browser(open_at: Callable[..., Hmi]
         assert out_of_reach(hmi, CONTROLS) == []
         show_tags(hmi)
         assert out_of_reach(hmi, ".row-button, .filter-bar *:not(.unseen), .health button") == []
+
+
+def test_the_words_of_the_ideal_range_stand_below_its_bracket(open_at: Callable[..., Hmi]) -> None:
+    hmi = open_at((1440, 900))
+    words, bracket = place(hmi.page.locator(".ramp-note")), place(hmi.page.locator(".ramp-ideal"))
+    assert bracket.left < (words.left + words.right) / 2 < bracket.right
+
+
+def test_the_row_of_sensors_fades_where_it_has_more(open_at: Callable[..., Hmi]) -> None:
+    row = open_at((1440, 900)).page.locator(".sensor-picker")
+    expect(row).to_have_attribute("data-more", "")
+    expect(row).to_have_css("mask-image", "none")
+    phone = open_at((PHONE["width"], PHONE["height"]))
+    row = phone.page.locator(".sensor-picker")
+    expect(row).to_have_attribute("data-more", "after")
+    expect(row).to_have_css("mask-image", re.compile("gradient"))
+    phone.choose_sensor("Soil moisture")
+    expect(row).to_have_attribute("data-more", "before")
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_the_table_tells_how_sure_a_species_is(open_at: Callable[..., Hmi], size: Size) -> None:
+    hmi = open_at(size)
+    show_tags(hmi)
+    expect(hmi.row("1").locator(".cell-species")).to_contain_text("lupin")
+    sure = hmi.row("1").locator(".cell-species .faint")
+    expect(sure).to_be_visible()
+    table = place(hmi.page.locator(".table-scroll"))
+    assert place(sure).right <= table.right
+    hmi.page.emulate_media(media="print")
+    expect(sure).to_be_visible()

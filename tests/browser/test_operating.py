@@ -343,7 +343,7 @@ def test_single_keys_can_be_switched_off(hmi: Hmi) -> None:
     expect(hmi.test_id("legend")).to_contain_text("Temperature")
 
 
-@pytest.mark.parametrize("width", [360, 820, 1280, 1440, 1920])
+@pytest.mark.parametrize("width", [360, 720, 820, 1280, 1440, 1920])
 def test_no_column_of_the_table_is_out_of_sight(
     house: Bridge, open_page: OpenPage, width: int
 ) -> None:

@@ -84,13 +84,14 @@ function Ramp({
   unit: TemperatureUnit;
 }): JSX.Element {
   const colour = sensorColour(sensor);
-  const style = {
-    '--ramp': rgbText(colour),
-    '--ramp-field': rgbText(colour, RAMP.maxAlpha),
-  } as CSSProperties;
   const ideal = range && sensor.ideal;
   const from = ideal && fraction(range, ideal[0]);
   const to = ideal && fraction(range, ideal[1]);
+  const style = {
+    '--ramp': rgbText(colour),
+    '--ramp-field': rgbText(colour, RAMP.maxAlpha),
+    '--ideal': ((from ?? 0) + (to ?? 1)) / 2,
+  } as CSSProperties;
   return (
     <div className="ramp" style={style}>
       <div className="ramp-bar" aria-hidden="true">
@@ -105,6 +106,7 @@ function Ramp({
       </div>
       <div className="ramp-ends">
         <span data-testid="range-low">{range ? valueText(sensor, range.low, unit) : '–'}</span>
+        <span className="ramp-before" />
         {sensor.ideal && (
           <span className="ramp-note">
             {S.legendIdeal(

@@ -20,6 +20,23 @@ export function SensorPicker(): JSX.Element {
       ?.querySelector('input:checked')
       ?.parentElement?.scrollIntoView({ block: 'nearest', inline: 'nearest' });
   }, [sensor]);
+  useEffect(() => {
+    const row = root.current;
+    if (!row) return undefined;
+    const look = (): void => {
+      const isMoreBefore = row.scrollLeft > 1;
+      const isMoreAfter = row.scrollLeft + row.clientWidth < row.scrollWidth - 1;
+      row.dataset['more'] = `${isMoreBefore ? 'before' : ''} ${isMoreAfter ? 'after' : ''}`.trim();
+    };
+    const watch = new ResizeObserver(look);
+    watch.observe(row);
+    for (const child of row.children) watch.observe(child);
+    row.addEventListener('scroll', look, { passive: true });
+    return () => {
+      watch.disconnect();
+      row.removeEventListener('scroll', look);
+    };
+  }, []);
   return (
     <div className="sensor-picker" ref={root}>
       <Segmented

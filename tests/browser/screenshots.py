@@ -136,7 +136,7 @@ def blindness(browser: Browser, url: str, folder: Path) -> None:
 
 
 def readme(browser: Browser, url: str) -> None:
-    """The README's pictures: all their colours, and still under 200 kB each."""
+    """The README's pictures: all their colours, and still under 250 kB each."""
     README.mkdir(exist_ok=True)
     for name, size, scheme, path in (
         ("wide-light", (1280, 800), "light", "/"),

@@ -225,9 +225,13 @@ def test_all_text_grows_with_the_text_of_the_browser(open_at: Callable[..., Hmi]
 
 
 def test_the_words_of_the_ideal_range_stand_below_its_bracket(open_at: Callable[..., Hmi]) -> None:
-    hmi = open_at((1440, 900))
+    hmi = open_at((1440, 900), "sensor=humidity")
     words, bracket = place(hmi.page.locator(".ramp-note")), place(hmi.page.locator(".ramp-ideal"))
-    assert bracket.left < (words.left + words.right) / 2 < bracket.right
+    # Measured from the middle of the ramp, where they would stand without a bracket.
+    ramp = place(hmi.page.locator(".ramp-bar"))
+    aside = (bracket.left + bracket.right - ramp.left - ramp.right) / 2
+    assert abs(aside) > 30
+    assert (words.left + words.right - ramp.left - ramp.right) / 2 == pytest.approx(aside, abs=20)
 
 
 def test_the_row_of_sensors_fades_where_it_has_more(open_at: Callable[..., Hmi]) -> None:

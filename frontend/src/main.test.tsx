@@ -14,7 +14,7 @@ beforeEach(() => {
   );
   Object.defineProperty(document, 'fonts', {
     configurable: true,
-    value: { ready: Promise.resolve() },
+    value: new EventTarget(),
   });
   localStorage.clear();
   document.body.innerHTML = '<div id="root"></div>';

@@ -315,7 +315,7 @@ def test_a_label_is_as_wide_as_its_text(house: Bridge, open_page: OpenPage) -> N
     hmi.expect_samples(3)
     hmi.settled_picture()
     # Once more, with the font that has come meanwhile.
-    hmi.page.evaluate("labels.length = 0")
+    hmi.page.evaluate("document.fonts.ready.then(() => { labels.length = 0; })")
     hmi.page.emulate_media(color_scheme="dark")
     hmi.expect(lambda: hmi.page.evaluate("labels.length") >= 5, "all labels painted anew")
     for text, picture, wide in hmi.page.evaluate("labels"):

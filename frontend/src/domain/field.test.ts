@@ -2,6 +2,7 @@ import { describe, expect, test } from 'vitest';
 
 import { mapPoint } from '../geometry/coordinates';
 import {
+  fieldCorners,
   fieldPixels,
   interpolate,
   resolutionFor,
@@ -100,4 +101,8 @@ test('a smooth picture stays under two million pixels', () => {
   const grid = { ...small, width: 1000, height: 1000 };
   expect(smoothDetail(grid)).toBe(1);
   expect(smoothDetail(small)).toBe(8);
+});
+
+test('the grid reaches from its origin over all of its cells', () => {
+  expect(fieldCorners(small)).toEqual([mapPoint(10, -2), mapPoint(11.5, -1)]);
 });

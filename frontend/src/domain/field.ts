@@ -111,6 +111,11 @@ export function smoothDetail(field: Field): number {
   return Math.max(1, Math.min(8, Math.floor(Math.sqrt(2_000_000 / cells))));
 }
 
-export function fieldOrigin(field: Field): MapPoint {
-  return mapPoint(field.originX, field.originY);
+/** Lower left and upper right corner of the grid. */
+export function fieldCorners(field: Field): readonly [MapPoint, MapPoint] {
+  const { originX, originY, width, height, resolution } = field;
+  return [
+    mapPoint(originX, originY),
+    mapPoint(originX + width * resolution, originY + height * resolution),
+  ];
 }

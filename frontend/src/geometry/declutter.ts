@@ -55,7 +55,8 @@ export function placeLabels(requests: readonly LabelRequest[], height: number): 
       text: spot.text,
       x: spot.box.left,
       y: spot.box.top,
-      width: spot.box.right - spot.box.left,
+      // Not right less left, which is off by float noise and so by a pixel.
+      width: spot.width,
     });
   }
   return placed;
@@ -65,7 +66,7 @@ function firstFree(
   { x, y, radius, texts }: LabelRequest,
   height: number,
   taken: Buckets,
-): { text: string; box: Box } | null {
+): { text: string; width: number; box: Box } | null {
   const reach = radius + GAP;
   for (const { text, width } of texts) {
     const corners: readonly (readonly [number, number])[] = [
@@ -76,7 +77,7 @@ function firstFree(
     ];
     for (const [left, top] of corners) {
       const box = { left, top, right: left + width, bottom: top + height };
-      if (taken.isFree(box)) return { text, box };
+      if (taken.isFree(box)) return { text, width, box };
     }
   }
   return null;

@@ -2,6 +2,7 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { canvasPoint, mapPoint, toCanvas, type View } from '../geometry/coordinates';
 import { act, receive, store } from '../store/app';
+import { NOTHING } from '../store/twin';
 import { FakeContext } from '../testing/canvas';
 import { showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
@@ -9,6 +10,7 @@ import { runMap } from './controller';
 import { pinUnderMouse, pointedAt } from './pointer';
 
 let element: HTMLElement;
+let pins: HTMLCanvasElement;
 let overlay: HTMLCanvasElement;
 let stop: () => void;
 let frames: FrameRequestCallback[];
@@ -26,7 +28,8 @@ const tagAt = (id: string, x: number, y: number, sec = 100): ReturnType<typeof w
 const start = (isFixed = false): void => {
   const canvas = (): HTMLCanvasElement => document.createElement('canvas');
   overlay = canvas();
-  stop = runMap(element, { still: canvas(), pins: canvas(), overlay }, isFixed);
+  pins = canvas();
+  stop = runMap(element, { still: canvas(), pins, overlay }, isFixed);
   paint();
 };
 /** Runs what waits for the next frame. */
@@ -52,6 +55,8 @@ const press = (key: string): void => {
 
 beforeEach(() => {
   frames = [];
+  pointedAt.dispatch(null);
+  pinUnderMouse.dispatch(null);
   calm = false;
   vi.stubGlobal('requestAnimationFrame', (frame: FrameRequestCallback) => frames.push(frame));
   vi.stubGlobal('cancelAnimationFrame', () => {
@@ -78,7 +83,7 @@ beforeEach(() => {
   );
   Object.defineProperty(document, 'fonts', {
     configurable: true,
-    value: { ready: Promise.resolve() },
+    value: new EventTarget(),
   });
   element = document.createElement('div');
   document.body.append(element);
@@ -111,6 +116,13 @@ describe('pulses', () => {
   test('not for those who want less motion', () => {
     calm = true;
     start();
+    observeAgain();
+    expect(drawn('arc')).toBe(0);
+  });
+
+  test('not where the pins are switched off', () => {
+    start();
+    act({ type: 'layer', layer: 'pins', on: false });
     observeAgain();
     expect(drawn('arc')).toBe(0);
   });
@@ -191,4 +203,64 @@ test('a wall screen is for looking: nothing chooses a tag or moves the map', () 
   pointer('pointermove', ...place(3, 2));
   expect(pinUnderMouse.get()?.tagId).toBe('b');
   expect(element.dataset['hand']).toBe('grab');
+});
+
+describe('keyboard', () => {
+  const crosshair = (): boolean => pointedAt.get() !== null;
+
+  test('a key that is not the map’s own leaves the read-out to the mouse', () => {
+    start();
+    press('2');
+    press('Shift');
+    expect(crosshair()).toBe(false);
+  });
+
+  test.each(['ArrowUp', '+', 'Enter', '0'])('%s is: the crosshair comes', (key) => {
+    start();
+    press(key);
+    expect(crosshair()).toBe(true);
+    element.dispatchEvent(new FocusEvent('blur'));
+    expect(crosshair()).toBe(false);
+  });
+
+  test('Enter chooses the tag nearest to the crosshair', () => {
+    start();
+    act({ type: 'camera', camera: { x: 3, y: 2, span: 8 } });
+    press('Enter');
+    expect(store.get().view.selected).toBe('b');
+  });
+});
+
+test('everything is in sight, the heat map too', () => {
+  const field = {
+    sensor: 'temperature',
+    width: 60,
+    height: 50,
+    originX: -2,
+    originY: -4,
+    resolution: 0.1,
+    valueMin: 1,
+    valueMax: 2,
+    sampleCount: 2,
+    values: new Float32Array(3_000).fill(1),
+  };
+  start();
+  receive({ type: 'field', field: { state: 'ready', message: '', value: field } });
+  for (const [x, y] of [place(-2, -4), place(4, 1)]) {
+    expect(x >= 0 && x <= SIZE.width && y >= 0 && y <= SIZE.height).toBe(true);
+  }
+  // Another sensor's heat map, which has the same grid, is on its way.
+  const before = view();
+  receive({ type: 'field', field: NOTHING });
+  observeAgain();
+  expect(view()).toEqual(before);
+});
+
+test('a font that comes late is drawn with', () => {
+  start();
+  const labels = FakeContext.recordOf(pins);
+  const before = labels?.calls.length;
+  document.fonts.dispatchEvent(new Event('loadingdone'));
+  paint();
+  expect(labels?.calls.length).toBeGreaterThan(before ?? NaN);
 });

@@ -1,5 +1,6 @@
 /** Ties the map's canvases to the store: draws what changed, once a frame, and nothing else. */
 import { DARK, LIGHT } from '../draw/palette';
+import { fieldCorners, type Field } from '../domain/field';
 import { PULSE_MS, type Pulse } from '../draw/overlay';
 import { pinRadius } from '../draw/pins';
 import type { Pin } from '../draw/scene';
@@ -40,6 +41,7 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
   let pulses: readonly Pulse[] = [];
   let crosshair = false;
   let shown = store.get();
+  let lastField = shown.twin.field.value;
 
   const camera = new MapCamera(
     element,
@@ -99,6 +101,7 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
     const state = store.get();
     shown = state;
     const { twin, view } = state;
+    lastField = twin.field.value ?? lastField;
     const changedTwin = twin.snapshot !== before.twin.snapshot;
     if (changedTwin && twin.snapshot && !calm.matches) {
       pulses = [...pulses, ...newPulses(state)];
@@ -123,8 +126,9 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
         run({ type: 'show', tagId: selected });
       });
     }
-    if (view.camera !== before.view.camera || (!view.camera && (changedTwin || !sameMap))) {
-      camera.goTo(view.camera, contentBounds(state));
+    const sameContent = !changedTwin && sameMap && twin.field === before.twin.field;
+    if (view.camera !== before.view.camera || (!view.camera && !sameContent)) {
+      camera.goTo(view.camera, contentBounds(state, lastField));
     }
   };
 
@@ -176,6 +180,10 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
     pointedAt.dispatch(on ? centre() : null);
     spoil('overlay');
   };
+  /** From now on the keyboard is at work: the read-out is the crosshair's. */
+  const aim = (): void => {
+    if (!crosshair) setCrosshair(true);
+  };
   const onFocus = (): void => {
     setCrosshair(element.matches(':focus-visible'));
   };
@@ -184,8 +192,8 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
   };
   const onKeyDown = (event: KeyboardEvent): void => {
     if (event.altKey || event.ctrlKey || event.metaKey) return;
-    if (!crosshair) setCrosshair(true);
     if (event.key === 'Enter' || event.key === ' ') {
+      aim();
       const { width, height } = camera.size;
       act({ type: 'select', tagId: pinAt(canvasPoint(width / 2, height / 2), 60)?.id ?? null });
       event.preventDefault();
@@ -193,6 +201,7 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
     }
     const command = keyCommand(event);
     if (!command) return;
+    aim();
     event.preventDefault();
     run(command);
   };
@@ -201,7 +210,7 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
     switch (command.type) {
       case 'fit':
         act({ type: 'camera', camera: null });
-        camera.goTo(null, contentBounds(store.get()));
+        camera.goTo(null, contentBounds(store.get(), lastField));
         break;
       case 'zoom':
         camera.zoomBy(command.factor);
@@ -226,7 +235,7 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
     const textScale = parseFloat(getComputedStyle(element).fontSize) / TEXT_PX || 1;
     painter.resize({ width, height }, window.devicePixelRatio, textScale);
     const state = store.get();
-    camera.goTo(state.view.camera, contentBounds(state));
+    camera.goTo(state.view.camera, contentBounds(state, lastField));
     spoil('still', 'pins', 'overlay');
   });
   resize.observe(element);
@@ -235,10 +244,12 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
   const fading = setInterval(() => {
     spoil('pins');
   }, 5_000);
-  void document.fonts.ready.then(() => {
+  // Not `fonts.ready`: that is so while nothing is asked for, and the font comes after it.
+  const onFonts = (): void => {
     painter.forget();
     spoil('still', 'pins');
-  });
+  };
+  document.fonts.addEventListener('loadingdone', onFonts);
 
   const stops = [
     store.subscribe(update),
@@ -264,6 +275,7 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
   return () => {
     for (const stop of stops) stop();
     gone.abort();
+    document.fonts.removeEventListener('loadingdone', onFonts);
     resize.disconnect();
     clearInterval(fading);
     cancelAnimationFrame(frame);
@@ -287,13 +299,22 @@ function newPulses({ twin }: AppState): Pulse[] {
   );
 }
 
-/** What a fit shows: everything pinned or planted, and the known part of the map. */
-function contentBounds({ twin }: AppState): Bounds | null {
+/**
+ * What a fit shows: everything pinned or planted, the heat map, and the known part of the map.
+ * The grid of the heat map is the same for every sensor, so that a switch moves nothing; while
+ * the next one is on its way, the last one's stands in for it.
+ */
+function contentBounds({ twin }: AppState, field: Field | null): Bounds | null {
   const points = (twin.snapshot?.tags ?? []).flatMap((tag) => [
     ...(tag.at ? [tag.at] : []),
     ...tag.footprint,
   ]);
-  return boundsOf([...points, ...(twin.map.value?.known ?? [])]);
+  return boundsOf([
+    ...points,
+    // A field whose tags are gone is one of a twin before this one.
+    ...(field && points.length > 0 ? fieldCorners(field) : []),
+    ...(twin.map.value?.known ?? []),
+  ]);
 }
 
 function keyCommand({ key, shiftKey }: KeyboardEvent): MapCommand | null {

@@ -63,8 +63,9 @@ export class Painter {
   #palette: Palette;
   #sprites = new Sprites(1);
   #widths = new Map<string, number>();
-  // Like those of the sprites: a canvas in the page inherits the style sheet's font features.
-  readonly #ruler = contextOf(newCanvas(1, 1));
+  // Off the page, like those of the sprites: one in the page inherits the font's features from
+  // the style sheet. Made anew for another font: one off the page keeps what it first found.
+  #ruler = contextOf(newCanvas(1, 1));
   readonly #stillBuffer = new PanBuffer();
   readonly #pinBuffer = new PanBuffer();
 
@@ -96,6 +97,7 @@ export class Painter {
     this.#pinBuffer.spoil();
     this.#sprites = new Sprites(this.#ratio);
     this.#widths = new Map();
+    this.#ruler = contextOf(newCanvas(1, 1));
   }
 
   #surface(canvas: HTMLCanvasElement): Surface {
@@ -164,7 +166,9 @@ export class Painter {
     },
   ): void {
     const surface = this.#surface(this.#canvases.overlay);
-    drawPulses(surface, view, moving.pulses, moving.now, this.#palette);
+    if (state.view.layers.has('pins')) {
+      drawPulses(surface, view, moving.pulses, moving.now, this.#palette);
+    }
     for (const tag of state.twin.snapshot?.tags ?? []) {
       if (!tag.at) continue;
       if (tag.id === state.view.selected) drawMark(surface, view, tag.at, true, this.#palette);

@@ -12,7 +12,7 @@ beforeEach(() => {
   vi.stubGlobal('fetch', () => Promise.reject(new Error('no server')));
   Object.defineProperty(document, 'fonts', {
     configurable: true,
-    value: { ready: Promise.resolve() },
+    value: new EventTarget(),
   });
   showTags([
     wireTag({ tag_id: '1', readings: readings({ temperature: 20 }) }),

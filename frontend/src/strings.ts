@@ -222,12 +222,11 @@ export const S = {
     bugs: 'bugs',
     pest: 'pest',
     age: 'age [s]',
+    observed: 'last observed [UTC]',
     yes: 'yes',
     no: 'no',
   },
   paper: (taken: string, printed: string): string => `As of ${taken}, printed ${printed}`,
   paperRange: (sensor: string, range: string): string => `${sensor} ${range}`,
   fileName: (kind: string, stamp: string): string => `lupin-twin-${kind}-${stamp}`,
-  pngFooter: (sensor: string, range: string, time: string): string =>
-    `${sensor}  ·  ${range}  ·  ${time}`,
 } as const;

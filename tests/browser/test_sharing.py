@@ -6,11 +6,12 @@ import csv
 import io
 import re
 from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
-from PIL import Image
+from PIL import Image, ImageStat
 from playwright.sync_api import Download, expect
 
 from tests.browser.hmi import PHONE, Hmi
@@ -84,6 +85,11 @@ def read_csv(download: Download) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(text.decode("utf-8-sig"), newline="")))
 
 
+def utc(text: str) -> datetime:
+    assert text.endswith("Z")
+    return datetime.fromisoformat(text)
+
+
 def test_the_table_as_csv_holds_every_tag_and_raw_values(
     house: Bridge, open_page: OpenPage
 ) -> None:
@@ -102,6 +108,8 @@ def test_the_table_as_csv_holds_every_tag_and_raw_values(
     assert rows["3"]["CO₂ [ppm]"] == ""  # the sensor gave no number
     assert rows["seen"]["age [s]"] == ""  # never observed
     assert int(rows["1"]["age [s]"]) >= 0
+    assert rows["seen"]["last observed [UTC]"] == ""
+    assert abs(utc(rows["1"]["last observed [UTC]"]) - datetime.now(UTC)) < timedelta(hours=1)
 
 
 def test_the_csv_is_the_table_as_it_is_filtered_and_sorted(
@@ -139,6 +147,27 @@ def test_text_that_a_spreadsheet_would_run_is_disarmed(domain: int, open_page: O
     assert row["x [m]"] == "-1"
 
 
+FOOTER_PX = 56
+
+
+def is_red(pixel: object) -> bool:
+    assert isinstance(pixel, tuple)
+    red, green, blue = pixel
+    return bool(red > green + 30 and red > blue + 30)
+
+
+def longest_dark_run(picture: Image.Image) -> int:
+    """The longest horizontal line of dark pixels in the right half, pixels."""
+    dark = picture.convert("L").point(lambda value: 255 if value < 90 else 0)
+    longest = 0
+    for y in range(dark.height):
+        run = 0
+        for x in range(dark.width // 2, dark.width):
+            run = run + 1 if dark.getpixel((x, y)) else 0
+            longest = max(longest, run)
+    return longest
+
+
 def test_the_map_as_png_is_what_is_on_the_screen(house: Bridge, open_page: OpenPage) -> None:
     for options, ratio in (({}, 1), ({"device_scale_factor": 2, "viewport": PHONE}, 2)):
         hmi = open_page(house.url, "layers=map,field,boxes", **options)
@@ -150,14 +179,19 @@ def test_the_map_as_png_is_what_is_on_the_screen(house: Bridge, open_page: OpenP
         box = hmi.map.bounding_box()
         assert box is not None
         assert picture.width == pytest.approx(box["width"] * ratio, abs=1)
-        assert picture.height == pytest.approx((box["height"] + 40) * ratio, abs=1.5)
+        assert picture.height == pytest.approx((box["height"] + FOOTER_PX) * ratio, abs=1.5)
         view = hmi.view()
         shown = Image.open(io.BytesIO(hmi.map.screenshot())).convert("RGB")
-        for point in [(1.0, 3.0), (3.0, 1.0), (0.5, 0.5), (2.0, 2.0)]:
+        for point in [(1.3, 3.3), (3.0, 1.5), (0.5, 2.5), (2.0, 2.0)]:
             x, y = ((pixel + 0.5) * ratio for pixel in view.pixel(*point))
             assert picture.getpixel((int(x), int(y))) == shown.getpixel((int(x), int(y)))
-        footer = picture.crop((0, picture.height - 40 * ratio, picture.width, picture.height))
-        assert len(set(footer.convert("L").tobytes())) > 10  # it is written on
+        footer = picture.crop((0, picture.height - FOOTER_PX * ratio, *picture.size))
+        # The ramp's upper half ends in temperature's full red, a legend of what is above.
+        reds = [rgb for _, rgb in footer.getcolors(1 << 20) or [] if is_red(rgb)]
+        assert len(reds) > 20
+        # The scale bar, of a round length.
+        length = longest_dark_run(footer) / ratio / view.scale
+        assert min(abs(length - metres) for metres in (0.5, 1, 2)) < 3 / view.scale
 
 
 def test_copying_the_link_works_or_says_where_it_is(house: Bridge, open_page: OpenPage) -> None:
@@ -189,6 +223,11 @@ def luminance(pixel: object) -> float:
     return float(sum(pixel) / len(pixel))
 
 
+def typical_luminance(picture: Image.Image) -> float:
+    """That of most of a map: of its ground and floor."""
+    return float(ImageStat.Stat(picture.convert("L")).median[0])
+
+
 def test_paper_has_every_row_says_when_and_is_light(house: Bridge, open_page: OpenPage) -> None:
     hmi = open_page(house.url, color_scheme="dark")
     hmi.expect_rows(*TAGS)
@@ -196,8 +235,7 @@ def test_paper_has_every_row_says_when_and_is_light(house: Bridge, open_page: Op
     hmi.expect_map()
     line = hmi.test_id("paper-line")
     expect(line).to_be_hidden()
-    # The corner of the map that nothing lies on: dark on the screen.
-    assert luminance(hmi.settled_picture().getpixel((5, 200))) < 60
+    assert typical_luminance(hmi.settled_picture()) < 60
 
     # What a browser does on its way to the printer.
     hmi.page.emulate_media(media="print")
@@ -212,10 +250,7 @@ def test_paper_has_every_row_says_when_and_is_light(house: Bridge, open_page: Op
     expect(line).to_be_visible()
     ground = hmi.page.evaluate("getComputedStyle(document.body).backgroundColor")
     assert luminance(tuple(int(part) for part in re.findall(r"\d+", ground))) > 200
-    # Lengthways and across: all of the map, and not only its frame, is light.
-    picture = hmi.settled_picture()
-    light = [luminance(picture.getpixel((x, 200))) for x in range(5, picture.width - 5, 40)]
-    assert sorted(light)[len(light) // 2] > 200
+    assert typical_luminance(hmi.settled_picture()) > 200
 
     hmi.page.evaluate("dispatchEvent(new Event('afterprint'))")
     hmi.page.emulate_media(media="screen")

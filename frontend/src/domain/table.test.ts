@@ -6,12 +6,18 @@ import { sensorNamed } from './sensors';
 import { filterRows, rowsOf, sortRows, tableCsv, type Row } from './table';
 
 const tags = [
-  tag({ tag_id: '2', readings: readings({ temperature: 20 }), species: 'rose' }),
+  tag({
+    tag_id: '2',
+    readings: readings({ temperature: 20 }),
+    species: 'rose',
+    last_observed: { sec: 100, nanosec: 250_000_000 },
+  }),
   tag({ tag_id: '10', readings: readings({ temperature: 35 }), anomaly: true, bug_count: 3 }),
   tag({ tag_id: '9', readings: readings({ humidity: 60 }), stale_seconds: 80 }),
   tag({
     tag_id: '1',
     stale_seconds: null,
+    last_observed: { sec: 0, nanosec: 0 },
     pose: { position: { x: 0, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 0 } },
   }),
 ];
@@ -63,13 +69,13 @@ describe('filter', () => {
   });
 });
 
-test('the file has every tag, values in the shown unit, and ages of now', () => {
+test('the file has every tag, values in the shown unit, and ages of its time', () => {
   const sensors = [sensorNamed('temperature'), sensorNamed('humidity')];
   const text = tableCsv(rows, sensors, 'F', 10_000);
   const lines = text.split('\r\n');
   expect(lines[0]).toContain('Temperature [°F],Humidity [%]');
   expect(lines).toHaveLength(1 + tags.length + 1);
-  expect(lines[1]).toBe('2,Healthy,Temperature,68,,rose,,0,0,no,15,1,2');
-  expect(lines[2]).toBe('10,Critical,Temperature,95,,,,0,3,yes,15,1,2');
-  expect(lines[4]).toBe('1,No data,,,,,,0,0,no,,,');
+  expect(lines[1]).toBe('2,Healthy,Temperature,68,,rose,,0,0,no,15,1970-01-01T00:01:40.250Z,1,2');
+  expect(lines[2]).toBe('10,Critical,Temperature,95,,,,0,3,yes,15,1970-01-01T00:01:40.000Z,1,2');
+  expect(lines[4]).toBe('1,No data,,,,,,0,0,no,,,,');
 });

@@ -1,4 +1,5 @@
 /** Rows of the table: what is in a column, how it sorts, what a filter finds. */
+import type { WireTime } from '../contract/types';
 import { S } from '../strings';
 import { ageSeconds } from './age';
 import { csv, type Cell } from './csv';
@@ -91,12 +92,18 @@ function haystack({ tag, health }: Row): string {
     .toLowerCase();
 }
 
+/** ISO 8601, of the twin's own clock: the ROS time that a bag has too; null: never. */
+function observedText({ sec, nanosec }: WireTime): string | null {
+  if (sec === 0 && nanosec === 0) return null;
+  return new Date(sec * 1000 + Math.floor(nanosec / 1e6)).toISOString();
+}
+
 /** The table as a file: raw values at full precision, in the units that the page shows. */
 export function tableCsv(
   rows: readonly Row[],
   sensors: readonly Sensor[],
   unit: TemperatureUnit,
-  /** ms on the monotonic clock. */
+  /** When the state was taken, ms on the monotonic clock: ages are those of that moment. */
   now: number,
 ): string {
   const T = S.csv;
@@ -114,6 +121,7 @@ export function tableCsv(
     T.bugs,
     T.pest,
     T.age,
+    T.observed,
     T.x,
     T.y,
   ];
@@ -133,6 +141,7 @@ export function tableCsv(
       tag.bugCount,
       tag.anomaly ? T.yes : T.no,
       age === null ? null : Math.round(age),
+      observedText(tag.wire.last_observed),
       tag.at && round(tag.at.x),
       tag.at && round(tag.at.y),
     ];

@@ -6,6 +6,11 @@ import { readings, wireTag } from '../testing/tags';
 import { copyLink, saveTable } from './actions';
 import { fileName } from './save';
 
+// Half an hour off the full one, and set before any module looks at the clock.
+vi.hoisted(() => {
+  process.env['TZ'] = 'Asia/Kolkata';
+});
+
 let saved: Blob[];
 let names: string[];
 
@@ -41,6 +46,14 @@ describe('table as a file', () => {
     expect(names[0]).toMatch(/^lupin-twin-tags-.*\.csv$/);
   });
 
+  test('ages are those of the moment in the file’s name, however much later it is saved', async () => {
+    const now = performance.now();
+    vi.spyOn(performance, 'now').mockReturnValue(now + 3_600_000);
+    saveTable();
+    // 5 s old when the state was taken.
+    expect((await lines())[1]).toMatch(/,5,1970-01-01T00:01:40\.000Z,/);
+  });
+
   test('is sorted as the table is', async () => {
     act({ type: 'sort', column: 'temperature' });
     act({ type: 'sort', column: 'temperature' });
@@ -50,7 +63,8 @@ describe('table as a file', () => {
 });
 
 test('a file’s name sorts by time and is legal everywhere', () => {
-  expect(fileName('map', 'png', Date.UTC(2026, 4, 1, 14, 3, 22))).toBe(
+  // On the clock of who saves it, like the time in the picture.
+  expect(fileName('map', 'png', Date.UTC(2026, 4, 1, 8, 33, 22))).toBe(
     'lupin-twin-map-2026-05-01T14-03-22.png',
   );
 });

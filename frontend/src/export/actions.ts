@@ -1,16 +1,17 @@
 /** The exports, as buttons and menu call them. */
-import { clockText, readingText } from '../domain/format';
-import { sensorColour, rgbText } from '../domain/ramp';
+import { momentText, readingText, valueText } from '../domain/format';
+import { sensorColour } from '../domain/ramp';
 import { sensorNamed } from '../domain/sensors';
 import { filterRows, rowsOf, sortRows, tableCsv } from '../domain/table';
+import { shown } from '../domain/text';
+import { drawFooter, FOOTER_PX, type Footer } from '../draw/footer';
 import { contextOf, newCanvas } from '../draw/surface';
 import { store } from '../store/app';
 import { selectHealth, selectRange, selectSensors } from '../store/derived';
-import { S } from '../strings';
 import { epochOf } from '../ui/useNow';
 import { fileName, save } from './save';
 
-/** The table as the operator sees it: filtered and sorted. */
+/** The table as the operator sees it, filtered and sorted; ages are those of the state's time. */
 export function saveTable(): void {
   const state = store.get();
   const { snapshot } = state.twin;
@@ -20,16 +21,14 @@ export function saveTable(): void {
     filterRows(rowsOf(snapshot.tags, selectHealth(state)), filter, health),
     sort,
   );
-  const text = tableCsv(rows, selectSensors(state), state.settings.unit, performance.now());
+  const text = tableCsv(rows, selectSensors(state), state.settings.unit, snapshot.takenAt);
   save(
     new Blob([text], { type: 'text/csv;charset=utf-8' }),
     fileName('tags', 'csv', epochOf(snapshot.takenAt)),
   );
 }
 
-const FOOTER_PX = 40;
-
-/** The map as the operator sees it, with a line that says what and when. */
+/** The map as the operator sees it, with a footer that says what, when and how large. */
 export async function saveMap(): Promise<void> {
   const layers = [...document.querySelectorAll<HTMLCanvasElement>('canvas[data-layer]')];
   const [first] = layers;
@@ -39,26 +38,24 @@ export async function saveMap(): Promise<void> {
   const style = getComputedStyle(document.documentElement);
   const canvas = newCanvas(first.width, first.height + FOOTER_PX * ratio);
   const context = contextOf(canvas);
-  context.fillStyle = style.getPropertyValue('--surface');
-  context.fillRect(0, 0, canvas.width, canvas.height);
   for (const layer of layers) context.drawImage(layer, 0, 0);
 
   const sensor = sensorNamed(state.view.sensor);
   const range = selectRange(state);
   const takenAt = epochOf(state.twin.snapshot.takenAt);
   const { unit } = state.settings;
-  const limits = range
-    ? `${readingText(sensor, range.low, unit)} – ${readingText(sensor, range.high, unit)}`
-    : S.legendNoTags;
-  const date = new Date(takenAt).toLocaleDateString('en-CA');
+  const footer: Footer = {
+    title: shown(sensor.label, 32),
+    time: momentText(takenAt),
+    ends: range && [valueText(sensor, range.low, unit), readingText(sensor, range.high, unit)],
+    colour: sensorColour(sensor),
+    scale: Number(layers.at(-1)?.dataset['view']?.split(',')[2]),
+  };
   context.setTransform(ratio, 0, 0, ratio, 0, first.height);
-  context.fillStyle = rgbText(sensorColour(sensor));
-  context.fillRect(14, 14, 12, 12);
-  context.fillStyle = style.getPropertyValue('--ink');
-  context.font = '500 13px "Inter Variable", system-ui, sans-serif';
-  context.textBaseline = 'middle';
-  const text = S.pngFooter(sensor.label, limits, `${date} ${clockText(takenAt)}`);
-  context.fillText(text, 34, FOOTER_PX / 2 + 0.5);
+  drawFooter(context, first.width / ratio, footer, {
+    ink: style.getPropertyValue('--ink'),
+    surface: style.getPropertyValue('--surface'),
+  });
 
   const blob = await new Promise<Blob | null>((resolve) => {
     canvas.toBlob(resolve, 'image/png');

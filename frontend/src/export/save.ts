@@ -1,3 +1,4 @@
+import { momentText } from '../domain/format';
 import { S } from '../strings';
 
 /** Hands a file to the browser's download. */
@@ -12,8 +13,8 @@ export function save(blob: Blob, name: string): void {
   }, 60_000);
 }
 
-/** A name that sorts by time and is legal everywhere: 2026-05-01T14-03-22. */
+/** A name that sorts by time and is legal everywhere, local time: 2026-05-01T14-03-22. */
 export function fileName(kind: string, extension: string, epochMs: number): string {
-  const stamp = new Date(epochMs).toISOString().slice(0, 19).replaceAll(':', '-');
+  const stamp = momentText(epochMs).replace(' ', 'T').replaceAll(':', '-');
   return `${S.fileName(kind, stamp)}.${extension}`;
 }

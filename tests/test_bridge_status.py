@@ -7,6 +7,7 @@ from typing import get_args
 import pytest
 
 from lupin_bridge import schema
+from lupin_bridge.bridge import WATCH_PERIOD_S
 from lupin_bridge.status import STALE_AFTER_S, Liveness, Reason, Status
 
 
@@ -14,6 +15,11 @@ def test_a_twin_is_live_until_it_was_silent_for_the_limit() -> None:
     liveness = Liveness(last_state_s=100.0)
     assert liveness.status(100.0 + STALE_AFTER_S - 0.001).reason == "live"
     assert liveness.status(100.0 + STALE_AFTER_S).reason == "stale"
+
+
+def test_a_silence_is_told_in_the_time_that_is_promised() -> None:
+    # Three missed publications are no accident, and a client knows by 3.5 s.
+    assert 3.0 <= STALE_AFTER_S < STALE_AFTER_S + WATCH_PERIOD_S <= 3.5
 
 
 def test_a_twin_that_was_never_heard_has_no_age() -> None:

@@ -12,6 +12,7 @@ from lupin_msgs.msg import SensorReading, TwinState, TwinTagState
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 
+from lupin_bridge import ros_logs
 from lupin_bridge.web_node import WebNode
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.parameters import ParameterError
@@ -225,6 +226,20 @@ def test_a_state_that_breaks_the_callback_is_counted_and_the_next_one_is_taken(
         peer.publish("/twin/state", TwinState(tags=[tag("1")]), depth=1)
         stage.until(lambda: stage.node.callback_errors == 1, "the error")
     assert stage.take(peer, tag("2")).tags[0].tag_id == "2"
+
+
+@pytest.mark.parametrize(("topic", "limit"), [("/twin/state", 128_000_000), ("/map", 64_000_000)])
+def test_a_message_past_the_limit_is_dropped_before_it_is_read(
+    stage: Stage, caplog: pytest.LogCaptureFixture, topic: str, limit: int
+) -> None:
+    ros_logs.forward()
+    (subscription,) = [s for s in stage.node.subscriptions if s.topic_name == topic]
+    for size in (limit, limit + 1):
+        subscription.callback(bytes(size))
+    dropped = [record.message for record in caplog.records if "dropped a message" in record.message]
+    assert dropped == [
+        f"dropped a message on {topic}: {limit + 1} bytes, the limit is {limit}",
+    ]
 
 
 @pytest.mark.parametrize(

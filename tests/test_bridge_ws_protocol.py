@@ -17,7 +17,7 @@ from lupin_bridge.server import MAX_INBOUND_BYTES
 from lupin_bridge.ws_protocol import Connection
 from tests.support.inprocess import run, running, until
 from tests.support.messages import scan
-from tests.support.raw_ws import BINARY, CLOSE, TEXT, RawClient, frames_of, masked
+from tests.support.raw_ws import BINARY, CLOSE, PING, TEXT, RawClient, frames_of, masked
 from tests.support.waiting import wait_for
 from tests.support.web import bridge, deaf_client, overfill
 
@@ -102,6 +102,35 @@ def test_a_socket_that_is_free_again_says_so_by_itself(domain: int) -> None:
                 assert 0 < queued <= len(SMALL_FRAME), "of what the socket does not take, one frame"
                 await asyncio.to_thread(drain, slow, freed)
                 assert (taken, freed[0]) == ([False], True)
+
+    run(domain, test())
+
+
+def test_who_does_not_read_gets_no_answer_to_his_pings(domain: int) -> None:
+    pings = 100
+
+    async def test() -> None:
+        async with running(ros_args=SILENT) as served:
+            with deaf_client(served.url) as deaf:
+                await until(lambda: served.server.server_state.connections, "the client")
+                (connection,) = served.server.server_state.connections
+                assert isinstance(connection, Connection)
+                await until(lambda: connection.on_writable is not None, "the client to have joined")
+                heard = 0
+                handle_ping = connection.handle_ping
+
+                def counted() -> None:
+                    nonlocal heard
+                    heard += 1
+                    handle_ping()
+
+                connection.handle_ping = counted  # type: ignore[method-assign]
+                while connection.can_take:
+                    connection.write(SMALL_FRAME)
+                queued = connection.transport.get_write_buffer_size()
+                deaf.sendall(masked(PING, bytes(125)) * pings)
+                await until(lambda: heard == pings, "all pings")
+                assert connection.transport.get_write_buffer_size() == queued
 
     run(domain, test())
 

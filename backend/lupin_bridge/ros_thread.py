@@ -211,11 +211,16 @@ class RosThread(Generic[NodeT, EventT]):
             executor.add_node(self._node)
             self._executor = executor
             self._to_loop(_settle, self._started, None, None)
-            spin_until_shutdown(executor, self._node.report)
+            spin_until_shutdown(executor, self._report)
         except BaseException as caught:  # noqa: BLE001  # no thread dies unseen
             error = caught
         finally:
             self._end(error)
+
+    def _report(self, what: str, error: Exception) -> None:
+        # rclpy's shutdown takes apart what a spin that is just about to wait still needs.
+        if not self._is_stopping:
+            self._require_node().report(what, error)
 
     def _init_ros(self) -> None:
         ros_logs.forward()

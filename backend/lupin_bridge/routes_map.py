@@ -61,7 +61,7 @@ async def _map(request: Request, kind: str) -> Response:
     if occupancy is None:
         return error_response("no map has come yet on the twin's map_topic", 404)
     headers = {"ETag": f'"{bridge.source.identity}-{occupancy.revision}-{kind}"', **REVALIDATE}
-    if matches(request.headers.get("if-none-match"), headers["ETag"]):
+    if matches(", ".join(request.headers.getlist("if-none-match")), headers["ETag"]):
         return Response(status_code=304, headers=headers)
     if kind == "json":
         return Response(map_json(occupancy), headers=headers, media_type=JSON_TYPE)

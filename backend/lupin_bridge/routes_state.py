@@ -7,7 +7,6 @@ from fastapi import APIRouter, Request, Response, WebSocket
 
 from lupin_bridge import listen_query, schema, state_json
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.frames import CBOR
 from lupin_bridge.http_tools import bridge_of, error_response, json_response, read_route
 from lupin_bridge.hub import CLOSE_POLICY, CLOSE_TRY_AGAIN_LATER, Client
 from lupin_bridge.listen_query import ListenRefused
@@ -26,15 +25,18 @@ async def ws_state(websocket: WebSocket) -> None:
     """The status and the current state at once, then every change; a client is not listened to."""
     bridge: Bridge = websocket.app.state.bridge
     offered: list[str] = websocket.scope["subprotocols"]
-    await websocket.accept(subprotocol=CBOR if CBOR in offered else None)
-    if bridge.hub.is_full:
-        limit = bridge.hub.max_clients
-        await websocket.close(CLOSE_TRY_AGAIN_LATER, f"{limit} clients are connected, the limit")
-        return
     try:
         query = listen_query.parse(websocket.query_params.multi_items(), offered)
     except ListenRefused as error:
+        await websocket.accept()
         await websocket.close(CLOSE_POLICY, str(error))
+        return
+    # What is selected is what is sent: a query may ask for JSON although CBOR was offered.
+    chosen = query.encoding if query.encoding in offered else None
+    await websocket.accept(subprotocol=chosen)
+    if bridge.hub.is_full:
+        limit = bridge.hub.max_clients
+        await websocket.close(CLOSE_TRY_AGAIN_LATER, f"{limit} clients are connected, the limit")
         return
     connection: Connection = getattr(websocket.state, CONNECTION_KEY)
     client = Client(
@@ -79,13 +81,14 @@ async def state(request: Request) -> Response:
 async def history(request: Request, tag_id: str) -> Response:
     """The tag's last scans that brought readings, sensor by sensor, oldest first."""
     bridge = bridge_of(request)
+    if bridge.latest is None:
+        return error_response(_NO_TWIN, 503)
     try:
         scans = await bridge.source.history(tag_id)
     except TwinUnavailableError as error:
         return error_response(str(error), 503)
     if scans is None:
-        latest = bridge.latest
-        return _no_such_tag(tag_id, 0 if latest is None else len(latest.snapshot.tags))
+        return _no_such_tag(tag_id, len(bridge.latest.snapshot.tags))
     return json_response(orjson.dumps(state_json.history(tag_id, scans)))
 
 

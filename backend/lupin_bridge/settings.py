@@ -53,8 +53,8 @@ class Settings:
         "as https://panel.example; may be given more than once",
     )
     tls_cert: str = _setting("", "PEM file with the certificate chain: serve https and wss")
-    log_format: str = _setting(TEXT, f"{' or '.join(FORMATS)}: lines for people or for a collector")
     tls_key: str = _setting("", "PEM file with the certificate's private key, not encrypted")
+    log_format: str = _setting(TEXT, f"{' or '.join(FORMATS)}: lines for people or for a collector")
 
     def __post_init__(self) -> None:
         for spec in fields(self):

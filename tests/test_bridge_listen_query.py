@@ -52,6 +52,8 @@ def test_an_encoding_is_asked_for_by_name_or_by_subprotocol(
         ([("max_rate_hz", "-1")], ["max_rate_hz is '-1'", "from 0.01"]),
         ([("max_rate_hz", "nan")], ["max_rate_hz is 'nan'", "from 0.01"]),
         ([("max_rate_hz", "fast")], ["max_rate_hz is 'fast'", "a number"]),
+        ([("max_rate_hz", "1_0")], ["max_rate_hz is '1_0'", "a number"]),
+        ([("max_rate_hz", "\u0661")], ["max_rate_hz is", "a number"]),
         ([("max_rate_hz", "0.0099")], ["from 0.01"]),
     ],
 )

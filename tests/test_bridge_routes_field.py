@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+import httpx
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -293,6 +294,17 @@ def test_the_same_field_is_not_sent_twice(live: Bridge, path: str) -> None:
         assert again.headers["cache-control"] == "no-cache"
     assert work_done(live) == before, "neither computed nor looked up"
     assert live.get(path, {"If-None-Match": '"other"'}, **QUERY).status_code == 200
+
+
+def test_all_lines_of_a_header_count(live: Bridge) -> None:
+    def ask(*lines: tuple[str, str]) -> httpx.Response:
+        return httpx.get(f"{live.url}/api/field", params=QUERY, headers=lines, trust_env=False)
+
+    two_types = ask(("Accept", "text/html;q=0.1"), ("Accept", "application/x-npy"))
+    assert two_types.headers["content-type"] == "application/x-npy"
+    tag = etag(live, "/api/field.json")
+    two_tags = ask(("If-None-Match", '"other"'), ("If-None-Match", tag), ("Accept", "*/*"))
+    assert two_tags.status_code == 304
 
 
 def test_each_query_and_each_format_has_a_tag_of_its_own(live: Bridge) -> None:

@@ -111,6 +111,15 @@ def test_who_asks_for_cbor_gets_the_same_in_binary(live: Bridge) -> None:
         by_subprotocol.until_tag("binary")
 
 
+def test_what_is_selected_as_subprotocol_is_what_is_sent(live: Bridge) -> None:
+    with live.listen(subprotocols=["cbor"], encoding="json") as by_query:
+        assert by_query.connection.subprotocol is None
+        assert isinstance(by_query.connection.recv(), str)
+    with live.listen(encoding="cbor") as not_offered:
+        assert not_offered.connection.subprotocol is None
+        assert isinstance(not_offered.connection.recv(), bytes)
+
+
 def test_who_asks_for_fewer_frames_is_sent_fewer(live: Bridge) -> None:
     with live.listen(max_rate_hz=0.01) as rare, live.listen() as frequent:
         numbers = [rare.until("state")["seq"]]

@@ -209,7 +209,8 @@ def test_a_twin_in_another_domain_is_never_seen_until_there_is_one_here(domain: 
         assert (said["twin"], said["reason"]) == ("offline", "never_seen")
         assert "ROS_DOMAIN_ID" in said["message"]
         assert live.get("/readyz").status_code == 503
-        assert live.get("/api/state").status_code == 503
+        for path in ("/api/state", "/api/tags/a", "/api/tags/a/history"):
+            assert live.get(path).status_code == 503
         assert live.get("/api/field", **FIELD).status_code == 503
         with twin_node(domain):
             reason(client, "live")

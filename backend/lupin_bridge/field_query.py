@@ -69,13 +69,23 @@ def parse(parameters: Sequence[tuple[str, str]]) -> FieldQuery:
     )
 
 
-def _number(name: str, text: str) -> float:
-    # float() takes more than plain numbers: `1_000`, and the digits of every script. Blanks around
-    # are fine: in a query string, `+2` reads ` 2`.
+def plain_number(text: str) -> float | None:
+    """A number in a query string; None: it is none.
+
+    float() takes more than plain numbers: `1_000`, and the digits of every script. Blanks around
+    are fine: in a query string, `+2` reads ` 2`.
+    """
     if _PLAIN.fullmatch(text.strip(" ")):
         with suppress(ValueError):
             return float(text)
-    raise FieldRefused(f"{name} is {text[:64]!r}, expected a number")
+    return None
+
+
+def _number(name: str, text: str) -> float:
+    number = plain_number(text)
+    if number is None:
+        raise FieldRefused(f"{name} is {text[:64]!r}, expected a number")
+    return number
 
 
 def _scale(text: str) -> int:

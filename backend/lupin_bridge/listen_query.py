@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from lupin_bridge.field_query import plain_number
 from lupin_bridge.frames import CBOR, ENCODINGS, JSON
 
 _SWITCH: Final = {"0": False, "1": True}
@@ -62,11 +63,8 @@ def parse(parameters: Sequence[tuple[str, str]], subprotocols: Sequence[str] = (
 def _rate(text: str | None) -> float:
     if text is None:
         return math.inf
-    try:
-        rate = float(text)
-    except ValueError:
-        rate = math.nan
-    if not rate >= MIN_RATE_HZ:  # false for NaN too
+    rate = plain_number(text)
+    if rate is None or not rate >= MIN_RATE_HZ:  # false for NaN too
         raise ListenRefused(f"max_rate_hz is {_shown(text)}, expected a number from {MIN_RATE_HZ}")
     return rate
 

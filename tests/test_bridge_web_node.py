@@ -257,6 +257,22 @@ def test_a_parameter_that_cannot_be_is_named(domain: int, override: str, complai
         Stage(domain, "--ros-args", "-p", override)
 
 
+def test_twins_are_counted_by_the_name_that_the_topic_really_has(
+    domain: int, peer: Peer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+
+    def count(topic: str) -> int:
+        asked.append(topic)
+        return 1
+
+    with stage_in(domain, "--ros-args", "-r", "/twin/state:=/r1/state") as stage:
+        monkeypatch.setattr(stage.node, "count_publishers", count)
+        peer.publish("/r1/state", TwinState(), depth=1)
+        stage.until(lambda: asked, "a state")
+    assert set(asked) == {"/r1/state"}
+
+
 def test_parameters_are_read_as_the_twin_reads_them(domain: int) -> None:
     with stage_in(domain, "--ros-args", "-p", "idw_power:=3") as stage:
         assert stage.node.rules.idw_power == 3.0

@@ -72,6 +72,8 @@ def test_no_argument_is_lost_but_for_what_ends_a_ros_part(arguments: list[str]) 
         (["serve", "--host", ""], "--host is empty, must be an address"),
         (["serve", "--port", "http"], "argument --port: invalid int value: 'http'"),
         (["serve", "--max-rate", "5"], "unrecognized arguments: --max-rate 5"),
+        (["demo", "--speed", "abc"], "argument --speed: invalid float value: 'abc'"),
+        (["demo", "--seed", "x"], "argument --seed: invalid int value: 'x'"),
         (["fly"], "invalid choice: 'fly'"),
         ([], "the following arguments are required: ROLE"),
     ],

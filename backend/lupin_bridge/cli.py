@@ -90,10 +90,10 @@ ROLES = {
 }
 
 
-# Handed on to the patrol as they are: it checks them.
-PATROL_OPTIONS = {
-    "speed": "how fast the patrol goes, patrol seconds a second (default: 1)",
-    "seed": "another seed, another patrol (default: 0)",
+# Handed on to the patrol, which checks their ranges; what is no number is refused here already.
+PATROL_OPTIONS: dict[str, tuple[type[int | float], str]] = {
+    "speed": (float, "how fast the patrol goes, patrol seconds a second (default: 1)"),
+    "seed": (int, "another seed, another patrol (default: 0)"),
 }
 
 
@@ -136,8 +136,8 @@ def _parser() -> argparse.ArgumentParser:
             role, parents=[common], help=text, description=text, allow_abbrev=False
         )
         if role == "demo":
-            for name, help_text in PATROL_OPTIONS.items():
-                own.add_argument(f"--{name}", metavar=name.upper(), help=help_text)
+            for name, (kind, help_text) in PATROL_OPTIONS.items():
+                own.add_argument(f"--{name}", type=kind, metavar=name.upper(), help=help_text)
     return parser
 
 

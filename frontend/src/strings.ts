@@ -56,7 +56,6 @@ export const S = {
   attentionNone: 'Nothing needs attention',
   below: 'below ideal',
   above: 'above ideal',
-  within: 'within ideal',
 
   sensors: 'Sensor',
   mapRegion: 'Map',
@@ -95,7 +94,6 @@ export const S = {
     'point at the map to tell.',
   legendTransparentShort: 'No colour: the minimum, or not known',
   legendIdeal: (low: string, high: string): string => `ideal ${low} to ${high}`,
-  legendSpecies: 'Species',
   legendUnknownSpecies: 'Not classified',
   pinValue: 'reading',
   pinLacking: 'has no such sensor',
@@ -130,7 +128,6 @@ export const S = {
   },
   pest: 'Pest',
   pestCount: (count: number): string => counted(count, 'bug', 'bugs'),
-  noPest: 'None seen',
   notOnMap: 'No pin',
   notOnMapLong: 'No position known yet, so the tag has no pin on the map.',
   neverObserved: 'never',

@@ -1,6 +1,5 @@
 import { mapPoint, type Bounds, type MapPoint } from '../geometry/coordinates';
-import { RAMP } from './sensors';
-import { fraction, type Range, type Rgb } from './ramp';
+import { fieldAlpha, type Range, type Rgb } from './ramp';
 
 /** A reconstructed field of one sensor. */
 export interface Field {
@@ -58,7 +57,6 @@ export function fieldPixels(field: Field, colour: Rgb, range: Range, detail: num
   const width = field.width * detail;
   const height = field.height * detail;
   const data = new Uint8ClampedArray(width * height * 4);
-  const scale = 255 * RAMP.maxAlpha;
   let at = 0;
   for (let top = 0; top < height; top++) {
     const y = height - 1 - top;
@@ -71,7 +69,7 @@ export function fieldPixels(field: Field, colour: Rgb, range: Range, detail: num
       data[at] = colour[0];
       data[at + 1] = colour[1];
       data[at + 2] = colour[2];
-      data[at + 3] = scale * fraction(range, value);
+      data[at + 3] = 255 * fieldAlpha(range, value);
     }
   }
   return { width, height, data };

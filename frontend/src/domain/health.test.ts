@@ -83,3 +83,14 @@ describe('house', () => {
     expect(houseHealth([])).toMatchObject({ status: 'no-data', worst: null });
   });
 });
+
+test('of a tag’s equally bad sensors the first reported drives it', () => {
+  // Both are at the clamp.
+  for (const names of [
+    ['temperature', 'humidity'],
+    ['humidity', 'temperature'],
+  ]) {
+    const values = Object.fromEntries(names.map((name) => [name, 1e6]));
+    expect(tagHealth(tag({ readings: readings(values) })).sensor).toBe(names[0]);
+  }
+});

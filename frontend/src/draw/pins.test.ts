@@ -98,7 +98,6 @@ test('blooms share a sprite a colour', () => {
   const dot = (x: number, red: number): Parameters<typeof drawBlooms>[2][number] => ({
     at: mapPoint(x, 1),
     look: { colour: [red, 0, 0], shape: 'circle' },
-    anomaly: false,
   });
   drawBlooms(surface, view, [dot(1, 1), dot(2, 1), dot(3, 2)], new Sprites(1), LIGHT);
   const canvases = copies.named('drawImage').map(({ args }) => args[0]);

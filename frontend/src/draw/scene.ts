@@ -36,7 +36,6 @@ export interface Pin {
 export interface BloomDot {
   readonly at: MapPoint;
   readonly look: BloomLook;
-  readonly anomaly: boolean;
 }
 
 export interface Scene {
@@ -65,8 +64,8 @@ export function buildScene(input: SceneInput): Scene {
     if (tag.footprint.length >= 3) {
       boxes.set(tag.footprint.map(({ x, y }) => `${x},${y}`).join(' '), tag.footprint);
     }
-    for (const { at, species, anomaly } of tag.blooms) {
-      blooms.push({ at, look: looks.get(species) ?? UNKNOWN_SPECIES, anomaly });
+    for (const { at, species } of tag.blooms) {
+      blooms.push({ at, look: looks.get(species) ?? UNKNOWN_SPECIES });
     }
     if (tag.at) pins.push(pinOf(tag, tag.at, input));
   }

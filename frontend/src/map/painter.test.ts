@@ -117,4 +117,15 @@ describe('painter', () => {
     const grounds = named(canvases.still, 'fillRect').map(({ state }) => state['fillStyle']);
     expect(new Set(grounds).size).toBe(2);
   });
+
+  test('smooth on demand: more pixels a cell, in the same place', () => {
+    const width = (): unknown =>
+      (named(canvases.still, 'drawImage').at(-1)?.args[0] as HTMLCanvasElement).width;
+    show('field');
+    painter.paintStill(store.get(), view, 0, true);
+    expect(width()).toBe(2);
+    show('field', 'smooth');
+    painter.paintStill(store.get(), view, 0, true);
+    expect(width()).toBe(16);
+  });
 });

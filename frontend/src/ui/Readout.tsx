@@ -1,4 +1,4 @@
-import { useEffect, useRef, useState, type JSX } from 'react';
+import { useEffect, useState, type JSX } from 'react';
 
 import { valueAt } from '../domain/field';
 import { metresText, readingText } from '../domain/format';
@@ -30,7 +30,6 @@ const LONGEST_BAR_PX = 110;
 
 /** A round length and how long it is on the map. */
 export function ScaleBar(): JSX.Element {
-  const root = useRef<HTMLDivElement>(null);
   const [scale, setScale] = useState(50);
   useEffect(() => {
     const map = document.getElementById('map-view');
@@ -45,7 +44,7 @@ export function ScaleBar(): JSX.Element {
   const bar = scaleBar(scale, LONGEST_BAR_PX);
   const length = lengthText(bar.metres);
   return (
-    <div className="scale-bar" ref={root} role="img" aria-label={S.scaleBar(length)}>
+    <div className="scale-bar" role="img" aria-label={S.scaleBar(length)}>
       <span className="bar" style={{ width: `${bar.pixels}px` }} />
       <span>{length}</span>
     </div>

@@ -251,13 +251,15 @@ def test_a_callback_that_raises_is_reported_and_the_thread_lives_on(domain: int)
 def test_what_breaks_under_a_stop_is_no_error(domain: int) -> None:
     async def test() -> None:
         async with Stage() as stage:
-            gate = threading.Event()
+            gate, reached = threading.Event(), threading.Event()
 
             def fail() -> None:
+                reached.set()
                 gate.wait(20.0)
                 raise AttributeError("'NoneType' object has no attribute 'handle'")
 
             await stage.ros.call(lambda node: node.create_timer(0.01, fail))
+            await until(reached.is_set, "the callback")
             stopping = asyncio.create_task(stage.ros.stop())
             await until(lambda: stage.ros._is_stopping, "the stop")
             gate.set()

@@ -20,6 +20,7 @@ from lupin_bridge.ros_thread import STOP_TIMEOUT_S
 from lupin_bridge.server import (
     GOODBYE_S,
     GRACEFUL_SHUTDOWN_S,
+    MAX_INBOUND_BYTES,
     address_of,
     allow_connections,
     listen,
@@ -162,6 +163,7 @@ def test_what_a_client_says_is_read_and_thrown_away(live: Bridge) -> None:
 
 
 def test_a_message_past_the_limit_ends_that_client_alone(live: Bridge) -> None:
+    assert MAX_INBOUND_BYTES == LARGEST_MESSAGE
     with live.listen() as healthy, live.listen() as loud:
         for _ in range(10):
             loud.connection.send("x" * LARGEST_MESSAGE)

@@ -248,27 +248,6 @@ def test_a_callback_that_raises_is_reported_and_the_thread_lives_on(domain: int)
     run(domain, test())
 
 
-def test_what_breaks_under_a_stop_is_no_error(domain: int) -> None:
-    async def test() -> None:
-        async with Stage() as stage:
-            gate, reached = threading.Event(), threading.Event()
-
-            def fail() -> None:
-                reached.set()
-                gate.wait(20.0)
-                raise AttributeError("'NoneType' object has no attribute 'handle'")
-
-            await stage.ros.call(lambda node: node.create_timer(0.01, fail))
-            await until(reached.is_set, "the callback")
-            stopping = asyncio.create_task(stage.ros.stop())
-            await until(lambda: stage.ros._is_stopping, "the stop")
-            gate.set()
-            await stopping
-            assert stage.ros.callback_errors == 0
-
-    run(domain, test())
-
-
 def test_the_end_of_the_thread_is_told_once_and_said_aloud(
     domain: int, caplog: pytest.LogCaptureFixture
 ) -> None:

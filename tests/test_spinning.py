@@ -12,7 +12,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 
 from lupin_twin import spinning as spinning_module
-from lupin_twin.spinning import spin_until_shutdown
+from lupin_twin.spinning import end_spinning, spin_until_shutdown
 from tests.support.waiting import wait_for
 
 
@@ -39,7 +39,8 @@ class Spinning:
 def spinning(domain: int) -> Iterator[Spinning]:
     it = Spinning(domain)
     yield it
-    it.executor.shutdown(timeout_sec=2)
+    if not it.has_ended():
+        end_spinning(it.executor)
     it.thread.join(5)
     it.node.destroy_node()
     rclpy.try_shutdown(context=it.context)
@@ -73,10 +74,50 @@ def test_between_an_error_and_the_next_try_it_rests(monkeypatch: pytest.MonkeyPa
     assert happened == ["spin", "rest", "spin", "rest", "spin"]
 
 
-def test_it_ends_with_the_executor(spinning: Spinning) -> None:
+def test_it_ends_when_it_is_asked_to(spinning: Spinning) -> None:
     spinning.thread.start()
-    spinning.executor.shutdown(timeout_sec=2)
+    end_spinning(spinning.executor)
     wait_for(spinning.has_ended, "the end of the spinning")
+    assert spinning.errors == []
+
+
+def test_the_end_breaks_no_spin_that_is_about_to_wait(
+    spinning: Spinning, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """rclpy's own shutdown, called from here at that moment, breaks the spin."""
+    about_to_wait, asked = threading.Event(), threading.Event()
+    get_nodes = spinning.executor.get_nodes
+
+    def pause() -> Any:
+        if threading.current_thread() is spinning.thread and not asked.is_set():
+            about_to_wait.set()
+            asked.wait(20)
+        return get_nodes()
+
+    monkeypatch.setattr(spinning.executor, "get_nodes", pause)
+    spinning.thread.start()
+    assert about_to_wait.wait(20)
+    end_spinning(spinning.executor)
+    asked.set()
+    wait_for(spinning.has_ended, "the end of the spinning")
+    assert spinning.errors == []
+
+
+def test_a_callback_ends_before_the_spinning_does(spinning: Spinning) -> None:
+    runs, asked, ended = threading.Event(), threading.Event(), threading.Event()
+
+    def work() -> None:
+        runs.set()
+        asked.wait(20)
+        ended.set()
+
+    spinning.node.create_timer(0.01, work)
+    spinning.thread.start()
+    assert runs.wait(20)
+    end_spinning(spinning.executor)
+    asked.set()
+    wait_for(spinning.has_ended, "the end of the spinning")
+    assert ended.is_set()
     assert spinning.errors == []
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import threading
-import time
 from collections.abc import Callable, Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -20,7 +19,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from lupin_bridge import ros_logs
 from lupin_bridge.source import TwinUnavailableError
-from lupin_twin.spinning import spin_until_shutdown
+from lupin_twin.spinning import end_spinning, spin_until_shutdown
 
 log = logging.getLogger(__name__)
 
@@ -98,17 +97,13 @@ class RosThread(Generic[NodeT, EventT]):
 
     async def stop(self) -> None:
         """Stop the node and join the thread."""
-        self._is_stopping = True
-        # It waits for the callback that is running: not on the loop.
-        await asyncio.to_thread(self._stop)
+        was_stopping, self._is_stopping = self._is_stopping, True
+        if not was_stopping and self._executor is not None and self._thread.is_alive():
+            end_spinning(self._executor)
+        # A callback that runs now ends first: not to be waited for on the loop.
+        await asyncio.to_thread(self._thread.join, STOP_TIMEOUT_S)
         if self._thread.is_alive():
             log.warning("the ROS thread did not end within %s s: left behind", STOP_TIMEOUT_S)
-
-    def _stop(self) -> None:
-        deadline_s = time.monotonic() + STOP_TIMEOUT_S
-        if self._executor is not None:
-            self._executor.shutdown(STOP_TIMEOUT_S)
-        self._thread.join(max(0.0, deadline_s - time.monotonic()))
 
     @property
     def is_alive(self) -> bool:
@@ -218,9 +213,7 @@ class RosThread(Generic[NodeT, EventT]):
             self._end(error)
 
     def _report(self, what: str, error: Exception) -> None:
-        # rclpy's shutdown takes apart what a spin that is just about to wait still needs.
-        if not self._is_stopping:
-            self._require_node().report(what, error)
+        self._require_node().report(what, error)
 
     def _init_ros(self) -> None:
         ros_logs.forward()

@@ -166,7 +166,8 @@ def _running_node(ros_arguments: list[str]) -> Iterator[PatrolNode]:
         try:
             yield node
         finally:
-            executor.shutdown(timeout_sec=2.0)
+            # In its own thread: it takes apart what a spin that is about to wait still needs.
+            executor.create_task(executor.shutdown)
             thread.join()
             node.destroy_node()
     finally:

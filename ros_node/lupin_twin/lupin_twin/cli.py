@@ -37,7 +37,7 @@ def _run() -> int:
     from rclpy.executors import SingleThreadedExecutor  # noqa: PLC0415
 
     from lupin_twin.node import TwinNode  # noqa: PLC0415
-    from lupin_twin.spinning import spin_until_shutdown  # noqa: PLC0415
+    from lupin_twin.spinning import end_spinning, spin_until_shutdown  # noqa: PLC0415
 
     node = TwinNode()
     executor = SingleThreadedExecutor()
@@ -56,7 +56,7 @@ def _run() -> int:
     # Not sigtimedwait: after a SIGSTOP and a SIGCONT, CPython returns from it without a signal.
     signal.sigwait(STOP_SIGNALS)
     exit_code = 1 if ended.is_set() else 0
-    executor.shutdown(timeout_sec=2.0)
+    end_spinning(executor)
     thread.join()
     node.destroy_node()
     return exit_code

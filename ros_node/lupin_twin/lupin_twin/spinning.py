@@ -28,3 +28,12 @@ def spin_until_shutdown(executor: Any, on_error: Callable[[str, Exception], None
             sleep(PAUSE_S)
         else:
             return
+
+
+def end_spinning(executor: Any) -> None:
+    """Ask the spinning to end, once, from any thread; a callback that runs now ends first.
+
+    rclpy's `shutdown` takes apart what a spin that is just about to wait still needs, so it has
+    to run where nothing waits: in the spinning thread itself.
+    """
+    executor.create_task(executor.shutdown)

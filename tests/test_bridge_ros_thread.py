@@ -230,6 +230,49 @@ def test_who_waits_no_longer_gives_the_future_up_in_the_nodes_thread(domain: int
     run(domain, test())
 
 
+@pytest.mark.parametrize("has_begun", [True, False])
+def test_who_leaves_before_the_question_is_asked_leaves_nothing_behind(
+    domain: int, has_begun: bool
+) -> None:
+    async def test() -> None:
+        async with Stage() as stage:
+            gate, busy = threading.Event(), threading.Event()
+            open_questions: list[Future] = []
+
+            def hold() -> None:
+                busy.set()
+                gate.wait(20.0)
+
+            def start(_: Probe) -> Future:
+                if has_begun:
+                    hold()
+                open_questions.append(Future())
+                return open_questions[-1]
+
+            if not has_begun:
+                held = asyncio.create_task(stage.ros.call(lambda _: hold()))
+                await until(busy.is_set, "a busy thread")
+            waiting = asyncio.create_task(
+                stage.ros.ask(start, lambda _, future: open_questions.remove(future))
+            )
+            waiting_calls = 1 if has_begun else 2
+            await until(lambda: stage.ros.calls_waiting == waiting_calls, "the question to wait")
+            await until(busy.is_set, "a busy thread")
+            waiting.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await waiting
+            gate.set()
+            # What was handed over before this has run after it, at the latest.
+            for _ in range(3):
+                await stage.ros.call(lambda _: None)
+            assert open_questions == []
+            assert stage.ros.callback_errors == 0
+            if not has_begun:
+                await held
+
+    run(domain, test())
+
+
 # --- the end ------------------------------------------------------------------------------------
 
 

@@ -170,22 +170,33 @@ class RosThread(Generic[NodeT, EventT]):
 
         """
         result: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
+        # Both in the ROS thread, where the one that was handed over first may run last.
+        future: Any = None
+        is_given_up = False
 
-        def begin(node: NodeT) -> Any:
+        def begin(node: NodeT) -> None:
+            nonlocal future
+            if is_given_up:
+                return
             future = start(node)
             future.add_done_callback(
                 lambda done: self._to_loop(
                     _settle, result, None if done.exception() else done.result(), done.exception()
                 )
             )
-            return future
 
-        future = await self.call(begin)
+        def end() -> None:
+            nonlocal is_given_up
+            is_given_up = True
+            if future is not None:
+                give_up(self._require_node(), future)
+
         try:
+            await self.call(begin)
             return await result
         except asyncio.CancelledError:
             if self._executor is not None and not self._is_stopping:
-                self._executor.create_task(lambda: give_up(self._require_node(), future))
+                self._executor.create_task(end)
             raise
 
     def _require_node(self) -> NodeT:

@@ -34,7 +34,7 @@ export async function saveMap(): Promise<void> {
   const [first] = layers;
   const state = store.get();
   if (!first || first.width === 0 || !state.twin.snapshot) return;
-  const ratio = first.width / Math.max(1, first.clientWidth);
+  const ratio = first.width / Math.max(1, first.getBoundingClientRect().width);
   const style = getComputedStyle(document.documentElement);
   const canvas = newCanvas(first.width, first.height + FOOTER_PX * ratio);
   const context = contextOf(canvas);

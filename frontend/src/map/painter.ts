@@ -76,12 +76,16 @@ export class Painter {
 
   /** `textScale`: how large the page's text is there, 1 as usual. */
   resize(size: Size, ratio: number, textScale = 1): void {
-    this.#size = size;
+    // The page's sizes are fractions at times. A canvas stretched to one would blur each pixel:
+    // these are whole, in pixels of the page and of the screen, and the frame cuts what is over.
+    this.#size = { width: Math.ceil(size.width), height: Math.ceil(size.height) };
     this.#ratio = ratio;
     this.#textScale = textScale;
     for (const canvas of Object.values(this.#canvases) as HTMLCanvasElement[]) {
-      canvas.width = Math.round(size.width * ratio);
-      canvas.height = Math.round(size.height * ratio);
+      canvas.width = Math.round(this.#size.width * ratio);
+      canvas.height = Math.round(this.#size.height * ratio);
+      canvas.style.width = `${canvas.width / ratio}px`;
+      canvas.style.height = `${canvas.height / ratio}px`;
     }
     this.forget();
   }

@@ -14,6 +14,7 @@ from rclpy.executors import SingleThreadedExecutor
 
 from lupin_bridge import ros_logs
 from lupin_bridge.web_node import WebNode
+from lupin_twin import convert
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.parameters import ParameterError
 from lupin_twin.state import Snapshot
@@ -203,13 +204,36 @@ def test_a_map_that_cannot_be_used_leaves_the_last_one(stage: Stage, peer: Peer,
 
 
 def test_the_same_map_has_the_same_revision_in_every_replica(domain: int, peer: Peer) -> None:
-    peer.publish_map(occupancy_grid([[0, 100]]))
     revisions = set()
-    for _ in range(2):
+    for stamp_s in range(2):
+        # A replica that starts later hears a later copy.
+        peer.publish_map(occupancy_grid([[0, 100]], stamp_s=stamp_s))
         with stage_in(domain) as stage:
             stage.first_map()
             revisions.add(stage.node.revision)
     assert len(revisions) == 1
+
+
+def test_a_map_that_is_told_again_changes_nothing(
+    stage: Stage, peer: Peer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    peer.publish_map(occupancy_grid([[0, 100]]))
+    first, revision = stage.first_map(), stage.node.revision
+    stamps: list[int] = []
+    take = convert.map_of
+
+    def map_of(msg: Any, revision: int) -> OccupancyMap:
+        stamps.append(msg.header.stamp.sec)
+        return take(msg, revision)
+
+    monkeypatch.setattr(convert, "map_of", map_of)
+    peer.publish_map(occupancy_grid([[0, 100]], stamp_s=5))
+    stage.until(lambda: stamps == [5], "the copy")
+    assert stage.node.occupancy_map is first
+    assert stage.node.revision == revision
+    peer.publish_map(occupancy_grid([[100, 0]], stamp_s=6))
+    stage.until(lambda: stage.node.occupancy_map is not first, "another map")
+    assert stage.node.revision != revision
 
 
 # --- the rest -----------------------------------------------------------------------------------

@@ -60,7 +60,9 @@ async def _map(request: Request, kind: str) -> Response:
         return error_response(str(error), 503)
     if occupancy is None:
         return error_response("no map has come yet on the twin's map_topic", 404)
-    headers = {"ETag": f'"{bridge.source.identity}-{occupancy.revision}-{kind}"', **REVALIDATE}
+    # A replica that started later has the same map with a later stamp, which is in the JSON.
+    which = occupancy.stamp_ns if kind == "json" else kind
+    headers = {"ETag": f'"{bridge.source.identity}-{occupancy.revision}-{which}"', **REVALIDATE}
     if matches(", ".join(request.headers.getlist("if-none-match")), headers["ETag"]):
         return Response(status_code=304, headers=headers)
     if kind == "json":

@@ -6,6 +6,7 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from hashlib import blake2b
 from typing import Any, Final
 
@@ -48,10 +49,13 @@ SHARED_PARAMETERS: Final = (
 )
 
 
-def _digest_of_map(msg: Any) -> int:
-    """A map's revision: the same in all replicas, whichever of the twin's maps they have heard."""
-    digest = blake2b(repr((msg.header, msg.info)).encode("utf-8", "surrogatepass"), digest_size=6)
-    digest.update(msg.data)
+def _digest_of_map(occupancy: OccupancyMap) -> int:
+    """A map's revision: the same in all replicas, and for each copy of a map that has not changed.
+
+    SLAM publishes it anew every few seconds, with another stamp each time.
+    """
+    digest = blake2b(repr(occupancy.place).encode("utf-8", "surrogatepass"), digest_size=6)
+    digest.update(occupancy.cells.data)
     return int.from_bytes(digest.digest())
 
 
@@ -159,10 +163,12 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
             )
             return
         try:
-            self.occupancy_map = convert.map_of(msg, _digest_of_map(msg))
+            new = convert.map_of(msg, 0)
         except ValueError as error:
             self._say(("map", 0), f"dropped a map: {error}; the last one stays")
             return
+        if self.occupancy_map is None or not new.shows_the_same_as(self.occupancy_map):
+            self.occupancy_map = replace(new, revision=_digest_of_map(new))
 
     # --- small parts --------------------------------------------------------------------------
 

@@ -102,9 +102,11 @@ def occupancy_grid(
     resolution: float = 1.0,
     origin: Any = None,
     frame_id: str = "map",
+    stamp_s: int = 0,
 ) -> Any:
     """A map from its rows, the first at the origin (smallest y)."""
     msg = OccupancyGrid()
+    msg.header.stamp.sec = stamp_s
     msg.header.frame_id = frame_id
     msg.info.resolution = float(resolution)
     msg.info.height = len(rows)

@@ -51,13 +51,22 @@ class OccupancyMap:
     cells: npt.NDArray[np.int8]
     revision: int
 
+    @property
+    def place(self) -> tuple[str, int, int, float, float, float, float]:
+        """Frame, cells in x and y, side of a cell (m), origin (m) and its yaw (rad)."""
+        return (
+            self.frame_id,
+            self.width,
+            self.height,
+            self.resolution,
+            self.origin_x,
+            self.origin_y,
+            self.origin_yaw,
+        )
+
     def shows_the_same_as(self, other: OccupancyMap) -> bool:
         """Whether place and cells are the same, whenever and however often it was published."""
-        ours, theirs = (
-            (m.frame_id, m.width, m.height, m.resolution, m.origin_x, m.origin_y, m.origin_yaw)
-            for m in (self, other)
-        )
-        return ours == theirs and np.array_equal(self.cells, other.cells)
+        return self.place == other.place and np.array_equal(self.cells, other.cells)
 
 
 def occupancy_map(

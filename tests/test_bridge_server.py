@@ -257,7 +257,7 @@ def test_nor_does_a_twin_elsewhere_that_does_not_answer(domain: int) -> None:
     ):
         wait_until_ready(live)
         wait_for(lambda: live.get(FIELD).status_code == 200, "the twin's service")
-        twin.send(signal.SIGSTOP)
+        twin.freeze()
         with waiting_for(live.url, FIELD.replace("co2", "light")) as answer:
             wait_for(
                 lambda: "\nlupin_fields_computing 1.0" in live.get("/metrics").text,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import signal
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -103,9 +102,9 @@ def test_a_twin_is_stopped_and_goes_on(domain: int) -> None:
         assert live.get("/api/field", **FIELD).status_code == 200
 
         def told_in_time() -> bool:
-            twin.send(signal.SIGSTOP)
+            twin.freeze()
             told_s = reason(client, "stale")["state_age_seconds"]
-            twin.send(signal.SIGCONT)
+            twin.thaw()
             reason(client, "live")
             wait_for(lambda: live.get("/api/field", **FIELD).status_code == 200, "the service")
             return bool(told_s <= 3.5)
@@ -113,13 +112,13 @@ def test_a_twin_is_stopped_and_goes_on(domain: int) -> None:
         # As the client is told; a busy machine may be late once.
         assert any(told_in_time() for _ in range(5))
 
-        twin.send(signal.SIGSTOP)
+        twin.freeze()
         reason(client, "stale")
         refused = live.get("/api/field", sensor_type="temperature")
         assert refused.status_code == 504
         assert "within 1 s (field_timeout_s)" in refused.json()["detail"]
 
-        twin.send(signal.SIGCONT)
+        twin.thaw()
         reason(client, "live")
         robot.observe(scan("b", {"co2": 2.0}, (1, 0)))
         client.until_tag("b")
@@ -172,7 +171,7 @@ def test_field_requests_to_a_twin_that_does_not_answer_are_bounded_and_forgotten
         try:
             await until(lambda: states, "a state of the twin")
             await until(node.field_client.service_is_ready, "the twin's service")
-            twin.send(signal.SIGSTOP)
+            twin.freeze()
             asked = [
                 asyncio.create_task(source.field(FieldRequest(f"s{n}", 1.0, 0.0, 0.0, 1.0, 1.0)))
                 for n in range(50)
@@ -183,7 +182,7 @@ def test_field_requests_to_a_twin_that_does_not_answer_are_bounded_and_forgotten
             await until(lambda: not pending, "all requests to be forgotten")
             assert not source._asking
 
-            twin.send(signal.SIGCONT)
+            twin.thaw()
             grid = await source.field(FieldRequest("co2", 1.0, 0.0, 0.0, 1.0, 1.0))
             assert grid.grid.sample_count == 0
             await until(lambda: not pending, "this one to be forgotten too")

@@ -5,7 +5,6 @@ In `lupin-twin web`, whose twin is a process of its own. The contract: the truth
 
 from __future__ import annotations
 
-import signal
 import time
 
 import httpx
@@ -28,9 +27,9 @@ def measure_outages() -> str:
         live.listen() as client,
     ):
         told(client, "live")
-        twin.send(signal.SIGSTOP)
+        twin.freeze()
         stopped_s = told(client, "offline")
-        twin.send(signal.SIGCONT)
+        twin.thaw()
         continued_s = told(client, "live")
         twin.kill()
         killed_s = told(client, "offline")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import signal
 from collections.abc import Callable
 from urllib.parse import urlsplit
 
@@ -169,9 +168,9 @@ def test_a_server_that_hangs_is_noticed_although_the_connection_stays_open(
         stay(hmi)
         hmi.expect_rows("a")
         hmi.expect_phase("live")
-        running.process.send(signal.SIGSTOP)
+        running.process.freeze()
         hmi.page.clock.fast_forward(3_100)
         hmi.expect_phase("stale")
         expect_frozen(hmi, "nothing comes through it any more")
-        running.process.send(signal.SIGCONT)
+        running.process.thaw()
         expect_live(hmi)

@@ -80,9 +80,23 @@ class Process:
     def stand_still(self, seconds: float = 1.5) -> None:
         """Stop the process for so long, as Ctrl-Z does, and let it go on."""
         until = time.monotonic() + seconds
-        self.send(signal.SIGSTOP)
+        self.freeze()
         wait_for(lambda: time.monotonic() > until, "the time to pass")
+        self.thaw()
+
+    def freeze(self) -> None:
+        """Stop the process; returns when each of its threads stands still."""
+        self.send(signal.SIGSTOP)
+        wait_for(self._stands_still, "all threads to stand still")
+
+    def thaw(self) -> None:
+        """Let a frozen process go on."""
         self.send(signal.SIGCONT)
+
+    def _stands_still(self) -> bool:
+        stats = [path.read_text() for path in Path(f"/proc/{self.pid}/task").glob("*/stat")]
+        # proc(5): the state comes after the name, which may hold anything.
+        return all(stat.rpartition(") ")[2].startswith("T") for stat in stats)
 
     def wait(self, timeout_s: float = PATIENCE_S) -> int:
         """Wait for its end and return the exit code."""

@@ -12,6 +12,7 @@ import pytest
 from lupin_msgs.msg import SensorReading, TwinState, TwinTagState
 from lupin_msgs.srv import GetField
 
+from lupin_bridge import web_node
 from lupin_bridge.source import Revised, TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.web_twin import MAX_REQUESTS, WebTwin
 from lupin_twin.fields import FieldRefused, FieldRequest
@@ -91,6 +92,38 @@ def test_without_a_twin_a_field_is_refused_at_once_by_the_services_name(domain: 
         async with started() as (twin, _):
             with pytest.raises(TwinUnavailableError, match="no twin offers /twin/get_field"):
                 await twin.field(REQUEST)
+
+    run(domain, test())
+
+
+def test_a_field_of_a_twin_that_has_just_come_waits_for_its_service(domain: int) -> None:
+    async def test() -> None:
+        with Peer(domain) as peer:
+            async with started() as (twin, told):
+                peer.publish("/twin/state", TwinState(), depth=1)
+                await until(lambda: told, "a state of the twin")
+                early = asyncio.create_task(twin.field(REQUEST))
+                # Refused, it would have been by then.
+                for _ in range(3):
+                    await twin._thread.call(lambda _: None)
+                assert not early.done()
+                async with Service(peer).answering():
+                    assert (await early).grid.width == 2
+
+    run(domain, test())
+
+
+def test_a_field_of_a_twin_that_came_long_ago_waits_for_no_service(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def test() -> None:
+        with Peer(domain) as peer:
+            async with started() as (twin, told):
+                peer.publish("/twin/state", TwinState(), depth=1)
+                await until(lambda: told, "a state of the twin")
+                monkeypatch.setattr(web_node, "NEW_TWIN_S", 0.0)
+                with pytest.raises(TwinUnavailableError, match="no twin offers"):
+                    await twin.field(REQUEST)
 
     run(domain, test())
 

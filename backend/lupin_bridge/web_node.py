@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 import traceback
 from collections import deque
@@ -28,6 +29,8 @@ from lupin_twin.twin_count import TwinCount
 
 NODE_NAME: Final = "lupin_web"
 WARNING_PERIOD_S: Final = 5.0
+# DDS finds a twin's publisher and its service each on its own, one at times a little later.
+NEW_TWIN_S: Final = 2.0
 
 # 20,000 tags with all their flowers; a larger state is dropped before it becomes objects.
 MAX_STATE_BYTES: Final = 128_000_000
@@ -80,6 +83,7 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.occupancy_map: OccupancyMap | None = None
         self.digest = ""
         self.publishers_digest = ""
+        self._publishers_since_s = -math.inf
         self._on_state = on_state
         self._newest: Snapshot | None = None
         self._history: dict[str, deque[Observation]] = {}
@@ -117,6 +121,11 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         map_revision = 0 if self.occupancy_map is None else self.occupancy_map.revision
         return f"{self.publishers_digest}-{self.digest}-{map_revision:x}"
 
+    @property
+    def has_new_twin(self) -> bool:
+        """Whether a twin has come so lately that its service may not have been found yet."""
+        return time.monotonic() - self._publishers_since_s < NEW_TWIN_S
+
     def request_field(self, request: FieldRequest) -> Any:
         """Ask the twin; returns the rclpy Future of its response."""
         return self.field_client.call_async(convert.field_request_message(request))
@@ -145,7 +154,10 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         if len(self._digests) > len(snapshot.tags):
             self._forget_all_but(snapshot.tags)
         topic = self._topics["state_topic"]
-        self.publishers_digest = self._digest_of_publishers(topic)
+        publishers_digest = self._digest_of_publishers(topic)
+        if publishers_digest != self.publishers_digest:
+            self.publishers_digest = publishers_digest
+            self._publishers_since_s = time.monotonic()
         if self.twins.see(int(self.count_publishers(topic)), time.monotonic()):
             self._say(
                 ("twins", 0),

@@ -25,6 +25,8 @@ from lupin_twin.state import Observation, Snapshot
 # only wait in DDS, where they cannot be taken back.
 MAX_REQUESTS = 4
 
+SERVICE_LOOK_S = 0.02
+
 
 class WebTwin:
     """`TwinSource` over the ROS contracts of a twin in another process."""
@@ -124,12 +126,23 @@ class WebTwin:
             task.add_done_callback(lambda _: self._asking.pop((revision, request), None))
         return await asyncio.shield(task)
 
+    async def _find_service(self) -> None:
+        while not await self._thread.call(lambda node: node.field_client.service_is_ready()):
+            if not self._thread.peek(lambda node: node.has_new_twin):
+                service = self._thread.peek(lambda node: node.parameters.field_service_name)
+                raise TwinUnavailableError(f"no twin offers {service}: is it running?")
+            await asyncio.sleep(SERVICE_LOOK_S)
+
     async def _ask_once(self, revision: str, request: FieldRequest) -> RevisedGrid:
         try:
             async with asyncio.timeout(self._timeout_s), self._slots:
-                if not await self._thread.call(lambda node: node.field_client.service_is_ready()):
-                    service = self._thread.peek(lambda node: node.parameters.field_service_name)
-                    raise TwinUnavailableError(f"no twin offers {service}: is it running?")
+                while not await self._thread.call(
+                    lambda node: node.field_client.service_is_ready()
+                ):
+                    if not self._thread.peek(lambda node: node.has_new_twin):
+                        service = self._thread.peek(lambda node: node.parameters.field_service_name)
+                        raise TwinUnavailableError(f"no twin offers {service}: is it running?")
+                    await asyncio.sleep(SERVICE_LOOK_S)
                 response = await self._thread.ask(
                     lambda node: node.request_field(request),
                     lambda node, future: node.forget_request(future),

@@ -68,7 +68,7 @@ GRIDS = st.tuples(st.integers(1, 6), st.integers(1, 6)).flatmap(
 
 
 @given(GRIDS)
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_json_carries_every_value_with_null_for_nan(grid: FieldGrid) -> None:
     text = field_formats.write_json(grid)
     response = schema.GetFieldResponse.model_validate_json(text, strict=True)
@@ -105,7 +105,7 @@ def test_a_refusal_is_get_fields_failure_body() -> None:
 
 
 @given(GRIDS)
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_npy_is_the_array_itself(grid: FieldGrid) -> None:
     array = np.load(io.BytesIO(field_formats.write_npy(grid)), allow_pickle=False)
     assert (array.dtype, array.shape) == (np.dtype("<f4"), (grid.height, grid.width))
@@ -123,7 +123,7 @@ def test_row_0_of_npy_lies_at_the_smallest_y() -> None:
 @given(GRIDS, st.integers(1, 3))
 @example(grid_of([[-3e38, 2e38, 3e38]]), 1)  # the span is past float32
 @example(grid_of([[0.0, 1.4e-45, 4.2e-45]]), 1)  # its inverse is
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_every_pixel_of_a_png_is_the_ramps(grid: FieldGrid, scale: int) -> None:
     picture = decoded(field_formats.write_png(grid, "temperature", scale))
     assert picture.shape == (grid.height * scale, grid.width * scale, 4)

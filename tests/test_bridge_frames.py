@@ -156,7 +156,7 @@ def ageless(state: dict[str, Any]) -> dict[str, Any]:
 
 
 @given(STEPS)
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_who_applies_the_deltas_has_the_state(steps: list[dict[str, int]]) -> None:
     writer, known = FrameWriter(), dict[str, TagState]()
     mine: dict[str, Any] = {}

@@ -58,7 +58,7 @@ ROWS = st.tuples(st.integers(1, 5), st.integers(1, 5)).flatmap(
 
 
 @given(ROWS)
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_every_pixel_is_its_cells_grey(rows: list[list[int]]) -> None:
     picture = decoded(map_png(map_of(rows)))
     assert picture.shape == (len(rows), len(rows[0]), 4)

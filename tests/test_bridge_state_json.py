@@ -110,7 +110,7 @@ def plainly(snapshot: Snapshot) -> dict[str, Any]:
 
 
 @given(SNAPSHOTS)
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_any_snapshot_is_written_as_the_contract_has_it(snapshot: Snapshot) -> None:
     text = StateJson().state(snapshot)
     assert json.loads(text, parse_constant=pytest.fail) == plainly(snapshot)
@@ -118,7 +118,7 @@ def test_any_snapshot_is_written_as_the_contract_has_it(snapshot: Snapshot) -> N
 
 
 @given(SNAPSHOTS, SNAPSHOTS)
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_what_was_written_before_leaves_no_trace(first: Snapshot, second: Snapshot) -> None:
     writer = StateJson()
     writer.state(first)

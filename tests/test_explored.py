@@ -130,7 +130,7 @@ def test_half_turn_reverses_the_map() -> None:
     np.testing.assert_array_equal(mask_of(occupancy, 2, 2), [[False, False], [False, True]])
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     seed=st.integers(0, 1000),
     yaw=st.one_of(st.just(0.0), st.floats(-math.pi, math.pi)),

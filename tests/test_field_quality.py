@@ -104,7 +104,7 @@ def test_field_rules_are_the_ones_given() -> None:
     assert flat.worst.predicted == 11.0
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     spots=st.lists(
         st.tuples(

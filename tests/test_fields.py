@@ -104,7 +104,7 @@ def answer(engine: FieldEngine, request: FieldRequest, *args: Any) -> FieldGrid:
 # --- the request -----------------------------------------------------------------------------
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.floats())
 def test_request_holds_what_the_wire_can(number: float) -> None:
     request = request_of(resolution=number, bbox_min_x=number, bbox_max_y=-number)

@@ -49,7 +49,7 @@ schema = schemathesis.openapi.from_dict(json.loads(document()))
 
 
 @schema.parametrize()
-@settings(max_examples=60, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=60, derandomize=True, suppress_health_check=list(HealthCheck))
 def test_every_answer_is_one_that_the_document_describes(case: Any, live: Bridge) -> None:
     case.call_and_validate(base_url=live.url, excluded_checks=[positive_data_acceptance])
 

@@ -175,7 +175,7 @@ def small_parts() -> Iterator[None]:
         yield
 
 
-@settings(max_examples=1500, deadline=None)
+@settings(max_examples=1500)
 @given(cases())
 def test_field_is_the_definitions(case: Case) -> None:
     grid = case.by_twin()
@@ -183,7 +183,7 @@ def test_field_is_the_definitions(case: Case) -> None:
     assert_same_values(grid.values, case.by_loop(), case.samples)
 
 
-@settings(max_examples=1000, deadline=None)
+@settings(max_examples=1000)
 @given(cases())
 def test_field_is_the_definitions_however_it_is_split(case: Case) -> None:
     with small_parts():
@@ -252,7 +252,7 @@ def exact_cases(draw: st.DrawFn) -> Case:
     )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(exact_cases(), st.sampled_from([-(2.0**20), 2.0**8, 2.0**24]))
 def test_moving_everything_moves_the_field(case: Case, by: float) -> None:
     moved = Case(
@@ -267,7 +267,7 @@ def test_moving_everything_moves_the_field(case: Case, by: float) -> None:
     assert_same_values(moved.values, case.by_twin().values.tolist(), case.samples)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(exact_cases())
 def test_mirroring_everything_mirrors_the_field(case: Case) -> None:
     mirrored = Case(
@@ -281,7 +281,7 @@ def test_mirroring_everything_mirrors_the_field(case: Case) -> None:
     assert_same_values(mirrored.values, rows[:, ::-1].ravel().tolist(), case.samples)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(exact_cases(), st.sampled_from([-2.0, 0.25, 1024.0]))
 def test_scaling_the_values_scales_the_field(case: Case, factor: float) -> None:
     samples = tuple((x, y, value * factor) for x, y, value in case.samples)
@@ -290,7 +290,7 @@ def test_scaling_the_values_scales_the_field(case: Case, factor: float) -> None:
     assert_same_values(scaled.values, expected, samples)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(exact_cases(), VALUES, st.integers(0, 10))
 def test_a_sample_out_of_reach_changes_nothing(case: Case, value: float, index: int) -> None:
     # 80 m away from all of it; the reach is 5 m at most.
@@ -707,7 +707,7 @@ def test_dimensions_are_the_extent_in_cells_rounded_up(
     assert [type(number) for number in dimensions] == [int, int]
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=500)
 @given(
     st.integers(-100_000, 100_000),
     st.integers(1, 3000),
@@ -725,7 +725,7 @@ def test_float_noise_never_adds_a_cell(
     assert grid_dimensions(bounds[0], 0.0, bounds[1], 1.0, through(float(resolution)))[0] == cells
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     st.integers(-1000, 1000),
     st.integers(0, 300),

@@ -83,6 +83,9 @@ def test_it_goes_when_the_map_moves_and_lets_every_click_through(hmi: Hmi) -> No
     expect(hover_card(hmi)).to_have_count(0)
     hmi.point_at(1, 3)
     expect(hover_card(hmi)).to_be_visible()
+    # The end of the wheel's gesture, which puts the view into the address, moves nothing.
+    hmi.expect(lambda: "view=" in hmi.address(), "an address with the view")
+    expect(hover_card(hmi)).to_be_visible()
     # The tag's own card says it all.
     hmi.click_map(1, 3)
     expect(hmi.card("10")).to_be_visible()

@@ -35,6 +35,18 @@ describe('camera', () => {
     expect(onView).toHaveBeenCalledTimes(1);
   });
 
+  test('going to what the operator chose changes nothing', () => {
+    camera.goTo(null, bounds);
+    for (let step = 0; step < 40; step++) {
+      camera.zoomBy(step % 2 ? 1.37 : 0.81);
+      camera.panBy(0.037, -0.113);
+      const views = onView.mock.calls.length;
+      const chosen = onCamera.mock.lastCall?.[0];
+      camera.goTo(chosen ?? null, null);
+      expect(onView).toHaveBeenCalledTimes(views);
+    }
+  });
+
   test('before its size is known it stays where it is', () => {
     camera.resize({ width: 0, height: 0 });
     camera.goTo(null, bounds);

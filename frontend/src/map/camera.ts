@@ -24,6 +24,12 @@ export interface CameraHandlers {
 
 const toView = ({ x, y, k }: ZoomTransform): View => ({ x, y, scale: k });
 
+/** A view that was told as a camera and comes back differs in its last digits, and moves nothing. */
+const isSame = (a: View, b: View): boolean =>
+  Math.abs(a.x - b.x) < 1e-3 &&
+  Math.abs(a.y - b.y) < 1e-3 &&
+  Math.abs(a.scale / b.scale - 1) < 1e-9;
+
 /** Space around what is fitted: less on a phone, where each pixel counts. */
 export function fitInsets({ width }: Size): Insets {
   return width < 560
@@ -94,8 +100,7 @@ export class MapCamera {
       ? viewOf(camera, this.#size)
       : bounds && fit(bounds, this.#size, fitInsets(this.#size));
     if (!view) return;
-    const { x, y, scale } = this.#view;
-    if (view.x === x && view.y === y && view.scale === scale) return;
+    if (isSame(view, this.#view)) return;
     this.#programmed = true;
     this.#zoom.transform(this.#selection, zoomIdentity.translate(view.x, view.y).scale(view.scale));
     this.#programmed = false;

@@ -15,7 +15,7 @@ from websockets.streams import StreamReader
 
 from lupin_bridge.server import MAX_INBOUND_BYTES
 from lupin_bridge.ws_protocol import Connection
-from tests.support.inprocess import run, running, until
+from tests.support.inprocess import Running, run, running, until
 from tests.support.messages import scan
 from tests.support.raw_ws import BINARY, CLOSE, PING, TEXT, RawClient, frames_of, masked
 from tests.support.waiting import wait_for
@@ -84,15 +84,25 @@ def test_a_slow_client_skips_to_the_newest_and_a_quick_one_gets_every_frame() ->
         assert "Traceback" not in live.process.output
 
 
+async def joined(served: Running) -> Connection:
+    """The connection of the only client, once it is one of WebSocket: until then it is HTTP's."""
+
+    def look() -> Connection | None:
+        for connection in served.server.server_state.connections:
+            if isinstance(connection, Connection) and connection.on_writable is not None:
+                return connection
+        return None
+
+    found = await until(look, "the client to have joined")
+    assert found is not None
+    return found
+
+
 def test_a_socket_that_is_free_again_says_so_by_itself(domain: int) -> None:
     async def test() -> None:
         async with running(ros_args=SILENT) as served:
             with deaf_client(served.url) as slow:
-                connections = served.server.server_state.connections
-                await until(lambda: connections, "the client")
-                (connection,) = connections
-                assert isinstance(connection, Connection)
-                await until(lambda: connection.on_writable is not None, "the client to have joined")
+                connection = await joined(served)
                 freed: list[bool] = []
                 connection.on_writable = lambda: freed.append(connection.can_take)
                 while connection.can_take:
@@ -112,10 +122,7 @@ def test_who_does_not_read_gets_no_answer_to_his_pings(domain: int) -> None:
     async def test() -> None:
         async with running(ros_args=SILENT) as served:
             with deaf_client(served.url) as deaf:
-                await until(lambda: served.server.server_state.connections, "the client")
-                (connection,) = served.server.server_state.connections
-                assert isinstance(connection, Connection)
-                await until(lambda: connection.on_writable is not None, "the client to have joined")
+                connection = await joined(served)
                 heard = 0
                 handle_ping = connection.handle_ping
 

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from lupin_bridge.goodbye import EndsWithTheBridge, Goodbye
+from tests.support.inprocess import until
 
 HTTP = {"type": "http"}
 START = {"type": "http.response.start", "status": 200, "headers": []}
@@ -52,7 +53,7 @@ def test_who_waits_at_the_good_bye_or_comes_after_it_is_told_so() -> None:
     async def test() -> None:
         stage = Stage()
         waiting = stage.ask()
-        await asyncio.sleep(0)
+        await until(lambda: stage.calls, "the application to be asked")
         stage.goodbye.say()
         await waiting
         assert stage.status == 503
@@ -71,7 +72,7 @@ def test_an_answer_that_has_begun_goes_on(says_goodbye: bool) -> None:
     async def test() -> None:
         stage = Stage(begin_first=says_goodbye)
         asked = stage.ask()
-        await asyncio.sleep(0)
+        await until(lambda: stage.calls, "the application to be asked")
         if says_goodbye:
             stage.goodbye.say()
         stage.gate.set()

@@ -314,7 +314,6 @@ def test_a_stop_is_no_death(domain: int) -> None:
     async def test() -> None:
         async with Stage() as stage:
             pass
-        await asyncio.sleep(0)
         assert (stage.deaths, stage.ros.is_alive) == (0, False)
 
     run(domain, test())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import inspect
 import math
 from collections.abc import AsyncIterator
@@ -15,7 +14,6 @@ import pytest
 from lupin_bridge.local_twin import LocalTwin
 from lupin_bridge.source import (
     Revised,
-    RevisedGrid,
     TwinSource,
     TwinTimeoutError,
     TwinUnavailableError,
@@ -101,17 +99,6 @@ async def started(source_type: Any, arguments: Any, peer: Peer) -> AsyncIterator
         await source.stop()
 
 
-async def field(source: TwinSource, request: FieldRequest = REQUEST) -> RevisedGrid:
-    """The field as soon as the twin can be asked."""
-    while True:
-        try:
-            return await source.field(request)
-        except TwinTimeoutError:
-            raise
-        except TwinUnavailableError:
-            await asyncio.sleep(0.01)
-
-
 @pytest.mark.parametrize("source_type", SOURCES)
 def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
     domain: int, source_type: type
@@ -125,12 +112,12 @@ def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
 
             peer.observe(scan("1", {"co2": 400.0}, stamp_s=5.0))
             revisions.append((await stage.tag("1")).revision)
-            grid = (await field(source)).grid
+            grid = (await source.field(REQUEST)).grid
             assert (grid.sample_count, math.isnan(grid.values[0])) == (0, True)
 
             peer.discover(discovered({"1": pose(0.5, 0.5)}))
             revisions.append((await stage.tag("1", has_pose=True)).revision)
-            result = await field(source)
+            result = await source.field(REQUEST)
             assert (result.grid.width, result.grid.height, result.grid.sample_count) == (6, 2, 1)
             assert result.revision == source.revision() == revisions[-1]
             known = np.array([[True, True, True, True, False, False]] * 2).ravel()
@@ -154,7 +141,7 @@ def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
             assert source.rules().max_grid_cells == 1000
             assert (source.callback_errors, source.calls_waiting) == (0, 0)
             with pytest.raises(FieldRefused, match="sensor_type is empty"):
-                await field(source, FieldRequest("", 0.5, 0.0, 0.0, 1.0, 1.0))
+                await source.field(FieldRequest("", 0.5, 0.0, 0.0, 1.0, 1.0))
         alive.append(source.is_alive)
         assert alive == [True, False]
         assert stage.deaths == []

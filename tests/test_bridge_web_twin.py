@@ -77,14 +77,13 @@ async def started(timeout_s: float = 20.0) -> AsyncIterator[tuple[WebTwin, list[
 
 async def found(twin: WebTwin) -> None:
     """Wait until the service is there to be asked."""
-    while not await twin._thread.call(lambda node: node.field_client.service_is_ready()):
-        await asyncio.sleep(0.01)
+    client = twin._thread.peek(lambda node: node.field_client)
+    await until(client.service_is_ready, "the service")
 
 
-async def pending(twin: WebTwin) -> int:
+def pending(twin: WebTwin) -> int:
     """Requests that the ROS client still keeps."""
-    count: int = await twin._thread.call(lambda node: len(node.field_client._pending_requests))
-    return count
+    return twin._thread.peek(lambda node: len(node.field_client._pending_requests))
 
 
 def test_without_a_twin_a_field_is_refused_at_once_by_the_services_name(domain: int) -> None:
@@ -153,8 +152,7 @@ def test_identical_requests_in_flight_are_asked_once_and_a_change_is_asked_for_a
             async with started() as (twin, told):
                 await found(twin)
                 first = [asyncio.create_task(twin.field(REQUEST)) for _ in range(10)]
-                while not await pending(twin):
-                    await asyncio.sleep(0.01)
+                await until(lambda: pending(twin), "the request to be on its way")
                 reading = SensorReading(name="co2", value=1.0)
                 state = TwinState(tags=[TwinTagState(tag_id="1", readings=[reading])])
                 service.peer.publish("/twin/state", state, depth=1)
@@ -179,13 +177,12 @@ def test_only_so_many_requests_are_on_their_way_at_once(domain: int) -> None:
                 await found(twin)
                 requests = [FieldRequest("co2", 0.5, 0.0, 0.0, 1.0, n) for n in range(1, 11)]
                 tasks = [asyncio.create_task(twin.field(request)) for request in requests]
-                while await pending(twin) < MAX_REQUESTS:
-                    await asyncio.sleep(0.01)
-                assert await pending(twin) == MAX_REQUESTS
+                await until(lambda: pending(twin) >= MAX_REQUESTS, "requests to be on their way")
+                assert pending(twin) == MAX_REQUESTS
                 async with service.answering():
                     await asyncio.gather(*tasks)
                 assert len(service.asked) == 10
-                assert await pending(twin) == 0
+                await until(lambda: pending(twin) == 0, "all of them to be forgotten")
 
     run(domain, test())
 
@@ -197,7 +194,6 @@ def test_a_twin_that_does_not_answer_in_time_is_given_up(domain: int) -> None:
                 await found(twin)
                 with pytest.raises(TwinTimeoutError, match=r"within 0\.3 s \(field_timeout_s\)"):
                     await twin.field(REQUEST)
-                while await pending(twin):
-                    await asyncio.sleep(0.01)
+                await until(lambda: not pending(twin), "the request to be forgotten")
 
     run(domain, test())

@@ -239,17 +239,23 @@ def test_a_second_twin_is_said_loudly_and_its_end_too(domain: int) -> None:
 # --- the bridge goes ----------------------------------------------------------------------------
 
 
+def etag_before_its_end(live: Bridge) -> str:
+    """The ETag of a field with tag "a"; the bridge is killed after it, and its clients see that."""
+    with live.listen() as client:
+        client.until_tag("a")
+        etag = live.get("/api/field", **FIELD).headers["etag"]
+        live.process.kill()
+        with pytest.raises(ConnectionClosed):
+            client.until("never", lambda _: False)
+    refuse_connections(live)
+    return str(etag)
+
+
 def test_a_bridge_is_killed_and_its_successor_serves_the_same_address(domain: int) -> None:
     with bridge(domain=domain) as first:
         robot = first.peer
         robot.observe(scan("a", {"co2": 1.0}, (0, 0)))
-        with first.listen() as client:
-            client.until_tag("a")
-            old = first.get("/api/field", **FIELD).headers["etag"]
-            first.process.kill()
-            with pytest.raises(ConnectionClosed):
-                client.until("never", lambda _: False)
-        refuse_connections(first)
+        old = etag_before_its_end(first)
         port = str(httpx.URL(first.url).port)
         with lupin_twin(domain, "serve", "--port", port) as process:
             assert url_of(process) == first.url
@@ -271,13 +277,7 @@ def test_a_bridge_for_a_twin_elsewhere_is_killed_and_its_successor_knows_what_th
         attached(process, robot) as first,
     ):
         robot.observe(scan("a", {"co2": 1.0}, (0, 0)))
-        with first.listen() as client:
-            client.until_tag("a")
-            old = first.get("/api/field", **FIELD).headers["etag"]
-            process.kill()
-            with pytest.raises(ConnectionClosed):
-                client.until("never", lambda _: False)
-        refuse_connections(first)
+        old = etag_before_its_end(first)
         port = str(httpx.URL(first.url).port)
         with lupin_twin(domain, "web", "--port", port) as successor:
             assert url_of(successor) == first.url

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
 from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, expect, sync_playwright
 
-from tests.browser.hmi import Hmi, open_hmi
-from tests.browser.house import furnish
+from tests.browser.hmi import Hmi, OpenPage, open_hmi
+from tests.browser.house import TAGS, furnish
 from tests.support.domains import own_domain
 from tests.support.waiting import PATIENCE_S
 from tests.support.web import Bridge, bridge
@@ -52,7 +52,7 @@ def house() -> Iterator[Bridge]:
 
 
 @pytest.fixture
-def open_page(browser: Browser) -> Iterator[Callable[..., Hmi]]:
+def open_page(browser: Browser) -> Iterator[OpenPage]:
     """`open_page(url, fragment, query, **options)` is `open_hmi` until the end of the test."""
     with ExitStack() as pages:
 
@@ -60,3 +60,14 @@ def open_page(browser: Browser) -> Iterator[Callable[..., Hmi]]:
             return pages.enter_context(open_hmi(browser, url, fragment, query, **options))
 
         yield open_one
+
+
+@pytest.fixture
+def hmi(house: Bridge, open_page: OpenPage) -> Hmi:
+    """A page that shows the whole house."""
+    page = open_page(house.url)
+    page.expect_rows(*TAGS)
+    page.expect_samples(3)
+    # The map comes last, and the first view is to show all of it.
+    page.settled_picture()
+    return page

@@ -245,6 +245,10 @@ class Hmi:
         raise AssertionError(f"{target} was not reached with {most} times {key}")
 
 
+# `open_page(url, fragment, query, **options)`, the fixture of `conftest.py`.
+OpenPage = Callable[..., Hmi]
+
+
 class Box(NamedTuple):
     """An upright box of pixels, right and bottom exclusive."""
 

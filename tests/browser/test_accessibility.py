@@ -5,18 +5,15 @@ Only here the page's own policy is bypassed, to get axe into the page.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.hmi import AXE, PHONE, WIDE, Hmi
+from tests.browser.hmi import AXE, PHONE, WIDE, Hmi, OpenPage
 from tests.browser.house import TAGS
 from tests.support.messages import scan
 from tests.support.web import Bridge, bridge
-
-OpenPage = Callable[..., Hmi]
 
 RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
 

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
 from lupin_msgs.msg import Observation
 from playwright.sync_api import expect
 
-from tests.browser.hmi import Hmi
+from tests.browser.hmi import OpenPage
 from tests.support.domains import own_domain
 from tests.support.messages import discovered, look, occupancy_grid, pose, scan
 from tests.support.web import Bridge, bridge
 
 SILENT = ("--ros-args", "-p", "state_publish_rate_hz:=0.01")
-
-OpenPage = Callable[..., Hmi]
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import colorsys
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +13,9 @@ from geometry_msgs.msg import Point, Pose, Quaternion
 from playwright.sync_api import expect
 
 from lupin_bridge import sensors
-from tests.browser.hmi import Hmi, Pixel
+from tests.browser.hmi import OpenPage, Pixel
 from tests.support.messages import look, occupancy_grid, scan
 from tests.support.web import Bridge, bridge
-
-OpenPage = Callable[..., Hmi]
 
 SENSORS: Any = json.loads((Path(sensors.__file__).parent / "sensors.json").read_text())
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.hmi import PHONE, Hmi
+from tests.browser.hmi import PHONE, Hmi, OpenPage
 from tests.support.domains import own_domain
 from tests.support.messages import look, occupancy_grid, scan
 from tests.support.web import Bridge, bridge
-
-OpenPage = Callable[..., Hmi]
 
 SCRIPT = "<script>alert('tag')</script>"
 IMAGE = "<img src=x onerror=alert('species')>"

@@ -2,31 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import pytest
 from playwright.sync_api import Locator, expect
 
-from tests.browser.hmi import PHONE, Hmi
-from tests.browser.house import TAGS
+from tests.browser.hmi import PHONE, Hmi, OpenPage
 from tests.support.web import Bridge
 
-OpenPage = Callable[..., Hmi]
 # Where the pins of `house.py` are.
 PINS = {"10": (1, 3), "1": (1, 1), "2": (3, 1), "3": (3, 3), "seen": (4, 2)}
 
 
 def hover_card(hmi: Hmi) -> Locator:
     return hmi.test_id("hover-card")
-
-
-@pytest.fixture
-def hmi(house: Bridge, open_page: OpenPage) -> Hmi:
-    page = open_page(house.url)
-    page.expect_rows(*TAGS)
-    page.expect_samples(3)
-    page.settled_picture()
-    return page
 
 
 def test_the_mouse_on_a_pin_shows_its_card_in_short(hmi: Hmi) -> None:

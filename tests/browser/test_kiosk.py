@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from playwright.sync_api import expect
 
-from tests.browser.hmi import Hmi
+from tests.browser.hmi import OpenPage
 from tests.support.web import Bridge
-
-OpenPage = Callable[..., Hmi]
 
 
 def test_a_wall_screen_that_is_brushed_stays_as_its_link_says(

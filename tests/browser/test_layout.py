@@ -10,11 +10,10 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Locator, expect
 
-from tests.browser.hmi import PHONE, Box, Hmi, Pixel
+from tests.browser.hmi import PHONE, Box, Hmi, OpenPage, Pixel
 from tests.support.messages import scan
 from tests.support.web import Bridge, bridge
 
-OpenPage = Callable[..., Hmi]
 Size = tuple[int, int]
 
 # A laptop of 1440 × 900 zoomed to 200 %; a phone on its side.

@@ -3,28 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.hmi import Hmi
+from tests.browser.hmi import Hmi, OpenPage
 from tests.browser.house import TAGS
 from tests.support.web import Bridge
-
-OpenPage = Callable[..., Hmi]
-
-
-@pytest.fixture
-def hmi(house: Bridge, open_page: OpenPage) -> Hmi:
-    """A page that shows the whole house."""
-    page = open_page(house.url)
-    page.expect_rows(*TAGS)
-    page.expect_samples(3)
-    # The map comes last, and the first view is to show all of it.
-    page.settled_picture()
-    return page
-
 
 # --- sensors ------------------------------------------------------------------------------------
 

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from urllib.parse import urlsplit
 
 from playwright.sync_api import expect
 
-from tests.browser.hmi import Hmi
+from tests.browser.hmi import Hmi, OpenPage
 from tests.support.messages import occupancy_grid, scan
 from tests.support.processes import lupin_twin, twin_node, url_of
 from tests.support.ros import Peer
 from tests.support.web import bridge
-
-OpenPage = Callable[..., Hmi]
 
 CLOCK = re.compile(r"Last data at \d\d:\d\d:\d\d")
 

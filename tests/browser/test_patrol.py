@@ -6,18 +6,15 @@ import json
 import re
 import signal
 import sys
-from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from playwright.sync_api import expect
 
-from tests.browser.hmi import Hmi
+from tests.browser.hmi import Hmi, OpenPage
 from tests.support.domains import ros_env
 from tests.support.processes import Process, lupin_twin, url_of
-
-OpenPage = Callable[..., Hmi]
 
 WATCH_PESTS = """
 () => {

@@ -6,7 +6,6 @@ import csv
 import io
 import math
 import re
-from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
@@ -15,12 +14,10 @@ import pytest
 from PIL import Image, ImageStat
 from playwright.sync_api import Download, expect
 
-from tests.browser.hmi import PHONE, Hmi, changed_box
+from tests.browser.hmi import PHONE, Hmi, OpenPage, changed_box
 from tests.browser.house import TAGS
 from tests.support.messages import look, scan
 from tests.support.web import Bridge, bridge
-
-OpenPage = Callable[..., Hmi]
 
 
 def test_a_link_shows_the_same_view_to_somebody_else(house: Bridge, open_page: OpenPage) -> None:

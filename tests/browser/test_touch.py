@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.hmi import PHONE, Hmi
+from tests.browser.hmi import PHONE, Hmi, OpenPage
 from tests.browser.house import TAGS
 from tests.support.web import Bridge
-
-OpenPage = Callable[..., Hmi]
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';
 import { S } from '../strings';
 import { HealthMark } from './HealthMark';
-import { Age, PestMark } from './TagRow';
+import { AgeFact, PestMark } from './TagRow';
 
 /** A tag may carry any number of sensors; the card that opens with a click has them all. */
 const MOST_READINGS = 8;
@@ -74,12 +74,7 @@ function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
             </div>
           );
         })}
-        <div>
-          <dt>{S.columns.age}</dt>
-          <dd>
-            <Age observedAt={tag.observedAt} />
-          </dd>
-        </div>
+        <AgeFact observedAt={tag.observedAt} />
       </dl>
       {hidden > 0 && <p className="faint">{S.cardMore(hidden)}</p>}
       {names.length === 0 && <p className="faint">{S.cardNoReadings}</p>}

@@ -1,4 +1,4 @@
-import { useMemo, type CSSProperties, type JSX } from 'react';
+import { useMemo, type CSSProperties, type JSX, type ReactNode } from 'react';
 
 import type { FieldQuality } from '../contract/types';
 import { numberText, readingText, valueText } from '../domain/format';
@@ -134,28 +134,28 @@ function Keys(): JSX.Element {
     // eslint-disable-next-line jsx-a11y/no-noninteractive-tabindex
     <ul className="legend-keys" aria-label={S.legend} tabIndex={0}>
       <li>
-        <svg viewBox="0 0 16 16" width="16" height="16" aria-hidden="true">
+        <KeySign>
           <path d="M8 1.5 14.5 8 8 14.5 1.5 8Z" className="key-pin" />
-        </svg>
+        </KeySign>
         {S.pinValue}
       </li>
       <li>
-        <svg viewBox="0 0 16 16" width="16" height="16" aria-hidden="true">
+        <KeySign>
           <path d="M8 1.5 14.5 8 8 14.5 1.5 8Z" className="key-pin hollow dashed" />
-        </svg>
+        </KeySign>
         {S.pinLacking}
       </li>
       <li>
-        <svg viewBox="0 0 16 16" width="16" height="16" aria-hidden="true">
+        <KeySign>
           <path d="M8 1.5 14.5 8 8 14.5 1.5 8ZM5 11 11 5" className="key-pin failed" />
-        </svg>
+        </KeySign>
         {S.pinFailed}
       </li>
       <li>
-        <svg viewBox="0 0 16 16" width="16" height="16" aria-hidden="true">
+        <KeySign>
           <circle cx="8" cy="8" r="6.2" className="key-pest" />
           <path d="M8 4.6v4M8 11v.01" className="key-pest-mark" />
-        </svg>
+        </KeySign>
         {S.pinPest}
       </li>
       {species.map(([name, look]) => (
@@ -176,12 +176,20 @@ function Keys(): JSX.Element {
 
 function BloomKey({ look: { colour, shape } }: { look: BloomLook }): JSX.Element {
   return (
-    <svg viewBox="0 0 16 16" width="14" height="14" aria-hidden="true">
+    <KeySign size={14}>
       <g className="key-bloom" fill={rgbText(colour)}>
         {shape === 'circle' && <circle cx="8" cy="8" r="5.5" />}
         {shape === 'square' && <path d="M3 3h10v10H3Z" />}
         {shape === 'triangle' && <path d="M8 1.500 14.500 13H1.500Z" />}
       </g>
+    </KeySign>
+  );
+}
+
+function KeySign({ size = 16, children }: { size?: number; children: ReactNode }): JSX.Element {
+  return (
+    <svg viewBox="0 0 16 16" width={size} height={size} aria-hidden="true">
+      {children}
     </svg>
   );
 }

@@ -14,7 +14,7 @@ import { S } from '../strings';
 import { HealthMark } from './HealthMark';
 import { Icon } from './Icon';
 import { Sparkline } from './Sparkline';
-import { Age, PestMark } from './TagRow';
+import { AgeFact, PestMark } from './TagRow';
 import { useHistory } from './useHistory';
 
 /** Everything about one tag, over the map. */
@@ -96,12 +96,7 @@ function CardBody({
         ))}
       </ul>
       <dl className="card-facts">
-        <div>
-          <dt>{S.columns.age}</dt>
-          <dd>
-            <Age observedAt={tag.observedAt} />
-          </dd>
-        </div>
+        <AgeFact observedAt={tag.observedAt} />
         <div>
           <dt>{S.columns.species}</dt>
           <dd>

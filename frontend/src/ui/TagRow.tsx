@@ -161,3 +161,15 @@ function Reading({
     </>
   );
 }
+
+/** The age as one entry of a `dl`. */
+export function AgeFact({ observedAt }: { observedAt: number | null }): JSX.Element {
+  return (
+    <div>
+      <dt>{S.columns.age}</dt>
+      <dd>
+        <Age observedAt={observedAt} />
+      </dd>
+    </div>
+  );
+}

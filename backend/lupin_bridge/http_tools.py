@@ -35,6 +35,11 @@ def bridge_of(request: Request) -> Bridge:
     return cast("Bridge", request.app.state.bridge)
 
 
+def list_header(request: Request, name: str) -> str:
+    """All lines of a header that is a list, as one (RFC 9110, section 5.3)."""
+    return ", ".join(request.headers.getlist(name))
+
+
 def json_response(
     body: bytes, status_code: int = 200, headers: dict[str, str] | None = None
 ) -> Response:

@@ -96,7 +96,8 @@ class Hub:
         self._clients: set[Client] = set()
         self._frame: StateFrame | None = None
         self._status_at = status_at
-        self._status_wires: dict[tuple[str, float], bytes] = {}
+        self._status_wires: dict[str, bytes] = {}
+        self._status_wires_s = 0.0
 
     def __len__(self) -> int:
         return len(self._clients)
@@ -182,13 +183,12 @@ class Hub:
     def _status_wire(self, encoding: str, now_s: float) -> bytes:
         # Written once for all who get it at the same moment, and never kept for later: it tells an
         # age, and who joins a twin long dead must not take its tags for seconds old.
-        key = (encoding, now_s)
-        if key not in self._status_wires:
-            self._status_wires = {
-                other: wire for other, wire in self._status_wires.items() if other[1] == now_s
-            }
-            self._status_wires[key] = status_frame(self._status_at(now_s), encoding)
-        return self._status_wires[key]
+        if now_s != self._status_wires_s:
+            self._status_wires.clear()
+            self._status_wires_s = now_s
+        if encoding not in self._status_wires:
+            self._status_wires[encoding] = status_frame(self._status_at(now_s), encoding)
+        return self._status_wires[encoding]
 
     def _write(self, client: Client, wire: bytes, now_s: float) -> bool:
         if not client.connection.can_take:

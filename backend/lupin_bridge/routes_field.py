@@ -22,6 +22,7 @@ from lupin_bridge.http_tools import (
     bridge_of,
     error_response,
     json_response,
+    list_header,
     read_route,
 )
 from lupin_bridge.source import TwinTimeoutError, TwinUnavailableError
@@ -111,7 +112,7 @@ def _register(field_format: FieldFormat) -> None:
 )
 async def field(request: Request) -> Response:
     """Inverse-distance-weighted from the pinned tags; not known where no tag is near."""
-    field_format = field_query.negotiate(_header(request, "accept"))
+    field_format = field_query.negotiate(list_header(request, "accept"))
     if field_format is None:
         types = ", ".join(known.media_type for known in field_formats.FORMATS)
         return error_response(f"Accept allows none of {types}", 406, {"Vary": "Accept"})
@@ -134,11 +135,6 @@ for _format in field_formats.FORMATS:
 async def field_quality(request: Request) -> Response:
     """The leave-one-out error of the current readings, and the share of cells painted."""
     return await _refusing(_quality(request))
-
-
-def _header(request: Request, name: str) -> str:
-    """All lines of a header that is a list, as one (RFC 9110, section 5.3)."""
-    return ", ".join(request.headers.getlist(name))
 
 
 async def _field(request: Request, field_format: FieldFormat) -> Response:
@@ -194,7 +190,7 @@ async def _quality(request: Request) -> Response:
     check_request(asked, rules.max_grid_cells)
     field_query.check_scale(query, JSON, 1, 1)
     tag = field_query.etag(bridge.source.revision(), asked, "quality", 1)
-    if field_query.matches(_header(request, "if-none-match"), tag):
+    if field_query.matches(list_header(request, "if-none-match"), tag):
         return Response(status_code=304, headers={"ETag": tag, **REVALIDATE})
 
     async def compute() -> _FieldResponse:
@@ -217,7 +213,7 @@ async def _answer(bridge: Bridge, request: Request, field_format: FieldFormat) -
     max_cells = source.rules().max_grid_cells
     width, height = check_request(asked, max_cells)
     field_query.check_scale(query, field_format, width * height, max_cells)
-    known = _header(request, "if-none-match")
+    known = list_header(request, "if-none-match")
     tag = field_query.etag(source.revision(), asked, field_format.name, query.scale)
     if field_query.matches(known, tag):
         return Response(status_code=304, headers={"ETag": tag, **REVALIDATE})

@@ -13,6 +13,7 @@ from lupin_bridge.http_tools import (
     REVALIDATE,
     bridge_of,
     error_response,
+    list_header,
     read_route,
 )
 from lupin_bridge.map_picture import map_json, map_png
@@ -63,7 +64,7 @@ async def _map(request: Request, kind: str) -> Response:
     # A replica that started later has the same map with a later stamp, which is in the JSON.
     which = occupancy.stamp_ns if kind == "json" else kind
     headers = {"ETag": f'"{bridge.source.identity}-{occupancy.revision}-{which}"', **REVALIDATE}
-    if matches(", ".join(request.headers.getlist("if-none-match")), headers["ETag"]):
+    if matches(list_header(request, "if-none-match"), headers["ETag"]):
         return Response(status_code=304, headers=headers)
     if kind == "json":
         return Response(map_json(occupancy), headers=headers, media_type=JSON_TYPE)

@@ -136,13 +136,7 @@ class WebTwin:
     async def _ask_once(self, revision: str, request: FieldRequest) -> RevisedGrid:
         try:
             async with asyncio.timeout(self._timeout_s), self._slots:
-                while not await self._thread.call(
-                    lambda node: node.field_client.service_is_ready()
-                ):
-                    if not self._thread.peek(lambda node: node.has_new_twin):
-                        service = self._thread.peek(lambda node: node.parameters.field_service_name)
-                        raise TwinUnavailableError(f"no twin offers {service}: is it running?")
-                    await asyncio.sleep(SERVICE_LOOK_S)
+                await self._find_service()
                 response = await self._thread.ask(
                     lambda node: node.request_field(request),
                     lambda node, future: node.forget_request(future),

@@ -246,7 +246,7 @@ class TwinStore:
         check_length("box_footprint points", len(flower.footprint), MAX_FOOTPRINT_POINTS)
         tag, stamps = self._tag(observation.tag_id)
         at_ns = observation.stamp_ns
-        if at_ns < _later(stamps.flower, at_ns):
+        if stamps.flower is not None and at_ns < stamps.flower:
             flower = tag.flower
         stamps = replace(
             stamps,

@@ -83,6 +83,31 @@ def test_an_answer_that_has_begun_goes_on(says_goodbye: bool) -> None:
     asyncio.run(test())
 
 
+def test_an_answer_that_begins_as_the_good_bye_is_said_goes_on() -> None:
+    async def test() -> None:
+        stage, rest = Stage(), asyncio.Event()
+
+        async def app(_scope: Any, _receive: Any, send: Callable[[Any], Awaitable[None]]) -> None:
+            stage.calls += 1
+            await stage.gate.wait()
+            await send(START)
+            await rest.wait()
+            await send(BODY)
+
+        asked = asyncio.ensure_future(
+            EndsWithTheBridge(app, stage.goodbye)(HTTP, nothing, stage.send)
+        )
+        await until(lambda: stage.calls, "the application to be asked")
+        stage.gate.set()
+        stage.goodbye.say()
+        await until(lambda: stage.sent, "the beginning of an answer")
+        rest.set()
+        await asked
+        assert stage.sent == [START, BODY]
+
+    asyncio.run(test())
+
+
 def test_what_the_application_raises_is_its_own() -> None:
     async def app(*_: Any) -> None:
         raise TimeoutError("of its own")

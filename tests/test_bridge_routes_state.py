@@ -111,6 +111,17 @@ def test_who_asks_for_cbor_gets_the_same_in_binary(live: Bridge) -> None:
         by_subprotocol.until_tag("binary")
 
 
+def test_who_offers_a_subprotocol_hears_why_a_query_is_refused(live: Bridge) -> None:
+    with live.listen(subprotocols=["other", "cbor"], delta="x") as refused:
+        # With none selected, a browser fails the connection before it sees the reason.
+        assert refused.connection.subprotocol == "cbor"
+        with pytest.raises(ConnectionClosedError) as closed:
+            refused.next()
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code == 1008
+    assert "delta" in closed.value.rcvd.reason
+
+
 def test_what_is_selected_as_subprotocol_is_what_is_sent(live: Bridge) -> None:
     with live.listen(subprotocols=["cbor"], encoding="json") as by_query:
         assert by_query.connection.subprotocol is None

@@ -175,6 +175,33 @@ def test_history_is_what_was_seen_from_here(domain: int, peer: Peer) -> None:
         assert stage.node.history("1") == (), "a successor that knows fewer tags starts anew"
 
 
+def test_history_follows_a_clock_that_goes_back_as_the_twins_does(stage: Stage, peer: Peer) -> None:
+    # The third is the twin's last reading held to the new time, the fourth a new one.
+    for value, sec in ((1.0, 100), (2.0, 200), (2.0, 7), (3.0, 9)):
+        message = tag("1", value)
+        message.last_observed.sec = sec
+        stage.take(peer, message)
+    history = stage.node.history("1")
+    assert history is not None
+    assert [(scan.stamp_ns // 10**9, scan.readings[0].value) for scan in history] == [
+        (7, 1.0),
+        (7, 2.0),
+        (9, 3.0),
+    ]
+
+
+def test_what_is_observed_as_the_clock_goes_back_is_in_the_history(
+    stage: Stage, peer: Peer
+) -> None:
+    for value, sec in ((1.0, 100), (2.0, 7)):
+        message = tag("1", value)
+        message.last_observed.sec = sec
+        stage.take(peer, message)
+    history = stage.node.history("1")
+    assert history is not None
+    assert [scan.readings[0].value for scan in history] == [1.0, 2.0]
+
+
 # --- maps ---------------------------------------------------------------------------------------
 
 

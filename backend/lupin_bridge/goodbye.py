@@ -63,6 +63,8 @@ class EndsWithTheBridge:
 
         async def send_on(message: Message) -> None:
             self._goodbye.spares(wait)
+            if wait.when() is not None and not wait.expired():
+                wait.reschedule(None)  # the good-bye was said just before, and has not come through
             await send(message)
 
         try:

@@ -7,6 +7,7 @@ from fastapi import APIRouter, Request, Response, WebSocket
 
 from lupin_bridge import listen_query, schema, state_json
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.frames import ENCODINGS
 from lupin_bridge.http_tools import bridge_of, error_response, json_response, read_route
 from lupin_bridge.hub import CLOSE_POLICY, CLOSE_TRY_AGAIN_LATER, Client
 from lupin_bridge.listen_query import ListenRefused
@@ -28,7 +29,9 @@ async def ws_state(websocket: WebSocket) -> None:
     try:
         query = listen_query.parse(websocket.query_params.multi_items(), offered)
     except ListenRefused as error:
-        await websocket.accept()
+        # A browser that offered subprotocols and got none would never see why.
+        known = next((name for name in offered if name in ENCODINGS), None)
+        await websocket.accept(subprotocol=known)
         await websocket.close(CLOSE_POLICY, str(error))
         return
     # What is selected is what is sent: a query may ask for JSON although CBOR was offered.

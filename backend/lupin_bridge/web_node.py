@@ -188,8 +188,17 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         if not tag.readings or tag.last_observed_ns is None:
             return
         history = self._history.setdefault(tag.tag_id, deque(maxlen=self.parameters.buffer_len))
-        if not history or history[-1].stamp_ns != tag.last_observed_ns:
-            history.append(Observation(tag.tag_id, tag.last_observed_ns, tag.readings))
+        at_ns = tag.last_observed_ns
+        if history and history[-1].stamp_ns > at_ns:
+            # The twin has followed a clock that went back, see `TwinStore.hold_to`.
+            held = [replace(scan, stamp_ns=min(scan.stamp_ns, at_ns)) for scan in history]
+            history.clear()
+            history.extend(held)
+            is_new = held[-1].readings != tag.readings
+        else:
+            is_new = not history or history[-1].stamp_ns != at_ns
+        if is_new:
+            history.append(Observation(tag.tag_id, at_ns, tag.readings))
 
     def _forget_all_but(self, tags: Sequence[TagState]) -> None:
         ids = {tag.tag_id for tag in tags}

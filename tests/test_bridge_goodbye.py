@@ -11,6 +11,7 @@ import pytest
 
 from lupin_bridge.goodbye import EndsWithTheBridge, Goodbye
 from tests.support.inprocess import until
+from tests.support.waiting import PATIENCE_S
 
 HTTP = {"type": "http"}
 START = {"type": "http.response.start", "status": 200, "headers": []}
@@ -55,13 +56,13 @@ def test_who_waits_at_the_good_bye_or_comes_after_it_is_told_so() -> None:
         waiting = stage.ask()
         await until(lambda: stage.calls, "the application to be asked")
         stage.goodbye.say()
-        await waiting
+        await asyncio.wait_for(waiting, PATIENCE_S)
         assert stage.status == 503
         assert json.loads(stage.sent[1]["body"]) == {"detail": "the bridge is shutting down"}
         assert (b"retry-after", b"3") in stage.sent[0]["headers"]
 
         stage.sent.clear()
-        await stage.ask()
+        await asyncio.wait_for(stage.ask(), PATIENCE_S)
         assert (stage.status, stage.calls) == (503, 1)
 
     asyncio.run(test())

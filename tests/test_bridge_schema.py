@@ -82,6 +82,8 @@ def live() -> Iterator[Bridge]:
         running.tag("full", lambda tag: tag["species"])
         running.tag("discovered")
         running.tag("no pose")
+        # The topic is told at 1 Hz, what the bridge shows is younger.
+        peer.tag("full", lambda tag: tag.flowers)
         # Frames are paced: the one that new listeners get may be a moment older than the state.
         with running.listen() as listener:
             listener.until(

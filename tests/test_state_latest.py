@@ -70,6 +70,15 @@ def test_the_history_is_in_the_order_of_time_and_keeps_the_newest() -> None:
     assert store.history("1") == (scans[2.0], scans[3.0], scans[4.0])
 
 
+def test_scans_of_equal_stamps_stay_in_the_order_of_their_arrival() -> None:
+    store = TwinStore()
+    for number in range(4):
+        store.record(scan("1", at_s=5.0, co2=float(number)))
+    history = store.history("1")
+    assert history is not None
+    assert [kept.readings[0].value for kept in history] == [0.0, 1.0, 2.0, 3.0]
+
+
 def test_after_a_clock_that_went_back_all_ages_from_there_and_news_is_news() -> None:
     store = TwinStore()
     store.record(scan("1", at_s=40.0, co2=1.0))

@@ -33,5 +33,8 @@ def test_a_wall_screen_that_is_brushed_stays_as_its_link_says(
     assert wall.address() == address
     expect(wall.test_id("tag-card")).to_have_count(0)
     expect(wall.test_id("legend")).to_contain_text("Humidity %")
+    # Nothing to grab, nothing to click on.
+    wall.point_at(1, 3)
+    assert wall.map.evaluate("map => getComputedStyle(map).cursor") == "default"
     # To assistive technology it is a picture, not something to operate.
     expect(wall.map).to_have_attribute("role", "img")

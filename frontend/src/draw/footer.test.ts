@@ -53,4 +53,7 @@ test('nothing of it leaves a phone’s width or covers anything else', () => {
   for (const { args } of context.named('fillText')) {
     expect(Number(args[2])).toBeLessThan(FOOTER_PX);
   }
+  const length = context.named('fillText').find(({ args }) => args[0] === '1 m')?.args ?? [];
+  const end = Math.max(...context.named('lineTo').map(({ args }) => Number(args[0])));
+  expect(end).toBeLessThan(Number(length[1]) - 6 * String(length[0]).length);
 });

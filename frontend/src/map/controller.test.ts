@@ -135,6 +135,22 @@ describe('pulses', () => {
     window.dispatchEvent(new Event('afterprint'));
     expect(drawn('arc')).toBe(1);
   });
+
+  test('the mark of the mouse neither', () => {
+    start();
+    const strokesOf = (happen: () => void): number => {
+      const before = drawn('stroke');
+      happen();
+      paint();
+      return drawn('stroke') - before;
+    };
+    const marked = strokesOf(() => {
+      pointer('pointermove', ...place(3, 2));
+    });
+    expect(marked).toBeGreaterThan(0);
+    expect(strokesOf(() => window.dispatchEvent(new Event('beforeprint')))).toBe(0);
+    expect(strokesOf(() => window.dispatchEvent(new Event('afterprint')))).toBe(marked);
+  });
 });
 
 describe('mouse and finger', () => {
@@ -260,7 +276,10 @@ test('a font that comes late is drawn with', () => {
   start();
   const labels = FakeContext.recordOf(pins);
   const before = labels?.calls.length;
+  const made = vi.spyOn(document, 'createElement');
   document.fonts.dispatchEvent(new Event('loadingdone'));
   paint();
   expect(labels?.calls.length).toBeGreaterThan(before ?? NaN);
+  // The labels' pictures are painted anew, not copied.
+  expect(made).toHaveBeenCalledWith('canvas');
 });

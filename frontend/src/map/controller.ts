@@ -72,7 +72,8 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
 
   const paint = (): void => {
     frame = 0;
-    const state = store.get();
+    const live = store.get();
+    const state = isPrinting() ? { ...live, view: { ...live.view, hovered: null } } : live;
     const now = performance.now();
     const parts = new Set(dirty);
     dirty.clear();
@@ -240,16 +241,22 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
   });
   resize.observe(element);
 
+  const gone = new AbortController();
+  const { signal } = gone;
+
   // Pins fade while nothing arrives: look again now and then.
   const fading = setInterval(() => {
     spoil('pins');
   }, 5_000);
   // Not `fonts.ready`: that is so while nothing is asked for, and the font comes after it.
-  const onFonts = (): void => {
-    painter.forget();
-    spoil('still', 'pins');
-  };
-  document.fonts.addEventListener('loadingdone', onFonts);
+  document.fonts.addEventListener(
+    'loadingdone',
+    () => {
+      painter.forget();
+      spoil('still', 'pins');
+    },
+    { signal },
+  );
 
   const stops = [
     store.subscribe(update),
@@ -262,8 +269,6 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
       if (camera.size.width > 0) paint();
     }),
   ];
-  const gone = new AbortController();
-  const { signal } = gone;
   element.addEventListener('pointermove', onPointerMove, { signal });
   element.addEventListener('pointerleave', onPointerLeave, { signal });
   if (!isFixed) {
@@ -275,7 +280,6 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
   return () => {
     for (const stop of stops) stop();
     gone.abort();
-    document.fonts.removeEventListener('loadingdone', onFonts);
     resize.disconnect();
     clearInterval(fading);
     cancelAnimationFrame(frame);

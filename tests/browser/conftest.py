@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from typing import Any
@@ -45,8 +46,13 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture(scope="package")
 def house() -> Iterator[Bridge]:
-    """A server with the greenhouse of `house.py`, for tests that change nothing in it."""
-    with own_domain() as domain, bridge(domain=domain) as running:
+    """A server with the greenhouse of `house.py`, for tests that change nothing in it.
+
+    Its clock stands still, so that no pin fades between two pictures.
+    """
+    simulated = ("--ros-args", "-p", "use_sim_time:=true")
+    with own_domain() as domain, bridge(*simulated, domain=domain) as running:
+        running.peer.set_clock(time.time())
         furnish(running)
         yield running
 

@@ -25,6 +25,7 @@ from lupin_twin.state import Snapshot, TagState
 from tests.support.inprocess import Running, run, running, until
 from tests.support.messages import scan
 from tests.support.ros import Peer
+from tests.support.waiting import wait_for
 from tests.support.web import ws_url
 from tests.test_bridge_frames import received
 
@@ -335,4 +336,4 @@ def test_no_thread_and_no_descriptor_is_left_behind(domain: int) -> None:
     before = left()
     for _ in range(3):
         run(domain, once())
-    assert left() == before
+    wait_for(lambda: left() == before, "no more threads and descriptors than before")

@@ -18,6 +18,7 @@ from lupin_twin.idw import FieldGrid
 from lupin_twin.parameters import ParameterError
 from lupin_twin.state import Observation, Pose, Reading
 from tests.support.inprocess import run, until
+from tests.support.waiting import PATIENCE_S
 
 REQUEST = FieldRequest("co2", 0.5, 0.0, 0.0, 2.0, 2.0)
 OTHER = FieldRequest("co2", 0.25, 0.0, 0.0, 2.0, 2.0)
@@ -234,6 +235,7 @@ def test_what_takes_too_long_ends_by_the_setting_that_says_so(
             if what == "ROS thread":
                 await held
             await until(lambda: not stage.twin._computing, "the end of the computation")
+            stage.twin._timeout_s = PATIENCE_S
             assert (await stage.twin.field(REQUEST)).grid.width == 4
 
     run(domain, test())

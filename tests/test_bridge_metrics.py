@@ -10,11 +10,13 @@ from lupin_bridge.metrics import CONTENT_TYPE, COUNTERS, GAUGES, HISTOGRAMS, Met
 from tests.support.messages import scan
 from tests.support.processes import lupin_twin, url_of
 from tests.support.ros import Peer
-from tests.support.waiting import wait_for
+from tests.support.waiting import PATIENCE_S, wait_for
+
+CO2 = {"sensor_type": "co2"}
 
 
 def scrape(url: str) -> dict[str, float]:
-    response = httpx.get(f"{url}/metrics")
+    response = httpx.get(f"{url}/metrics", timeout=PATIENCE_S)
     assert response.headers["content-type"] == CONTENT_TYPE
     return {
         sample.name: sample.value
@@ -38,7 +40,7 @@ def test_every_metric_is_there_and_follows_what_happens(domain: int) -> None:
             peer.observe(scan("1", {"co2": 500.0}, at=(1, 1)), scan("2", {"co2": 500.0}))
             wait_for(lambda: scrape(url)["lupin_tags"] == 2.0, "both tags")
             for _ in range(2):
-                httpx.get(f"{url}/api/field.json", params={"sensor_type": "co2"})
+                httpx.get(f"{url}/api/field.json", params=CO2, timeout=PATIENCE_S)
             after = scrape(url)
         assert (after["lupin_clients"], after["lupin_tags_pinned"]) == (1.0, 1.0)
         assert after["lupin_frames_sent_total"] >= 2.0

@@ -106,7 +106,7 @@ def is_running(pid: int) -> bool:
     """Whether a process is there, and no zombie."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii")
-    except FileNotFoundError:
+    except (FileNotFoundError, ProcessLookupError):  # gone before or while it is read
         return False
     return stat.rpartition(") ")[2][0] != "Z"
 

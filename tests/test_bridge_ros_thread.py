@@ -179,7 +179,7 @@ def test_events_of_a_node_whose_loop_is_gone_do_no_harm(domain: int) -> None:
             await until(lambda: stage.ros.peek(lambda n: n.ticks) > ticks + 3, "more ticks")
             assert (stage.ros.is_alive, stage.ros.callback_errors) == (True, 0)
             await stage.ros.stop()
-            assert not stage.ros.is_alive
+            await until(lambda: not stage.ros.is_alive, "the end of the thread")
 
         asyncio.run(end())
 
@@ -314,7 +314,8 @@ def test_a_stop_is_no_death(domain: int) -> None:
     async def test() -> None:
         async with Stage() as stage:
             pass
-        assert (stage.deaths, stage.ros.is_alive) == (0, False)
+        await until(lambda: not stage.ros.is_alive, "the end of the thread")
+        assert stage.deaths == 0
 
     run(domain, test())
 

@@ -17,6 +17,7 @@ from PIL import Image
 from lupin_bridge import schema
 from tests.oracle_idw import field_by_loop
 from tests.support.messages import discovered, occupancy_grid, pose, scan
+from tests.support.waiting import PATIENCE_S
 from tests.support.web import Bridge, bridge
 
 # These tests ask faster than a person's browser may.
@@ -298,7 +299,8 @@ def test_the_same_field_is_not_sent_twice(live: Bridge, path: str) -> None:
 
 def test_all_lines_of_a_header_count(live: Bridge) -> None:
     def ask(*lines: tuple[str, str]) -> httpx.Response:
-        return httpx.get(f"{live.url}/api/field", params=QUERY, headers=lines, trust_env=False)
+        url = f"{live.url}/api/field"
+        return httpx.get(url, params=QUERY, headers=lines, timeout=PATIENCE_S, trust_env=False)
 
     two_types = ask(("Accept", "text/html;q=0.1"), ("Accept", "application/x-npy"))
     assert two_types.headers["content-type"] == "application/x-npy"

@@ -145,11 +145,11 @@ def test_who_has_not_subscribed_is_sent_nothing_and_counts_as_sent_nothing(
                 plain(frame, now_s)
 
             monkeypatch.setattr(hub, "publish", publish)
-            await inprocess.until(lambda: published == 2, "two states of the twin's heartbeat")
+            await inprocess.until(lambda: published >= 2, "two states of the twin's heartbeat")
             assert (hub.frames_sent, hub.bytes_sent) == (0, 0)
             writer.write(masked({"op": "subscribe", "topic": TOPIC}))
             assert b'"op":"publish"' in await reader.read(1 << 16)
-            assert hub.frames_sent == 1
+            assert hub.frames_sent >= 1
             writer.transport.abort()
 
     inprocess.run(domain, test())
@@ -255,7 +255,7 @@ def test_a_client_that_takes_no_reply_is_closed_and_meanwhile_holds_little(
             await inprocess.until(lambda: len(hub) == 1, "the client")
             if is_subscribed:
                 writer.write(masked({"op": "subscribe", "topic": TOPIC}))
-                await inprocess.until(lambda: hub.frames_sent == 1, "its first state")
+                await inprocess.until(lambda: hub.frames_sent >= 1, "its first state")
                 # Nor does a state show that it is stuck, where the twin is silent.
                 monkeypatch.setattr(hub, "publish", lambda _frame, _now_s: None)
             writer.write(masked(LARGE_CALL) * 5)

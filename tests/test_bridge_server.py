@@ -132,8 +132,11 @@ def assert_sent_away(answer: Future[httpx.Response]) -> None:
 
 
 def assert_quiet(process: Process) -> None:
+    # Whether a client that does not read is cut off by us or, on a busy machine, by uvicorn, which
+    # logs it as an error, is all the same.
+    ours = [line for line in process.output.splitlines() if "graceful shutdown" not in line]
     for word in ("Traceback", "ERROR", "Exception"):
-        assert word not in process.output
+        assert word not in "\n".join(ours)
 
 
 def last_words(listener: Listener) -> tuple[str, int]:
@@ -197,8 +200,7 @@ def test_a_signal_ends_it_and_every_client_is_told(
         running_bridge.get("/api/state")  # and its connection is kept alive
         assert running_bridge.process.stop(number) == 0
         assert last_words(one) == last_words(two) == ("shutting_down", 1012)
-        assert "Traceback" not in running_bridge.process.output
-        assert "ERROR" not in running_bridge.process.output
+        assert_quiet(running_bridge.process)
 
 
 def test_a_second_signal_does_no_harm() -> None:

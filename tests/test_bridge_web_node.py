@@ -219,10 +219,17 @@ def test_a_map_is_kept_and_told_with_the_next_state(stage: Stage, peer: Peer) ->
     [occupancy_grid([[0]], frame_id="odom"), occupancy_grid([[0]], resolution=float("nan"))],
     ids=["frame", "resolution"],
 )
-def test_a_map_that_cannot_be_used_leaves_the_last_one(stage: Stage, peer: Peer, bad: Any) -> None:
+def test_a_map_that_cannot_be_used_leaves_the_last_one(
+    stage: Stage, peer: Peer, monkeypatch: pytest.MonkeyPatch, bad: Any
+) -> None:
     peer.publish_map(occupancy_grid([[0, 100]]))
     good = stage.first_map()
+    said: list[str] = []
+    monkeypatch.setattr(stage.node, "_say", lambda _key, text: said.append(text))
     peer.publish_map(bad)
+    stage.until(lambda: said, "the refusal")
+    assert said[0].startswith("dropped a map: ")
+    assert stage.node.occupancy_map is good
     peer.publish_map(occupancy_grid([[0, 0, 0]]))
     stage.until(lambda: stage.node.occupancy_map is not good, "the next good map")
     assert stage.node.occupancy_map is not None

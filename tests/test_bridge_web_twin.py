@@ -18,6 +18,7 @@ from lupin_bridge.web_twin import MAX_REQUESTS, WebTwin
 from lupin_twin.fields import FieldRefused, FieldRequest
 from tests.support.inprocess import run, until
 from tests.support.ros import Peer
+from tests.support.waiting import PATIENCE_S
 
 REQUEST = FieldRequest("co2", 0.5, 0.0, 0.0, 1.0, 0.5)
 
@@ -95,7 +96,11 @@ def test_without_a_twin_a_field_is_refused_at_once_by_the_services_name(domain: 
     run(domain, test())
 
 
-def test_a_field_of_a_twin_that_has_just_come_waits_for_its_service(domain: int) -> None:
+def test_a_field_of_a_twin_that_has_just_come_waits_for_its_service(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(web_node, "NEW_TWIN_S", PATIENCE_S)
+
     async def test() -> None:
         with Peer(domain) as peer:
             async with started() as (twin, told):

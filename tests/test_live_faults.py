@@ -21,7 +21,7 @@ from tests.support.messages import discovered, look, occupancy_grid, pose, scan
 from tests.support.processes import lupin_twin, twin_node, url_of
 from tests.support.ros import Peer
 from tests.support.sabotage import sabotaged
-from tests.support.waiting import wait_for
+from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, Frame, Listener, bridge, listener, tag_ids
 
 FIELD: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.5}
@@ -99,7 +99,7 @@ def test_a_twin_is_stopped_and_goes_on(domain: int) -> None:
     ):
         robot.observe(scan("a", {"co2": 1.0}, (0, 0)))
         client.until_tag("a")
-        assert live.get("/api/field", **FIELD).status_code == 200
+        wait_for(lambda: live.get("/api/field", **FIELD).status_code == 200, "the service")
 
         def told_in_time() -> bool:
             twin.freeze()
@@ -183,6 +183,7 @@ def test_field_requests_to_a_twin_that_does_not_answer_are_bounded_and_forgotten
             assert not source._asking
 
             twin.thaw()
+            source._timeout_s = PATIENCE_S
             grid = await source.field(FieldRequest("co2", 1.0, 0.0, 0.0, 1.0, 1.0))
             assert grid.grid.sample_count == 0
             await until(lambda: not pending, "this one to be forgotten too")
@@ -304,7 +305,7 @@ def sabotaged_serve() -> Iterator[Bridge]:
         "lupin_twin.convert:field_request:boom-field",
         "lupin_twin.convert:StateMessages.build:boom-state:2",
         # Called for listeners, by the heartbeat and by the state's timer.
-        "lupin_twin.state:TwinStore.snapshot:boom-snapshot:5",
+        "lupin_twin.state:TwinStore.snapshot:boom-snapshot:3",
     )
     options = [part for fault in faults for part in ("--raise", fault)]
     with (
@@ -323,7 +324,8 @@ def sabotaged_web() -> Iterator[Bridge]:
     options = [part for fault in faults for part in ("--raise", fault)]
     with (
         own_domain() as domain,
-        twin_node(domain),
+        # Often, so that the one state that is lost makes no silence.
+        twin_node(domain, "--ros-args", "-p", "state_publish_rate_hz:=20.0"),
         sabotaged(domain, options, "lupin_bridge.cli", "web", "--port", "0") as process,
         Peer(domain) as robot,
         attached(process, robot) as live,
@@ -365,7 +367,7 @@ def goes_on_after(live: Bridge, fault: Callable[[], object], counted: int) -> No
         pytest.param(lambda peer: peer.discover(discovered({"boom-find": pose()})), 1, id="a find"),
         pytest.param(lambda peer: peer.publish_map(occupancy_grid([[0] * 13])), 1, id="a map"),
         pytest.param(lambda peer: peer.observe(scan("boom-state")), 2, id="the state's timer"),
-        pytest.param(lambda peer: peer.observe(scan("boom-snapshot")), 5, id="listeners"),
+        pytest.param(lambda peer: peer.observe(scan("boom-snapshot")), 3, id="listeners"),
     ],
 )
 def test_serve_goes_on_after_an_exception_in(

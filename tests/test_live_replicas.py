@@ -26,7 +26,8 @@ def replicas() -> Iterator[tuple[Bridge, Bridge]]:
     """Two `lupin-twin web` processes; the second comes when the twin has already seen something."""
     with ExitStack() as stack:
         domain = stack.enter_context(own_domain())
-        stack.enter_context(twin_node(domain))
+        # Often, so that a busy machine makes no silence.
+        stack.enter_context(twin_node(domain, "--ros-args", "-p", "state_publish_rate_hz:=20.0"))
         peer = stack.enter_context(Peer(domain))
 
         def replica() -> Bridge:

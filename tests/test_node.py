@@ -96,9 +96,10 @@ def test_late_joiner_gets_the_latched_state_and_a_volatile_one_waits_for_the_nex
                     durability=DurabilityPolicy.VOLATILE,
                 ),
             )
-            latched_state = late.state(lambda _: True, "the latched state")
+            late.listen()
+            late.until(lambda: late.states, "the latched state")
             late.until(lambda: volatile, "the next state, for the volatile one")
-    assert stamp_ns(latched_state) < joined_ns
+    assert stamp_ns(late.states[0]) < stamp_ns(volatile[0])
     assert stamp_ns(volatile[0]) > joined_ns
 
 
@@ -202,7 +203,9 @@ def test_a_pose_that_is_not_finite_is_no_pose(shared: Twin, path: str, broken: f
     elif path == "flower":
         shared.peer.observe(look(tag_id, at=(1.0, broken)))
     else:
-        shared.peer.discover(discovered({tag_id: messages.pose(1.0, 1.0, broken)}))
+        poses = {tag_id: messages.pose(1.0, 1.0, broken), f"{tag_id} whole": messages.pose()}
+        shared.peer.discover(discovered(poses))
+        shared.peer.tag(f"{tag_id} whole")
         shared.peer.observe(scan(tag_id))
     assert shared.peer.tag(tag_id).pose.orientation.w == 0.0
 

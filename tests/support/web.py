@@ -103,8 +103,13 @@ def listener(
 ) -> Iterator[Listener]:
     """A WebSocket client of the bridge at `url`; keyword arguments are the query."""
     offered = None if subprotocols is None else [Subprotocol(name) for name in subprotocols]
+    # No pings of its own: a test that is busy elsewhere reads no answers to them.
     with connect(
-        ws_url(url, **query), proxy=None, max_size=None, subprotocols=offered
+        ws_url(url, **query),
+        proxy=None,
+        max_size=None,
+        subprotocols=offered,
+        ping_interval=None,
     ) as connection:
         yield Listener(connection)
 

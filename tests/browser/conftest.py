@@ -74,6 +74,5 @@ def hmi(house: Bridge, open_page: OpenPage) -> Hmi:
     page = open_page(house.url)
     page.expect_rows(*TAGS)
     page.expect_samples(3)
-    # The map comes last, and the first view is to show all of it.
     page.settled_picture()
     return page

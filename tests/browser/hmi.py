@@ -181,7 +181,12 @@ class Hmi:
         return picture if width is None else picture.crop((0, 0, width, picture.height))
 
     def settled_picture(self, width: int | None = None) -> Image.Image:
-        """The map view once it stays the same: all that is on its way has been drawn."""
+        """The map view once it has the SLAM map and stays the same.
+
+        The heat map may come later still: see `expect_samples`.
+        """
+        self.expect_map()
+        self.view()  # with its font
         pictures = [self.picture(width)]
 
         def look() -> bool:
@@ -191,10 +196,18 @@ class Hmi:
         wait_for(look, "a picture that stays the same")
         return pictures[-1]
 
-    def expect_change(self, before: Image.Image) -> Box:
-        """Wait until the map view looks otherwise; returns the box of what is not the same."""
+    def expect_change(self, before: Image.Image) -> None:
+        """Wait until the map view looks otherwise, if only on its way to something."""
+        wait_for(
+            lambda: changed_box(before, self.picture(before.width)) is not None,
+            "a change of the map",
+        )
+
+    def lasting_change(self, before: Image.Image) -> Box:
+        """Wait until the map view looks otherwise and stays so; the box of what is not the same."""
+        self.expect_change(before)
         box = wait_for(
-            lambda: changed_box(before, self.picture(before.width)), "a change of the map"
+            lambda: changed_box(before, self.settled_picture(before.width)), "a lasting change"
         )
         assert box is not None
         return box

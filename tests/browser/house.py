@@ -7,6 +7,7 @@ from typing import Any
 from lupin_msgs.msg import Observation
 
 from tests.support.messages import discovered, look, occupancy_grid, pose, scan
+from tests.support.waiting import wait_for
 from tests.support.web import Bridge
 
 # Numbers in their order, then names.
@@ -36,3 +37,4 @@ def furnish(bridge: Bridge) -> None:
     bridge.peer.observe(*observations())
     bridge.tag("10", lambda tag: tag["anomaly"])
     bridge.tag("seen")
+    wait_for(lambda: bridge.get("/api/map").status_code == 200, "the map")

@@ -133,12 +133,14 @@ def test_a_pest_appears_on_map_and_table_and_a_clean_look_clears_it(
     shared.peer.observe(scan("crop", {"temperature": 20.0}, at=(6, 6)))
     hmi = open_page(shared.url, "view=6,6,4&layers=pins")
     expect(hmi.row("crop")).to_have_attribute("data-pest", "false")
+    # The pins have the colours of the field's range.
+    expect(hmi.test_id("sample-count")).to_have_text(re.compile(r"^\d+ tags? contribut"))
     before = hmi.settled_picture()
 
     shared.peer.observe(look("crop", "lupin", at=(6, 6), anomaly=True, bug_count=3))
     expect(hmi.row("crop")).to_have_attribute("data-pest", "true")
     expect(hmi.row("crop").locator(".cell-pest")).to_contain_text("Pest3 bugs")
-    ring = hmi.expect_change(before)
+    ring = hmi.lasting_change(before)
     # A ring about the pin, with a sign that reaches beyond it.
     x, y = hmi.view().pixel(6, 6)
     assert ring.left < x - 14

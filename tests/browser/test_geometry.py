@@ -74,6 +74,7 @@ def test_the_heat_map_is_the_right_way_up(domain: int, open_page: OpenPage) -> N
         running.tag("hot")
         hmi = open_page(running.url, f"{VIEW}&layers=map,field")
         hmi.expect_samples(4)
+        hmi.settled_picture()
         beside_hot = (HOT[0] + 0.5, HOT[1] + 0.5)
         beside_cold = [(x + 0.5, y + 0.5) for x, y in COLD]
         [ground] = hmi.pixels([(2.0, -1.9)])  # on the floor, beyond the field
@@ -99,6 +100,8 @@ def test_a_cell_that_is_not_known_shows_the_map_below_it(domain: int, open_page:
         wall, free, corner = (2.5, 1.5), (2.5, 0.5), (-1.4, -1.4)
         known = [(0.5, 0.5), (4.5, 3.5), (0.5, 3.5), (4.5, 0.5)]
         shares = [40 / 60, 1.0, 40 / 60, 40 / 60]
+        hmi.expect_map()
+        hmi.expect_pixels(lambda pixel: close(pixel, WALL), wall, what="the wall")
         hmi.expect_pixels(lambda pixel: pixel != hmi.pixel(2.5, 0.5), known[1], what="a field")
         with_field = hmi.settled_picture()
         view = hmi.view()
@@ -132,7 +135,7 @@ def test_the_field_ends_on_the_cells_where_the_server_says(
         bare = hmi.settled_picture()
         hmi.go("sensor=co2&view=3,3,6&layers=map,field")
         hmi.expect_samples(1)
-        disc = hmi.expect_change(bare)
+        disc = hmi.lasting_change(bare)
         view = hmi.view()
         grid = running.json("/api/field.json", sensor_type="co2", resolution=0.05)
         cells = [
@@ -155,12 +158,13 @@ def test_a_pin_sits_on_its_pose_and_in_its_cell(domain: int, open_page: OpenPage
         at = (3.125, 2.375)
         running.peer.observe(scan("a", {"co2": 900.0}, at=at))
         running.tag("a")
+        hmi = open_page(running.url, go=False)
         for camera in ("view=3,3,6", "view=3.1,2.4,0.4"):
-            hmi = open_page(running.url, f"sensor=co2&{camera}&layers=map")
+            hmi.go(f"sensor=co2&{camera}&layers=map")
             expect(hmi.row("a")).to_be_visible()
             bare = hmi.settled_picture()
             hmi.go(f"sensor=co2&{camera}&layers=map,pins")
-            pin = hmi.expect_change(bare)
+            pin = hmi.lasting_change(bare)
             x, y = hmi.view().pixel(*at)
             assert abs((pin.left + pin.right - 1) / 2 - x) <= 1
             assert abs((pin.top + pin.bottom - 1) / 2 - y) <= 1
@@ -189,11 +193,11 @@ def test_a_planter_box_and_its_blooms_lie_where_they_were_seen(
         bare = hmi.settled_picture()
         view = hmi.view()
         hmi.go("view=3,3,6&layers=map,boxes")
-        outline = hmi.expect_change(bare)
+        outline = hmi.lasting_change(bare)
         wanted = (*view.pixel(1.0, 4.5), *view.pixel(2.5, 4.0))
         assert max(abs(a - b) for a, b in zip(outline, wanted, strict=True)) <= 2
         hmi.go("view=3,3,6&layers=map,blooms")
-        dots = hmi.expect_change(bare)
+        dots = hmi.lasting_change(bare)
         # One dot is at the lower left of the other: as far from the box on each side.
         left, bottom = view.pixel(1.25, 4.25)
         right, top = view.pixel(2.25, 4.3)
@@ -271,9 +275,10 @@ def test_nothing_that_arrives_takes_the_map_out_of_the_operators_hand(
     with bridge(domain=domain) as running:
         running.peer.publish_map(floor(6, 6))
         running.peer.observe(scan("a", {"co2": 1.0}, at=(1, 1)))
-        hmi = open_page(running.url)
-        expect(hmi.row("a")).to_be_visible()
-        hmi.expect_map()
+        hmi = open_page(running.url, "sensor=co2")
+        # All that the view shows: a field that came later would widen it.
+        hmi.expect_samples(1)
+        hmi.settled_picture()
         start = hmi.view()
         hmi.point_at(3, 3)
         hmi.page.mouse.down()

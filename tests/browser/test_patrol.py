@@ -55,11 +55,12 @@ def sensors_shown(hmi: Hmi) -> dict[str, set[str]]:
 
 
 def unbidden(output: str) -> list[str]:
-    """Lines of a log that say something went wrong."""
+    """Lines of a log that say something went wrong, beside what a busy machine makes true."""
     return [
         line
         for line in output.splitlines()
         if re.search(r"warn|error|critical|traceback|exception", line, re.IGNORECASE)
+        and not re.search(r"left behind|fallen silent", line)
     ]
 
 

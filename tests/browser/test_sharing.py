@@ -25,6 +25,7 @@ def test_a_link_shows_the_same_view_to_somebody_else(house: Bridge, open_page: O
     mine.expect_rows(*TAGS)
     mine.choose_sensor("Humidity")
     mine.expect_samples(3)
+    mine.settled_picture()
     mine.click_map(3, 3)
     mine.page.get_by_role("button", name="Layers").click()
     mine.page.get_by_role("checkbox", name="Metre grid").uncheck()
@@ -66,6 +67,7 @@ def test_a_link_of_nonsense_is_the_whole_house(house: Bridge, open_page: OpenPag
     hmi.expect_rows(*TAGS)
     expect(hmi.test_id("legend")).to_contain_text("Temperature °C")
     hmi.page.get_by_role("button", name="Layers").click()
+    expect(hmi.page.get_by_role("checkbox")).to_have_count(8)
     assert hmi.page.get_by_role("checkbox", checked=True).count() == 0  # as the link says: none
 
 

@@ -16,7 +16,6 @@ from tests.support.web import Bridge
 def phone(house: Bridge, open_page: OpenPage) -> Hmi:
     hmi = open_page(house.url, viewport=PHONE, has_touch=True, is_mobile=True)
     hmi.expect_samples(3)
-    # The map comes last, and the first view is to show all of it.
     hmi.settled_picture()
     return hmi
 

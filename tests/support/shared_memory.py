@@ -25,7 +25,7 @@ def remove_what_the_dead_left(folder: Path = SHARED_MEMORY, young_s: float = YOU
         segment = lock.with_name(lock.name.removesuffix(LOCK))
         if segment.name.startswith("fastrtps_port"):
             continue
-        with suppress(FileNotFoundError), lock.open("rb") as file:
+        with suppress(FileNotFoundError, PermissionError), lock.open("rb") as file:
             if time.time() - lock.stat().st_mtime < young_s:
                 continue
             try:

@@ -107,6 +107,14 @@ const observeAgain = (): void => {
 };
 
 describe('pulses', () => {
+  // They last a moment, which a busy machine may spend elsewhere.
+  beforeEach(() => {
+    vi.useFakeTimers({ toFake: ['performance'] });
+  });
+  afterEach(() => {
+    vi.useRealTimers();
+  });
+
   test('a fresh observation sends out a ring', () => {
     start();
     observeAgain();

@@ -1,9 +1,11 @@
 /** What jsdom lacks of a browser, as far as the page's modules touch it on import or mount. */
-import { cleanup } from '@testing-library/react';
+import { cleanup, configure } from '@testing-library/react';
 import { afterEach } from 'vitest';
 
 import { FakeContext } from './canvas';
 
+// How long a busy machine takes is no matter.
+configure({ asyncUtilTimeout: 20_000 });
 afterEach(cleanup);
 
 window.matchMedia = (query: string) =>

@@ -1,5 +1,5 @@
 import { render, screen } from '@testing-library/react';
-import { expect, test } from 'vitest';
+import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { clockText } from '../domain/format';
 import { store } from '../store/app';
@@ -8,6 +8,14 @@ import { wireTag } from '../testing/tags';
 import { ConnectionBadge } from './ConnectionBadge';
 import { FrozenBanner } from './FrozenBanner';
 import { epochOf } from './useNow';
+
+// The time of the last frame is read from two clocks, which go on between two looks.
+beforeEach(() => {
+  vi.useFakeTimers({ toFake: ['Date', 'performance'] });
+});
+afterEach(() => {
+  vi.useRealTimers();
+});
 
 const text = (): string => screen.getByTestId('frozen').textContent;
 

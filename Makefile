@@ -99,7 +99,7 @@ hmi-test: setup ## the HMI's unit tests
 
 unit: setup $(DONE)/chromium ## Python tests, real ROS and real browser included
 	$(say) 'Python tests: units, ROS over DDS, browser'
-	@$(TEST_ENV) $(BIN)/pytest -q -n 3 --dist worksteal tests
+	@$(TEST_ENV) $(BIN)/pytest -q -n 4 --dist worksteal tests
 
 bench: setup $(DONE)/chromium ## measure: ratios side by side, nothing asserted
 	@$(BENCH_ENV) $(BIN)/python -m tests.bench $(ARGS)

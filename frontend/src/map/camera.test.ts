@@ -111,6 +111,24 @@ describe('camera', () => {
     expect(onCamera).toHaveBeenCalledTimes(1);
   });
 
+  test('what the wheel chose holds for a hand that grabs the map at once', () => {
+    vi.useFakeTimers();
+    camera.goTo(null, bounds);
+    const { scale } = camera.view;
+    element.dispatchEvent(new WheelEvent('wheel', { deltaY: -240 }));
+    const zoomed = camera.view;
+    expect(zoomed.scale).toBeGreaterThan(scale);
+    mouse(element, 'mousedown', 100);
+    // The wheel's gesture ends by a pause, inside that of the hand.
+    vi.runAllTimers();
+    expect(onCamera).toHaveBeenCalledTimes(1);
+    mouse(window, 'mousemove', 140);
+    mouse(window, 'mouseup', 140);
+    expect(onCamera).toHaveBeenCalledTimes(2);
+    expect(camera.view).toEqual({ ...zoomed, x: zoomed.x + 40 });
+    vi.useRealTimers();
+  });
+
   test('a click is no choice of a view', () => {
     camera.goTo(null, bounds);
     mouse(element, 'mousedown', 100);

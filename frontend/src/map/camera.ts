@@ -45,7 +45,7 @@ export class MapCamera {
   #view: View = { x: 0, y: 0, scale: 50 };
   /** A move of the program's own is no choice of the operator's. */
   #programmed = false;
-  /** The view that a gesture under way began with. */
+  /** The view that the gestures under way began with. */
   #held: View | null = null;
 
   /** `isFixed`: the program alone moves it; no wheel, finger or mouse does. */
@@ -64,7 +64,8 @@ export class MapCamera {
         handlers.onView(this.#view);
       })
       .on('start', () => {
-        if (!this.#programmed) this.#held = this.#view;
+        // Not anew by a hand that grabs the map before the gesture of the wheel has ended.
+        if (!this.#programmed) this.#held ??= this.#view;
       })
       .on('end', () => {
         if (this.#programmed) return;

@@ -175,7 +175,7 @@ def small_parts() -> Iterator[None]:
         yield
 
 
-@settings(max_examples=1500)
+@settings(max_examples=1200)
 @given(cases())
 def test_field_is_the_definitions(case: Case) -> None:
     grid = case.by_twin()
@@ -183,7 +183,7 @@ def test_field_is_the_definitions(case: Case) -> None:
     assert_same_values(grid.values, case.by_loop(), case.samples)
 
 
-@settings(max_examples=1000)
+@settings(max_examples=800)
 @given(cases())
 def test_field_is_the_definitions_however_it_is_split(case: Case) -> None:
     with small_parts():

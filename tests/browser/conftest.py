@@ -18,6 +18,24 @@ from tests.support.waiting import PATIENCE_S
 from tests.support.web import Bridge, bridge
 
 CHROMIUM = os.environ.get("CHROMIUM", "/usr/bin/chromium")
+# Two pages of Chromium's own for the address bar, which nobody sees here, are a sixth of the time.
+# The last of such switches counts: with them those of Playwright that matter on loopback.
+NOT_WANTED = (
+    "WebUIOmniboxPopup",
+    "WebUIOmniboxAimPopup",
+    "AvoidUnnecessaryBeforeUnloadCheckSync",
+    "DestroyProfileOnBrowserClose",
+    "HttpsUpgrades",
+    "HttpsFirstBalancedModeAutoEnable",
+    "LensOverlay",
+    "MediaRouter",
+    "PaintHolding",
+    "ThirdPartyStoragePartitioning",
+    "OptimizationHints",
+    "NetworkTimeServiceQuerying",
+    "AimEnabled",
+    "PreconnectToSearch",
+)
 # No GPU anywhere, and no word to anybody outside.
 CHROMIUM_ARGS = (
     "--no-sandbox",
@@ -27,6 +45,7 @@ CHROMIUM_ARGS = (
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
+    f"--disable-features={','.join(NOT_WANTED)}",
 )
 
 

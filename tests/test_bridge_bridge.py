@@ -22,10 +22,10 @@ from lupin_bridge.source import CacheCounts, Revised
 from lupin_twin.fields import FieldJob
 from lupin_twin.idw import FieldGrid
 from lupin_twin.state import Snapshot, TagState
-from tests.support.inprocess import Running, run, running, until
+from tests.support.inprocess import Running, run, running
 from tests.support.messages import scan
 from tests.support.ros import Peer
-from tests.support.waiting import wait_for
+from tests.support.waiting import until, wait_for
 from tests.support.web import ws_url
 from tests.test_bridge_frames import received
 

@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 
 from lupin_bridge.goodbye import EndsWithTheBridge, Goodbye
-from tests.support.inprocess import until
-from tests.support.waiting import PATIENCE_S
+from tests.support.waiting import PATIENCE_S, until
 
 HTTP = {"type": "http"}
 START = {"type": "http.response.start", "status": 200, "headers": []}

@@ -17,8 +17,8 @@ from lupin_twin.fields import FieldJob, FieldRefused, FieldRequest
 from lupin_twin.idw import FieldGrid
 from lupin_twin.parameters import ParameterError
 from lupin_twin.state import Observation, Pose, Reading
-from tests.support.inprocess import run, until
-from tests.support.waiting import PATIENCE_S
+from tests.support.inprocess import run
+from tests.support.waiting import PATIENCE_S, until
 
 REQUEST = FieldRequest("co2", 0.5, 0.0, 0.0, 2.0, 2.0)
 OTHER = FieldRequest("co2", 0.25, 0.0, 0.0, 2.0, 2.0)

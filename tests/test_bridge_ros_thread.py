@@ -15,7 +15,8 @@ from rclpy.task import Future
 
 from lupin_bridge.ros_thread import STOP_TIMEOUT_S, RosThread
 from lupin_bridge.source import TwinUnavailableError
-from tests.support.inprocess import ros_domain, run, until
+from tests.support.inprocess import ros_domain, run
+from tests.support.waiting import until
 
 
 class Probe(Node):  # type: ignore[misc]  # rclpy is not typed

@@ -11,9 +11,10 @@ from websockets.asyncio.client import connect
 from lupin_bridge import schema
 from lupin_twin.node import TwinNode
 from lupin_twin.state import TwinStore
-from tests.support.inprocess import Running, run, running, until
+from tests.support.inprocess import Running, run, running
 from tests.support.messages import scan
 from tests.support.ros import Peer
+from tests.support.waiting import until
 from tests.support.web import bridge, ws_url
 
 

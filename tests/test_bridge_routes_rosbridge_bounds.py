@@ -26,6 +26,7 @@ from tests.support.rosbridge import (
     masked,
     ros_at,
 )
+from tests.support.waiting import until
 
 
 def calls(count: int) -> list[str]:
@@ -135,7 +136,7 @@ def test_who_has_not_subscribed_is_sent_nothing_and_counts_as_sent_nothing(
         async with inprocess.running() as here:
             hub = here.bridge.hub
             reader, writer = await deaf(here.url)
-            await inprocess.until(lambda: len(hub) == 1, "the client")
+            await until(lambda: len(hub) == 1, "the client")
             writer.write(masked({"op": "set_level", "level": "none"}))
             published, plain = 0, hub.publish
 
@@ -145,7 +146,7 @@ def test_who_has_not_subscribed_is_sent_nothing_and_counts_as_sent_nothing(
                 plain(frame, now_s)
 
             monkeypatch.setattr(hub, "publish", publish)
-            await inprocess.until(lambda: published >= 2, "two states of the twin's heartbeat")
+            await until(lambda: published >= 2, "two states of the twin's heartbeat")
             assert (hub.frames_sent, hub.bytes_sent) == (0, 0)
             writer.write(masked({"op": "subscribe", "topic": TOPIC}))
             assert b'"op":"publish"' in await reader.read(1 << 16)
@@ -195,7 +196,7 @@ def test_many_messages_at_once_do_not_hold_up_the_others(
             other = asyncio.create_task(somebody_else())
             _reader, writer = await deaf(here.url)
             writer.write(masked({"op": "set_level", "level": "none"}) * 100)
-            await inprocess.until(lambda: len(at_turn) == 100, "all of them")
+            await until(lambda: len(at_turn) == 100, "all of them")
             assert len(set(at_turn)) == 100, "somebody else's turn came after each"
             writer.transport.abort()
             other.cancel()
@@ -227,7 +228,7 @@ def test_a_client_that_leaves_takes_its_calls_along(
                     for call in calls(5):
                         ros.connection.send(call)
                     asyncio.run_coroutine_threadsafe(
-                        inprocess.until(lambda: began == 2, "two calls with the twin"), loop
+                        until(lambda: began == 2, "two calls with the twin"), loop
                     ).result()
 
                 await in_thread(here.url, talk)
@@ -236,8 +237,8 @@ def test_a_client_that_leaves_takes_its_calls_along(
             loop = asyncio.get_running_loop()
             await leave()
             assert gone.is_set()
-            await inprocess.until(lambda: ended == 2, "the end of both")
-            await inprocess.until(lambda: len(here.bridge.hub) == 0, "a hub without clients")
+            await until(lambda: ended == 2, "the end of both")
+            await until(lambda: len(here.bridge.hub) == 0, "a hub without clients")
             assert began == 2, "those that waited were never begun"
 
     inprocess.run(domain, test())
@@ -252,10 +253,10 @@ def test_a_client_that_takes_no_reply_is_closed_and_meanwhile_holds_little(
             # A reader that is let go of would be emptied by asyncio.
             _reader, writer = await deaf(here.url)
             hub = here.bridge.hub
-            await inprocess.until(lambda: len(hub) == 1, "the client")
+            await until(lambda: len(hub) == 1, "the client")
             if is_subscribed:
                 writer.write(masked({"op": "subscribe", "topic": TOPIC}))
-                await inprocess.until(lambda: hub.frames_sent >= 1, "its first state")
+                await until(lambda: hub.frames_sent >= 1, "its first state")
                 # Nor does a state show that it is stuck, where the twin is silent.
                 monkeypatch.setattr(hub, "publish", lambda _frame, _now_s: None)
             writer.write(masked(LARGE_CALL) * 5)
@@ -268,8 +269,8 @@ def test_a_client_that_takes_no_reply_is_closed_and_meanwhile_holds_little(
                     most_bytes = max(most_bytes, waiting)
                 return hub.clients_dismissed == 1
 
-            await inprocess.until(is_dismissed, "its dismissal")
-            await inprocess.until(lambda: not here.server.server_state.connections, "its end")
+            await until(is_dismissed, "its dismissal")
+            await until(lambda: not here.server.server_state.connections, "its end")
             assert 0 < most_bytes < 12_000_000, "the replies of the running calls"
             writer.transport.abort()
 
@@ -281,7 +282,7 @@ def test_a_client_that_was_slow_to_take_a_reply_stays(domain: int) -> None:
         async with inprocess.running() as here:
             reader, writer = await deaf(here.url)
             writer.write(masked(LARGE_CALL) * 3)
-            await inprocess.until(lambda: here.bridge.hub.blocked == 1, "a full socket")
+            await until(lambda: here.bridge.hub.blocked == 1, "a full socket")
             while here.bridge.hub.blocked:
                 assert await reader.read(1 << 20), "it was closed"
             assert len(here.bridge.hub) == 1

@@ -20,10 +20,11 @@ from lupin_bridge.source import (
 )
 from lupin_bridge.web_twin import WebTwin
 from lupin_twin.fields import FieldRefused, FieldRequest
-from tests.support.inprocess import run, until
+from tests.support.inprocess import run
 from tests.support.messages import discovered, occupancy_grid, pose, scan
-from tests.support.processes import twin_node
+from tests.support.processes import OFTEN, twin_node
 from tests.support.ros import Peer
+from tests.support.waiting import until
 
 SOURCES = [LocalTwin, WebTwin]
 MEMBERS = [name for name in vars(TwinSource) if not name.startswith("_")]
@@ -77,7 +78,7 @@ class Stage:
 @asynccontextmanager
 async def stage_of(source_type: type, domain: int) -> AsyncIterator[Stage]:
     """A started source; for `WebTwin`, with a twin in a process of its own."""
-    arguments = ("--ros-args", "-p", "state_publish_rate_hz:=20.0", "-p", "max_grid_cells:=1000")
+    arguments = (*OFTEN, "-p", "max_grid_cells:=1000")
     with Peer(domain) as peer:
         if source_type is WebTwin:
             with twin_node(domain, *arguments):

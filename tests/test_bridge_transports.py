@@ -11,7 +11,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
 from lupin_bridge.transports import UNSENT_BYTES, bound_unsent, tear_down
-from tests.support.inprocess import until
+from tests.support.waiting import until
 
 # More than any socket takes by itself.
 MUCH = bytes(64_000_000)

@@ -16,9 +16,9 @@ from lupin_bridge import web_node
 from lupin_bridge.source import Revised, TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.web_twin import MAX_REQUESTS, WebTwin
 from lupin_twin.fields import FieldRefused, FieldRequest
-from tests.support.inprocess import run, until
+from tests.support.inprocess import run
 from tests.support.ros import Peer
-from tests.support.waiting import PATIENCE_S
+from tests.support.waiting import PATIENCE_S, until
 
 REQUEST = FieldRequest("co2", 0.5, 0.0, 0.0, 1.0, 0.5)
 

@@ -15,10 +15,10 @@ from websockets.streams import StreamReader
 
 from lupin_bridge.server import MAX_INBOUND_BYTES
 from lupin_bridge.ws_protocol import Connection
-from tests.support.inprocess import Running, run, running, until
+from tests.support.inprocess import Running, run, running
 from tests.support.messages import scan
 from tests.support.raw_ws import BINARY, CLOSE, PING, TEXT, RawClient, frames_of, masked
-from tests.support.waiting import wait_for
+from tests.support.waiting import until, wait_for
 from tests.support.web import bridge, deaf_client, overfill
 
 # Silent by itself: every frame is one that the test has caused, or a heartbeat of the bridge.

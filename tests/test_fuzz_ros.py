@@ -28,21 +28,16 @@ from tests.support.hostile import (
 from tests.support.live import attached, wait_until_ready
 from tests.support.messages import discovered, look, pose, scan
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
-from tests.support.processes import lupin_twin
+from tests.support.processes import OFTEN, lupin_twin
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
-
-# It asks for thousands of fields, twice.
-pytestmark = pytest.mark.timeout(900)
 
 # Of the process with the twin: for one lot at any time, and kept of all that is sent here (which is
 # bounded tag by tag, and there are some 30).
 MEMORY_MB = 40.0
 KEPT_MB = 80.0
 NO_LIMITS = ("--field-rate-hz", "10000")
-# So that the bridge apart has not to be waited for.
-OFTEN = ("-p", "state_publish_rate_hz:=20.0")
 # A topic holds 50 messages; a lot that was waited for has lost none.
 LOT = 40
 LOTS = 25
@@ -53,7 +48,7 @@ def both() -> Iterator[tuple[Bridge, Bridge]]:
     """`serve` with the twin, and a `web` that hears of it all over `/twin/state`."""
     with (
         own_domain() as domain,
-        bridge(*NO_LIMITS, "--ros-args", *OFTEN, domain=domain) as twin,
+        bridge(*NO_LIMITS, *OFTEN, domain=domain) as twin,
         lupin_twin(domain, "web", *NO_LIMITS) as process,
         attached(process, twin.peer) as apart,
     ):

@@ -15,13 +15,13 @@ from lupin_bridge.status import STALE_AFTER_S
 from lupin_bridge.web_twin import MAX_REQUESTS, WebTwin
 from lupin_twin.fields import FieldRequest
 from tests.support.domains import own_domain
-from tests.support.inprocess import run, until
+from tests.support.inprocess import run
 from tests.support.live import attached, wait_until_ready
 from tests.support.messages import discovered, look, occupancy_grid, pose, scan
-from tests.support.processes import lupin_twin, twin_node, url_of
+from tests.support.processes import OFTEN, lupin_twin, twin_node, url_of
 from tests.support.ros import Peer
 from tests.support.sabotage import sabotaged
-from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.waiting import PATIENCE_S, until, wait_for
 from tests.support.web import Bridge, Frame, Listener, bridge, listener, tag_ids
 
 FIELD: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.5}
@@ -324,8 +324,8 @@ def sabotaged_web() -> Iterator[Bridge]:
     options = [part for fault in faults for part in ("--raise", fault)]
     with (
         own_domain() as domain,
-        # Often, so that the one state that is lost makes no silence.
-        twin_node(domain, "--ros-args", "-p", "state_publish_rate_hz:=20.0"),
+        # The one state that is lost makes no silence.
+        twin_node(domain, *OFTEN),
         sabotaged(domain, options, "lupin_bridge.cli", "web", "--port", "0") as process,
         Peer(domain) as robot,
         attached(process, robot) as live,

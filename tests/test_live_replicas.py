@@ -12,7 +12,7 @@ from websockets.exceptions import ConnectionClosed
 from tests.support.domains import own_domain
 from tests.support.live import attached, wait_until_ready
 from tests.support.messages import look, occupancy_grid, scan
-from tests.support.processes import lupin_twin, twin_node
+from tests.support.processes import OFTEN, lupin_twin, twin_node
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, tag_ids
@@ -26,8 +26,7 @@ def replicas() -> Iterator[tuple[Bridge, Bridge]]:
     """Two `lupin-twin web` processes; the second comes when the twin has already seen something."""
     with ExitStack() as stack:
         domain = stack.enter_context(own_domain())
-        # Often, so that a busy machine makes no silence.
-        stack.enter_context(twin_node(domain, "--ros-args", "-p", "state_publish_rate_hz:=20.0"))
+        stack.enter_context(twin_node(domain, *OFTEN))
         peer = stack.enter_context(Peer(domain))
 
         def replica() -> Bridge:

@@ -14,10 +14,8 @@ from rclpy.serialization import serialize_message
 from tests.support import messages
 from tests.support.domains import own_domain
 from tests.support.messages import discovered, look, occupancy_grid, scan
-from tests.support.processes import Process, twin_node
+from tests.support.processes import OFTEN, Process, twin_node
 from tests.support.ros import Peer
-
-FAST = ("--ros-args", "-p", "state_publish_rate_hz:=20.0")
 
 
 class Twin:
@@ -57,13 +55,13 @@ def _twin(*ros_args: str) -> Iterator[Twin]:
 @pytest.fixture(scope="module")
 def shared() -> Iterator[Twin]:
     """One twin for many tests, each with tags of its own."""
-    yield from _twin(*FAST)
+    yield from _twin(*OFTEN)
 
 
 @pytest.fixture
 def twin() -> Iterator[Twin]:
     """A twin of the test's own."""
-    yield from _twin(*FAST)
+    yield from _twin(*OFTEN)
 
 
 # --- the state ----------------------------------------------------------------------------------
@@ -110,7 +108,7 @@ def stamp_ns(state: Any) -> int:
 def test_fifty_observations_latched_before_the_twin_started_are_all_heard(domain: int) -> None:
     with Peer(domain) as producer:
         producer.observe(*(scan(f"t{i}", {"co2": 400.0 + i}, at=(i, 0)) for i in range(50)))
-        with twin_node(domain, *FAST):
+        with twin_node(domain, *OFTEN):
             # First the twin, which a busy machine may take its time to start, then its tags.
             producer.state(lambda _: True, "a state")
             state = producer.state(lambda s: len(s.tags) >= 50, "all 50 tags")
@@ -325,7 +323,7 @@ def test_a_tag_past_its_bounds_is_refused_with_the_value_and_the_limit(twin: Twi
 
 
 def test_a_malformed_map_is_refused_and_the_last_good_one_stays(domain: int) -> None:
-    clip = ("--ros-args", "-p", "clip_to_explored:=true", "-p", "state_publish_rate_hz:=20.0")
+    clip = (*OFTEN, "-p", "clip_to_explored:=true")
     with twin_node(domain, *clip) as process, Peer(domain) as peer:
         peer.wait_for_twin()
         twin = Twin(process, peer)
@@ -413,7 +411,7 @@ def test_a_bad_request_is_refused_with_everything_else_zeroed(
 
 
 def test_stamps_and_staleness_follow_the_simulated_clock(domain: int) -> None:
-    clock = (*FAST, "-p", "use_sim_time:=true")
+    clock = (*OFTEN, "-p", "use_sim_time:=true")
     with twin_node(domain, *clock) as process, Peer(domain) as peer:
         peer.wait_for_twin()
         peer.set_clock(100.0)

@@ -57,7 +57,7 @@ def open_at(house: Bridge, open_page: OpenPage) -> Callable[..., Hmi]:
     def open_one(size: Size, fragment: str = "", query: str = "", **options: object) -> Hmi:
         viewport = {"width": size[0], "height": size[1]}
         hmi = open_page(house.url, fragment, query, viewport=viewport, **options)
-        expect(hmi.test_id("sample-count")).to_have_text(re.compile(r"^\d+ tags? contribut"))
+        hmi.expect_samples()
         hmi.settled_picture()
         return hmi
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import gc
 import os
-import time
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
@@ -54,18 +53,6 @@ def run(domain: int, test: Coroutine[Any, Any, T]) -> T:
     gc.collect()  # a task complains of an error that nobody looked at when it is collected
     assert errors == []
     return result
-
-
-async def until(look: Callable[[], T], what: str, timeout_s: float = PATIENCE_S) -> T:
-    """Call `look` until it gives something true, and return that; the loop goes on meanwhile."""
-    deadline = time.monotonic() + timeout_s
-    while True:
-        found = look()
-        if found:
-            return found
-        if time.monotonic() > deadline:
-            raise AssertionError(f"waited {timeout_s:g} s in vain for {what}; last: {found!r}")
-        await asyncio.sleep(0.01)
 
 
 @dataclass

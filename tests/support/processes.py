@@ -17,6 +17,10 @@ from typing import Self
 from tests.support.domains import ros_env
 from tests.support.waiting import PATIENCE_S, wait_for
 
+# ROS arguments, last on a command line: a state so often that none has to be waited for, and that
+# a busy machine makes no silence.
+OFTEN = ("--ros-args", "-p", "state_publish_rate_hz:=20.0")
+
 
 class Process:
     """A process with its output in a file; killed with all its children at the end of `with`."""

@@ -13,7 +13,7 @@ LOCK = "_el"
 YOUNG_S = 10.0
 
 
-def remove_what_the_dead_left(folder: Path = SHARED_MEMORY, young_s: float = YOUNG_S) -> int:
+def remove_what_the_dead_left(folder: Path = SHARED_MEMORY) -> int:
     """Remove the segments of processes that are no more; returns how many.
 
     A participant's segment, half a megabyte, has a file beside it that its process keeps locked.
@@ -26,7 +26,7 @@ def remove_what_the_dead_left(folder: Path = SHARED_MEMORY, young_s: float = YOU
         if segment.name.startswith("fastrtps_port"):
             continue
         with suppress(FileNotFoundError, PermissionError), lock.open("rb") as file:
-            if time.time() - lock.stat().st_mtime < young_s:
+            if time.time() - lock.stat().st_mtime < YOUNG_S:
                 continue
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from collections.abc import Callable
 from typing import TypeVar
@@ -27,13 +28,24 @@ def wait_for(
         AssertionError: nothing true within `timeout_s`; names what was waited for.
     """
     deadline = time.monotonic() + timeout_s
-    while True:
-        found = look()
-        if found:
-            return found
-        if time.monotonic() > deadline:
-            raise AssertionError(f"waited {timeout_s:g} s in vain for {what}; last: {found!r}")
+    while not (found := look()):
+        _hold_to(deadline, f"waited {timeout_s:g} s in vain for {what}; last: {found!r}")
         if meanwhile is None:
             time.sleep(_PAUSE_S)
         else:
             meanwhile()
+    return found
+
+
+async def until(look: Callable[[], T], what: str, timeout_s: float = PATIENCE_S) -> T:
+    """`wait_for` in a coroutine: the loop goes on meanwhile."""
+    deadline = time.monotonic() + timeout_s
+    while not (found := look()):
+        _hold_to(deadline, f"waited {timeout_s:g} s in vain for {what}; last: {found!r}")
+        await asyncio.sleep(_PAUSE_S)
+    return found
+
+
+def _hold_to(deadline_s: float, complaint: str) -> None:
+    if time.monotonic() > deadline_s:
+        raise AssertionError(complaint)

@@ -280,6 +280,12 @@ test('everything is in sight, the heat map too', () => {
   expect(view()).toEqual(before);
 });
 
+test('a map of another size is drawn at once, and not empty for a frame', () => {
+  const still = document.createElement('canvas');
+  stop = runMap(element, { still, pins, overlay });
+  expect(FakeContext.recordOf(still)?.named('clearRect').length).toBeGreaterThan(0);
+});
+
 test('a font that comes late is drawn with', () => {
   start();
   const labels = FakeContext.recordOf(pins);

@@ -238,6 +238,8 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
     const state = store.get();
     camera.goTo(state.view.camera, contentBounds(state, lastField));
     spoil('still', 'pins', 'overlay');
+    // At once: a canvas of another size is empty, and would be seen so until the next frame.
+    paint();
   });
   resize.observe(element);
 

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from lupin_bridge.rosbridge_session import MAX_BURST
-from lupin_bridge.ws_protocol import FRAMES_AT_ONCE
+from lupin_bridge.rosbridge.session import MAX_BURST
+from lupin_bridge.serving.ws_protocol import FRAMES_AT_ONCE
 from tests.support.messages import scan
 from tests.support.proc_stat import open_files, peak_mb, reset_peak, resident_mb
 from tests.support.raw_ws import (

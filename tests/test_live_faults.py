@@ -10,9 +10,9 @@ import httpx
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from lupin_bridge.source import Revised, TwinTimeoutError
-from lupin_bridge.status import STALE_AFTER_S
-from lupin_bridge.web_twin import MAX_REQUESTS, WebTwin
+from lupin_bridge.stream.status import STALE_AFTER_S
+from lupin_bridge.twin.source import Revised, TwinTimeoutError
+from lupin_bridge.twin.web_twin import MAX_REQUESTS, WebTwin
 from lupin_twin.fields import FieldRequest
 from tests.support.domains import own_domain
 from tests.support.inprocess import run

@@ -17,8 +17,8 @@ import httpx
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from lupin_bridge.server import MAX_INBOUND_BYTES
-from lupin_bridge.ws_protocol import FRAMES_AT_ONCE, FRAMES_PER_S
+from lupin_bridge.serving.server import MAX_INBOUND_BYTES
+from lupin_bridge.serving.ws_protocol import FRAMES_AT_ONCE, FRAMES_PER_S
 from tests.bench.bench_live import Server, serving
 from tests.support.proc_stat import open_files, peak_mb, reset_peak, resident_mb
 from tests.support.waiting import PATIENCE_S, wait_for

@@ -6,206 +6,29 @@ import ast
 import re
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator, Mapping
-from pathlib import Path
-from typing import NamedTuple
+from collections.abc import Iterable
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
-PACKAGES = {
-    "lupin_twin": ROOT / "ros_node" / "lupin_twin" / "lupin_twin",
-    "lupin_patrol": ROOT / "ros_node" / "lupin_patrol" / "lupin_patrol",
-    "lupin_bridge": ROOT / "backend" / "lupin_bridge",
-}
-
-ROS = frozenset(
-    {
-        "rclpy",
-        "lupin_msgs",
-        "builtin_interfaces",
-        "geometry_msgs",
-        "nav_msgs",
-        "rcl_interfaces",
-        "rosgraph_msgs",
-        "std_msgs",
-    }
+from tests.support.structure import (
+    ALL_ARROWS,
+    ARROWS,
+    CLAIMS_PURITY,
+    KNOW_ROS,
+    LIBRARIES,
+    MODULES,
+    PACKAGES,
+    PURE_EXCEPT,
+    PURE_LIBRARIES,
+    PURE_STANDARD,
+    ROOMS,
+    ROS,
+    TO_OURS,
+    Arrow,
+    arrows_in,
+    project_module,
+    room,
 )
-# The modules that know ROS; all others have to run, and be tested, without it.
-KNOW_ROS = {
-    "lupin_twin": {"cli", "convert", "node", "ros_parameters", "spinning"},
-    "lupin_patrol": {"cli", "messages", "node"},
-    "lupin_bridge": {"ros_logs", "ros_thread", "web_node"},
-}
-# What else a package may use, and in which modules: None is all of them. The bridge may use what
-# its own dependencies list.
-LIBRARIES: Mapping[str, Mapping[str, set[str] | None]] = {
-    "lupin_twin": {
-        "numpy": {"idw", "explored", "field_quality", "fields", "convert"},
-    },
-    "lupin_patrol": {
-        "numpy": {"exploration", "geometry", "perception", "route"},
-        "greenhouse_sim": {"climate", "cli"},
-    },
-    "lupin_bridge": dict.fromkeys(
-        (
-            "PIL",
-            "cbor2",
-            "fastapi",
-            "lupin_twin",
-            "numpy",
-            "orjson",
-            "prometheus_client",
-            "pydantic",
-            "starlette",
-            "uvicorn",
-            "websockets",
-        )
-    ),
-}
-
-# module: the modules of its own package that it may import.
-ARROWS: Mapping[str, Mapping[str, set[str]]] = {
-    "lupin_twin": {
-        "state": set(),
-        "idw": set(),
-        "parameters": set(),
-        "throttle": set(),
-        "twin_count": set(),
-        "spinning": set(),
-        "explored": {"idw"},
-        "field_cache": {"idw"},
-        "field_quality": {"state", "idw"},
-        "fields": {"state", "idw", "explored", "field_cache"},
-        "convert": {"state", "idw", "explored", "fields"},
-        "ros_parameters": {"parameters"},
-        "node": {
-            "convert",
-            "explored",
-            "field_cache",
-            "fields",
-            "parameters",
-            "ros_parameters",
-            "state",
-            "throttle",
-            "twin_count",
-        },
-        "cli": {"node", "parameters", "spinning"},
-    },
-    "lupin_patrol": {
-        "chance": set(),
-        "geometry": set(),
-        "climate": {"geometry"},
-        "house": {"geometry"},
-        "exploration": {"geometry", "house"},
-        "route": {"geometry", "house"},
-        "plants": {"chance", "geometry", "house"},
-        "perception": {"chance", "geometry", "house", "plants"},
-        "events": {"exploration", "geometry", "perception", "plants"},
-        "mission": {
-            "chance",
-            "climate",
-            "events",
-            "exploration",
-            "geometry",
-            "house",
-            "perception",
-            "plants",
-            "route",
-        },
-        "messages": {"events", "house", "perception", "plants"},
-        "node": {"events", "messages"},
-        "cli": {"mission", "node"},
-        "__main__": {"cli"},
-    },
-}
-
-# What a pure module must not touch: the outside world, and the clock.
-IMPURE = ROS | {
-    "asyncio",
-    "fastapi",
-    "http",
-    "httpx",
-    "multiprocessing",
-    "os",
-    "signal",
-    "socket",
-    "starlette",
-    "subprocess",
-    "threading",
-    "time",
-    "uvicorn",
-}
-CLAIMS_PURITY = re.compile(r"\bPure\b|No input or output")
-
-
-class Arrow(NamedTuple):
-    """One import: the module (`package.module`), what it imports, and in which line."""
-
-    source: str
-    target: str
-    line: int
-
-    @property
-    def package(self) -> str:
-        return self.source.partition(".")[0]
-
-    @property
-    def module(self) -> str:
-        return self.source.partition(".")[2]
-
-    @property
-    def top(self) -> str:
-        """The package that is imported from."""
-        return self.target.partition(".")[0]
-
-    def __str__(self) -> str:
-        return f"{self.source} -> {self.target} (line {self.line})"
-
-
-def arrows_in(source: str, text: str) -> Iterator[Arrow]:
-    """Every import in a module's text, those in functions and for type checkers included."""
-    package = source.rpartition(".")[0]
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield Arrow(source, alias.name, node.lineno)
-        elif isinstance(node, ast.ImportFrom):
-            module = node.module or ""
-            if node.level:
-                module = ".".join(filter(None, [package, module]))
-            for alias in node.names:
-                # `from package import module` and `from package.module import name` alike.
-                yield Arrow(source, f"{module}.{alias.name}", node.lineno)
-
-
-def modules(package: str) -> dict[str, str]:
-    """The text of a package's modules, by `package.module`."""
-    return {
-        f"{package}.{file.stem}": file.read_text(encoding="utf-8")
-        for file in sorted(PACKAGES[package].glob("*.py"))
-        if file.stem != "__init__"
-    }
-
-
-MODULES = {name: text for package in PACKAGES for name, text in modules(package).items()}
-
-
-def project_module(target: str) -> str | None:
-    """The project's module that an import names, None where it is of no module of ours."""
-    name = ".".join(target.split(".")[:2])
-    return name if name in MODULES else None
-
-
-ALL_ARROWS = [arrow for name, text in MODULES.items() for arrow in arrows_in(name, text)]
-TO_OURS = {
-    name: {
-        found: arrow
-        for arrow in ALL_ARROWS
-        if arrow.source == name and (found := project_module(arrow.target))
-    }
-    for name in MODULES
-}
 
 
 def offenders(arrows: Iterable[object]) -> str:
@@ -227,6 +50,26 @@ def test_a_module_imports_only_what_lies_below_it(package: str) -> None:
         if target.partition(".")[0] == package
         and target.partition(".")[2] not in ARROWS[package][name]
     )
+
+
+def test_a_room_looks_only_into_those_below_it() -> None:
+    names = [name for name in MODULES if name.startswith("lupin_bridge.")]
+    assert {room(name) for name in names} == set(ROOMS), "a new room has to say what it may import"
+    assert not offenders(
+        arrow
+        for name in names
+        for target, arrow in TO_OURS[name].items()
+        if target.startswith("lupin_bridge.")
+        and room(target) != room(name)
+        and room(target) not in ROOMS[room(name)]
+    )
+
+
+def test_the_rooms_lie_one_below_the_other() -> None:
+    seen: set[str] = set()
+    while ready := [name for name in ROOMS if name not in seen and ROOMS[name] <= seen]:
+        seen.update(ready)
+    assert set(ROOMS) - seen == set(), "rooms that lead in a circle"
 
 
 @pytest.mark.parametrize("package", PACKAGES)
@@ -282,7 +125,7 @@ def test_routes_and_the_application_never_lead_to_ros() -> None:
                 return found
         return []
 
-    starts = [name for name in MODULES if re.match(r"lupin_bridge\.(routes_|app$|openapi$)", name)]
+    starts = [name for name in MODULES if re.match(r"lupin_bridge\.(routes\.|app$|openapi$)", name)]
     assert len(starts) > 5
     for name in starts:
         assert not " -> ".join(way([name]))
@@ -330,7 +173,7 @@ def test_one_module_crosses_between_the_ros_thread_and_the_loop() -> None:
     found = [
         f"{name} uses {word} (line {node.lineno})"
         for name, text in MODULES.items()
-        if name.startswith("lupin_bridge.") and name != "lupin_bridge.ros_thread"
+        if name.startswith("lupin_bridge.") and name != "lupin_bridge.twin.ros_thread"
         for node in ast.walk(ast.parse(text))
         if isinstance(node, ast.Attribute | ast.Name)
         and (word := node.attr if isinstance(node, ast.Attribute) else node.id) in crossing
@@ -338,17 +181,47 @@ def test_one_module_crosses_between_the_ros_thread_and_the_loop() -> None:
     assert not offenders(found)
 
 
-def test_what_is_pure_touches_neither_the_world_nor_the_clock() -> None:
-    pure = {
+def pure_modules() -> set[str]:
+    """Those that say so of themselves, and all of the twin's that do not know ROS."""
+    return {
         name
         for name, text in MODULES.items()
         if CLAIMS_PURITY.search(ast.get_docstring(ast.parse(text)) or "")
         or (name.startswith("lupin_twin.") and name.partition(".")[2] not in KNOW_ROS["lupin_twin"])
     }
-    assert {"lupin_twin.throttle", "lupin_bridge.hub", "lupin_bridge.state_json"} <= pure
+
+
+def is_pure(arrow: Arrow, pure: set[str]) -> bool:
+    """Whether a pure module may have this arrow."""
+    if arrow.top in PACKAGES and project_module(arrow.target) in pure:
+        return True
+    allowed = PURE_STANDARD | PURE_LIBRARIES | PURE_EXCEPT.get(arrow.source, set())
+    return any(arrow.target == name or arrow.target.startswith(f"{name}.") for name in allowed)
+
+
+def test_what_is_pure_uses_only_what_is_on_the_list() -> None:
+    pure = pure_modules()
+    some = {"lupin_twin.throttle", "lupin_bridge.stream.hub", "lupin_bridge.stream.state_json"}
+    assert some <= pure
     assert not offenders(
-        arrow for arrow in ALL_ARROWS if arrow.source in pure and arrow.top in IMPURE
+        arrow for arrow in ALL_ARROWS if arrow.source in pure and not is_pure(arrow, pure)
     )
+
+
+def test_the_list_for_pure_modules_leaves_the_world_out() -> None:
+    pure = pure_modules()
+    for target in (
+        "sqlite3",
+        "os",
+        "time",
+        "threading",
+        "pathlib.Path",
+        "rclpy.node.Node",
+        "uvicorn",
+    ):
+        assert not is_pure(Arrow("lupin_twin.state", target, 1), pure), target
+    assert is_pure(Arrow("lupin_twin.state", "collections.abc.Iterable", 1), pure)
+    assert not is_pure(Arrow("lupin_twin.state", "lupin_twin.node.TwinNode", 1), pure)
 
 
 def test_no_import_hides_from_this_file() -> None:

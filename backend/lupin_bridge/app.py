@@ -7,22 +7,20 @@ from pathlib import Path
 from fastapi import FastAPI, Request, Response
 from starlette.staticfiles import StaticFiles
 
-from lupin_bridge import (
-    docs_page,
-    routes_field,
-    routes_health,
-    routes_map,
-    routes_rosbridge,
-    routes_signin,
-    routes_state,
-    schema,
-)
-from lupin_bridge.access_middleware import Access, AccessControl
+from lupin_bridge.access.middleware import Access, AccessControl
+from lupin_bridge.access.security import ReadOnly
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.goodbye import EndsWithTheBridge
-from lupin_bridge.http_protocol import PieceByPiece
-from lupin_bridge.http_tools import error_response
-from lupin_bridge.security import ReadOnly
+from lupin_bridge.routes import docs_page
+from lupin_bridge.routes import field as routes_field
+from lupin_bridge.routes import health as routes_health
+from lupin_bridge.routes import map as routes_map
+from lupin_bridge.routes import rosbridge as routes_rosbridge
+from lupin_bridge.routes import signin as routes_signin
+from lupin_bridge.routes import state as routes_state
+from lupin_bridge.routes.tools import error_response
+from lupin_bridge.serving.goodbye import EndsWithTheBridge
+from lupin_bridge.serving.http_protocol import PieceByPiece
+from lupin_bridge.stream import schema
 
 STATIC_FOLDER = Path(__file__).parent / "static"
 

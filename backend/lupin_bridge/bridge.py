@@ -10,14 +10,14 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
-from lupin_bridge.field_limits import FieldLimits
-from lupin_bridge.frames import FrameWriter
-from lupin_bridge.goodbye import Goodbye
-from lupin_bridge.hub import Client, Hub, next_beat_s
+from lupin_bridge.field.limits import FieldLimits
 from lupin_bridge.metrics import Metrics, Sample
+from lupin_bridge.serving.goodbye import Goodbye
 from lupin_bridge.settings import Settings
-from lupin_bridge.source import Revised, TwinSource
-from lupin_bridge.status import Liveness, Status
+from lupin_bridge.stream.frames import FrameWriter
+from lupin_bridge.stream.hub import Client, Hub, next_beat_s
+from lupin_bridge.stream.status import Liveness, Status
+from lupin_bridge.twin.source import Revised, TwinSource
 from lupin_twin.state import NANOSECONDS_PER_SECOND
 
 log = logging.getLogger(__name__)

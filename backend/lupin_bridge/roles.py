@@ -10,16 +10,16 @@ import subprocess
 import sys
 from collections.abc import Sequence
 
-from lupin_bridge.access import exposure
-from lupin_bridge.access_middleware import Access
+from lupin_bridge.access.middleware import Access
+from lupin_bridge.access.policy import exposure
+from lupin_bridge.access.tls import check_pair
 from lupin_bridge.app import create_app
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.local_twin import LocalTwin
-from lupin_bridge.ros_thread import RosStartError
-from lupin_bridge.server import BridgeServer, address_of, allow_connections, listen
+from lupin_bridge.serving.server import BridgeServer, address_of, allow_connections, listen
 from lupin_bridge.settings import SettingError, Settings
-from lupin_bridge.tls import check_pair
-from lupin_bridge.web_twin import WebTwin
+from lupin_bridge.twin.local_twin import LocalTwin
+from lupin_bridge.twin.ros_thread import RosStartError
+from lupin_bridge.twin.web_twin import WebTwin
 from lupin_twin.parameters import ParameterError
 
 log = logging.getLogger("lupin_bridge")
@@ -69,7 +69,7 @@ async def _run(
     make_source = WebTwin if role == "web" else LocalTwin
     source = make_source(ros_args=ros_args, timeout_s=settings.field_timeout_s)
     bridge = Bridge(source, settings)
-    server = BridgeServer(create_app(bridge, access=access), bridge)
+    server = BridgeServer(create_app(bridge, access=access), settings, bridge.say_goodbye)
     await bridge.start()
     # The 100,000 objects of all modules are here to stay. Each full collection would walk through
     # them, 30 to 50 ms during which nobody is served.

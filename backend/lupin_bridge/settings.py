@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from lupin_bridge.access import OriginError, parse_origin
 from lupin_bridge.logs import FORMATS, TEXT
 
 
@@ -70,11 +69,6 @@ class Settings:
             )
         if not self.host:
             raise SettingError("--host is empty, must be an address")
-        for origin in self.allow_origin:
-            try:
-                parse_origin(origin)
-            except OriginError as error:
-                raise SettingError(f"--allow-origin: {error}") from None
         if bool(self.tls_cert) != bool(self.tls_key):
             given, missing = ("cert", "key") if self.tls_cert else ("key", "cert")
             raise SettingError(f"--tls-{given} is given without --tls-{missing}, TLS needs both")

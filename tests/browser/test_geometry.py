@@ -12,12 +12,12 @@ import pytest
 from geometry_msgs.msg import Point, Pose, Quaternion
 from playwright.sync_api import expect
 
-from lupin_bridge import sensors
+from lupin_bridge.field import sensors
 from tests.browser.hmi import OpenPage, Pixel
 from tests.support.messages import look, occupancy_grid, scan
 from tests.support.web import Bridge, bridge
 
-SENSORS: Any = json.loads((Path(sensors.__file__).parent / "sensors.json").read_text())
+SENSORS: Any = json.loads((Path(sensors.__file__).parents[1] / "sensors.json").read_text())
 
 
 # What the light theme makes of occupied, free and unknown cells.

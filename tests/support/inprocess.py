@@ -14,9 +14,9 @@ import httpx
 
 from lupin_bridge.app import create_app
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.local_twin import LocalTwin
-from lupin_bridge.server import BridgeServer, address_of, listen
+from lupin_bridge.serving.server import BridgeServer, address_of, listen
 from lupin_bridge.settings import Settings
+from lupin_bridge.twin.local_twin import LocalTwin
 from lupin_twin.node import TwinNode
 from tests.support.waiting import PATIENCE_S
 
@@ -78,7 +78,7 @@ async def running(
     settings = settings or Settings()
     twin = LocalTwin(ros_args=ros_args, timeout_s=settings.field_timeout_s)
     bridge = Bridge(twin, settings)
-    server = BridgeServer(create_app(bridge), bridge)
+    server = BridgeServer(create_app(bridge), bridge.settings, bridge.say_goodbye)
     listener = listen("127.0.0.1", 0)
     url = address_of(listener)
     await bridge.start()

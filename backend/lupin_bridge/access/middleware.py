@@ -1,0 +1,216 @@
+"""The doorman: every request and WebSocket handshake passes `access` and `credentials` here."""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from dataclasses import dataclass, field
+from typing import Final, Self
+
+import orjson
+from starlette.datastructures import MutableHeaders
+from starlette.requests import HTTPConnection
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from lupin_bridge.access.credentials import Credentials
+from lupin_bridge.access.policy import AccessPolicy, Asked, OriginError
+from lupin_bridge.access.security import with_security_headers
+from lupin_bridge.serving.rate_limit import RateLimit, client_key
+from lupin_bridge.settings import SettingError, Settings
+
+log = logging.getLogger(__name__)
+
+# What a browser needs to sign in, and what a supervisor needs to see that the process lives.
+OPEN_PATHS: Final = frozenset({"/signin", "/signin.js", "/signin.css", "/healthz"})
+
+# Wrong tokens an address may send at once, and a minute from then on.
+GUESS_BURST: Final = 10
+GUESSES_PER_MINUTE: Final = 10
+
+_PREFLIGHT_MAX_AGE_S: Final = "600"
+
+
+@dataclass(frozen=True, slots=True)
+class Access:
+    """Who may read: the hosts and origins, and the token if there is one.
+
+    `secure`: the bridge serves TLS itself, so that its cookie may demand it.
+    """
+
+    policy: AccessPolicy = field(default_factory=AccessPolicy)
+    credentials: Credentials | None = None
+    secure: bool = False
+
+    @classmethod
+    def of(cls, settings: Settings, token: str | None) -> Self:
+        """From the settings, and LUPIN_TOKEN if it is set.
+
+        Raises:
+            SettingError: an allowed origin that is none, or a token that cannot be one.
+
+        """
+        try:
+            policy = AccessPolicy(settings.host, settings.allow_origin)
+        except OriginError as error:
+            raise SettingError(f"--allow-origin: {error}") from None
+        return cls(
+            policy,
+            None if token is None else Credentials(token),
+            secure=bool(settings.tls_cert),
+        )
+
+
+class AccessControl:
+    """ASGI middleware: 403 for foreign hosts and pages, 401 and 429 for whoever has no token."""
+
+    def __init__(self, app: ASGIApp, access: Access) -> None:
+        self._app = app
+        self._access = access
+        self._guesses = RateLimit(GUESSES_PER_MINUTE / 60.0, GUESS_BURST)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, or refuse it."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        request = HTTPConnection(scope)
+        verdict = self._access.policy.judge(_asked(request))
+        if self._access.policy.origins:
+            send = _with_cors(send, verdict.foreign)
+        if verdict.refusal is not None:
+            refusal: _Refusal | None = _Refusal(403, verdict.refusal)
+        elif verdict.foreign is not None and _is_preflight(request):
+            refusal = _Refusal(204, "", _PREFLIGHT_HEADERS)
+        else:
+            refusal = self._check_credentials(request)
+        if refusal is None:
+            await self._app(scope, receive, send)
+        else:
+            await refusal.send(scope, receive, send)
+
+    def _check_credentials(self, request: HTTPConnection) -> _Refusal | None:
+        credentials = self._access.credentials
+        path: str = request.scope["path"]
+        if credentials is None or path in OPEN_PATHS:
+            return None
+        header = request.headers.get("authorization")
+        if header is not None:
+            return self._check_header(credentials, header, client_of(request))
+        # A cookie is no guess: it cannot be made without the token, however often one tries.
+        if credentials.accepts_cookie(
+            request.cookies.get(credentials.cookie_name, ""), time.time()
+        ):
+            return None
+        if _wants_page(request):
+            # Relative, for a bridge behind a path prefix.
+            location = "../" * (path.count("/") - 1) + "signin"
+            return _Refusal(303, "sign in first", {"location": location})
+        return _unauthorized(
+            "a token is needed: send it as Authorization: Bearer, or sign in at /signin"
+        )
+
+    def _check_header(self, credentials: Credentials, header: str, client: str) -> _Refusal | None:
+        now_s = time.monotonic()
+        wait_s = self._guesses.wait_s(client, now_s)
+        if wait_s > 0.0:
+            return _Refusal(
+                429,
+                f"{client} has sent more than {GUESS_BURST} wrong tokens and {GUESSES_PER_MINUTE} "
+                "a minute: no token is looked at until Retry-After",
+                {"retry-after": str(math.ceil(wait_s))},
+            )
+        if credentials.accepts_header(header):
+            return None
+        self._guesses.take(client, now_s)
+        log.warning("wrong token from %s", client)
+        return _unauthorized("this is not the bridge's token, expected Authorization: Bearer")
+
+
+def client_of(request: HTTPConnection) -> str:
+    """The client that limits are counted for: who is connected, whatever a header claims."""
+    return client_key(request.client.host if request.client is not None else "")
+
+
+@dataclass(frozen=True, slots=True)
+class _Refusal:
+    """An answer in the application's stead, to a request or a WebSocket handshake."""
+
+    status: int
+    detail: str
+    headers: dict[str, str] = field(default_factory=dict)
+
+    async def send(self, scope: Scope, receive: Receive, send: Send) -> None:
+        prefix = ""
+        if scope["type"] == "websocket":
+            await receive()  # websocket.connect
+            prefix = "websocket."  # ASGI's "Websocket Denial Response"
+        body = orjson.dumps({"detail": self.detail}) if self.detail else b""
+        headers = {"cache-control": "no-store", **self.headers}
+        if body:
+            headers |= {"content-type": "application/json", "content-length": str(len(body))}
+        send = with_security_headers(send)
+        await send(
+            {
+                "type": f"{prefix}http.response.start",
+                "status": self.status,
+                "headers": [(name.encode(), value.encode()) for name, value in headers.items()],
+            }
+        )
+        await send({"type": f"{prefix}http.response.body", "body": body})
+
+
+_PREFLIGHT_HEADERS: Final = {
+    "access-control-allow-methods": "GET, HEAD",
+    "access-control-allow-headers": "Authorization, If-None-Match",
+    "access-control-max-age": _PREFLIGHT_MAX_AGE_S,
+}
+
+
+def _unauthorized(detail: str) -> _Refusal:
+    return _Refusal(401, detail, {"www-authenticate": 'Bearer realm="lupin-twin"'})
+
+
+def _asked(request: HTTPConnection) -> Asked:
+    headers = request.headers
+    return Asked(
+        scheme="https" if request.scope["scheme"] in ("https", "wss") else "http",
+        hosts=headers.getlist("host"),
+        origins=headers.getlist("origin"),
+        fetch_site=headers.get("sec-fetch-site", ""),
+        fetch_mode=headers.get("sec-fetch-mode", ""),
+    )
+
+
+def _is_preflight(request: HTTPConnection) -> bool:
+    return (
+        request.scope.get("method") == "OPTIONS"
+        and "access-control-request-method" in request.headers
+    )
+
+
+def _wants_page(request: HTTPConnection) -> bool:
+    return (
+        request.scope.get("method") in ("GET", "HEAD")
+        and not request.scope["path"].startswith("/api/")
+        and "text/html" in request.headers.get("accept", "")
+    )
+
+
+def _with_cors(send: Send, foreign: str | None) -> Send:
+    """Let the pages of an allowed origin read the answer, and keep caches from mixing them up."""
+
+    async def send_with_cors(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            headers.add_vary_header("Origin")
+            if foreign is not None:
+                headers["Access-Control-Allow-Origin"] = foreign
+                # Listed by the operator and never a pattern: its pages may use the session that
+                # the browser sends along anyway for a WebSocket.
+                headers["Access-Control-Allow-Credentials"] = "true"
+                own = [name for name in headers if name.startswith("x-field-")]
+                headers["Access-Control-Expose-Headers"] = ", ".join(("ETag", "Retry-After", *own))
+        await send(message)
+
+    return send_with_cors

@@ -1,0 +1,60 @@
+"""Liveness of the bridge, readiness of the twin behind it, and metrics of both."""
+
+from __future__ import annotations
+
+import orjson
+from fastapi import APIRouter, Request, Response
+
+from lupin_bridge.metrics import CONTENT_TYPE
+from lupin_bridge.routes.tools import NEVER_KEEP, bridge_of, json_response, read_route
+from lupin_bridge.stream import schema
+
+router = APIRouter()
+
+
+@read_route(
+    router,
+    "/healthz",
+    summary="Is the bridge itself alive?",
+    responses={
+        200: {"model": schema.Health},
+        503: {"model": schema.Health, "description": "the ROS thread has ended: restart"},
+    },
+)
+async def healthz(request: Request) -> Response:
+    """503 when the ROS thread has ended, for whoever restarts services."""
+    source = bridge_of(request).source
+    alive = source.is_alive
+    body = {
+        "ok": alive,
+        "message": "The ROS thread runs." if alive else "The ROS thread has ended. Restart.",
+        "callback_errors": source.callback_errors,
+    }
+    return json_response(orjson.dumps(body), 200 if alive else 503)
+
+
+@read_route(
+    router,
+    "/metrics",
+    summary="Metrics for Prometheus",
+    responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
+)
+async def metrics(request: Request) -> Response:
+    """Clients, frames, latencies, fields, and the ROS thread, in Prometheus' text format."""
+    text = bridge_of(request).metrics.text()
+    return Response(text, headers=NEVER_KEEP, media_type=CONTENT_TYPE)
+
+
+@read_route(
+    router,
+    "/readyz",
+    summary="Is there a live twin behind the bridge?",
+    responses={
+        200: {"model": schema.StatusFrame},
+        503: {"model": schema.StatusFrame, "description": "never seen, silent, or dead"},
+    },
+)
+async def readyz(request: Request) -> Response:
+    """The status as WebSocket clients are told it; 503 while the twin is offline."""
+    status = bridge_of(request).status
+    return json_response(orjson.dumps(status.frame()), 200 if status.is_live else 503)

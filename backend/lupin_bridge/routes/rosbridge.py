@@ -1,0 +1,166 @@
+"""`/rosbridge`: roslib clients read the twin here as they would through rosbridge.
+
+What is served and what is refused stands in `rosbridge`. Of one connection there are at most
+`MAX_OPEN_CALLS` calls under way, `MAX_RUNNING_CALLS` of them with the twin; the others wait. One
+that takes longer than `field_timeout_s`, or than its own `timeout`, ends with `result` false, and
+so does one past `field_rate_hz` or the other limits of fields, which hold here as over HTTP.
+Replies wait for a slow client, at most one for each running call, and nothing more is read from
+it meanwhile; after `client_timeout_s` it is closed, as any other client.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from contextlib import ExitStack
+from typing import Final
+
+from fastapi import APIRouter, WebSocket
+
+from lupin_bridge.access.middleware import client_of
+from lupin_bridge.bridge import Bridge
+from lupin_bridge.field import formats as field_formats
+from lupin_bridge.field.limits import FieldLimitError
+from lupin_bridge.rosbridge.protocol import service_failure, service_response
+from lupin_bridge.rosbridge.services import FieldCall
+from lupin_bridge.rosbridge.session import Session, TooManyMessages
+from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
+from lupin_bridge.stream.frames import text_frame
+from lupin_bridge.stream.hub import CLOSE_POLICY, CLOSE_TRY_AGAIN_LATER, Client
+from lupin_bridge.twin.source import TwinUnavailableError
+from lupin_twin.fields import FieldRefused, FieldRequest
+
+MAX_OPEN_CALLS: Final = 32
+MAX_RUNNING_CALLS: Final = 2
+
+log = logging.getLogger(__name__)
+router = APIRouter()
+
+
+@router.websocket("/rosbridge")
+async def rosbridge(websocket: WebSocket) -> None:
+    """The read-only part of the rosbridge v2 protocol."""
+    bridge: Bridge = websocket.app.state.bridge
+    await websocket.accept()
+    if bridge.hub.is_full:
+        limit = bridge.hub.max_clients
+        await websocket.close(CLOSE_TRY_AGAIN_LATER, f"{limit} clients are connected, the limit")
+        return
+    await _Conversation(websocket, bridge).run()
+
+
+class _Conversation:
+    """One client: its session, and the calls that it waits for."""
+
+    def __init__(self, websocket: WebSocket, bridge: Bridge) -> None:
+        self._websocket = websocket
+        self._bridge = bridge
+        self._address = client_of(websocket)
+        self._connection: Connection = getattr(websocket.state, CONNECTION_KEY)
+        self._session = Session(bridge.source.names())
+        self._client = Client(
+            self._connection,
+            strict_interval=True,
+            wants_status=False,
+            wants_state=False,
+            wire=lambda _client, frame: self._session.wire(frame),
+        )
+        self._calls: set[asyncio.Task[None]] = set()
+        self._running = asyncio.Semaphore(MAX_RUNNING_CALLS)
+
+    async def run(self) -> None:
+        """Until the client has gone."""
+        self._connection.on_writable = self._go_on
+        self._bridge.join(self._client)
+        try:
+            while (event := await self._websocket.receive())["type"] != "websocket.disconnect":
+                text: str | None = event.get("text")
+                await self._take(event["bytes"] if text is None else text)
+        except TooManyMessages as error:
+            self._connection.dismiss(CLOSE_POLICY, str(error))
+            while (await self._websocket.receive())["type"] != "websocket.disconnect":
+                await asyncio.sleep(0)
+        finally:
+            self._connection.on_writable = None
+            self._bridge.hub.leave(self._client)
+            for call in self._calls:
+                call.cancel()
+
+    async def _take(self, message: str | bytes) -> None:
+        reaction = self._session.receive(message, time.monotonic())
+        for reply in reaction.replies:
+            await self._send(reply)
+        if reaction.field_call is not None:
+            await self._open(reaction.field_call)
+        self._follow_subscriptions(reaction.state_is_due)
+        # What one client has sent at once must not hold up the others.
+        await asyncio.sleep(0)
+
+    def _follow_subscriptions(self, state_is_due: bool) -> None:
+        client = self._client
+        client.wants_state = self._session.is_subscribed
+        client.min_interval_s = self._session.min_interval_s
+        if state_is_due:
+            client.sent_seq = 0
+            client.next_due_s = 0.0
+            self._bridge.serve(client)
+
+    def _go_on(self) -> None:
+        # Here and not in the hub, which looks only when a state is due: a reply may have filled
+        # the socket.
+        self._client.blocked_since_s = None
+        self._bridge.serve(self._client)
+
+    async def _send(self, message: bytes) -> None:
+        if not self._connection.can_take and self._client.blocked_since_s is None:
+            self._client.blocked_since_s = time.monotonic()
+        await self._connection.write_when_free(text_frame(message))
+
+    # --- calls of GetField --------------------------------------------------------------------
+
+    async def _open(self, field_call: FieldCall) -> None:
+        call = field_call.call
+        if len(self._calls) >= MAX_OPEN_CALLS:
+            text = f"{MAX_OPEN_CALLS} calls are under way, the limit for one client"
+            await self._send(service_failure(call.id, call.service, text))
+            return
+        limit_s = self._bridge.settings.field_timeout_s
+        if call.timeout_s is not None:
+            limit_s = min(limit_s, call.timeout_s)
+        task = asyncio.create_task(self._answer(field_call, limit_s))
+        self._calls.add(task)
+        task.add_done_callback(self._calls.discard)
+
+    async def _answer(self, field_call: FieldCall, limit_s: float) -> None:
+        deadline_s = asyncio.get_running_loop().time() + limit_s
+        call, limits = field_call.call, self._bridge.field_limits
+        async with self._running:
+            with ExitStack() as held:
+                try:
+                    held.enter_context(limits.request(self._address, time.monotonic()))
+                    async with asyncio.timeout_at(deadline_s):
+                        values = await self._values(field_call.request)
+                    response = service_response(call.id, call.service, values, result=True)
+                except TimeoutError:
+                    text = f"{call.service} did not answer within {limit_s:g} s"
+                    response = service_failure(call.id, call.service, text)
+                except (FieldLimitError, TwinUnavailableError) as error:
+                    response = service_failure(call.id, call.service, str(error))
+                except Exception:
+                    log.exception("a call of %s met an error", call.service)
+                    text = "the bridge met an error of its own, see its log"
+                    response = service_failure(call.id, call.service, text)
+                await self._send(response)
+
+    async def _values(self, request: FieldRequest) -> bytes:
+        bridge = self._bridge
+        with bridge.field_limits.computing(), bridge.metrics.field_seconds.time():
+            try:
+                result = await bridge.source.field(request)
+            except FieldRefused as error:
+                # The service has answered, and the answer is no: as over ROS, `ok` false says so.
+                return field_formats.refusal_json(str(error))
+            return await asyncio.get_running_loop().run_in_executor(
+                bridge.pool, field_formats.write_json, result.grid
+            )

@@ -1,0 +1,117 @@
+"""The state: over WebSocket, as JSON, and tag by tag."""
+
+from __future__ import annotations
+
+import orjson
+from fastapi import APIRouter, Request, Response, WebSocket
+
+from lupin_bridge.bridge import Bridge
+from lupin_bridge.routes.tools import bridge_of, error_response, json_response, read_route
+from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
+from lupin_bridge.stream import listen_query, schema, state_json
+from lupin_bridge.stream.frames import ENCODINGS
+from lupin_bridge.stream.hub import CLOSE_POLICY, CLOSE_TRY_AGAIN_LATER, Client
+from lupin_bridge.stream.listen_query import ListenRefused
+from lupin_bridge.twin.source import TwinUnavailableError
+
+router = APIRouter()
+
+_NO_TWIN = "no twin has been heard yet"
+_UNAVAILABLE = {503: {"model": schema.ErrorMessage, "description": "no twin was heard yet"}}
+_NO_TAG = {404: {"model": schema.ErrorMessage, "description": "no such tag"}}
+
+
+@router.websocket("/ws/state")
+async def ws_state(websocket: WebSocket) -> None:
+    """The status and the current state at once, then every change; a client is not listened to."""
+    bridge: Bridge = websocket.app.state.bridge
+    offered: list[str] = websocket.scope["subprotocols"]
+    try:
+        query = listen_query.parse(websocket.query_params.multi_items(), offered)
+    except ListenRefused as error:
+        # A browser that offered subprotocols and got none would never see why.
+        known = next((name for name in offered if name in ENCODINGS), None)
+        await websocket.accept(subprotocol=known)
+        await websocket.close(CLOSE_POLICY, str(error))
+        return
+    # What is selected is what is sent: a query may ask for JSON although CBOR was offered.
+    chosen = query.encoding if query.encoding in offered else None
+    await websocket.accept(subprotocol=chosen)
+    if bridge.hub.is_full:
+        limit = bridge.hub.max_clients
+        await websocket.close(CLOSE_TRY_AGAIN_LATER, f"{limit} clients are connected, the limit")
+        return
+    connection: Connection = getattr(websocket.state, CONNECTION_KEY)
+    client = Client(
+        connection,
+        encoding=query.encoding,
+        delta=query.delta,
+        min_interval_s=query.min_interval_s,
+    )
+    connection.on_writable = lambda: bridge.serve(client)
+    bridge.join(client)
+    try:
+        while (await websocket.receive())["type"] != "websocket.disconnect":
+            pass
+    finally:
+        connection.on_writable = None
+        bridge.hub.leave(client)
+
+
+@read_route(
+    router,
+    "/api/state",
+    summary="The current state of every tag",
+    responses={200: {"model": schema.TwinState}, **_UNAVAILABLE},
+)
+async def state(request: Request) -> Response:
+    """The newest TwinState with the message's own field names, and ages as of this answer."""
+    bridge = bridge_of(request)
+    latest = bridge.latest
+    if latest is None:
+        return error_response(_NO_TWIN, 503)
+    return json_response(bridge.frames.json.state(latest.snapshot, bridge.ros_time_ns))
+
+
+# An id may hold a slash, which is decoded before the routes are tried: hence :path, and the longer
+# route first.
+@read_route(
+    router,
+    "/api/tags/{tag_id:path}/history",
+    summary="The last scans of one tag",
+    responses={200: {"model": schema.TagHistory}, **_NO_TAG, **_UNAVAILABLE},
+)
+async def history(request: Request, tag_id: str) -> Response:
+    """The tag's last scans that brought readings, sensor by sensor, oldest first."""
+    bridge = bridge_of(request)
+    if bridge.latest is None:
+        return error_response(_NO_TWIN, 503)
+    try:
+        scans = await bridge.source.history(tag_id)
+    except TwinUnavailableError as error:
+        return error_response(str(error), 503)
+    if scans is None:
+        return _no_such_tag(tag_id, len(bridge.latest.snapshot.tags))
+    return json_response(orjson.dumps(state_json.history(tag_id, scans)))
+
+
+@read_route(
+    router,
+    "/api/tags/{tag_id:path}",
+    summary="One tag",
+    responses={200: {"model": schema.TwinTagState}, **_NO_TAG, **_UNAVAILABLE},
+)
+async def tag(request: Request, tag_id: str) -> Response:
+    """Everything that the twin knows about one tag."""
+    bridge = bridge_of(request)
+    latest = bridge.latest
+    if latest is None:
+        return error_response(_NO_TWIN, 503)
+    for candidate in latest.snapshot.tags:
+        if candidate.tag_id == tag_id:
+            return json_response(bridge.frames.json.tag(candidate, bridge.ros_time_ns))
+    return _no_such_tag(tag_id, len(latest.snapshot.tags))
+
+
+def _no_such_tag(tag_id: str, known: int) -> Response:
+    return error_response(f"no tag {tag_id[:64]!r} is known ({known} others are)", 404)

@@ -1,0 +1,1 @@
+"""uvicorn's protocols, and the bounds on connections."""

@@ -1,0 +1,147 @@
+"""The WebSocket connection as the fan-out needs it: write at once, or know that it cannot take it.
+
+uvicorn hands an application `send()` alone, which waits for a slow client. The fan-out must not
+wait: it asks, and keeps the newest frame for the moment at which the client is ready again.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.frames import CloseCode
+from websockets.protocol import State
+
+from lupin_bridge.serving.transports import bound_unsent, tear_down
+
+CONNECTION_KEY = "connection"
+
+# Clients have next to nothing to say, and everybody else waits while a frame of theirs is parsed:
+# 3 ms at a time, of the smallest frames, and a hundredth of a second at once.
+READ_BYTES = 8_192
+FRAMES_PER_S = 1_000
+FRAMES_AT_ONCE = 5_000
+
+# How long a client that is told to go has to read the reason before its socket is torn down. Closed
+# at once, with more of the client's still on its way, it would be reset, and the reason lost.
+CLOSE_GRACE_S = 1.0
+
+
+_READ_BUFFER = memoryview(bytearray(READ_BYTES))
+
+
+class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
+    """uvicorn's protocol, that also puts itself into `scope["state"]["connection"]`.
+
+    Buffered, so that a client is heard in small helpings, each in its turn.
+    """
+
+    def __init__(
+        self,
+        config: Any,
+        server_state: Any,
+        app_state: dict[str, Any],
+        _loop: asyncio.AbstractEventLoop | None = None,
+    ) -> None:
+        super().__init__(config, server_state, {**app_state, CONNECTION_KEY: self}, _loop)
+        self.on_writable: Callable[[], None] | None = None
+        # When all frames heard would be through at the allowed rate (ITU-T I.371).
+        self._frames_through_s = 0.0
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Stop at the first bytes that the socket does not take: what is queued is one frame.
+
+        Over TLS, asyncio keeps another 64 kB below the limit that can be set.
+        """
+        super().connection_made(transport)
+        bound_unsent(transport)
+        # Not 0: asyncio's TLS transport stops at the limit, not past it, and would stop on nothing.
+        self.transport.set_write_buffer_limits(high=1, low=0)
+
+    def get_buffer(self, sizehint: int) -> memoryview:  # noqa: ARG002  # asyncio's suggestion
+        """Where the next bytes go; shared by all connections, for they are read at once."""
+        return _READ_BUFFER
+
+    def buffer_updated(self, nbytes: int) -> None:
+        """Bytes have come."""
+        self.data_received(bytes(_READ_BUFFER[:nbytes]))
+
+    def handle_events(self) -> None:
+        """Handle the frames that a client has sent, unless it sends too many."""
+        now_s = self.loop.time()
+        heard_s = max(self._frames_through_s, now_s) + len(self.conn.events) / FRAMES_PER_S
+        if heard_s - now_s <= FRAMES_AT_ONCE / FRAMES_PER_S:
+            self._frames_through_s = heard_s
+            super().handle_events()
+        else:
+            self.transport.pause_reading()
+            self.dismiss(
+                CloseCode.POLICY_VIOLATION,
+                f"sent more than {FRAMES_PER_S} frames a second after {FRAMES_AT_ONCE} at once",
+            )
+
+    def resume_writing(self) -> None:
+        """The socket has taken everything: time for the newest frame."""
+        super().resume_writing()
+        if self.on_writable is not None:
+            self.on_writable()
+
+    async def send(self, message: Any) -> None:
+        """Pass on; a handshake that was answered with a refusal counts as complete.
+
+        uvicorn would take it for one that the application forgot, and log an error for each.
+        """
+        await super().send(message)
+        if message["type"] == "websocket.http.response.body" and self.close_sent:
+            self.handshake_complete = True
+
+    def handle_ping(self) -> None:
+        """Answer a ping, unless its sender does not read: unread answers would only pile up."""
+        pong = b"".join(self.conn.data_to_send())
+        if self.writable.is_set():
+            self.transport.write(pong)
+
+    def handle_parser_exception(self) -> None:
+        """Answer what breaks the protocol or a limit with the reason; the rest is thrown away."""
+        close = self.conn.close_sent
+        if close is None or self.close_sent:
+            return  # the parser repeats its complaint with whatever else comes
+        self.queue.put_nowait(
+            {"type": "websocket.disconnect", "code": close.code, "reason": close.reason}
+        )
+        self._say_last_words()
+
+    @property
+    def can_take(self) -> bool:
+        """Whether everything written so far has gone out, and more may follow."""
+        return self.writable.is_set() and not self.close_sent and not self.transport.is_closing()
+
+    def write(self, wire: bytes) -> None:
+        """Write a whole frame; never waits. The caller has asked `can_take`."""
+        self.transport.write(wire)
+
+    async def write_when_free(self, wire: bytes) -> None:
+        """Write as soon as all before has gone out; at most one frame slips in between.
+
+        Nothing is written to a connection that is closing.
+        """
+        await self.writable.wait()
+        if not self.close_sent and not self.transport.is_closing():
+            self.transport.write(wire)
+
+    def dismiss(self, code: int, reason: str) -> None:
+        """Send a close frame with the reason, and tear the socket down if nobody reads it."""
+        if self.conn.state is State.OPEN and not self.transport.is_closing():
+            self.conn.send_close(code, reason)
+            self._say_last_words()
+        else:
+            self.loop.call_later(CLOSE_GRACE_S, tear_down, self.transport)
+
+    def _say_last_words(self) -> None:
+        """Write the close frame that the protocol has ready, and end after the grace."""
+        self.transport.write(b"".join(self.conn.data_to_send()))
+        self.close_sent = True
+        # uvicorn's own: with it, the end of the application is not yet that of the connection.
+        self.close_timer = self.loop.call_later(CLOSE_GRACE_S, tear_down, self.transport)

@@ -1,0 +1,1 @@
+"""The state on its way to clients: JSON, frames, fan-out, status."""

@@ -1,0 +1,151 @@
+"""WebSocket frames of the state: each encoding made once, and shared by every client.
+
+Pure. A frame is written in an encoding when the first client asks for it, and kept for the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import cbor2
+import orjson
+from websockets.frames import Frame, Opcode
+
+from lupin_bridge.stream.state_json import StateJson, header
+from lupin_bridge.stream.status import Status
+from lupin_twin.state import Snapshot, TagState
+
+JSON: Final = "json"
+CBOR: Final = "cbor"
+
+
+def text_frame(payload: bytes) -> bytes:
+    """UTF-8 text as one WebSocket text frame; a server does not mask (RFC 6455, section 5.1)."""
+    return Frame(Opcode.TEXT, payload).serialize(mask=False)
+
+
+def binary_frame(payload: bytes) -> bytes:
+    """Bytes as one WebSocket binary frame."""
+    return Frame(Opcode.BINARY, payload).serialize(mask=False)
+
+
+def _cbor_frame(json_payload: bytes) -> bytes:
+    # By way of the JSON: what the two encodings say is the same to the last field.
+    return binary_frame(cbor2.dumps(orjson.loads(json_payload)))
+
+
+_WRITERS: Final[Mapping[str, Callable[[bytes], bytes]]] = {JSON: text_frame, CBOR: _cbor_frame}
+ENCODINGS: Final = tuple(_WRITERS)
+
+
+def status_frame(status: Status, encoding: str = JSON) -> bytes:
+    """A status as a WebSocket frame."""
+    return _WRITERS[encoding](orjson.dumps(status.frame()))
+
+
+@dataclass(slots=True, eq=False)
+class StateFrame:
+    """One state on its way to every client.
+
+    `base` is the frame before it, whose own base is cut off: a delta goes back by one.
+    """
+
+    seq: int
+    revision: str
+    snapshot: Snapshot
+    base: StateFrame | None
+    _writer: FrameWriter
+    _json: bytes | None = None
+    _wires: dict[tuple[str, str], bytes] = field(default_factory=dict)
+
+    @property
+    def json(self) -> bytes:
+        """The state as JSON of `schema.TwinState`; 10 ms of work for 10,000 tags, if asked for."""
+        if self._json is None:
+            self._json = self._writer.json.state(self.snapshot)
+        return self._json
+
+    def let_go(self) -> None:
+        """Keep only what a delta needs: or every frame ever made would stay in memory."""
+        self.base = None
+        self._json = None
+        self._wires.clear()
+
+    def full(self, encoding: str) -> bytes:
+        """`schema.StateFrame` as a WebSocket frame."""
+        return self.wire("full", encoding, self._full)
+
+    def delta(self, encoding: str) -> bytes:
+        """`schema.DeltaFrame` as a WebSocket frame: only what is not as in `base`."""
+        return self.wire("delta", encoding, self._delta)
+
+    def wire(self, kind: str, encoding: str, payload: Callable[[], bytes]) -> bytes:
+        """The frame of this kind in this encoding, from `payload()` if it is the first call."""
+        key = (kind, encoding)
+        if key not in self._wires:
+            self._wires[key] = _WRITERS[encoding](payload())
+        return self._wires[key]
+
+    def _full(self) -> bytes:
+        return b'{"type":"state","seq":%d,"revision":%b,"state":%b}' % (
+            self.seq,
+            orjson.dumps(self.revision),
+            self.json,
+        )
+
+    def _delta(self) -> bytes:
+        assert self.base is not None  # the hub asks only then
+        changed, removed = difference(self.base.snapshot.tags, self.snapshot.tags)
+        stamp_ns = self.snapshot.stamp_ns
+        return (
+            b'{"type":"delta","seq":%d,"base":%d,"revision":%b,"header":%b,'
+            b'"changed":[%b],"removed":%b}'
+        ) % (
+            self.seq,
+            self.base.seq,
+            orjson.dumps(self.revision),
+            orjson.dumps(header(stamp_ns, self.snapshot.frame_id)),
+            b",".join([self._writer.json.tag(tag, stamp_ns) for tag in changed]),
+            orjson.dumps(removed),
+        )
+
+
+def difference(
+    before: Sequence[TagState], after: Sequence[TagState]
+) -> tuple[list[TagState], list[str]]:
+    """The tags of `after` that are not the very same in `before`, and the tag_ids that are gone.
+
+    Tags keep their places for as long as a twin lives, new ones come behind them: place by place,
+    10,000 tags take 0.3 ms. Only a twin that was restarted makes a look-up by name necessary.
+    """
+    pairs = [(old, new) for old, new in zip(before, after, strict=False) if old is not new]
+    if len(after) >= len(before) and all(old.tag_id == new.tag_id for old, new in pairs):
+        return [*(new for _, new in pairs), *after[len(before) :]], []
+    left = {tag.tag_id: tag for tag in before}
+    changed = [tag for tag in after if left.pop(tag.tag_id, None) is not tag]
+    return changed, list(left)
+
+
+class FrameWriter:
+    """Numbers the frames; `seq` starts at 1 and grows by one a frame."""
+
+    def __init__(self) -> None:
+        self.json = StateJson()
+        self._newest: StateFrame | None = None
+
+    def state(self, snapshot: Snapshot, revision: str) -> StateFrame:
+        """The next state frame."""
+        base = self._newest
+        if base is not None:
+            base.let_go()
+        frame = StateFrame(
+            seq=1 if base is None else base.seq + 1,
+            revision=revision,
+            snapshot=snapshot,
+            base=base,
+            _writer=self,
+        )
+        self._newest = frame
+        return frame

@@ -1,0 +1,204 @@
+"""Fan-out of state frames: one frame for all, and for a slow client only ever the newest.
+
+The policy for slow clients, in full: a frame is written to a client whose socket has taken all of
+the one before. To any other client nothing is written and nothing queued; when its socket is free
+again it gets the newest frame there is, and sees from `seq` what it skipped. A client that cannot
+take a frame for `client_timeout_s` is closed.
+
+No input or output here and no clock: connections and times (seconds of a clock that never jumps)
+are arguments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from lupin_bridge.stream.frames import JSON, StateFrame, status_frame
+from lupin_bridge.stream.status import Status
+
+# RFC 6455, section 7.4.1, and the IANA registry: 1008 policy violation, 1013 try again later.
+CLOSE_POLICY: Final = 1008
+CLOSE_TRY_AGAIN_LATER: Final = 1013
+
+
+# Frames come a little early or late; so much of an interval is forgiven.
+BEAT_SLACK: Final = 0.1
+
+
+def next_beat_s(due_s: float, now_s: float, interval_s: float) -> float:
+    """When the next frame is due after one at `now_s`, that was due at `due_s`.
+
+    A beat, not a distance from this frame on: or of a source that keeps to the rate, a client would
+    miss the frame after each one that was a little late. After a pause the beat begins anew: what
+    was not sent then is not made up for.
+    """
+    return max(due_s, now_s - BEAT_SLACK * interval_s) + interval_s
+
+
+class Writable(Protocol):
+    """What the hub needs of a connection; `ws_protocol.Connection` is one."""
+
+    @property
+    def can_take(self) -> bool:
+        """Whether everything written so far has gone out."""
+
+    def write(self, wire: bytes) -> None:
+        """Write without waiting."""
+
+    def dismiss(self, code: int, reason: str) -> None:
+        """Close with a reason, whether or not the other side reads."""
+
+
+def plain_wire(client: Client, frame: StateFrame) -> bytes:
+    """A frame for a listener of `/ws/state`: a delta where it asked for them and has the base."""
+    base = frame.base
+    if client.delta and base is not None and base.seq == client.sent_seq:
+        return frame.delta(client.encoding)
+    return frame.full(client.encoding)
+
+
+@dataclass(slots=True, eq=False)
+class Client:
+    """One listener: what it asked for, what it has got, and since when its socket is full.
+
+    `min_interval_s` is the time between two frames: now and then a tenth less, on average right;
+    never less where `strict_interval`. `wire` writes a frame as this client reads it.
+    """
+
+    connection: Writable
+    encoding: str = JSON
+    delta: bool = False
+    min_interval_s: float = 0.0
+    strict_interval: bool = False
+    wants_status: bool = True
+    wants_state: bool = True
+    wire: Callable[[Client, StateFrame], bytes] = plain_wire
+    sent_seq: int = 0
+    next_due_s: float = 0.0
+    status_due: bool = True
+    blocked_since_s: float | None = None
+
+
+class Hub:
+    """Every client and the newest frame. Belongs to the event loop."""
+
+    def __init__(
+        self, max_clients: int, client_timeout_s: float, status_at: Callable[[float], Status]
+    ) -> None:
+        self.max_clients = max_clients
+        self.frames_sent = 0
+        self.frames_skipped = 0
+        self.bytes_sent = 0
+        self.clients_dismissed = 0
+        self._client_timeout_s = client_timeout_s
+        self._clients: set[Client] = set()
+        self._frame: StateFrame | None = None
+        self._status_at = status_at
+        self._status_wires: dict[str, bytes] = {}
+        self._status_wires_s = 0.0
+
+    def __len__(self) -> int:
+        return len(self._clients)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether one more client would be one too many."""
+        return len(self._clients) >= self.max_clients
+
+    @property
+    def blocked(self) -> int:
+        """How many clients have a socket that takes nothing just now."""
+        return sum(client.blocked_since_s is not None for client in self._clients)
+
+    def join(self, client: Client, now_s: float) -> None:
+        """Add a client and give it the status and the current state at once, in that order."""
+        self._clients.add(client)
+        self.serve(client, now_s)
+
+    def leave(self, client: Client) -> None:
+        """Forget a client; harmless if it has left already."""
+        self._clients.discard(client)
+
+    def publish(self, frame: StateFrame, now_s: float) -> None:
+        """Make this the newest frame and give it to everyone who can take it."""
+        self._frame = frame
+        self.serve_all(now_s)
+
+    def announce(self, now_s: float) -> None:
+        """The status is another one: give it to everyone who can take it."""
+        self._status_wires.clear()
+        for client in self._clients:
+            client.status_due = True
+        self.serve_all(now_s)
+
+    def serve_all(self, now_s: float) -> None:
+        """Give everyone what they lack and can take now."""
+        for client in self._clients:
+            self.serve(client, now_s)
+
+    def serve(self, client: Client, now_s: float) -> None:
+        """Give a client what it lacks, as far as its socket takes it and its rate allows."""
+        if client.status_due and client.wants_status:
+            if not self._write(client, self._status_wire(client.encoding, now_s), now_s):
+                return
+            client.status_due = False
+        if not client.wants_state:
+            if not client.connection.can_take:
+                self._mark_blocked(client, now_s)
+            return
+        frame = self._frame
+        if frame is None or frame.seq == client.sent_seq or now_s < client.next_due_s:
+            return
+        if not client.connection.can_take:
+            self._mark_blocked(client, now_s)
+            return
+        if self._write(client, client.wire(client, frame), now_s):
+            if client.sent_seq:
+                self.frames_skipped += frame.seq - client.sent_seq - 1
+            self.frames_sent += 1
+            client.sent_seq = frame.seq
+            if client.strict_interval:
+                client.next_due_s = now_s + client.min_interval_s
+            else:
+                client.next_due_s = next_beat_s(client.next_due_s, now_s, client.min_interval_s)
+
+    def dismiss_stuck(self, now_s: float) -> int:
+        """Close every client that has not taken a frame for too long; returns how many."""
+        stuck = [
+            client
+            for client in self._clients
+            if client.blocked_since_s is not None
+            and now_s - client.blocked_since_s >= self._client_timeout_s
+        ]
+        for client in stuck:
+            self.leave(client)
+            client.connection.dismiss(
+                CLOSE_POLICY, f"took no frame for {self._client_timeout_s:g} s"
+            )
+        self.clients_dismissed += len(stuck)
+        return len(stuck)
+
+    def _status_wire(self, encoding: str, now_s: float) -> bytes:
+        # Written once for all who get it at the same moment, and never kept for later: it tells an
+        # age, and who joins a twin long dead must not take its tags for seconds old.
+        if now_s != self._status_wires_s:
+            self._status_wires.clear()
+            self._status_wires_s = now_s
+        if encoding not in self._status_wires:
+            self._status_wires[encoding] = status_frame(self._status_at(now_s), encoding)
+        return self._status_wires[encoding]
+
+    def _write(self, client: Client, wire: bytes, now_s: float) -> bool:
+        if not client.connection.can_take:
+            self._mark_blocked(client, now_s)
+            return False
+        client.blocked_since_s = None
+        client.connection.write(wire)
+        self.bytes_sent += len(wire)
+        return True
+
+    def _mark_blocked(self, client: Client, now_s: float) -> None:
+        if client.blocked_since_s is None:
+            client.blocked_since_s = now_s

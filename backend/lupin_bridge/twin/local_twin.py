@@ -1,0 +1,160 @@
+"""The source of `serve`: a twin in this process, in a thread of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import uuid
+from collections.abc import Callable, Coroutine, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
+
+from lupin_bridge.twin.ros_thread import RosThread
+from lupin_bridge.twin.source import CacheCounts, Revised, RevisedGrid, TwinNames, TwinTimeoutError
+from lupin_twin.explored import OccupancyMap
+from lupin_twin.fields import FieldJob, FieldRequest, FieldRules
+from lupin_twin.idw import FieldGrid
+from lupin_twin.node import TwinNode
+from lupin_twin.state import Observation
+
+# A third of what counts as silence (`status.STALE_AFTER_S`).
+HEARTBEAT_S = 1.0
+
+ResultT = TypeVar("ResultT")
+
+
+class LocalTwin:
+    """`TwinSource` over a `TwinNode` of this process."""
+
+    def __init__(self, *, ros_args: Sequence[str], timeout_s: float) -> None:
+        self._ros_args = ros_args
+        self._timeout_s = timeout_s
+        # A restarted server must never match an ETag of its predecessor, whose counts it repeats.
+        self._identity = uuid.uuid4().hex[:12]
+        self._thread: RosThread[TwinNode, Revised]
+        # Two, so that one heavy field does not hold up all the others.
+        self._pool = ThreadPoolExecutor(max_workers=2, thread_name_prefix="field")
+        self._computing: dict[object, asyncio.Task[FieldGrid]] = {}
+
+    async def start(
+        self, on_state: Callable[[Revised], None], on_death: Callable[[], None]
+    ) -> None:
+        """Start the ROS thread with its node; see `TwinSource.start`."""
+
+        def make_node(context: Any, post: Callable[[Revised], None]) -> TwinNode:
+            node = TwinNode(context=context)
+            node.add_listener(
+                lambda snapshot: post(Revised(snapshot, self._revision_of(node))), HEARTBEAT_S
+            )
+            return node
+
+        self._thread = RosThread(
+            make_node, ros_args=self._ros_args, on_event=on_state, on_death=on_death
+        )
+        await self._thread.start()
+
+    async def stop(self) -> None:
+        """Stop the ROS thread and the workers."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        await self._thread.stop()
+
+    @property
+    def identity(self) -> str:
+        """Of this process: its counts start over with the next one."""
+        return self._identity
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether the ROS thread runs."""
+        return self._thread.is_alive
+
+    @property
+    def calls_waiting(self) -> int:
+        """Calls that wait for the ROS thread now."""
+        return self._thread.calls_waiting
+
+    @property
+    def callback_errors(self) -> int:
+        """Errors met by the node's callbacks so far."""
+        return self._thread.callback_errors
+
+    def revision(self) -> str:
+        """The process's identity, the observation count and the map's revision."""
+        return self._thread.peek(self._revision_of)
+
+    def twin_count(self) -> int:
+        """How many nodes publish the state topic, ours included."""
+        return self._thread.peek(lambda node: node.twins.value)
+
+    def rules(self) -> FieldRules:
+        """The node's parameters for fields."""
+        return self._thread.peek(lambda node: node.fields.rules)
+
+    def names(self) -> TwinNames:
+        """The parameters `state_topic` and `field_service_name` as ROS resolves them."""
+        return self._thread.peek(
+            lambda node: TwinNames(
+                node.resolve_topic_name(node.parameters.state_topic),
+                node.resolve_service_name(node.parameters.field_service_name),
+            )
+        )
+
+    def cache_counts(self) -> CacheCounts:
+        """The node's cache of fields."""
+        cache = self._thread.peek(lambda node: node.fields.cache)
+        return CacheCounts(cache.hits, cache.misses, len(cache), cache.bytes)
+
+    def occupancy_map(self) -> OccupancyMap | None:
+        """The latest map that the node accepted."""
+        return self._thread.peek(lambda node: node.occupancy_map)
+
+    async def field(self, request: FieldRequest) -> RevisedGrid:
+        """A hit from the node's cache, or the field computed on a worker and handed back to it."""
+        return await self._in_time(self._field(request))
+
+    async def history(self, tag_id: str) -> tuple[Observation, ...] | None:
+        """The last `buffer_len` scans of a tag."""
+        return await self._in_time(self._thread.call(lambda node: node.store.history(tag_id)))
+
+    async def _field(self, request: FieldRequest) -> RevisedGrid:
+        def look_up(node: TwinNode) -> tuple[FieldGrid | FieldJob, str]:
+            answer = node.fields.lookup(request, node.store, node.occupancy_map)
+            return answer, self._revision_of(node)
+
+        answer, revision = await self._thread.call(look_up)
+        if isinstance(answer, FieldJob):
+            answer = await self._compute_once(answer)
+        return RevisedGrid(answer, revision)
+
+    async def _compute_once(self, job: FieldJob) -> FieldGrid:
+        """Identical requests in flight share one computation; who leaves does not end it."""
+        task = self._computing.get(job.key)
+        if task is None:
+            task = asyncio.create_task(self._compute(job))
+            self._computing[job.key] = task
+
+            def forget(done: asyncio.Task[FieldGrid]) -> None:
+                del self._computing[job.key]
+                if not done.cancelled():
+                    done.exception()  # looked at, should all who waited have left
+
+            task.add_done_callback(forget)
+        return await asyncio.shield(task)
+
+    async def _compute(self, job: FieldJob) -> FieldGrid:
+        loop = asyncio.get_running_loop()
+        grid = await loop.run_in_executor(self._pool, job.compute)
+        await self._thread.call(lambda node: node.fields.keep(job, grid))
+        return grid
+
+    async def _in_time(self, answer: Coroutine[Any, Any, ResultT]) -> ResultT:
+        try:
+            async with asyncio.timeout(self._timeout_s):
+                return await answer
+        except TimeoutError:
+            raise TwinTimeoutError(
+                f"the twin did not answer within {self._timeout_s:g} s (field_timeout_s)"
+            ) from None
+
+    def _revision_of(self, node: TwinNode) -> str:
+        observation_count, map_revision = node.revision
+        return f"{self._identity}-{observation_count}-{map_revision}"

@@ -1,0 +1,317 @@
+"""The doorman of a live bridge: foreign hosts and pages, tokens, and a discreet log."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from lupin_bridge.access.middleware import GUESS_BURST, OPEN_PATHS, Access
+from lupin_bridge.settings import SettingError, Settings
+from lupin_bridge.stream import schema
+from tests.support.access import BEARER, TOKEN, Served, refused_start, served
+from tests.support.domains import own_domain
+from tests.support.processes import lupin_twin, url_of
+from tests.support.waiting import wait_for
+from tests.support.web import ROUTES
+
+PANEL = "http://panel.example:3000"
+UPGRADE = {
+    "Connection": "Upgrade",
+    "Upgrade": "websocket",
+    "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
+    "Sec-WebSocket-Version": "13",
+}
+PAGE = {"Accept": "text/html,application/xhtml+xml,*/*;q=0.8"}
+WRONG = {"Authorization": f"Bearer {TOKEN[::-1]}"}
+PATHS = [path.replace("{tag_id}", "7") for path in ROUTES]
+
+
+@pytest.fixture(scope="module")
+def open_bridge() -> Iterator[Served]:
+    """Without a token; pages of one foreign origin may read."""
+    with served("--allow-origin", PANEL, "--allow-origin", "https://robot.example") as running:
+        yield running
+        assert "ERROR" not in running.process.output
+
+
+@pytest.fixture(scope="module")
+def closed(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[Served]:
+    """With a token; at its end, its log is searched for it."""
+    with served(LUPIN_TOKEN=TOKEN, ROS_LOG_DIR=str(tmp_path_factory.mktemp("log"))) as running:
+        yield running
+        assert "ERROR" not in running.process.output
+        assert TOKEN not in running.process.output
+
+
+def refusal_of(answer: httpx.Response) -> str:
+    """The detail of a refusal that has all the headers of one."""
+    assert answer.headers["x-content-type-options"] == "nosniff"
+    assert answer.headers["cross-origin-resource-policy"] == "same-origin"
+    assert answer.headers["cache-control"] == "no-store"
+    return schema.ErrorMessage.model_validate_json(answer.content).detail
+
+
+@pytest.mark.parametrize("origin", ["", "*", "null", "panel.example", "http://panel.example/x"])
+def test_an_allowed_origin_has_to_be_one(origin: str) -> None:
+    with pytest.raises(SettingError, match=r"--allow-origin: .* is not an origin") as refused:
+        Access.of(Settings(allow_origin=("http://good.example", origin)), None)
+    assert repr(origin) in str(refused.value)
+
+
+# --- Host ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost:9", "[::1]", "robot.example:8443"])
+def test_own_names_are_served(open_bridge: Served, host: str) -> None:
+    assert open_bridge.get("/api/state", {"Host": host}).status_code == 200
+
+
+@pytest.mark.parametrize("path", ["/api/state", "/healthz", "/", "/signin", "/nowhere"])
+def test_a_rebound_name_gets_nothing(open_bridge: Served, path: str) -> None:
+    answer = open_bridge.get(path, {"Host": "evil.example:8000"})
+    assert answer.status_code == 403
+    detail = refusal_of(answer)
+    assert "'evil.example'" in detail
+    assert "--allow-origin http://evil.example:8000" in detail
+
+
+def test_a_rebound_name_gets_no_websocket(open_bridge: Served) -> None:
+    headers = {**UPGRADE, "Host": "evil.example", "Origin": "http://evil.example"}
+    answer = open_bridge.get("/ws/state", headers)
+    assert answer.status_code == 403
+    assert "'evil.example'" in refusal_of(answer)
+
+
+# --- Origin -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "http://127.0.0.1:1", "null"])
+def test_a_foreign_page_gets_neither_an_answer_nor_leave_to_read_it(
+    open_bridge: Served, origin: str
+) -> None:
+    answer = open_bridge.get("/api/state", {"Origin": origin})
+    assert answer.status_code == 403
+    assert repr(origin) in refusal_of(answer)
+    assert not [name for name in answer.headers if name.startswith("access-control-")]
+
+
+@pytest.mark.parametrize("path", ["/ws/state", "/rosbridge", "/ws/nowhere"])
+def test_a_foreign_page_gets_no_websocket(open_bridge: Served, path: str) -> None:
+    assert open_bridge.handshake(path, {"Origin": "http://evil.example"}) == 403
+
+
+def test_the_own_page_needs_no_leave(open_bridge: Served) -> None:
+    answer = open_bridge.get("/api/state", {"Origin": open_bridge.url})
+    assert answer.status_code == 200
+    assert "access-control-allow-origin" not in answer.headers
+    assert open_bridge.handshake(headers={"Origin": open_bridge.url}) == 101
+
+
+def test_the_pages_of_an_allowed_origin_may_read(open_bridge: Served) -> None:
+    answer = open_bridge.get("/api/field?sensor_type=co2", {"Origin": PANEL})
+    assert answer.status_code == 200
+    assert answer.headers["access-control-allow-origin"] == PANEL
+    assert answer.headers["access-control-allow-credentials"] == "true"
+    exposed = answer.headers["access-control-expose-headers"].lower().split(", ")
+    assert {"etag", "retry-after", "x-field-sample-count"} <= set(exposed)
+    assert open_bridge.handshake(headers={"Origin": PANEL}) == 101
+
+
+def test_a_cache_keeps_the_origins_apart(open_bridge: Served) -> None:
+    for headers in ({}, {"Origin": PANEL}, {"Origin": "http://evil.example"}):
+        assert "Origin" in open_bridge.get("/api/state", headers).headers["vary"]
+    both = open_bridge.get("/api/field?sensor_type=co2", {"Origin": PANEL}).headers["vary"]
+    assert {part.strip() for part in both.split(",")} == {"Accept", "Origin"}
+
+
+def test_an_allowed_page_may_ask_before_it_sends_a_token(open_bridge: Served) -> None:
+    asks = {"Access-Control-Request-Method": "GET"}
+    answer = open_bridge.get("/api/state", {"Origin": PANEL, **asks}, method="OPTIONS")
+    assert (answer.status_code, answer.content) == (204, b"")
+    assert answer.headers["access-control-allow-origin"] == PANEL
+    assert answer.headers["access-control-allow-methods"] == "GET, HEAD"
+    assert "Authorization" in answer.headers["access-control-allow-headers"]
+    for origin, status in (("http://evil.example", 403), (open_bridge.url, 405)):
+        other = open_bridge.get("/api/state", {"Origin": origin, **asks}, method="OPTIONS")
+        assert other.status_code == status
+        assert "access-control-allow-origin" not in other.headers
+
+
+def test_an_allowed_page_cannot_write_either(open_bridge: Served) -> None:
+    assert open_bridge.get("/api/state", {"Origin": PANEL}, method="POST").status_code == 405
+
+
+def test_a_picture_in_a_foreign_page_is_not_even_computed(open_bridge: Served) -> None:
+    hidden = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors"}
+    answer = open_bridge.get("/api/field.png?sensor_type=co2", hidden)
+    assert answer.status_code == 403
+    assert "asks without naming itself" in refusal_of(answer)
+    link = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "navigate"}
+    assert open_bridge.get("/", link).status_code == 200
+
+
+# --- the token ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", [path for path in PATHS if path not in OPEN_PATHS])
+def test_every_route_wants_the_token(closed: Served, path: str) -> None:
+    answer = closed.get(path)
+    assert answer.status_code == 401
+    assert answer.headers["www-authenticate"].startswith("Bearer")
+    assert refusal_of(answer) == (
+        "a token is needed: send it as Authorization: Bearer, or sign in at /signin"
+    )
+    assert closed.get(path, BEARER).status_code not in (401, 403, 429)
+
+
+@pytest.mark.parametrize(
+    "path", ["/nowhere", "/assets/app.js", "/lupin.svg", "/healthz/", "/SIGNIN"]
+)
+def test_what_is_there_and_what_is_not_looks_the_same_without_it(closed: Served, path: str) -> None:
+    assert closed.get(path).status_code == 401
+
+
+@pytest.mark.parametrize("path", sorted(OPEN_PATHS))
+def test_life_shows_and_signing_in_works_without_it(closed: Served, path: str) -> None:
+    assert closed.get(path).status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("path", "location"),
+    [
+        ("/", "signin"),
+        ("/docs", "signin"),
+        ("/some/where/", "../../signin"),
+        ("//evil", "../signin"),
+    ],
+)
+def test_a_person_is_sent_to_the_sign_in_page(closed: Served, path: str, location: str) -> None:
+    answer = closed.get(closed.url + path, PAGE)
+    assert (answer.status_code, answer.headers["location"]) == (303, location)
+    assert answer.headers["cache-control"] == "no-store"
+
+
+def test_a_person_who_opens_an_api_address_is_told(closed: Served) -> None:
+    assert closed.get("/api/state", PAGE).status_code == 401
+
+
+def test_a_method_that_writes_is_not_discussed_with_strangers(closed: Served) -> None:
+    assert closed.get("/api/state", method="POST").status_code == 401
+    assert closed.get("/api/state", BEARER, method="POST").status_code == 405
+
+
+@pytest.mark.parametrize("path", ["/ws/state", "/rosbridge"])
+def test_a_websocket_wants_the_token(closed: Served, path: str) -> None:
+    assert closed.handshake(path) == 401
+    answer = closed.get(path, UPGRADE)
+    assert answer.headers["www-authenticate"].startswith("Bearer")
+    assert "a token is needed" in refusal_of(answer)
+
+
+def test_a_websocket_opens_with_the_token_or_a_session(closed: Served) -> None:
+    assert closed.handshake(headers=BEARER) == 101
+    session = closed.get("/api/signin", BEARER).headers["set-cookie"].partition(";")[0]
+    assert closed.handshake(headers={"Cookie": session}) == 101
+    assert closed.handshake(headers={"Cookie": f"other=1; {session}"}) == 101
+    assert closed.handshake(headers={"Cookie": session[:-1] + "x"}) == 401
+
+
+def test_a_token_in_the_address_opens_nothing(closed: Served) -> None:
+    for query in (f"?token={TOKEN}", f"?access_token={TOKEN}", f"?LUPIN_TOKEN={TOKEN}"):
+        assert closed.get("/api/state" + query).status_code == 401
+        assert closed.handshake("/ws/state" + query) == 401
+
+
+def test_a_good_token_does_not_open_the_door_to_foreign_pages(closed: Served) -> None:
+    assert closed.get("/api/state", {**BEARER, "Origin": "http://evil.example"}).status_code == 403
+    assert closed.get("/api/state", {**BEARER, "Host": "evil.example"}).status_code == 403
+
+
+def test_guessing_is_slowed_down_for_the_guesser_alone(closed: Served) -> None:
+    with closed.client("127.0.5.1") as guesser, closed.client("127.0.5.2") as other:
+        session = other.get("/api/signin", headers=BEARER).headers["set-cookie"].partition(";")[0]
+        answers = [guesser.get("/api/signin", headers=WRONG)]
+        while answers[-1].status_code == 401 and len(answers) < 100:
+            assert "not the bridge's token" in refusal_of(answers[-1])
+            answers.append(guesser.get("/api/signin", headers=WRONG))
+        assert len(answers) > GUESS_BURST
+        assert answers[-1].status_code == 429
+        assert 1 <= int(answers[-1].headers["retry-after"]) <= 6
+        assert "127.0.5.1 has sent" in refusal_of(answers[-1])
+        # No oracle: the right token is not looked at either.
+        assert guesser.get("/api/state", headers=BEARER).status_code == 429
+        # A session cannot be guessed, so it goes on; and other addresses do not notice.
+        assert guesser.get("/api/state", headers={"Cookie": session}).status_code == 200
+        assert other.get("/api/state", headers=BEARER).status_code == 200
+    assert closed.process.output.count("wrong token from 127.0.5.1") == len(answers) - 1
+
+
+def test_good_tokens_and_old_cookies_are_no_guesses(closed: Served) -> None:
+    with closed.client("127.0.6.1") as client:
+        for _ in range(GUESS_BURST + 5):
+            assert client.get("/api/state", headers=BEARER).status_code == 200
+            old = {"Cookie": "lupin_session_00000000=1.0"}
+            assert client.get("/api/state", headers=old).status_code == 401
+        assert client.get("/api/state", headers=BEARER).status_code == 200
+
+
+def test_no_log_carries_a_token_or_a_session(tmp_path: Path) -> None:
+    with served(LUPIN_TOKEN=TOKEN, ROS_LOG_DIR=str(tmp_path)) as live:
+        session = live.get("/api/signin", BEARER).headers["set-cookie"].partition(";")[0]
+        live.get("/api/signin", WRONG)
+        live.get(f"/api/state?token={TOKEN}", {"Cookie": session})
+        live.get("/api/state", {"Authorization": f"Basic {TOKEN}"})
+        live.handshake(headers=BEARER)
+        live.handshake(headers=WRONG)
+        live.handshake(f"/ws/state?token={TOKEN}")
+        live.get("/api/state", {**BEARER, "Host": "evil.example"})
+        assert live.process.stop() == 0
+        logs = [live.process.output, *(f.read_text() for f in tmp_path.rglob("*") if f.is_file())]
+        assert "wrong token from 127.0.0.1" in logs[0]
+        for secret in (TOKEN, TOKEN[::-1], session.partition("=")[2]):
+            assert not [log for log in logs if secret in log]
+
+
+# --- at the start -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("token", ["", "short", "with a space in it"])
+def test_a_token_that_cannot_be_one_ends_the_start(token: str) -> None:
+    line = refused_start(LUPIN_TOKEN=token)
+    assert line.startswith("lupin-twin: LUPIN_TOKEN h")
+    assert not token or token not in line
+
+
+def test_an_origin_that_is_none_ends_the_start() -> None:
+    line = refused_start("--allow-origin", PANEL, "--allow-origin", "panel.example")
+    assert line.startswith("lupin-twin: --allow-origin: 'panel.example' is not an origin")
+
+
+def test_listening_further_than_this_machine_is_said_loudly() -> None:
+    with served("--host", "0.0.0.0") as live:
+        warnings = [line for line in live.process.output.splitlines() if "WARNING" in line]
+        assert "without LUPIN_TOKEN" in warnings[0]
+        assert "without --tls-cert" in warnings[1]
+        assert live.get("/api/state").status_code == 200, "it goes by its addresses"
+    with served() as live:
+        assert "LUPIN_TOKEN" not in live.process.output
+
+
+def test_the_patrol_of_the_demo_does_not_inherit_the_token() -> None:
+    with own_domain() as domain, lupin_twin(domain, "demo", LUPIN_TOKEN=TOKEN) as demo:
+        url_of(demo)
+
+        def patrol() -> list[Path]:
+            children = Path(f"/proc/{demo.pid}/task/{demo.pid}/children").read_text().split()
+            folders = [Path("/proc") / child for child in children]
+            return [f for f in folders if b"lupin_patrol" in (f / "cmdline").read_bytes()]
+
+        (folder,) = wait_for(patrol, "the patrol's process")
+        environment = (folder / "environ").read_bytes().split(b"\0")
+        assert [e for e in environment if e.startswith(b"ROS_DOMAIN_ID=")]
+        assert not [e for e in environment if TOKEN.encode() in e]

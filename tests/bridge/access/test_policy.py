@@ -1,0 +1,248 @@
+"""Host, Origin and Sec-Fetch: which requests may pass, and what the others are told."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lupin_bridge.access.policy import (
+    AccessPolicy,
+    Asked,
+    OriginError,
+    Verdict,
+    exposure,
+    host_of,
+    parse_origin,
+)
+
+POLICY = AccessPolicy(
+    "greenhouse.lan", ["http://panel.example:3000", "https://Robot.Example", "http://[fd00::7]:80"]
+)
+PASS = Verdict()
+
+
+def judge(host: str = "127.0.0.1:8000", *origins: str, scheme: str = "http") -> Verdict:
+    return POLICY.judge(Asked(scheme=scheme, hosts=[host], origins=origins))
+
+
+# --- Host ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "host",
+    [
+        "127.0.0.1",
+        "127.0.0.1:8000",
+        "192.168.7.20:8000",
+        "0.0.0.0:8000",
+        "[::1]:8000",
+        "[fd00::7]",
+        "localhost",
+        "LocalHost:8000",
+        "localhost.:8000",
+        "twin.localhost:8000",
+        "greenhouse.lan:8000",
+        "GREENHOUSE.lan.",
+        "panel.example",
+        "robot.example:8443",
+    ],
+)
+def test_a_host_that_is_the_bridges_own_passes(host: str) -> None:
+    assert judge(host) == PASS
+
+
+@pytest.mark.parametrize(
+    "host",
+    [
+        "evil.example",
+        "evil.example:8000",
+        "127.0.0.1.evil.example",
+        "localhost.evil.example",
+        "evil-localhost",
+        "notgreenhouse.lan",
+        "sub.panel.example",
+    ],
+)
+def test_a_foreign_host_is_named_with_the_way_to_allow_it(host: str) -> None:
+    refusal = judge(host).refusal
+    assert refusal is not None
+    assert repr(host.partition(":")[0]) in refusal
+    assert f"--allow-origin http://{host}" in refusal
+
+
+@pytest.mark.parametrize(
+    "host", ["", " ", "a b", "evil.example/x", "user@127.0.0.1", "127.0.0.1:x", "[::1", "h\u00e4"]
+)
+def test_what_is_no_host_is_refused(host: str) -> None:
+    refusal = judge(host).refusal
+    assert refusal is not None
+    assert repr(host) in refusal
+
+
+@pytest.mark.parametrize("hosts", [[], ["127.0.0.1", "evil.example"]])
+def test_there_is_one_host_header(hosts: list[str]) -> None:
+    refusal = POLICY.judge(Asked(scheme="http", hosts=hosts)).refusal
+    assert refusal == f"the request has {len(hosts)} Host headers, expected one"
+
+
+def test_a_long_host_is_cut_in_the_answer() -> None:
+    assert len(judge("x" * 60_000).refusal or "") < 500
+    assert len(judge("127.0.0.1", "http://" + "x" * 60_000).refusal or "") < 500
+
+
+# --- Origin -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("host", "origin", "scheme"),
+    [
+        ("127.0.0.1:8000", "http://127.0.0.1:8000", "http"),
+        ("localhost", "http://localhost", "http"),
+        ("localhost:80", "http://localhost", "http"),
+        ("localhost:443", "https://localhost", "https"),
+        ("[::1]:8000", "http://[::1]:8000", "http"),
+        ("Greenhouse.LAN:8000", "http://greenhouse.lan:8000", "http"),
+    ],
+)
+def test_the_bridges_own_pages_pass(host: str, origin: str, scheme: str) -> None:
+    assert judge(host, origin, scheme=scheme) == PASS
+
+
+@pytest.mark.parametrize(
+    ("origin", "allowed"),
+    [
+        ("http://panel.example:3000", "http://panel.example:3000"),
+        ("https://robot.example", "https://robot.example"),
+        ("https://robot.example:443", "https://robot.example"),
+        ("http://[fd00::7]", "http://[fd00::7]"),
+    ],
+)
+def test_an_allowed_foreign_origin_passes_and_is_told_apart(origin: str, allowed: str) -> None:
+    assert judge("127.0.0.1:8000", origin) == Verdict(foreign=allowed)
+
+
+@pytest.mark.parametrize(
+    "origin",
+    [
+        "http://evil.example",
+        "http://127.0.0.1",  # the same host on another port
+        "http://127.0.0.1:3000",
+        "https://127.0.0.1:8000",  # another scheme
+        "http://localhost:8000",  # another name of the same machine
+        "http://panel.example",
+        "https://panel.example:3000",
+        "http://panel.example:3000.evil.example",
+        "http://evil.example:3000#panel.example:3000",
+        "http://robot.example",
+        "null",
+        "",
+        "*",
+        "file://",
+        "chrome-extension://abcdef",
+        "http://panel.example:3000 http://evil.example",
+    ],
+)
+def test_a_foreign_origin_is_refused_by_name(origin: str) -> None:
+    verdict = judge("127.0.0.1:8000", origin)
+    assert verdict.foreign is None
+    assert verdict.refusal is not None
+    assert origin in verdict.refusal
+
+
+def test_two_origin_headers_are_refused_even_if_each_is_allowed() -> None:
+    origins = ("http://127.0.0.1:8000", "http://panel.example:3000")
+    assert judge("127.0.0.1:8000", *origins).refusal is not None
+
+
+def test_a_good_origin_does_not_make_up_for_a_foreign_host() -> None:
+    # This is DNS rebinding: to the browser, page and bridge are one origin.
+    verdict = judge("evil.example:8000", "http://evil.example:8000")
+    assert verdict.refusal is not None
+    assert "name 'evil.example'" in verdict.refusal
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "*",
+        "null",
+        "panel.example",
+        "//panel.example",
+        "ftp://panel.example",
+        "http://",
+        "http://panel.example/path",
+        "http://panel.example?query",
+        "http://user@panel.example",
+        "http://*.example",
+        "http://panel.example:port",
+        "http://panel example",
+        "http://panel.example\n",
+    ],
+)
+def test_what_is_no_origin_is_refused_with_what_was_expected(text: str) -> None:
+    with pytest.raises(OriginError, match="expected http:// or https://") as refused:
+        parse_origin(text)
+    assert repr(text) in str(refused.value)
+
+
+@given(st.text(max_size=40))
+def test_any_text_is_an_origin_or_none(text: str) -> None:
+    try:
+        origin = parse_origin(text)
+    except OriginError:
+        return
+    assert parse_origin(origin) == origin
+    assert host_of(origin.partition("://")[2]) is not None
+
+
+# --- Sec-Fetch ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("site", "mode", "passes"),
+    [
+        ("", "", True),  # not a browser, or one without TLS beyond localhost
+        ("none", "navigate", True),  # typed into the address bar
+        ("same-origin", "cors", True),
+        ("same-origin", "no-cors", True),
+        ("cross-site", "navigate", True),  # a link, which no page can read through
+        ("same-site", "navigate", True),
+        ("cross-site", "no-cors", False),  # <img>, <script>, <link>
+        ("same-site", "no-cors", False),  # the same from another port of this host
+    ],
+)
+def test_a_foreign_page_that_does_not_name_itself_gets_nothing(
+    site: str, mode: str, passes: bool
+) -> None:
+    asked = Asked(scheme="http", hosts=["127.0.0.1"], fetch_site=site, fetch_mode=mode)
+    refusal = POLICY.judge(asked).refusal
+    assert (refusal is None) == passes
+    assert passes or "--allow-origin" in str(refusal)
+
+
+def test_an_allowed_origin_that_names_itself_may_be_cross_site() -> None:
+    asked = Asked("http", ["127.0.0.1"], ["http://panel.example:3000"], "cross-site", "cors")
+    assert POLICY.judge(asked).refusal is None
+
+
+# --- what is said at the start ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1", "127.8.8.8", "::1"])
+def test_loopback_needs_no_warning(address: str) -> None:
+    assert exposure(address, has_token=False, has_tls=False) == []
+
+
+@pytest.mark.parametrize("address", ["0.0.0.0", "::", "192.168.7.20", "fe80::1%eth0"])
+def test_listening_further_warns_of_what_is_missing(address: str) -> None:
+    without_both = exposure(address, has_token=False, has_tls=False)
+    assert len(without_both) == 2
+    assert "without LUPIN_TOKEN" in without_both[0]
+    assert "without --tls-cert" in without_both[1]
+    assert all(address in warning for warning in without_both)
+    assert exposure(address, has_token=True, has_tls=True) == []
+    assert exposure(address, has_token=False, has_tls=True) == without_both[:1]
+    (in_clear,) = exposure(address, has_token=True, has_tls=False)
+    assert "the token too" in in_clear

@@ -1,0 +1,96 @@
+"""What holds for every answer of a live bridge: reads only, and the security headers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import httpx
+import pytest
+
+from lupin_bridge.stream import schema
+from tests.support.messages import occupancy_grid, scan
+from tests.support.web import ROUTES, Bridge, bridge
+
+PATHS = [path.replace("{tag_id}", "7") for path in ROUTES]
+ELSEWHERE = ["/", "/nowhere", "/ws/state"]
+QUERY = {"sensor_type": "co2", "resolution": "0.5"}
+
+
+@pytest.fixture(scope="module")
+def live() -> Iterator[Bridge]:
+    with bridge() as running:
+        running.peer.observe(scan("7", {"co2": 400.0}, at=(1, 1)))
+        running.peer.publish_map(occupancy_grid([[0]]))
+        running.tag("7")
+        running.peer.until(lambda: running.get("/api/map").status_code == 200, "the map")
+        yield running
+
+
+def ask(live: Bridge, method: str, path: str) -> httpx.Response:
+    return live.http.request(method, path, params=QUERY if "field" in path else None)
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_head_is_get_without_the_body(live: Bridge, path: str) -> None:
+    got, head = ask(live, "GET", path), ask(live, "HEAD", path)
+    assert (got.status_code, head.status_code, head.content) == (200, 200, b"")
+    assert got.content
+
+    def kept(answer: httpx.Response) -> dict[str, str]:
+        # The length of an age in seconds changes while one looks.
+        changing = ("date", "content-length") if "no-store" in str(answer.headers) else ("date",)
+        return {name: value for name, value in answer.headers.items() if name not in changing}
+
+    assert kept(head) == kept(got)
+
+
+@pytest.mark.parametrize("path", [*PATHS, *ELSEWHERE])
+@pytest.mark.parametrize("method", ["POST", "PUT", "PATCH", "DELETE", "OPTIONS", "TRACE", "BREW"])
+def test_anything_but_a_read_is_refused(live: Bridge, path: str, method: str) -> None:
+    answer = ask(live, method, path)
+    assert answer.status_code == 405
+    assert answer.headers["allow"] == "GET, HEAD"
+    message = schema.ErrorMessage.model_validate_json(answer.content)
+    assert message.detail == f"method {method} is not allowed: nothing here writes, use GET or HEAD"
+
+
+def test_a_refused_body_is_not_mistaken_for_the_next_request(live: Bridge) -> None:
+    assert live.http.post("/api/state", content=b"x" * 100_000).status_code == 405
+    assert live.get("/healthz").status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "status"),
+    [
+        ("GET", "/api/state", 200),
+        ("GET", "/docs", 200),
+        ("GET", "/api/field.png?sensor_type=co2", 200),
+        ("GET", "/api/field", 400),
+        ("GET", "/nowhere", 404),
+        ("POST", "/api/state", 405),
+    ],
+)
+def test_every_answer_has_the_security_headers(
+    live: Bridge, method: str, path: str, status: int
+) -> None:
+    answer = live.http.request(method, path)
+    assert answer.status_code == status
+    policy = dict(
+        part.strip().split(" ", 1) for part in answer.headers["content-security-policy"].split(";")
+    )
+    assert policy["default-src"] == policy["connect-src"] == "'self'"
+    assert policy["img-src"] == "'self' blob: data:"
+    assert policy["object-src"] == policy["base-uri"] == policy["frame-ancestors"] == "'none'"
+    assert "script-src" not in policy, "the default allows no inline script"
+    assert "unsafe" not in answer.headers["content-security-policy"]
+    assert answer.headers["x-content-type-options"] == "nosniff"
+    assert answer.headers["x-frame-options"] == "DENY"
+    assert answer.headers["referrer-policy"] == "no-referrer"
+    assert answer.headers["cross-origin-opener-policy"] == "same-origin"
+    assert answer.headers["cross-origin-resource-policy"] == "same-origin"
+
+
+def test_nothing_is_said_of_the_server_and_nothing_is_opened_to_other_origins(live: Bridge) -> None:
+    headers = live.get("/api/state", headers={"Origin": "http://elsewhere"}).headers
+    assert "server" not in headers
+    assert not [name for name in headers if name.startswith("access-control-")]

@@ -1,0 +1,146 @@
+"""TLS: bad files are told before anything starts, and good ones make https and wss."""
+
+from __future__ import annotations
+
+import ssl
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+from cryptography.hazmat.primitives.serialization import (
+    BestAvailableEncryption,
+    Encoding,
+    PrivateFormat,
+    load_pem_private_key,
+)
+from websockets.sync.client import connect
+
+from lupin_bridge.access.tls import TlsError, check_pair
+from tests.support.access import BEARER, TOKEN, Served, refused_start, served
+from tests.support.tls import Certificate, certificate
+from tests.support.web import Listener, ws_url
+
+
+@pytest.fixture(scope="module")
+def ours(tmp_path_factory: pytest.TempPathFactory) -> Certificate:
+    return certificate(tmp_path_factory.mktemp("tls"))
+
+
+@pytest.fixture(scope="module")
+def secure(ours: Certificate) -> Iterator[Served]:
+    with served(*ours.options, trust=ours.trust, LUPIN_TOKEN=TOKEN) as running:
+        yield running
+
+
+def refusal(cert: Path, key: Path) -> str:
+    with pytest.raises(TlsError) as refused:
+        check_pair(str(cert), str(key))
+    message = str(refused.value)
+    assert "\n" not in message
+    return message
+
+
+# --- the files ----------------------------------------------------------------------------------
+
+
+def test_a_certificate_and_its_key_will_do(ours: Certificate) -> None:
+    check_pair(str(ours.cert), str(ours.key))
+
+
+def test_a_missing_file_is_named(ours: Certificate, tmp_path: Path) -> None:
+    nowhere = tmp_path / "nowhere.pem"
+    assert refusal(nowhere, ours.key) == f"--tls-cert {nowhere}: No such file or directory"
+    assert refusal(ours.cert, nowhere) == f"--tls-key {nowhere}: No such file or directory"
+    assert refusal(tmp_path, ours.key) == f"--tls-cert {tmp_path}: Is a directory"
+
+
+def test_a_file_that_is_not_what_it_should_be_is_named(ours: Certificate, tmp_path: Path) -> None:
+    for content in (b"", b"hello", b"\x00\xff" * 100, ours.key.read_bytes()):
+        odd = tmp_path / "odd.pem"
+        odd.write_bytes(content)
+        assert refusal(odd, ours.key) == f"--tls-cert {odd} holds no PEM certificate"
+    odd.write_bytes(ours.cert.read_bytes())
+    assert f"--tls-key {odd} is no usable private key" in refusal(ours.cert, odd)
+
+
+def test_another_certificates_key_is_refused(ours: Certificate, tmp_path: Path) -> None:
+    other = certificate(tmp_path)
+    assert refusal(ours.cert, other.key) == f"--tls-key {other.key} is not the key of {ours.cert}"
+
+
+def test_an_encrypted_key_is_refused_without_asking_the_terminal(
+    ours: Certificate, tmp_path: Path
+) -> None:
+    key = load_pem_private_key(ours.key.read_bytes(), None)
+    encrypted = tmp_path / "encrypted.key"
+    encrypted.write_bytes(
+        key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, BestAvailableEncryption(b"secret"))
+    )
+    assert "is encrypted: give a key without a passphrase" in refusal(ours.cert, encrypted)
+
+
+@pytest.mark.parametrize(
+    ("given", "missing"), [("--tls-cert", "--tls-key"), ("--tls-key", "--tls-cert")]
+)
+def test_one_without_the_other_ends_the_start(given: str, missing: str, ours: Certificate) -> None:
+    line = refused_start(given, str(ours.cert))
+    assert line == f"lupin-twin: {given} is given without {missing}, TLS needs both"
+
+
+def test_a_bad_file_ends_the_start_with_one_line(ours: Certificate) -> None:
+    line = refused_start("--tls-cert", "/nowhere", "--tls-key", str(ours.key))
+    assert line == "lupin-twin: --tls-cert /nowhere: No such file or directory"
+
+
+# --- served -------------------------------------------------------------------------------------
+
+
+def test_https_and_wss_are_served_and_announced(secure: Served) -> None:
+    assert secure.url.startswith("https://127.0.0.1:")
+    assert secure.get("/api/state", BEARER).json()["tags"] == []
+    assert secure.handshake(headers=BEARER) == 101
+
+
+def test_every_frame_comes_over_wss(secure: Served, ours: Certificate) -> None:
+    url = ws_url(secure.url)
+    with connect(url, additional_headers=BEARER, ssl=ours.trust, proxy=None) as connection:
+        frames = Listener(connection)
+        first = frames.until("state")["seq"]
+        for number in range(1, 4):
+            assert frames.until("state")["seq"] == first + number
+
+
+def test_the_own_origin_is_https_then(secure: Served) -> None:
+    own, plain = secure.url, secure.url.replace("https", "http")
+    for origin, status, handshake in ((own, 200, 101), (plain, 403, 403)):
+        headers = {**BEARER, "Origin": origin}
+        assert secure.get("/api/state", headers).status_code == status
+        assert secure.handshake(headers=headers) == handshake
+
+
+def test_the_cookie_never_leaves_tls(secure: Served) -> None:
+    cookie = secure.get("/api/signin", BEARER).headers["set-cookie"]
+    assert "secure" in [part.strip().lower() for part in cookie.split(";")]
+
+
+def test_a_self_signed_certificate_is_not_nailed_down(secure: Served) -> None:
+    assert "strict-transport-security" not in secure.get("/signin").headers
+
+
+def test_old_versions_of_tls_are_refused(secure: Served, ours: Certificate) -> None:
+    old = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    old.load_verify_locations(cadata=ssl.DER_cert_to_PEM_cert(_authority(ours.trust)))
+    with pytest.warns(DeprecationWarning, match="TLSv1_1"):
+        old.maximum_version = ssl.TLSVersion.TLSv1_1
+    with pytest.raises(httpx.ConnectError), Served(secure.process, secure.url, old).client() as it:
+        it.get("/healthz")
+
+
+def test_plain_http_gets_nowhere(secure: Served) -> None:
+    with pytest.raises(httpx.TransportError):
+        Served(secure.process, secure.url.replace("https", "http")).get("/healthz")
+
+
+def _authority(trust: ssl.SSLContext) -> bytes:
+    return next(der for der in trust.get_ca_certs(binary_form=True))

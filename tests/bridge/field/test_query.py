@@ -1,0 +1,223 @@
+"""A field's query string, Accept, ETag and headers, without a server."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lupin_bridge.field import query as field_query
+from lupin_bridge.field.formats import FORMATS, JSON, NPY, PNG, FieldFormat
+from lupin_bridge.field.query import FieldQuery, parse
+from lupin_twin.fields import FieldRefused, FieldRequest
+
+BOX = {"bbox_min_x": "-1", "bbox_min_y": "0.5", "bbox_max_x": "2e1", "bbox_max_y": "3"}
+REQUEST = FieldRequest("co2", 0.1, -1.0, 0.5, 20.0, 3.0)
+
+
+# --- parsing ------------------------------------------------------------------------------------
+
+
+def test_a_full_query() -> None:
+    query = parse([("sensor_type", "co2"), ("resolution", "0.25"), *BOX.items(), ("scale", "4")])
+    assert query == FieldQuery("co2", 0.25, (-1.0, 0.5, 20.0, 3.0), 4)
+
+
+def test_what_is_left_out_has_a_default_and_the_box_is_left_to_the_server() -> None:
+    query = parse([("sensor_type", "co2")])
+    assert query == FieldQuery("co2", field_query.DEFAULT_RESOLUTION_M, None, 1)
+    assert query.request((0.0, 1.0, 2.0, 3.0)) == FieldRequest("co2", 0.1, 0.0, 1.0, 2.0, 3.0)
+
+
+def test_a_box_of_the_query_comes_before_the_default_one() -> None:
+    query = parse([("sensor_type", "co2"), *BOX.items()])
+    assert query.request((0.0, 1.0, 2.0, 3.0)) == REQUEST
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [("1", 1.0), ("-.5", -0.5), ("+2.", 2.0), (" 2", 2.0), ("1e-9", 1e-9), ("1E300", 1e300)],
+)
+def test_numbers_as_people_and_programs_write_them(text: str, number: float) -> None:
+    assert parse([("resolution", text)]).resolution == number
+
+
+def test_what_is_a_number_but_not_finite_is_left_for_get_fields_own_check() -> None:
+    assert parse([("resolution", "-inf")]).resolution == -math.inf
+    assert math.isnan(parse([("resolution", "nan")]).resolution)
+
+
+def test_a_missing_sensor_is_left_for_get_fields_own_check() -> None:
+    assert parse([]).sensor_type == ""
+
+
+@pytest.mark.parametrize("left_out", field_query.BOX_NAMES)
+def test_an_incomplete_box_is_refused_by_the_name_of_what_is_missing(left_out: str) -> None:
+    given_box = [(name, value) for name, value in BOX.items() if name != left_out]
+    with pytest.raises(FieldRefused, match=f"incomplete: {left_out} is missing"):
+        parse(given_box)
+
+
+@pytest.mark.parametrize("name", ["sensor", "Resolution", "bbox", "", "x" * 5_000])
+def test_an_unknown_parameter_is_refused_and_the_known_ones_are_named(name: str) -> None:
+    with pytest.raises(FieldRefused, match="unknown, expected sensor_type, resolution") as refused:
+        parse([(name, "1")])
+    assert repr(name[:64]) in str(refused.value)
+    assert len(str(refused.value)) < 300
+
+
+@pytest.mark.parametrize("name", field_query.NAMES)
+def test_a_repeated_parameter_is_refused_even_with_the_same_value(name: str) -> None:
+    with pytest.raises(FieldRefused, match=f"{name} is given more than once"):
+        parse([(name, "1"), (name, "1")])
+
+
+@pytest.mark.parametrize("name", ["resolution", *field_query.BOX_NAMES])
+@pytest.mark.parametrize(
+    "text", ["", "one", "1,5", "0x10", "1m", "1_0", "1 0", "٣", "9" * 5_000 + "x"]
+)
+def test_what_is_no_number_is_refused_with_its_name_and_value(name: str, text: str) -> None:
+    values = {**BOX, name: text}
+    with pytest.raises(FieldRefused, match=f"{name} is .*expected a number") as refused:
+        parse(list(values.items()))
+    assert repr(text[:64]) in str(refused.value)
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "1001", "1.5", "", "²", "٣", "1e2", "9" * 5_000, "x"])
+def test_a_scale_out_of_its_range_is_refused(text: str) -> None:
+    with pytest.raises(FieldRefused, match="whole number from 1 to 1000"):
+        parse([("scale", text)])
+
+
+@pytest.mark.parametrize("scale", [1, 1000])
+def test_both_ends_of_the_scale_belong_to_it(scale: int) -> None:
+    assert parse([("scale", str(scale))]).scale == scale
+
+
+def test_a_picture_may_have_as_many_pixels_as_a_field_has_cells() -> None:
+    query = FieldQuery("co2", 0.1, None, 10)
+    field_query.check_scale(query, PNG, cells=100, max_cells=10_000)
+    with pytest.raises(FieldRefused, match="10100 pixels, the limit is 10000"):
+        field_query.check_scale(query, PNG, cells=101, max_cells=10_000)
+
+
+@pytest.mark.parametrize("field_format", [JSON, NPY])
+def test_only_a_picture_can_be_scaled(field_format: FieldFormat) -> None:
+    query = FieldQuery("co2", 0.1, None, 2)
+    with pytest.raises(FieldRefused, match="scale is 2, but only a PNG"):
+        field_query.check_scale(query, field_format, cells=1, max_cells=10)
+    field_query.check_scale(replace(query, scale=1), field_format, cells=1, max_cells=10)
+
+
+# --- Accept (RFC 9110, section 12.5.1) ----------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("accept", "expected"),
+    [
+        (None, JSON),
+        ("", JSON),
+        ("  ", JSON),
+        ("*/*", JSON),
+        ("application/json", JSON),
+        ("image/png", PNG),
+        ("IMAGE/PNG", PNG),
+        ("application/x-npy", NPY),
+        ("image/*", PNG),
+        ("application/*", JSON),
+        ("image/avif,image/webp,image/png,*/*;q=0.8", PNG),  # an <img> in a browser
+        ("text/html,application/xml;q=0.9,*/*;q=0.8", JSON),  # its address bar
+        ("application/json;q=0.5, image/png;q=0.7", PNG),
+        ("application/json;q=0, */*", PNG),
+        ("application/*;q=0.2, image/png;q=0.1", JSON),
+        ("*/*, application/json;q=0.1, image/png;q=0.2", NPY),
+        ("application/json; charset=utf-8", JSON),
+        ("image/png;q=high, application/x-npy;q=0.1", NPY),
+        ("image/png;q=nan, application/x-npy;q=0.1", NPY),
+        ("image/png;q=7, application/x-npy", PNG),
+        ("text/html", None),
+        ("application/json;q=0", None),
+        (",;q=,/", None),
+    ],
+)
+def test_accept_decides_the_format(accept: str | None, expected: FieldFormat | None) -> None:
+    assert field_query.negotiate(accept) == expected
+
+
+@given(st.text(st.characters(codec="latin-1"), max_size=60))
+def test_any_accept_header_gives_a_format_or_none(accept: str) -> None:
+    assert field_query.negotiate(accept) in (None, *FORMATS)
+
+
+# --- ETag (RFC 9110, sections 8.8.3 and 13.1.2) ---------------------------------------------------
+
+
+def test_an_etag_is_strong_and_stands_for_all_that_a_field_depends_on() -> None:
+    tags = {
+        field_query.etag("r1", REQUEST, "json", 1),
+        field_query.etag("r2", REQUEST, "json", 1),
+        field_query.etag("r1", REQUEST, "png", 1),
+        field_query.etag("r1", REQUEST, "png", 2),
+        *(
+            field_query.etag("r1", replace(REQUEST, **{name: 9.5}), "json", 1)  # type: ignore[arg-type]
+            for name in ("resolution", *field_query.BOX_NAMES)
+        ),
+        field_query.etag("r1", replace(REQUEST, sensor_type="light"), "json", 1),
+    }
+    assert len(tags) == 10
+    assert all(re.fullmatch(r'"[\x21\x23-\x7e]+"', tag) for tag in tags)
+    assert field_query.etag("r1", REQUEST, "json", 1) == field_query.etag("r1", REQUEST, "json", 1)
+
+
+def test_numbers_that_are_the_same_float32_are_the_same_request() -> None:
+    other = replace(REQUEST, resolution=0.1 + 1e-12)
+    assert field_query.etag("r1", REQUEST, "json", 1) == field_query.etag("r1", other, "json", 1)
+
+
+def test_any_sensor_name_has_an_etag() -> None:
+    field_query.etag("r", replace(REQUEST, sensor_type="\ud800"), "json", 1)
+
+
+@pytest.mark.parametrize(
+    ("if_none_match", "holds"),
+    [
+        (None, False),
+        ("", False),
+        ('"abc"', True),
+        ('W/"abc"', True),
+        ('"x", "abc"', True),
+        ('"x","abc" ,"y"', True),
+        ("*", True),
+        ('"ab"', False),
+        ("abc", False),
+        ('"abc', False),
+    ],
+)
+def test_if_none_match_names_the_tag_or_does_not(if_none_match: str | None, holds: bool) -> None:
+    assert field_query.matches(if_none_match, '"abc"') is holds
+
+
+# --- headers ------------------------------------------------------------------------------------
+
+
+def test_metadata_goes_into_headers_that_any_client_can_read() -> None:
+    headers = field_query.headers({"Unit": "°C", "Value-Min": "-1.5"}, "co2.json")
+    assert headers == {
+        "X-Field-Unit": "%C2%B0C",
+        "X-Field-Value-Min": "-1.5",
+        "Content-Disposition": 'inline; filename="co2.json"',
+    }
+
+
+@given(st.text(st.characters(codec="utf-8"), max_size=40))
+def test_no_sensor_name_can_break_out_of_a_header_or_a_folder(name: str) -> None:
+    headers = field_query.headers({"Sensor": name}, f"{name}.png")
+    for value in headers.values():
+        assert re.fullmatch(r"[\x20-\x7e]*", value), "a header is one line of ASCII"
+    file_name = re.fullmatch(r'inline; filename="(.*)"', headers["Content-Disposition"])
+    assert file_name is not None
+    assert re.fullmatch(r"[A-Za-z0-9._-]+", file_name[1])

@@ -1,0 +1,401 @@
+"""The field over HTTP, beside the same field over the ROS service of the same twin."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import httpx
+import numpy as np
+import numpy.typing as npt
+import pytest
+from PIL import Image
+
+from lupin_bridge.stream import schema
+from tests.oracle_idw import field_by_loop
+from tests.support.messages import discovered, occupancy_grid, pose, scan
+from tests.support.waiting import PATIENCE_S
+from tests.support.web import Bridge, bridge
+
+# These tests ask faster than a person's browser may.
+EAGER = ("--field-rate-hz", "10000")
+SAMPLES = [(1.0, 1.0, 20.0), (2.0, 1.5, 24.0), (3.5, 0.5, 30.0)]
+BOX = {"bbox_min_x": 0.0, "bbox_min_y": -0.5, "bbox_max_x": 6.0, "bbox_max_y": 3.0}
+QUERY: dict[str, Any] = {"sensor_type": "temperature", "resolution": 0.25, **BOX}
+FORMATS = ["json", "npy", "png"]
+
+
+@pytest.fixture(scope="module")
+def live() -> Iterator[Bridge]:
+    """A bridge whose twin knows three samples of temperature, for reading alone."""
+    with bridge(*EAGER) as running:
+        for number, (x, y, value) in enumerate(SAMPLES):
+            running.peer.observe(scan(str(number), {"temperature": value}, at=(x, y)))
+        running.peer.observe(scan("nan", {"temperature": math.nan}, at=(1.2, 1.2)))
+        running.tag("nan")
+        yield running
+
+
+@pytest.fixture
+def changing() -> Iterator[Bridge]:
+    """A bridge of the test's own."""
+    with bridge(*EAGER) as running:
+        yield running
+
+
+def npy(running: Bridge, **query: Any) -> npt.NDArray[np.float32]:
+    answer = running.get("/api/field.npy", **query)
+    assert answer.status_code == 200, answer.text
+    return np.load(io.BytesIO(answer.content), allow_pickle=False)  # type: ignore[no-any-return]
+
+
+# --- the same numbers everywhere ----------------------------------------------------------------
+
+
+def test_the_service_and_both_formats_give_the_definitions_numbers(live: Bridge) -> None:
+    service = live.peer.get_field(**QUERY)
+    body = live.json("/api/field.json", **QUERY)
+    array = npy(live, **QUERY)
+    expected = field_by_loop(
+        SAMPLES,
+        width=24,
+        height=14,
+        bbox_min_x=0.0,
+        bbox_min_y=-0.5,
+        resolution=0.25,
+        falloff_radius_m=1.5,
+        max_distance_m=1.5,
+        power=2.0,
+    )
+    assert (service.ok, service.width, service.height) == (True, 24, 14)
+    assert any(map(math.isnan, expected))
+    assert any(map(math.isfinite, expected))
+    np.testing.assert_allclose(array.ravel(), np.array(expected, np.float32), rtol=1e-6)
+    # From here on to the last bit, and NaN for NaN.
+    np.testing.assert_array_equal(array.ravel(), np.array(service.values, np.float32))
+    numbers = [math.nan if value is None else value for value in body.pop("values")]
+    np.testing.assert_array_equal(array.ravel(), np.array(numbers, np.float32))
+    for name, value in body.items():
+        as_sent = np.float32(value) if isinstance(value, float) else value
+        assert as_sent == getattr(service, name), name
+
+
+def test_a_sensor_that_nobody_has_reported_is_all_unknown_and_no_error(live: Bridge) -> None:
+    body = live.json("/api/field.json", **{**QUERY, "sensor_type": "nobody's"})
+    assert (body["ok"], body["sample_count"]) == (True, 0)
+    assert set(body["values"]) == {None}
+    assert (body["value_min"], body["value_max"]) == (0, 0)
+
+
+def test_without_a_box_it_is_that_of_all_pinned_tags_and_their_reach(changing: Bridge) -> None:
+    empty = changing.json("/api/field", sensor_type="co2")
+    assert (empty["origin_x"], empty["origin_y"], empty["width"]) == (-1.5, -1.5, 30)
+    changing.peer.observe(
+        scan("1", {"co2": 400.0}, at=(-2.0, 3.0)),
+        scan("2", {"light": 1.0}, at=(4.0, 5.0)),
+        scan("no pose", {"co2": 1.0}),
+    )
+    changing.tag("no pose")
+    body = changing.json("/api/field", sensor_type="co2", resolution=0.5)
+    assert (body["origin_x"], body["origin_y"]) == (-3.5, 1.5)
+    assert (body["width"], body["height"]) == (18, 10), "to 5.5 and 6.5"
+
+
+# --- formats ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("accept", "media_type"),
+    [
+        (None, "application/json"),
+        ("*/*", "application/json"),
+        ("image/png", "image/png"),
+        ("application/x-npy", "application/x-npy"),
+        ("image/webp,image/png;q=0.9,*/*;q=0.1", "image/png"),
+    ],
+)
+def test_accept_decides_the_format_and_caches_are_told(
+    live: Bridge, accept: str | None, media_type: str
+) -> None:
+    answer = live.get("/api/field", {} if accept is None else {"Accept": accept}, **QUERY)
+    assert answer.headers["content-type"] == media_type
+    assert answer.headers["vary"] == "Accept"
+    suffix = {"image/png": "png", "application/json": "json"}.get(media_type, "npy")
+    assert answer.content == live.get(f"/api/field.{suffix}", **QUERY).content
+
+
+def test_a_format_that_there_is_none_of_is_406(live: Bridge) -> None:
+    answer = live.get("/api/field", {"Accept": "text/html"}, **QUERY)
+    assert (answer.status_code, answer.headers["vary"]) == (406, "Accept")
+    message = schema.ErrorMessage.model_validate_json(answer.content)
+    assert "application/json, image/png, application/x-npy" in message.detail
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_a_suffix_wins_over_accept_and_needs_no_vary(live: Bridge, suffix: str) -> None:
+    answer = live.get(f"/api/field.{suffix}", {"Accept": "text/html"}, **QUERY)
+    assert answer.status_code == 200
+    assert "vary" not in answer.headers
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_every_format_says_in_its_headers_what_it_shows(live: Bridge, suffix: str) -> None:
+    headers = live.get(f"/api/field.{suffix}", **QUERY).headers
+    values = [v for v in npy(live, **QUERY).ravel().tolist() if math.isfinite(v)]
+    assert {name: v for name, v in headers.items() if name.startswith("x-field-")} == {
+        "x-field-sensor": "temperature",
+        "x-field-unit": "%C2%B0C",
+        "x-field-width": "24",
+        "x-field-height": "14",
+        "x-field-origin-x": "0.0",
+        "x-field-origin-y": "-0.5",
+        "x-field-resolution": "0.25",
+        "x-field-value-min": str(np.float32(min(values))),
+        "x-field-value-max": str(np.float32(max(values))),
+        "x-field-sample-count": "3",
+    }
+    assert headers["content-disposition"] == f'inline; filename="temperature.{suffix}"'
+    assert headers["cache-control"] == "no-cache"
+
+
+def test_a_picture_is_the_array_turned_over(live: Bridge) -> None:
+    array = npy(live, **QUERY)
+    answer = live.get("/api/field.png", **QUERY, scale=3)
+    with Image.open(io.BytesIO(answer.content)) as image:
+        image.load()
+        assert image.size == (24 * 3, 14 * 3)
+        assert image.text["Sample-Count"] == "3"  # type: ignore[attr-defined]
+        alpha = np.asarray(image.convert("RGBA"))[:, :, 3]
+    cells = np.flipud(alpha[1::3, 1::3]).astype(float)
+    span = np.nanmax(array) - np.nanmin(array)
+    expected = np.nan_to_num((array - np.nanmin(array)) / span * 153)
+    np.testing.assert_allclose(cells, expected, atol=0.81)
+
+
+def test_a_sensor_with_an_odd_name_is_served_under_a_plain_one(live: Bridge) -> None:
+    name = 'CO₂ "in" ../air\r\n'
+    for suffix in FORMATS:
+        headers = live.get(f"/api/field.{suffix}", **{**QUERY, "sensor_type": name}).headers
+        assert headers["content-disposition"] == (
+            f'inline; filename="CO___in__..\\_air__.{suffix}"'.replace("\\", "")
+        )
+        assert headers["x-field-sensor"] == "CO%E2%82%82 %22in%22 ../air%0D%0A"
+
+
+# --- refusals -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"sensor_type": ""}, ["sensor_type is empty"]),
+        ({"sensor_type": None}, ["sensor_type is empty"]),
+        ({"sensor_type": "x" * 300}, ["sensor_type", "300 characters", "limit is 256"]),
+        ({"resolution": 0}, ["resolution is 0", "greater than 0"]),
+        ({"resolution": -0.5}, ["resolution is -0.5", "greater than 0"]),
+        ({"resolution": "nan"}, ["resolution is nan", "finite"]),
+        ({"resolution": "inf"}, ["resolution is inf", "finite"]),
+        ({"resolution": 1e300}, ["resolution is 1e+300", "float32"]),
+        ({"resolution": 1e-300}, ["resolution is 1e-300", "float32"]),
+        ({"resolution": "fine"}, ["resolution is 'fine'", "expected a number"]),
+        ({"bbox_min_x": "nan"}, ["bbox_min_x is nan", "finite"]),
+        ({"bbox_max_y": "-inf"}, ["bbox_max_y is -inf", "finite"]),
+        ({"bbox_max_x": 1e39}, ["bbox_max_x is 1e+39", "float32"]),
+        ({"bbox_min_x": 7.0}, ["bbox_min_x", "7.0", "bbox_max_x", "6.0"]),
+        ({"bbox_min_y": 3.5}, ["bbox_min_y", "3.5", "bbox_max_y", "3.0"]),
+        ({"bbox_min_y": None}, ["incomplete", "bbox_min_y is missing"]),
+        ({"bbox_min_y": "1m"}, ["bbox_min_y is '1m'", "expected a number"]),
+        ({"sensor": "co2"}, ["'sensor' is unknown", "expected sensor_type"]),
+        ({"resolution": [0.5, 0.5]}, ["resolution is given more than once"]),
+        ({"scale": 0}, ["scale is '0'", "1 to 1000"]),
+        ({"scale": 1001}, ["scale is '1001'", "1 to 1000"]),
+    ],
+)
+def test_a_bad_request_gets_get_fields_failure_body(
+    live: Bridge, change: dict[str, Any], named: list[str]
+) -> None:
+    query = {name: value for name, value in {**QUERY, **change}.items() if value is not None}
+    for path in ("/api/field", *(f"/api/field.{suffix}" for suffix in FORMATS)):
+        answer = live.get(path, **query)
+        assert answer.status_code == 400
+        refused = schema.GetFieldResponse.model_validate_json(answer.content)
+        assert not refused.ok
+        for words in named:
+            assert words in refused.error_message
+        rest = refused.model_dump(exclude={"ok", "error_message", "values"})
+        assert (rest, refused.values) == (dict.fromkeys(rest, 0), [])
+        assert answer.headers["cache-control"] == "no-store"
+
+
+@pytest.mark.parametrize(
+    ("resolution", "far"),
+    [(1e-9, 1_000.0), (1e-38, 1e38), (1e-45, 3.4e38), (0.001, 1_001.0)],
+)
+def test_a_grid_bomb_is_refused_over_http_as_over_ros(
+    live: Bridge, resolution: float, far: float
+) -> None:
+    bomb: dict[str, Any] = {"sensor_type": "co2", "resolution": resolution}
+    bomb |= {"bbox_min_x": 0.0, "bbox_min_y": 0.0, "bbox_max_x": far, "bbox_max_y": far}
+    service = live.peer.get_field(**bomb)
+    answer = live.get("/api/field.png", **bomb)
+    assert (service.ok, answer.status_code) == (False, 400)
+    assert answer.json()["error_message"] == service.error_message
+    assert "the limit is 1000000" in service.error_message
+
+
+def test_as_many_cells_as_the_limit_allows_and_not_one_more() -> None:
+    with bridge(*EAGER, "--ros-args", "-p", "max_grid_cells:=12") as small:
+        query: dict[str, Any] = {"sensor_type": "co2", "resolution": 1}
+        query |= {"bbox_min_x": 0, "bbox_min_y": 0}
+        fits = {**query, "bbox_max_x": 4, "bbox_max_y": 3}
+        assert small.get("/api/field", **fits).status_code == 200
+        refused = small.get("/api/field", **{**fits, "bbox_max_x": 5})
+        assert "5 x 3 cells, the limit is 12" in refused.json()["error_message"]
+        scaled = {**query, "bbox_max_x": 1, "bbox_max_y": 3, "scale": 2}
+        assert small.get("/api/field.png", **scaled).status_code == 200
+        refused = small.get("/api/field.png", **{**scaled, "bbox_max_y": 4})
+        assert "16 pixels, the limit is 12" in refused.json()["error_message"]
+
+
+def test_only_a_picture_can_be_scaled(live: Bridge) -> None:
+    for suffix in ("json", "npy"):
+        answer = live.get(f"/api/field.{suffix}", **QUERY, scale=2)
+        assert answer.status_code == 400
+        assert "only a PNG can be scaled" in answer.json()["error_message"]
+
+
+# --- ETag ---------------------------------------------------------------------------------------
+
+
+def etag(running: Bridge, path: str = "/api/field.json", **query: Any) -> str:
+    answer = running.get(path, **(query or QUERY))
+    assert answer.status_code == 200, answer.text
+    return answer.headers["etag"]
+
+
+def work_done(running: Bridge) -> list[str]:
+    """What the metrics say of the fields that were computed, looked up or waited for so far."""
+    names = ("field_cache_hits_total", "field_cache_misses_total", "field_seconds_count")
+    lines = running.get("/metrics").text.splitlines()
+    found = [line for line in lines if line.startswith(tuple(f"lupin_{name} " for name in names))]
+    assert len(found) == len(names)
+    return found
+
+
+@pytest.mark.parametrize("path", ["/api/field", "/api/field.png", "/api/field/quality"])
+def test_the_same_field_is_not_sent_twice(live: Bridge, path: str) -> None:
+    tag, before = etag(live, path), work_done(live)
+    for known in (tag, f"W/{tag}", f'"other", {tag}', "*"):
+        again = live.get(path, {"If-None-Match": known}, **QUERY)
+        assert (again.status_code, again.content) == (304, b"")
+        assert again.headers["etag"] == tag
+        assert again.headers["cache-control"] == "no-cache"
+    assert work_done(live) == before, "neither computed nor looked up"
+    assert live.get(path, {"If-None-Match": '"other"'}, **QUERY).status_code == 200
+
+
+def test_all_lines_of_a_header_count(live: Bridge) -> None:
+    def ask(*lines: tuple[str, str]) -> httpx.Response:
+        url = f"{live.url}/api/field"
+        return httpx.get(url, params=QUERY, headers=lines, timeout=PATIENCE_S, trust_env=False)
+
+    two_types = ask(("Accept", "text/html;q=0.1"), ("Accept", "application/x-npy"))
+    assert two_types.headers["content-type"] == "application/x-npy"
+    tag = etag(live, "/api/field.json")
+    two_tags = ask(("If-None-Match", '"other"'), ("If-None-Match", tag), ("Accept", "*/*"))
+    assert two_tags.status_code == 304
+
+
+def test_each_query_and_each_format_has_a_tag_of_its_own(live: Bridge) -> None:
+    tags = [
+        etag(live, path, **query)
+        for path in ("/api/field.json", "/api/field.png", "/api/field.npy")
+        for query in (QUERY, {**QUERY, "resolution": 0.5}, {**QUERY, "sensor_type": "co2"})
+    ]
+    tags += [etag(live, "/api/field.png", **QUERY, scale=2), etag(live, "/api/field/quality")]
+    assert len(set(tags)) == len(tags)
+    assert etag(live, "/api/field") == etag(live, "/api/field.json"), "the same thing"
+
+
+def test_a_tag_holds_until_the_field_could_have_changed(changing: Bridge) -> None:
+    def changed_from(old: str) -> str:
+        def look() -> str | None:
+            answer = changing.get("/api/field", {"If-None-Match": old}, **QUERY)
+            return answer.headers["etag"] if answer.status_code == 200 else None
+
+        return str(changing.peer.until(look, "a new ETag"))
+
+    first = etag(changing)
+    changing.peer.observe(scan("1", {"temperature": 20.0}))
+    observed = changed_from(first)
+    changing.peer.discover(discovered({"1": pose(1.0, 1.0)}))
+    pinned = changed_from(observed)
+    assert changing.json("/api/field", **QUERY)["sample_count"] == 1
+    changing.peer.publish_map(occupancy_grid([[0]]))
+    mapped = changed_from(pinned)
+    # A discovery of what is known, and another frame's message, change nothing.
+    changing.peer.discover(discovered({"1": pose(5.0, 5.0)}))
+    changing.peer.observe(scan("2", {"temperature": 1.0}, frame_id="odom"))
+    with changing.listen() as listener:
+        for _ in range(2):
+            listener.until("state")
+    assert changing.get("/api/field", {"If-None-Match": mapped}, **QUERY).status_code == 304
+
+
+def test_with_clipping_a_new_map_is_a_new_field() -> None:
+    with bridge(*EAGER, "--ros-args", "-p", "clip_to_explored:=true") as clipping:
+        clipping.peer.observe(scan("1", {"temperature": 20.0}, at=(0.5, 0.5)))
+        clipping.tag("1")
+        query: dict[str, Any] = {"sensor_type": "temperature", "resolution": 1.0}
+        query |= {"bbox_min_x": 0, "bbox_min_y": 0, "bbox_max_x": 2, "bbox_max_y": 1}
+        answer = clipping.get("/api/field", **query)
+        assert answer.json()["values"] == [None, None]
+        for cells, expected in (([[0, -1]], [20.0, None]), ([[0, 0]], [20.0, 20.0])):
+            old = answer.headers["etag"]
+            clipping.peer.publish_map(occupancy_grid(cells))
+
+            def look(old: str = old) -> Any:
+                fresh = clipping.get("/api/field", {"If-None-Match": old}, **query)
+                return fresh if fresh.status_code == 200 else None
+
+            answer = clipping.peer.until(look, "the field on the new map")
+            assert answer.json()["values"] == expected
+
+
+def test_a_restarted_bridge_never_matches_a_tag_of_its_predecessor(domain: int) -> None:
+    answers = []
+    for _ in range(2):
+        with bridge(*EAGER, domain=domain) as running:
+            running.peer.observe(scan("1", {"temperature": 20.0}, at=(1.0, 1.0)))
+            running.tag("1")
+            answers.append(running.get("/api/field.json", **QUERY))
+            old = answers[0].headers["etag"]
+            again = running.get("/api/field.json", {"If-None-Match": old}, **QUERY)
+    assert answers[0].content == answers[1].content, "the same field"
+    assert again.status_code == 200, "under another tag"
+
+
+# --- quality ------------------------------------------------------------------------------------
+
+
+def test_quality_is_of_the_field_that_is_asked_for(live: Bridge) -> None:
+    quality = schema.FieldQuality.model_validate(live.json("/api/field/quality", **QUERY))
+    values = npy(live, **QUERY)
+    assert quality.sensor_type == "temperature"
+    assert quality.painted_share == pytest.approx(np.isfinite(values).mean())
+    assert quality.sample_count == 3
+
+
+def test_readings_past_float32_do_not_break_the_answer(changing: Bridge) -> None:
+    changing.peer.observe(
+        scan("1", {"temperature": 1e300}, at=(1, 1)), scan("2", {"temperature": 3.0}, at=(2, 1))
+    )
+    changing.tag("2")
+    for suffix in FORMATS:
+        assert changing.get(f"/api/field.{suffix}", **QUERY).status_code == 200
+    text = changing.get("/api/field.json", **QUERY).text
+    json.loads(text, parse_constant=pytest.fail)
+    schema.GetFieldResponse.model_validate_json(text, strict=True)

@@ -1,0 +1,90 @@
+"""Liveness and readiness: of a live bridge, and of one whose ROS thread has ended."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+
+from websockets.asyncio.client import connect
+
+from lupin_bridge.stream import schema
+from lupin_twin.node import TwinNode
+from lupin_twin.state import TwinStore
+from tests.support.inprocess import Running, run, running
+from tests.support.messages import scan
+from tests.support.ros import Peer
+from tests.support.waiting import until
+from tests.support.web import bridge, ws_url
+
+
+def test_a_live_bridge_is_healthy_and_ready() -> None:
+    with bridge() as live:
+        health = schema.Health.model_validate(live.json("/healthz"))
+        assert (health.ok, health.callback_errors) == (True, 0)
+        ready = schema.StatusFrame.model_validate(live.json("/readyz"))
+        assert (ready.twin, ready.reason) == ("live", "live")
+        assert ready.state_age_seconds is not None
+        for path in ("/healthz", "/readyz"):
+            assert live.get(path).headers["cache-control"] == "no-store"
+
+
+async def end_ros_thread(served: Running) -> None:
+    """What no callback should do, and what must not go unseen: end the thread itself."""
+    waiting = asyncio.create_task(served.in_ros_thread(lambda _: sys.exit("the end")))
+    await until(lambda: not served.twin.is_alive, "the end of the ROS thread")
+    waiting.cancel()
+
+
+def test_when_the_ros_thread_ends_health_says_so_and_every_client_is_told(domain: int) -> None:
+    async def test() -> None:
+        async with running() as served, connect(ws_url(served.url), proxy=None) as listener:
+            assert json.loads(await listener.recv())["reason"] == "live"
+            await end_ros_thread(served)
+            while (frame := json.loads(await listener.recv())).get("reason") != "thread_dead":
+                pass
+            schema.StatusFrame.model_validate(frame)
+            assert (frame["twin"], "Restart" in frame["message"]) == ("offline", True)
+
+            answer = await served.http.get("/healthz")
+            assert answer.status_code == 503
+            assert schema.Health.model_validate_json(answer.content).ok is False
+            answer = await served.http.get("/readyz")
+            assert (answer.status_code, answer.json()["reason"]) == (503, "thread_dead")
+            # What was known last is still told; what would need the thread is refused at once.
+            assert (await served.http.get("/api/state")).status_code == 200
+            assert (await served.http.get("/api/tags/7/history")).status_code == 503
+            answer = await served.http.get("/api/field?sensor_type=co2")
+            assert (answer.status_code, answer.headers["retry-after"]) == (503, "3")
+            async with connect(ws_url(served.url), proxy=None) as late:
+                assert json.loads(await late.recv())["reason"] == "thread_dead"
+
+    run(domain, test())
+
+
+def test_a_callback_that_raises_is_counted_and_the_thread_lives_on(domain: int) -> None:
+    async def test() -> None:
+        async with running() as served:
+
+            def spoil(node: TwinNode) -> TwinStore:
+                store, node.store = node.store, None  # type: ignore[assignment]
+                return store
+
+            with Peer(domain) as peer:
+                store = await served.in_ros_thread(spoil)
+                peer.observe(scan("lost", {"co2": 1.0}))
+                await until(lambda: served.twin.callback_errors, "the error to be counted")
+                health = (await served.http.get("/healthz")).json()
+                assert health["ok"]
+                assert health["callback_errors"] >= 1
+                await served.in_ros_thread(lambda node: setattr(node, "store", store))
+                peer.observe(scan("kept", {"co2": 1.0}))
+                await until(
+                    lambda: (
+                        served.bridge.latest is not None
+                        and "kept" in [t.tag_id for t in served.bridge.latest.snapshot.tags]
+                    ),
+                    "the next observation",
+                )
+
+    run(domain, test())

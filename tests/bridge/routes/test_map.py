@@ -1,0 +1,117 @@
+"""The map: none before one has come, then where it is and how it looks, pixel by pixel."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Iterator
+from itertools import count
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from geometry_msgs.msg import Point, Pose, Quaternion
+from PIL import Image
+
+from lupin_bridge.stream import schema
+from tests.support.messages import occupancy_grid, scan
+from tests.support.web import Bridge, bridge
+
+ROWS = [[0, 100, -1], [-1, 50, 0]]
+NOWHERE_YET = count()
+
+
+@pytest.fixture(scope="module")
+def mapped() -> Iterator[Bridge]:
+    with bridge() as running:
+        yield running
+
+
+def put_map(running: Bridge, rows: list[list[int]], origin: Pose | None = None) -> str:
+    """Publish a map and wait until it is served; returns its ETag.
+
+    Without an origin the map lies where none has been: one that is there already is no news.
+    """
+    before = running.get("/api/map").headers.get("etag")
+    origin = origin or Pose(position=Point(x=float(next(NOWHERE_YET))))
+    running.peer.publish_map(occupancy_grid(rows, 0.05, origin))
+
+    def look() -> str | None:
+        tag = running.get("/api/map").headers.get("etag")
+        return tag if tag != before else None
+
+    return str(running.peer.until(look, "the new map"))
+
+
+def picture(running: Bridge) -> npt.NDArray[np.uint8]:
+    """The map's picture as RGBA (height, width, 4), its first row on top."""
+    answer = running.get("/api/map.png")
+    assert (answer.status_code, answer.headers["content-type"]) == (200, "image/png")
+    with Image.open(io.BytesIO(answer.content)) as image:
+        return np.asarray(image.convert("RGBA"))
+
+
+def test_before_any_map_both_routes_say_so() -> None:
+    with bridge() as unmapped:
+        for path in ("/api/map", "/api/map.png"):
+            answer = unmapped.get(path)
+            assert answer.status_code == 404
+            message = schema.ErrorMessage.model_validate_json(answer.content)
+            assert message.detail == "no map has come yet on the twin's map_topic"
+
+
+def test_the_map_is_where_the_message_has_it(mapped: Bridge) -> None:
+    turn = Quaternion(z=math.sin(0.25), w=math.cos(0.25))
+    put_map(mapped, ROWS, Pose(position=Point(x=-4.0, y=1.5), orientation=turn))
+    grid = schema.OccupancyGrid.model_validate(mapped.json("/api/map"))
+    assert (grid.header.frame_id, grid.info.resolution) == ("map", 0.05)
+    assert (grid.info.width, grid.info.height) == (3, 2)
+    position, orientation = grid.info.origin.position, grid.info.origin.orientation
+    assert (position.x, position.y) == (-4.0, 1.5)
+    assert orientation.z == pytest.approx(math.sin(0.25))
+    assert orientation.w == pytest.approx(math.cos(0.25))
+
+
+def test_the_pictures_top_row_is_the_maps_last(mapped: Bridge) -> None:
+    put_map(mapped, ROWS)
+    pixels = picture(mapped)
+    assert pixels[:, :, 3].tolist() == [[0, 255, 255], [255, 255, 0]]
+    top_free, bottom_free = pixels[0, 2, 0], pixels[1, 0, 0]
+    assert top_free == bottom_free > pixels[0, 1, 0] > pixels[1, 1, 0]
+
+
+def test_a_map_is_fetched_again_only_when_it_is_a_new_one(mapped: Bridge) -> None:
+    old = put_map(mapped, [[0]])
+    for path in ("/api/map", "/api/map.png"):
+        first = mapped.get(path)
+        assert first.headers["cache-control"] == "no-cache"
+        again = mapped.get(path, {"If-None-Match": first.headers["etag"]})
+        assert (again.status_code, again.content) == (304, b"")
+        assert again.headers["etag"] == first.headers["etag"]
+    assert mapped.get("/api/map").headers["etag"] != mapped.get("/api/map.png").headers["etag"]
+    assert put_map(mapped, ROWS) != old
+    assert mapped.get("/api/map", {"If-None-Match": old}).status_code == 200
+
+
+def test_a_map_that_grows_is_a_larger_picture(mapped: Bridge) -> None:
+    put_map(mapped, [[0, 0]])
+    assert picture(mapped).shape == (1, 2, 4)
+    put_map(mapped, [[0, 0, 0]] * 5)
+    assert picture(mapped).shape == (5, 3, 4)
+
+
+def test_a_listener_learns_of_a_new_map_by_the_revision(mapped: Bridge) -> None:
+    with mapped.listen() as listener:
+        # Of what is there by now: a frame on its way may be from before another test's map.
+        mapped.peer.observe(scan("by now"))
+        before = listener.until_tag("by now")["revision"]
+        mapped.peer.publish_map(occupancy_grid([[100, -1]]))
+        listener.until("state", lambda frame: frame["revision"] != before)
+
+
+def test_a_restarted_bridge_never_matches_an_etag_of_its_predecessor(domain: int) -> None:
+    tags = []
+    for _ in range(2):
+        with bridge(domain=domain) as running:
+            tags.append(put_map(running, ROWS, Pose()))
+    assert tags[0] != tags[1]

@@ -1,0 +1,301 @@
+"""`/rosbridge` of a real `lupin-twin serve`: by hand over a WebSocket, ROS on the other side."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Iterator
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+
+from lupin_bridge.rosbridge.session import MAX_BURST
+from tests.support import messages
+from tests.support.proc_stat import resident_mb
+from tests.support.rosbridge import FIELD, FIELD_ARGS, TOPIC, Message, Ros, ros_at, tags
+from tests.support.web import Bridge, bridge
+
+
+@pytest.fixture(scope="module")
+def house() -> Iterator[Bridge]:
+    """A twin with two tags, 1 and 2."""
+    with bridge() as running:
+        running.peer.wait_for_twin()
+        running.peer.observe(
+            messages.scan("1", {"temperature": 20.0}, at=(0.0, 0.0)),
+            messages.scan("2", {"temperature": 30.0, "co2": 400.0}, at=(1.0, 0.0)),
+        )
+        running.peer.spin_briefly()
+        with running.listen() as listener:
+            listener.until_tag("2")
+        yield running
+
+
+@pytest.fixture
+def ros(house: Bridge) -> Iterator[Ros]:
+    with ros_at(house.url) as client:
+        yield client
+
+
+def observed(house: Bridge, tag_id: str) -> None:
+    """Let the robot see one more tag, and wait until the bridge has shown it to everybody."""
+    with house.listen() as listener:
+        house.peer.observe(messages.scan(tag_id, {"temperature": 20.0}))
+        house.peer.spin_briefly()
+        listener.until_tag(tag_id)
+
+
+# --- the state --------------------------------------------------------------------------------
+
+
+def test_who_subscribes_gets_the_current_state_at_once_and_then_every_change(
+    house: Bridge, ros: Ros
+) -> None:
+    ros.subscribe()
+    first = ros.next()
+    assert (first["op"], first["topic"]) == ("publish", TOPIC)
+    assert {"1", "2"} <= set(tags(first))
+    served = house.json("/api/state")["tags"]
+    told = {tag["tag_id"]: tag for tag in first["msg"]["tags"]}
+    for tag in served:
+        assert told[tag["tag_id"]] | {"stale_seconds": 0} == tag | {"stale_seconds": 0}
+    observed(house, "next")
+    ros.until_tag("next")
+
+
+def test_before_a_subscription_and_after_its_end_no_state_comes(house: Bridge, ros: Ros) -> None:
+    observed(house, "before")
+    assert ros.is_quiet()
+    ros.subscribe("a")
+    ros.until_tag("before")
+    ros.send(op="unsubscribe", topic=TOPIC, id="a")
+    ros.drain()
+    observed(house, "after")
+    assert ros.is_quiet()
+    ros.subscribe("a")
+    assert "after" in tags(ros.next())
+
+
+def test_a_throttled_subscription_gets_the_latched_state_and_waits(house: Bridge, ros: Ros) -> None:
+    ros.subscribe("slow", throttle_rate=3_600_000)
+    assert ros.next()["op"] == "publish"
+    observed(house, "unseen")
+    assert ros.is_quiet()
+    ros.subscribe("quick")
+    assert "unseen" in tags(ros.next()), "each subscription begins with the current state"
+    observed(house, "seen")
+    ros.until_tag("seen")
+
+
+def test_a_relative_name_is_answered_as_it_was_asked(ros: Ros) -> None:
+    ros.subscribe(topic="twin/state")
+    assert ros.next()["topic"] == "twin/state"
+
+
+def test_no_status_of_the_bridge_comes_between(ros: Ros) -> None:
+    """They are `/ws/state`'s own; roslib could not read them."""
+    ros.subscribe()
+    assert {ros.next()["op"] for _ in range(2)} == {"publish"}
+
+
+# --- the field --------------------------------------------------------------------------------
+
+
+def test_a_call_gets_what_the_ros_service_answers_and_nan_as_null(house: Bridge, ros: Ros) -> None:
+    response = ros.call(FIELD, args=FIELD_ARGS)
+    assert (response["op"], response["id"], response["result"]) == (
+        "service_response",
+        "call",
+        True,
+    )
+    assert response["service"] == FIELD
+    over_ros = house.peer.get_field(**FIELD_ARGS)
+    values = response["values"]
+    assert values["ok"] is True
+    assert (values["width"], values["height"]) == (over_ros.width, over_ros.height) == (12, 12)
+    assert values["sample_count"] == over_ros.sample_count
+    known = [None if value != value else value for value in over_ros.values]  # noqa: PLR0124
+    assert None in values["values"]
+    assert values["values"] == pytest.approx(known)
+    assert values == house.json("/api/field", **FIELD_ARGS)
+
+
+def test_a_refused_field_is_an_answer_of_the_service(house: Bridge, ros: Ros) -> None:
+    """As over ROS: the call succeeds, and `ok` is false."""
+    args = {"sensor_type": "temperature"}
+    response = ros.call(FIELD, args=args)
+    assert response["result"] is True
+    assert response["values"]["ok"] is False
+    assert response["values"]["error_message"] == house.peer.get_field(**args).error_message
+    assert response["values"]["values"] == []
+
+
+def test_a_call_that_cannot_be_made_fails_with_the_reason(ros: Ros) -> None:
+    response = ros.call(FIELD, args={**FIELD_ARGS, "color": "red"})
+    assert response["result"] is False
+    assert response["values"].startswith("args.color is unknown, expected sensor_type, ")
+    response = ros.call("/twin/reset")
+    assert response["result"] is False
+    assert response["values"].startswith("service '/twin/reset' is not served")
+
+
+def test_a_call_ends_when_its_own_time_is_up(ros: Ros) -> None:
+    response = ros.call(FIELD, args=FIELD_ARGS, timeout=1e-9)
+    assert response["result"] is False
+    assert response["values"] == f"{FIELD} did not answer within 1e-09 s"
+
+
+# --- refusals ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        {"op": "advertise", "topic": "/cmd_vel", "type": "geometry_msgs/msg/Twist"},
+        {"op": "publish", "topic": "/cmd_vel", "msg": {"linear": {"x": 1}}},
+        {"op": "publish", "topic": TOPIC, "msg": {}},
+        {"op": "advertise_service", "service": "/s", "type": "std_srvs/srv/Trigger"},
+        {"op": "auth", "mac": "m"},
+        {"op": "drive"},
+    ],
+)
+def test_what_is_not_served_is_refused_and_changes_nothing(
+    house: Bridge, ros: Ros, message: Message
+) -> None:
+    def publishers() -> list[int]:
+        return [house.peer.node.count_publishers(topic) for topic in ("/cmd_vel", TOPIC)]
+
+    before, published = house.json("/api/state")["tags"], publishers()
+    ros.send(**message, id="w")
+    status = ros.next()
+    assert (status["op"], status["level"], status["id"]) == ("status", "error", "w")
+    assert message["op"] in status["msg"]
+    house.peer.spin_briefly()
+    assert publishers() == published
+    after = house.json("/api/state")["tags"]
+    assert [t["tag_id"] for t in after] == [t["tag_id"] for t in before]
+    assert ros.is_quiet()
+
+
+def test_a_binary_frame_is_refused_and_the_connection_stays(ros: Ros) -> None:
+    ros.connection.send(b"\x00\xff")
+    assert ros.next()["msg"] == "a binary frame is refused, expected JSON text"
+    assert ros.is_quiet()
+
+
+def test_a_message_past_the_servers_limit_ends_the_connection_alone(house: Bridge) -> None:
+    with ros_at(house.url) as big, ros_at(house.url) as other:
+        big.connection.send('{"op":"' + "x" * 70_000 + '"}')
+        with pytest.raises(ConnectionClosed) as closed:
+            big.next()
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1009
+        assert other.is_quiet()
+
+
+def test_who_floods_is_closed_with_the_reason(house: Bridge) -> None:
+    with ros_at(house.url) as flood, ros_at(house.url) as other:
+        flood.send(op="set_level", level="none")
+        with pytest.raises(ConnectionClosed) as closed:
+            send_often(flood, "{}", 100 * MAX_BURST)
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1008
+        assert closed.value.rcvd.reason == "more than 100 messages a second after 500 at once"
+        assert other.is_quiet()
+
+
+def send_often(ros: Ros, message: str, times: int) -> None:
+    for _ in range(times):
+        ros.connection.send(message)
+
+
+def garbage(chance: random.Random) -> str | bytes:
+    """A frame that is none of the protocol's: bytes, text, JSON of the wrong kind, half an op."""
+    whole = json.dumps(
+        {
+            "op": chance.choice(["subscribe", "call_service", "unsubscribe", "publish", "x", 5]),
+            "id": chance.choice([None, {}, [], "i" * 300, True, 1.5]),
+            "topic": chance.choice(["/x", 7, None, {"a": []}]),
+            "service": chance.choice([FIELD, "/x", [], None]),
+            "args": chance.choice([{"resolution": "x"}, [[]], "x", {"x": 1}]),
+        }
+    )
+    frames: list[str | bytes] = [
+        chance.randbytes(chance.randrange(40)),
+        whole[: chance.randrange(len(whole))],
+        "[" * chance.randrange(15_000),
+        "\x00\ud7ff\u202e" * chance.randrange(9),
+        chance.choice(["null", "[]", "{}", '"x"', "1e999", "NaN", '{"op":{}}']),
+        '{"a":' * 3000,
+        whole,
+    ]
+    return chance.choice(frames)
+
+
+def test_ten_thousand_malformed_frames_change_nothing(house: Bridge) -> None:
+    chance = random.Random(7)
+
+    def rubbish(connections: int) -> None:
+        for _ in range(connections):
+            some_rubbish()
+
+    def some_rubbish() -> None:
+        with ros_at(house.url) as ros:
+            for _ in range(MAX_BURST - 100):
+                ros.connection.send(garbage(chance))
+                # Each has its answer: a status, or the response to a call that could not be made.
+                reply = ros.next()
+                assert reply["op"] in ("status", "service_response")
+                assert reply.get("result") is not True
+            assert ros.is_quiet()
+
+    with ros_at(house.url) as other, house.listen() as listener:
+        other.subscribe()
+        other.next()
+        rubbish(5)
+        before_mb = resident_mb(house.process.pid)
+        rubbish(20)
+        assert resident_mb(house.process.pid) - before_mb < 5.0
+        house.peer.observe(messages.scan("clean", {"temperature": 20.0}))
+        house.peer.spin_briefly()
+        other.until_tag("clean")
+        listener.until_tag("clean")
+    health = house.json("/healthz")
+    assert (health["ok"], health["callback_errors"]) == (True, 0)
+    assert "Traceback" not in house.process.output
+
+
+# --- set-ups of their own ---------------------------------------------------------------------
+
+
+def test_names_are_the_ones_that_ros_knows() -> None:
+    remapping = ("--ros-args", "-r", "/twin/state:=/house/state", "-p", "field_service_name:=field")
+    with bridge(*remapping) as house, ros_at(house.url) as ros:
+        topics = ros.call("/rosapi/topics")["values"]
+        assert topics == {"topics": ["/house/state"], "types": ["lupin_msgs/msg/TwinState"]}
+        assert ros.call("/rosapi/services")["values"]["services"][0] == "/field"
+        ros.subscribe(topic="/house/state")
+        assert ros.next()["topic"] == "/house/state"
+        ros.subscribe()
+        assert "expected /house/state" in ros.first("status")["msg"]
+
+
+def test_one_client_too_many_is_turned_away_and_told_so() -> None:
+    with bridge("--max-clients", "1") as house, ros_at(house.url) as ros:
+        assert ros.is_quiet()
+        with ros_at(house.url) as late, pytest.raises(ConnectionClosed) as closed:
+            late.next()
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1013
+        assert closed.value.rcvd.reason == "1 clients are connected, the limit"
+
+
+def test_the_limits_of_fields_hold_here_too() -> None:
+    with bridge("--field-rate-hz", "0.1") as house, ros_at(house.url) as ros:
+        assert ros.call(FIELD, args=FIELD_ARGS)["result"] is True
+        response = ros.call(FIELD, args=FIELD_ARGS)
+        assert response["result"] is False
+        assert response["values"] == (
+            "127.0.0.1 asks for more than 0.1 fields a second, the limit (field_rate_hz)"
+        )
+        assert house.get("/api/field", **FIELD_ARGS).status_code == 429, "of one client, together"

@@ -1,0 +1,305 @@
+"""The state over WebSocket and HTTP, from a real twin that a real peer feeds."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+from urllib.parse import quote
+
+import pytest
+from websockets.exceptions import ConnectionClosedError
+
+from lupin_bridge.stream import schema
+from tests.support.messages import discovered, look, pose, scan
+from tests.support.web import Bridge, bridge, tag_ids
+
+# The twin itself publishes once in 100 s: what comes earlier was caused by a change, or is the
+# bridge's own heartbeat, which changes no revision.
+SILENT = ("--ros-args", "-p", "state_publish_rate_hz:=0.01", "-p", "buffer_len:=3")
+
+
+@pytest.fixture(scope="module")
+def live() -> Iterator[Bridge]:
+    """A bridge for many tests, each with tags of its own."""
+    with bridge(*SILENT) as running:
+        yield running
+
+
+# --- WebSocket ----------------------------------------------------------------------------------
+
+
+def test_a_late_joiner_gets_the_status_and_then_the_state_while_the_twin_is_silent(
+    live: Bridge,
+) -> None:
+    with live.listen() as listener:
+        live.peer.observe(scan("early", {"co2": 400.0}, at=(1, 2)))
+        listener.until_tag("early")
+    with live.listen() as late:
+        status, state = late.next(), late.next()
+    assert (status["type"], status["twin"], status["reason"]) == ("status", "live", "live")
+    assert state["type"] == "state"
+    assert "early" in tag_ids(state["state"])
+
+
+def test_a_change_is_pushed_without_waiting_for_the_twins_next_publication(live: Bridge) -> None:
+    with live.listen() as listener:
+        listener.until("state")
+        live.peer.observe(scan("pushed", {"co2": 500.0}, at=(1, 2)))
+        listener.until_tag("pushed")
+        live.peer.discover(discovered({"seen": pose(3, 3)}))
+        listener.until_tag("seen")
+        live.peer.observe(look("looked at", anomaly=True))
+        listener.until_tag("looked at")
+
+
+def test_seq_grows_and_the_revision_changes_with_what_could_change_a_field(live: Bridge) -> None:
+    with live.listen() as listener:
+        frames = [listener.until("state")]
+        for number in range(3):
+            live.peer.observe(scan(f"counted {number}", {"co2": 1.0}))
+            frames.append(listener.until_tag(f"counted {number}"))
+        heartbeat = listener.until("state", lambda frame: frame["seq"] > frames[-1]["seq"])
+    numbers = [frame["seq"] for frame in frames]
+    assert numbers == sorted(set(numbers))
+    assert len({frame["revision"] for frame in frames}) == 4
+    assert heartbeat["revision"] == frames[-1]["revision"]
+
+
+def test_who_connects_again_goes_on_with_the_same_numbers(live: Bridge) -> None:
+    with live.listen() as listener:
+        first = listener.until("state")["seq"]
+    with live.listen() as listener:
+        assert listener.until("state")["seq"] >= first
+
+
+def test_a_heartbeat_comes_although_nothing_changes_and_ages_grow(live: Bridge) -> None:
+    live.peer.observe(scan("ageing", {"co2": 1.0}))
+    live.tag("ageing")
+    with live.listen() as listener:
+        ages = []
+        for _ in range(2):
+            state = listener.until_tag("ageing")["state"]
+            tag = next(tag for tag in state["tags"] if tag["tag_id"] == "ageing")
+            ages.append(tag["stale_seconds"])
+    assert ages == sorted(set(ages))
+
+
+def test_who_asks_for_deltas_gets_the_state_once_and_then_what_changes(live: Bridge) -> None:
+    with live.listen(delta=1) as listener:
+        last = listener.until("state")["seq"]
+        # What other tests have told may still be on its way when the first of them comes.
+        for tag_id in ("ready", "changed"):
+            live.peer.observe(scan(tag_id, {"co2": 1.0}))
+            changed: list[str] = []
+            while tag_id not in changed:
+                delta = listener.next()
+                assert (delta["type"], delta["base"]) == ("delta", last)
+                schema.DeltaFrame.model_validate(delta)
+                last = delta["seq"]
+                changed = [tag["tag_id"] for tag in delta["changed"]]
+        assert changed == ["changed"]
+
+
+def test_who_asks_for_cbor_gets_the_same_in_binary(live: Bridge) -> None:
+    live.peer.observe(scan("binary", {"co2": float("nan")}, at=(1, 2)))
+    live.tag("binary")
+    with live.listen(encoding="cbor") as by_query:
+        assert isinstance(by_query.connection.recv(), bytes)
+        frame = by_query.until_tag("binary")
+    schema.StateFrame.model_validate(frame)
+    with live.listen(subprotocols=["other", "cbor"]) as by_subprotocol:
+        assert by_subprotocol.connection.subprotocol == "cbor"
+        by_subprotocol.until_tag("binary")
+
+
+def test_who_offers_a_subprotocol_hears_why_a_query_is_refused(live: Bridge) -> None:
+    with live.listen(subprotocols=["other", "cbor"], delta="x") as refused:
+        # With none selected, a browser fails the connection before it sees the reason.
+        assert refused.connection.subprotocol == "cbor"
+        with pytest.raises(ConnectionClosedError) as closed:
+            refused.next()
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code == 1008
+    assert "delta" in closed.value.rcvd.reason
+
+
+def test_what_is_selected_as_subprotocol_is_what_is_sent(live: Bridge) -> None:
+    with live.listen(subprotocols=["cbor"], encoding="json") as by_query:
+        assert by_query.connection.subprotocol is None
+        assert isinstance(by_query.connection.recv(), str)
+    with live.listen(encoding="cbor") as not_offered:
+        assert not_offered.connection.subprotocol is None
+        assert isinstance(not_offered.connection.recv(), bytes)
+
+
+def test_who_asks_for_fewer_frames_is_sent_fewer(live: Bridge) -> None:
+    with live.listen(max_rate_hz=0.01) as rare, live.listen() as frequent:
+        numbers = [rare.until("state")["seq"]]
+        for number in range(4):
+            live.peer.observe(scan(f"often {number}", {"co2": 1.0}))
+            frequent.until_tag(f"often {number}")
+        # The next is due in 100 s.
+        numbers += [frame["seq"] for frame in rare.rest() if frame["type"] == "state"]
+        assert len(numbers) == 1
+
+
+def test_what_cannot_be_served_is_refused_with_the_reason(live: Bridge) -> None:
+    with live.listen(rate="\U0001f337" * 40) as refused:
+        with pytest.raises(ConnectionClosedError) as closed:
+            refused.next()
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1008
+        assert closed.value.rcvd.reason == (
+            "parameter 'rate' is unknown, expected delta, encoding or max_rate_hz"
+        )
+
+
+def test_one_client_more_than_the_limit_is_told_so_and_sent_away() -> None:
+    with bridge("--max-clients", "2", *SILENT) as small, small.listen() as one:
+        with small.listen() as two:
+            one.until("state")
+            two.until("state")
+            with small.listen() as three, pytest.raises(ConnectionClosedError) as closed:
+                three.next()
+            assert closed.value.rcvd is not None
+            assert closed.value.rcvd.code == 1013
+            assert closed.value.rcvd.reason == "2 clients are connected, the limit"
+        small.peer.until(lambda: _takes(small), "room for another")
+        small.peer.observe(scan("for one", {"co2": 1.0}))
+        one.until_tag("for one")
+
+
+def _takes(running: Bridge) -> bool:
+    with running.listen() as listener:
+        try:
+            return bool(listener.next()["type"] == "status")
+        except ConnectionClosedError:
+            return False
+
+
+# --- /api/state ---------------------------------------------------------------------------------
+
+
+def test_the_state_is_what_the_peer_has_sent(live: Bridge) -> None:
+    live.peer.observe(
+        scan("whole", {"temperature": 21.5, "co2": 800.0}, at=(1.5, -2.5)),
+        look(
+            "whole",
+            species="rose",
+            anomaly=True,
+            flower_count=3,
+            bug_count=2,
+            blooms=[(1.0, 2.0)],
+            footprint=[(0.0, 0.0), (1.0, 0.0)],
+        ),
+    )
+    tag = live.tag("whole", lambda tag: tag["species"])
+    assert tag["pose"]["position"] == {"x": 1.5, "y": -2.5, "z": 0.0}
+    assert {r["name"]: r["value"] for r in tag["readings"]} == {"temperature": 21.5, "co2": 800.0}
+    assert (tag["species"], tag["species_confidence"], tag["anomaly"]) == ("rose", 0.9, True)
+    assert (tag["flower_count"], tag["bug_count"]) == (3, 2)
+    assert tag["flowers"] == [
+        {
+            "position": {"x": 1.0, "y": 2.0, "z": 0.0},
+            "height_m": 0.4,
+            "species": "rose",
+            "confidence": 0.8,
+            "anomaly": False,
+        }
+    ]
+    assert tag["box_footprint"]["points"][1] == {"x": 1.0, "y": 0.0, "z": 0.0}
+
+
+def test_the_state_is_kept_by_nobody(live: Bridge) -> None:
+    assert live.get("/api/state").headers["cache-control"] == "no-store"
+
+
+# --- one tag ------------------------------------------------------------------------------------
+
+
+def test_one_tag_is_the_states(live: Bridge) -> None:
+    live.peer.observe(scan("single", {"co2": 1.0}, at=(1, 2)))
+    in_state = live.tag("single")
+    alone = live.json("/api/tags/single")
+    assert {**alone, "stale_seconds": 0} == {**in_state, "stale_seconds": 0}
+
+
+@pytest.mark.parametrize("path", ["/api/tags/nobody", "/api/tags/nobody/history"])
+def test_a_tag_that_is_not_there_is_named_with_404(live: Bridge, path: str) -> None:
+    known = len(live.json("/api/state")["tags"])
+    answer = live.get(path)
+    assert answer.status_code == 404
+    message = schema.ErrorMessage.model_validate_json(answer.content)
+    assert message.detail == f"no tag 'nobody' is known ({known} others are)"
+
+
+@pytest.mark.parametrize(
+    "tag_id",
+    [
+        "ä ö",
+        "100%",
+        "a?b=c#d",
+        "<b>&amp;",
+        "..",
+        "日本",
+        '"',
+        "a\\b",
+        "%2F",
+        " ",
+        "/",
+        "../x",
+        "x/1",
+    ],
+)
+def test_any_tag_id_is_found_by_its_percent_encoded_name(live: Bridge, tag_id: str) -> None:
+    live.peer.observe(scan(tag_id, {"co2": 1.0}))
+    live.tag(tag_id)
+    encoded = quote(tag_id, safe="").replace("..", "%2E%2E")
+    assert live.json(f"/api/tags/{encoded}")["tag_id"] == tag_id
+    assert live.json(f"/api/tags/{encoded}/history")["tag_id"] == tag_id
+
+
+@pytest.mark.parametrize(
+    "tag_id",
+    ["%00", "%FF%FE", "%0d%0aSet-Cookie:x=1", "%3Cscript%3E", "x" * 5_000, "%F0%9F%8C%B7", "a%2Fb"],
+)
+def test_a_hostile_tag_id_is_a_plain_404(live: Bridge, tag_id: str) -> None:
+    for path in (f"/api/tags/{tag_id}", f"/api/tags/{tag_id}/history"):
+        answer = live.get(path)
+        assert answer.status_code == 404
+        assert len(schema.ErrorMessage.model_validate_json(answer.content).detail) < 400
+        assert "set-cookie" not in answer.headers
+        assert answer.headers["content-type"] == "application/json"
+
+
+# --- history ------------------------------------------------------------------------------------
+
+
+def history(live: Bridge, tag_id: str) -> dict[str, list[Any]]:
+    """The past values of each sensor of a tag, oldest first."""
+    sensors = live.json(f"/api/tags/{tag_id}/history")["sensors"]
+    return {sensor["name"]: [v["value"] for v in sensor["values"]] for sensor in sensors}
+
+
+def test_a_history_holds_the_last_scans_and_no_look(live: Bridge) -> None:
+    for value in range(5):
+        live.peer.observe(scan("past", {"co2": value}, stamp_s=100.0 + value))
+    live.peer.observe(scan("past", {"light": 900.0}, stamp_s=110.0), look("past"))
+    live.tag("past", lambda tag: tag["species"])
+    assert history(live, "past") == {"co2": [3.0, 4.0], "light": [900.0]}, "buffer_len is 3"
+    values = live.json("/api/tags/past/history")["sensors"][0]["values"]
+    assert values[0]["stamp"] == {"sec": 103, "nanosec": 0}
+
+
+def test_a_tag_that_was_never_scanned_has_an_empty_history(live: Bridge) -> None:
+    live.peer.discover(discovered({"unscanned": pose(1, 1)}))
+    live.tag("unscanned")
+    assert history(live, "unscanned") == {}
+
+
+def test_json_is_json_for_every_reader(live: Bridge) -> None:
+    live.peer.observe(scan("odd", {"co2": float("nan"), "light": float("-inf")}))
+    live.tag("odd")
+    for path in ("/api/state", "/api/tags/odd", "/api/tags/odd/history"):
+        json.loads(live.get(path).text, parse_constant=pytest.fail)

@@ -1,0 +1,171 @@
+"""Answers go out as their readers take them: in pieces, and not at all to who takes nothing."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from lupin_bridge.serving.http_protocol import HTTP_CONNECTION_KEY, PIECE_BYTES, PieceByPiece
+from tests.support.access import Served, served
+from tests.support.waiting import PATIENCE_S, wait_for
+
+# 1,000,000 cells, 5 MB of JSON: more than two sockets hold between them.
+LARGE_FIELD = (
+    "/api/field.json?sensor_type=co2&resolution=0.01"
+    "&bbox_min_x=0&bbox_min_y=0&bbox_max_x=10&bbox_max_y=10"
+)
+SMALL_FIELD = LARGE_FIELD.replace("0.01", "10")
+CONCURRENCY = 3
+TIMEOUT_S = 3
+
+
+# --- in pieces ----------------------------------------------------------------------------------
+
+
+class Reader:
+    """A connection that takes `takes` messages and then waits until it is torn down."""
+
+    def __init__(self, takes: int | None = None) -> None:
+        self.messages: list[dict[str, Any]] = []
+        self.gone = asyncio.Event()
+        self._takes = takes
+
+    async def send(self, message: Any) -> None:
+        if self._takes is not None and len(self.messages) >= self._takes:
+            await self.gone.wait()
+            return
+        self.messages.append(message)
+
+    def abort(self) -> None:
+        self.gone.set()
+
+    @property
+    def body(self) -> bytes:
+        return b"".join(message.get("body", b"") for message in self.messages)
+
+
+def answer(reader: Reader, *bodies: bytes, timeout_s: float = PATIENCE_S) -> None:
+    """Send an answer of these bodies to a reader."""
+
+    async def app(_scope: Any, _receive: Any, send: Any) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        for number, body in enumerate(bodies):
+            more = number + 1 < len(bodies)
+            await send({"type": "http.response.body", "body": body, "more_body": more})
+
+    async def receive() -> Any:
+        raise AssertionError("nobody asked")
+
+    scope = {"type": "http", "state": {HTTP_CONNECTION_KEY: reader}}
+    asyncio.run(PieceByPiece(app, timeout_s)(scope, receive, reader.send))
+
+
+def test_a_large_body_goes_out_in_pieces_that_add_up_to_it() -> None:
+    body = bytes(range(256)) * (10 * PIECE_BYTES // 256) + b"the rest"
+    reader = Reader()
+    answer(reader, body)
+    assert reader.body == body
+    assert max(len(message.get("body", b"")) for message in reader.messages) == PIECE_BYTES
+    more = [message["more_body"] for message in reader.messages[1:]]
+    assert more == [True] * 11 + [False], "one end, and it is last"
+
+
+@pytest.mark.parametrize("body", [b"", b"x", b"x" * PIECE_BYTES])
+def test_a_small_body_goes_out_whole(body: bytes) -> None:
+    reader = Reader()
+    answer(reader, body)
+    assert [message.get("body") for message in reader.messages] == [None, body]
+
+
+def test_a_streamed_body_goes_on_after_a_large_part() -> None:
+    large = b"x" * (PIECE_BYTES + 1)
+    reader = Reader()
+    answer(reader, b"head", large, b"tail")
+    assert reader.body == b"head" + large + b"tail"
+    assert [message["more_body"] for message in reader.messages[1:]].count(False) == 1
+
+
+def test_who_takes_nothing_is_torn_off_and_the_answer_returns() -> None:
+    reader = Reader(takes=3)
+    answer(reader, b"x" * (10 * PIECE_BYTES), timeout_s=0.05)
+    assert reader.gone.is_set()
+    assert len(reader.body) == 2 * PIECE_BYTES
+
+
+def test_who_takes_none_of_many_small_answers_is_torn_off_too() -> None:
+    reader = Reader(takes=0)
+    answer(reader, b"small", timeout_s=0.05)
+    assert reader.gone.is_set()
+    assert reader.messages == []
+
+
+def test_websockets_pass_through() -> None:
+    seen: list[Any] = []
+
+    async def app(*arguments: Any) -> None:
+        seen.append(arguments)
+
+    given: Any = ({"type": "websocket"}, object(), object())
+    asyncio.run(PieceByPiece(app, 1.0)(*given))
+    assert seen == [given]
+
+
+# --- served -------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def live() -> Iterator[Served]:
+    options = ("--client-timeout-s", str(TIMEOUT_S), "--field-concurrency", str(CONCURRENCY))
+    with served(*options) as running:
+        yield running
+
+
+@contextlib.contextmanager
+def deaf_reader(live: Served, path: str) -> Iterator[socket.socket]:
+    """A client that asks and reads nothing, with little room for the answer."""
+    host, port = live.url.removeprefix("http://").split(":")
+    with socket.socket() as client:
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        client.settimeout(PATIENCE_S)
+        client.connect((host, int(port)))
+        client.sendall(f"GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
+        yield client
+
+
+def rest_of(client: socket.socket) -> int:
+    """How many bytes still come before the connection ends."""
+    size = 0
+    with contextlib.suppress(ConnectionResetError):
+        while piece := client.recv(65_536):
+            size += len(piece)
+    return size
+
+
+def test_a_large_field_arrives_whole(live: Served) -> None:
+    response = live.get(LARGE_FIELD)
+    assert len(response.content) == int(response.headers["content-length"]) > 4_000_000
+    assert len(response.json()["values"]) == 1_000_000
+    head = live.get(LARGE_FIELD, method="HEAD")
+    assert (head.content, head.headers["content-length"]) == (
+        b"",
+        response.headers["content-length"],
+    )
+
+
+def test_deaf_readers_keep_their_own_places_and_are_cut_off(live: Served) -> None:
+    refused = f"has {CONCURRENCY} field requests in flight, the limit (field_concurrency)"
+    with contextlib.ExitStack() as readers:
+        deaf = [readers.enter_context(deaf_reader(live, LARGE_FIELD)) for _ in range(CONCURRENCY)]
+        wait_for(lambda: refused in live.get(SMALL_FIELD).text, "the deaf readers' places")
+        with live.client("127.0.4.1") as other:
+            assert other.get(SMALL_FIELD).status_code == 200, "it is another client"
+        line = f"cut off a reader that took nothing for {TIMEOUT_S} s"
+        wait_for(lambda: live.process.output.count(line) == CONCURRENCY, "their end")
+        assert all(rest_of(client) < 4_000_000 for client in deaf)
+    wait_for(lambda: live.get(SMALL_FIELD).status_code == 200, "their places to be free")
+    assert "ERROR" not in live.process.output

@@ -1,0 +1,276 @@
+"""The server: its socket, its limits, and its end, with clients connected."""
+
+from __future__ import annotations
+
+import resource
+import signal
+import socket
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import pytest
+from websockets.exceptions import ConnectionClosed
+
+from lupin_bridge.cli import IDLE_WORKERS_END_S
+from lupin_bridge.roles import PATROL_STOP_S
+from lupin_bridge.serving.server import (
+    GOODBYE_S,
+    GRACEFUL_SHUTDOWN_S,
+    MAX_INBOUND_BYTES,
+    address_of,
+    allow_connections,
+    listen,
+)
+from lupin_bridge.twin.ros_thread import STOP_TIMEOUT_S
+from tests.support.inprocess import run, running
+from tests.support.live import attached, wait_until_ready
+from tests.support.processes import Process, lupin_twin, twin_node, url_of
+from tests.support.ros import Peer
+from tests.support.sabotage import sabotaged
+from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.web import Bridge, Listener, bridge, deaf_client, listener, overfill
+
+FIELD = "/api/field?sensor_type=co2&resolution=0.5"
+MILLION_CELLS = (
+    "/api/field?sensor_type=co2&resolution=0.001"
+    "&bbox_min_x=0&bbox_min_y=0&bbox_max_x=1&bbox_max_y=1"
+)
+
+
+@pytest.fixture(scope="module")
+def live() -> Iterator[Bridge]:
+    with bridge() as running_bridge:
+        yield running_bridge
+
+
+def open_files() -> set[str]:
+    """The numbers of this process's descriptors."""
+    return {entry.name for entry in Path("/proc/self/fd").iterdir()}
+
+
+# --- the socket ---------------------------------------------------------------------------------
+
+
+def test_who_connects_before_the_server_serves_has_only_to_wait() -> None:
+    with listen("127.0.0.1", 0) as listener:
+        with socket.create_connection(listener.getsockname()) as client:
+            assert client.getpeername() == listener.getsockname()
+        assert address_of(listener) == f"http://127.0.0.1:{listener.getsockname()[1]}"
+
+
+def test_ipv6_has_brackets_in_its_address() -> None:
+    with listen("::1", 0) as listener:
+        assert address_of(listener) == f"http://[::1]:{listener.getsockname()[1]}"
+
+
+@pytest.mark.parametrize(
+    ("soft", "hard", "expected"),
+    [
+        (1_024, 20_000, 5_512),
+        (8_000, 20_000, 8_000),
+        (1_024, 4_096, 4_096),
+        (1_024, resource.RLIM_INFINITY, 5_512),
+        (resource.RLIM_INFINITY, resource.RLIM_INFINITY, resource.RLIM_INFINITY),
+    ],
+)
+def test_it_may_open_as_many_files_as_clients_need_and_says_where_it_may_not(
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    soft: int,
+    hard: int,
+    expected: int,
+) -> None:
+    limits = [(soft, hard)]
+    monkeypatch.setattr(resource, "getrlimit", lambda _: limits[-1])
+    monkeypatch.setattr(resource, "setrlimit", lambda _, both: limits.append(both))
+    allow_connections(5_000)
+    assert limits[-1] == (expected, hard)
+    names_all = "--max-clients is 5000, but this process may open 4096 files" in caplog.text
+    assert names_all == (hard == 4_096)
+
+
+def test_an_address_in_use_is_refused_and_nothing_stays_open() -> None:
+    with listen("127.0.0.1", 0) as listener:
+        before = open_files()
+        with pytest.raises(OSError, match="in use"):
+            listen("127.0.0.1", listener.getsockname()[1])
+        assert open_files() == before
+
+
+def test_a_small_write_leaves_at_once(domain: int) -> None:
+    async def test() -> None:
+        async with running() as served:
+            await served.http.get("/healthz")
+            (connection,) = served.server.server_state.connections
+            assert connection.transport is not None
+            client = connection.transport.get_extra_info("socket")
+            assert client.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY) == 1
+
+    run(domain, test())
+
+
+@contextmanager
+def waiting_for(url: str, path: str) -> Iterator[Future[httpx.Response]]:
+    """A client that asks and waits; its answer comes when it comes."""
+
+    def ask() -> httpx.Response:
+        return httpx.get(f"{url}{path}", timeout=PATIENCE_S, trust_env=False)
+
+    with ThreadPoolExecutor(1) as client:
+        yield client.submit(ask)
+
+
+def assert_sent_away(answer: Future[httpx.Response]) -> None:
+    """Whoever waited for a field at the good-bye knows why it does not come, and what to do."""
+    response = answer.result(PATIENCE_S)
+    assert response.status_code == 503
+    assert response.json() == {"detail": "the bridge is shutting down"}
+    assert response.headers["retry-after"] == "3"
+
+
+def assert_quiet(process: Process) -> None:
+    # Whether a client that does not read is cut off by us or, on a busy machine, by uvicorn, which
+    # logs it as an error, is all the same.
+    ours = [line for line in process.output.splitlines() if "graceful shutdown" not in line]
+    for word in ("Traceback", "ERROR", "Exception"):
+        assert word not in "\n".join(ours)
+
+
+def last_words(listener: Listener) -> tuple[str, int]:
+    """The reason in the last status frame, and the code of the close frame."""
+    reason = ""
+    try:
+        while True:
+            frame = listener.next()
+            if frame["type"] == "status":
+                reason = frame["reason"]
+    except ConnectionClosed as closed:
+        return reason, 0 if closed.rcvd is None else closed.rcvd.code
+
+
+# As SECURITY.md says: 64 kB.
+LARGEST_MESSAGE = 65_536
+
+# --- limits -------------------------------------------------------------------------------------
+
+
+def test_what_a_client_says_is_read_and_thrown_away(live: Bridge) -> None:
+    with live.listen() as listener:
+        for _ in range(50):
+            listener.connection.send("x" * 10_000)
+            listener.connection.send(b"\x00\xff")
+        listener.until("state", lambda frame: frame["seq"] > 1)
+
+
+def test_a_message_past_the_limit_ends_that_client_alone(live: Bridge) -> None:
+    assert MAX_INBOUND_BYTES == LARGEST_MESSAGE
+    with live.listen() as healthy, live.listen() as loud:
+        for _ in range(10):
+            loud.connection.send("x" * LARGEST_MESSAGE)
+        loud.until("state", lambda frame: frame["seq"] > 1)
+        loud.connection.send("x" * (LARGEST_MESSAGE + 1))
+        assert last_words(loud)[1] == 1009
+        newest = healthy.until("state")["seq"]
+        healthy.until("state", lambda frame: frame["seq"] > newest)
+
+
+def test_frames_are_not_compressed(live: Bridge) -> None:
+    with live.listen() as listener:
+        assert listener.connection.response is not None
+        assert "sec-websocket-extensions" not in listener.connection.response.headers
+
+
+def test_what_a_header_claims_of_a_proxy_is_not_believed(live: Bridge) -> None:
+    page = live.get("/docs", headers={"X-Forwarded-Proto": "https", "X-Forwarded-For": "1.2.3.4"})
+    assert f"curl '{live.url}/api/state'" in page.text
+
+
+# --- the end ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_and_every_client_is_told(
+    number: signal.Signals,
+) -> None:
+    with bridge() as running_bridge, running_bridge.listen() as one, running_bridge.listen() as two:
+        one.until("state")
+        running_bridge.get("/api/state")  # and its connection is kept alive
+        assert running_bridge.process.stop(number) == 0
+        assert last_words(one) == last_words(two) == ("shutting_down", 1012)
+        assert_quiet(running_bridge.process)
+
+
+def test_a_second_signal_does_no_harm() -> None:
+    with bridge() as running_bridge, running_bridge.listen() as listener:
+        listener.until("state")
+        running_bridge.process.send(signal.SIGTERM)
+        running_bridge.process.send(signal.SIGTERM)
+        assert running_bridge.process.wait() == 0
+        assert "Traceback" not in running_bridge.process.output
+
+
+def test_clients_that_do_not_read_do_not_hold_up_the_end() -> None:
+    with (
+        bridge() as running_bridge,
+        running_bridge.listen() as healthy,
+        deaf_client(running_bridge.url),
+        deaf_client(running_bridge.url, MILLION_CELLS),
+    ):
+        overfill(running_bridge, healthy)
+        assert running_bridge.process.stop(signal.SIGTERM) == 0
+        assert last_words(healthy) == ("shutting_down", 1012)
+        assert_quiet(running_bridge.process)
+
+
+# What of a request for a field never comes back: a worker that computes it, one that writes it,
+# the ROS thread.
+HANGS = (
+    "lupin_twin.fields:FieldJob.compute:co2",
+    "lupin_bridge.field.formats:write:co2",
+    "lupin_twin.fields:FieldEngine.lookup:co2",
+)
+
+
+@pytest.mark.parametrize("hang", HANGS)
+def test_a_field_that_takes_for_ever_does_not_hold_up_the_end(domain: int, hang: str) -> None:
+    with (
+        sabotaged(domain, ["--hang", hang], "lupin_bridge.cli", "serve", "--port", "0") as process,
+        listener(url_of(process)) as healthy,
+        waiting_for(url_of(process), FIELD) as answer,
+    ):
+        healthy.until("state")
+        process.wait_for_output(f"{hang.split(':')[1]} hangs")
+        assert process.stop(signal.SIGINT) == 0
+        assert_sent_away(answer)
+        assert last_words(healthy) == ("shutting_down", 1012)
+        assert_quiet(process)
+
+
+def test_nor_does_a_twin_elsewhere_that_does_not_answer(domain: int) -> None:
+    with (
+        twin_node(domain) as twin,
+        lupin_twin(domain, "web") as process,
+        Peer(domain) as peer,
+        attached(process, peer) as live,
+        live.listen() as healthy,
+    ):
+        wait_until_ready(live)
+        wait_for(lambda: live.get(FIELD).status_code == 200, "the twin's service")
+        twin.freeze()
+        with waiting_for(live.url, FIELD.replace("co2", "light")) as answer:
+            wait_for(
+                lambda: "\nlupin_fields_computing 1.0" in live.get("/metrics").text,
+                "the request to be under way",
+            )
+            assert process.stop(signal.SIGINT) == 0
+            assert_sent_away(answer)
+        assert last_words(healthy) == ("shutting_down", 1012)
+        assert_quiet(process)
+
+
+def test_the_times_of_the_end_add_up_to_what_is_promised() -> None:
+    assert GOODBYE_S < GRACEFUL_SHUTDOWN_S
+    assert GRACEFUL_SHUTDOWN_S + max(STOP_TIMEOUT_S, PATROL_STOP_S) + IDLE_WORKERS_END_S <= 2.0

@@ -1,0 +1,82 @@
+"""Sockets to a reader that does not read."""
+
+from __future__ import annotations
+
+import asyncio
+import fcntl
+import socket
+import struct
+import termios
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+
+from lupin_bridge.serving.transports import UNSENT_BYTES, bound_unsent, tear_down
+from tests.support.waiting import until
+
+# More than any socket takes by itself.
+MUCH = bytes(64_000_000)
+
+
+@asynccontextmanager
+async def connection() -> AsyncIterator[tuple[asyncio.WriteTransport, socket.socket]]:
+    """Our transport, and the socket at its other end, which nobody reads."""
+    made: list[asyncio.WriteTransport] = []
+
+    class Ours(asyncio.Protocol):
+        def connection_made(self, transport: asyncio.BaseTransport) -> None:
+            assert isinstance(transport, asyncio.WriteTransport)
+            made.append(transport)
+
+    server = await asyncio.get_running_loop().create_server(Ours, "127.0.0.1", 0)
+    with socket.create_connection(server.sockets[0].getsockname()) as theirs:
+        await until(lambda: made, "the connection")
+        yield made[0], theirs
+    made[0].abort()
+    server.close()
+    await server.wait_closed()
+
+
+def held_by_the_kernel(transport: asyncio.WriteTransport) -> int:
+    """Bytes that the socket has taken and the other end has not (tcp(7), SIOCOUTQ)."""
+    answer = fcntl.ioctl(transport.get_extra_info("socket"), termios.TIOCOUTQ, b"\0" * 4)
+    return int(struct.unpack("i", answer)[0])
+
+
+def hoarded(prepare: Callable[[asyncio.BaseTransport], None]) -> int:
+    """What the kernel takes of much that nobody reads."""
+
+    async def test() -> int:
+        async with connection() as (transport, _):
+            prepare(transport)
+            transport.write(MUCH)
+            return held_by_the_kernel(transport)
+
+    return asyncio.run(test())
+
+
+def test_the_kernel_hoards_little_for_who_does_not_read() -> None:
+    assert hoarded(bound_unsent) <= 2 * UNSENT_BYTES
+    assert hoarded(lambda _: None) > 4 * UNSENT_BYTES, "otherwise this shows nothing"
+
+
+def test_who_does_not_read_is_reset() -> None:
+    async def test() -> None:
+        async with connection() as (transport, theirs):
+            transport.write(MUCH)
+            tear_down(transport)
+            await until(lambda: theirs.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR), "a reset")
+
+    asyncio.run(test())
+
+
+def test_who_has_read_all_is_closed() -> None:
+    async def test() -> None:
+        async with connection() as (transport, theirs):
+            transport.write(b"the end")
+            tear_down(transport)
+            loop = asyncio.get_running_loop()
+            theirs.setblocking(False)
+            assert await loop.sock_recv(theirs, 100) == b"the end"
+            assert await loop.sock_recv(theirs, 100) == b""
+
+    asyncio.run(test())

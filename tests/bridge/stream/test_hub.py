@@ -1,0 +1,306 @@
+"""The hub's policy, with connections whose room is the test's to give."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from lupin_bridge.stream.frames import CBOR, FrameWriter
+from lupin_bridge.stream.hub import CLOSE_POLICY, Client, Hub
+from lupin_bridge.stream.status import Reason, Status
+from lupin_twin.state import Snapshot, TagState
+from tests.bridge.stream.test_frames import content, received
+
+TIMEOUT_S = 30.0
+
+
+class Socket:
+    """A connection that takes as many frames as it has room for."""
+
+    def __init__(self, room: int = 1_000_000) -> None:
+        self.room = room
+        self.wires: list[bytes] = []
+        self.dismissed: tuple[int, str] | None = None
+
+    @property
+    def can_take(self) -> bool:
+        return self.room > 0
+
+    def write(self, wire: bytes) -> None:
+        assert self.can_take, "written to a connection that cannot take it"
+        self.room -= 1
+        self.wires.append(wire)
+
+    def dismiss(self, code: int, reason: str) -> None:
+        self.dismissed = (code, reason)
+
+    @property
+    def got(self) -> list[Any]:
+        """What came, in short: a status's reason, a state's number, a delta's two."""
+        return [in_short(json.loads(bytes(received(wire).data))) for wire in self.wires]
+
+
+def in_short(frame: dict[str, Any]) -> Any:
+    if frame["type"] == "status":
+        return frame["reason"]
+    return frame["seq"] if frame["type"] == "state" else (frame["base"], frame["seq"])
+
+
+class Stage:
+    """A hub, and frames for it."""
+
+    def __init__(self, max_clients: int = 10) -> None:
+        self.hub = Hub(max_clients, TIMEOUT_S, self.status_at)
+        self.reason: Reason = "live"
+        self.since_s = 0.0
+        self.writer = FrameWriter()
+
+    def publish(self, now_s: float = 0.0) -> int:
+        """Publish the next frame; returns its number."""
+        frame = self.writer.state(Snapshot(0, "map", (TagState("7"),)), "r")
+        self.hub.publish(frame, now_s)
+        return frame.seq
+
+    def status_at(self, now_s: float) -> Status:
+        return Status(self.reason, now_s - self.since_s)
+
+    def announce(self, reason: Reason, now_s: float = 0.0) -> None:
+        self.reason = reason
+        self.hub.announce(now_s)
+
+    def join(self, socket: Socket, now_s: float = 0.0, **asked: Any) -> Client:
+        client = Client(socket, **asked)
+        self.hub.join(client, now_s)
+        return client
+
+
+@pytest.fixture
+def stage() -> Stage:
+    return Stage()
+
+
+# --- everyone -----------------------------------------------------------------------------------
+
+
+def test_who_joins_gets_the_status_and_then_the_newest_state_at_once(stage: Stage) -> None:
+    stage.announce("live")
+    stage.publish()
+    stage.publish(0.1)
+    late = Socket()
+    stage.join(late, 5.0)
+    assert late.got == ["live", 2]
+
+
+def test_who_joins_before_there_is_a_state_gets_the_status_alone(stage: Stage) -> None:
+    stage.announce("never_seen")
+    early = Socket()
+    stage.join(early)
+    assert early.got == ["never_seen"]
+    stage.publish()
+    assert early.got == ["never_seen", 1]
+
+
+def test_a_status_tells_the_age_of_the_moment_at_which_a_client_gets_it(stage: Stage) -> None:
+    stage.announce("stale", 3.0)
+    sockets = [Socket(), Socket(), Socket(room=0)]
+    clients = [stage.join(socket, 3_600.0) for socket in sockets]
+    sockets[2].room = 1
+    stage.hub.serve(clients[2], 3_700.0)
+    ages = [
+        json.loads(bytes(received(socket.wires[0]).data))["state_age_seconds"] for socket in sockets
+    ]
+    assert ages == [3_600.0, 3_600.0, 3_700.0]
+    assert sockets[0].wires[0] is sockets[1].wires[0], "one serialisation serves all"
+
+
+def test_everyone_gets_every_frame_and_every_status_once(stage: Stage) -> None:
+    sockets = [Socket(), Socket()]
+    for socket in sockets:
+        stage.join(socket)
+    stage.publish()
+    stage.publish(0.1)
+    stage.announce("stale", 4.0)
+    stage.hub.serve_all(5.0)
+    for socket in sockets:
+        assert socket.got == ["live", 1, 2, "stale"]
+    assert sockets[0].wires[1] is sockets[1].wires[1], "one serialisation serves all"
+
+
+def test_who_wants_no_status_or_no_state_gets_none(stage: Stage) -> None:
+    no_status, no_state = Socket(), Socket()
+    stage.join(no_status, wants_status=False)
+    stage.join(no_state, wants_state=False)
+    stage.publish()
+    stage.announce("stale")
+    assert (no_status.got, no_state.got) == ([1], ["live", "stale"])
+
+
+def test_who_has_left_gets_nothing_more(stage: Stage) -> None:
+    socket = Socket()
+    client = stage.join(socket)
+    stage.hub.leave(client)
+    stage.hub.leave(client)
+    stage.publish()
+    assert socket.got == ["live"]
+
+
+def test_the_hub_is_full_at_its_limit_and_has_room_when_somebody_leaves() -> None:
+    stage = Stage(max_clients=2)
+    first = stage.join(Socket())
+    fullness = [stage.hub.is_full]
+    stage.join(Socket())
+    fullness.append(stage.hub.is_full)
+    stage.hub.leave(first)
+    fullness.append(stage.hub.is_full)
+    assert (fullness, len(stage.hub)) == ([False, True, False], 1)
+
+
+# --- slow clients -------------------------------------------------------------------------------
+
+
+def test_a_slow_client_is_never_queued_for_and_gets_the_newest(stage: Stage) -> None:
+    slow, quick = Socket(room=1), Socket()
+    client = stage.join(slow, wants_status=False)
+    stage.join(quick, wants_status=False)
+    for number in range(8):
+        stage.publish(number / 10)
+    assert slow.got == [1]
+    assert quick.got == [1, 2, 3, 4, 5, 6, 7, 8]
+    assert stage.hub.blocked == 1
+    slow.room = 1_000
+    stage.hub.serve(client, 1.0)
+    assert slow.got == [1, 8]
+    stage.hub.serve(client, 1.1)
+    assert slow.got == [1, 8], "the same frame twice"
+    assert (stage.hub.blocked, stage.hub.frames_sent, stage.hub.frames_skipped) == (0, 10, 6)
+
+
+def test_a_slow_client_is_told_the_newest_status_before_the_newest_state(stage: Stage) -> None:
+    slow = Socket(room=0)
+    client = stage.join(slow)
+    stage.announce("live")
+    stage.publish()
+    stage.announce("stale", 4.0)
+    slow.room = 1
+    stage.hub.serve(client, 5.0)
+    assert slow.got == ["stale"]
+    slow.room = 1
+    stage.hub.serve(client, 5.0)
+    assert slow.got == ["stale", 1]
+
+
+def test_a_client_that_takes_nothing_for_too_long_is_closed_and_forgotten(stage: Stage) -> None:
+    stuck, quick = Socket(room=0), Socket()
+    stage.join(stuck, wants_status=False)
+    stage.join(quick)
+    stage.publish(10.0)
+    stage.publish(20.0)
+    assert stage.hub.dismiss_stuck(10.0 + TIMEOUT_S - 0.1) == 0
+    assert stage.hub.dismiss_stuck(10.0 + TIMEOUT_S) == 1
+    assert stuck.dismissed == (CLOSE_POLICY, "took no frame for 30 s")
+    assert (quick.dismissed, len(stage.hub)) == (None, 1)
+    assert stage.hub.dismiss_stuck(1_000.0) == 0
+    assert stage.hub.clients_dismissed == 1
+
+
+def test_the_time_counts_from_the_first_frame_that_was_not_taken(stage: Stage) -> None:
+    slow = Socket(room=1)
+    client = stage.join(slow, wants_status=False)
+    stage.publish(1.0)
+    assert stage.hub.dismiss_stuck(500.0) == 0, "a silent twin makes nobody stuck"
+    stage.publish(500.0)
+    stage.publish(520.0)
+    slow.room = 1
+    stage.hub.serve(client, 525.0)
+    assert stage.hub.dismiss_stuck(531.0) == 0, "it has taken a frame since"
+    stage.publish(540.0)
+    assert stage.hub.dismiss_stuck(540.0 + TIMEOUT_S) == 1
+
+
+# --- what a client asked for --------------------------------------------------------------------
+
+
+def test_deltas_go_to_who_asked_and_has_the_frame_before(stage: Stage) -> None:
+    socket, whole = Socket(), Socket()
+    stage.publish()
+    client = stage.join(socket, delta=True, wants_status=False)
+    stage.join(whole, wants_status=False)
+    stage.publish()
+    stage.publish()
+    assert socket.got == [1, (1, 2), (2, 3)]
+    assert whole.got == [1, 2, 3]
+    socket.room = 0
+    stage.publish()
+    stage.publish()
+    socket.room = 2
+    stage.hub.serve(client, 1.0)
+    stage.publish(1.0)
+    assert socket.got[3:] == [5, (5, 6)], "whole after a gap"
+
+
+def test_cbor_goes_to_who_asked(stage: Stage) -> None:
+    socket = Socket()
+    stage.announce("live")
+    stage.join(socket, encoding=CBOR, delta=True)
+    stage.publish()
+    stage.publish()
+    frames = [content(wire, CBOR) for wire in socket.wires]
+    assert [in_short(frame) for frame in frames] == ["live", 1, (1, 2)]
+
+
+def test_a_rate_holds_on_average_and_a_status_does_not_wait_for_it(stage: Stage) -> None:
+    socket = Socket()
+    stage.join(socket, min_interval_s=1.0)
+    socket.wires.clear()
+    for tenth in range(55):
+        stage.publish(tenth / 10)
+    # The first of each second: 0.0, 1.0, 2.0 …
+    assert socket.got == [1, 11, 21, 31, 41, 51]
+    stage.announce("stale", 5.45)
+    assert socket.got[-1] == "stale"
+    stage.hub.serve_all(5.9)
+    assert socket.got[-1] == "stale"
+    stage.hub.serve_all(6.0)
+    assert socket.got[-1] == 55, "the newest, when its time has come"
+
+
+def test_a_late_frame_does_not_delay_those_after_it_unless_the_interval_is_strict(
+    stage: Stage,
+) -> None:
+    on_average, strict = Socket(), Socket()
+    stage.join(on_average, min_interval_s=1.0, wants_status=False)
+    stage.join(strict, min_interval_s=1.0, strict_interval=True, wants_status=False)
+    for now_s in (0.0, 1.05, 2.0, 2.05, 3.0, 3.05):
+        stage.publish(now_s)
+    assert on_average.got == [1, 2, 3, 5]
+    assert strict.got == [1, 2, 4, 6]
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.05, 0.099])
+def test_of_a_source_that_keeps_to_the_rate_nothing_is_missed(stage: Stage, late_s: float) -> None:
+    socket = Socket()
+    stage.join(socket, min_interval_s=1.0, wants_status=False)
+    for second in range(100):
+        stage.publish(second + (late_s if second % 3 == 0 else 0.0))
+    assert len(socket.got) == 100
+
+
+def test_a_pause_is_not_made_up_for_by_a_burst(stage: Stage) -> None:
+    socket = Socket()
+    stage.join(socket, min_interval_s=1.0, wants_status=False)
+    stage.publish(0.0)
+    for now_s in (100.0, 100.1, 100.85, 100.95, 101.85, 101.95):
+        stage.publish(now_s)
+    # One as soon as there is something, and the next a beat later, a tenth of it forgiven.
+    assert socket.got == [1, 2, 5, 7]
+
+
+def test_nor_is_the_time_before_a_client_came(stage: Stage) -> None:
+    socket = Socket()
+    stage.publish(100.0)
+    stage.join(socket, 100.3, min_interval_s=1.0, wants_status=False)
+    for now_s in (100.5, 101.1, 101.25, 102.15, 102.25):
+        stage.publish(now_s)
+    assert socket.got == [1, 4, 6]

@@ -1,0 +1,187 @@
+"""Snapshot to JSON: held against the contract's types and against the plainest writing."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lupin_bridge.stream import schema, state_json
+from lupin_bridge.stream.state_json import StateJson
+from lupin_twin.state import Bloom, Flower, Observation, Pose, Reading, Snapshot, TagState
+
+ANY_NUMBER = st.floats(width=64)
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+# A text that looks like the place at which the age goes must not be mistaken for it.
+TEXT = st.one_of(
+    st.text(st.characters(codec="utf-8"), max_size=12), st.just('"stale_seconds":null')
+)
+STAMP_NS = st.integers(0, 4_000_000_000_000_000_000)
+
+POSES = st.builds(Pose, *[FINITE] * 6, FINITE.filter(lambda w: w != 0.0))
+BLOOMS = st.builds(
+    Bloom, ANY_NUMBER, ANY_NUMBER, ANY_NUMBER, ANY_NUMBER, TEXT, ANY_NUMBER, st.booleans()
+)
+FLOWERS = st.builds(
+    Flower,
+    species=TEXT,
+    confidence=ANY_NUMBER,
+    anomaly=st.booleans(),
+    flower_count=st.integers(0, 65_535),
+    bug_count=st.integers(0, 65_535),
+    blooms=st.lists(BLOOMS, max_size=3).map(tuple),
+    footprint=st.lists(st.tuples(ANY_NUMBER, ANY_NUMBER, ANY_NUMBER), max_size=3).map(tuple),
+)
+TAGS = st.builds(
+    TagState,
+    tag_id=TEXT,
+    pose=st.none() | POSES,
+    readings=st.lists(st.builds(Reading, TEXT, ANY_NUMBER), max_size=3).map(tuple),
+    last_observed_ns=st.none() | STAMP_NS,
+    flower=FLOWERS,
+)
+SNAPSHOTS = st.builds(
+    Snapshot,
+    stamp_ns=STAMP_NS,
+    frame_id=TEXT,
+    tags=st.lists(TAGS, max_size=4, unique_by=lambda tag: tag.tag_id).map(tuple),
+)
+
+POSE = Pose(1.0, 2.0, 0.5, 0.0, 0.0, 0.0, 1.0)
+
+
+def number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def stamp(stamp_ns: int) -> dict[str, int]:
+    return {"sec": stamp_ns // 10**9, "nanosec": stamp_ns % 10**9}
+
+
+def xyz(x: float, y: float, z: float) -> dict[str, float | None]:
+    return {"x": number(x), "y": number(y), "z": number(z)}
+
+
+def plainly(snapshot: Snapshot) -> dict[str, Any]:
+    """The snapshot as the contract has it, written out once more."""
+    tags = []
+    for tag in snapshot.tags:
+        pose, flower = tag.pose or Pose(0, 0, 0, 0, 0, 0, 0), tag.flower
+        age = None
+        if tag.last_observed_ns is not None:
+            age = max(0, snapshot.stamp_ns - tag.last_observed_ns) / 1e9
+        tags.append(
+            {
+                "tag_id": tag.tag_id,
+                "pose": {
+                    "position": xyz(pose.x, pose.y, pose.z),
+                    "orientation": {**xyz(pose.qx, pose.qy, pose.qz), "w": pose.qw},
+                },
+                "readings": [{"name": r.name, "value": number(r.value)} for r in tag.readings],
+                "last_observed": stamp(tag.last_observed_ns or 0),
+                "stale_seconds": age if age is None else pytest.approx(age, abs=0.00051),
+                "species": flower.species,
+                "species_confidence": number(flower.confidence),
+                "anomaly": flower.anomaly,
+                "flower_count": flower.flower_count,
+                "bug_count": flower.bug_count,
+                "flowers": [
+                    {
+                        "position": xyz(bloom.x, bloom.y, bloom.z),
+                        "height_m": number(bloom.height_m),
+                        "species": bloom.species,
+                        "confidence": number(bloom.confidence),
+                        "anomaly": bloom.anomaly,
+                    }
+                    for bloom in flower.blooms
+                ],
+                "box_footprint": {"points": [xyz(*point) for point in flower.footprint]},
+            }
+        )
+    return {
+        "header": {"stamp": stamp(snapshot.stamp_ns), "frame_id": snapshot.frame_id},
+        "tags": tags,
+    }
+
+
+@given(SNAPSHOTS)
+@settings(max_examples=100)
+def test_any_snapshot_is_written_as_the_contract_has_it(snapshot: Snapshot) -> None:
+    text = StateJson().state(snapshot)
+    assert json.loads(text, parse_constant=pytest.fail) == plainly(snapshot)
+    schema.TwinState.model_validate_json(text, strict=True)
+
+
+@given(SNAPSHOTS, SNAPSHOTS)
+@settings(max_examples=50)
+def test_what_was_written_before_leaves_no_trace(first: Snapshot, second: Snapshot) -> None:
+    writer = StateJson()
+    writer.state(first)
+    assert writer.state(second) == StateJson().state(second)
+    assert writer.state(first) == StateJson().state(first)
+
+
+def test_a_tag_that_did_not_change_gets_older_all_the_same() -> None:
+    writer = StateJson()
+    tag = TagState("7", POSE, last_observed_ns=1_000_000_000)
+    ages = [
+        json.loads(writer.state(Snapshot(now_ns, "map", (tag,))))["tags"][0]["stale_seconds"]
+        for now_ns in (1_000_000_000, 3_500_000_000, 0)
+    ]
+    assert ages == [0.0, 2.5, 0.0]
+
+
+def test_a_tag_is_written_anew_when_it_was_replaced() -> None:
+    writer = StateJson()
+    tag = TagState("7", POSE, readings=(Reading("co2", 400.0),))
+    writer.tag(tag, 0)
+    changed = replace(tag, readings=(Reading("co2", 500.0),))
+    assert json.loads(writer.tag(changed, 0))["readings"] == [{"name": "co2", "value": 500.0}]
+
+
+def test_a_tag_never_observed_and_never_pinned_says_so() -> None:
+    text = StateJson().tag(TagState("7"), 5_000_000_000)
+    tag = schema.TwinTagState.model_validate_json(text)
+    assert tag.stale_seconds is None
+    assert tag.last_observed == schema.Time(sec=0, nanosec=0)
+    assert tag.pose.orientation.w == 0
+
+
+def test_numbers_that_are_none_are_null() -> None:
+    readings = tuple(Reading(str(value), value) for value in (math.nan, math.inf, -math.inf))
+    text = StateJson().tag(TagState("7", readings=readings), 0)
+    assert {reading["value"] for reading in json.loads(text)["readings"]} == {None}
+
+
+def test_a_history_is_sorted_by_sensor_and_keeps_its_order() -> None:
+    scans = [
+        Observation("7", 1_500_000_000, (Reading("co2", 400.0), Reading("light", 900.0))),
+        Observation("7", 2_000_000_000, (Reading("co2", math.nan),)),
+        Observation("7", 3_000_000_001, (Reading("light", 800.0),)),
+    ]
+    assert state_json.history("7", scans) == {
+        "tag_id": "7",
+        "sensors": [
+            {
+                "name": "co2",
+                "values": [
+                    {"stamp": {"sec": 1, "nanosec": 500_000_000}, "value": 400.0},
+                    {"stamp": {"sec": 2, "nanosec": 0}, "value": None},
+                ],
+            },
+            {
+                "name": "light",
+                "values": [
+                    {"stamp": {"sec": 1, "nanosec": 500_000_000}, "value": 900.0},
+                    {"stamp": {"sec": 3, "nanosec": 1}, "value": 800.0},
+                ],
+            },
+        ],
+    }
+    schema.TagHistory.model_validate(state_json.history("7", scans))
+    assert state_json.history("7", []) == {"tag_id": "7", "sensors": []}

@@ -1,0 +1,85 @@
+"""Status: live, or offline for one of four reasons."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import pytest
+
+from lupin_bridge.bridge import WATCH_PERIOD_S
+from lupin_bridge.stream import schema
+from lupin_bridge.stream.status import STALE_AFTER_S, Liveness, Reason, Status
+
+
+def test_a_twin_is_live_until_it_was_silent_for_the_limit() -> None:
+    liveness = Liveness(last_state_s=100.0)
+    assert liveness.status(100.0 + STALE_AFTER_S - 0.001).reason == "live"
+    assert liveness.status(100.0 + STALE_AFTER_S).reason == "stale"
+
+
+def test_a_silence_is_told_in_the_time_that_is_promised() -> None:
+    # Three missed publications are no accident, and a client knows by 3.5 s.
+    assert 3.0 <= STALE_AFTER_S < STALE_AFTER_S + WATCH_PERIOD_S <= 3.5
+
+
+def test_a_twin_that_was_never_heard_has_no_age() -> None:
+    assert Liveness().status(5.0) == Status("never_seen", None)
+
+
+def test_an_age_is_never_negative() -> None:
+    assert Liveness(last_state_s=10.0).status(9.0) == Status("live", 0.0)
+
+
+def test_a_twin_that_is_heard_again_is_live_again() -> None:
+    liveness = Liveness(last_state_s=0.0)
+    assert liveness.status(50.0).reason == "stale"
+    liveness.last_state_s = 50.0
+    assert liveness.status(50.0).is_live
+
+
+def test_the_reason_nearest_to_the_cure_comes_first() -> None:
+    liveness = Liveness(last_state_s=0.0)
+    liveness.thread_dead = True
+    assert liveness.status(0.0) == Status("thread_dead", 0.0)
+    liveness.shutting_down = True
+    assert liveness.status(0.0) == Status("shutting_down", 0.0)
+
+
+@pytest.mark.parametrize("reason", get_args(Reason))
+@pytest.mark.parametrize("age_s", [None, 1.23456])
+def test_every_status_has_a_frame_of_the_contract(reason: Reason, age_s: float | None) -> None:
+    frame = schema.StatusFrame.model_validate(Status(reason, age_s).frame())
+    assert (frame.twin == "live") == (reason == "live")
+    assert frame.reason == reason
+    assert frame.has_map is False
+    assert frame.message
+    assert frame.state_age_seconds == (None if age_s is None else 1.235)
+
+
+def test_the_first_map_is_news_for_a_page_and_not_for_a_person() -> None:
+    liveness = Liveness(last_state_s=0.0)
+    before = liveness.status(0.0)
+    liveness.has_map = True
+    status = liveness.status(0.1)
+    assert status.is_news_after(before)
+    assert not status.says_more_than(before)
+    assert schema.StatusFrame.model_validate(status.frame()).has_map is True
+
+
+def test_more_than_one_twin_is_said_as_long_as_they_live() -> None:
+    liveness = Liveness(last_state_s=0.0, twin_count=2)
+    assert liveness.status(0.0).is_live
+    assert liveness.status(0.0).message.startswith("2 twins publish on the same topic")
+    assert "silent" in liveness.status(10.0).message
+
+
+def test_what_is_news_for_clients_and_what_for_people() -> None:
+    live = Status("live", 0.1)
+    assert live.is_news_after(None)
+    assert not Status("live", 0.9).is_news_after(live), "an age alone is none"
+    for more in (Status("stale", 3.0), Status("live", 0.1, twin_count=2)):
+        assert more.is_news_after(live)
+        assert more.says_more_than(live)
+    mapped = Status("live", 0.1, has_map=True)
+    assert mapped.is_news_after(live)
+    assert not mapped.says_more_than(live)

@@ -1,0 +1,117 @@
+"""The application: what answers at which path, and the page."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import httpx
+import pytest
+
+from lupin_bridge.app import STATIC_FOLDER, create_app
+from lupin_bridge.stream import schema
+from tests.support.web import ROUTES
+
+PAGE = '<!doctype html><title>HMI</title><script type="module" src="/assets/a.js"></script>'
+
+
+@pytest.fixture
+def static(tmp_path: Path) -> Path:
+    """A built page, and a file beside it that is nobody's business."""
+    folder = tmp_path / "static"
+    (folder / "assets").mkdir(parents=True)
+    (folder / "index.html").write_text(PAGE)
+    (folder / "assets" / "a.js").write_text("export {}\n")
+    (tmp_path / "secret.txt").write_text("secret")
+    return folder
+
+
+def ask(static_folder: Path, method: str, path: str) -> httpx.Response:
+    """One request to an application without a twin, answered in this process."""
+
+    async def request() -> httpx.Response:
+        transport = httpx.ASGITransport(create_app(None, static_folder))
+        async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
+            return await client.request(method, path)
+
+    return asyncio.run(request())
+
+
+@pytest.mark.parametrize("path", ["/docs", "/openapi.json"])
+def test_it_describes_itself_without_a_twin(tmp_path: Path, path: str) -> None:
+    assert path in ROUTES
+    assert ask(tmp_path, "GET", path).status_code == 200
+
+
+@pytest.mark.parametrize("path", ["/redoc", "/docs/oauth2-redirect"])
+def test_the_frameworks_own_pages_are_off(tmp_path: Path, path: str) -> None:
+    assert ask(tmp_path, "GET", path).status_code == 404
+
+
+def test_the_page_and_its_files_are_served_from_the_same_origin(static: Path) -> None:
+    page = ask(static, "GET", "/")
+    assert (page.status_code, page.text) == (200, PAGE)
+    assert page.headers["content-type"].startswith("text/html")
+    assert "default-src 'self'" in page.headers["content-security-policy"]
+    script = ask(static, "GET", "/assets/a.js")
+    assert script.headers["content-type"].startswith("text/javascript")
+    assert script.headers["x-content-type-options"] == "nosniff"
+    assert ask(static, "HEAD", "/").text == ""
+
+
+def test_the_page_does_not_hide_a_route(static: Path) -> None:
+    (static / "docs").write_text("a file of that name")
+    assert "API" in ask(static, "GET", "/docs").text
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/../secret.txt",
+        "/..%2fsecret.txt",
+        "/%2e%2e/secret.txt",
+        "/%2e%2e%2fsecret.txt",
+        "/%252e%252e%252fsecret.txt",
+        "/..%5csecret.txt",
+        "/assets/..%2f..%2fsecret.txt",
+        "/assets/../../secret.txt",
+        "/link.txt",
+        "/folder/secret.txt",
+        "//etc/passwd",
+        "/%2fetc%2fpasswd",
+        "/etc/passwd",
+        "/file:///etc/passwd",
+        "/assets/a.js%00.txt",
+        "/%00",
+        "/" + "x/" * 5_000,
+    ],
+)
+def test_nothing_outside_the_folder_is_served(static: Path, path: str) -> None:
+    (static / "link.txt").symlink_to(static.parent / "secret.txt")
+    (static / "folder").symlink_to(static.parent)
+    answer = ask(static, "GET", path)
+    assert answer.status_code == 404
+    assert "root:" not in answer.text
+    assert "secret" not in answer.text.replace("secret.txt", "")
+
+
+@pytest.mark.parametrize("built", [True, False])
+@pytest.mark.parametrize("path", ["/nowhere", "/api/nowhere", "/api/field.gif", "/API/state"])
+def test_what_is_not_there_is_said_in_json(static: Path, path: str, built: bool) -> None:
+    answer = ask(static if built else static / "nonexistent", "GET", path)
+    assert answer.status_code == 404
+    message = schema.ErrorMessage.model_validate_json(answer.content)
+    assert message.detail == f"there is nothing at {path!r}; see /docs"
+    assert answer.headers["cache-control"] == "no-store"
+
+
+def test_without_a_built_page_the_root_says_where_to_look(tmp_path: Path) -> None:
+    assert "see /docs" in ask(tmp_path / "nonexistent", "GET", "/").json()["detail"]
+
+
+def test_a_long_path_is_cut_in_the_answer(tmp_path: Path) -> None:
+    assert len(ask(tmp_path, "GET", "/" + "x" * 5_000).text) < 300
+
+
+def test_the_page_is_looked_for_where_the_build_puts_it() -> None:
+    assert STATIC_FOLDER.parts[-3:] == ("backend", "lupin_bridge", "static")

@@ -1,0 +1,339 @@
+"""From a source to listeners: pace, status, watch; and that nothing is left behind."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Self
+
+import pytest
+from websockets.asyncio.client import connect
+
+from lupin_bridge.bridge import Bridge
+from lupin_bridge.field import formats as field_formats
+from lupin_bridge.settings import Settings
+from lupin_bridge.stream.hub import Client
+from lupin_bridge.twin.source import CacheCounts, Revised
+from lupin_twin.fields import FieldJob
+from lupin_twin.idw import FieldGrid
+from lupin_twin.state import Snapshot, TagState
+from tests.bridge.stream.test_frames import received
+from tests.support.inprocess import Running, run, running
+from tests.support.messages import scan
+from tests.support.ros import Peer
+from tests.support.waiting import until, wait_for
+from tests.support.web import ws_url
+
+
+class Script:
+    """A source that tells what the test makes it tell. What a real one does, others test."""
+
+    def __init__(self) -> None:
+        self.tell: Callable[[Revised], None]
+        self.die: Callable[[], None]
+        self.is_alive = True
+        self.twins = 1
+        self.calls_waiting = self.callback_errors = 0
+
+    async def start(
+        self, on_state: Callable[[Revised], None], on_death: Callable[[], None]
+    ) -> None:
+        self.tell, self.die = on_state, on_death
+
+    async def stop(self) -> None:
+        self.is_alive = False
+
+    def twin_count(self) -> int:
+        return self.twins
+
+    def occupancy_map(self) -> None:
+        return None
+
+    def cache_counts(self) -> CacheCounts:
+        return CacheCounts()
+
+
+class Ear:
+    """A connection that always takes a frame."""
+
+    can_take = True
+
+    def __init__(self) -> None:
+        self.heard: list[dict[str, Any]] = []
+
+    def write(self, wire: bytes) -> None:
+        self.heard.append(json.loads(bytes(received(wire).data)))
+
+    def dismiss(self, code: int, reason: str) -> None:
+        raise AssertionError(f"dismissed: {code} {reason}")
+
+    @property
+    def states(self) -> list[dict[str, Any]]:
+        return [frame for frame in self.heard if frame["type"] == "state"]
+
+    @property
+    def reasons(self) -> list[str]:
+        return [frame["reason"] for frame in self.heard if frame["type"] == "status"]
+
+
+def state(number: int) -> Revised:
+    """The state after so many changes."""
+    return Revised(Snapshot(number, "map", (TagState(f"t{number}"),)), f"r{number}")
+
+
+class Stage:
+    """A bridge between a script and an ear."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic, **settings: Any) -> None:
+        self.script, self.ear = Script(), Ear()
+        self.bridge = Bridge(self.script, Settings(**settings), clock)  # type: ignore[arg-type]
+
+    async def __aenter__(self) -> Self:
+        await self.bridge.start()
+        self.bridge.join(Client(self.ear))
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.bridge.stop()
+
+
+# --- pace ---------------------------------------------------------------------------------------
+
+
+def test_a_change_goes_out_at_once_and_the_next_by_the_beat(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now_s, waits_s = 100.0, list[float]()
+
+    async def test() -> None:
+        nonlocal now_s
+        loop = asyncio.get_running_loop()
+        call_later = loop.call_later
+        async with Stage(clock=lambda: now_s, max_rate_hz=20.0) as stage:
+
+            def noting(delay_s: float, callback: Any, *args: Any, **more: Any) -> Any:
+                if callback == stage.bridge._push:
+                    waits_s.append(delay_s)
+                    delay_s = 1_000_000.0  # the test lets it happen
+                return call_later(delay_s, callback, *args, **more)
+
+            monkeypatch.setattr(loop, "call_later", noting)
+            number = 0
+            # (when changes come, how long they have to wait)
+            for comes_s, wait_s in (
+                (100.0, None),
+                (100.01, 0.035),  # a tenth of the interval is forgiven
+                (100.06, 0.035),  # the one before went out at 100.045
+                (200.0, None),
+                (200.02, 0.025),  # a pause is not made up for
+            ):
+                now_s = comes_s
+                for _ in range(3 if wait_s else 1):
+                    number += 1
+                    stage.script.tell(state(number))
+                assert (stage.ear.states[-1]["revision"] == f"r{number}") == (wait_s is None)
+                if wait_s is not None:
+                    assert waits_s == [pytest.approx(wait_s)], "one wait for all three"
+                    now_s += waits_s.pop()
+                    stage.bridge._push()
+                    assert stage.ear.states[-1]["revision"] == f"r{number}"
+        assert [frame["seq"] for frame in stage.ear.states] == [1, 2, 3, 4, 5]
+
+    asyncio.run(test())
+
+
+def test_what_a_frame_carries_is_the_newest_of_all_that_came_since_the_last() -> None:
+    async def test() -> None:
+        async with Stage(max_rate_hz=50.0) as stage:
+            for number in range(1, 101):
+                stage.script.tell(state(number))
+            await until(lambda: stage.ear.states[-1]["revision"] == "r100", "the newest")
+            assert stage.ear.states[0]["revision"] == "r1"
+            assert len(stage.ear.states) <= 3
+            assert stage.bridge.latest == state(100)
+
+    asyncio.run(test())
+
+
+def test_a_heartbeat_right_after_a_frame_tells_nobody_anything_and_is_spared() -> None:
+    async def test() -> None:
+        async with Stage(max_rate_hz=100.0) as stage:
+            stage.script.tell(state(1))
+            for _ in range(3):
+                stage.script.tell(Revised(state(1).snapshot, "r1"))
+            stage.script.tell(state(2))
+            await until(lambda: len(stage.ear.states) == 2, "the change")
+            assert stage.ear.states[-1]["revision"] == "r2"
+
+    asyncio.run(test())
+
+
+# --- status -------------------------------------------------------------------------------------
+
+
+def test_a_status_goes_out_when_it_changes_and_only_then() -> None:
+    async def test() -> None:
+        async with Stage() as stage:
+            stage.bridge._liveness.stale_after_s = 0.3
+            assert stage.ear.reasons == ["never_seen"]
+            stage.script.tell(state(1))
+            assert stage.ear.reasons == ["never_seen", "live"]
+            await until(lambda: len(stage.ear.reasons) == 3, "the silence to be noticed")
+            stage.script.tell(state(2))
+            await until(lambda: len(stage.ear.reasons) == 4, "the twin to be back")
+            stage.script.die()
+            stage.script.die()
+            stage.bridge.say_goodbye()
+        assert stage.ear.reasons == [
+            "never_seen",
+            "live",
+            "stale",
+            "live",
+            "thread_dead",
+            "shutting_down",
+        ]
+
+    asyncio.run(test())
+
+
+def test_a_second_twin_is_told_of(caplog: pytest.LogCaptureFixture) -> None:
+    async def test() -> None:
+        async with Stage() as stage:
+            stage.script.tell(state(1))
+            stage.script.twins = 2
+            stage.script.tell(state(2))
+            told = stage.ear.heard[-1] if stage.ear.reasons[-1] == "live" else {}
+            await until(
+                lambda: any("2 twins" in f.get("message", "") for f in stage.ear.heard), "it"
+            )
+            assert told
+            assert "2 twins publish on the same topic" in caplog.text
+
+    asyncio.run(test())
+
+
+# --- the watch ----------------------------------------------------------------------------------
+
+
+def test_the_watch_outlives_an_error(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def test() -> None:
+        async with Stage() as stage:
+            looks = 0
+
+            def fail(_now_s: float) -> int:
+                nonlocal looks
+                looks += 1
+                raise RuntimeError("a defect")
+
+            monkeypatch.setattr(stage.bridge.hub, "dismiss_stuck", fail)
+            await until(lambda: looks >= 2, "a second look")
+            assert "the watch met an error and goes on" in caplog.text
+
+    asyncio.run(test())
+
+
+def test_who_asked_for_a_low_rate_gets_the_newest_although_nothing_more_happens() -> None:
+    now_s = 100.0
+
+    async def test() -> None:
+        nonlocal now_s
+        async with Stage(clock=lambda: now_s, max_rate_hz=100.0) as stage:
+            stage.bridge._liveness.stale_after_s = math.inf  # no status takes it along
+            rare = Ear()
+            stage.bridge.join(Client(rare, min_interval_s=0.3))
+            for number in range(1, 6):
+                stage.script.tell(state(number))
+            await until(lambda: stage.ear.states[-1]["revision"] == "r5", "the newest")
+            assert [frame["revision"] for frame in rare.states] == ["r1"]
+            now_s += 0.3
+            await until(lambda: rare.states[-1]["revision"] == "r5", "the newest in its time")
+            assert [frame["revision"] for frame in rare.states] == ["r1", "r5"]
+
+    asyncio.run(test())
+
+
+# --- with a real twin ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("stage", ["compute", "encode"])
+def test_while_a_field_is_made_states_are_answered_and_frames_keep_coming(
+    domain: int, monkeypatch: pytest.MonkeyPatch, stage: str
+) -> None:
+    gate, reached = threading.Event(), threading.Event()
+
+    def hold() -> None:
+        reached.set()
+        gate.wait(20.0)
+
+    compute, write = FieldJob.compute, field_formats.write
+
+    def held_compute(job: FieldJob) -> FieldGrid:
+        hold()
+        return compute(job)
+
+    def held_write(*args: Any) -> bytes:
+        hold()
+        return write(*args)
+
+    if stage == "compute":
+        monkeypatch.setattr(FieldJob, "compute", held_compute)
+    else:
+        monkeypatch.setattr(field_formats, "write", held_write)
+
+    async def test(served: Running, peer: Peer) -> None:
+        heavy = asyncio.create_task(served.http.get(MILLION_CELLS))
+        await until(reached.is_set, "the heavy request to be at work")
+        async with connect(ws_url(served.url), proxy=None, max_size=None) as listener:
+            for number in range(3):
+                peer.observe(scan(f"meanwhile {number}", {"co2": 1.0}))
+                while f"meanwhile {number}" not in str(await listener.recv()):
+                    pass
+                answer = await served.http.get("/api/state")
+                assert f"meanwhile {number}" in answer.text
+        assert not heavy.done()
+        gate.set()
+        answer = await heavy
+        assert (answer.status_code, answer.headers["x-field-width"]) == (200, "1000")
+
+    async def with_twin() -> None:
+        async with running() as served:
+            with Peer(domain) as peer:
+                try:
+                    await test(served, peer)
+                finally:
+                    gate.set()
+
+    run(domain, with_twin())
+
+
+MILLION_CELLS = (
+    "/api/field.npy?sensor_type=co2&resolution=0.001"
+    "&bbox_min_x=0&bbox_min_y=0&bbox_max_x=1&bbox_max_y=1"
+)
+
+
+def test_no_thread_and_no_descriptor_is_left_behind(domain: int) -> None:
+    def left() -> tuple[set[str], int]:
+        threads = {thread.name for thread in threading.enumerate()}
+        return threads, len(list(Path("/proc/self/fd").iterdir()))
+
+    async def once() -> None:
+        async with (
+            running() as served,
+            connect(ws_url(served.url), proxy=None, max_size=None) as listener,
+        ):
+            await listener.recv()
+            assert (await served.http.get("/api/field.png?sensor_type=co2")).status_code == 200
+
+    run(domain, once())  # what is made once for a process stays
+    before = left()
+    for _ in range(3):
+        run(domain, once())
+    wait_for(lambda: left() == before, "no more threads and descriptors than before")

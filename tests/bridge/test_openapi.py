@@ -1,0 +1,88 @@
+"""The OpenAPI document: complete, and to be had without ROS."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lupin_bridge.app import create_app
+from lupin_bridge.openapi import document
+from tests.support.web import ROUTES
+
+DOCUMENT: dict[str, Any] = json.loads(document())
+
+
+def test_it_lists_every_route_of_the_contract_and_none_besides() -> None:
+    described = {route for route, documented in ROUTES.items() if documented}
+    assert set(DOCUMENT["paths"]) == described
+
+
+def test_every_route_is_described_for_get_alone() -> None:
+    for path, operations in DOCUMENT["paths"].items():
+        assert list(operations) == ["get"], path
+        operation = operations["get"]
+        assert operation["summary"], path
+        assert all(answer["description"] for answer in operation["responses"].values()), path
+
+
+def test_every_parameter_is_described() -> None:
+    field = DOCUMENT["paths"]["/api/field"]["get"]["parameters"]
+    assert [parameter["name"] for parameter in field] == [
+        "sensor_type",
+        "resolution",
+        "bbox_min_x",
+        "bbox_min_y",
+        "bbox_max_x",
+        "bbox_max_y",
+        "scale",
+    ]
+    assert all(parameter["description"] for parameter in field)
+
+
+@pytest.mark.parametrize("frame", ["StateFrame", "StatusFrame"])
+def test_the_websocket_frames_are_among_the_types(frame: str) -> None:
+    assert "type" in DOCUMENT["components"]["schemas"][frame]["required"]
+
+
+def references(part: Any) -> list[str]:
+    if isinstance(part, dict):
+        own = [part["$ref"]] if isinstance(part.get("$ref"), str) else []
+        return own + [ref for value in part.values() for ref in references(value)]
+    if isinstance(part, list):
+        return [ref for value in part for ref in references(value)]
+    return []
+
+
+def test_every_reference_leads_to_a_type() -> None:
+    known = {f"#/components/schemas/{name}" for name in DOCUMENT["components"]["schemas"]}
+    found = set(references(DOCUMENT))
+    assert found
+    assert found <= known
+
+
+def test_asking_for_it_twice_gives_the_same() -> None:
+    app = create_app(None)
+    assert app.openapi() == app.openapi() == DOCUMENT
+
+
+def test_the_copy_that_the_browsers_types_are_made_from_is_fresh() -> None:
+    copy = Path(__file__).parents[2] / "frontend" / "openapi.json"
+    assert copy.read_bytes() == document(), (
+        f"stale: run `python -m lupin_bridge.openapi > {copy}` and `npm run types:gen`"
+    )
+
+
+def test_the_command_needs_no_ros() -> None:
+    script = (
+        "import runpy, sys; runpy.run_module('lupin_bridge.openapi', run_name='__main__');"
+        "ros = [m for m in sys.modules if m.split('.')[0] in ('rclpy', 'lupin_msgs')];"
+        "assert not ros, ros"
+    )
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
+    assert json.loads(result.stdout) == DOCUMENT
+    assert result.stdout.endswith(b"}\n")

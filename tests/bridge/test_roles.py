@@ -1,0 +1,160 @@
+"""The roles as processes: what stops them at once, what they show, and how they end."""
+
+from __future__ import annotations
+
+import signal
+import socket
+from pathlib import Path
+
+import pytest
+
+from lupin_bridge.serving.server import listen
+from tests.support.messages import scan
+from tests.support.processes import Process, lupin_twin, url_of
+from tests.support.ros import Peer
+from tests.support.waiting import wait_for
+from tests.support.web import bridge, listener, tag_ids
+
+ROLES = ["serve", "demo", "web"]
+ALL_TAGS = 29
+
+
+# --- what is wrong is said in one line ------------------------------------------------------------
+
+
+def refused(process: Process) -> str:
+    """The one line with which the command has refused to run."""
+    assert process.wait() == 2
+    lines = [line for line in process.output.splitlines() if "[rcl]" not in line]
+    assert len(lines) == 1, lines
+    assert lines[0].startswith("lupin-twin: ")
+    return lines[0]
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_a_port_in_use_is_named(domain: int, role: str) -> None:
+    with listen("127.0.0.1", 0) as taken:
+        port = taken.getsockname()[1]
+        with lupin_twin(domain, role, "--port", str(port)) as process:
+            line = refused(process)
+    assert line == f"lupin-twin: cannot listen on 127.0.0.1 port {port}: Address already in use"
+
+
+def test_an_address_of_another_machine_is_named(domain: int) -> None:
+    with lupin_twin(domain, "serve", "--host", "192.0.2.1") as process:
+        assert "cannot listen on 192.0.2.1 port 0" in refused(process)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["-p", "idw_power:=-1.0"], "parameter idw_power is -1.0, expected 0.01 to 100.0"),
+        (["-p", "nonsense"], "parse parameter override rule: '-p nonsense'"),
+        (["--params-file", "/nonexistent.yaml"], "/nonexistent.yaml"),
+    ],
+)
+def test_a_bad_ros_argument_is_named(domain: int, arguments: list[str], named: str) -> None:
+    with lupin_twin(domain, "serve", "--ros-args", *arguments) as process:
+        assert named in refused(process)
+
+
+# --- roles --------------------------------------------------------------------------------------
+
+
+def test_ros_arguments_reach_the_twin() -> None:
+    arguments = ("--ros-args", "-p", "idw_max_distance_m:=0.5", "-r", "/map:=/floor")
+    with bridge(*arguments, "--", "--max-rate-hz", "5") as live:
+        live.peer.observe(scan("1", {"co2": 400.0}, at=(0, 0)))
+        live.tag("1")
+        field = live.json("/api/field", sensor_type="co2")
+        assert (field["origin_x"], field["width"]) == (-0.5, 10)
+        assert live.peer.node.count_subscribers("/map") == 0
+
+
+def test_the_role_web_shows_a_twin_elsewhere(domain: int) -> None:
+    with (
+        lupin_twin(domain, "web") as web,
+        listener(url_of(web)) as early,
+        lupin_twin(domain, "serve"),
+        Peer(domain) as peer,
+    ):
+        assert early.until("status")["reason"] == "never_seen"
+        peer.observe(scan("elsewhere", {"co2": 1.0}))
+        early.until_tag("elsewhere")
+        assert early.until("state")["revision"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_web_role_ends_at_once_and_quietly(domain: int, number: signal.Signals) -> None:
+    with lupin_twin(domain, "web") as process:
+        url_of(process)
+        assert process.stop(number) == 0
+        assert "Traceback" not in process.output
+
+
+def children_of(pid: int) -> list[int]:
+    """The processes that a process has started."""
+    tasks = Path(f"/proc/{pid}/task")
+    return [
+        int(child)
+        for task in tasks.iterdir()
+        for child in (task / "children").read_text(encoding="ascii").split()
+    ]
+
+
+def is_running(pid: int) -> bool:
+    """Whether a process is there, and no zombie."""
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii")
+    except (FileNotFoundError, ProcessLookupError):  # gone before or while it is read
+        return False
+    return stat.rpartition(") ")[2][0] != "Z"
+
+
+def test_the_demo_shows_the_whole_greenhouse_and_ends_with_its_patrol(domain: int) -> None:
+    with (
+        lupin_twin(domain, "demo", "--speed", "10", "--seed", "3") as demo,
+        listener(url_of(demo)) as screen,
+    ):
+        (patrol,) = wait_for(lambda: children_of(demo.pid), "the patrol")
+        ids: set[str] = set()
+
+        def look() -> bool:
+            frame = screen.next()
+            if frame["type"] == "state":
+                ids.update(tag_ids(frame["state"]))
+            return len(ids) == ALL_TAGS
+
+        wait_for(look, f"all {ALL_TAGS} tags", meanwhile=lambda: None)
+        assert is_running(patrol)
+        assert demo.stop(signal.SIGINT) == 0
+        assert not is_running(patrol)
+        assert "Traceback" not in demo.output
+
+
+def test_the_patrol_ends_although_the_demo_is_killed(domain: int) -> None:
+    with lupin_twin(domain, "demo") as demo:
+        url_of(demo)
+        (patrol,) = wait_for(lambda: children_of(demo.pid), "the patrol")
+        demo.wait_for_output("patrol starts")
+        demo.send(signal.SIGKILL)
+        demo.wait()
+        wait_for(lambda: not is_running(patrol), "the end of the patrol")
+
+
+def test_ipv6_is_served_too(domain: int) -> None:
+    with lupin_twin(domain, "serve", "--host", "::1") as process:
+        url = url_of(process)
+        assert url.startswith("http://[::1]:")
+        port = int(url.rpartition(":")[2])
+        with socket.create_connection(("::1", port)) as client:
+            client.sendall(b"GET /healthz HTTP/1.1\r\nHost: [::1]\r\nConnection: close\r\n\r\n")
+            assert client.recv(12) == b"HTTP/1.1 200"
+
+
+def test_a_patrol_that_ends_by_itself_is_told(domain: int) -> None:
+    with lupin_twin(domain, "demo", "--speed", "0") as demo:
+        url_of(demo)
+        demo.wait_for_output("the patrol has ended with code 2")
+        assert "argument --speed" in demo.output
+        assert demo.stop() == 0

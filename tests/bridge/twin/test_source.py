@@ -1,0 +1,152 @@
+"""What every source has to be: both are held to the protocol, and to what it promises."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lupin_bridge.twin.local_twin import LocalTwin
+from lupin_bridge.twin.source import (
+    Revised,
+    TwinSource,
+    TwinTimeoutError,
+    TwinUnavailableError,
+)
+from lupin_bridge.twin.web_twin import WebTwin
+from lupin_twin.fields import FieldRefused, FieldRequest
+from tests.support.inprocess import run
+from tests.support.messages import discovered, occupancy_grid, pose, scan
+from tests.support.processes import OFTEN, twin_node
+from tests.support.ros import Peer
+from tests.support.waiting import until
+
+SOURCES = [LocalTwin, WebTwin]
+MEMBERS = [name for name in vars(TwinSource) if not name.startswith("_")]
+REQUEST = FieldRequest("co2", 0.5, 0.0, 0.0, 3.0, 1.0)
+
+
+@pytest.mark.parametrize("source", SOURCES)
+@pytest.mark.parametrize("name", MEMBERS)
+def test_a_member_is_as_the_protocol_has_it(source: type, name: str) -> None:
+    declared, made = vars(TwinSource)[name], vars(source)[name]
+    assert type(made) is type(declared)
+    if isinstance(declared, property):
+        declared, made = declared.fget, made.fget
+    assert inspect.signature(made) == inspect.signature(declared)
+    assert inspect.iscoroutinefunction(made) == inspect.iscoroutinefunction(declared)
+    assert made.__doc__
+
+
+def test_a_time_out_is_a_kind_of_not_being_there() -> None:
+    assert issubclass(TwinTimeoutError, TwinUnavailableError)
+
+
+def test_when_a_state_was_made_is_no_part_of_what_it_is() -> None:
+    first = Revised(snapshot=None, revision="r", made_s=1.0)  # type: ignore[arg-type]
+    assert first == Revised(snapshot=None, revision="r", made_s=2.0)  # type: ignore[arg-type]
+
+
+class Stage:
+    """A source of one kind, a peer on its twin's topics, and what the source has told."""
+
+    def __init__(self, source: TwinSource, peer: Peer) -> None:
+        self.source, self.peer = source, peer
+        self.told: list[Revised] = []
+        self.deaths: list[None] = []
+
+    async def tag(self, tag_id: str, has_pose: bool | None = None) -> Revised:
+        """The first state told that has the tag, with or without a pose as asked."""
+
+        def look() -> Revised | None:
+            newest = self.told[-1] if self.told else None
+            for tag in () if newest is None else newest.snapshot.tags:
+                if tag.tag_id == tag_id and has_pose in (None, tag.pose is not None):
+                    return newest
+            return None
+
+        found = await until(look, f"tag {tag_id}")
+        assert found is not None
+        return found
+
+
+@asynccontextmanager
+async def stage_of(source_type: type, domain: int) -> AsyncIterator[Stage]:
+    """A started source; for `WebTwin`, with a twin in a process of its own."""
+    arguments = (*OFTEN, "-p", "max_grid_cells:=1000")
+    with Peer(domain) as peer:
+        if source_type is WebTwin:
+            with twin_node(domain, *arguments):
+                async with started(WebTwin, arguments, peer) as stage:
+                    yield stage
+        else:
+            async with started(source_type, arguments, peer) as stage:
+                yield stage
+
+
+@asynccontextmanager
+async def started(source_type: Any, arguments: Any, peer: Peer) -> AsyncIterator[Stage]:
+    source = source_type(ros_args=arguments, timeout_s=20.0)
+    stage = Stage(source, peer)
+    await source.start(stage.told.append, lambda: stage.deaths.append(None))
+    try:
+        yield stage
+    finally:
+        await source.stop()
+
+
+@pytest.mark.parametrize("source_type", SOURCES)
+def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
+    domain: int, source_type: type
+) -> None:
+    async def test() -> None:
+        async with stage_of(source_type, domain) as stage:
+            source, peer = stage.source, stage.peer
+            alive = [source.is_alive]
+            assert source.occupancy_map() is None
+            revisions = []
+
+            peer.observe(scan("1", {"co2": 400.0}, stamp_s=5.0))
+            revisions.append((await stage.tag("1")).revision)
+            grid = (await source.field(REQUEST)).grid
+            assert (grid.sample_count, math.isnan(grid.values[0])) == (0, True)
+
+            peer.discover(discovered({"1": pose(0.5, 0.5)}))
+            revisions.append((await stage.tag("1", has_pose=True)).revision)
+            result = await source.field(REQUEST)
+            assert (result.grid.width, result.grid.height, result.grid.sample_count) == (6, 2, 1)
+            assert result.revision == source.revision() == revisions[-1]
+            known = np.array([[True, True, True, True, False, False]] * 2).ravel()
+            np.testing.assert_array_equal(np.isfinite(result.grid.values), known)
+            assert (result.grid.value_min, result.grid.value_max) == (400.0, 400.0)
+
+            peer.publish_map(occupancy_grid([[0, 100]]))
+            await until(lambda: source.occupancy_map() is not None, "the map")
+            await until(lambda: stage.told[-1].revision not in revisions, "the map's revision")
+            revisions.append(stage.told[-1].revision)
+            assert len(set(revisions)) == 3
+
+            history = await source.history("1")
+            assert history is not None
+            assert [(scan.stamp_ns, scan.readings[0].value) for scan in history] == [
+                (5_000_000_000, 400.0)
+            ]
+            assert await source.history("nobody") is None
+            assert source.twin_count() == 1
+            assert source.names().state_topic == "/twin/state"
+            assert source.rules().max_grid_cells == 1000
+            assert (source.callback_errors, source.calls_waiting) == (0, 0)
+            with pytest.raises(FieldRefused, match="sensor_type is empty"):
+                await source.field(FieldRequest("", 0.5, 0.0, 0.0, 1.0, 1.0))
+        alive.append(source.is_alive)
+        assert alive == [True, False]
+        assert stage.deaths == []
+        with pytest.raises(TwinUnavailableError):
+            await source.field(REQUEST)
+
+    run(domain, test())

@@ -11,7 +11,7 @@ const RULES = [
   'src/{domain,geometry}/**/*.test.ts',
   'src/connection/{backoff,latest,machine}.test.ts',
   'src/contract/{frames,npy}.test.ts',
-  'src/store/{create,permalink,twin,view}.test.ts',
+  'src/store/{create,memo,permalink,twin,view}.test.ts',
 ];
 
 export default defineConfig({

@@ -1,3 +1,4 @@
+import { now } from '../clock';
 import { parseFrame } from '../contract/frames';
 import type { Frame } from '../contract/types';
 import { INITIAL, nextDeadline, step, type Connection, type ConnectionEvent } from './machine';
@@ -35,7 +36,7 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
   };
 
   const tick = (): void => {
-    send({ type: 'tick', now: performance.now(), random: Math.random() });
+    send({ type: 'tick', now: now(), random: Math.random() });
   };
 
   // Handlers are taken off before closing: a dropped socket that still speaks is not heard.
@@ -51,39 +52,38 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
     socket = new WebSocket(url);
     socket.onopen = () => {
       isOpened = true;
-      send({ type: 'opened', now: performance.now() });
+      send({ type: 'opened', now: now() });
     };
     socket.onclose = ({ code }) => {
       socket = null;
-      send({ type: 'closed', now: performance.now(), code, random: Math.random() });
+      send({ type: 'closed', now: now(), code, random: Math.random() });
       if (!isOpened) handlers.onRefused();
     };
     socket.onmessage = ({ data }) => {
       const frame = typeof data === 'string' ? parseFrame(data) : null;
       if (!frame) return;
-      const now = performance.now();
-      send({ type: 'frame', now, status: frame.type === 'status' ? frame : null });
+      send({ type: 'frame', now: now(), status: frame.type === 'status' ? frame : null });
       handlers.onFrame(frame, connection);
     };
   };
 
   const retry = (): void => {
-    send({ type: 'wake', now: performance.now() });
+    send({ type: 'wake', now: now() });
   };
   const giveUp = (): void => {
-    send({ type: 'broken', now: performance.now(), random: Math.random() });
+    send({ type: 'broken', now: now(), random: Math.random() });
   };
   const wake = (): void => {
     if (document.visibilityState === 'visible') retry();
   };
   const online = (): void => {
-    send({ type: 'online', now: performance.now() });
+    send({ type: 'online', now: now() });
   };
   document.addEventListener('visibilitychange', wake);
   window.addEventListener('online', online);
   window.addEventListener('pageshow', wake);
 
-  send({ type: 'start', now: performance.now() });
+  send({ type: 'start', now: now() });
 
   const stop = (): void => {
     document.removeEventListener('visibilitychange', wake);

@@ -4,9 +4,23 @@ const FADE_FROM_S = 60;
 const FADE_TO_S = 1800;
 const FAINTEST = 0.35;
 
+/**
+ * How ages go on in what is shown: with the browser's clock; or not, as of one moment (a past
+ * one, ms on the monotonic clock).
+ */
+export type Ageing = { readonly kind: 'growing' } | { readonly kind: 'as-of'; readonly at: number };
+
+export const GROWING: Ageing = { kind: 'growing' };
+
 /** Seconds since a moment on the monotonic clock; null: there was none. */
-export function ageSeconds(observedAt: number | null, now: number): number | null {
-  return observedAt === null ? null : Math.max(0, now - observedAt) / 1000;
+export function ageSeconds(
+  observedAt: number | null,
+  now: number,
+  ageing: Ageing = GROWING,
+): number | null {
+  if (observedAt === null) return null;
+  const asOf = ageing.kind === 'as-of' ? ageing.at : now;
+  return Math.max(0, asOf - observedAt) / 1000;
 }
 
 /** How strongly to draw something of that age, 0.35 to 1, even in ratios of age; null: faintest. */

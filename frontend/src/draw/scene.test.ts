@@ -1,5 +1,6 @@
 import { describe, expect, test } from 'vitest';
 
+import { GROWING } from '../domain/age';
 import { houseHealth } from '../domain/health';
 import { sensorNamed } from '../domain/sensors';
 import { readings, snapshot, tag } from '../testing/tags';
@@ -14,6 +15,7 @@ const scene = (tags: readonly Tag[], now = 0): Scene =>
     range: { low: 10, high: 30 },
     unit: 'C',
     now,
+    ageing: GROWING,
   });
 
 describe('pins', () => {

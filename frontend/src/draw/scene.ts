@@ -1,5 +1,5 @@
 /** What to draw, from the data: one list each of pins, blooms and boxes. Pure. */
-import { ageSeconds, freshness } from '../domain/age';
+import { ageSeconds, freshness, type Ageing } from '../domain/age';
 import { readingText } from '../domain/format';
 import type { HouseHealth } from '../domain/health';
 import { fraction, type Range } from '../domain/ramp';
@@ -52,6 +52,7 @@ export interface SceneInput {
   readonly unit: TemperatureUnit;
   /** ms on the monotonic clock. */
   readonly now: number;
+  readonly ageing: Ageing;
 }
 
 export function buildScene(input: SceneInput): Scene {
@@ -75,11 +76,11 @@ export function buildScene(input: SceneInput): Scene {
 function pinOf(
   tag: Snapshot['tags'][number],
   at: MapPoint,
-  { health, sensor, range, unit, now }: SceneInput,
+  { health, sensor, range, unit, now, ageing }: SceneInput,
 ): Pin {
   const value = tag.readings.get(sensor.name);
   const id = shown(tag.id, 12);
-  const strength = freshness(ageSeconds(tag.observedAt, now));
+  const strength = freshness(ageSeconds(tag.observedAt, now, ageing));
   const status = health.byTag.get(tag.id)?.status;
   return {
     id: tag.id,

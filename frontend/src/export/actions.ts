@@ -1,27 +1,24 @@
 /** The exports, as buttons and menu call them. */
+import { epochOf } from '../clock';
 import { momentText, readingText, valueText } from '../domain/format';
 import { sensorColour } from '../domain/ramp';
 import { sensorNamed } from '../domain/sensors';
-import { filterRows, rowsOf, sortRows, tableCsv } from '../domain/table';
+import { tableCsv } from '../domain/table';
 import { shown } from '../domain/text';
 import { drawFooter, FOOTER_PX, type Footer } from '../draw/footer';
 import { contextOf, newCanvas } from '../draw/surface';
 import { store } from '../store/app';
-import { selectHealth, selectRange, selectSensors } from '../store/derived';
-import { epochOf } from '../ui/useNow';
+import { selectRange, selectRows, selectSensors } from '../store/derived';
+import { selectSnapshot } from '../store/moment';
 import { fileName, save } from './save';
 
 /** The table as the operator sees it, filtered and sorted; ages are those of the state's time. */
 export function saveTable(): void {
   const state = store.get();
-  const { snapshot } = state.twin;
+  const snapshot = selectSnapshot(state);
   if (!snapshot) return;
-  const { sort, filter, health } = state.view;
-  const rows = sortRows(
-    filterRows(rowsOf(snapshot.tags, selectHealth(state)), filter, health),
-    sort,
-  );
-  const text = tableCsv(rows, selectSensors(state), state.settings.unit, snapshot.takenAt);
+  const { unit } = state.settings;
+  const text = tableCsv(selectRows(state), selectSensors(state), unit, snapshot.takenAt);
   save(
     new Blob([text], { type: 'text/csv;charset=utf-8' }),
     fileName('tags', 'csv', epochOf(snapshot.takenAt)),
@@ -33,7 +30,8 @@ export async function saveMap(): Promise<void> {
   const layers = [...document.querySelectorAll<HTMLCanvasElement>('canvas[data-layer]')];
   const [first] = layers;
   const state = store.get();
-  if (!first || first.width === 0 || !state.twin.snapshot) return;
+  const snapshot = selectSnapshot(state);
+  if (!first || first.width === 0 || !snapshot) return;
   const ratio = first.width / Math.max(1, first.getBoundingClientRect().width);
   const style = getComputedStyle(document.documentElement);
   const canvas = newCanvas(first.width, first.height + FOOTER_PX * ratio);
@@ -42,14 +40,14 @@ export async function saveMap(): Promise<void> {
 
   const sensor = sensorNamed(state.view.sensor);
   const range = selectRange(state);
-  const takenAt = epochOf(state.twin.snapshot.takenAt);
+  const takenAt = epochOf(snapshot.takenAt);
   const { unit } = state.settings;
   const footer: Footer = {
     title: shown(sensor.label, 32),
     time: momentText(takenAt),
     ends: range && [valueText(sensor, range.low, unit), readingText(sensor, range.high, unit)],
     colour: sensorColour(sensor),
-    scale: Number(layers.at(-1)?.dataset['view']?.split(',')[2]),
+    scale: state.viewport.view.scale,
   };
   context.setTransform(ratio, 0, 0, ratio, 0, first.height);
   drawFooter(context, first.width / ratio, footer, {

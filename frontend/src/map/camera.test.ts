@@ -1,28 +1,35 @@
 import { beforeEach, describe, expect, test, vi, type Mock } from 'vitest';
 
 import { corners, mapPoint, toCanvas, type Camera, type View } from '../geometry/coordinates';
+import { NO_VIEWPORT, type Viewport } from '../store/viewport';
 import { MapCamera } from './camera';
 
 const size = { width: 600, height: 400 };
 const bounds = { minX: 0, minY: 0, maxX: 4, maxY: 8 };
+let viewport: Viewport;
 let onView: Mock<(view: View) => void>;
 let onCamera: Mock<(camera: Camera) => void>;
 let camera: MapCamera;
 let element: HTMLElement;
 
+const cameraOn = (target: HTMLElement, isFixed = false): MapCamera =>
+  new MapCamera(target, { viewport: () => viewport, onView, onCamera }, isFixed);
+
 beforeEach(() => {
-  onView = vi.fn<(view: View) => void>();
+  viewport = { ...NO_VIEWPORT, size };
+  onView = vi.fn<(view: View) => void>((view) => {
+    viewport = { ...viewport, view };
+  });
   onCamera = vi.fn<(camera: Camera) => void>();
   element = document.createElement('div');
-  camera = new MapCamera(element, { onView, onCamera });
-  camera.resize(size);
+  camera = cameraOn(element);
 });
 
 describe('camera', () => {
   test('shows everything, and does not take that for the operator’s choice', () => {
     camera.goTo(null, bounds);
     for (const corner of corners(bounds)) {
-      const { x, y } = toCanvas(camera.view, corner);
+      const { x, y } = toCanvas(viewport.view, corner);
       expect(x >= 0 && x <= size.width && y >= 0 && y <= size.height).toBe(true);
     }
     expect(onView).toHaveBeenCalledTimes(1);
@@ -48,17 +55,17 @@ describe('camera', () => {
   });
 
   test('before its size is known it stays where it is', () => {
-    camera.resize({ width: 0, height: 0 });
+    viewport = NO_VIEWPORT;
     camera.goTo(null, bounds);
     expect(onView).not.toHaveBeenCalled();
   });
 
   test('zooming keeps the middle, and is a choice', () => {
     camera.goTo({ x: 2, y: 4, span: 8 }, null);
-    const before = camera.view.scale;
+    const before = viewport.view.scale;
     camera.zoomBy(2);
-    expect(camera.view.scale).toBeCloseTo(before * 2);
-    const middle = toCanvas(camera.view, mapPoint(2, 4));
+    expect(viewport.view.scale).toBeCloseTo(before * 2);
+    const middle = toCanvas(viewport.view, mapPoint(2, 4));
     expect(middle.x).toBeCloseTo(300);
     expect(middle.y).toBeCloseTo(200);
     expect(onCamera).toHaveBeenLastCalledWith(expect.objectContaining({ span: 4 }));
@@ -67,7 +74,7 @@ describe('camera', () => {
   test('panning right and down moves the map left and up', () => {
     camera.goTo({ x: 2, y: 4, span: 8 }, null);
     camera.panBy(0.1, 0.1);
-    const middle = toCanvas(camera.view, mapPoint(2, 4));
+    const middle = toCanvas(viewport.view, mapPoint(2, 4));
     expect(middle.x).toBeCloseTo(300 - 60);
     expect(middle.y).toBeCloseTo(200 - 40);
   });
@@ -75,22 +82,22 @@ describe('camera', () => {
   test('shows a point that is out of sight, in the middle of what is free', () => {
     camera.goTo({ x: 2, y: 4, span: 8 }, null);
     camera.show(mapPoint(2, 40), 100);
-    const shown = toCanvas(camera.view, mapPoint(2, 40));
+    const shown = toCanvas(viewport.view, mapPoint(2, 40));
     expect(shown.x).toBeCloseTo(300);
     expect(shown.y).toBeCloseTo(150);
   });
 
   test('leaves a point alone that is in sight', () => {
     camera.goTo({ x: 2, y: 4, span: 8 }, null);
-    const { view } = camera;
+    const { view } = viewport;
     camera.show(mapPoint(2.5, 4.5), 0);
-    expect(camera.view).toEqual(view);
+    expect(viewport.view).toEqual(view);
   });
 
   test('a point below the card is not in sight', () => {
     camera.goTo({ x: 2, y: 4, span: 8 }, null);
     camera.show(mapPoint(2, 2), 200);
-    expect(toCanvas(camera.view, mapPoint(2, 2)).y).toBeCloseTo(100);
+    expect(toCanvas(viewport.view, mapPoint(2, 2)).y).toBeCloseTo(100);
   });
 
   const mouse = (target: EventTarget, type: string, x: number): void => {
@@ -102,11 +109,11 @@ describe('camera', () => {
 
   test('nothing that arrives takes the map out of the operator’s hand', () => {
     camera.goTo(null, bounds);
-    const before = camera.view;
+    const before = viewport.view;
     mouse(element, 'mousedown', 100);
     mouse(window, 'mousemove', 140);
     camera.goTo(null, { ...bounds, maxX: 40 });
-    expect(camera.view).toEqual({ ...before, x: before.x + 40 });
+    expect(viewport.view).toEqual({ ...before, x: before.x + 40 });
     mouse(window, 'mouseup', 140);
     expect(onCamera).toHaveBeenCalledTimes(1);
   });
@@ -114,9 +121,9 @@ describe('camera', () => {
   test('what the wheel chose holds for a hand that grabs the map at once', () => {
     vi.useFakeTimers();
     camera.goTo(null, bounds);
-    const { scale } = camera.view;
+    const { scale } = viewport.view;
     element.dispatchEvent(new WheelEvent('wheel', { deltaY: -240 }));
-    const zoomed = camera.view;
+    const zoomed = viewport.view;
     expect(zoomed.scale).toBeGreaterThan(scale);
     mouse(element, 'mousedown', 100);
     // The wheel's gesture ends by a pause, inside that of the hand.
@@ -125,7 +132,7 @@ describe('camera', () => {
     mouse(window, 'mousemove', 140);
     mouse(window, 'mouseup', 140);
     expect(onCamera).toHaveBeenCalledTimes(2);
-    expect(camera.view).toEqual({ ...zoomed, x: zoomed.x + 40 });
+    expect(viewport.view).toEqual({ ...zoomed, x: zoomed.x + 40 });
     vi.useRealTimers();
   });
 
@@ -140,17 +147,26 @@ describe('camera', () => {
 
   test('a fixed one is moved by the program alone', () => {
     const wall = document.createElement('div');
-    const fixed = new MapCamera(wall, { onView, onCamera }, true);
-    fixed.resize(size);
+    const fixed = cameraOn(wall, true);
     fixed.goTo(null, bounds);
-    const { view } = fixed;
+    const { view } = viewport;
     mouse(wall, 'mousedown', 100);
     mouse(window, 'mousemove', 140);
     mouse(window, 'mouseup', 140);
     wall.dispatchEvent(new WheelEvent('wheel', { deltaY: -200 }));
-    expect(fixed.view).toEqual(view);
+    expect(viewport.view).toEqual(view);
     expect(onCamera).not.toHaveBeenCalled();
     fixed.goTo(null, { ...bounds, maxX: 40 });
-    expect(fixed.view).not.toEqual(view);
+    expect(viewport.view).not.toEqual(view);
+  });
+
+  test('a map that comes back into the page goes on where it was', () => {
+    camera.goTo(null, bounds);
+    const { view } = viewport;
+    const again = cameraOn(document.createElement('div'));
+    expect(viewport.view).toBe(view);
+    again.panBy(0.1, 0);
+    expect(viewport.view.x).toBeCloseTo(view.x - 60);
+    expect(viewport.view).toMatchObject({ y: view.y, scale: view.scale });
   });
 });

@@ -15,12 +15,18 @@ import {
   type Size,
   type View,
 } from '../geometry/coordinates';
+import type { Viewport } from '../store/viewport';
 
 export interface CameraHandlers {
+  /** What is on the screen now; the store has it, and nobody but this camera moves it. */
+  readonly viewport: () => Viewport;
   readonly onView: (view: View) => void;
   /** The operator came to rest on a view. */
   readonly onCamera: (camera: Camera) => void;
 }
+
+const transformOf = ({ x, y, scale }: View): ZoomTransform =>
+  zoomIdentity.translate(x, y).scale(scale);
 
 const toView = ({ x, y, k }: ZoomTransform): View => ({ x, y, scale: k });
 
@@ -37,12 +43,14 @@ export function fitInsets({ width }: Size): Insets {
     : { top: 30, right: 76, bottom: 52, left: 40 };
 }
 
-/** Wheel, pinch and drag on one element, and the programmed moves; d3-zoom keeps the transform. */
+/**
+ * Wheel, pinch and drag on one element, and the programmed moves. Where they lead is told and
+ * kept in the store; d3-zoom has its own copy, on the element.
+ */
 export class MapCamera {
   readonly #selection;
   readonly #zoom;
-  #size: Size = { width: 0, height: 0 };
-  #view: View = { x: 0, y: 0, scale: 50 };
+  readonly #viewport: () => Viewport;
   /** A move of the program's own is no choice of the operator's. */
   #programmed = false;
   /** The view that the gestures under way began with. */
@@ -50,44 +58,36 @@ export class MapCamera {
 
   /** `isFixed`: the program alone moves it; no wheel, finger or mouse does. */
   constructor(element: HTMLElement, handlers: CameraHandlers, isFixed = false) {
+    this.#viewport = handlers.viewport;
     this.#selection = select<HTMLElement, unknown>(element);
     this.#zoom = zoom<HTMLElement, unknown>()
       .scaleExtent([MIN_SCALE, MAX_SCALE])
       // Without the browser's layout: the size is known from the resize observer.
       .extent(() => [
         [0, 0],
-        [this.#size.width, this.#size.height],
+        [this.#viewport().size.width, this.#viewport().size.height],
       ])
-      .clickDistance(6)
+      .clickDistance(6);
+    if (isFixed) this.#zoom.filter(() => false);
+    this.#selection.call(this.#zoom);
+    // A map that comes back into the page goes on where it was.
+    this.#zoom.transform(this.#selection, transformOf(this.#viewport().view));
+    this.#zoom
       .on('zoom', (event: D3ZoomEvent<HTMLElement, unknown>) => {
-        this.#view = toView(event.transform);
-        handlers.onView(this.#view);
+        handlers.onView(toView(event.transform));
       })
       .on('start', () => {
         // Not anew by a hand that grabs the map before the gesture of the wheel has ended.
-        if (!this.#programmed) this.#held ??= this.#view;
+        if (!this.#programmed) this.#held ??= this.#viewport().view;
       })
       .on('end', () => {
         if (this.#programmed) return;
         // A click is a gesture too, and moves nothing.
-        const hasMoved = this.#held !== this.#view;
+        const { view, size } = this.#viewport();
+        const hasMoved = this.#held !== view;
         this.#held = null;
-        if (hasMoved) handlers.onCamera(cameraOf(this.#view, this.#size));
+        if (hasMoved) handlers.onCamera(cameraOf(view, size));
       });
-    if (isFixed) this.#zoom.filter(() => false);
-    this.#selection.call(this.#zoom);
-  }
-
-  get view(): View {
-    return this.#view;
-  }
-
-  get size(): Size {
-    return this.#size;
-  }
-
-  resize(size: Size): void {
-    this.#size = size;
   }
 
   /**
@@ -96,14 +96,13 @@ export class MapCamera {
    */
   goTo(camera: Camera | null, bounds: Bounds | null): void {
     if (this.#held !== null) return;
-    if (this.#size.width === 0 || this.#size.height === 0) return;
-    const view = camera
-      ? viewOf(camera, this.#size)
-      : bounds && fit(bounds, this.#size, fitInsets(this.#size));
+    const { view: before, size } = this.#viewport();
+    if (size.width === 0 || size.height === 0) return;
+    const view = camera ? viewOf(camera, size) : bounds && fit(bounds, size, fitInsets(size));
     if (!view) return;
-    if (isSame(view, this.#view)) return;
+    if (isSame(view, before)) return;
     this.#programmed = true;
-    this.#zoom.transform(this.#selection, zoomIdentity.translate(view.x, view.y).scale(view.scale));
+    this.#zoom.transform(this.#selection, transformOf(view));
     this.#programmed = false;
   }
 
@@ -113,19 +112,20 @@ export class MapCamera {
 
   /** Moves what is seen, by a share of the view's size. */
   panBy(x: number, y: number): void {
-    const { scale } = this.#view;
+    const { view, size } = this.#viewport();
     this.#zoom.translateBy(
       this.#selection,
-      (-x * this.#size.width) / scale,
-      (-y * this.#size.height) / scale,
+      (-x * size.width) / view.scale,
+      (-y * size.height) / view.scale,
     );
   }
 
   /** Brings a point into view; one that is well inside the free part stays where it is. */
   show(point: MapPoint, coveredBelow: number): void {
-    const { x, y } = toCanvas(this.#view, point);
-    const { width } = this.#size;
-    const height = Math.max(0, this.#size.height - coveredBelow);
+    const { view, size } = this.#viewport();
+    const { x, y } = toCanvas(view, point);
+    const { width } = size;
+    const height = Math.max(0, size.height - coveredBelow);
     const margin = Math.min(40, height / 4);
     const isInside = x > margin && y > margin && x < width - margin && y < height - margin;
     if (isInside || width === 0) return;

@@ -1,4 +1,5 @@
 /** Ties the map's canvases to the store: draws what changed, once a frame, and nothing else. */
+import { now } from '../clock';
 import { DARK, LIGHT } from '../draw/palette';
 import { fieldCorners, type Field } from '../domain/field';
 import { PULSE_MS, type Pulse } from '../draw/overlay';
@@ -15,8 +16,9 @@ import {
   type View,
 } from '../geometry/coordinates';
 import { nearest } from '../geometry/nearest';
-import { act, store, type AppState } from '../store/app';
+import { act, moveViewport, store } from '../store/app';
 import { selectRange } from '../store/derived';
+import { selectShown, selectTag, type Shown } from '../store/moment';
 import { isDark, isPrinting, onThemeChange } from '../store/theme';
 import { MapCamera } from './camera';
 import { onMapCommand, type MapCommand } from './commands';
@@ -40,13 +42,15 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
   let frame = 0;
   let pulses: readonly Pulse[] = [];
   let crosshair = false;
-  let shown = store.get();
-  let lastField = shown.twin.field.value;
+  let drawn = store.get();
+  let lastField = selectShown(drawn).field.value;
 
   const camera = new MapCamera(
     element,
     {
+      viewport: () => store.get().viewport,
       onView: (view) => {
+        moveViewport({ view });
         publish(view);
         // The pin has moved away from under the mouse.
         pinUnderMouse.dispatch(null);
@@ -61,62 +65,77 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
 
   const publish = ({ x, y, scale }: View): void => {
     canvases.overlay.dataset['view'] = [x, y, scale].map((n) => n.toFixed(4)).join(',');
-    element.dispatchEvent(new CustomEvent('mapview', { detail: { scale } }));
     if (crosshair) pointedAt.dispatch(centre());
   };
 
+  // A map that comes back into the page may never have to move.
+  publish(store.get().viewport.view);
+
   const spoil = (...parts: Part[]): void => {
     for (const part of parts) dirty.add(part);
-    if (frame === 0 && camera.size.width > 0) frame = requestAnimationFrame(paint);
+    if (frame === 0 && store.get().viewport.size.width > 0) frame = requestAnimationFrame(paint);
   };
 
   const paint = (): void => {
     frame = 0;
     const live = store.get();
     const state = isPrinting() ? { ...live, view: { ...live.view, hovered: null } } : live;
-    const now = performance.now();
+    const { view } = live.viewport;
+    const at = now();
     const parts = new Set(dirty);
     dirty.clear();
     if (parts.has('still') || parts.has('view')) {
-      painter.paintStill(state, camera.view, now, parts.has('still'));
+      painter.paintStill(state, view, at, parts.has('still'));
     }
     if (parts.has('pins') || parts.has('view')) {
-      painter.paintPins(state, camera.view, now, parts.has('pins'));
+      painter.paintPins(state, view, at, parts.has('pins'));
     }
     if (parts.has('overlay') || parts.has('view')) {
-      pulses = pulses.filter(({ since }) => now - since < PULSE_MS);
-      painter.paintOverlay(state, camera.view, {
+      pulses = pulses.filter(({ since }) => at - since < PULSE_MS);
+      painter.paintOverlay(state, view, {
         pulses: isPrinting() ? [] : pulses,
-        now,
+        now: at,
         crosshair: crosshair && !isPrinting(),
       });
     }
     if (pulses.length > 0) spoil('overlay');
   };
 
-  const centre = (): MapPoint =>
-    toMap(camera.view, canvasPoint(camera.size.width / 2, camera.size.height / 2));
+  const middle = (): CanvasPoint => {
+    const { width, height } = store.get().viewport.size;
+    return canvasPoint(width / 2, height / 2);
+  };
+  const centre = (): MapPoint => toMap(store.get().viewport.view, middle());
 
   const update = (): void => {
-    const before = shown;
+    const before = drawn;
     const state = store.get();
-    shown = state;
-    const { twin, view } = state;
-    lastField = twin.field.value ?? lastField;
-    const changedTwin = twin.snapshot !== before.twin.snapshot;
-    if (changedTwin && twin.snapshot && !calm.matches) {
-      pulses = [...pulses, ...newPulses(state)];
+    drawn = state;
+    const { view } = state;
+    const house = selectShown(state);
+    const last = selectShown(before);
+    lastField = house.field.value ?? lastField;
+    const changedTags = house.snapshot !== last.snapshot;
+    // What was news at another moment is none.
+    if (changedTags && house.snapshot && house.moment === null && !calm.matches) {
+      pulses = [...pulses, ...newPulses(house)];
     }
-    const sameMap = twin.map === before.twin.map;
+    const sameMap = house.map === last.map;
     const stillChanged =
       !sameMap ||
-      twin.field !== before.twin.field ||
+      house.field !== last.field ||
       view.layers !== before.view.layers ||
       view.sensor !== before.view.sensor ||
       selectRange(state) !== selectRange(before) ||
-      (changedTwin && twin.snapshot?.revision !== before.twin.snapshot?.revision);
+      (changedTags && house.snapshot?.revision !== last.snapshot?.revision);
     if (stillChanged) spoil('still');
-    if (changedTwin || stillChanged || state.settings !== before.settings) spoil('pins', 'overlay');
+    if (
+      changedTags ||
+      stillChanged ||
+      house.ageing !== last.ageing ||
+      state.settings !== before.settings
+    )
+      spoil('pins', 'overlay');
     if (view.selected !== before.view.selected || view.hovered !== before.view.hovered) {
       spoil('pins', 'overlay');
     }
@@ -127,21 +146,21 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
         run({ type: 'show', tagId: selected });
       });
     }
-    const sameContent = !changedTwin && sameMap && twin.field === before.twin.field;
+    const sameContent = !changedTags && sameMap && house.field === last.field;
     if (view.camera !== before.view.camera || (!view.camera && !sameContent)) {
-      camera.goTo(view.camera, contentBounds(state, lastField));
+      camera.goTo(view.camera, contentBounds(house, lastField));
     }
   };
 
   const pinAt = (point: CanvasPoint, reach: number): Pin | null => {
-    if (!store.get().view.layers.has('pins')) return null;
-    const { pins } = painter.scene(store.get(), performance.now());
-    return nearest(pins, camera.view, point, reach);
+    const state = store.get();
+    if (!state.view.layers.has('pins')) return null;
+    return nearest(painter.scene(state, now()).pins, state.viewport.view, point, reach);
   };
 
   const hover = (pin: Pin | null): void => {
     act({ type: 'hover', tagId: pin?.id ?? null });
-    const { view, size } = camera;
+    const { view, size } = store.get().viewport;
     pinUnderMouse.dispatch(
       pin && {
         tagId: pin.id,
@@ -160,7 +179,7 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
   const onPointerMove = (event: PointerEvent): void => {
     if (event.pointerType === 'touch') return;
     const point = pointOf(event);
-    pointedAt.dispatch(toMap(camera.view, point));
+    pointedAt.dispatch(toMap(store.get().viewport.view, point));
     const pin = event.buttons === 0 ? pinAt(point, MOUSE_REACH) : null;
     hover(pin);
     const hand = pin === null || isFixed ? 'grab' : 'point';
@@ -173,7 +192,7 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
   const onClick = (event: MouseEvent): void => {
     const isTouch = event instanceof PointerEvent && event.pointerType === 'touch';
     const point = pointOf(event);
-    if (isTouch) pointedAt.dispatch(toMap(camera.view, point));
+    if (isTouch) pointedAt.dispatch(toMap(store.get().viewport.view, point));
     act({ type: 'select', tagId: pinAt(point, isTouch ? TOUCH_REACH : MOUSE_REACH)?.id ?? null });
   };
   const setCrosshair = (on: boolean): void => {
@@ -195,8 +214,7 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
     if (event.altKey || event.ctrlKey || event.metaKey) return;
     if (event.key === 'Enter' || event.key === ' ') {
       aim();
-      const { width, height } = camera.size;
-      act({ type: 'select', tagId: pinAt(canvasPoint(width / 2, height / 2), 60)?.id ?? null });
+      act({ type: 'select', tagId: pinAt(middle(), 60)?.id ?? null });
       event.preventDefault();
       return;
     }
@@ -211,7 +229,7 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
     switch (command.type) {
       case 'fit':
         act({ type: 'camera', camera: null });
-        camera.goTo(null, contentBounds(store.get(), lastField));
+        camera.goTo(null, contentBounds(selectShown(store.get()), lastField));
         break;
       case 'zoom':
         camera.zoomBy(command.factor);
@@ -220,7 +238,7 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
         camera.panBy(command.x, command.y);
         break;
       case 'show': {
-        const tag = store.get().twin.snapshot?.tags.find(({ id }) => id === command.tagId);
+        const tag = selectTag(store.get(), command.tagId);
         if (tag?.at) camera.show(tag.at, coveredBelow(element));
         break;
       }
@@ -230,13 +248,13 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
   const resize = new ResizeObserver(([entry]) => {
     if (!entry) return;
     const { width, height } = entry.contentRect;
-    camera.resize({ width, height });
+    moveViewport({ size: { width, height } });
     if (width === 0 || height === 0) return;
     // Its labels grow with the page's text: on a wall screen, and as the browser is set.
     const textScale = parseFloat(getComputedStyle(element).fontSize) / TEXT_PX || 1;
     painter.resize({ width, height }, window.devicePixelRatio, textScale);
     const state = store.get();
-    camera.goTo(state.view.camera, contentBounds(state, lastField));
+    camera.goTo(state.view.camera, contentBounds(selectShown(state), lastField));
     spoil('still', 'pins', 'overlay');
     // At once: a canvas of another size is empty, and would be seen so until the next frame.
     paint();
@@ -268,7 +286,7 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
       spoil('still', 'pins', 'overlay');
       // Not with the next frame: a page on its way to the printer gets none.
       cancelAnimationFrame(frame);
-      if (camera.size.width > 0) paint();
+      if (store.get().viewport.size.width > 0) paint();
     }),
   ];
   element.addEventListener('pointermove', onPointerMove, { signal });
@@ -297,10 +315,10 @@ function coveredBelow(element: HTMLElement): number {
   return overlaps ? map.bottom - card.top : 0;
 }
 
-function newPulses({ twin }: AppState): Pulse[] {
-  const fresh = new Set(twin.snapshot?.fresh);
-  const since = performance.now();
-  return (twin.snapshot?.tags ?? []).flatMap((tag) =>
+function newPulses({ snapshot }: Shown): Pulse[] {
+  const fresh = new Set(snapshot?.fresh);
+  const since = now();
+  return (snapshot?.tags ?? []).flatMap((tag) =>
     tag.at && fresh.has(tag.id) ? [{ at: tag.at, since }] : [],
   );
 }
@@ -310,8 +328,8 @@ function newPulses({ twin }: AppState): Pulse[] {
  * The grid of the heat map is the same for every sensor, so that a switch moves nothing; while
  * the next one is on its way, the last one's stands in for it.
  */
-function contentBounds({ twin }: AppState, field: Field | null): Bounds | null {
-  const points = (twin.snapshot?.tags ?? []).flatMap((tag) => [
+function contentBounds({ snapshot, map }: Shown, field: Field | null): Bounds | null {
+  const points = (snapshot?.tags ?? []).flatMap((tag) => [
     ...(tag.at ? [tag.at] : []),
     ...tag.footprint,
   ]);
@@ -319,7 +337,7 @@ function contentBounds({ twin }: AppState, field: Field | null): Bounds | null {
     ...points,
     // A field whose tags are gone is one of a twin before this one.
     ...(field && points.length > 0 ? fieldCorners(field) : []),
-    ...(twin.map.value?.known ?? []),
+    ...(map.value?.known ?? []),
   ]);
 }
 

@@ -81,7 +81,7 @@ describe('painter', () => {
   });
 
   test('a pulse touches its own canvas alone', () => {
-    const pulses = [{ at: store.get().twin.snapshot?.tags[0]?.at, since: 0 }] as never;
+    const pulses = [{ at: store.get().twin.latest.snapshot?.tags[0]?.at, since: 0 }] as never;
     painter.paintOverlay(store.get(), view, { pulses, now: 10, crosshair: false });
     expect(named(canvases.overlay, 'arc')).toHaveLength(1);
     expect(calls(canvases.still)).toHaveLength(0);

@@ -1,3 +1,4 @@
+import type { Ageing } from '../domain/age';
 import { fieldPixels, smoothDetail, type Field } from '../domain/field';
 import type { HouseHealth } from '../domain/health';
 import { sensorColour, type Range } from '../domain/ramp';
@@ -36,7 +37,9 @@ import {
 import type { Size, View } from '../geometry/coordinates';
 import { placeLabels } from '../geometry/declutter';
 import type { AppState } from '../store/app';
-import { memoLast, selectHealth, selectRange } from '../store/derived';
+import { selectHealth, selectRange } from '../store/derived';
+import { memoLast } from '../store/memo';
+import { selectShown, selectTags } from '../store/moment';
 import type { MapPicture } from './picture';
 
 export interface Canvases {
@@ -123,14 +126,15 @@ export class Painter {
 
   #drawStill(surface: Surface, view: View, state: AppState, now: number): void {
     const { layers } = state.view;
+    const house = selectShown(state);
     drawGround(surface, this.#palette);
-    const picture = state.twin.map.value;
+    const picture = house.map.value;
     if (picture && layers.has('map')) {
       drawPicture(surface, view, this.#mapPicture(picture, this.#palette), picture.placement);
     }
     if (layers.has('grid')) drawGridLines(surface, view, this.#palette);
     if (layers.has('boxes')) drawBoxes(surface, view, this.scene(state, now).boxes, this.#palette);
-    const field = state.twin.field.value;
+    const field = house.field.value;
     const range = selectRange(state);
     if (field && range && field.sampleCount > 0 && layers.has('field')) {
       const detail = layers.has('smooth') ? smoothDetail(field) : 1;
@@ -173,7 +177,7 @@ export class Painter {
     if (state.view.layers.has('pins')) {
       drawPulses(surface, view, moving.pulses, moving.now, this.#palette);
     }
-    for (const tag of state.twin.snapshot?.tags ?? []) {
+    for (const tag of selectTags(state)) {
       if (!tag.at) continue;
       if (tag.id === state.view.selected) drawMark(surface, view, tag.at, true, this.#palette);
       else if (tag.id === state.view.hovered) drawMark(surface, view, tag.at, false, this.#palette);
@@ -182,10 +186,11 @@ export class Painter {
   }
 
   scene(state: AppState, now: number): Scene {
-    const { snapshot } = state.twin;
+    const { snapshot, ageing } = selectShown(state);
     if (!snapshot) return EMPTY_SCENE;
     return this.#scene(
       snapshot,
+      ageing,
       selectHealth(state),
       state.view.sensor,
       selectRange(state),
@@ -197,6 +202,7 @@ export class Painter {
   readonly #scene = memoLast(
     (
       snapshot: Snapshot,
+      ageing: Ageing,
       health: HouseHealth,
       sensor: string,
       range: Range | null,
@@ -205,6 +211,7 @@ export class Painter {
     ) =>
       buildScene({
         snapshot,
+        ageing,
         health,
         sensor: sensorNamed(sensor),
         range,

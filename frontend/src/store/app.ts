@@ -2,16 +2,19 @@ import { createStore, useSelected } from './create';
 import { DEFAULT_SETTINGS, type Settings } from './settings';
 import { NO_TWIN, reduceTwin, type TwinAction, type TwinState } from './twin';
 import { DEFAULT_VIEW, reduceView, type ViewAction, type ViewState } from './view';
+import { NO_VIEWPORT, type Viewport } from './viewport';
 
 export interface AppState {
   readonly twin: TwinState;
   readonly view: ViewState;
+  readonly viewport: Viewport;
   readonly settings: Settings;
 }
 
 export type AppAction =
   | { readonly slice: 'twin'; readonly action: TwinAction }
   | { readonly slice: 'view'; readonly action: ViewAction }
+  | { readonly slice: 'viewport'; readonly viewport: Partial<Viewport> }
   | { readonly slice: 'settings'; readonly settings: Partial<Settings> };
 
 export function reduceApp(state: AppState, action: AppAction): AppState {
@@ -24,18 +27,30 @@ export function reduceApp(state: AppState, action: AppAction): AppState {
       const view = reduceView(state.view, action.action);
       return view === state.view ? state : { ...state, view };
     }
+    case 'viewport':
+      return { ...state, viewport: { ...state.viewport, ...action.viewport } };
     case 'settings':
       return { ...state, settings: { ...state.settings, ...action.settings } };
   }
 }
 
 export const store = createStore(
-  { twin: NO_TWIN, view: DEFAULT_VIEW, settings: DEFAULT_SETTINGS },
+  {
+    twin: NO_TWIN,
+    view: DEFAULT_VIEW,
+    viewport: NO_VIEWPORT,
+    settings: DEFAULT_SETTINGS,
+  },
   reduceApp,
 );
 
 export const act = (action: ViewAction): void => {
   store.dispatch({ slice: 'view', action });
+};
+
+/** For the map's camera alone, which keeps it in step with wheel, finger and keys. */
+export const moveViewport = (viewport: Partial<Viewport>): void => {
+  store.dispatch({ slice: 'viewport', viewport });
 };
 
 export const receive = (action: TwinAction): void => {

@@ -1,24 +1,15 @@
-import { beforeEach, describe, expect, test, vi } from 'vitest';
+import { beforeEach, describe, expect, test } from 'vitest';
 
 import { showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { act, receive, store } from './app';
-import { memoLast, selectHealth, selectRange, selectSensors } from './derived';
+import { selectHealth, selectRange, selectSensors } from './derived';
 
 beforeEach(() => {
   showTags([
     wireTag({ tag_id: '1', readings: readings({ temperature: 20, ph: 7 }) }),
     wireTag({ tag_id: '2', readings: readings({ temperature: 30 }) }),
   ]);
-});
-
-test('the same arguments give the same object', () => {
-  const compute = vi.fn((a: number, b: number) => ({ sum: a + b }));
-  const memo = memoLast(compute);
-  const first = memo(1, 2);
-  expect(memo(1, 2)).toBe(first);
-  expect(memo(1, 3)).not.toBe(first);
-  expect(compute).toHaveBeenCalledTimes(2);
 });
 
 describe('range in use', () => {

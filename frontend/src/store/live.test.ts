@@ -28,7 +28,7 @@ class FakeSocket {
 }
 
 let stop: () => void;
-const revision = (): string | undefined => store.get().twin.snapshot?.revision;
+const revision = (): string | undefined => store.get().twin.latest.snapshot?.revision;
 
 beforeEach(() => {
   vi.useFakeTimers({ toFake: ['setTimeout', 'clearTimeout', 'performance'] });
@@ -49,7 +49,7 @@ test('the first state is taken at once, as old as the bridge says', () => {
   FakeSocket.last.speak(status({ state_age_seconds: 12 }));
   FakeSocket.last.speak(stateFrame([wireTag()], { sec: 1, revision: 'first' }));
   expect(revision()).toBe('first');
-  expect(store.get().twin.snapshot?.takenAt).toBeCloseTo(performance.now() - 12_000, -1);
+  expect(store.get().twin.latest.snapshot?.takenAt).toBeCloseTo(performance.now() - 12_000, -1);
 });
 
 test('of many frames the newest is taken, a few times a second', () => {

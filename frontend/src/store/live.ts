@@ -1,4 +1,5 @@
 /** The page's one connection, and what its frames do to the store. */
+import { now } from '../clock';
 import { latestAfter, type Latest } from '../connection/latest';
 import { signInIfAsked } from '../connection/session';
 import { connect } from '../connection/socket';
@@ -34,13 +35,13 @@ export function startLive(): () => void {
     timer = undefined;
     if (!latest || !isNew) return;
     isNew = false;
-    takenAt = performance.now();
+    takenAt = now();
     receive({ type: 'state', latest, now: arrivedAt, stateAgeSeconds });
   };
 
   const link = connect(stateSocketUrl(), {
     onConnection: (connection) => {
-      receive({ type: 'connection', connection, now: performance.now() });
+      receive({ type: 'connection', connection, now: now() });
     },
     onRefused: () => void signInIfAsked(),
     onFrame: (frame, connection) => {
@@ -53,7 +54,7 @@ export function startLive(): () => void {
       }
       latest = next;
       isNew = true;
-      arrivedAt = performance.now();
+      arrivedAt = now();
       if (isFirst) {
         // The first state may be an old one that the bridge kept; its status says how old.
         greeted = connection.epoch;

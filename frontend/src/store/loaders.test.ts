@@ -58,7 +58,7 @@ describe('loaders', () => {
     showTags(tags);
     await settle();
     expect(asked).toContain('/api/field.npy?sensor_type=temperature&resolution=0.05');
-    expect(store.get().twin.field.value).toMatchObject({
+    expect(store.get().twin.latest.field.value).toMatchObject({
       sensor: 'temperature',
       originX: -1.5,
       originY: 0.5,
@@ -71,9 +71,9 @@ describe('loaders', () => {
     showTags(tags);
     await settle();
     act({ type: 'sensor', sensor: 'co2' });
-    expect(store.get().twin.field.value).toBeNull();
+    expect(store.get().twin.latest.field.value).toBeNull();
     await settle();
-    expect(store.get().twin.field.value?.sensor).toBe('co2');
+    expect(store.get().twin.latest.field.value?.sensor).toBe('co2');
   });
 
   test('the same revision is not fetched again; a new one is, and a new connection', async () => {
@@ -113,7 +113,7 @@ describe('loaders', () => {
     showTags(tags);
     await vi.advanceTimersByTimeAsync(20_000);
     expect(count('quality')).toBe(1);
-    expect(store.get().twin.quality).toBeNull();
+    expect(store.get().twin.latest.quality).toBeNull();
   });
 
   test('a refusal is kept with its reason', async () => {
@@ -124,13 +124,16 @@ describe('loaders', () => {
     );
     showTags(tags);
     await settle();
-    expect(store.get().twin.field).toMatchObject({ state: 'failed', message: 'resolution is 0' });
+    expect(store.get().twin.latest.field).toMatchObject({
+      state: 'failed',
+      message: 'resolution is 0',
+    });
   });
 
   test('without a connection nothing is fetched, nor what had failed tried again', async () => {
     showTags(tags);
     await settle();
-    expect(store.get().twin.map.state).toBe('failed');
+    expect(store.get().twin.latest.map.state).toBe('failed');
     goLost();
     asked.length = 0;
     await vi.advanceTimersByTimeAsync(60_000);

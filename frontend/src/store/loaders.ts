@@ -6,6 +6,7 @@ import type { Snapshot } from '../domain/twin';
 import { boundsOf } from '../geometry/coordinates';
 import { loadMap, type MapPicture } from '../map/picture';
 import { receive, store, type AppState } from './app';
+import { selectNewest } from './moment';
 import { createRefresher, type Task } from './refresher';
 import { NOTHING } from './twin';
 
@@ -24,7 +25,7 @@ export function startLoaders(): () => void {
       receive({ type: 'field', field: { value, state: 'ready', message: '' } });
     },
     onError: (error) => {
-      const { value } = store.get().twin.field;
+      const { value } = selectNewest(store.get()).field;
       receive({ type: 'field', field: { value, state: 'failed', message: reason(error) } });
     },
   });
@@ -34,7 +35,7 @@ export function startLoaders(): () => void {
       receive({ type: 'map', map: { value, state: 'ready', message: '' } });
     },
     onError: (error) => {
-      const { value } = store.get().twin.map;
+      const { value } = selectNewest(store.get()).map;
       receive({ type: 'map', map: { value, state: 'failed', message: reason(error) } });
     },
   });
@@ -56,11 +57,12 @@ export function startLoaders(): () => void {
     if (seen?.twin === state.twin && seen.view.sensor === state.view.sensor) return;
     seen = state;
     const { epoch, status } = state.twin.connection;
+    const newest = selectNewest(state);
     const { sensor } = state.view;
     const base = baseKey(state);
-    const wanted = base === null ? null : fieldTask(base, sensor, state.twin.snapshot);
+    const wanted = base === null ? null : fieldTask(base, sensor, newest.snapshot);
     // What the page does not show any more goes at once: a restarted twin begins empty.
-    const { value } = state.twin.field;
+    const { value } = newest.field;
     if (value && (value.sensor !== sensor || (base !== null && !wanted))) {
       receive({ type: 'field', field: NOTHING });
       receive({ type: 'quality', quality: null });
@@ -71,7 +73,7 @@ export function startLoaders(): () => void {
       quality.want(null);
       return;
     }
-    if (state.twin.map.value && !status?.has_map) receive({ type: 'map', map: NOTHING });
+    if (newest.map.value && !status?.has_map) receive({ type: 'map', map: NOTHING });
     map.want(status?.has_map ? { key: base, group: 'map', run: loadMap } : null);
     quality.want(
       epoch === missingSince
@@ -97,8 +99,9 @@ export function startLoaders(): () => void {
  * Changes with the revision, and with each connection: another server may sit behind it. Null
  * while there is none, and until the bridge has said on it what there is to ask for.
  */
-function baseKey({ twin: { snapshot, connection } }: AppState): string | null {
-  const { epoch, socket, status } = connection;
+function baseKey(state: AppState): string | null {
+  const { snapshot } = selectNewest(state);
+  const { epoch, socket, status } = state.twin.connection;
   return snapshot && status && socket.kind === 'open' ? `${epoch}|${snapshot.revision}` : null;
 }
 

@@ -1,3 +1,5 @@
+import { now } from '../clock';
+
 /** One thing to fetch. */
 export interface Task<T> {
   /** What it depends on; a task with the key of the one before has nothing new to bring. */
@@ -48,7 +50,7 @@ export function createRefresher<T>(options: RefresherOptions<T>): Refresher<T> {
       failures === 0
         ? options.intervalMs
         : Math.min(RETRY_LONGEST_MS, RETRY_FIRST_MS * 2 ** (failures - 1));
-    timer = setTimeout(start, Math.max(0, startedAt + pause - performance.now()));
+    timer = setTimeout(start, Math.max(0, startedAt + pause - now()));
   };
 
   const start = (): void => {
@@ -57,7 +59,7 @@ export function createRefresher<T>(options: RefresherOptions<T>): Refresher<T> {
     const abort = new AbortController();
     const mine = { task, abort };
     running = mine;
-    startedAt = performance.now();
+    startedAt = now();
     task.run(abort.signal).then(
       (value) => {
         if (running !== mine) return;

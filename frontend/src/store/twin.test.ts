@@ -8,7 +8,7 @@ const late = stateFrame([wireTag({ tag_id: 'a' }), wireTag({ tag_id: 'b' })], { 
 
 describe('state frames', () => {
   test('one frame is enough for a page that comes late', () => {
-    const { snapshot } = reduceTwin(NO_TWIN, { type: 'state', latest: late, now: 50 });
+    const { snapshot } = reduceTwin(NO_TWIN, { type: 'state', latest: late, now: 50 }).latest;
     expect(snapshot?.tags.map(({ id }) => id)).toEqual(['a', 'b']);
     expect(snapshot?.takenAt).toBe(50);
   });
@@ -19,7 +19,7 @@ describe('state frames', () => {
       latest: late,
       now: 100_000,
       stateAgeSeconds: 40,
-    });
+    }).latest;
     expect(snapshot?.takenAt).toBe(60_000);
   });
 
@@ -27,8 +27,8 @@ describe('state frames', () => {
     const before = reduceTwin(NO_TWIN, { type: 'state', latest: late, now: 50 });
     const latest = stateFrame([wireTag({ tag_id: 'c' })], { seq: 1, sec: 3, revision: 'new' });
     const after = reduceTwin(before, { type: 'state', latest, now: 60 });
-    expect(after.snapshot?.tags.map(({ id }) => id)).toEqual(['c']);
-    expect(after.snapshot?.revision).toBe('new');
+    expect(after.latest.snapshot?.tags.map(({ id }) => id)).toEqual(['c']);
+    expect(after.latest.snapshot?.revision).toBe('new');
   });
 });
 

@@ -16,22 +16,31 @@ export interface Fetched<T> {
 
 export const NOTHING: Fetched<never> = { value: null, state: 'waiting', message: '' };
 
-export interface TwinState {
-  readonly phase: Phase;
-  readonly connection: Connection;
+/** The greenhouse as it was or is at one moment, and what is fetched about that moment. */
+export interface House {
   readonly snapshot: Snapshot | null;
   readonly field: Fetched<Field>;
   readonly map: Fetched<MapPicture>;
   readonly quality: FieldQuality | null;
 }
 
+export const NO_HOUSE: House = { snapshot: null, field: NOTHING, map: NOTHING, quality: null };
+
+/** Read by `moment.ts` alone, which chooses what the page shows; everyone else asks there. */
+export interface TwinState {
+  readonly phase: Phase;
+  readonly connection: Connection;
+  /** As the frames tell it. */
+  readonly latest: House;
+  /** As it was at another moment, ROS seconds; null: nobody has asked. */
+  readonly past: { readonly at: number; readonly house: House } | null;
+}
+
 export const NO_TWIN: TwinState = {
   phase: 'connecting',
   connection: INITIAL,
-  snapshot: null,
-  field: NOTHING,
-  map: NOTHING,
-  quality: null,
+  latest: NO_HOUSE,
+  past: null,
 };
 
 export type TwinAction =
@@ -45,7 +54,8 @@ export type TwinAction =
     }
   | { readonly type: 'field'; readonly field: Fetched<Field> }
   | { readonly type: 'map'; readonly map: Fetched<MapPicture> }
-  | { readonly type: 'quality'; readonly quality: FieldQuality | null };
+  | { readonly type: 'quality'; readonly quality: FieldQuality | null }
+  | { readonly type: 'past'; readonly past: TwinState['past'] };
 
 export function reduceTwin(state: TwinState, action: TwinAction): TwinState {
   switch (action.type) {
@@ -57,16 +67,25 @@ export function reduceTwin(state: TwinState, action: TwinAction): TwinState {
     case 'state': {
       // No comparison of seq: one socket delivers in order, and a restarted server counts anew.
       const arrivedAt = action.now - (action.stateAgeSeconds ?? 0) * 1000;
-      return { ...state, snapshot: snapshotOf(action.latest, arrivedAt, state.snapshot) };
+      return withLatest(state, {
+        snapshot: snapshotOf(action.latest, arrivedAt, state.latest.snapshot),
+      });
     }
     case 'field':
-      return { ...state, field: action.field };
+      return withLatest(state, { field: action.field });
     case 'map':
-      return { ...state, map: action.map };
+      return withLatest(state, { map: action.map });
     case 'quality':
-      return { ...state, quality: action.quality };
+      return withLatest(state, { quality: action.quality });
+    case 'past':
+      return { ...state, past: action.past };
   }
 }
+
+const withLatest = (state: TwinState, part: Partial<House>): TwinState => ({
+  ...state,
+  latest: { ...state.latest, ...part },
+});
 
 /** Each frame moves the connection's clock; only the rest is worth a render. */
 function sameToTheEye(a: Connection, b: Connection): boolean {

@@ -23,6 +23,8 @@ export interface Sort {
 }
 
 export interface ViewState {
+  /** What is shown: null is now, a number a moment in the past, ROS seconds. */
+  readonly moment: number | null;
   readonly sensor: string;
   /** Id of the tag whose card is open. */
   readonly selected: string | null;
@@ -45,6 +47,7 @@ export const DEFAULT_LAYERS: ReadonlySet<Layer> = new Set(
 );
 
 export const DEFAULT_VIEW: ViewState = {
+  moment: null,
   sensor: KNOWN_SENSORS[0]?.name ?? 'temperature',
   selected: null,
   hovered: null,

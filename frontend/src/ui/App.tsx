@@ -3,6 +3,7 @@ import { useEffect, type JSX } from 'react';
 import { act, useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';
+import { selectSnapshot } from '../store/moment';
 import { S } from '../strings';
 import { FrozenBanner } from './FrozenBanner';
 import { Header } from './Header';
@@ -21,7 +22,7 @@ export function App({ kiosk }: { kiosk: boolean }): JSX.Element {
   const selected = useApp((state) => state.view.selected);
   const message = useSelected(toast, (text) => text);
 
-  const hasTags = useApp((state) => state.twin.snapshot !== null);
+  const hasTags = useApp((state) => selectSnapshot(state) !== null);
 
   // The row of the chosen tag comes into view, once its card has taken its place.
   useEffect(() => {

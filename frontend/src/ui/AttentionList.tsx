@@ -6,6 +6,7 @@ import { sensorNamed } from '../domain/sensors';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
+import { selectTags } from '../store/moment';
 import { S } from '../strings';
 import { HealthMark } from './HealthMark';
 import { Age, PestMark } from './TagRow';
@@ -14,11 +15,11 @@ const LONGEST = 14;
 
 /** For a wall screen: the tags that need somebody, pests first, then the worst. */
 export function AttentionList(): JSX.Element {
-  const snapshot = useApp((state) => state.twin.snapshot);
+  const tags = useApp(selectTags);
   const health = useApp(selectHealth);
   const unit = useApp((state) => state.settings.unit);
   const rows = useMemo(() => {
-    const all = sortRows(rowsOf(snapshot?.tags ?? [], health), {
+    const all = sortRows(rowsOf(tags, health), {
       column: 'health',
       descending: true,
     });
@@ -27,7 +28,7 @@ export function AttentionList(): JSX.Element {
         tag.anomaly || own.status === 'critical' || own.status === 'stressed',
     );
     return [...bad.filter(({ tag }) => tag.anomaly), ...bad.filter(({ tag }) => !tag.anomaly)];
-  }, [snapshot, health]);
+  }, [tags, health]);
   return (
     <div className="attention">
       <h3>{rows.length > 0 ? S.attention : S.attentionNone}</h3>

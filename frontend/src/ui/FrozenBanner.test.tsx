@@ -1,13 +1,13 @@
 import { render, screen } from '@testing-library/react';
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
+import { epochOf } from '../clock';
 import { clockText } from '../domain/format';
 import { store } from '../store/app';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import { ConnectionBadge } from './ConnectionBadge';
 import { FrozenBanner } from './FrozenBanner';
-import { epochOf } from './useNow';
 
 // The time of the last frame is read from two clocks, which go on between two looks.
 beforeEach(() => {
@@ -29,7 +29,7 @@ test('a lost connection: frozen, since when, and a way to try now', () => {
   showTags([wireTag()]);
   goLost();
   render(<FrozenBanner />);
-  const since = clockText(epochOf(store.get().twin.snapshot?.takenAt ?? NaN));
+  const since = clockText(epochOf(store.get().twin.latest.snapshot?.takenAt ?? NaN));
   expect(text()).toContain(`Last data at ${since}`);
   expect(screen.getByRole('button', { name: 'Try now' })).toBeTruthy();
 });

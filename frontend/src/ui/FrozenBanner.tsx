@@ -1,11 +1,13 @@
 import type { JSX } from 'react';
 
+import { epochOf } from '../clock';
 import type { StatusFrame } from '../contract/types';
 import { clockText, ageText } from '../domain/format';
 import { retryConnection } from '../store/live';
 import { useApp } from '../store/app';
+import { selectNewest } from '../store/moment';
 import { S } from '../strings';
-import { epochOf, useNow } from './useNow';
+import { useNow } from './useNow';
 
 /** Why the bridge calls the twin offline, for a person. */
 export function offlineReason(status: StatusFrame | null): string {
@@ -15,7 +17,7 @@ export function offlineReason(status: StatusFrame | null): string {
 /** Across the page whenever what it shows is not the present. */
 export function FrozenBanner(): JSX.Element | null {
   const phase = useApp((state) => state.twin.phase);
-  const takenAt = useApp((state) => state.twin.snapshot?.takenAt);
+  const takenAt = useApp((state) => selectNewest(state).snapshot?.takenAt);
   const connection = useApp((state) => state.twin.connection);
   const now = useNow();
   if (phase === 'live' || takenAt === undefined) return null;

@@ -9,6 +9,7 @@ import { pinUnderMouse, type PinUnderMouse } from '../map/pointer';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';
+import { selectTag } from '../store/moment';
 import { S } from '../strings';
 import { HealthMark } from './HealthMark';
 import { AgeFact, PestMark } from './TagRow';
@@ -23,9 +24,7 @@ const MOST_READINGS = 8;
 export function HoverCard(): JSX.Element | null {
   const pin = useSelected(pinUnderMouse, (under) => under);
   const selected = useApp((state) => state.view.selected);
-  const tag = useApp((state) =>
-    pin ? state.twin.snapshot?.tags.find(({ id }) => id === pin.tagId) : undefined,
-  );
+  const tag = useApp((state) => (pin ? selectTag(state, pin.tagId) : undefined));
   // The chosen tag's own card is open already.
   if (!pin || !tag || pin.tagId === selected) return null;
   return <Brief key={tag.id} pin={pin} tag={tag} />;

@@ -10,6 +10,7 @@ import { differenceToShown, unitOf, type TemperatureUnit } from '../domain/units
 import { snapshotSpecies } from '../draw/scene';
 import { useApp } from '../store/app';
 import { selectRange } from '../store/derived';
+import { selectShown, selectSnapshot, selectTags } from '../store/moment';
 import { S } from '../strings';
 import { RangeControl } from './RangeControl';
 
@@ -17,14 +18,14 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
   const name = useApp((state) => state.view.sensor);
   const unit = useApp((state) => state.settings.unit);
   const range = useApp(selectRange);
-  const field = useApp((state) => state.twin.field.value);
-  const quality = useApp((state) => state.twin.quality);
+  const field = useApp((state) => selectShown(state).field.value);
+  const quality = useApp((state) => selectShown(state).quality);
   const sensor = sensorNamed(name);
   const samples = field?.sensor === name ? field.sampleCount : 0;
   const isFetching = useApp(
-    ({ twin }) =>
-      twin.field.value?.sensor !== name &&
-      twin.snapshot?.tags.some((tag) => tag.at && tag.readings.get(name) != null),
+    (state) =>
+      selectShown(state).field.value?.sensor !== name &&
+      selectTags(state).some((tag) => tag.at && tag.readings.get(name) != null),
   );
   return (
     <section className="legend" aria-label={S.legend} data-testid="legend">
@@ -123,7 +124,7 @@ function Ramp({
 
 /** What pins and dots mean. */
 function Keys(): JSX.Element {
-  const snapshot = useApp((state) => state.twin.snapshot);
+  const snapshot = useApp(selectSnapshot);
   const species = useMemo(
     () => (snapshot ? [...speciesLooks(snapshotSpecies(snapshot))] : []),
     [snapshot],

@@ -2,6 +2,7 @@ import type { JSX } from 'react';
 
 import { MapView } from '../map/MapView';
 import { useApp } from '../store/app';
+import { selectShown } from '../store/moment';
 import { S } from '../strings';
 import { HoverCard } from './HoverCard';
 import { Legend } from './Legend';
@@ -11,7 +12,7 @@ import { Readout, ScaleBar } from './Readout';
 import { SensorPicker } from './SensorPicker';
 
 export function MapPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
-  const mapState = useApp((state) => state.twin.map.state);
+  const mapState = useApp((state) => selectShown(state).map.state);
   return (
     <section className="map-panel" aria-label={S.mapRegion} data-map-state={mapState}>
       <SensorPicker />

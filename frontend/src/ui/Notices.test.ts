@@ -1,7 +1,7 @@
 import { beforeEach, describe, expect, test } from 'vitest';
 
 import { act, receive, store } from '../store/app';
-import { NO_TWIN } from '../store/twin';
+import { NO_HOUSE, NO_TWIN } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { noticeFor } from './Notices';
@@ -16,9 +16,9 @@ describe('before the first state', () => {
     expect(noticeFor(empty)?.id).toBe('connecting');
     goLost();
     const lost = store.get().twin;
-    expect(noticeFor({ ...empty, twin: { ...lost, snapshot: null } })?.id).toBe('unreachable');
+    expect(noticeFor({ ...empty, twin: { ...lost, latest: NO_HOUSE } })?.id).toBe('unreachable');
     goLive(status({ twin: 'offline', reason: 'never_seen' }));
-    const offline = { ...store.get().twin, snapshot: null };
+    const offline = { ...store.get().twin, latest: NO_HOUSE };
     expect(noticeFor({ ...empty, twin: offline })).toMatchObject({ id: 'no-twin' });
   });
 });

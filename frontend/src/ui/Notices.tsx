@@ -3,6 +3,7 @@ import type { JSX } from 'react';
 import { sensorNamed } from '../domain/sensors';
 import { shown } from '../domain/text';
 import { useApp, type AppState } from '../store/app';
+import { selectShown, selectTags } from '../store/moment';
 import { S } from '../strings';
 import { offlineReason } from './FrozenBanner';
 
@@ -15,8 +16,9 @@ interface Notice {
 }
 
 /** What is missing, and what to do about it; the most basic lack first and alone. */
-export function noticeFor({ twin, view }: AppState): Notice | null {
-  const { snapshot, phase, connection } = twin;
+export function noticeFor(state: AppState): Notice | null {
+  const { phase, connection } = state.twin;
+  const { snapshot, field, map } = selectShown(state);
   const offline = {
     id: 'no-twin',
     title: S.emptyNoTwin,
@@ -36,14 +38,14 @@ export function noticeFor({ twin, view }: AppState): Notice | null {
   if (!snapshot.tags.some((tag) => tag.at)) {
     return { id: 'no-pins', title: S.emptyNoPins, hint: S.emptyNoPinsHint };
   }
-  if (!snapshot.tags.some((tag) => tag.at && tag.readings.get(view.sensor) != null)) {
-    const label = shown(sensorNamed(view.sensor).label, 32);
+  if (!snapshot.tags.some((tag) => tag.at && tag.readings.get(state.view.sensor) != null)) {
+    const label = shown(sensorNamed(state.view.sensor).label, 32);
     return { id: 'no-reading', title: S.emptyNoReading(label), hint: S.emptyNoReadingHint };
   }
-  if (twin.field.state === 'failed') {
-    return { id: 'field-failed', title: S.fieldFailed(shown(twin.field.message, 160)) };
+  if (field.state === 'failed') {
+    return { id: 'field-failed', title: S.fieldFailed(shown(field.message, 160)) };
   }
-  if (!twin.map.value && (!connection.status?.has_map || twin.map.state === 'failed')) {
+  if (!map.value && (!connection.status?.has_map || map.state === 'failed')) {
     return { id: 'no-map', title: S.emptyNoMap };
   }
   return null;
@@ -66,7 +68,7 @@ export function Notices({ place }: { place: 'middle' | 'edge' }): JSX.Element | 
 
 /** In place of the rows of a table that has none. */
 export function EmptyTable(): JSX.Element | null {
-  const isEmpty = useApp((state) => !state.twin.snapshot?.tags.length);
+  const isEmpty = useApp((state) => selectTags(state).length === 0);
   const title = useApp((state) => noticeFor(state)?.title);
   const hint = useApp((state) => noticeFor(state)?.hint);
   if (!isEmpty) return null;

@@ -1,4 +1,4 @@
-import { useEffect, useState, type JSX } from 'react';
+import type { JSX } from 'react';
 
 import { valueAt } from '../domain/field';
 import { metresText, readingText } from '../domain/format';
@@ -7,12 +7,13 @@ import { lengthText, scaleBar } from '../geometry/scale';
 import { pointedAt } from '../map/pointer';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
+import { selectShown } from '../store/moment';
 import { S } from '../strings';
 
 /** The field's value at the point that mouse or crosshair is on. */
 export function Readout(): JSX.Element | null {
   const point = useSelected(pointedAt, (at) => at);
-  const field = useApp((state) => state.twin.field.value);
+  const field = useApp((state) => selectShown(state).field.value);
   const name = useApp((state) => state.view.sensor);
   const unit = useApp((state) => state.settings.unit);
   if (!point) return null;
@@ -30,17 +31,7 @@ const LONGEST_BAR_PX = 110;
 
 /** A round length and how long it is on the map. */
 export function ScaleBar(): JSX.Element {
-  const [scale, setScale] = useState(50);
-  useEffect(() => {
-    const map = document.getElementById('map-view');
-    const onView = (event: Event): void => {
-      setScale((event as CustomEvent<{ scale: number }>).detail.scale);
-    };
-    map?.addEventListener('mapview', onView);
-    return () => {
-      map?.removeEventListener('mapview', onView);
-    };
-  }, []);
+  const scale = useApp((state) => state.viewport.view.scale);
   const bar = scaleBar(scale, LONGEST_BAR_PX);
   const length = lengthText(bar.metres);
   return (

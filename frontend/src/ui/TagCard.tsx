@@ -10,6 +10,7 @@ import type { TagHistory } from '../contract/types';
 import { commandMap } from '../map/commands';
 import { act, useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
+import { selectTag } from '../store/moment';
 import { S } from '../strings';
 import { HealthMark } from './HealthMark';
 import { Icon } from './Icon';
@@ -19,7 +20,7 @@ import { useHistory } from './useHistory';
 
 /** Everything about one tag, over the map. */
 export function TagCard({ tagId }: { tagId: string }): JSX.Element {
-  const tag = useApp((state) => state.twin.snapshot?.tags.find(({ id }) => id === tagId));
+  const tag = useApp((state) => selectTag(state, tagId));
   const health = useApp((state) => selectHealth(state).byTag.get(tagId));
   const unit = useApp((state) => state.settings.unit);
   const history = useHistory(tagId, tag?.observation);

@@ -7,6 +7,8 @@ import type { Sensor } from '../domain/sensors';
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';
 import type { TemperatureUnit } from '../domain/units';
+import { useApp } from '../store/app';
+import { selectShown } from '../store/moment';
 import { S } from '../strings';
 import { HealthMark } from './HealthMark';
 import { Icon } from './Icon';
@@ -107,8 +109,9 @@ export function Age({
   observedAt: number | null;
   format?: (seconds: number) => string;
 }): JSX.Element {
+  const ageing = useApp((state) => selectShown(state).ageing);
   const text = useTicking((now) => {
-    const age = ageSeconds(observedAt, now);
+    const age = ageSeconds(observedAt, now, ageing);
     return age === null ? null : format(age);
   });
   return text === null ? (

@@ -1,40 +1,25 @@
-import {
-  memo,
-  useMemo,
-  type CSSProperties,
-  type JSX,
-  type ReactNode,
-  type SyntheticEvent,
-} from 'react';
+import { memo, type CSSProperties, type JSX, type ReactNode, type SyntheticEvent } from 'react';
 
 import { rgbText, sensorColour } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
-import { filterRows, rowsOf, sortRows } from '../domain/table';
 import { shown } from '../domain/text';
 import { unitOf } from '../domain/units';
 import { act, store, useApp } from '../store/app';
-import { selectHealth, selectSensors } from '../store/derived';
+import { selectRows, selectSensors } from '../store/derived';
+import { selectTags } from '../store/moment';
 import { S } from '../strings';
 import { Icon } from './Icon';
 import { TagRow } from './TagRow';
 
 /** Every tag, also those without a pin and those whose scan failed. */
 export function TagTable(): JSX.Element {
-  const snapshot = useApp((state) => state.twin.snapshot);
-  const health = useApp(selectHealth);
   const sensors = useApp(selectSensors);
   const chosen = useApp((state) => state.view.sensor);
   const selected = useApp((state) => state.view.selected);
   const hovered = useApp((state) => state.view.hovered);
-  const sort = useApp((state) => state.view.sort);
-  const filter = useApp((state) => state.view.filter);
-  const status = useApp((state) => state.view.health);
   const unit = useApp((state) => state.settings.unit);
-
-  const rows = useMemo(
-    () => sortRows(filterRows(rowsOf(snapshot?.tags ?? [], health), filter, status), sort),
-    [snapshot, health, filter, status, sort],
-  );
+  const rows = useApp(selectRows);
+  const hasTags = useApp((state) => selectTags(state).length > 0);
   const columns = 6 + sensors.length;
   return (
     // Keyboard and screen reader use the button in each row; for the pointer the whole row is
@@ -97,7 +82,7 @@ export function TagTable(): JSX.Element {
             hovered={row.tag.id === hovered}
           />
         ))}
-        {rows.length === 0 && snapshot && snapshot.tags.length > 0 && (
+        {rows.length === 0 && hasTags && (
           <tr className="no-match">
             <td colSpan={columns}>
               {S.nothingMatches}{' '}

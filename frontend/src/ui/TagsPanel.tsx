@@ -1,9 +1,9 @@
 import type { JSX } from 'react';
 
 import { saveTable } from '../export/actions';
-import { filterRows, rowsOf } from '../domain/table';
 import { act, useApp } from '../store/app';
-import { selectHealth } from '../store/derived';
+import { selectRows } from '../store/derived';
+import { selectTags } from '../store/moment';
 import { S } from '../strings';
 import { AttentionList } from './AttentionList';
 import { HealthSummary } from './HealthSummary';
@@ -37,16 +37,8 @@ export function TagsPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
 function FilterBar(): JSX.Element {
   const filter = useApp((state) => state.view.filter);
   const status = useApp((state) => state.view.health);
-  const all = useApp((state) => state.twin.snapshot?.tags.length ?? 0);
-  const count = useApp((state) =>
-    state.twin.snapshot
-      ? filterRows(
-          rowsOf(state.twin.snapshot.tags, selectHealth(state)),
-          state.view.filter,
-          state.view.health,
-        ).length
-      : 0,
-  );
+  const all = useApp((state) => selectTags(state).length);
+  const count = useApp((state) => selectRows(state).length);
   return (
     <div className="filter-bar">
       <label className="search">

@@ -1,8 +1,7 @@
 /** Single keys that work anywhere in the page, unless somebody is typing. */
-import { filterRows, rowsOf, sortRows } from '../domain/table';
 import { commandMap } from '../map/commands';
 import { act, prefer, store } from '../store/app';
-import { selectHealth, selectSensors } from '../store/derived';
+import { selectRows, selectSensors } from '../store/derived';
 import { isDark } from '../store/theme';
 import { openHelp } from './HelpDialog';
 import { FILTER_ID } from './TagsPanel';
@@ -86,13 +85,9 @@ function runKey(key: string): boolean {
 /** The tag after or before the chosen one, in the table's order. */
 function stepTag(by: 1 | -1): void {
   const state = store.get();
-  const { view, twin } = state;
-  const rows = sortRows(
-    filterRows(rowsOf(twin.snapshot?.tags ?? [], selectHealth(state)), view.filter, view.health),
-    view.sort,
-  );
+  const rows = selectRows(state);
   if (rows.length === 0) return;
-  const index = rows.findIndex(({ tag }) => tag.id === view.selected);
+  const index = rows.findIndex(({ tag }) => tag.id === state.view.selected);
   const next = index < 0 ? (by > 0 ? 0 : rows.length - 1) : index + by;
   const tag = rows[(next + rows.length) % rows.length]?.tag;
   if (!tag) return;

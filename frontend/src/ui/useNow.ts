@@ -1,15 +1,21 @@
 import { useSyncExternalStore } from 'react';
 
-let now = performance.now();
+import { now } from '../clock';
+
+let ticked = now();
 let timer: ReturnType<typeof setInterval> | undefined;
 const listeners = new Set<() => void>();
 
 function subscribe(listener: () => void): () => void {
   listeners.add(listener);
-  timer ??= setInterval(() => {
-    now = performance.now();
-    for (const each of [...listeners]) each();
-  }, 1_000);
+  if (timer === undefined) {
+    // Nobody has looked for a while.
+    ticked = now();
+    timer = setInterval(() => {
+      ticked = now();
+      for (const each of [...listeners]) each();
+    }, 1_000);
+  }
   return () => {
     listeners.delete(listener);
     if (listeners.size > 0) return;
@@ -20,15 +26,10 @@ function subscribe(listener: () => void): () => void {
 
 /** The monotonic clock in ms, ticking once a second for everyone at the same moment. */
 export function useNow(): number {
-  return useSyncExternalStore(subscribe, () => now);
+  return useSyncExternalStore(subscribe, () => ticked);
 }
 
 /** Something that follows from the time; renders when it changes, not with each tick. */
 export function useTicking<Part extends string | null>(part: (now: number) => Part): Part {
-  return useSyncExternalStore(subscribe, () => part(now));
-}
-
-/** Time of day, ms since the epoch, of a moment on the monotonic clock. */
-export function epochOf(moment: number): number {
-  return Date.now() - (performance.now() - moment);
+  return useSyncExternalStore(subscribe, () => part(ticked));
 }

@@ -1,0 +1,25 @@
+/** The same function, but the same arguments as last time give the same object back. */
+export function memoLast<Args extends readonly unknown[], Result>(
+  compute: (...args: Args) => Result,
+): (...args: Args) => Result {
+  let last: { readonly args: Args; readonly result: Result } | null = null;
+  return (...args) => {
+    const hit = last?.args.every((arg, index) => Object.is(arg, args[index]));
+    if (last && hit) return last.result;
+    const result = compute(...args);
+    last = { args, result };
+    return result;
+  };
+}
+
+/** The same for one object, and for each one that is still about: two states can be compared. */
+export function memoOne<Arg extends object, Result>(
+  compute: (arg: Arg) => Result,
+): (arg: Arg) => Result {
+  const results = new WeakMap<Arg, { readonly result: Result }>();
+  return (arg) => {
+    let known = results.get(arg);
+    if (!known) results.set(arg, (known = { result: compute(arg) }));
+    return known.result;
+  };
+}

@@ -1,0 +1,100 @@
+import { readdirSync, readFileSync } from 'node:fs';
+import { join } from 'node:path';
+
+import { beforeEach, describe, expect, test } from 'vitest';
+
+import { ageSeconds } from '../domain/age';
+import { snapshotOf } from '../domain/twin';
+import { showTags } from '../testing/page';
+import { readings, stateFrame, wireTag } from '../testing/tags';
+import { act, receive, store } from './app';
+import { selectHealth, selectRange, selectRows, selectSensors } from './derived';
+import { selectShown, selectTag, selectTags, shownAt } from './moment';
+import { NO_HOUSE, NO_TWIN, type House } from './twin';
+
+const then = (): House => ({
+  ...NO_HOUSE,
+  snapshot: snapshotOf(
+    stateFrame([
+      wireTag({ tag_id: 'old', readings: readings({ temperature: 40, ph: 6 }), stale_seconds: 30 }),
+    ]),
+    1_000,
+    null,
+  ),
+});
+
+beforeEach(() => {
+  showTags([wireTag({ tag_id: 'new', readings: readings({ temperature: 20 }) })]);
+  receive({ type: 'past', past: { at: 77, house: then() } });
+});
+
+describe('another moment', () => {
+  test('changes all that is selected, and the way back too', () => {
+    const look = (): unknown => {
+      const state = store.get();
+      return {
+        tags: selectTags(state).map(({ id }) => id),
+        rows: selectRows(state).map(({ tag }) => tag.id),
+        health: selectHealth(state).worst?.tagId,
+        sensors: selectSensors(state).some(({ name }) => name === 'ph'),
+        range: selectRange(state),
+        isThere: selectTag(state, 'old') !== undefined,
+      };
+    };
+    const now = look();
+    expect(now).toMatchObject({ tags: ['new'], rows: ['new'], health: 'new', isThere: false });
+    act({ type: 'look', view: { moment: 77 } });
+    expect(look()).toEqual({
+      tags: ['old'],
+      rows: ['old'],
+      health: 'old',
+      sensors: true,
+      range: { low: 40, high: 40 },
+      isThere: true,
+    });
+    act({ type: 'look', view: { moment: null } });
+    expect(look()).toEqual(now);
+  });
+
+  test('has ages of its own, which do not go on', () => {
+    const shown = shownAt(store.get().twin, 77);
+    const [tag] = shown.snapshot?.tags ?? [];
+    expect(ageSeconds(tag?.observedAt ?? null, 1_000, shown.ageing)).toBe(30);
+    expect(ageSeconds(tag?.observedAt ?? null, 999_000, shown.ageing)).toBe(30);
+  });
+
+  test('that is not here yet shows nothing, not another one', () => {
+    expect(shownAt(store.get().twin, 78)).toMatchObject(NO_HOUSE);
+    expect(shownAt(NO_TWIN, null)).toMatchObject(NO_HOUSE);
+  });
+
+  test('is the same object for the same data', () => {
+    const { twin } = store.get();
+    const now = shownAt(twin, null);
+    expect(shownAt(twin, 77)).toBe(shownAt(twin, 77));
+    expect(shownAt(twin, null)).toBe(now);
+    expect(selectShown(store.get())).toBe(now);
+  });
+});
+
+test('nobody else reads the houses of the store', () => {
+  const src = join(import.meta.dirname, '..');
+  const readers = readdirSync(src, { recursive: true, encoding: 'utf8' }).filter(
+    (name) =>
+      /\.tsx?$/.test(name) &&
+      !/\.test\.tsx?$/.test(name) &&
+      /\btwin\??\.(latest|past)\b/.test(readFileSync(join(src, name), 'utf8')),
+  );
+  expect(readers.map((name) => name.replaceAll('\\', '/'))).toEqual(['store/moment.ts']);
+});
+
+test('nobody asks a clock of the browser but the page’s own clock', () => {
+  const src = join(import.meta.dirname, '..');
+  const askers = readdirSync(src, { recursive: true, encoding: 'utf8' }).filter(
+    (name) =>
+      /\.tsx?$/.test(name) &&
+      !/\.test\.tsx?$|^testing/.test(name) &&
+      /\b(performance|Date)\.now\b/.test(readFileSync(join(src, name), 'utf8')),
+  );
+  expect(askers).toEqual(['clock.ts']);
+});

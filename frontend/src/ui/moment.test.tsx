@@ -1,0 +1,83 @@
+/** Given another moment, every part of the page shows that moment. */
+import { act as flush, render, screen } from '@testing-library/react';
+import { beforeEach, expect, test, vi } from 'vitest';
+
+import { LIGHT } from '../draw/palette';
+import { snapshotOf } from '../domain/twin';
+import { Painter } from '../map/painter';
+import { act, receive, store } from '../store/app';
+import { NO_HOUSE } from '../store/twin';
+import { showTags } from '../testing/page';
+import { readings, stateFrame, wireTag } from '../testing/tags';
+import { HealthSummary } from './HealthSummary';
+import { Legend } from './Legend';
+import { TagCard } from './TagCard';
+import { TagTable } from './TagTable';
+
+const tagWith = (temperature: number, stale: number, x: number): ReturnType<typeof wireTag> =>
+  wireTag({
+    tag_id: 'a',
+    readings: readings({ temperature }),
+    stale_seconds: stale,
+    pose: { position: { x, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } },
+  });
+
+beforeEach(() => {
+  vi.stubGlobal('fetch', () => Promise.reject(new Error('no server')));
+  showTags([tagWith(22, 5, 1)]);
+});
+
+/** Text without what a screen reader or a title adds. */
+const text = (testId: string): string => screen.getByTestId(testId).textContent;
+
+const go = (moment: number | null): void => {
+  flush(() => {
+    act({ type: 'look', view: { moment } });
+  });
+};
+
+test('table, card, legend, health and map are those of the moment', () => {
+  const painter = new Painter(
+    {
+      still: document.createElement('canvas'),
+      pins: document.createElement('canvas'),
+      overlay: document.createElement('canvas'),
+    },
+    LIGHT,
+  );
+  const then = stateFrame([tagWith(40, 7_200, 3)], { sec: 500 });
+  receive({
+    type: 'past',
+    past: { at: 500, house: { ...NO_HOUSE, snapshot: snapshotOf(then, 0, null) } },
+  });
+  const pin = (): unknown => {
+    const [first] = painter.scene(store.get(), performance.now()).pins;
+    return [first?.texts[0], first?.at.x, first?.strength];
+  };
+  render(
+    <>
+      <TagTable />
+      <TagCard tagId="a" />
+      <Legend kiosk={false} />
+      <HealthSummary kiosk={false} />
+    </>,
+  );
+  expect(text('tag-table')).toContain('22.0');
+  expect(text('tag-card')).toContain('22.0');
+  expect(text('range-high')).toContain('22.0');
+  expect(screen.getByTestId('house-health').dataset['health']).toBe('healthy');
+  expect(pin()).toEqual(['a · 22.0\u00a0°C', 1, 1]);
+
+  go(500);
+  for (const part of ['tag-table', 'tag-card', 'range-high']) {
+    expect(text(part)).toContain('40.0');
+    expect(text(part)).not.toContain('22.0');
+  }
+  expect(text('tag-table')).toContain('2\u00a0h');
+  expect(screen.getByTestId('house-health').dataset['health']).toBe('critical');
+  expect(pin()).toEqual(['a · 40.0\u00a0°C', 3, expect.closeTo(0.33, 1)]);
+
+  go(null);
+  expect(text('tag-table')).toContain('22.0');
+  expect(text('tag-card')).toContain('22.0');
+});

@@ -26,7 +26,8 @@ from lupin_twin.explored import explored_mask, occupancy_map  # noqa: E402
 from lupin_twin.field_cache import FieldCache  # noqa: E402
 from lupin_twin.field_quality import leave_one_out  # noqa: E402
 from lupin_twin.fields import FieldEngine, FieldJob, FieldRequest, FieldRules  # noqa: E402
-from lupin_twin.idw import FieldGrid, FieldSample, cell_centres, compute_idw_field  # noqa: E402
+from lupin_twin.grid import FieldGrid, cell_centres  # noqa: E402
+from lupin_twin.idw import FieldSample, compute_idw_field  # noqa: E402
 from lupin_twin.state import Observation, Pose, Reading, TagState, TwinStore  # noqa: E402
 from tests.oracle_idw import value_at  # noqa: E402
 

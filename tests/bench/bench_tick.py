@@ -14,7 +14,7 @@ from lupin_msgs.msg import TwinState
 from rclpy.context import Context
 
 from lupin_twin import convert
-from lupin_twin.node import latched
+from lupin_twin.habits import latched
 from lupin_twin.state import Flower, Pose, Reading, Snapshot, TagState
 from tests.support.domains import own_domain
 

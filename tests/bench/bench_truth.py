@@ -18,11 +18,12 @@ from lupin_patrol import messages
 from lupin_patrol.climate import Climate
 from lupin_patrol.events import FlowersSeen, PassCompleted, TagScanned, TagsDiscovered
 from lupin_patrol.mission import Mission
-from lupin_twin import convert
+from lupin_twin import convert, ingest
+from lupin_twin.drops import Drop
 from lupin_twin.field_cache import FieldCache
 from lupin_twin.field_quality import leave_one_out, painted_share
 from lupin_twin.fields import FieldEngine, FieldJob, FieldRequest
-from lupin_twin.idw import FieldGrid, cell_centres
+from lupin_twin.grid import FieldGrid, cell_centres
 from lupin_twin.node import field_rules
 from lupin_twin.parameters import TwinParameters
 from lupin_twin.state import TwinStore
@@ -39,9 +40,9 @@ def after_one_pass(day_speed: float) -> tuple[TwinStore, float]:
         stamp = Time(sec=int(event.at_s) + 1)
         if isinstance(event, TagScanned):
             time_of_day_s = event.time_of_day_s
-            store.record(convert.scan(messages.tag_reading(event, stamp, "map"), 10**18))
+            write(store, messages.tag_reading(event, stamp, "map"))
         elif isinstance(event, FlowersSeen):
-            store.record_flower(convert.flower_look(messages.flower(event, stamp, "map"), 10**18))
+            write(store, messages.flower(event, stamp, "map"))
         elif isinstance(event, TagsDiscovered):
             pin_all(store, messages.discovered_tags(event, stamp, "map"))
         elif isinstance(event, PassCompleted):
@@ -49,11 +50,16 @@ def after_one_pass(day_speed: float) -> tuple[TwinStore, float]:
     return store, time_of_day_s
 
 
+def write(store: TwinStore, msg: Any) -> None:
+    made = ingest.observation(convert.heard(msg), "map", 10**18)
+    assert not isinstance(made, Drop)
+    ingest.apply(made, store)
+
+
 def pin_all(store: TwinStore, msg: Any) -> None:
-    for tag in msg.tags:
-        pose = convert.discovered_pose(tag.pose_in_map)
-        if pose is not None:
-            store.pin(tag.tag_id, pose)
+    for pin in ingest.discoveries(convert.heard_tags(msg), "map", store.is_pinned):
+        assert not isinstance(pin, Drop)
+        ingest.apply(pin, store)
 
 
 def field_of(store: TwinStore, sensor: str) -> FieldGrid:

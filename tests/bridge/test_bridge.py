@@ -20,7 +20,7 @@ from lupin_bridge.settings import Settings
 from lupin_bridge.stream.hub import Client
 from lupin_bridge.twin.source import CacheCounts, Revised
 from lupin_twin.fields import FieldJob
-from lupin_twin.idw import FieldGrid
+from lupin_twin.grid import FieldGrid
 from lupin_twin.state import Snapshot, TagState
 from tests.bridge.stream.test_frames import received
 from tests.support.inprocess import Running, run, running

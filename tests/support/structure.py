@@ -29,19 +29,22 @@ ROS = frozenset(
 )
 # The modules that know ROS; all others have to run, and be tested, without it.
 KNOW_ROS = {
-    "lupin_twin": {"cli", "convert", "node", "ros_parameters", "spinning"},
+    "lupin_twin": {"cli", "convert", "habits", "node", "ros_parameters", "spinning"},
     "lupin_patrol": {"cli", "messages", "node"},
     "lupin_bridge": {"twin.ros_logs", "twin.ros_thread", "twin.web_node"},
 }
+# What the patrol may use of the twin: how a node behaves, and nothing of what a twin knows.
+SHARED_WITH_PATROL = {"lupin_twin.habits", "lupin_twin.spinning", "lupin_twin.stop_signals"}
 # What else a package may use, and in which modules: None is all of them. The bridge may use what
 # its own dependencies list.
 LIBRARIES: Mapping[str, Mapping[str, set[str] | None]] = {
     "lupin_twin": {
-        "numpy": {"idw", "explored", "field_quality", "fields", "convert"},
+        "numpy": {"grid", "idw", "explored", "field_quality", "fields", "convert"},
     },
     "lupin_patrol": {
         "numpy": {"exploration", "geometry", "perception", "route"},
         "greenhouse_sim": {"climate", "cli"},
+        "lupin_twin": {"cli", "node"},
     },
     "lupin_bridge": dict.fromkeys(
         (
@@ -64,29 +67,36 @@ LIBRARIES: Mapping[str, Mapping[str, set[str] | None]] = {
 ARROWS: Mapping[str, Mapping[str, set[str]]] = {
     "lupin_twin": {
         "state": set(),
-        "idw": set(),
+        "drops": set(),
+        "grid": set(),
+        "stop_signals": set(),
+        "idw": {"grid"},
         "parameters": set(),
         "throttle": set(),
         "twin_count": set(),
         "spinning": set(),
-        "explored": {"idw"},
-        "field_cache": {"idw"},
-        "field_quality": {"state", "idw"},
-        "fields": {"state", "idw", "explored", "field_cache"},
-        "convert": {"state", "idw", "explored", "fields"},
+        "explored": {"grid"},
+        "field_cache": {"grid"},
+        "field_quality": {"state", "grid", "idw"},
+        "fields": {"state", "grid", "idw", "explored", "field_cache"},
+        "ingest": {"drops", "state"},
+        "convert": {"state", "grid", "explored", "fields", "ingest"},
         "ros_parameters": {"parameters"},
+        "habits": {"drops", "ros_parameters", "throttle"},
         "node": {
             "convert",
             "explored",
+            "drops",
             "field_cache",
             "fields",
+            "habits",
+            "ingest",
             "parameters",
             "ros_parameters",
             "state",
-            "throttle",
             "twin_count",
         },
-        "cli": {"node", "parameters", "spinning"},
+        "cli": {"node", "parameters", "spinning", "stop_signals"},
     },
     "lupin_patrol": {
         "chance": set(),
@@ -180,6 +190,7 @@ PURE_LIBRARIES = frozenset({"PIL", "cbor2", "numpy", "orjson", "pydantic", "webs
 # A pure module that needs one thing more.
 PURE_EXCEPT: Mapping[str, set[str]] = {
     "lupin_twin.idw": {"sys"},  # float_info
+    "lupin_twin.stop_signals": {"signal"},  # which is what it is about
     # Values and errors of modules that do more than that.
     "lupin_bridge.access.credentials": {"lupin_bridge.settings.SettingError"},
     "lupin_bridge.field.formats": {

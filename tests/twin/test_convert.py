@@ -15,8 +15,9 @@ from lupin_msgs.msg import Observation as ObservationMsg
 from lupin_msgs.srv import GetField
 from rclpy.serialization import deserialize_message, serialize_message
 
-from lupin_twin import convert
-from lupin_twin.idw import FieldGrid
+from lupin_twin import convert, ingest
+from lupin_twin.grid import FieldGrid
+from lupin_twin.ingest import HeardLook, HeardReading
 from lupin_twin.state import (
     NANOSECONDS_PER_SECOND,
     Bloom,
@@ -79,87 +80,34 @@ def test_counts_saturate_at_the_messages_range() -> None:
     assert (msg.flower_count, msg.bug_count) == (65_535, 0)
 
 
-@pytest.mark.parametrize("w", [1.0, -0.5, 1e-17])
-def test_a_scans_pose_counts_with_any_w_but_zero(w: float) -> None:
-    pose = convert.scanned_pose(messages.pose(1.0, 2.0, w=w))
-    assert pose is not None
-    assert (pose.x, pose.qw) == (1.0, w)
+@pytest.mark.parametrize("w", [1.0, 0.0, math.nan])
+def test_a_pose_is_heard_as_it_was_sent(w: float) -> None:
+    heard = convert.pose_of(messages.pose(1.0, 2.0, w=w))
+    assert (heard.x, heard.y) == (1.0, 2.0)
+    assert repr(heard.qw) == repr(w)
 
 
-def test_a_scans_pose_with_w_zero_or_a_broken_number_is_none() -> None:
-    assert convert.scanned_pose(messages.pose(w=0.0)) is None
-    assert convert.scanned_pose(messages.pose(w=-0.0)) is None
-    for broken in (math.nan, math.inf):
-        assert convert.scanned_pose(messages.pose(broken)) is None
-        assert convert.scanned_pose(messages.pose(w=broken)) is None
-        assert convert.discovered_pose(messages.pose(0.0, broken)) is None
-        assert convert.discovered_pose(messages.pose(w=broken)) is None
-
-
-def test_a_discoverys_w_zero_is_taken_as_one() -> None:
-    for w, expected in ((0.0, 1.0), (-0.0, 1.0), (0.5, 0.5)):
-        pose = convert.discovered_pose(messages.pose(w=w))
-        assert pose is not None
-        assert pose.qw == expected
-
-
-@pytest.mark.parametrize("length", [1.0, 2.5])
-def test_a_discoverys_half_turn_stays_one_and_is_told_from_no_pose(length: float) -> None:
-    msg = messages.pose(1.0, 2.0)
-    msg.orientation = Quaternion(x=0.6 * length, y=0.0, z=-0.8 * length, w=0.0)
-    pose = convert.discovered_pose(msg)
-    assert pose is not None
-    assert (pose.qx, pose.qy, pose.qz) == pytest.approx((0.6, 0.0, -0.8), abs=1e-15)
-    assert 0.0 < pose.qw < 1e-8
-    published = convert.pose_message(pose)
-    assert (
-        convert.scanned_pose(deserialize_message(serialize_message(published), type(msg))) == pose
+def test_a_tag_reading_is_heard_field_by_field() -> None:
+    msg = messages.scan(
+        "1", {"co2": 1.0}, at=(1.0, 2.0), status=ObservationMsg.STATUS_SKIPPED, stamp_s=4.0
     )
-
-
-@pytest.mark.parametrize(
-    ("stamp_s", "now_s", "expected_s"),
-    [
-        (60.0, 100.0, 60.0),  # latched earlier: as old as it says
-        (100.0, 100.0, 100.0),
-        (130.0, 100.0, 100.0),  # from the future: no younger than now
-        (0.0, 100.0, 100.0),  # no stamp: now
-        (60.0, 0.0, 60.0),  # simulated time has not started
-        (0.0, 0.0, 1e-9),  # of neither: not 0, which stands for never
-    ],
-)
-def test_when_an_observation_was_made(stamp_s: float, now_s: float, expected_s: float) -> None:
-    header = messages.scan("1", stamp_s=stamp_s).header
-    assert convert.observed_at(header.stamp, round(now_s * S)) == round(expected_s * S)
-
-
-def test_a_scan_that_is_not_ok_has_no_pose() -> None:
-    ok = messages.scan("1", {"co2": 1.0}, at=(1.0, 2.0))
-    failed = messages.scan("1", {"co2": 1.0}, at=(1.0, 2.0), status=ObservationMsg.STATUS_SKIPPED)
-    assert convert.scan(ok, S).pose is not None
-    assert convert.scan(ok, S).succeeded
-    assert convert.scan(failed, S).pose is None
-    assert not convert.scan(failed, S).succeeded
-    assert convert.scan(failed, S).readings == (Reading("co2", 1.0),)
-
-
-def test_a_scan_without_a_stamp_was_made_when_its_sensors_were_read() -> None:
-    msg = messages.scan("1", {"co2": 1.0})
     msg.tag_reading.stamp.sec = 3
-    assert convert.scan(msg, 10 * S).stamp_ns == 3 * S
-    messages.set_stamp(msg.header, 4.0)
-    assert convert.scan(msg, 10 * S).stamp_ns == 4 * S
+    heard = convert.heard(msg)
+    assert (heard.kind, heard.status, heard.frame_id) == (0, 3, "map")
+    assert heard.stamp_ns == 4 * S
+    pose = Pose(1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    assert heard.part == HeardReading("1", 3 * S, (Reading("co2", 1.0),), pose)
 
 
-def test_a_look_carries_everything() -> None:
+def test_a_look_is_heard_field_by_field() -> None:
     msg = messages.look(
         "1", "rose", at=(1.0, 2.0), anomaly=True, flower_count=4, bug_count=2,
         blooms=[(0.5, 0.5)], footprint=[(0.0, 0.0), (1.0, 0.0)], stamp_s=3.0,
+        frame_id="odom", pose_frame_id="map",
     )  # fmt: skip
-    look = convert.flower_look(msg, 10 * S)
-    assert (look.tag_id, look.stamp_ns) == ("1", 3 * S)
-    assert look.pose is not None
-    assert look.flower == Flower(
+    heard = convert.heard(msg)
+    assert (heard.kind, heard.status, heard.frame_id, heard.stamp_ns) == (1, 0, "odom", 3 * S)
+    flower = Flower(
         species="rose",
         confidence=0.9,
         anomaly=True,
@@ -168,6 +116,29 @@ def test_a_look_carries_everything() -> None:
         blooms=(Bloom(0.5, 0.5, 0.0, 0.4, "rose", 0.8, anomaly=False),),
         footprint=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
     )
+    assert heard.part == HeardLook("1", "map", flower, Pose(1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0))
+
+
+@pytest.mark.parametrize("kind", [2, 77])
+def test_an_observation_of_another_kind_has_no_part(kind: int) -> None:
+    msg = messages.scan("1", {"co2": 1.0})
+    msg.kind = kind
+    assert convert.heard(msg).part is None
+
+
+def test_the_kinds_and_the_status_are_the_messages() -> None:
+    assert ingest.KIND_TAG_READING == ObservationMsg.KIND_TAG_READING
+    assert ingest.KIND_FLOWER == ObservationMsg.KIND_FLOWER
+    assert ingest.KIND_ANOMALY == ObservationMsg.KIND_ANOMALY
+    assert ingest.STATUS_OK == ObservationMsg.STATUS_OK
+
+
+def test_discovered_tags_are_heard_and_a_pose_is_made_when_it_is_asked_for() -> None:
+    heard = convert.heard_tags(
+        messages.discovered({"1": messages.pose(1.0), "2": messages.pose(2.0)})
+    )
+    assert (heard.frame_id, list(heard.tag_ids)) == ("map", ["1", "2"])
+    assert heard.pose(1) == Pose(2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 @given(st.floats(width=32))

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from lupin_twin.field_cache import MAX_ENTRIES, FieldCache, FieldKey
-from lupin_twin.idw import FieldGrid, compute_idw_field
+from lupin_twin.grid import FieldGrid
+from lupin_twin.idw import compute_idw_field
 
 
 def key(number: int, sensor_type: str = "temperature") -> FieldKey:

@@ -23,7 +23,7 @@ from lupin_twin.fields import (
     check_request,
     default_box,
 )
-from lupin_twin.idw import FieldGrid
+from lupin_twin.grid import FieldGrid
 from lupin_twin.state import MAX_TEXT_LENGTH, Observation, Pose, Reading, TwinStore
 
 MAX_CELLS = 1_000_000

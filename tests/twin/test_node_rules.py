@@ -35,7 +35,7 @@ class Stage:
     def __init__(self, node: TwinNode) -> None:
         self.node = node
         self.warnings: list[str] = []
-        node._warn = lambda key, text: self.warnings.append(text)  # type: ignore[method-assign]
+        node.habits.warn = lambda key, text: self.warnings.append(text)  # type: ignore[method-assign]
 
     def subscription(self, topic: str) -> Any:
         [found] = [s for s in self.node.subscriptions if s.topic_name == topic]

@@ -16,7 +16,7 @@ from PIL.PngImagePlugin import PngInfo
 from lupin_bridge.field.sensors import max_alpha, sensor
 from lupin_twin.field_quality import leave_one_out, painted_share
 from lupin_twin.fields import FieldRules
-from lupin_twin.idw import FieldGrid
+from lupin_twin.grid import FieldGrid
 from lupin_twin.state import TagState
 
 # Palette index 0 is "not known"; the ramp has the other 255.

@@ -12,7 +12,7 @@ from lupin_bridge.twin.ros_thread import RosThread
 from lupin_bridge.twin.source import CacheCounts, Revised, RevisedGrid, TwinNames, TwinTimeoutError
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldJob, FieldRequest, FieldRules
-from lupin_twin.idw import FieldGrid
+from lupin_twin.grid import FieldGrid
 from lupin_twin.node import TwinNode
 from lupin_twin.state import Observation
 

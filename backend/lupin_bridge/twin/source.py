@@ -9,7 +9,7 @@ from typing import Protocol
 
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRequest, FieldRules
-from lupin_twin.idw import FieldGrid
+from lupin_twin.grid import FieldGrid
 from lupin_twin.state import Observation, Snapshot
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-import traceback
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -16,19 +15,18 @@ from lupin_msgs.srv import GetField
 from nav_msgs.msg import OccupancyGrid
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
-from rclpy.serialization import deserialize_message
 
-from lupin_twin import convert
+from lupin_twin import convert, ingest
+from lupin_twin.drops import Drop, Reason
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRequest
-from lupin_twin.node import field_rules, latched
+from lupin_twin.habits import Habits
+from lupin_twin.node import field_rules
 from lupin_twin.ros_parameters import declare, naming, naming_use_sim_time
 from lupin_twin.state import Observation, Snapshot, TagState
-from lupin_twin.throttle import Throttle
 from lupin_twin.twin_count import TwinCount
 
 NODE_NAME: Final = "lupin_web"
-WARNING_PERIOD_S: Final = 5.0
 # DDS finds a twin's publisher and its service each on its own, one at times a little later.
 NEW_TWIN_S: Final = 2.0
 
@@ -76,9 +74,10 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def __init__(self, on_state: Callable[[Snapshot], None], *, context: Any = None) -> None:
         with naming_use_sim_time():
             super().__init__(NODE_NAME, context=context)
+        self.habits = Habits(self)
+        self.report = self.habits.report
         self.parameters = declare(self, SHARED_PARAMETERS)
         self.rules = field_rules(self.parameters)
-        self.callback_errors = 0
         self.twins = TwinCount()
         self.occupancy_map: OccupancyMap | None = None
         self.digest = ""
@@ -89,27 +88,32 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._history: dict[str, deque[Observation]] = {}
         self._digests: dict[str, tuple[TagState, bytes]] = {}
         self._topics: dict[str, str] = {}
-        self._throttle = Throttle(WARNING_PERIOD_S)
         group = MutuallyExclusiveCallbackGroup()
         p = self.parameters
         for parameter, message_type, max_bytes, callback in (
             ("state_topic", TwinState, MAX_STATE_BYTES, self._take_state),
             ("map_topic", OccupancyGrid, MAX_MAP_BYTES, self._take_map),
         ):
-            topic = getattr(p, parameter)
-            read = self._reader(parameter, message_type, max_bytes, callback)
-            with naming(parameter, topic):
-                subscription = self.create_subscription(
-                    message_type, topic, read, latched(1), callback_group=group, raw=True
-                )
-            # As ROS has resolved and remapped it: that is the name in its graph, and in warnings.
-            self._topics[parameter] = subscription.topic_name
+            self._topics[parameter] = self.habits.subscribe(
+                parameter,
+                getattr(p, parameter),
+                message_type,
+                depth=1,
+                max_bytes=max_bytes,
+                group=group,
+                callback=callback,
+            )
         with naming("field_service_name", p.field_service_name):
             self.field_client = self.create_client(
                 GetField, p.field_service_name, callback_group=group
             )
 
     # --- for the source, on this node's thread ------------------------------------------------
+
+    @property
+    def callback_errors(self) -> int:
+        """Errors met by callbacks so far."""
+        return self.habits.callback_errors
 
     @property
     def revision(self) -> str:
@@ -159,7 +163,7 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self.publishers_digest = publishers_digest
             self._publishers_since_s = time.monotonic()
         if self.twins.see(int(self.count_publishers(topic)), time.monotonic()):
-            self._say(
+            self.habits.warn(
                 ("twins", 0),
                 f"{self.twins.value} nodes publish {topic}: what is shown is a mixture; "
                 "stop all twins but one, or give them ROS domains of their own",
@@ -168,16 +172,14 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _take_map(self, msg: Any) -> None:
         # Kept, and told with the next state: a map is no sign of life of the twin.
-        frame_id, expected = msg.header.frame_id, self.parameters.frame_id
-        if frame_id not in ("", expected):
-            self._say(
-                ("frame", 0), f"dropped a map: its frame is {frame_id[:64]!r}, not {expected!r}"
-            )
+        topic = self._topics["map_topic"]
+        if dropped := ingest.wrong_frame(msg.header.frame_id, self.parameters.frame_id):
+            self.habits.drop(dropped, topic)
             return
         try:
             new = convert.map_of(msg, 0)
         except ValueError as error:
-            self._say(("map", 0), f"dropped a map: {error}; the last one stays")
+            self.habits.drop(Drop(Reason.MAP, f"{error}; the last one stays", "a map"), topic)
             return
         if self.occupancy_map is None or not new.shows_the_same_as(self.occupancy_map):
             self.occupancy_map = replace(new, revision=_digest_of_map(new))
@@ -222,39 +224,3 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 self._digests[tag.tag_id] = kept
             total.update(kept[1])
         return total.hexdigest()
-
-    def _reader(
-        self, parameter: str, message_type: Any, max_bytes: int, callback: Callable[[Any], None]
-    ) -> Callable[[bytes], None]:
-        def read(data: bytes) -> None:
-            topic = self._topics[parameter]
-            if len(data) > max_bytes:
-                self._say(
-                    ("size", topic),
-                    f"dropped a message on {topic}: {len(data)} bytes, the limit is {max_bytes}",
-                )
-                return
-            try:
-                message = deserialize_message(data, message_type)
-            except Exception as error:  # noqa: BLE001  # rclpy raises several kinds
-                self._say(
-                    ("unreadable", topic), f"dropped an unreadable message on {topic}: {error}"
-                )
-                return
-            try:
-                callback(message)
-            except Exception as error:  # noqa: BLE001  # one bad message must not end the node
-                self.report(topic, error)
-
-        return read
-
-    def report(self, what: str, error: Exception) -> None:
-        """Count and log an error of a callback, with its trace, throttled."""
-        self.callback_errors += 1
-        if self._throttle.ask(("error", what), time.monotonic()) is not None:
-            trace = "".join(traceback.format_exception(error))
-            self.get_logger().error(f"error number {self.callback_errors}, in {what}:\n{trace}")
-
-    def _say(self, key: tuple[str, object], text: str) -> None:
-        if self._throttle.ask(key, time.monotonic()) is not None:
-            self.get_logger().warning(text)

@@ -10,6 +10,8 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import NoReturn
 
+from lupin_twin import stop_signals
+
 _PR_SET_PDEATHSIG = 1
 
 SPEED_LIMITS = (0.1, 50.0)
@@ -62,9 +64,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 def main() -> int:
     """Run the node until it is stopped or done; returns the exit code."""
-    # First of all, before anything slow is imported and before ROS starts its threads: Ctrl-C
-    # and SIGTERM wait until the node asks for them, so neither can end in a traceback.
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    stop_signals.block()  # before anything slow is imported
     from greenhouse_sim.simulator import GreenhouseSimulator  # noqa: PLC0415  # see above
     from rclpy.utilities import remove_ros_args  # noqa: PLC0415
 

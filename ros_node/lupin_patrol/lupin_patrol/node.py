@@ -1,15 +1,14 @@
 """The ROS node: plays a mission's events on the topics of DESIGN.md.
 
 Stamps are ROS time (`use_sim_time` included); the pace is the process's steady clock. Signals are
-waited for in a thread, never handled asynchronously: whoever calls `play` has blocked STOP_SIGNALS
-before the first other thread was started.
+waited for in a thread, never handled asynchronously: whoever calls `play` has blocked them before
+the first other thread was started.
 """
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from threading import Event as Flag
 from threading import Thread
 from time import monotonic
@@ -24,9 +23,8 @@ from rclpy.exceptions import (
     InvalidParameterTypeException,
     InvalidTopicNameException,
 )
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
 from lupin_patrol.events import (
@@ -39,8 +37,9 @@ from lupin_patrol.events import (
     TagsDiscovered,
 )
 from lupin_patrol.messages import discovered_tags, flower, occupancy_grid, tag_reading
-
-STOP_SIGNALS = {signal.SIGINT, signal.SIGTERM}
+from lupin_twin import stop_signals
+from lupin_twin.habits import Habits, latched
+from lupin_twin.spinning import end_spinning, spin_until_shutdown
 
 # The contract's depth. One pass makes more observations than that (two for each of 29 tags), so a
 # twin that starts late misses the oldest ones; the next pass brings them.
@@ -66,6 +65,7 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
             super().__init__("lupin_patrol")
         except InvalidParameterTypeException as error:
             raise ParameterError(f"parameter use_sim_time is no bool: {error}") from error
+        self.habits = Habits(self)
         self._frame_id = self._name("frame_id", "map")
         self.observations = self._latched(
             Observation, "observations_topic", "/floranova/observations", OBSERVATIONS_DEPTH
@@ -107,14 +107,8 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _latched(self, message: type[Any], parameter: str, default: str, depth: int) -> Any:
         topic = self._name(parameter, default)
-        profile = QoSProfile(
-            history=HistoryPolicy.KEEP_LAST,
-            depth=depth,
-            reliability=ReliabilityPolicy.RELIABLE,
-            durability=DurabilityPolicy.TRANSIENT_LOCAL,
-        )
         try:
-            return self.create_publisher(message, topic, profile)
+            return self.create_publisher(message, topic, latched(depth))
         except InvalidTopicNameException as error:
             reason = str(error).partition("\n")[0].rstrip(":")
             raise ParameterError(f"parameter {parameter} is {topic!r}: {reason}") from error
@@ -161,33 +155,24 @@ def _running_node(ros_arguments: list[str]) -> Iterator[PatrolNode]:
     try:
         node = PatrolNode()
         executor.add_node(node)
-        thread = Thread(target=_spin, args=(executor,), name="ros")
+        thread = Thread(target=spin_until_shutdown, args=(executor, node.habits.report), name="ros")
         thread.start()
         try:
             yield node
         finally:
-            # In its own thread: it takes apart what a spin that is about to wait still needs.
-            executor.create_task(executor.shutdown)
+            end_spinning(executor)
             thread.join()
             node.destroy_node()
     finally:
         rclpy.try_shutdown()
 
 
-def _spin(executor: SingleThreadedExecutor) -> None:
-    with suppress(ExternalShutdownException):
-        executor.spin()
-
-
 def _stop_flag() -> Flag:
-    """A flag that a stop signal sets.
-
-    Not sigtimedwait: after a SIGSTOP and a SIGCONT, CPython returns from it without a signal.
-    """
+    """A flag that a stop signal sets."""
     flag = Flag()
 
     def wait() -> None:
-        signal.sigwait(STOP_SIGNALS)
+        stop_signals.wait()
         flag.set()
 
     Thread(target=wait, name="signals", daemon=True).start()

@@ -7,15 +7,14 @@ import sys
 from collections.abc import Sequence
 from threading import Event, Thread, main_thread
 
-STOP_SIGNALS = {signal.SIGINT, signal.SIGTERM}
+from lupin_twin import stop_signals
+
 USAGE_ERROR = 2
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the twin until a signal ends it; returns the exit code, 1 if its thread has died."""
-    # First of all, before anything slow is imported and before ROS starts its threads: Ctrl-C
-    # and SIGTERM wait until they are asked for, so neither can end in a traceback.
-    signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
+    stop_signals.block()  # before anything slow is imported
     import rclpy  # noqa: PLC0415  # see above
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
 
@@ -46,15 +45,14 @@ def _run() -> int:
 
     def spin() -> None:
         try:
-            spin_until_shutdown(executor, node.report)
+            spin_until_shutdown(executor, node.habits.report)
         finally:
             ended.set()
             signal.pthread_kill(main_thread().ident or 0, signal.SIGTERM)  # it waits, see below
 
     thread = Thread(target=spin, name="ros")
     thread.start()
-    # Not sigtimedwait: after a SIGSTOP and a SIGCONT, CPython returns from it without a signal.
-    signal.sigwait(STOP_SIGNALS)
+    stop_signals.wait()
     exit_code = 1 if ended.is_set() else 0
     end_spinning(executor)
     thread.join()

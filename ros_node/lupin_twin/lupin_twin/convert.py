@@ -1,9 +1,8 @@
 """Messages to dataclasses and back: the only module that knows both.
 
-Everything that comes in is copied into immutable values of `state`, everything that goes out is
-a fresh message (or, for the state, one that is kept per tag and rebuilt only when the tag has
-changed). No rule of ingestion lives here; the choice of what counts as a pose does, because only
-the messages have a quaternion whose `w` may be 0.
+Everything that comes in is copied into immutable values, everything that goes out is a fresh
+message (or, for the state, one that is kept per tag and rebuilt only when the tag has changed). No
+rule lives here: what was heard becomes plain values, and `ingest` says what counts.
 
 Numbers go into messages as plain Python `float` and `int`: rclpy does not check fields by default
 and would serialise a NumPy scalar as garbage.
@@ -14,7 +13,6 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -27,13 +25,20 @@ from std_msgs.msg import Header
 
 from lupin_twin.explored import OccupancyMap, occupancy_map
 from lupin_twin.fields import FieldRequest
-from lupin_twin.idw import FieldGrid
+from lupin_twin.grid import FieldGrid
+from lupin_twin.ingest import (
+    KIND_FLOWER,
+    KIND_TAG_READING,
+    Heard,
+    HeardLook,
+    HeardReading,
+    HeardTags,
+    scanned_pose,
+)
 from lupin_twin.state import (
     NANOSECONDS_PER_SECOND,
     Bloom,
     Flower,
-    FlowerObservation,
-    Observation,
     Pose,
     Reading,
     Snapshot,
@@ -41,8 +46,6 @@ from lupin_twin.state import (
 )
 
 UINT16_MAX: Final = 65_535
-# The `w` of half a turn, which is 0, kept apart from the 0 that stands for no pose.
-HALF_TURN_W: Final = 1e-9
 INT32_MAX: Final = 2_147_483_647
 
 
@@ -58,20 +61,6 @@ def time_msg(stamp_ns: int) -> Time:
     """Nanoseconds of ROS time as builtin_interfaces/Time; held to the message's range."""
     sec, nanosec = divmod(max(0, stamp_ns), NANOSECONDS_PER_SECOND)
     return Time(sec=min(sec, INT32_MAX), nanosec=nanosec)
-
-
-def observed_at(stamp: Any, now_ns: int) -> int:
-    """When an observation was made: its own stamp, or now where it has none or is ahead of now.
-
-    An observation that was latched before the twin started is as old as it says, not as young as
-    its arrival. A stamp from the future (a robot's clock that runs ahead) cannot be older than
-    now. While simulated time has not started (now is 0), the stamp is all there is; without one it
-    was at the first moment of that time, for 0 stands for never.
-    """
-    stamp_ns = nanoseconds(stamp)
-    if stamp_ns > 0 and (stamp_ns <= now_ns or now_ns == 0):
-        return stamp_ns
-    return max(now_ns, 1)
 
 
 # --- numbers --------------------------------------------------------------------------------
@@ -92,36 +81,8 @@ def _saturated(value: int) -> int:
 # --- what comes in --------------------------------------------------------------------------
 
 
-def scanned_pose(pose: Any) -> Pose | None:
-    """The pose of a scan; None where `orientation.w` is 0 or any coordinate is not finite."""
-    result = _pose(pose, qw=float(pose.orientation.w))
-    return result if result.qw != 0.0 and result.is_finite else None
-
-
-def discovered_pose(pose: Any) -> Pose | None:
-    """The pose of a discovery; None where a coordinate is not finite.
-
-    `w == 0` is taken as 1 where nothing else of the orientation is set. Where something is, it is
-    half a turn; published as it is it would mean "no pose", so its `w` becomes the next to nothing
-    that can be told from 0, and the pose is 2e-9 rad from what was said.
-    """
-    w = float(pose.orientation.w)
-    result = _pose(pose, qw=w or 1.0)
-    if not result.is_finite:
-        return None
-    length = math.hypot(result.qx, result.qy, result.qz)
-    if w or not length:
-        return result
-    return replace(
-        result,
-        qx=result.qx / length,
-        qy=result.qy / length,
-        qz=result.qz / length,
-        qw=HALF_TURN_W,
-    )
-
-
-def _pose(pose: Any, qw: float) -> Pose:
+def pose_of(pose: Any) -> Pose:
+    """geometry_msgs/Pose as it was sent: what of it counts is for `ingest` to say."""
     position, orientation = pose.position, pose.orientation
     return Pose(
         x=float(position.x),
@@ -130,48 +91,48 @@ def _pose(pose: Any, qw: float) -> Pose:
         qx=float(orientation.x),
         qy=float(orientation.y),
         qz=float(orientation.z),
-        qw=qw,
+        qw=float(orientation.w),
     )
 
 
-def scan(msg: Any, now_ns: int) -> Observation:
-    """A tag reading out of lupin_msgs/Observation; the pose counts only when the status is OK.
-
-    Without a stamp in the header it was made when the sensors were read.
-    """
-    succeeded = msg.status == msg.STATUS_OK
-    stamp = msg.header.stamp if nanoseconds(msg.header.stamp) else msg.tag_reading.stamp
-    return Observation(
-        tag_id=msg.tag_reading.tag_id,
-        stamp_ns=observed_at(stamp, now_ns),
-        readings=tuple(
-            Reading(reading.name, float(reading.value)) for reading in msg.tag_reading.readings
-        ),
-        pose=scanned_pose(msg.tag_pose_in_map) if succeeded else None,
-        succeeded=succeeded,
+def heard(msg: Any) -> Heard:
+    """lupin_msgs/Observation as values, with the part that its kind fills."""
+    return Heard(
+        kind=int(msg.kind),
+        status=int(msg.status),
+        frame_id=msg.header.frame_id,
+        stamp_ns=nanoseconds(msg.header.stamp),
+        part=_part(msg),
     )
 
 
-def failed_look(msg: Any, now_ns: int) -> Observation:
-    """A flower observation whose status is not OK: the tag was tried, and nothing was learnt.
+def _part(msg: Any) -> HeardReading | HeardLook | None:
+    if msg.kind == KIND_TAG_READING:
+        reading = msg.tag_reading
+        return HeardReading(
+            tag_id=reading.tag_id,
+            stamp_ns=nanoseconds(reading.stamp),
+            readings=tuple(Reading(r.name, float(r.value)) for r in reading.readings),
+            pose=pose_of(msg.tag_pose_in_map),
+        )
+    if msg.kind == KIND_FLOWER:
+        look = msg.flower
+        return HeardLook(
+            tag_id=look.tag_id,
+            frame_id=look.pose.header.frame_id,
+            flower=_flower(look, shortest(look.confidence)),
+            pose=pose_of(look.pose.pose),
+        )
+    return None
 
-    Its payload holds defaults, not a result; taken as one it would clear a pest unseen.
-    """
-    return Observation(
-        tag_id=msg.flower.tag_id,
-        stamp_ns=observed_at(msg.header.stamp, now_ns),
-        succeeded=False,
-    )
 
-
-def flower_look(msg: Any, now_ns: int) -> FlowerObservation:
-    """A flower observation out of lupin_msgs/Observation."""
-    flower = msg.flower
-    return FlowerObservation(
-        tag_id=flower.tag_id,
-        stamp_ns=observed_at(msg.header.stamp, now_ns),
-        flower=_flower(flower, shortest(flower.confidence)),
-        pose=scanned_pose(flower.pose.pose),
+def heard_tags(msg: Any) -> HeardTags:
+    """lupin_msgs/DiscoveredTags as values."""
+    tags = msg.tags
+    return HeardTags(
+        frame_id=msg.header.frame_id,
+        tag_ids=[tag.tag_id for tag in tags],
+        pose=lambda index: pose_of(tags[index].pose_in_map),
     )
 
 
@@ -261,7 +222,7 @@ def _tag_state(tag: Any) -> TagState:
     never_observed = not math.isfinite(tag.stale_seconds)
     return TagState(
         tag_id=tag.tag_id,
-        pose=scanned_pose(tag.pose),
+        pose=scanned_pose(pose_of(tag.pose)),
         readings=tuple(Reading(reading.name, float(reading.value)) for reading in tag.readings),
         last_observed_ns=None if never_observed else nanoseconds(tag.last_observed),
         flower=_flower(tag, shortest(tag.species_confidence)),

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from lupin_twin.idw import BoolArray, FloatArray, cell_centres
+from lupin_twin.grid import BoolArray, FloatArray, cell_centres
 
 # A site of 350 m by 350 m at 5 cm. The bound keeps memory finite when a producer is broken.
 MAX_MAP_CELLS: Final = 50_000_000

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from typing import Final, NamedTuple
 
-from lupin_twin.idw import FieldGrid
+from lupin_twin.grid import FieldGrid
 
 MAX_ENTRIES: Final = 64
 

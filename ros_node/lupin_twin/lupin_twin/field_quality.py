@@ -17,7 +17,8 @@ from typing import Final
 
 import numpy as np
 
-from lupin_twin.idw import FieldGrid, FloatArray, IndexArray, PairwiseIdw, sample_columns
+from lupin_twin.grid import FieldGrid, FloatArray
+from lupin_twin.idw import IndexArray, PairwiseIdw, sample_columns
 from lupin_twin.state import TagState, samples_of
 
 # Pairs of tags that are looked at together; bounds the memory, whatever the number of tags.

@@ -14,7 +14,8 @@ import numpy as np
 
 from lupin_twin.explored import OccupancyMap, explored_mask
 from lupin_twin.field_cache import FieldCache, FieldKey
-from lupin_twin.idw import FieldGrid, compute_idw_field, grid_dimensions
+from lupin_twin.grid import FieldGrid, grid_dimensions
+from lupin_twin.idw import compute_idw_field
 from lupin_twin.state import MAX_TEXT_LENGTH, TwinStore
 
 # The revision of a map that has not come yet; a real one is never negative.

@@ -18,7 +18,7 @@ from lupin_bridge.field import formats as field_formats
 from lupin_bridge.field.formats import FORMATS, JSON, NPY, PNG
 from lupin_bridge.field.sensors import sensor
 from lupin_bridge.stream import schema
-from lupin_twin.idw import FieldGrid
+from lupin_twin.grid import FieldGrid
 
 TEMPERATURE_RGB = sensor("temperature").rgb
 ALPHA_MAX = 153  # 60 % of 255

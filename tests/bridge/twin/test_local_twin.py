@@ -14,7 +14,7 @@ import pytest
 from lupin_bridge.twin.local_twin import LocalTwin
 from lupin_bridge.twin.source import Revised, TwinTimeoutError
 from lupin_twin.fields import FieldJob, FieldRefused, FieldRequest
-from lupin_twin.idw import FieldGrid
+from lupin_twin.grid import FieldGrid
 from lupin_twin.parameters import ParameterError
 from lupin_twin.state import Observation, Pose, Reading
 from tests.support.inprocess import run

@@ -225,10 +225,10 @@ def test_a_map_that_cannot_be_used_leaves_the_last_one(
     peer.publish_map(occupancy_grid([[0, 100]]))
     good = stage.first_map()
     said: list[str] = []
-    monkeypatch.setattr(stage.node, "_say", lambda _key, text: said.append(text))
+    monkeypatch.setattr(stage.node.habits, "warn", lambda _key, text: said.append(text))
     peer.publish_map(bad)
     stage.until(lambda: said, "the refusal")
-    assert said[0].startswith("dropped a map: ")
+    assert " on /map: " in said[0]
     assert stage.node.occupancy_map is good
     peer.publish_map(occupancy_grid([[0, 0, 0]]))
     stage.until(lambda: stage.node.occupancy_map is not good, "the next good map")

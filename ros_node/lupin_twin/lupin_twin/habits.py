@@ -1,0 +1,122 @@
+"""What every node of the project does alike: latched QoS, guarded callbacks, throttled warnings.
+
+Also how a message is read: raw, so that its size is checked before it becomes objects, and one
+that cannot be read is told of with its topic.
+"""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Callable
+from typing import Any, Final
+
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+
+from lupin_twin.drops import Drop, Reason
+from lupin_twin.ros_parameters import naming
+from lupin_twin.throttle import Throttle
+
+WARNING_PERIOD_S: Final = 5.0
+
+
+def latched(depth: int) -> QoSProfile:
+    """RELIABLE and TRANSIENT_LOCAL: who comes late still gets the last `depth` messages.
+
+    Fixed, never inferred from the graph: a profile chosen before the other side is there misses
+    what the other side has latched.
+    """
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    )
+
+
+def read_message(data: bytes, message_type: Any, max_bytes: int) -> Any | Drop:
+    """The message that `data` holds, serialised; a drop, where it is too large or none."""
+    if len(data) > max_bytes:
+        return Drop(Reason.SIZE, f"{len(data)} bytes, the limit is {max_bytes}")
+    try:
+        return deserialize_message(data, message_type)
+    except Exception as error:  # noqa: BLE001  # rclpy raises several kinds
+        return Drop(Reason.UNREADABLE, str(error), "an unreadable message")
+
+
+class Habits:
+    """What one node says and counts; belongs to its thread."""
+
+    def __init__(self, node: Node) -> None:
+        self.callback_errors = 0
+        self._node = node
+        self._throttle = Throttle(WARNING_PERIOD_S)
+
+    def subscribe(
+        self,
+        parameter: str,
+        topic: str,
+        message_type: Any,
+        *,
+        depth: int,
+        max_bytes: int,
+        group: Any,
+        callback: Callable[[Any], None],
+    ) -> str:
+        """Have `callback(message)` called, guarded, for each message on a latched topic.
+
+        `parameter` is what gave the name. Returns the topic as ROS has resolved and remapped it:
+        that is the name in its graph, and in warnings. What weighs more than `max_bytes` serialised
+        is dropped before a single Python object is made of it.
+
+        Raises:
+            lupin_twin.parameters.ParameterError: a name that ROS does not take.
+
+        """
+
+        def take(data: bytes) -> None:
+            name = str(subscription.topic_name)
+            message = read_message(data, message_type, max_bytes)
+            if isinstance(message, Drop):
+                self.drop(message, name)
+            else:
+                self.guarded(name, callback)(message)
+
+        with naming(parameter, topic):
+            subscription = self._node.create_subscription(
+                message_type, topic, take, latched(depth), callback_group=group, raw=True
+            )
+        return str(subscription.topic_name)
+
+    def drop(self, drop: Drop, topic: str) -> None:
+        """Tell of something that was dropped."""
+        self.warn((drop.reason, (topic, drop.case)), drop.on(topic))
+
+    def warn(self, key: tuple[str, object], text: str) -> None:
+        """Log a warning, at most one a period for each key, and how many were held back."""
+        held_back = self._throttle.ask(key, time.monotonic())
+        if held_back is not None:
+            more = f" ({held_back} more since the last warning)" if held_back else ""
+            self._node.get_logger().warning(text + more)
+
+    def guarded(self, what: str, callback: Callable[..., None]) -> Callable[..., None]:
+        """`callback`, whose errors are reported: one bad message must not end the node."""
+
+        def run(*args: Any) -> None:
+            try:
+                callback(*args)
+            except Exception as error:  # noqa: BLE001  # see above
+                self.report(what, error)
+
+        return run
+
+    def report(self, what: str, error: Exception) -> None:
+        """Count and log an error of a callback, with its trace, throttled."""
+        self.callback_errors += 1
+        if self._throttle.ask(("error", what), time.monotonic()) is not None:
+            trace = "".join(traceback.format_exception(error))
+            self._node.get_logger().error(
+                f"error number {self.callback_errors}, in {what}:\n{trace}"
+            )

@@ -1,0 +1,119 @@
+"""What every node does alike, by a node of its own in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import rclpy
+from lupin_msgs.msg import Observation
+from rclpy.context import Context
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
+from rclpy.serialization import serialize_message
+
+from lupin_twin.drops import Drop, Reason
+from lupin_twin.habits import WARNING_PERIOD_S, Habits, latched, read_message
+from tests.support.messages import scan
+
+
+class Logged:
+    """Stands in for a node's logger and for the clock that throttles it."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.now_s = 100.0
+
+    def warning(self, text: str) -> None:
+        self.lines.append(text)
+
+    error = warning
+
+
+@pytest.fixture
+def logged(monkeypatch: pytest.MonkeyPatch) -> Logged:
+    made = Logged()
+    monkeypatch.setattr("lupin_twin.habits.time.monotonic", lambda: made.now_s)
+    return made
+
+
+@pytest.fixture
+def habits(domain: int, logged: Logged) -> Iterator[Habits]:
+    context = Context()
+    rclpy.init(args=[], context=context, domain_id=domain)
+    node = rclpy.create_node("habits", context=context)
+    node.get_logger = lambda: logged
+    yield Habits(node)
+    node.destroy_node()
+    rclpy.try_shutdown(context=context)
+
+
+def test_latched_is_reliable_transient_local_and_keeps_the_last() -> None:
+    profile = latched(7)
+    assert profile.history == HistoryPolicy.KEEP_LAST
+    assert profile.depth == 7
+    assert profile.reliability == ReliabilityPolicy.RELIABLE
+    assert profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+
+
+def test_a_message_is_read_up_to_its_limit_and_dropped_past_it() -> None:
+    data = serialize_message(scan("1", {"co2": 1.0}))
+    read: Any = read_message(data, Observation, len(data))
+    assert read.tag_reading.tag_id == "1"
+    drop = read_message(data, Observation, len(data) - 1)
+    assert drop == Drop(Reason.SIZE, f"{len(data)} bytes, the limit is {len(data) - 1}")
+
+
+def test_what_cannot_be_read_is_a_drop() -> None:
+    drop = read_message(serialize_message(scan("1", {"co2": 1.0}))[:50], Observation, 1_000)
+    assert isinstance(drop, Drop)
+    assert drop.reason is Reason.UNREADABLE
+
+
+def test_a_subscription_hands_on_messages_and_tells_of_the_others(
+    habits: Habits, logged: Logged
+) -> None:
+    taken: list[Any] = []
+    topic = habits.subscribe(
+        "observations_topic",
+        "some/observations",
+        Observation,
+        depth=3,
+        max_bytes=1_000,
+        group=None,
+        callback=taken.append,
+    )
+    assert topic == "/some/observations"
+    [subscription] = [s for s in habits._node.subscriptions if s.topic_name == topic]
+    subscription.callback(serialize_message(scan("1")))
+    subscription.callback(bytes(1_001))
+    assert [msg.tag_reading.tag_id for msg in taken] == ["1"]
+    assert logged.lines == [
+        "dropped a message on /some/observations: 1001 bytes, the limit is 1000"
+    ]
+
+
+def test_warnings_are_throttled_by_their_key_and_counted(habits: Habits, logged: Logged) -> None:
+    for _ in range(3):
+        habits.drop(Drop(Reason.FRAME, "no"), "/t")
+    habits.drop(Drop(Reason.KIND, "no", case="2"), "/t")
+    habits.drop(Drop(Reason.KIND, "no", case="9"), "/t")
+    logged.now_s += WARNING_PERIOD_S
+    habits.drop(Drop(Reason.FRAME, "no"), "/t")
+    said = "dropped a message on /t: no"
+    assert logged.lines == [said, said, said, f"{said} (2 more since the last warning)"]
+
+
+def test_an_error_of_a_callback_is_counted_and_told_with_its_trace(
+    habits: Habits, logged: Logged
+) -> None:
+    def fail() -> None:
+        raise ValueError("broken")
+
+    guarded = habits.guarded("the test", fail)
+    guarded()
+    guarded()
+    assert habits.callback_errors == 2
+    [line] = logged.lines
+    assert line.startswith("error number 1, in the test:\n")
+    assert "ValueError: broken" in line

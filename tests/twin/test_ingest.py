@@ -1,0 +1,191 @@
+"""The rules of ingestion, one by one: plain values in, a write or a drop out."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from lupin_twin import ingest
+from lupin_twin.convert import pose_message, pose_of
+from lupin_twin.drops import Drop, Reason
+from lupin_twin.ingest import Heard, HeardLook, HeardReading, HeardTags, Pin
+from lupin_twin.state import (
+    MAX_TEXT_LENGTH,
+    Flower,
+    FlowerObservation,
+    Observation,
+    Pose,
+    Reading,
+    TwinStore,
+)
+from tests.support.store import S, at
+
+NOW_NS = 100 * S
+SKIPPED = 3
+READINGS = (Reading("co2", 1.0),)
+
+
+def heard_reading(tag_id: str = "1", pose: Pose | None = None, **changes: object) -> Heard:
+    part = HeardReading(tag_id, 3 * S, READINGS, pose or at(1.0, 2.0))
+    return replace(Heard(0, 0, "map", 4 * S, part), **changes)  # type: ignore[arg-type]
+
+
+def heard_look(tag_id: str = "1", frame_id: str = "", **changes: object) -> Heard:
+    part = HeardLook(tag_id, frame_id, Flower("rose", 0.9), at(1.0, 2.0))
+    return replace(Heard(1, 0, "map", 4 * S, part), **changes)  # type: ignore[arg-type]
+
+
+def reason_of(heard: Heard) -> Reason | None:
+    write = ingest.observation(heard, "map", NOW_NS)
+    return write.reason if isinstance(write, Drop) else None
+
+
+# --- observations -------------------------------------------------------------------------------
+
+
+def test_a_tag_reading_is_a_scan_with_its_pose_and_stamp() -> None:
+    assert ingest.observation(heard_reading(), "map", NOW_NS) == Observation(
+        "1", 4 * S, READINGS, at(1.0, 2.0)
+    )
+
+
+def test_a_scan_without_a_stamp_was_made_when_its_sensors_were_read() -> None:
+    write = ingest.observation(heard_reading(stamp_ns=0), "map", NOW_NS)
+    assert isinstance(write, Observation)
+    assert write.stamp_ns == 3 * S
+
+
+def test_a_scan_that_is_not_ok_keeps_its_readings_and_loses_its_pose() -> None:
+    assert ingest.observation(heard_reading(status=SKIPPED), "map", NOW_NS) == Observation(
+        "1", 4 * S, READINGS, None, succeeded=False
+    )
+
+
+def test_a_look_is_what_the_camera_made_of_it() -> None:
+    assert ingest.observation(heard_look(), "map", NOW_NS) == FlowerObservation(
+        "1", 4 * S, Flower("rose", 0.9), at(1.0, 2.0)
+    )
+
+
+def test_a_look_that_is_not_ok_is_a_failed_try_and_its_payload_nothing() -> None:
+    assert ingest.observation(heard_look(status=SKIPPED), "map", NOW_NS) == Observation(
+        "1", 4 * S, succeeded=False
+    )
+
+
+@pytest.mark.parametrize(("kind", "name"), [(2, "KIND_ANOMALY"), (77, "an unknown kind")])
+def test_other_kinds_are_dropped_by_their_name(kind: int, name: str) -> None:
+    drop = ingest.observation(Heard(kind, 0, "map", S, None), "map", NOW_NS)
+    assert isinstance(drop, Drop)
+    assert drop.reason is Reason.KIND
+    assert drop.on("/t") == f"dropped an observation on /t: kind {kind} ({name}) is not a tag's"
+
+
+def test_a_frame_is_the_expected_one_or_empty_and_a_looks_own_comes_first() -> None:
+    assert reason_of(heard_reading(frame_id="")) is None
+    assert reason_of(heard_reading(frame_id="odom")) is Reason.FRAME
+    assert reason_of(heard_look(frame_id="odom")) is Reason.FRAME
+    assert reason_of(heard_look("1", "map", status=0)) is None
+    assert reason_of(replace(heard_look("1", "map"), frame_id="odom")) is None
+    assert reason_of(replace(heard_look(), frame_id="odom")) is Reason.FRAME
+
+
+def test_the_frame_is_looked_at_before_the_tag_id() -> None:
+    assert reason_of(heard_reading("", frame_id="odom")) is Reason.FRAME
+    assert reason_of(heard_reading("")) is Reason.TAG_ID
+    assert reason_of(heard_look("")) is Reason.TAG_ID
+
+
+@pytest.mark.parametrize(
+    ("stamp_s", "now_s", "expected_s"),
+    [
+        (60.0, 100.0, 60.0),  # latched earlier: as old as it says
+        (100.0, 100.0, 100.0),
+        (130.0, 100.0, 100.0),  # from the future: no younger than now
+        (0.0, 100.0, 100.0),  # no stamp: now
+        (60.0, 0.0, 60.0),  # simulated time has not started
+        (0.0, 0.0, 1e-9),  # of neither: not 0, which stands for never
+    ],
+)
+def test_when_an_observation_was_made(stamp_s: float, now_s: float, expected_s: float) -> None:
+    assert ingest.observed_at(round(stamp_s * S), round(now_s * S)) == round(expected_s * S)
+
+
+# --- poses --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("w", [1.0, -0.5, 1e-17])
+def test_a_scans_pose_counts_with_any_w_but_zero(w: float) -> None:
+    pose = replace(at(1.0, 2.0), qw=w)
+    assert ingest.scanned_pose(pose) == pose
+
+
+def test_a_scans_pose_with_w_zero_or_a_broken_number_is_none() -> None:
+    assert ingest.scanned_pose(replace(at(0.0), qw=0.0)) is None
+    assert ingest.scanned_pose(replace(at(0.0), qw=-0.0)) is None
+    for broken in (math.nan, math.inf):
+        assert ingest.scanned_pose(at(broken)) is None
+        assert ingest.scanned_pose(replace(at(0.0), qw=broken)) is None
+        assert ingest.discovered_pose(at(0.0, broken)) is None
+        assert ingest.discovered_pose(replace(at(0.0), qw=broken)) is None
+
+
+def test_a_discoverys_w_zero_is_taken_as_one() -> None:
+    for w, expected in ((0.0, 1.0), (-0.0, 1.0), (0.5, 0.5)):
+        pose = ingest.discovered_pose(replace(at(0.0), qw=w))
+        assert pose is not None
+        assert pose.qw == expected
+
+
+@pytest.mark.parametrize("length", [1.0, 2.5])
+def test_a_discoverys_half_turn_stays_one_and_is_told_from_no_pose(length: float) -> None:
+    pose = ingest.discovered_pose(replace(at(1.0), qx=0.6 * length, qz=-0.8 * length, qw=0.0))
+    assert pose is not None
+    assert (pose.qx, pose.qy, pose.qz) == pytest.approx((0.6, 0.0, -0.8), abs=1e-15)
+    assert 0.0 < pose.qw < 1e-8
+    assert ingest.scanned_pose(pose_of(pose_message(pose))) == pose
+
+
+# --- discovered tags ----------------------------------------------------------------------------
+
+
+def test_a_discovery_pins_what_has_no_pose_yet_and_makes_no_other_pose() -> None:
+    asked = []
+
+    def pose(index: int) -> Pose:
+        asked.append(index)
+        return at(math.nan if index == 3 else index)
+
+    heard = HeardTags("map", ["a", "b", "", "broken"], pose)
+    made = list(ingest.discoveries(heard, "map", is_pinned=lambda tag_id: tag_id == "a"))
+    assert made[0] == Pin("b", at(1.0))
+    assert [drop.reason for drop in made[1:] if isinstance(drop, Drop)] == [
+        Reason.TAG_ID,
+        Reason.POSE,
+    ]
+    assert asked == [1, 3]
+
+
+def test_a_discovery_in_another_frame_is_dropped_once_whatever_it_holds() -> None:
+    heard = HeardTags("odom", ["a", ""], lambda _: at(0.0))
+    [drop] = ingest.discoveries(heard, "map", is_pinned=lambda _: False)
+    assert isinstance(drop, Drop)
+    assert drop.on("/t") == "dropped a message on /t: its frame is 'odom', expected 'map'"
+
+
+# --- writing ------------------------------------------------------------------------------------
+
+
+def test_what_is_written_is_in_the_store_and_what_it_refuses_is_a_drop() -> None:
+    store = TwinStore()
+    assert ingest.apply(Observation("1", S, READINGS), store) is None
+    assert ingest.apply(FlowerObservation("1", S, Flower("rose")), store) is None
+    assert ingest.apply(Pin("1", at(1.0)), store) is None
+    [tag] = store.snapshot(S, "map").tags
+    assert (tag.readings, tag.flower.species, tag.pose) == (READINGS, "rose", at(1.0))
+    drop = ingest.apply(Pin("x" * (MAX_TEXT_LENGTH + 1), at(1.0)), store)
+    assert drop is not None
+    assert drop.reason is Reason.REJECTED
+    assert f"the limit is {MAX_TEXT_LENGTH}" in drop.why

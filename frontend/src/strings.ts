@@ -52,6 +52,11 @@ export const S = {
   healthAllWell: 'Every judged reading lies within its ideal range',
   healthNothing: 'No reading with an ideal range yet',
   healthFilter: ', show only these tags',
+  /** Told to screen readers. */
+  tagChosen: (tag: string, health: string, row: number, rows: number): string =>
+    `Tag ${tag}, ${health}, ${row} of ${rows}`,
+  tagsCritical: (tags: readonly string[], more: number): string =>
+    `Critical now: ${tags.join('; ')}${more > 0 ? ` and ${more} more` : ''}`,
   attention: 'Needs attention',
   attentionNone: 'Nothing needs attention',
   below: 'below ideal',

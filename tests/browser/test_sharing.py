@@ -56,6 +56,48 @@ def test_a_link_shows_the_same_view_to_somebody_else(house: Bridge, open_page: O
     expect(theirs.page.get_by_role("checkbox", name="Tag pins")).to_be_checked()
 
 
+def test_a_link_keeps_filter_and_order_of_the_table(house: Bridge, open_page: OpenPage) -> None:
+    mine = open_page(house.url)
+    mine.expect_rows(*TAGS)
+    mine.page.get_by_role("searchbox").fill("lupin")
+    column = mine.page.get_by_role("columnheader", name="Tag").get_by_role("button")
+    column.click()  # from ascending to descending
+    mine.expect_rows("10", "1")
+    mine.page.get_by_test_id("house-health").get_by_role("button", name="Healthy").click()
+    mine.expect_rows("1")
+    wanted = {"filter": ["lupin"], "sort": ["-tag"], "health": ["healthy"]}
+    mine.expect(
+        lambda: parse_qs(urlsplit(mine.address()).fragment) == wanted, "the table in the address"
+    )
+    theirs = open_page(house.url, urlsplit(mine.address()).fragment)
+    theirs.expect_rows("1")
+    expect(theirs.page.get_by_role("searchbox")).to_have_value("lupin")
+    healthy = theirs.page.get_by_test_id("house-health").get_by_role("button", name="Healthy")
+    healthy.click()
+    theirs.expect_rows("10", "1")
+
+
+def test_back_closes_the_card_and_undoes_nothing_else(house: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(house.url)
+    hmi.expect_rows(*TAGS)
+    hmi.row("2").click()
+    expect(hmi.card("2")).to_be_visible()
+    hmi.row("3").click()
+    hmi.choose_sensor("Humidity")
+    hmi.expect(lambda: "tag=3" in hmi.address(), "the other tag in the address")
+    hmi.page.go_back()
+    expect(hmi.page.get_by_test_id("tag-card")).to_have_count(0)
+    expect(hmi.test_id("legend")).to_contain_text("Humidity %")
+    hmi.expect(lambda: hmi.address().endswith("#sensor=humidity"), "an address without a tag")
+    hmi.page.go_forward()
+    expect(hmi.card("3")).to_be_visible()
+    # One that is closed by hand leaves no step behind that does nothing.
+    hmi.page.keyboard.press("Escape")
+    hmi.expect(lambda: hmi.address().endswith("#sensor=humidity"), "an address without a tag")
+    hmi.page.go_back()
+    hmi.expect(lambda: hmi.address() == "about:blank", "what was there before the page")
+
+
 def test_a_link_to_a_tag_that_is_not_there_says_so(house: Bridge, open_page: OpenPage) -> None:
     hmi = open_page(house.url, "tag=nobody")
     hmi.expect_rows(*TAGS)

@@ -1,7 +1,7 @@
 import { describe, expect, test } from 'vitest';
 
 import { readings, tag } from '../testing/tags';
-import { deviation, houseHealth, sideOf, statusOf, tagHealth } from './health';
+import { deviation, houseHealth, newlyCritical, sideOf, statusOf, tagHealth } from './health';
 import { sensorNamed } from './sensors';
 
 const ideal = sensorNamed('temperature').ideal ?? [NaN, NaN];
@@ -93,4 +93,18 @@ test('of a tag’s equally bad sensors the first reported drives it', () => {
     const values = Object.fromEntries(names.map((name) => [name, 1e6]));
     expect(tagHealth(tag({ readings: readings(values) })).sensor).toBe(names[0]);
   }
+});
+
+test('newly critical is who was not critical before, or not there', () => {
+  const house = (temperatures: Record<string, number>): ReturnType<typeof houseHealth> =>
+    houseHealth(
+      Object.entries(temperatures).map(([tag_id, temperature]) =>
+        tag({ tag_id, readings: readings({ temperature }) }),
+      ),
+    );
+  const before = house({ 1: high + width, 2: low });
+  const now = house({ 1: high + width, 2: high + width, 3: high + width, 4: low });
+  expect(newlyCritical(before, now).map(({ tagId }) => tagId)).toEqual(['2', '3']);
+  expect(newlyCritical(now, before)).toEqual([]);
+  expect(newlyCritical(now, now)).toEqual([]);
 });

@@ -1,7 +1,9 @@
 import { sensorNamed } from './sensors';
 import type { Tag } from './twin';
 
-export type HealthStatus = 'healthy' | 'stressed' | 'critical' | 'no-data';
+/** From the worst to the best, and last what cannot be judged. */
+export const HEALTH_STATUSES = ['critical', 'stressed', 'healthy', 'no-data'] as const;
+export type HealthStatus = (typeof HEALTH_STATUSES)[number];
 
 /** Distance beyond which more makes no difference, in widths of the ideal range. */
 const MAX_DEVIATION = 2;
@@ -95,4 +97,12 @@ export function houseHealth(tags: readonly Tag[]): HouseHealth {
     if (worst?.deviation == null || health.deviation > worst.deviation) worst = health;
   }
   return { status: worst?.status ?? 'no-data', worst, counts, byTag };
+}
+
+/** Tags that are critical now and were not before; those of a tag that is new too. */
+export function newlyCritical(before: HouseHealth, now: HouseHealth): TagHealth[] {
+  if (now === before || now.counts.critical === 0) return [];
+  return [...now.byTag.values()].filter(
+    ({ tagId, status }) => status === 'critical' && before.byTag.get(tagId)?.status !== 'critical',
+  );
 }

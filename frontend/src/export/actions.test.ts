@@ -1,9 +1,11 @@
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
+import { onMapCommand } from '../map/commands';
 import { act, prefer } from '../store/app';
+import { FakeContext } from '../testing/canvas';
 import { showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
-import { copyLink, saveTable } from './actions';
+import { copyLink, saveMap, saveTable } from './actions';
 import { fileName } from './save';
 
 // Half an hour off the full one, and set before any module looks at the clock.
@@ -60,6 +62,37 @@ describe('table as a file', () => {
     saveTable();
     expect((await lines())[1]).toMatch(/^'=9/);
   });
+});
+
+test('a picture is taken of layers that are as on paper', async () => {
+  const layer = document.createElement('canvas');
+  layer.dataset['layer'] = 'still';
+  layer.width = layer.height = 10;
+  document.body.append(layer);
+  let result: HTMLCanvasElement | null = null;
+  vi.spyOn(HTMLCanvasElement.prototype, 'toBlob').mockImplementation(function (
+    this: HTMLCanvasElement,
+    tell: BlobCallback,
+  ) {
+    // eslint-disable-next-line @typescript-eslint/no-this-alias -- which one it was
+    result = this;
+    tell(new Blob(['png']));
+  });
+  const drawn = (): number => {
+    const canvas = result;
+    return canvas ? (FakeContext.recordOf(canvas)?.named('drawImage').length ?? 0) : 0;
+  };
+  await saveMap();
+  // Nobody draws a map here, so nothing was shown to take.
+  expect(drawn()).toBe(0);
+  const stop = onMapCommand((command) => {
+    if (command.type === 'picture') command.take();
+  });
+  await saveMap();
+  stop();
+  layer.remove();
+  expect(drawn()).toBe(1);
+  expect(names).toHaveLength(2);
 });
 
 test('a file’s name sorts by time and is legal everywhere', () => {

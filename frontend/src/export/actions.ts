@@ -7,6 +7,7 @@ import { tableCsv } from '../domain/table';
 import { shown } from '../domain/text';
 import { drawFooter, FOOTER_PX, type Footer } from '../draw/footer';
 import { contextOf, newCanvas } from '../draw/surface';
+import { commandMap } from '../map/commands';
 import { store } from '../store/app';
 import { selectRange, selectRows, selectSensors } from '../store/derived';
 import { selectSnapshot } from '../store/moment';
@@ -36,7 +37,12 @@ export async function saveMap(): Promise<void> {
   const style = getComputedStyle(document.documentElement);
   const canvas = newCanvas(first.width, first.height + FOOTER_PX * ratio);
   const context = contextOf(canvas);
-  for (const layer of layers) context.drawImage(layer, 0, 0);
+  commandMap({
+    type: 'picture',
+    take: () => {
+      for (const layer of layers) context.drawImage(layer, 0, 0);
+    },
+  });
 
   const sensor = sensorNamed(state.view.sensor);
   const range = selectRange(state);

@@ -5,7 +5,9 @@ export type MapCommand =
   /** Share of the view's size to move by; x to the right, y down. */
   | { readonly type: 'pan'; readonly x: number; readonly y: number }
   /** Brings a tag's pin into view. */
-  | { readonly type: 'show'; readonly tagId: string };
+  | { readonly type: 'show'; readonly tagId: string }
+  /** Shows the layers as on paper, without what moves or follows the pointer, while `take` runs. */
+  | { readonly type: 'picture'; readonly take: () => void };
 
 type Listener = (command: MapCommand) => void;
 

@@ -6,6 +6,7 @@ import { NOTHING } from '../store/twin';
 import { FakeContext } from '../testing/canvas';
 import { showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
+import { commandMap } from './commands';
 import { runMap } from './controller';
 import { pinUnderMouse, pointedAt } from './pointer';
 
@@ -119,6 +120,20 @@ describe('pulses', () => {
     start();
     observeAgain();
     expect(drawn('arc')).toBe(1);
+  });
+
+  test('a picture of the map has no ring, and the screen has it again behind it', () => {
+    start();
+    observeAgain();
+    let rings = -1;
+    const take = (): void => {
+      rings = drawn('arc') - 1;
+    };
+    commandMap({ type: 'picture', take });
+    expect(rings).toBe(0);
+    expect(drawn('arc')).toBe(1);
+    paint();
+    expect(drawn('arc')).toBe(2);
   });
 
   test('not for those who want less motion', () => {

@@ -42,6 +42,8 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
   let frame = 0;
   let pulses: readonly Pulse[] = [];
   let crosshair = false;
+  /** A picture of the map is being taken. */
+  let isTaken = false;
   let drawn = store.get();
   let lastField = selectShown(drawn).field.value;
 
@@ -77,9 +79,12 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
   };
 
   const paint = (): void => {
+    // It may be asked for before the frame that it was to have.
+    cancelAnimationFrame(frame);
     frame = 0;
     const live = store.get();
-    const state = isPrinting() ? { ...live, view: { ...live.view, hovered: null } } : live;
+    const onPaper = isPrinting() || isTaken;
+    const state = onPaper ? { ...live, view: { ...live.view, hovered: null } } : live;
     const { view } = live.viewport;
     const at = now();
     const parts = new Set(dirty);
@@ -93,9 +98,9 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
     if (parts.has('overlay') || parts.has('view')) {
       pulses = pulses.filter(({ since }) => at - since < PULSE_MS);
       painter.paintOverlay(state, view, {
-        pulses: isPrinting() ? [] : pulses,
+        pulses: onPaper ? [] : pulses,
         now: at,
-        crosshair: crosshair && !isPrinting(),
+        crosshair: crosshair && !onPaper,
       });
     }
     if (pulses.length > 0) spoil('overlay');
@@ -242,6 +247,14 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
         if (tag?.at) camera.show(tag.at, coveredBelow(element));
         break;
       }
+      case 'picture':
+        isTaken = true;
+        spoil('pins', 'overlay');
+        paint();
+        command.take();
+        isTaken = false;
+        spoil('pins', 'overlay');
+        break;
     }
   };
 

@@ -1,4 +1,4 @@
-import { afterEach, beforeEach, expect, test, vi } from 'vitest';
+import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { startAddress } from './address';
 import { act, store } from './app';
@@ -50,4 +50,74 @@ test('a wall screen chooses no tag, leaves its address alone, and comes back to 
   vi.advanceTimersByTime(1_000);
   expect(store.get().view.sensor).toBe('co2');
   expect(vi.getTimerCount()).toBe(0);
+});
+
+describe('a card is a step of the browser’s history', () => {
+  /** What the browser does with a step, in its own time. */
+  const travel = async (steps: number): Promise<void> => {
+    const arrived = new Promise((resolve) => {
+      window.addEventListener('popstate', resolve, { once: true });
+    });
+    history.go(steps);
+    await arrived;
+  };
+  const arrival = (): Promise<unknown> =>
+    new Promise((resolve) => {
+      window.addEventListener('popstate', resolve, { once: true });
+    });
+
+  beforeEach(() => {
+    // The history's steps are timers too.
+    vi.useRealTimers();
+    stop();
+    history.replaceState(null, '', '/#sensor=co2');
+    stop = startAddress();
+  });
+
+  test('Back closes it and undoes nothing else; Forward opens it again', async () => {
+    const length = history.length;
+    act({ type: 'select', tagId: '7' });
+    expect(location.hash).toBe('#sensor=co2&tag=7');
+    act({ type: 'select', tagId: '8' });
+    act({ type: 'sensor', sensor: 'light' });
+    await vi.waitFor(() => {
+      expect(location.hash).toBe('#sensor=light&tag=8');
+    });
+    expect(history.length).toBe(length + 1);
+    await travel(-1);
+    expect(store.get().view).toMatchObject({ selected: null, sensor: 'light' });
+    expect(location.hash).toBe('#sensor=light');
+    await travel(1);
+    expect(store.get().view).toMatchObject({ selected: '8', sensor: 'light' });
+  });
+
+  test('one that is closed by hand leaves no step that does nothing', async () => {
+    for (const tagId of ['7', '8']) {
+      act({ type: 'select', tagId });
+      const back = arrival();
+      act({ type: 'select', tagId: null });
+      await back;
+      expect(location.hash).toBe('#sensor=co2');
+      expect(history.state).toMatchObject({ tag: null });
+    }
+  });
+
+  test('one that is opened while the last is being left has its step', async () => {
+    act({ type: 'select', tagId: '7' });
+    const back = arrival();
+    act({ type: 'select', tagId: null });
+    act({ type: 'select', tagId: '8' });
+    await back;
+    expect(location.hash).toBe('#sensor=co2&tag=8');
+    await travel(-1);
+    expect(store.get().view.selected).toBeNull();
+  });
+
+  test('Back to a link before the last one follows it whole', async () => {
+    history.pushState(null, '', '#sensor=light&tag=3');
+    window.dispatchEvent(new HashChangeEvent('hashchange'));
+    expect(store.get().view).toMatchObject({ selected: '3', sensor: 'light' });
+    await travel(-1);
+    expect(store.get().view).toMatchObject({ selected: null, sensor: 'co2' });
+  });
 });

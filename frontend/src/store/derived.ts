@@ -1,18 +1,24 @@
 /** What follows from the state; each remembers its last answer, so that it is worked out once. */
-import { houseHealth } from '../domain/health';
+import { houseHealth, type HouseHealth } from '../domain/health';
 import { rangeOf, type Range } from '../domain/ramp';
 import { sensorsIn, type Sensor } from '../domain/sensors';
 import { filterRows, rowsOf, sortRows, type Row } from '../domain/table';
 import type { Tag } from '../domain/twin';
 import type { AppState } from './app';
 import { memoLast, memoOne } from './memo';
-import { selectShown, selectTags } from './moment';
+import { selectNewest, selectShown, selectTags } from './moment';
 import { fixedRange, type Sort, type ViewState } from './view';
 
 const healthOfTags = memoOne(houseHealth);
 
 export const selectHealth = (state: AppState): ReturnType<typeof houseHealth> =>
   healthOfTags(selectTags(state));
+
+/** As it is now, whatever moment is shown; null before anything has come. */
+export function selectNewestHealth(state: AppState): HouseHealth | null {
+  const { snapshot } = selectNewest(state);
+  return snapshot && healthOfTags(snapshot.tags);
+}
 
 const sensorNames = memoLast(
   // The names as one string: a new snapshot with the same sensors keeps the same list.

@@ -1,7 +1,7 @@
 import { describe, expect, test } from 'vitest';
 
 import { fromFragment, toFragment, type Linked } from './permalink';
-import { DEFAULT_LAYERS, DEFAULT_VIEW } from './view';
+import { DEFAULT_LAYERS, DEFAULT_VIEW, LONGEST_FILTER } from './view';
 
 describe('permalink', () => {
   test('a plain view needs no fragment', () => {
@@ -19,6 +19,9 @@ describe('permalink', () => {
         ['a,b=&c', { low: 400, high: 1200 }],
       ]),
       layers: new Set(['map', 'field', 'smooth', 'pins']),
+      sort: { column: 'soil_moisture', descending: true },
+      filter: 'basil & "pest"',
+      health: 'no-data',
     };
     expect(fromFragment(`#${toFragment(view)}`)).toEqual(view);
   });
@@ -47,6 +50,11 @@ describe('permalink', () => {
     'range.=1,9',
     'sensor=&tag=',
     'nonsense',
+    'sort=-',
+    'sort=',
+    'health=ill',
+    'health=',
+    'filter=',
   ])('%s is passed over', (fragment) => {
     expect(fromFragment(fragment)).toEqual({
       sensor: DEFAULT_VIEW.sensor,
@@ -54,7 +62,25 @@ describe('permalink', () => {
       camera: null,
       ranges: new Map(),
       layers: DEFAULT_LAYERS,
+      sort: DEFAULT_VIEW.sort,
+      filter: '',
+      health: null,
     });
+  });
+
+  test('what is as by default is left out of the table’s part too', () => {
+    const sort = { column: 'age', descending: false };
+    expect(toFragment({ ...DEFAULT_VIEW, sort, filter: 'a b', health: 'critical' })).toBe(
+      'sort=age&filter=a+b&health=critical',
+    );
+    const tag = { column: 'tag', descending: true };
+    expect(toFragment({ ...DEFAULT_VIEW, sort: tag })).toBe('sort=-tag');
+  });
+
+  test('a filter is as long as one can type', () => {
+    const text = 'x'.repeat(LONGEST_FILTER);
+    expect(fromFragment(`filter=${text}`).filter).toBe(text);
+    expect(fromFragment(`filter=${text}y`).filter).toBe(text);
   });
 
   test('an unknown layer is passed over', () => {

@@ -1,9 +1,21 @@
 /** The part of the view that a link carries, in the URL's fragment: it never reaches a server. */
+import { HEALTH_STATUSES } from '../domain/health';
 import type { Range } from '../domain/ramp';
 import type { Camera } from '../geometry/coordinates';
-import { DEFAULT_LAYERS, DEFAULT_VIEW, LAYERS, type Layer, type ViewState } from './view';
+import {
+  DEFAULT_LAYERS,
+  DEFAULT_VIEW,
+  LAYERS,
+  LONGEST_FILTER,
+  type Layer,
+  type Sort,
+  type ViewState,
+} from './view';
 
-export type Linked = Pick<ViewState, 'sensor' | 'selected' | 'layers' | 'ranges' | 'camera'>;
+export type Linked = Pick<
+  ViewState,
+  'sensor' | 'selected' | 'layers' | 'ranges' | 'camera' | 'sort' | 'filter' | 'health'
+>;
 
 /** The fragment, without "#"; what is as by default is left out. */
 export function toFragment(view: Linked): string {
@@ -20,6 +32,12 @@ export function toFragment(view: Linked): string {
   if (!sameLayers(view.layers, DEFAULT_LAYERS)) {
     parts.set('layers', LAYERS.filter((layer) => view.layers.has(layer)).join(','));
   }
+  const { column, descending } = view.sort;
+  if (column !== DEFAULT_VIEW.sort.column || descending) {
+    parts.set('sort', `${descending ? '-' : ''}${column}`);
+  }
+  if (view.filter !== '') parts.set('filter', view.filter);
+  if (view.health !== null) parts.set('health', view.health);
   return parts.toString().replaceAll('%2C', ',');
 }
 
@@ -34,7 +52,17 @@ export function fromFragment(fragment: string): Linked {
     camera: cameraOf(numbers(parts.get('view'), 3)),
     ranges: rangesOf(parts, sensor),
     layers: layers === null ? DEFAULT_LAYERS : new Set(layers.split(',').filter(isLayer)),
+    sort: sortOf(parts.get('sort')),
+    filter: (parts.get('filter') ?? '').slice(0, LONGEST_FILTER),
+    health: HEALTH_STATUSES.find((status) => status === parts.get('health')) ?? null,
   };
+}
+
+/** A column's name; a minus before it: descending. */
+function sortOf(text: string | null): Sort {
+  const descending = text?.startsWith('-') ?? false;
+  const column = descending ? text?.slice(1) : text;
+  return column ? { column, descending } : DEFAULT_VIEW.sort;
 }
 
 /** "range" is that of the sensor in view, "range.co2" that of another. */

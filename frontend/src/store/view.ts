@@ -16,6 +16,9 @@ export const LAYERS = [
 ] as const;
 export type Layer = (typeof LAYERS)[number];
 
+/** What the page takes for a filter of the table, characters. */
+export const LONGEST_FILTER = 200;
+
 export interface Sort {
   /** A column's id; a sensor's is its name. */
   readonly column: string;

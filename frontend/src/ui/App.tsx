@@ -5,6 +5,7 @@ import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';
 import { selectSnapshot } from '../store/moment';
 import { S } from '../strings';
+import { Announcer } from './Announcer';
 import { FrozenBanner } from './FrozenBanner';
 import { Header } from './Header';
 import { HelpDialog } from './HelpDialog';
@@ -60,6 +61,7 @@ export function App({ kiosk }: { kiosk: boolean }): JSX.Element {
       </main>
       {!kiosk && <PaneTabs />}
       <HelpDialog />
+      <Announcer />
       <div className="toast" role="status">
         {message}
       </div>

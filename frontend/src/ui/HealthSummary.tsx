@@ -1,7 +1,7 @@
 import type { JSX } from 'react';
 
 import { readingText, valueText } from '../domain/format';
-import type { HealthStatus, HouseHealth } from '../domain/health';
+import { HEALTH_STATUSES, type HouseHealth } from '../domain/health';
 import { sensorNamed } from '../domain/sensors';
 import { shown } from '../domain/text';
 import type { TemperatureUnit } from '../domain/units';
@@ -9,8 +9,6 @@ import { act, useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
 import { S } from '../strings';
 import { HealthMark, HealthShape } from './HealthMark';
-
-const ORDER: readonly HealthStatus[] = ['critical', 'stressed', 'healthy', 'no-data'];
 
 /** The house's state, what drives it, and how many tags are in which state. */
 export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
@@ -51,7 +49,7 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
         )}
       </div>
       <ul className="health-counts">
-        {ORDER.map((status) => (
+        {HEALTH_STATUSES.map((status) => (
           <li key={status}>
             <button
               type="button"

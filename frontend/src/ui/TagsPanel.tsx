@@ -4,6 +4,7 @@ import { saveTable } from '../export/actions';
 import { act, useApp } from '../store/app';
 import { selectRows } from '../store/derived';
 import { selectTags } from '../store/moment';
+import { LONGEST_FILTER } from '../store/view';
 import { S } from '../strings';
 import { AttentionList } from './AttentionList';
 import { HealthSummary } from './HealthSummary';
@@ -51,7 +52,7 @@ function FilterBar(): JSX.Element {
           placeholder={S.filterHint}
           autoComplete="off"
           spellCheck={false}
-          maxLength={200}
+          maxLength={LONGEST_FILTER}
           onChange={(event) => {
             act({ type: 'filter', text: event.target.value });
           }}

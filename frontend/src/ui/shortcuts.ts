@@ -1,8 +1,11 @@
 /** Single keys that work anywhere in the page, unless somebody is typing. */
+import { shown } from '../domain/text';
 import { commandMap } from '../map/commands';
 import { act, prefer, store } from '../store/app';
 import { selectRows, selectSensors } from '../store/derived';
 import { isDark } from '../store/theme';
+import { S } from '../strings';
+import { chosenTag } from './announce';
 import { openHelp } from './HelpDialog';
 import { FILTER_ID } from './TagsPanel';
 
@@ -89,7 +92,10 @@ function stepTag(by: 1 | -1): void {
   if (rows.length === 0) return;
   const index = rows.findIndex(({ tag }) => tag.id === state.view.selected);
   const next = index < 0 ? (by > 0 ? 0 : rows.length - 1) : index + by;
-  const tag = rows[(next + rows.length) % rows.length]?.tag;
-  if (!tag) return;
+  const at = (next + rows.length) % rows.length;
+  const row = rows[at];
+  if (!row) return;
+  const { tag, health } = row;
   act({ type: 'select', tagId: tag.id });
+  chosenTag.dispatch(S.tagChosen(shown(tag.id, 24), S.health[health.status], at + 1, rows.length));
 }

@@ -8,6 +8,7 @@ const here = (path: string): string => fileURLToPath(new URL(path, import.meta.u
 const BRIDGE = process.env['LUPIN_BRIDGE'] ?? 'http://127.0.0.1:8000';
 
 const RULES = [
+  'src/structure.test.ts',
   'src/{domain,geometry}/**/*.test.ts',
   'src/connection/{backoff,latest,machine}.test.ts',
   'src/contract/{frames,npy}.test.ts',

@@ -1,8 +1,4 @@
-/** Every word that the page shows, in one place. */
-import type { Phase } from './connection/machine';
-import type { HealthStatus } from './domain/health';
-import type { Layer } from './store/view';
-
+/** Every word that the page shows, in one place. It knows nobody: whoever looks a word up has it typed. */
 const counted = (count: number, one: string, many: string): string =>
   `${count} ${count === 1 ? one : many}`;
 
@@ -17,7 +13,7 @@ export const S = {
     stale: 'No signal',
     offline: 'Twin offline',
     reconnecting: 'Reconnecting',
-  } satisfies Record<Phase, string>,
+  },
   phaseLabel: 'Connection',
   retryNow: 'Try now',
   nextTry: (seconds: number): string => (seconds > 0 ? `next try in ${seconds} s` : 'trying now'),
@@ -29,7 +25,7 @@ export const S = {
     connecting: 'Waiting for the bridge to answer.',
     live: '',
     offline: 'The bridge answers, but the twin behind it does not.',
-  } satisfies Record<Phase, string>,
+  },
   offlineWhy: {
     live: '',
     never_seen: 'The bridge has not heard from any twin yet. Is it running in this ROS domain?',
@@ -43,7 +39,7 @@ export const S = {
     stressed: 'Stressed',
     critical: 'Critical',
     'no-data': 'No data',
-  } satisfies Record<HealthStatus, string>,
+  },
   healthHeading: 'House health',
   healthDriver: (tag: string, sensor: string, value: string, ideal: string): string =>
     `Tag ${tag}: ${sensor} ${value}, ${ideal}`,
@@ -81,7 +77,7 @@ export const S = {
     blooms: 'Blooms',
     pins: 'Tag pins',
     labels: 'Labels',
-  } satisfies Record<Layer, string>,
+  },
   scaleBar: (length: string): string => `Scale: ${length}`,
   notKnown: 'not known',
   position: (x: string, y: string): string => `x ${x} m, y ${y} m`,

@@ -4,9 +4,7 @@
  * A delta names the frame that it builds on. Frames of one connection come in order, so a delta
  * that builds on another frame than the last means that the two sides have lost each other.
  */
-import type { DeltaFrame, StateFrame, TwinTagState, WireTime } from '../contract/types';
-
-export type Latest = Omit<StateFrame, 'type'>;
+import type { DeltaFrame, Latest, StateFrame, TwinTagState, WireTime } from '../contract/types';
 
 /** The state after a frame; null where the frame does not build on what is there. */
 export function latestAfter(latest: Latest | null, frame: StateFrame | DeltaFrame): Latest | null {

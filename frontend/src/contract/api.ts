@@ -1,7 +1,6 @@
 /** The bridge's routes. Addresses are relative to the page, so any path prefix works. */
-import type { Field } from '../domain/field';
 import { parseNpy } from './npy';
-import type { FieldQuality, OccupancyGrid, TagHistory } from './types';
+import type { Field, FieldQuality, OccupancyGrid, TagHistory } from './types';
 
 /** A refusal by the server, with its reason. */
 export class Refusal extends Error {

@@ -13,3 +13,26 @@ export type FieldQuality = Schemas['FieldQuality'];
 export type TagHistory = Schemas['TagHistory'];
 export type WirePoint = Schemas['Point'];
 export type WireTime = Schemas['Time'];
+
+/** The newest state, put together from full frames and deltas. */
+export type Latest = Omit<StateFrame, 'type'>;
+
+/** A reconstructed field of one sensor. */
+export interface Field {
+  readonly sensor: string;
+  /** Cells. */
+  readonly width: number;
+  readonly height: number;
+  /** Lower left corner of cell (0, 0), metres in the map frame. */
+  readonly originX: number;
+  readonly originY: number;
+  /** Metres a cell. */
+  readonly resolution: number;
+  /** Over the known cells, in the sensor's unit; both 0 where there is none. */
+  readonly valueMin: number;
+  readonly valueMax: number;
+  /** Tags that contributed. */
+  readonly sampleCount: number;
+  /** Row-major, row 0 at the bottom (lowest y); not-a-number: not known. */
+  readonly values: Float32Array;
+}

@@ -1,5 +1,6 @@
 import { describe, expect, test } from 'vitest';
 
+import type { Field } from '../contract/types';
 import { mapPoint } from '../geometry/coordinates';
 import {
   fieldCorners,
@@ -8,7 +9,6 @@ import {
   resolutionFor,
   smoothDetail,
   valueAt,
-  type Field,
 } from './field';
 
 function field(rows: readonly (readonly number[])[]): Field {

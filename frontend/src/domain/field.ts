@@ -1,25 +1,6 @@
+import type { Field } from '../contract/types';
 import { mapPoint, type Bounds, type MapPoint } from '../geometry/coordinates';
 import { fieldAlpha, type Range, type Rgb } from './ramp';
-
-/** A reconstructed field of one sensor. */
-export interface Field {
-  readonly sensor: string;
-  /** Cells. */
-  readonly width: number;
-  readonly height: number;
-  /** Lower left corner of cell (0, 0), metres in the map frame. */
-  readonly originX: number;
-  readonly originY: number;
-  /** Metres a cell. */
-  readonly resolution: number;
-  /** Over the known cells, in the sensor's unit; both 0 where there is none. */
-  readonly valueMin: number;
-  readonly valueMax: number;
-  /** Tags that contributed. */
-  readonly sampleCount: number;
-  /** Row-major, row 0 at the bottom (lowest y); not-a-number: not known. */
-  readonly values: Float32Array;
-}
 
 /** The value of the cell that holds the point; null outside the grid and where it is not known. */
 export function valueAt(field: Field, point: MapPoint): number | null {

@@ -1,5 +1,4 @@
-import type { Latest } from '../connection/latest';
-import type { TwinTagState, WirePoint, WireTime } from '../contract/types';
+import type { Latest, TwinTagState, WirePoint, WireTime } from '../contract/types';
 import { mapPoint, type MapPoint } from '../geometry/coordinates';
 
 export interface Bloom {

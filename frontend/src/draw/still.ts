@@ -1,5 +1,5 @@
 /** What changes only with the data or the view: ground, SLAM map, heat map, grid, boxes. */
-import type { Field } from '../domain/field';
+import type { Field } from '../contract/types';
 import { mix, rgbText } from '../domain/ramp';
 import { canvasPoint, toCanvas, toMap, type MapPoint, type View } from '../geometry/coordinates';
 import { imageToCanvas, type Placement } from '../geometry/image';

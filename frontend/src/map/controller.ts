@@ -1,7 +1,8 @@
 /** Ties the map's canvases to the store: draws what changed, once a frame, and nothing else. */
 import { now } from '../clock';
 import { DARK, LIGHT } from '../draw/palette';
-import { fieldCorners, type Field } from '../domain/field';
+import type { Field } from '../contract/types';
+import { fieldCorners } from '../domain/field';
 import { PULSE_MS, type Pulse } from '../draw/overlay';
 import { pinRadius } from '../draw/pins';
 import type { Pin } from '../draw/scene';

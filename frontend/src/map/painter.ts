@@ -1,5 +1,6 @@
 import type { Ageing } from '../domain/age';
-import { fieldPixels, smoothDetail, type Field } from '../domain/field';
+import type { Field } from '../contract/types';
+import { fieldPixels, smoothDetail } from '../domain/field';
 import type { HouseHealth } from '../domain/health';
 import { sensorColour, type Range } from '../domain/ramp';
 import { sensorNamed } from '../domain/sensors';
@@ -40,7 +41,7 @@ import type { AppState } from '../store/app';
 import { selectHealth, selectRange } from '../store/derived';
 import { memoLast } from '../store/memo';
 import { selectShown, selectTags } from '../store/moment';
-import type { MapPicture } from './picture';
+import type { MapPicture } from '../store/picture';
 
 export interface Canvases {
   readonly still: HTMLCanvasElement;

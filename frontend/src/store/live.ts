@@ -1,9 +1,10 @@
 /** The page's one connection, and what its frames do to the store. */
 import { now } from '../clock';
-import { latestAfter, type Latest } from '../connection/latest';
+import { latestAfter } from '../connection/latest';
 import { signInIfAsked } from '../connection/session';
 import { connect } from '../connection/socket';
 import { stateSocketUrl } from '../contract/api';
+import type { Latest } from '../contract/types';
 import { receive } from './app';
 
 /**

@@ -1,10 +1,10 @@
 /** Fetches what the frames do not carry, whenever the twin's revision says that it changed. */
 import { fetchField, fetchQuality, Refusal } from '../contract/api';
-import type { FieldQuality } from '../contract/types';
-import { resolutionFor, type Field } from '../domain/field';
+import type { Field, FieldQuality } from '../contract/types';
+import { resolutionFor } from '../domain/field';
 import type { Snapshot } from '../domain/twin';
 import { boundsOf } from '../geometry/coordinates';
-import { loadMap, type MapPicture } from '../map/picture';
+import { loadMap, type MapPicture } from './picture';
 import { receive, store, type AppState } from './app';
 import { selectNewest } from './moment';
 import { createRefresher, type Task } from './refresher';

@@ -1,10 +1,8 @@
 /** What came from the server: the connection, the greenhouse, and what is fetched about it. */
-import type { FieldQuality, StatusFrame } from '../contract/types';
-import type { Latest } from '../connection/latest';
+import type { Field, FieldQuality, Latest, StatusFrame } from '../contract/types';
 import { INITIAL, phaseOf, type Connection, type Phase } from '../connection/machine';
-import type { Field } from '../domain/field';
 import { snapshotOf, type Snapshot } from '../domain/twin';
-import type { MapPicture } from '../map/picture';
+import type { MapPicture } from './picture';
 
 /** Something fetched beside the frames. While it is fetched again, the old value stays. */
 export interface Fetched<T> {

@@ -1,0 +1,86 @@
+/** One direction of imports, held by a table. What it does not name is not allowed. */
+import { readdirSync, readFileSync } from 'node:fs';
+import { join } from 'node:path';
+
+import { expect, test } from 'vitest';
+
+import { fileGraph, partOf, ringIn, wrongImports, type Table } from './testing/imports';
+
+/**
+ * From the lowest to the highest: each part may import from those that it names, from itself,
+ * and from nothing else. A part is a folder, with all folders in it, or a file beside this one.
+ */
+const TABLE: Table = {
+  strings: [],
+  clock: [],
+  contract: [],
+  geometry: ['contract'],
+  // The numbers of the sensors stand once, in the bridge's sensors.json.
+  domain: ['contract', 'geometry', 'strings', '../../backend/lupin_bridge/sensors.json'],
+  connection: ['contract', 'clock'],
+  draw: ['contract', 'geometry', 'domain'],
+  store: ['clock', 'contract', 'geometry', 'domain', 'connection', 'npm:react'],
+  map: [
+    ...['strings', 'clock', 'contract', 'geometry', 'domain', 'draw', 'store'],
+    ...['npm:react', 'npm:d3-selection', 'npm:d3-zoom'],
+  ],
+  export: ['strings', 'clock', 'domain', 'draw', 'store'],
+  ui: [
+    ...['strings', 'clock', 'contract', 'geometry', 'domain', 'draw', 'store', 'map', 'export'],
+    ...['npm:react', 'npm:react-dom'],
+  ],
+  main: ['styles', 'store', 'ui', 'npm:react', 'npm:react-dom'],
+  // For tests alone: no part above names it.
+  testing: [
+    ...['contract', 'domain', 'connection', 'store'],
+    ...['npm:vitest', 'npm:@testing-library/react', 'npm:typescript', 'npm:node:path'],
+  ],
+};
+
+/** The sources by their path; tests may import whatever they test. */
+const sources = new Map(
+  readdirSync(import.meta.dirname, { recursive: true, encoding: 'utf8' })
+    .map((name) => name.replaceAll('\\', '/'))
+    .filter((name) => /\.tsx?$/.test(name) && !/\.test\.tsx?$/.test(name))
+    .map((name) => [name, readFileSync(join(import.meta.dirname, name), 'utf8')]),
+);
+
+test('every import goes in a direction that the table names', () => {
+  expect(sources.size).toBeGreaterThan(50);
+  expect(wrongImports(sources, TABLE)).toEqual([]);
+});
+
+test('the table names every part, and no part that is gone', () => {
+  expect([...new Set([...sources.keys()].map(partOf))].sort()).toEqual(Object.keys(TABLE).sort());
+});
+
+test('neither the table nor the files lead back to where they began', () => {
+  expect(ringIn(new Map(Object.entries(TABLE)))).toBeNull();
+  expect(ringIn(fileGraph(sources))).toBeNull();
+});
+
+test.each([
+  ['upwards', 'domain/age.ts', "import { store } from '../store/app';"],
+  ['from a nested folder', 'domain/judge/deep/rule.ts', "import '../../../store/app';"],
+  ['of a type alone', 'contract/api.ts', "import type { Tag } from '../domain/twin';"],
+  ['handed on', 'geometry/image.ts', "export { S } from '../strings';"],
+  ['at run time', 'draw/pins.ts', "const load = () => import('../map/painter');"],
+  ['of another file of the bridge', 'domain/a.ts', "import '../../../backend/x.json';"],
+  ['of a package', 'domain/age.ts', "import { useState } from 'react';"],
+  ['of what is for tests', 'ui/App.tsx', "import { tag } from '../testing/tags';"],
+  ['by a part that the table does not know', 'extras/a.ts', "import '../strings';"],
+  ['of a part that the table does not know', 'ui/App.tsx', "import '../extras/a';"],
+])('an import %s is seen', (_, path, text) => {
+  expect(wrongImports(new Map([[path, text]]), TABLE)).toHaveLength(1);
+});
+
+test('a ring of files is seen, also of types alone', () => {
+  const ring = new Map([
+    ['ui/a.ts', "import type { B } from './b';"],
+    ['ui/b.tsx', "import './deep/c';"],
+    ['ui/deep/c.ts', "import '../a';"],
+  ]);
+  expect(ringIn(fileGraph(ring))).toEqual(['ui/a.ts', 'ui/b.tsx', 'ui/deep/c.ts', 'ui/a.ts']);
+  ring.set('ui/deep/c.ts', '');
+  expect(ringIn(fileGraph(ring))).toBeNull();
+});

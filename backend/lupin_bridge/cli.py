@@ -11,11 +11,19 @@ import tempfile
 import threading
 import time
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import Field
 from typing import Any, NoReturn
 
 from lupin_bridge import logs
-from lupin_bridge.settings import SettingError, Settings, option
+from lupin_bridge.configuration import (
+    CONFIG_VARIABLE,
+    settings_from,
+    strange_variables,
+    take_token,
+)
+from lupin_bridge.settings import SettingError, Settings, one_of, option, table
+
+log = logging.getLogger(__name__)
 
 USAGE_ERROR = 2
 # An idle worker ends at once when it is told to; who takes longer is at work.
@@ -32,11 +40,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         # until the server asks for them, so that neither can end in a traceback.
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
         _prepare_process()
-        logs.set_up(settings.log_format)
+        logs.set_up(settings.log_format, settings.log_level)
+        for warning in strange_variables(os.environ):
+            log.warning("%s", warning)
         from lupin_bridge.roles import run  # noqa: PLC0415  # see above
 
-        # Taken out of the environment: the processes that we start have no use for it.
-        token = os.environ.pop("LUPIN_TOKEN", None)
+        token = take_token(settings, os.environ)
         run(options.role, settings, token, ros_args, _patrol_args(options))
     except SettingError as error:
         _fail(str(error))
@@ -103,32 +112,40 @@ def _patrol_args(options: argparse.Namespace) -> list[str]:
 
 
 def _settings_from(options: argparse.Namespace) -> Settings:
-    values: dict[str, Any] = {}
-    for spec in fields(Settings):
-        value = getattr(options, spec.name)
-        # What may be given more than once comes as a list.
-        values[spec.name] = tuple(value) if isinstance(value, list) else value
-    return Settings(**values)
+    given = {spec.name: getattr(options, spec.name) for spec in table()}
+    return settings_from(
+        {name: value for name, value in given.items() if value is not None},
+        os.environ,
+        options.config,
+    )
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="lupin-twin",
         description="Digital twin of a greenhouse: ROS 2 node, web bridge and browser HMI.",
-        epilog="Everything from --ros-args on goes to ROS: --ros-args -p idw_power:=3.0",
+        epilog="Everything from --ros-args on goes to ROS: --ros-args -p idw_power:=3.0. A setting "
+        "may also stand in the environment (LUPIN_PORT for --port) or in the file of --config.",
     )
     roles = parser.add_subparsers(dest="role", required=True, metavar="ROLE")
     common = argparse.ArgumentParser(add_help=False)
-    for spec in fields(Settings):
+    common.add_argument(
+        "--config",
+        metavar="FILE",
+        help=f"TOML file with any of these settings, by their names with _ "
+        f"(default: {CONFIG_VARIABLE}, or none)",
+    )
+    for spec in table():
         default: Any = spec.default
         repeatable = isinstance(default, tuple)
         common.add_argument(
             option(spec.name),
             type=str if repeatable else type(default),
             action="append" if repeatable else "store",
-            default=list(default) if repeatable else default,
+            # None: not given here, and so for the environment or the file to say.
+            default=None,
             metavar=spec.name.rpartition("_")[2].upper(),
-            help=f"{spec.metadata['help']} (default: {default or 'none'})",
+            help=f"{_described(spec)} (default: {default or 'none'})",
         )
     for role, text in ROLES.items():
         # No abbreviations: what one means would change with the next setting.
@@ -139,6 +156,12 @@ def _parser() -> argparse.ArgumentParser:
             for name, (kind, help_text) in PATROL_OPTIONS.items():
                 own.add_argument(f"--{name}", type=kind, metavar=name.upper(), help=help_text)
     return parser
+
+
+def _described(spec: Field[Any]) -> str:
+    low, high, choices = (spec.metadata[name] for name in ("low", "high", "choices"))
+    limits = f", from {low:g} to {high:g}" if low is not None else ""
+    return f"{spec.metadata['help']}{limits}{f': {one_of(choices)}' if choices else ''}"
 
 
 def _prepare_process() -> None:

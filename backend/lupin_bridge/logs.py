@@ -14,6 +14,7 @@ from lupin_twin.throttle import Throttle
 TEXT: Final = "text"
 JSON: Final = "json"
 FORMATS: Final = (TEXT, JSON)
+LEVELS: Final = ("debug", "info", "warning", "error")
 
 WEB_SERVER_PERIOD_S: Final = 5.0
 
@@ -60,15 +61,21 @@ class OnceInAWhile(logging.Filter):
         return True
 
 
-def set_up(log_format: str) -> None:
-    """Send the log to standard error in this format."""
+def set_up(log_format: str, level: str = "info") -> None:
+    """Send the log to standard error in this format, from this level on."""
+    least = logging.getLevelNamesMapping()[level.upper()]
     handler = logging.StreamHandler(sys.stderr)
+    # What ROS's nodes log passes no logger of ours, but this.
+    handler.setLevel(least)
     if log_format == JSON:
         handler.setFormatter(JsonFormatter())
     else:
         handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
     logging.root.addHandler(handler)
-    logging.root.setLevel(logging.INFO)
+    # The libraries' debugging is not the bridge's: a line for each byte.
+    logging.root.setLevel(max(least, logging.INFO))
+    for ours in ("lupin_bridge", "lupin_twin"):
+        logging.getLogger(ours).setLevel(least)
     # Its news (started, waiting, connection open) are ours to tell, once.
-    logging.getLogger("uvicorn").setLevel(logging.WARNING)
+    logging.getLogger("uvicorn").setLevel(max(least, logging.WARNING))
     logging.getLogger("uvicorn.error").addFilter(OnceInAWhile())

@@ -1,19 +1,27 @@
-"""The bridge's settings: one table for the command line, the checks and the docs."""
+"""The bridge's settings: one table for the command line, environment, file, checks and docs."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from typing import Any
+from collections.abc import Iterable, Mapping
+from dataclasses import Field, dataclass, field, fields
+from typing import Any, Final
 
-from lupin_bridge.logs import FORMATS, TEXT
+from lupin_bridge.logs import FORMATS, LEVELS, TEXT
 
 
 class SettingError(ValueError):
     """A setting that cannot be; the message names it, its value and the limit."""
 
 
-def _setting(default: Any, help_text: str, low: float | None = None, high: float = 0.0) -> Any:
-    return field(default=default, metadata={"help": help_text, "low": low, "high": high})
+def _setting(
+    default: Any,
+    help_text: str,
+    low: float | None = None,
+    high: float = 0.0,
+    choices: Iterable[str] = (),
+) -> Any:
+    metadata = {"help": help_text, "low": low, "high": high, "choices": tuple(choices)}
+    return field(default=default, metadata=metadata)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +54,9 @@ class Settings:
     field_total_concurrency: int = _setting(
         32, "field requests being computed for all clients together", 1, 10_000
     )
+    allow_host: tuple[str, ...] = _setting(
+        (), "another name of the bridge, such as twin.example; may be given more than once"
+    )
     allow_origin: tuple[str, ...] = _setting(
         (),
         "origin whose pages may read the bridge too, and whose host is a name of the bridge, such "
@@ -53,27 +64,63 @@ class Settings:
     )
     tls_cert: str = _setting("", "PEM file with the certificate chain: serve https and wss")
     tls_key: str = _setting("", "PEM file with the certificate's private key, not encrypted")
-    log_format: str = _setting(TEXT, f"{' or '.join(FORMATS)}: lines for people or for a collector")
+    token_file: str = _setting("", "file with the token that readers have to know, a line of text")
+    log_format: str = _setting(TEXT, "lines for people, or JSON for a collector", choices=FORMATS)
+    log_level: str = _setting("info", "the least that is logged", choices=LEVELS)
+    # What the operator called a setting, where it is not the option: a variable, a file's line.
+    given_as: Mapping[str, str] = field(
+        default_factory=dict, repr=False, compare=False, kw_only=True
+    )
 
     def __post_init__(self) -> None:
-        for spec in fields(self):
-            low, high = spec.metadata["low"], spec.metadata["high"]
-            value = getattr(self, spec.name)
-            if low is not None and not low <= value <= high:
-                raise SettingError(
-                    f"{option(spec.name)} is {value}, must be from {low:g} to {high:g}"
-                )
-        if self.log_format not in FORMATS:
-            raise SettingError(
-                f"--log-format is {self.log_format!r}, must be {' or '.join(FORMATS)}"
-            )
-        if not self.host:
-            raise SettingError("--host is empty, must be an address")
+        for spec in table():
+            check(spec, getattr(self, spec.name), self.called(spec.name))
         if bool(self.tls_cert) != bool(self.tls_key):
-            given, missing = ("cert", "key") if self.tls_cert else ("key", "cert")
-            raise SettingError(f"--tls-{given} is given without --tls-{missing}, TLS needs both")
+            given, missing = ("tls_cert", "tls_key") if self.tls_cert else ("tls_key", "tls_cert")
+            raise SettingError(
+                f"{self.called(given)} is given without {option(missing)}, TLS needs both"
+            )
+
+    def called(self, name: str) -> str:
+        """What a message should call a setting: as its operator gave it."""
+        return self.given_as.get(name, option(name))
+
+
+def table() -> tuple[Field[Any], ...]:
+    """The settings themselves."""
+    return tuple(spec for spec in fields(Settings) if spec.metadata)
+
+
+def check(spec: Field[Any], value: Any, called: str) -> None:
+    """Refuse a value out of its range.
+
+    Raises:
+        SettingError: it is, or it is empty where there has to be something.
+
+    """
+    low, high, choices = (spec.metadata[name] for name in ("low", "high", "choices"))
+    if low is not None and not low <= value <= high:
+        raise SettingError(f"{called} is {value}, must be from {low:g} to {high:g}")
+    if choices and value not in choices:
+        raise SettingError(f"{called} is {value!r}, must be {one_of(choices)}")
+    if spec.name == "host" and not value:
+        raise SettingError(f"{called} is empty, must be an address")
+
+
+def one_of(names: Iterable[str]) -> str:
+    """Names as a choice between them, for a message."""
+    *most, last = names
+    return f"{', '.join(most)} or {last}" if most else last
 
 
 def option(name: str) -> str:
     """The command-line option of a setting."""
     return "--" + name.replace("_", "-")
+
+
+ENV_PREFIX: Final = "LUPIN_"
+
+
+def variable(name: str) -> str:
+    """The environment variable of a setting."""
+    return ENV_PREFIX + name.upper()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import time
+from collections.abc import Iterator
 
 import pytest
 
@@ -12,11 +13,14 @@ from lupin_bridge import logs
 
 
 @pytest.fixture(autouse=True)
-def untouched_root(monkeypatch: pytest.MonkeyPatch) -> None:
+def untouched_root(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """`set_up` works on the root logger, which the test run has set up for itself."""
     monkeypatch.setattr(logging.root, "handlers", [])
     monkeypatch.setattr(logging.root, "level", logging.WARNING)
     monkeypatch.setattr(logging.getLogger("uvicorn.error"), "filters", [])
+    yield
+    for name in ("lupin_bridge", "lupin_twin"):
+        logging.getLogger(name).setLevel(logging.NOTSET)
 
 
 def test_json_is_one_object_a_line_with_the_error(capsys: pytest.CaptureFixture[str]) -> None:
@@ -36,6 +40,21 @@ def test_text_is_a_line_for_people(capsys: pytest.CaptureFixture[str]) -> None:
     logs.set_up(logs.TEXT)
     logging.getLogger("lupin_bridge.test").warning("hello")
     assert capsys.readouterr().err.endswith(" WARNING lupin_bridge.test: hello\n")
+
+
+@pytest.mark.parametrize("level", logs.LEVELS)
+def test_what_is_below_the_level_stays_out(level: str, capsys: pytest.CaptureFixture[str]) -> None:
+    logs.set_up(logs.TEXT, level)
+    for least in logs.LEVELS:
+        logging.getLogger("lupin_bridge.test").log(getattr(logging, least.upper()), "ours")
+        # As the nodes' lines come: past every logger.
+        record = logging.LogRecord("ros", getattr(logging, least.upper()), "", 0, "ros", (), None)
+        logging.root.handle(record)
+        logging.getLogger("asyncio").debug("a library's")
+    said = capsys.readouterr().err
+    expected = len(logs.LEVELS) - logs.LEVELS.index(level)
+    assert (said.count(": ours"), said.count(": ros")) == (expected, expected)
+    assert "library" not in said
 
 
 def test_the_web_servers_own_news_stay_out(capsys: pytest.CaptureFixture[str]) -> None:

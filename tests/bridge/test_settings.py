@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields
 from typing import Any
 
 import pytest
 
-from lupin_bridge.settings import SettingError, Settings, option
+from lupin_bridge.settings import SettingError, Settings, one_of, option, table, variable
 
-NUMBERS = [spec for spec in fields(Settings) if spec.metadata["low"] is not None]
+NUMBERS = [spec for spec in table() if spec.metadata["low"] is not None]
 
 
 def test_the_defaults_serve_this_machine_alone() -> None:
@@ -48,5 +47,26 @@ def test_tls_needs_both_files() -> None:
 
 
 def test_every_setting_has_a_help_text_and_an_option_of_its_name() -> None:
-    assert all(spec.metadata["help"] for spec in fields(Settings))
+    assert all(spec.metadata["help"] for spec in table())
     assert option("client_timeout_s") == "--client-timeout-s"
+    assert variable("client_timeout_s") == "LUPIN_CLIENT_TIMEOUT_S"
+
+
+@pytest.mark.parametrize("spec", [spec for spec in table() if spec.metadata["choices"]])
+def test_what_is_none_of_the_choices_is_named_with_them(spec: Any) -> None:
+    choices = spec.metadata["choices"]
+    for choice in choices:
+        assert getattr(Settings(**{spec.name: choice}), spec.name) == choice
+    with pytest.raises(SettingError) as refused:
+        Settings(**{spec.name: "loud"})  # type: ignore[arg-type]
+    assert str(refused.value) == f"{option(spec.name)} is 'loud', must be {one_of(choices)}"
+
+
+def test_a_mistake_is_called_what_its_operator_called_it() -> None:
+    with pytest.raises(SettingError, match=r"^LUPIN_TLS_KEY is given without --tls-cert"):
+        Settings(tls_key="k.pem", given_as={"tls_key": "LUPIN_TLS_KEY"})
+
+
+def test_choices_are_told_as_in_a_sentence() -> None:
+    assert one_of(["a", "b", "c"]) == "a, b or c"
+    assert one_of(["a"]) == "a"

@@ -132,6 +132,7 @@ ROOMS: Mapping[str, set[str]] = {
     "logs": set(),
     "metrics": set(),
     "settings": {"logs"},
+    "configuration": {"settings"},
     "serving": {"settings"},
     "twin": set(),
     "field": {"serving"},
@@ -152,7 +153,7 @@ ROOMS: Mapping[str, set[str]] = {
     },
     "app": {"access", "bridge", "routes", "serving", "stream"},
     "roles": {"access", "app", "bridge", "serving", "settings", "twin"},
-    "cli": {"logs", "roles", "settings"},
+    "cli": {"configuration", "logs", "roles", "settings"},
     "openapi": {"app"},
 }
 

@@ -29,17 +29,20 @@ class TokenError(SettingError):
 
 
 class Credentials:
-    """Tells the right token and its sessions from all others, in constant time."""
+    """Tells the right token and its sessions from all others, in constant time.
 
-    def __init__(self, token: str) -> None:
+    `called` is what messages call the place that the token was given in.
+    """
+
+    def __init__(self, token: str, called: str = "LUPIN_TOKEN") -> None:
         if len(token) < MIN_TOKEN_LENGTH:
             raise TokenError(
-                f"LUPIN_TOKEN has {len(token)} characters, must have at least {MIN_TOKEN_LENGTH}: "
+                f"{called} has {len(token)} characters, must have at least {MIN_TOKEN_LENGTH}: "
                 "make one with `openssl rand -hex 32`, or unset it"
             )
         if _TOKEN.fullmatch(token) is None:
             raise TokenError(
-                "LUPIN_TOKEN holds a character that no bearer token may: use letters, digits and "
+                f"{called} holds a character that no bearer token may: use letters, digits and "
                 "-._~+/ (RFC 6750)"
             )
         self._digest = _digest(token.encode())

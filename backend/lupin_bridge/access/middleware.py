@@ -14,7 +14,7 @@ from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from lupin_bridge.access.credentials import Credentials
-from lupin_bridge.access.policy import AccessPolicy, Asked, OriginError
+from lupin_bridge.access.policy import AccessPolicy, Asked, HostError, OriginError
 from lupin_bridge.access.security import with_security_headers
 from lupin_bridge.serving.rate_limit import RateLimit, client_key
 from lupin_bridge.settings import SettingError, Settings
@@ -44,19 +44,22 @@ class Access:
 
     @classmethod
     def of(cls, settings: Settings, token: str | None) -> Self:
-        """From the settings, and LUPIN_TOKEN if it is set.
+        """From the settings, and the token if there is one.
 
         Raises:
-            SettingError: an allowed origin that is none, or a token that cannot be one.
+            SettingError: an allowed origin or host that is none, or a token that cannot be one.
 
         """
+        called = settings.called("token_file") if settings.token_file else "LUPIN_TOKEN"
         try:
-            policy = AccessPolicy(settings.host, settings.allow_origin)
+            policy = AccessPolicy(settings.host, settings.allow_origin, settings.allow_host)
+        except HostError as error:
+            raise SettingError(f"{settings.called('allow_host')}: {error}") from None
         except OriginError as error:
-            raise SettingError(f"--allow-origin: {error}") from None
+            raise SettingError(f"{settings.called('allow_origin')}: {error}") from None
         return cls(
             policy,
-            None if token is None else Credentials(token),
+            None if token is None else Credentials(token, called),
             secure=bool(settings.tls_cert),
         )
 

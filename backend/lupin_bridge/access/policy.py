@@ -33,6 +33,10 @@ class OriginError(ValueError):
     """Not an origin; the message says what was expected and got."""
 
 
+class HostError(ValueError):
+    """Not a host's name; the message says what was expected and got."""
+
+
 def host_of(authority: str) -> str | None:
     """The host of a Host header, in lower case and without brackets; None: not a Host header."""
     match = _AUTHORITY.fullmatch(authority)
@@ -55,6 +59,19 @@ def parse_origin(text: str) -> str:
     scheme, port = match["scheme"].lower(), authority["port"]
     suffix = "" if port is None or port == _DEFAULT_PORTS[scheme] else f":{port}"
     return f"{scheme}://{authority['host'].lower()}{suffix}"
+
+
+def parse_host(text: str) -> str:
+    """A host's name as `host_of` gives it.
+
+    Raises:
+        HostError: it is none, or has a scheme or port.
+
+    """
+    match = _AUTHORITY.fullmatch(text)
+    if match is None or match["port"] is not None:
+        raise HostError(f"{text[:128]!r} is not a host's name, expected it without scheme and port")
+    return match["host"].strip("[]").rstrip(".").lower()
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,10 +99,15 @@ class Verdict:
 class AccessPolicy:
     """The hosts that this bridge goes by, and the origins whose pages may read it."""
 
-    def __init__(self, host: str = "127.0.0.1", allowed_origins: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        host: str = "127.0.0.1",
+        allowed_origins: Iterable[str] = (),
+        allowed_hosts: Iterable[str] = (),
+    ) -> None:
         self.origins: Final = frozenset(parse_origin(origin) for origin in allowed_origins)
         named = (host_of(origin.partition("://")[2]) for origin in self.origins)
-        self._hosts = {host.rstrip(".").lower(), *named}
+        self._hosts = {host.rstrip(".").lower(), *named, *map(parse_host, allowed_hosts)}
 
     def judge(self, asked: Asked) -> Verdict:
         """Whether a request may pass."""
@@ -98,7 +120,7 @@ class AccessPolicy:
         if not self._goes_by(host):
             return Verdict(
                 f"this bridge does not go by the name {host[:128]!r}: use its IP address, or start "
-                f"it with --allow-origin {asked.scheme}://{authority[:128]}"
+                f"it with --allow-host {host[:128]}"
             )
         if asked.origins:
             return self._judge_origin(asked, authority)
@@ -143,8 +165,8 @@ def exposure(address: str, *, has_token: bool, has_tls: bool) -> list[str]:
     warnings = []
     if not has_token:
         warnings.append(
-            f"listening on {address} without LUPIN_TOKEN: anyone who reaches this port reads "
-            "everything the twin knows"
+            f"listening on {address} without LUPIN_TOKEN or --token-file: anyone who reaches this "
+            "port reads everything the twin knows"
         )
     if not has_tls:
         warnings.append(

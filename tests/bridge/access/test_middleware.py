@@ -77,7 +77,7 @@ def test_a_rebound_name_gets_nothing(open_bridge: Served, path: str) -> None:
     assert answer.status_code == 403
     detail = refusal_of(answer)
     assert "'evil.example'" in detail
-    assert "--allow-origin http://evil.example:8000" in detail
+    assert detail.endswith("--allow-host evil.example")
 
 
 def test_a_rebound_name_gets_no_websocket(open_bridge: Served) -> None:
@@ -290,6 +290,21 @@ def test_a_token_that_cannot_be_one_ends_the_start(token: str) -> None:
 def test_an_origin_that_is_none_ends_the_start() -> None:
     line = refused_start("--allow-origin", PANEL, "--allow-origin", "panel.example")
     assert line.startswith("lupin-twin: --allow-origin: 'panel.example' is not an origin")
+
+
+def test_a_host_that_is_none_ends_the_start() -> None:
+    line = refused_start("--allow-host", "https://twin.example")
+    assert line.startswith("lupin-twin: --allow-host: 'https://twin.example' is not a host's name")
+
+
+def test_an_allowed_host_is_a_name_and_no_origin() -> None:
+    with served("--allow-host", "twin.example") as live:
+        named = {"Host": "twin.example:8000"}
+        assert live.get("/api/state", named).status_code == 200
+        assert live.get("/api/state", {"Host": "sub.twin.example"}).status_code == 403
+        foreign = live.get("/api/state", {"Origin": "http://twin.example"})
+        assert foreign.status_code == 403
+        assert "access-control-allow-origin" not in foreign.headers
 
 
 def test_listening_further_than_this_machine_is_said_loudly() -> None:

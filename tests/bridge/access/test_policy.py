@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 from lupin_bridge.access.policy import (
     AccessPolicy,
     Asked,
+    HostError,
     OriginError,
     Verdict,
     exposure,
     host_of,
+    parse_host,
     parse_origin,
 )
 
@@ -68,7 +70,7 @@ def test_a_foreign_host_is_named_with_the_way_to_allow_it(host: str) -> None:
     refusal = judge(host).refusal
     assert refusal is not None
     assert repr(host.partition(":")[0]) in refusal
-    assert f"--allow-origin http://{host}" in refusal
+    assert refusal.endswith(f"--allow-host {host.partition(':')[0]}")
 
 
 @pytest.mark.parametrize(
@@ -89,6 +91,22 @@ def test_there_is_one_host_header(hosts: list[str]) -> None:
 def test_a_long_host_is_cut_in_the_answer() -> None:
     assert len(judge("x" * 60_000).refusal or "") < 500
     assert len(judge("127.0.0.1", "http://" + "x" * 60_000).refusal or "") < 500
+
+
+@pytest.mark.parametrize("name", ["twin.example", "TWIN.example.", "10.0.0.7", "[fd00::7]", "fd"])
+def test_an_allowed_host_goes_by_its_name_whatever_the_port(name: str) -> None:
+    policy = AccessPolicy("127.0.0.1", allowed_hosts=[name])
+    host = name if name.startswith("[") else name.lower().rstrip(".")
+    assert parse_host(name) == host.strip("[]")
+    for authority in (host, f"{host}:8443"):
+        assert policy.judge(Asked("http", [authority])) == PASS
+
+
+@pytest.mark.parametrize("name", ["", "*", "a b", "twin.example:80", "http://twin.example", "a/b"])
+def test_an_allowed_host_has_to_be_a_name(name: str) -> None:
+    with pytest.raises(HostError, match="expected it without scheme and port") as refused:
+        AccessPolicy("127.0.0.1", allowed_hosts=["twin.example", name])
+    assert repr(name) in str(refused.value)
 
 
 # --- Origin -------------------------------------------------------------------------------------

@@ -1,0 +1,181 @@
+"""Where settings come from: the command line, the environment, a file, in this order.
+
+All three are read by the table in `settings`, and so is each one's mistake: what it names is the
+option, the variable, or the file's line and key. A library for settings would bring its own words
+for a mistake and a second table beside the command line's; TOML is in the standard library.
+"""
+
+from __future__ import annotations
+
+import difflib
+import logging
+import re
+import stat
+import tomllib
+from collections.abc import Iterable, Mapping, MutableMapping
+from dataclasses import Field
+from pathlib import Path
+from typing import Any, Final
+
+from lupin_bridge.settings import ENV_PREFIX, SettingError, Settings, check, table, variable
+
+log = logging.getLogger(__name__)
+
+CONFIG_VARIABLE: Final = variable("config")
+TOKEN_VARIABLE: Final = variable("token")
+_NOT_IN_THE_TABLE: Final = (CONFIG_VARIABLE, TOKEN_VARIABLE)
+_BARE: Final = re.compile(r"[A-Za-z0-9_-]{1,64}")
+# Nobody writes this much; a device or a disk image given by mistake is not read to its end.
+MAX_FILE_BYTES: Final = 65_536
+
+_KINDS: Final = {
+    int: "a whole number",
+    float: "a number",
+    str: "a text",
+    tuple: "a list of texts",
+}
+
+
+def settings_from(
+    options: Mapping[str, Any], environment: Mapping[str, str], config: str | None = None
+) -> Settings:
+    """The settings, each from the first place that has it.
+
+    `options` are those that were given on the command line, by their names; `config` is --config's.
+
+    Raises:
+        SettingError: a value that cannot be, a key that is no setting, a file that cannot be read.
+
+    """
+    values: dict[str, Any] = {}
+    given_as: dict[str, str] = {}
+    path, path_called = (
+        (config, "--config")
+        if config is not None
+        else (environment.get(CONFIG_VARIABLE), CONFIG_VARIABLE)
+    )
+    if path is not None:
+        _take_file(path, path_called, values, given_as)
+    for spec in table():
+        called = variable(spec.name)
+        if called in environment:
+            value = _from_text(spec, environment[called], called)
+            check(spec, value, called)
+            values[spec.name], given_as[spec.name] = value, called
+    for name, value in options.items():
+        values[name] = tuple(value) if isinstance(value, list) else value
+        given_as.pop(name, None)
+    return Settings(**values, given_as=given_as)
+
+
+def take_token(settings: Settings, environment: MutableMapping[str, str]) -> str | None:
+    """The token that readers have to know, if there is one, with the environment rid of it.
+
+    The processes that the bridge starts have no use for it.
+
+    Raises:
+        SettingError: it is given twice, or its file cannot be read.
+
+    """
+    token = environment.pop(TOKEN_VARIABLE, None)
+    if not settings.token_file:
+        return token
+    called = settings.called("token_file")
+    if token is not None:
+        raise SettingError(f"{TOKEN_VARIABLE} and {called} are both given, expected one of them")
+    text = read_text(settings.token_file, called).strip()
+    mode = Path(settings.token_file).stat().st_mode
+    if mode & stat.S_IROTH:
+        log.warning(
+            "%s %s has mode %o: anyone on this machine can read the token, make it 600",
+            called,
+            settings.token_file,
+            stat.S_IMODE(mode),
+        )
+    return text
+
+
+def strange_variables(environment: Iterable[str]) -> list[str]:
+    """Warnings of variables that look like settings and are none.
+
+    They are no error: other programs, and Kubernetes, may have variables that begin like ours.
+    """
+    known = {*_NOT_IN_THE_TABLE, *(variable(spec.name) for spec in table())}
+    return [
+        f"the environment's {name} is no setting of the bridge{_meant(name, known)}"
+        for name in sorted(environment)
+        if name.startswith(ENV_PREFIX) and name not in known
+    ]
+
+
+def _take_file(path: str, called: str, values: dict[str, Any], given_as: dict[str, str]) -> None:
+    text = read_text(path, called)
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SettingError(f"{path} is not TOML: {error}") from None
+    specs = {spec.name: spec for spec in table()}
+    for key, value in content.items():
+        place = f"{path}{_line_of(key, text)}: {key if _BARE.fullmatch(key) else repr(key[:64])}"
+        if key == "token":
+            raise SettingError(
+                f"{place} is no setting: put the token into a file of its own, and name that with "
+                "token_file"
+            )
+        if key not in specs:
+            raise SettingError(f"{place} is no setting of the bridge{_meant(key, specs)}")
+        values[key] = _from_toml(specs[key], value, place)
+        check(specs[key], values[key], place)
+        given_as[key] = place
+
+
+def read_text(path: str, called: str) -> str:
+    """A small file's text; `called` is the setting that names it.
+
+    Raises:
+        SettingError: it cannot be read, is too large, or is no text.
+
+    """
+    try:
+        with Path(path).open("rb") as file:
+            content = file.read(MAX_FILE_BYTES + 1)
+    except OSError as error:
+        raise SettingError(f"{called} {path}: {error.strerror}") from None
+    if len(content) > MAX_FILE_BYTES:
+        raise SettingError(f"{called} {path} has more than {MAX_FILE_BYTES} bytes, the limit")
+    try:
+        return content.decode()
+    except UnicodeDecodeError:
+        raise SettingError(f"{called} {path} is no text (UTF-8)") from None
+
+
+def _from_text(spec: Field[Any], text: str, called: str) -> Any:
+    kind: Any = type(spec.default)
+    if kind is tuple:
+        return tuple(filter(None, (part.strip() for part in text.split(","))))
+    try:
+        return kind(text)
+    except ValueError:
+        raise SettingError(f"{called} is {text[:128]!r}, must be {_KINDS[kind]}") from None
+
+
+def _from_toml(spec: Field[Any], value: Any, called: str) -> Any:
+    kind = type(spec.default)
+    if kind is tuple and isinstance(value, list) and all(isinstance(part, str) for part in value):
+        return tuple(value)
+    if kind is float and type(value) is int:
+        return float(value)
+    if type(value) is not kind:  # a bool is an int to Python alone
+        raise SettingError(f"{called} is {str(value)[:128]!r}, must be {_KINDS[kind]}")
+    return value
+
+
+def _line_of(key: str, text: str) -> str:
+    # tomllib tells no places. Tables are no settings, so a key stands at a line's begin.
+    found = re.search(rf"""^[ \t\[]*["']?{re.escape(key)}["']?[ \t]*[=.\]]""", text, re.MULTILINE)
+    return "" if found is None else f" line {text.count(chr(10), 0, found.start()) + 1}"
+
+
+def _meant(name: str, known: Iterable[str]) -> str:
+    near = difflib.get_close_matches(name, known, n=1)
+    return f" (did you mean {near[0]}?)" if near else ""

@@ -75,6 +75,7 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
         "throttle": set(),
         "twin_count": set(),
         "spinning": set(),
+        "workers": set(),
         "explored": {"grid"},
         "field_cache": {"grid"},
         "field_quality": {"state", "grid", "idw"},
@@ -191,6 +192,8 @@ PURE_LIBRARIES = frozenset({"PIL", "cbor2", "numpy", "orjson", "pydantic", "webs
 # A pure module that needs one thing more.
 PURE_EXCEPT: Mapping[str, set[str]] = {
     "lupin_twin.idw": {"sys"},  # float_info
+    # It has no ROS and does no input or output, but it is threads and order in time.
+    "lupin_twin.workers": {"concurrent.futures", "threading", "time"},
     "lupin_twin.stop_signals": {"signal"},  # which is what it is about
     # Values and errors of modules that do more than that.
     "lupin_bridge.access.credentials": {"lupin_bridge.settings.SettingError"},

@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 
 from lupin_twin import field_quality, idw
 from lupin_twin.field_quality import FieldQuality, leave_one_out, painted_share
-from lupin_twin.idw import compute_idw_field
+from lupin_twin.idw import Abandoned, compute_idw_field
 from lupin_twin.state import Pose, Reading, TagState
 from tests.oracle_idw import value_at
 
-RULES = {"falloff_radius_m": 1.5, "max_distance_m": 1.5, "power": 2.0}
+RULES: dict[str, Any] = {"falloff_radius_m": 1.5, "max_distance_m": 1.5, "power": 2.0}
 
 Spot = tuple[float, float, float]
 
@@ -179,3 +179,11 @@ def test_painted_share_is_that_of_the_known_cells() -> None:
         power=2.0,
     )
     assert painted_share(grid) == 0.25
+
+
+def test_a_judgement_that_nobody_waits_for_ends_between_two_parts() -> None:
+    answers = iter([False, False, True])
+    spots = [(x * 0.5, y * 0.5, 1.0) for x in range(40) for y in range(40)]
+    with pytest.raises(Abandoned):
+        quality_of(spots, should_stop=lambda: next(answers))
+    assert next(answers, None) is None, "asked three times, and not again"

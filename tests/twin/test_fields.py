@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
@@ -12,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lupin_twin import idw
 from lupin_twin.explored import OccupancyMap, occupancy_map
 from lupin_twin.field_cache import FieldCache
 from lupin_twin.fields import (
@@ -21,9 +23,11 @@ from lupin_twin.fields import (
     FieldRequest,
     FieldRules,
     check_request,
+    cost_s,
     default_box,
 )
 from lupin_twin.grid import FieldGrid
+from lupin_twin.idw import Abandoned
 from lupin_twin.state import MAX_TEXT_LENGTH, Observation, Pose, Reading, TwinStore
 
 MAX_CELLS = 1_000_000
@@ -296,6 +300,47 @@ def test_any_thread_may_compute(store: TwinStore) -> None:
     for job, grid in zip(jobs, grids, strict=True):
         assert isinstance(job, FieldJob)
         np.testing.assert_array_equal(grid.values, job.compute().values)
+
+
+def test_a_job_that_nobody_waits_for_ends_between_two_parts(store: TwinStore) -> None:
+    """Asked so often that no two questions are more than some milliseconds apart."""
+    for number in range(100):
+        store.record(scan(f"far {number}", number * 1.0, 0.0, 1.0))
+    rules = {"falloff_radius_m": 200.0, "max_distance_m": 200.0}
+    job = engine_of(**rules).lookup(request_of(resolution=0.01), store, None)
+    assert isinstance(job, FieldJob)
+    asked = itertools.count(1)
+    job.compute(lambda: next(asked) == 0)
+    assert next(asked) > 400 * 200 * 100 / idw._MAX_PAIRS
+    answers = iter([False, False, True])
+    with pytest.raises(Abandoned):
+        job.compute(lambda: next(answers))
+    assert next(answers, None) is None, "asked three times, and not again"
+
+
+@pytest.mark.parametrize(
+    ("samples", "changes", "rules", "expected_s"),
+    [
+        (0, {"resolution": 0.01}, {}, 400 * 200 * 20e-9),
+        # Each sample reaches a window of 3 m.
+        (10, {"resolution": 0.01}, {}, 400 * 200 * 20e-9 + 10 * 300 * 200 * 5e-9),
+        (10, {"resolution": 0.01}, {"idw_power": 3.0}, 400 * 200 * 20e-9 + 600_000 * 15e-9),
+        # And no more than the box.
+        (10, {}, {"max_distance_m": 50.0}, 8 * 20e-9 + 10 * 8 * 5e-9),
+    ],
+)
+def test_cost_follows_cells_and_the_windows_of_the_samples(
+    samples: int, changes: dict[str, Any], rules: dict[str, Any], expected_s: float
+) -> None:
+    cost = cost_s(request_of(**changes), samples, rules_of(**rules))
+    assert cost == pytest.approx(expected_s, rel=0.01)
+
+
+def test_a_jobs_cost_is_that_of_its_samples(store: TwinStore) -> None:
+    job = engine_of().lookup(request_of(), store, None)
+    assert isinstance(job, FieldJob)
+    assert len(job.samples) == 2
+    assert job.cost_s == cost_s(request_of(), 2, rules_of())
 
 
 def test_sliding_box_keeps_the_cache_within_its_bounds(store: TwinStore) -> None:

@@ -11,14 +11,14 @@ sensor's own unit.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from lupin_twin.grid import FieldGrid, FloatArray
-from lupin_twin.idw import IndexArray, PairwiseIdw, sample_columns
+from lupin_twin.idw import Abandoned, IndexArray, PairwiseIdw, never, sample_columns
 from lupin_twin.state import TagState, samples_of
 
 # Pairs of tags that are looked at together; bounds the memory, whatever the number of tags.
@@ -58,14 +58,16 @@ def leave_one_out(
     falloff_radius_m: float,
     max_distance_m: float,
     power: float,
+    should_stop: Callable[[], bool] = never,
 ) -> FieldQuality:
     """The quality of the field of `sensor_type` made of `tags` (a snapshot's) by these rules.
 
     Only tags with a pose and a finite reading take part, as in the field. The cost follows the
-    pairs of tags in reach of each other.
+    pairs of tags in reach of each other. `should_stop()` is asked every millisecond or so.
 
     Raises:
         ValueError: a rule out of its range, named with its value and the limit.
+        Abandoned: `should_stop` said so.
 
     """
     tag_ids: list[str] = []
@@ -81,7 +83,7 @@ def leave_one_out(
         power=power,
         max_pairs=_MAX_PAIRS,
     )
-    predicted = _predictions(x, y, measured, idw)
+    predicted = _predictions(x, y, measured, idw, should_stop)
     judged = np.flatnonzero(~np.isnan(predicted))
     if judged.size == 0:
         return FieldQuality(sensor_type, judged=0, unjudged=len(samples), rmse=None, worst=None)
@@ -107,7 +109,13 @@ def painted_share(grid: FieldGrid) -> float:
     return float(np.count_nonzero(~np.isnan(grid.values)) / grid.values.size)
 
 
-def _predictions(x: FloatArray, y: FloatArray, value: FloatArray, idw: PairwiseIdw) -> FloatArray:
+def _predictions(
+    x: FloatArray,
+    y: FloatArray,
+    value: FloatArray,
+    idw: PairwiseIdw,
+    should_stop: Callable[[], bool],
+) -> FloatArray:
     """Each sample's value from the others, NaN where none is in reach of the gate.
 
     The samples are halved along the longer side of their box, again and again, until those of a
@@ -118,6 +126,8 @@ def _predictions(x: FloatArray, y: FloatArray, value: FloatArray, idw: PairwiseI
     parts = [(everyone, everyone)] if value.size else []
     with np.errstate(all="ignore"):
         while parts:
+            if should_stop():
+                raise Abandoned
             part, near = parts.pop()
             gap = _gap_squares(x[part], x[near]) + _gap_squares(y[part], y[near])
             near = near[gap <= idw.reach_square]

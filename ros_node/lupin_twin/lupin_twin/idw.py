@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, pairwise
 from typing import Final, NamedTuple
 
@@ -92,6 +92,15 @@ def _largest_square_within(radius: float) -> float:
 _COINCIDENT_SQUARE: Final = _largest_square_within(math.nextafter(COINCIDENT_EPS_M, 0.0))
 
 
+class Abandoned(Exception):
+    """A computation that ended before its result, for nobody waits for it any more."""
+
+
+def never() -> bool:
+    """The `should_stop` of a computation that is always waited for."""
+    return False
+
+
 class FieldSample(NamedTuple):
     """One reading at its place: x and y in metres (map frame), the value in the sensor's unit."""
 
@@ -112,15 +121,17 @@ def compute_idw_field(
     max_distance_m: float,
     power: float,
     explored_mask: BoolArray | None = None,
+    should_stop: Callable[[], bool] = never,
 ) -> FieldGrid:
     """The field of `samples` over the box, by the module's definition.
 
     `samples` are (x, y, value) in the order they were recorded; `FieldSample` is one. No samples
     make a field without a value, which is no error. `explored_mask` has the grid's shape,
-    (height, width).
+    (height, width). `should_stop()` is asked every millisecond or so.
 
     Raises:
         ValueError: an argument out of its range, named with its value and the limit.
+        Abandoned: `should_stop` said so.
 
     """
     width, height = grid_dimensions(bbox_min_x, bbox_min_y, bbox_max_x, bbox_max_y, resolution)
@@ -147,6 +158,7 @@ def compute_idw_field(
         idw=idw,
         explored=explored_mask,
         values=values,
+        should_stop=should_stop,
     )
     with np.errstate(all="ignore"):
         painter.paint()
@@ -338,6 +350,7 @@ class _Painter:
         idw: PairwiseIdw,
         explored: BoolArray | None,
         values: npt.NDArray[np.float32],
+        should_stop: Callable[[], bool],
     ) -> None:
         self.x, self.y, self.value = samples
         self.cell_x, self.cell_y = cell_x, cell_y
@@ -345,6 +358,7 @@ class _Painter:
         self.reach_in_cells = 2.0 * math.sqrt(idw.reach_square) / resolution
         self.explored = explored
         self.values = values
+        self.should_stop = should_stop
 
     def paint(self) -> None:
         """Fill `values`, part by part."""
@@ -352,6 +366,8 @@ class _Painter:
         whole = _Part(0, height, 0, width, np.arange(self.value.size))
         parts = list(self._split(whole, 1, 1)) if self.value.size else []
         while parts:
+            if self.should_stop():
+                raise Abandoned
             part = parts.pop()
             if self.idw.fits(part.reaching.size, part.rows * part.columns):
                 self._evaluate(part)

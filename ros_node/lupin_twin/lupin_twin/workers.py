@@ -1,0 +1,168 @@
+"""Threads for what takes longer than a tick, so ordered that the small never waits for the large.
+
+A job is due at its arrival plus `PATIENCE` times its estimated cost, and the earliest due goes
+first. So a dear job lets cheap ones pass, but only those that come within `PATIENCE` times its own
+cost: none starves, whatever comes later. One thread takes nothing but small jobs (`SMALL_S`): they
+need not wait for a large one to end either.
+
+Work that nobody waits for ends: `Job.cancel` takes it off the queue, and where it runs already,
+its `should_stop` turns true, which long computations ask between their steps.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Final, Generic, TypeVar
+
+# Estimates are seconds of one core. A small job costs what nobody notices.
+SMALL_S: Final = 0.05
+PATIENCE: Final = 2.0
+# Threads that take any job; two, so that one heavy job does not hold up all other large ones.
+LARGE_THREADS: Final = 2
+SMALL_THREADS: Final = 1
+
+ResultT = TypeVar("ResultT")
+ShouldStop = Callable[[], bool]
+
+
+class Job(Future[ResultT], Generic[ResultT]):
+    """The result to come of `work(should_stop)`, which is estimated to take `cost_s`."""
+
+    def __init__(
+        self,
+        work: Callable[[ShouldStop], ResultT],
+        cost_s: float,
+        arrived_s: float,
+        on_cancel: Callable[[Job[ResultT]], None],
+    ) -> None:
+        super().__init__()
+        self.cost_s = cost_s
+        self.due_s = arrived_s + PATIENCE * cost_s
+        self._work = work
+        self._on_cancel = on_cancel
+        self._is_abandoned = False
+
+    @property
+    def is_small(self) -> bool:
+        """Whether the threads for small jobs take it too."""
+        return self.cost_s <= SMALL_S
+
+    def should_stop(self) -> bool:
+        """Whether nobody waits for the result any more; any thread may ask."""
+        return self._is_abandoned
+
+    def cancel(self) -> bool:
+        """Nobody waits any more: take it off the queue, or let it end soon where it runs."""
+        if not self.done() and not self._is_abandoned:
+            self._is_abandoned = True
+            self._on_cancel(self)
+        return super().cancel()
+
+    def run(self) -> None:
+        """Do the work, in a worker's thread."""
+        if not self.set_running_or_notify_cancel():
+            return
+        try:
+            result = self._work(self.should_stop)
+        except BaseException as error:  # noqa: BLE001  # handed to whoever waits
+            self.set_exception(error)
+        else:
+            self.set_result(result)
+        # What it was made of must not live as long as its result.
+        del self._work
+
+
+class Workers:
+    """The threads and the jobs that wait for one. Any thread may call it.
+
+    The threads start with the first job. `clock` tells seconds and never jumps.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        clock: Callable[[], float] = time.monotonic,
+        large_threads: int = LARGE_THREADS,
+        small_threads: int = SMALL_THREADS,
+    ) -> None:
+        self.abandoned = 0
+        self._name = name
+        self._clock = clock
+        self._only_small = [False] * large_threads + [True] * small_threads
+        self._waiting: list[Job[object]] = []
+        self._running: set[Job[object]] = set()
+        self._changed = threading.Condition()
+        self._threads: list[threading.Thread] = []
+        self._is_closed = False
+
+    @property
+    def waiting(self) -> int:
+        """Jobs that no thread has taken yet."""
+        return len(self._waiting)
+
+    @property
+    def running(self) -> int:
+        """Jobs that a thread is at."""
+        return len(self._running)
+
+    def submit(self, work: Callable[[ShouldStop], ResultT], cost_s: float = 0.0) -> Future[ResultT]:
+        """Have `work(should_stop)` done; `cost_s` is an estimate, in seconds of one core.
+
+        Raises:
+            RuntimeError: the workers were closed.
+
+        """
+        job: Job[ResultT] = Job(work, cost_s, self._clock(), self._forget)
+        with self._changed:
+            if self._is_closed:
+                raise RuntimeError("the workers were closed")
+            if not self._threads:
+                self._start()
+            self._waiting.append(job)  # type: ignore[arg-type]  # whatever its result
+            self._changed.notify_all()
+        return job
+
+    def close(self) -> None:
+        """End: drop what waits, and ask what runs to stop. Waits for nothing."""
+        with self._changed:
+            self._is_closed = True
+            left = [*self._waiting, *self._running]
+            self._changed.notify_all()
+        for job in left:
+            job.cancel()
+
+    def _forget(self, job: Job[ResultT]) -> None:
+        with self._changed:
+            self.abandoned += 1
+            if job in self._waiting:
+                self._waiting.remove(job)  # type: ignore[arg-type]
+
+    def _start(self) -> None:
+        for number, only_small in enumerate(self._only_small):
+            thread = threading.Thread(
+                target=self._run, args=(only_small,), name=f"{self._name}_{number}", daemon=True
+            )
+            self._threads.append(thread)
+            thread.start()
+
+    def _run(self, only_small: bool) -> None:
+        while (job := self._take(only_small)) is not None:
+            job.run()
+            with self._changed:
+                self._running.discard(job)
+            del job  # or its result would live until the next one
+
+    def _take(self, only_small: bool) -> Job[object] | None:
+        with self._changed:
+            while not self._is_closed:
+                mine = [job for job in self._waiting if job.is_small or not only_small]
+                if mine:
+                    job = min(mine, key=lambda job: job.due_s)  # of equals, the first that came
+                    self._waiting.remove(job)
+                    self._running.add(job)
+                    return job
+                self._changed.wait()
+            return None

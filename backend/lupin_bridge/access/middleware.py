@@ -13,6 +13,8 @@ from starlette.datastructures import MutableHeaders
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from lupin_bridge.access import cookies
+from lupin_bridge.access.cookies import CookieTooLong
 from lupin_bridge.access.credentials import Credentials
 from lupin_bridge.access.policy import AccessPolicy, Asked, HostError, OriginError
 from lupin_bridge.access.security import with_security_headers
@@ -88,7 +90,7 @@ class AccessControl:
         else:
             refusal = self._check_credentials(request)
         if refusal is None:
-            await self._app(scope, receive, send)
+            await self._app(_without_cookies(scope), receive, send)
         else:
             await refusal.send(scope, receive, send)
 
@@ -101,9 +103,11 @@ class AccessControl:
         if header is not None:
             return self._check_header(credentials, header, client_of(request))
         # A cookie is no guess: it cannot be made without the token, however often one tries.
-        if credentials.accepts_cookie(
-            request.cookies.get(credentials.cookie_name, ""), time.time()
-        ):
+        try:
+            values = cookies.values_of(credentials.cookie_name, request.scope["headers"])
+        except CookieTooLong as error:
+            return _Refusal(431, str(error))
+        if any(credentials.accepts_cookie(value, time.time()) for value in values):
             return None
         if _wants_page(request):
             # Relative, for a bridge behind a path prefix.
@@ -128,6 +132,11 @@ class AccessControl:
         self._guesses.take(client, now_s)
         log.warning("wrong token from %s", client)
         return _unauthorized("this is not the bridge's token, expected Authorization: Bearer")
+
+
+def _without_cookies(scope: Scope) -> Scope:
+    """What the routes get: FastAPI takes the cookies of every request apart, asked for or not."""
+    return {**scope, "headers": [line for line in scope["headers"] if line[0] != b"cookie"]}
 
 
 def client_of(request: HTTPConnection) -> str:

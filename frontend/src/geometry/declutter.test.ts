@@ -26,6 +26,18 @@ describe('labels', () => {
     expect(label).toMatchObject({ text: 'a · 21.5 °C', x: 12, y: -9 });
   });
 
+  test('one beside the edge or the buttons goes where it can be seen', () => {
+    const within = { left: -200, top: -200, right: 40, bottom: 200 };
+    const [atEdge] = placeLabels([request({})], HEIGHT, { within, covered: [] });
+    expect(atEdge).toMatchObject({ text: 'a · 21.5 °C', x: -82 });
+    const buttons = { left: -100, top: -100, right: -20, bottom: 100 };
+    const [between] = placeLabels([request({})], HEIGHT, { within, covered: [buttons] });
+    expect(between).toMatchObject({ text: 'a', x: 12 });
+    // Out of sight anyway: it comes in with the pan.
+    const [beyond] = placeLabels([request({ x: 50 })], HEIGHT, { within, covered: [] });
+    expect(beyond).toMatchObject({ text: 'a · 21.5 °C', x: 62 });
+  });
+
   test('a crowd never overlaps, and still shows a good part of itself', () => {
     const crowd = Array.from({ length: 60 }, (_, i) =>
       request({ id: String(i), x: (i % 10) * 40, y: Math.floor(i / 10) * 30 }),

@@ -3,6 +3,8 @@
  * turn, and is left out when nothing is free. Important ones come first. Works in pixels
  * relative to the map's origin, so a pan reuses the result.
  */
+import type { Box } from './clear';
+
 export interface LabelRequest {
   readonly id: string;
   /** Centre of the pin, pixels. */
@@ -25,18 +27,24 @@ export interface PlacedLabel {
   readonly width: number;
 }
 
-interface Box {
-  readonly left: number;
-  readonly top: number;
-  readonly right: number;
-  readonly bottom: number;
+/** Where labels may be seen: boxes in pixels relative to the map's origin. */
+export interface Room {
+  /** What is in sight; a label of a pin in there is not cut off. */
+  readonly within: Box;
+  /** Buttons and the like. */
+  readonly covered: readonly Box[];
 }
 
 const GAP = 4;
 const BUCKET = 64;
 
-export function placeLabels(requests: readonly LabelRequest[], height: number): PlacedLabel[] {
+export function placeLabels(
+  requests: readonly LabelRequest[],
+  height: number,
+  room: Room | null = null,
+): PlacedLabel[] {
   const taken = new Buckets();
+  for (const box of room?.covered ?? []) taken.add(box);
   for (const { x, y, radius } of requests) {
     const r = radius * 0.8;
     taken.add({ left: x - r, top: y - r, right: x + r, bottom: y + r });
@@ -47,7 +55,7 @@ export function placeLabels(requests: readonly LabelRequest[], height: number): 
 
   const placed: PlacedLabel[] = [];
   for (const { request } of ordered) {
-    const spot = firstFree(request, height, taken);
+    const spot = firstFree(request, height, taken, room?.within ?? null);
     if (!spot) continue;
     taken.add(spot.box);
     placed.push({
@@ -66,8 +74,10 @@ function firstFree(
   { x, y, radius, texts }: LabelRequest,
   height: number,
   taken: Buckets,
+  sight: Box | null,
 ): { text: string; width: number; box: Box } | null {
   const reach = radius + GAP;
+  const within = sight && contains(sight, { left: x, top: y, right: x, bottom: y }) ? sight : null;
   for (const { text, width } of texts) {
     const corners: readonly (readonly [number, number])[] = [
       [x + reach, y - height / 2],
@@ -77,11 +87,17 @@ function firstFree(
     ];
     for (const [left, top] of corners) {
       const box = { left, top, right: left + width, bottom: top + height };
-      if (taken.isFree(box)) return { text, width, box };
+      if ((!within || contains(within, box)) && taken.isFree(box)) return { text, width, box };
     }
   }
   return null;
 }
+
+const contains = (outer: Box, inner: Box): boolean =>
+  inner.left >= outer.left &&
+  inner.top >= outer.top &&
+  inner.right <= outer.right &&
+  inner.bottom <= outer.bottom;
 
 /** Boxes by the squares they touch, so that a thousand labels do not cost a million checks. */
 class Buckets {

@@ -1,11 +1,13 @@
 import { beforeEach, describe, expect, test, vi, type Mock } from 'vitest';
 
+import { isClear } from '../geometry/clear';
 import { corners, mapPoint, toCanvas, type Camera, type View } from '../geometry/coordinates';
 import { NO_VIEWPORT, type Viewport } from '../store/viewport';
 import { MapCamera } from './camera';
 
 const size = { width: 600, height: 400 };
 const bounds = { minX: 0, minY: 0, maxX: 4, maxY: 8 };
+const content = { bounds, pins: corners(bounds) };
 let viewport: Viewport;
 let onView: Mock<(view: View) => void>;
 let onCamera: Mock<(camera: Camera) => void>;
@@ -27,7 +29,7 @@ beforeEach(() => {
 
 describe('camera', () => {
   test('shows everything, and does not take that for the operator’s choice', () => {
-    camera.goTo(null, bounds);
+    camera.goTo(null, content);
     for (const corner of corners(bounds)) {
       const { x, y } = toCanvas(viewport.view, corner);
       expect(x >= 0 && x <= size.width && y >= 0 && y <= size.height).toBe(true);
@@ -37,13 +39,13 @@ describe('camera', () => {
   });
 
   test('going where it is changes nothing', () => {
-    camera.goTo(null, bounds);
-    camera.goTo(null, bounds);
+    camera.goTo(null, content);
+    camera.goTo(null, content);
     expect(onView).toHaveBeenCalledTimes(1);
   });
 
   test('going to what the operator chose changes nothing', () => {
-    camera.goTo(null, bounds);
+    camera.goTo(null, content);
     for (let step = 0; step < 40; step++) {
       camera.zoomBy(step % 2 ? 1.37 : 0.81);
       camera.panBy(0.037, -0.113);
@@ -56,7 +58,7 @@ describe('camera', () => {
 
   test('before its size is known it stays where it is', () => {
     viewport = NO_VIEWPORT;
-    camera.goTo(null, bounds);
+    camera.goTo(null, content);
     expect(onView).not.toHaveBeenCalled();
   });
 
@@ -100,6 +102,26 @@ describe('camera', () => {
     expect(toCanvas(viewport.view, mapPoint(2, 2)).y).toBeCloseTo(100);
   });
 
+  test('nor is one below the buttons', () => {
+    camera.goTo({ x: 2, y: 4, span: 8 }, null);
+    const { view } = viewport;
+    const buttons = { left: 540, top: 40, right: 590, bottom: 240 };
+    const hidden = mapPoint(2 + 250 / view.scale, 4);
+    camera.show(hidden, 0);
+    expect(viewport.view).toEqual(view);
+    camera.show(hidden, 0, [buttons]);
+    expect(toCanvas(viewport.view, hidden).x).toBeCloseTo(300);
+  });
+
+  test('a fit leaves no pin below the buttons', () => {
+    const buttons = { left: 300, top: 0, right: 600, bottom: 120 };
+    camera.goTo(null, content);
+    const corner = mapPoint(bounds.maxX, bounds.maxY);
+    expect(isClear(viewport.view, corner, [buttons])).toBe(false);
+    camera.goTo(null, content, [buttons]);
+    for (const pin of content.pins) expect(isClear(viewport.view, pin, [buttons])).toBe(true);
+  });
+
   const mouse = (target: EventTarget, type: string, x: number): void => {
     const event = new MouseEvent(type, { clientX: x, clientY: 0, bubbles: true });
     // Which the constructor does not take: in a test, `window` is a stand-in for jsdom's own.
@@ -108,11 +130,11 @@ describe('camera', () => {
   };
 
   test('nothing that arrives takes the map out of the operator’s hand', () => {
-    camera.goTo(null, bounds);
+    camera.goTo(null, content);
     const before = viewport.view;
     mouse(element, 'mousedown', 100);
     mouse(window, 'mousemove', 140);
-    camera.goTo(null, { ...bounds, maxX: 40 });
+    camera.goTo(null, { ...content, bounds: { ...bounds, maxX: 40 } });
     expect(viewport.view).toEqual({ ...before, x: before.x + 40 });
     mouse(window, 'mouseup', 140);
     expect(onCamera).toHaveBeenCalledTimes(1);
@@ -120,7 +142,7 @@ describe('camera', () => {
 
   test('what the wheel chose holds for a hand that grabs the map at once', () => {
     vi.useFakeTimers();
-    camera.goTo(null, bounds);
+    camera.goTo(null, content);
     const { scale } = viewport.view;
     element.dispatchEvent(new WheelEvent('wheel', { deltaY: -240 }));
     const zoomed = viewport.view;
@@ -137,18 +159,18 @@ describe('camera', () => {
   });
 
   test('a click is no choice of a view', () => {
-    camera.goTo(null, bounds);
+    camera.goTo(null, content);
     mouse(element, 'mousedown', 100);
     mouse(window, 'mouseup', 100);
     expect(onCamera).not.toHaveBeenCalled();
-    camera.goTo(null, { ...bounds, maxX: 40 });
+    camera.goTo(null, { ...content, bounds: { ...bounds, maxX: 40 } });
     expect(onView).toHaveBeenCalledTimes(2);
   });
 
   test('a fixed one is moved by the program alone', () => {
     const wall = document.createElement('div');
     const fixed = cameraOn(wall, true);
-    fixed.goTo(null, bounds);
+    fixed.goTo(null, content);
     const { view } = viewport;
     mouse(wall, 'mousedown', 100);
     mouse(window, 'mousemove', 140);
@@ -156,12 +178,12 @@ describe('camera', () => {
     wall.dispatchEvent(new WheelEvent('wheel', { deltaY: -200 }));
     expect(viewport.view).toEqual(view);
     expect(onCamera).not.toHaveBeenCalled();
-    fixed.goTo(null, { ...bounds, maxX: 40 });
+    fixed.goTo(null, { ...content, bounds: { ...bounds, maxX: 40 } });
     expect(viewport.view).not.toEqual(view);
   });
 
   test('a map that comes back into the page goes on where it was', () => {
-    camera.goTo(null, bounds);
+    camera.goTo(null, content);
     const { view } = viewport;
     const again = cameraOn(document.createElement('div'));
     expect(viewport.view).toBe(view);

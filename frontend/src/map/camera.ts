@@ -1,14 +1,13 @@
 import { select } from 'd3-selection';
 import { zoom, zoomIdentity, type D3ZoomEvent, type ZoomTransform } from 'd3-zoom';
 
+import { fitClear, isClear, type Box } from '../geometry/clear';
 import {
   cameraOf,
-  fit,
   MAX_SCALE,
   MIN_SCALE,
   toCanvas,
   viewOf,
-  type Bounds,
   type Camera,
   type Insets,
   type MapPoint,
@@ -16,6 +15,7 @@ import {
   type View,
 } from '../geometry/coordinates';
 import type { Viewport } from '../store/viewport';
+import type { Content } from './content';
 
 export interface CameraHandlers {
   /** What is on the screen now; the store has it, and nobody but this camera moves it. */
@@ -91,19 +91,27 @@ export class MapCamera {
   }
 
   /**
-   * Shows a camera, or everything within `bounds`. Not told to `onCamera`. While the operator has
-   * hold of the map it stays with the operator, whatever else arrives.
+   * Shows a camera, or everything there is, with no pin below what is `covered`. Not told to
+   * `onCamera`. While the operator has hold of the map it stays with the operator, whatever else
+   * arrives.
    */
-  goTo(camera: Camera | null, bounds: Bounds | null): void {
+  goTo(camera: Camera | null, content: Content | null, covered: readonly Box[] = []): void {
     if (this.#held !== null) return;
     const { view: before, size } = this.#viewport();
     if (size.width === 0 || size.height === 0) return;
-    const view = camera ? viewOf(camera, size) : bounds && fit(bounds, size, fitInsets(size));
+    const view = camera
+      ? viewOf(camera, size)
+      : content && fitClear(content.bounds, content.pins, size, fitInsets(size), covered);
     if (!view) return;
     if (isSame(view, before)) return;
     this.#programmed = true;
     this.#zoom.transform(this.#selection, transformOf(view));
     this.#programmed = false;
+  }
+
+  /** Whether the operator has hold of the map, or the wheel has not yet come to rest. */
+  get isHeld(): boolean {
+    return this.#held !== null;
   }
 
   zoomBy(factor: number): void {
@@ -121,14 +129,14 @@ export class MapCamera {
   }
 
   /** Brings a point into view; one that is well inside the free part stays where it is. */
-  show(point: MapPoint, coveredBelow: number): void {
+  show(point: MapPoint, coveredBelow: number, covered: readonly Box[] = []): void {
     const { view, size } = this.#viewport();
     const { x, y } = toCanvas(view, point);
     const { width } = size;
     const height = Math.max(0, size.height - coveredBelow);
     const margin = Math.min(40, height / 4);
     const isInside = x > margin && y > margin && x < width - margin && y < height - margin;
-    if (isInside || width === 0) return;
+    if (width === 0 || (isInside && isClear(view, point, covered))) return;
     this.#zoom.translateTo(this.#selection, point.x, -point.y, [width / 2, height / 2]);
   }
 

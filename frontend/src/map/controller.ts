@@ -1,17 +1,14 @@
 /** Ties the map's canvases to the store: draws what changed, once a frame, and nothing else. */
 import { now } from '../clock';
 import { DARK, LIGHT } from '../draw/palette';
-import type { Field } from '../contract/types';
-import { fieldCorners } from '../domain/field';
 import { PULSE_MS, type Pulse } from '../draw/overlay';
 import { pinRadius } from '../draw/pins';
 import type { Pin } from '../draw/scene';
+import type { Box } from '../geometry/clear';
 import {
-  boundsOf,
   canvasPoint,
   toCanvas,
   toMap,
-  type Bounds,
   type CanvasPoint,
   type MapPoint,
   type View,
@@ -23,6 +20,7 @@ import { selectShown, selectTag, type Shown } from '../store/moment';
 import { isDark, isPrinting, onThemeChange } from '../store/theme';
 import { MapCamera } from './camera';
 import { onMapCommand, type MapCommand } from './commands';
+import { contentOf, coveredBelow, coveredBoxes, watchCovered } from './content';
 import { Painter, type Canvases } from './painter';
 import { pinUnderMouse, pointedAt } from './pointer';
 
@@ -45,6 +43,8 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
   let crosshair = false;
   /** A picture of the map is being taken. */
   let isTaken = false;
+  /** What of the map the page stands on. */
+  let covered: readonly Box[] = [];
   let drawn = store.get();
   let lastField = selectShown(drawn).field.value;
 
@@ -61,6 +61,8 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
       },
       onCamera: (chosen) => {
         act({ type: 'camera', camera: chosen });
+        // Labels find their places anew.
+        spoil('pins');
       },
     },
     isFixed,
@@ -94,7 +96,7 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
       painter.paintStill(state, view, at, parts.has('still'));
     }
     if (parts.has('pins') || parts.has('view')) {
-      painter.paintPins(state, view, at, parts.has('pins'));
+      painter.paintPins(state, view, at, parts.has('pins'), camera.isHeld ? null : covered);
     }
     if (parts.has('overlay') || parts.has('view')) {
       pulses = pulses.filter(({ since }) => at - since < PULSE_MS);
@@ -154,8 +156,13 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
     }
     const sameContent = !changedTags && sameMap && house.field === last.field;
     if (view.camera !== before.view.camera || (!view.camera && !sameContent)) {
-      camera.goTo(view.camera, contentBounds(house, lastField));
+      camera.goTo(view.camera, contentOf(house, lastField), covered);
     }
+  };
+
+  const goToContent = (): void => {
+    const state = store.get();
+    camera.goTo(state.view.camera, contentOf(selectShown(state), lastField), covered);
   };
 
   const pinAt = (point: CanvasPoint, reach: number): Pin | null => {
@@ -235,7 +242,7 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
     switch (command.type) {
       case 'fit':
         act({ type: 'camera', camera: null });
-        camera.goTo(null, contentBounds(selectShown(store.get()), lastField));
+        camera.goTo(null, contentOf(selectShown(store.get()), lastField), covered);
         break;
       case 'zoom':
         camera.zoomBy(command.factor);
@@ -245,7 +252,7 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
         break;
       case 'show': {
         const tag = selectTag(store.get(), command.tagId);
-        if (tag?.at) camera.show(tag.at, coveredBelow(element));
+        if (tag?.at) camera.show(tag.at, coveredBelow(element), covered);
         break;
       }
       case 'picture':
@@ -267,13 +274,20 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
     // Its labels grow with the page's text: on a wall screen, and as the browser is set.
     const textScale = parseFloat(getComputedStyle(element).fontSize) / TEXT_PX || 1;
     painter.resize({ width, height }, window.devicePixelRatio, textScale);
-    const state = store.get();
-    camera.goTo(state.view.camera, contentBounds(selectShown(state), lastField));
+    covered = coveredBoxes(element);
+    goToContent();
     spoil('still', 'pins', 'overlay');
     // At once: a canvas of another size is empty, and would be seen so until the next frame.
     paint();
   });
   resize.observe(element);
+  const unwatch = watchCovered(element, () => {
+    const before = covered;
+    covered = coveredBoxes(element);
+    if (JSON.stringify(before) === JSON.stringify(covered)) return;
+    goToContent();
+    spoil('pins');
+  });
 
   const gone = new AbortController();
   const { signal } = gone;
@@ -315,18 +329,11 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
     for (const stop of stops) stop();
     gone.abort();
     resize.disconnect();
+    unwatch();
     clearInterval(fading);
     cancelAnimationFrame(frame);
     camera.destroy();
   };
-}
-
-/** Height of the map's lower part that the tag's card lies over, in pixels. */
-function coveredBelow(element: HTMLElement): number {
-  const card = document.querySelector('.card')?.getBoundingClientRect();
-  const map = element.getBoundingClientRect();
-  const overlaps = card && card.left < map.right && card.top < map.bottom && card.bottom > map.top;
-  return overlaps ? map.bottom - card.top : 0;
 }
 
 function newPulses({ snapshot }: Shown): Pulse[] {
@@ -335,24 +342,6 @@ function newPulses({ snapshot }: Shown): Pulse[] {
   return (snapshot?.tags ?? []).flatMap((tag) =>
     tag.at && fresh.has(tag.id) ? [{ at: tag.at, since }] : [],
   );
-}
-
-/**
- * What a fit shows: everything pinned or planted, the heat map, and the known part of the map.
- * The grid of the heat map is the same for every sensor, so that a switch moves nothing; while
- * the next one is on its way, the last one's stands in for it.
- */
-function contentBounds({ snapshot, map }: Shown, field: Field | null): Bounds | null {
-  const points = (snapshot?.tags ?? []).flatMap((tag) => [
-    ...(tag.at ? [tag.at] : []),
-    ...tag.footprint,
-  ]);
-  return boundsOf([
-    ...points,
-    // A field whose tags are gone is one of a twin before this one.
-    ...(field && points.length > 0 ? fieldCorners(field) : []),
-    ...(map.value?.known ?? []),
-  ]);
 }
 
 function keyCommand({ key, shiftKey }: KeyboardEvent): MapCommand | null {

@@ -67,7 +67,7 @@ describe('painter', () => {
     painter.paintStill(store.get(), view, 0, true);
     expect(named(canvases.still, 'drawImage')).toHaveLength(1);
     expect(calls(canvases.pins)).toHaveLength(0);
-    painter.paintPins(store.get(), view, 0, true);
+    painter.paintPins(store.get(), view, 0, true, []);
     expect(named(canvases.pins, 'drawImage')).toHaveLength(1);
     expect(named(canvases.still, 'drawImage')).toHaveLength(1);
   });
@@ -91,7 +91,7 @@ describe('painter', () => {
   test('layers that are off are not drawn', () => {
     show();
     painter.paintStill(store.get(), view, 0, true);
-    painter.paintPins(store.get(), view, 0, true);
+    painter.paintPins(store.get(), view, 0, true, []);
     expect(named(canvases.still, 'drawImage')).toHaveLength(0);
     expect(named(canvases.pins, 'drawImage')).toHaveLength(0);
   });

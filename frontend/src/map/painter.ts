@@ -36,7 +36,8 @@ import {
   type Surface,
 } from '../draw/surface';
 import type { Size, View } from '../geometry/coordinates';
-import { placeLabels } from '../geometry/declutter';
+import type { Box } from '../geometry/clear';
+import { placeLabels, type Room } from '../geometry/declutter';
 import type { AppState } from '../store/app';
 import { selectHealth, selectRange } from '../store/derived';
 import { memoLast } from '../store/memo';
@@ -70,6 +71,8 @@ export class Painter {
   // Off the page, like those of the sprites: one in the page inherits the font's features from
   // the style sheet. Made anew for another font: one off the page keeps what it first found.
   #ruler = contextOf(newCanvas(1, 1));
+  /** Where labels found their places when the map last came to rest, and at which scale. */
+  #room: (Room & { readonly scale: number }) | null = null;
   readonly #stillBuffer = new PanBuffer();
   readonly #pinBuffer = new PanBuffer();
 
@@ -144,8 +147,19 @@ export class Painter {
     }
   }
 
-  paintPins(state: AppState, view: View, now: number, isNew: boolean): void {
+  /** `covered`: what stands on the map; null while the map moves, and labels with it. */
+  paintPins(
+    state: AppState,
+    view: View,
+    now: number,
+    isNew: boolean,
+    covered: readonly Box[] | null,
+  ): void {
     const surface = this.#surface(this.#canvases.pins);
+    if (covered) {
+      const { width, height } = this.#size;
+      this.#room = this.#roomAt(view.x, view.y, view.scale, width, height, covered);
+    }
     if (isNew) this.#pinBuffer.spoil();
     this.#pinBuffer.draw(surface, view, (target, seen) => {
       this.#drawPins(target, seen, state, now);
@@ -161,7 +175,8 @@ export class Painter {
     drawPins(surface, view, scene.pins, colour, this.#sprites, this.#palette);
     if (!layers.has('labels')) return;
     const first = state.view.selected ?? state.view.hovered;
-    const labels = this.#labels(scene, view.scale, first, this.#widths);
+    const room = this.#room?.scale === view.scale ? this.#room : null;
+    const labels = this.#labels(scene, view.scale, first, this.#widths, room);
     drawLabels(surface, view, labels, this.#sprites, this.#palette, this.#textScale);
   }
 
@@ -222,11 +237,42 @@ export class Painter {
   );
 
   readonly #labels = memoLast(
-    (scene: Scene, scale: number, first: string | null, widths: Map<string, number>) =>
+    (
+      scene: Scene,
+      scale: number,
+      first: string | null,
+      widths: Map<string, number>,
+      room: Room | null,
+    ) =>
       placeLabels(
         labelRequests(scene.pins, scale, first, (text) => this.#widthOf(text, widths)),
         labelHeight(this.#textScale),
+        room,
       ),
+  );
+
+  /** From pixels of the map view to those relative to the map's origin. */
+  readonly #roomAt = memoLast(
+    (
+      x: number,
+      y: number,
+      scale: number,
+      width: number,
+      height: number,
+      covered: readonly Box[],
+    ): Room & { scale: number } => {
+      const moved = ({ left, top, right, bottom }: Box): Box => ({
+        left: left - x,
+        top: top - y,
+        right: right - x,
+        bottom: bottom - y,
+      });
+      return {
+        scale,
+        within: moved({ left: 0, top: 0, right: width, bottom: height }),
+        covered: covered.map(moved),
+      };
+    },
   );
 
   #widthOf(text: string, widths: Map<string, number>): number {

@@ -14,7 +14,7 @@ export function MapControls(): JSX.Element {
     </button>
   );
   return (
-    <div className="map-controls">
+    <div className="map-controls" data-over-map>
       <div className="stack">
         {button(S.zoomIn, 'plus', () => {
           commandMap({ type: 'zoom', factor: 1.5 });

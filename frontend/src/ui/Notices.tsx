@@ -59,7 +59,12 @@ export function Notices({ place }: { place: 'middle' | 'edge' }): JSX.Element | 
   const large = useApp((state) => noticeFor(state)?.large ?? false);
   if (!id || large !== (place === 'middle')) return null;
   return (
-    <div className={large ? 'notice notice-large' : 'notice'} data-testid="notice" data-notice={id}>
+    <div
+      className={large ? 'notice notice-large' : 'notice'}
+      data-over-map={large ? undefined : true}
+      data-testid="notice"
+      data-notice={id}
+    >
       <strong>{title}</strong>
       {hint && <span>{hint}</span>}
     </div>

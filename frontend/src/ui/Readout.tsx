@@ -35,7 +35,7 @@ export function ScaleBar(): JSX.Element {
   const bar = scaleBar(scale, LONGEST_BAR_PX);
   const length = lengthText(bar.metres);
   return (
-    <div className="scale-bar" role="img" aria-label={S.scaleBar(length)}>
+    <div className="scale-bar" data-over-map role="img" aria-label={S.scaleBar(length)}>
       <span className="bar" style={{ width: `${bar.pixels}px` }} />
       <span>{length}</span>
     </div>

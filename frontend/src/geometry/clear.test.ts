@@ -1,0 +1,65 @@
+import { describe, expect, test } from 'vitest';
+
+import { fitClear, isClear, type Box } from './clear';
+import { boundsOf, corners, fit, mapPoint, toCanvas, type Bounds } from './coordinates';
+
+const insets = { top: 26, right: 60, bottom: 40, left: 26 };
+const bounds: Bounds = { minX: 0, minY: 0, maxX: 6, maxY: 6 };
+const pins = corners(bounds);
+/** A row of buttons in the upper right corner of a low map. */
+const low = { width: 500, height: 240 };
+const row: Box = { left: 300, top: 10, right: 490, bottom: 56 };
+/** The same buttons in a column. */
+const high = { width: 500, height: 700 };
+const column: Box = { left: 444, top: 10, right: 490, bottom: 200 };
+
+describe('a fit', () => {
+  test('is the plain one where no pin is in the way', () => {
+    expect(fitClear(bounds, pins, high, { ...insets, right: 80 }, [column])).toEqual(
+      fit(bounds, high, { ...insets, right: 80 }),
+    );
+    expect(fitClear(bounds, [], low, insets, [row])).toEqual(fit(bounds, low, insets));
+  });
+
+  test.each([
+    ['row', low, [row]],
+    ['column', { width: 500, height: 500 }, [column]],
+    ['row and notice', low, [row, { left: 0, top: 205, right: 500, bottom: 240 }]],
+  ] as const)('has no pin below a %s, and shows them all', (_, size, covered) => {
+    const wide = boundsOf([mapPoint(0, 0), mapPoint(14, 6)]) ?? bounds;
+    const all = corners(wide);
+    expect(all.every((pin) => isClear(fit(wide, size, insets), pin, covered))).toBe(false);
+    const view = fitClear(wide, all, size, insets, covered);
+    for (const pin of all) {
+      expect(isClear(view, pin, covered)).toBe(true);
+      const { x, y } = toCanvas(view, pin);
+      expect(x > 0 && x < size.width && y > 0 && y < size.height).toBe(true);
+    }
+  });
+
+  test('gives way on the side that costs less', () => {
+    // Flat: there is room below the row. Tall: there is room beside the column.
+    const flat = { minX: 0, minY: 0, maxX: 14, maxY: 3 };
+    const tall = { minX: 0, minY: 0, maxX: 6, maxY: 9 };
+    const below = fitClear(flat, corners(flat), low, { ...insets, left: 200 }, [row]);
+    expect(below.scale).toBeCloseTo(fit(flat, low, { ...insets, left: 200, top: 77 }).scale);
+    const beside = fitClear(tall, corners(tall), { width: 500, height: 500 }, insets, [column]);
+    expect(beside.scale).toBeCloseTo(
+      fit(tall, { width: 500, height: 500 }, { ...insets, right: 77 }).scale,
+    );
+  });
+
+  test('that cannot be clear is the plain one', () => {
+    const all: Box = { left: 0, top: 0, right: 500, bottom: 240 };
+    expect(fitClear(bounds, pins, low, insets, [all])).toEqual(fit(bounds, low, insets));
+  });
+});
+
+test('a pin is clear from its own reach on', () => {
+  const view = { x: 0, y: 0, scale: 1 };
+  const box: Box = { left: 100, top: 100, right: 200, bottom: 200 };
+  expect(isClear(view, mapPoint(79, -150), [box])).toBe(true);
+  expect(isClear(view, mapPoint(79.5, -150), [box])).toBe(false);
+  expect(isClear(view, mapPoint(150, -221), [box])).toBe(true);
+  expect(isClear(view, mapPoint(150, -220), [box])).toBe(false);
+});

@@ -1,0 +1,75 @@
+/** What there is to show on the map, and what stands on it. */
+import type { Field } from '../contract/types';
+import { fieldCorners } from '../domain/field';
+import type { Tag } from '../domain/twin';
+import type { Box } from '../geometry/clear';
+import { boundsOf, type Bounds, type MapPoint } from '../geometry/coordinates';
+import { memoOne } from '../store/memo';
+import type { Shown } from '../store/moment';
+
+export interface Content {
+  readonly bounds: Bounds;
+  readonly pins: readonly MapPoint[];
+}
+
+const NO_TAGS: readonly Tag[] = [];
+
+const places = memoOne((tags: readonly Tag[]) => {
+  const pins = tags.flatMap((tag) => (tag.at ? [tag.at] : []));
+  return { pins, points: [...pins, ...tags.flatMap((tag) => tag.footprint)] };
+});
+
+/**
+ * What a fit shows: everything pinned or planted, the heat map, and the known part of the map.
+ * The grid of the heat map is the same for every sensor, so that a switch moves nothing; while
+ * the next one is on its way, the last one's stands in for it.
+ */
+export function contentOf({ snapshot, map }: Shown, field: Field | null): Content | null {
+  const { pins, points } = places(snapshot?.tags ?? NO_TAGS);
+  const bounds = boundsOf([
+    ...points,
+    // A field whose tags are gone is one of a twin before this one.
+    ...(field && points.length > 0 ? fieldCorners(field) : []),
+    ...(map.value?.known ?? []),
+  ]);
+  return bounds && { bounds, pins };
+}
+
+/** What in the page stands on the map and hides a pin: buttons, scale bar, notices. */
+const OVER_MAP = '[data-over-map]';
+
+/** The boxes in the map view that something of the page covers. */
+export function coveredBoxes(element: HTMLElement): Box[] {
+  const map = element.getBoundingClientRect();
+  return [...(element.parentElement?.querySelectorAll(OVER_MAP) ?? [])].flatMap((each) => {
+    const { left, top, right, bottom, width, height } = each.getBoundingClientRect();
+    if (width === 0 || height === 0) return [];
+    return [
+      {
+        left: left - map.left,
+        top: top - map.top,
+        right: right - map.left,
+        bottom: bottom - map.top,
+      },
+    ];
+  });
+}
+
+/** Calls back when something that stands on the map may have changed its size; returns the end. */
+export function watchCovered(element: HTMLElement, onChange: () => void): () => void {
+  const observer = new ResizeObserver(onChange);
+  for (const each of element.parentElement?.querySelectorAll('.map-controls, .map-foot') ?? []) {
+    observer.observe(each);
+  }
+  return () => {
+    observer.disconnect();
+  };
+}
+
+/** Height of the map's lower part that the tag's card lies over, in pixels. */
+export function coveredBelow(element: HTMLElement): number {
+  const card = document.querySelector('.card')?.getBoundingClientRect();
+  const map = element.getBoundingClientRect();
+  const overlaps = card && card.left < map.right && card.top < map.bottom && card.bottom > map.top;
+  return overlaps ? map.bottom - card.top : 0;
+}

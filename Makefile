@@ -71,13 +71,13 @@ $(DONE)/hmi: $(HMI_SOURCES) $(DONE)/node_modules
 	@npm run --silent build
 	@touch $@
 
-$(DONE)/chromium: .ci/chromium | $(DONE)/checked
-	@.ci/chromium
+$(DONE)/tools: .ci/tools | $(DONE)/checked
+	@.ci/tools
 	@touch $@
 
 # --- checks ------------------------------------------------------------------------------------
 
-test: setup $(DONE)/chromium lint types hmi-test unit ## every check: lint, types, unit, real ROS, browser
+test: setup $(DONE)/tools lint types hmi-test unit ## every check: lint, types, unit, real ROS, browser
 	$(say) 'all checks passed'
 
 lint: setup ## ruff, ESLint, Prettier
@@ -97,11 +97,11 @@ hmi-test: setup ## the HMI's unit tests
 	$(say) 'front-end unit tests'
 	@npm run --silent test
 
-unit: setup $(DONE)/chromium ## Python tests, real ROS and real browser included
+unit: setup $(DONE)/tools ## Python tests, real ROS and real browser included
 	$(say) 'Python tests: units, ROS over DDS, browser'
 	@$(TEST_ENV) $(BIN)/pytest -q -n 4 --dist worksteal tests
 
-bench: setup $(DONE)/chromium ## measure: ratios side by side, nothing asserted
+bench: setup $(DONE)/tools ## measure: ratios side by side, nothing asserted
 	@$(BENCH_ENV) $(BIN)/python -m tests.bench $(ARGS)
 
 bench-live: setup ## the live bridge with up to 5,000 clients, in five minutes

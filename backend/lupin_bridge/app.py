@@ -7,6 +7,7 @@ from pathlib import Path
 from fastapi import FastAPI, Request, Response
 from starlette.staticfiles import StaticFiles
 
+from lupin_bridge.access.entrance import ComesIn, Entrance
 from lupin_bridge.access.middleware import Access, AccessControl
 from lupin_bridge.access.security import ReadOnly
 from lupin_bridge.bridge import Bridge
@@ -26,12 +27,15 @@ STATIC_FOLDER = Path(__file__).parent / "static"
 
 
 def create_app(
-    bridge: Bridge | None, static_folder: Path = STATIC_FOLDER, access: Access | None = None
+    bridge: Bridge | None,
+    static_folder: Path = STATIC_FOLDER,
+    access: Access | None = None,
+    entrance: Entrance | None = None,
 ) -> FastAPI:
     """The application around a bridge that its caller starts and stops.
 
     Without a bridge it can only describe itself (OpenAPI). Without `access` it goes by the names
-    of this machine, and asks for no token.
+    of this machine, and asks for no token. Without `entrance`, who asks is who is connected.
     """
     access = access or Access()
     app = FastAPI(
@@ -61,6 +65,7 @@ def create_app(
         app.add_middleware(EndsWithTheBridge, goodbye=bridge.goodbye)
     app.add_middleware(ReadOnly)
     app.add_middleware(AccessControl, access=access)
+    app.add_middleware(ComesIn, entrance=entrance or Entrance())
     app.add_exception_handler(404, _not_found)
     if static_folder.is_dir():
         app.mount("/", StaticFiles(directory=static_folder, html=True), name="hmi")
@@ -78,7 +83,8 @@ excepted; a browser signs in at `/signin`.
 
 
 async def _not_found(request: Request, _error: Exception) -> Response:
-    return error_response(f"there is nothing at {request.url.path[:128]!r}; see /docs", 404)
+    prefix = request.scope.get("root_path", "")
+    return error_response(f"there is nothing at {request.url.path[:128]!r}; see {prefix}/docs", 404)
 
 
 def _describe_frames(app: FastAPI) -> None:

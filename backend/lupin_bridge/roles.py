@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 
+from lupin_bridge.access.entrance import Entrance
 from lupin_bridge.access.middleware import Access
 from lupin_bridge.access.policy import exposure
 from lupin_bridge.access.tls import check_pair
@@ -43,10 +44,13 @@ def run(
 
     """
     access = Access.of(settings, token)
+    entrance = Entrance.of(settings)
     if settings.tls_cert:
         check_pair(settings.tls_cert, settings.tls_key)
     try:
-        asyncio.run(_run(role, settings, access, ros_args, patrol_args))
+        asyncio.run(
+            _run(role, settings, access, entrance, ros_args=ros_args, patrol_args=patrol_args)
+        )
     except (ParameterError, RosStartError) as error:
         raise SettingError(str(error)) from error
 
@@ -55,6 +59,8 @@ async def _run(
     role: str,
     settings: Settings,
     access: Access,
+    entrance: Entrance,
+    *,
     ros_args: Sequence[str],
     patrol_args: Sequence[str],
 ) -> None:
@@ -69,7 +75,8 @@ async def _run(
     make_source = WebTwin if role == "web" else LocalTwin
     source = make_source(ros_args=ros_args, timeout_s=settings.field_timeout_s)
     bridge = Bridge(source, settings)
-    server = BridgeServer(create_app(bridge, access=access), settings, bridge.say_goodbye)
+    app = create_app(bridge, access=access, entrance=entrance)
+    server = BridgeServer(app, settings, bridge.say_goodbye)
     await bridge.start()
     # The 100,000 objects of all modules are here to stay. Each full collection would walk through
     # them, 30 to 50 ms during which nobody is served.

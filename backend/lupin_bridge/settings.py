@@ -62,6 +62,12 @@ class Settings:
         "origin whose pages may read the bridge too, and whose host is a name of the bridge, such "
         "as https://panel.example; may be given more than once",
     )
+    trusted_proxy: tuple[str, ...] = _setting(
+        (),
+        "address or network of a reverse proxy whose X-Forwarded-For and X-Forwarded-Proto are "
+        "believed, such as 127.0.0.1 or 10.0.0.0/24; may be given more than once",
+    )
+    path_prefix: str = _setting("", "path that a proxy serves the bridge below, such as /gh1")
     tls_cert: str = _setting("", "PEM file with the certificate chain: serve https and wss")
     tls_key: str = _setting("", "PEM file with the certificate's private key, not encrypted")
     token_file: str = _setting("", "file with the token that readers have to know, a line of text")

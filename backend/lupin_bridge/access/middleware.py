@@ -16,6 +16,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from lupin_bridge.access import cookies
 from lupin_bridge.access.cookies import CookieTooLong
 from lupin_bridge.access.credentials import Credentials
+from lupin_bridge.access.entrance import path_of
 from lupin_bridge.access.policy import AccessPolicy, Asked, HostError, OriginError
 from lupin_bridge.access.security import with_security_headers
 from lupin_bridge.serving.rate_limit import RateLimit, client_key
@@ -96,7 +97,7 @@ class AccessControl:
 
     def _check_credentials(self, request: HTTPConnection) -> _Refusal | None:
         credentials = self._access.credentials
-        path: str = request.scope["path"]
+        path = path_of(request.scope)
         if credentials is None or path in OPEN_PATHS:
             return None
         header = request.headers.get("authorization")
@@ -140,7 +141,7 @@ def _without_cookies(scope: Scope) -> Scope:
 
 
 def client_of(request: HTTPConnection) -> str:
-    """The client that limits are counted for: who is connected, whatever a header claims."""
+    """The client that limits are counted for: who is connected, or whom a trusted proxy names."""
     return client_key(request.client.host if request.client is not None else "")
 
 
@@ -204,7 +205,7 @@ def _is_preflight(request: HTTPConnection) -> bool:
 def _wants_page(request: HTTPConnection) -> bool:
     return (
         request.scope.get("method") in ("GET", "HEAD")
-        and not request.scope["path"].startswith("/api/")
+        and not path_of(request.scope).startswith("/api/")
         and "text/html" in request.headers.get("accept", "")
     )
 

@@ -16,7 +16,10 @@ router = APIRouter()
 @read_route(router, "/openapi.json", include_in_schema=False)
 async def openapi(request: Request) -> Response:
     """The OpenAPI document."""
-    body = orjson.dumps(request.app.openapi(), option=orjson.OPT_INDENT_2)
+    document = request.app.openapi()
+    if prefix := request.scope.get("root_path", ""):
+        document = {**document, "servers": [{"url": prefix}]}
+    body = orjson.dumps(document, option=orjson.OPT_INDENT_2)
     return Response(body, headers=REVALIDATE, media_type=JSON_TYPE)
 
 
@@ -42,7 +45,7 @@ def render(document: dict[str, Any], base_url: str) -> str:
         f"<title>{escape(info['title'])}: API</title></head><body><main>"
         f"<h1>{escape(info['title'])}: API</h1><p>{escape(info['summary'])}</p>"
         f"<p>{escape(info['description'])}</p>"
-        '<p>As a document for tools: <a href="/openapi.json">/openapi.json</a></p>'
+        '<p>As a document for tools: <a href="openapi.json">/openapi.json</a></p>'
         f"<h2>Routes</h2>{routes}<h2>Types</h2>{schemas}</main></body></html>"
     )
 

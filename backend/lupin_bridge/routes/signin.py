@@ -37,8 +37,8 @@ async def sign_in(request: Request) -> Response:
         access.credentials.cookie_name,
         access.credentials.cookie(time.time()),
         max_age=SESSION_S,
-        path="/",
-        secure=access.secure,
+        path=f"{request.scope.get('root_path', '')}/",
+        secure=request.scope["scheme"] == "https",
         httponly=True,
         samesite="strict",
     )

@@ -1,0 +1,56 @@
+"""A real nginx with the configuration that we ship, on ports of the test's own."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from tests.support.processes import Process
+from tests.support.waiting import wait_for
+
+CONFIGURATION = Path(__file__).parents[2] / "backend" / "deploy" / "nginx.conf"
+_SHIPPED_PORTS = (8001, 8002, 8003)
+
+
+def configured(folder: Path, port: int, upstreams: Sequence[int]) -> str:
+    """The shipped configuration with other ports, and with places to write in that are ours."""
+    text = CONFIGURATION.read_text(encoding="utf-8")
+    changes = {"listen 80;": f"listen 127.0.0.1:{port};", "http {": f"http {{\n{_scratch(folder)}"}
+    for shipped, ours in zip(_SHIPPED_PORTS, upstreams, strict=True):
+        changes[f"server 127.0.0.1:{shipped} "] = f"server 127.0.0.1:{ours} "
+    for old, new in changes.items():
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return text
+
+
+def _scratch(folder: Path) -> str:
+    kinds = ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
+    return "".join(f"{kind}_temp_path {folder / kind};\n" for kind in kinds)
+
+
+@contextmanager
+def nginx(folder: Path, upstreams: Sequence[int]) -> Iterator[str]:
+    """nginx in front of three bridges on these ports of loopback; gives its address."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    file = folder / "nginx.conf"
+    file.write_text(configured(folder, port, upstreams), encoding="utf-8")
+    program = shutil.which("nginx", path=f"{os.environ['PATH']}:/usr/sbin")
+    assert program is not None, "nginx is needed: .ci/tools installs it"
+    own = f"daemon off; pid {folder / 'pid'}; error_log stderr warn;"
+    command = [program, "-p", str(folder), "-e", "stderr", "-c", str(file), "-g", own]
+    with Process(command, os.environ) as process:
+
+        def listens() -> bool:
+            assert process.exit_code is None, process.output
+            with socket.socket() as client:
+                return client.connect_ex(("127.0.0.1", port)) == 0
+
+        wait_for(listens, "nginx to listen")
+        yield f"http://127.0.0.1:{port}"

@@ -1,0 +1,221 @@
+"""Behind a real nginx, with the configuration that we ship: one twin, three replicas, a prefix."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidHandshake
+from websockets.sync.client import connect
+
+from tests.support.access import BEARER, TOKEN
+from tests.support.domains import own_domain
+from tests.support.live import attached, wait_until_ready
+from tests.support.messages import scan
+from tests.support.nginx import nginx
+from tests.support.processes import OFTEN, lupin_twin, twin_node
+from tests.support.ros import Peer
+from tests.support.rosbridge import Ros
+from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.web import Bridge
+
+# What a client may be without news of the twin (README, "WebSocket frames").
+BACK_WITHIN_S = 3.5
+CLIENTS = 12
+PAUSE_S = 0.5
+
+
+@dataclass
+class House:
+    """A twin, three replicas, and nginx before them."""
+
+    url: str
+    replicas: list[Bridge]
+    peer: Peer
+
+
+@pytest.fixture
+def house(tmp_path: Path) -> Iterator[House]:
+    with ExitStack() as stack:
+        domain = stack.enter_context(own_domain())
+        stack.enter_context(twin_node(domain, *OFTEN))
+        peer = stack.enter_context(Peer(domain))
+        options = ("--path-prefix", "/gh1", "--trusted-proxy", "127.0.0.1")
+        named = ("--allow-host", "twin.example")
+        processes = [
+            stack.enter_context(lupin_twin(domain, "web", *options, *named, LUPIN_TOKEN=TOKEN))
+            for _ in range(3)
+        ]
+        replicas = [stack.enter_context(attached(process, peer)) for process in processes]
+        for replica in replicas:
+            replica.http.headers.update(BEARER)
+            wait_until_ready(replica)
+        peer.observe(scan("a", {"co2": 400.0}, (0, 0)))
+        for replica in replicas:
+            replica.tag("a")
+        ports = [int(replica.url.rpartition(":")[2]) for replica in replicas]
+        yield House(stack.enter_context(nginx(tmp_path, ports)), replicas, peer)
+
+
+# --- everything below the prefix ------------------------------------------------------------------
+
+
+def test_the_page_and_all_that_it_asks_for_are_below_the_prefix(house: House) -> None:
+    with httpx.Client(base_url=house.url, trust_env=False, timeout=PATIENCE_S) as browser:
+        page = {"Accept": "text/html", "Host": "twin.example"}
+        # Led to the sign-in page, and in with its cookie.
+        asked = browser.get("/gh1/", headers=page)
+        assert (asked.status_code, asked.headers["location"]) == (303, "signin")
+        assert browser.get("/gh1/signin", headers=page).status_code == 200
+        signed_in = browser.get("/gh1/api/signin", headers=BEARER)
+        (cookie,) = signed_in.headers.get_list("set-cookie")
+        assert "Path=/gh1/" in cookie
+        assert "Secure" not in cookie, "nginx serves http here, and says so"
+        assert browser.get("/gh1", headers=page).headers["location"].endswith("/gh1/")
+        # Every replica takes the cookie; nothing outside the prefix gets it.
+        for _ in range(6):
+            home = browser.get("/gh1/", headers=page)
+            assert "Lupin twin" in home.text
+        assert not browser.get("/", headers=page).is_success
+        for name in (part.split('"')[0] for part in home.text.split('="./')[1:]):
+            assert browser.get(f"/gh1/{name}").status_code == 200, name
+        assert browser.get("/gh1/api/state").json()["tags"][0]["tag_id"] == "a"
+        docs = browser.get("/gh1/docs").text
+        assert f"curl '{house.url}/gh1/api/state'" in docs
+        assert browser.get("/gh1/openapi.json").json()["servers"] == [{"url": "/gh1"}]
+        ours, theirs = {"Origin": house.url}, {"Origin": "http://evil.example"}
+        assert browser.get("/gh1/api/state", headers=ours).status_code == 200
+        assert browser.get("/gh1/api/state", headers=theirs).status_code == 403
+        headers = {"Cookie": cookie.partition(";")[0], **ours}
+    with connect(ws(house), additional_headers=headers, proxy=None) as socket:
+        assert '"status"' in str(socket.recv(timeout=PATIENCE_S))
+    rosbridge = f"{house.url.replace('http', 'ws', 1)}/gh1/rosbridge"
+    with connect(rosbridge, additional_headers=headers, proxy=None) as socket:
+        assert Ros(socket).call("/rosapi/topics")["result"]
+
+
+def ws(house: House) -> str:
+    return house.url.replace("http", "ws", 1) + "/gh1/ws/state"
+
+
+def test_limits_and_logs_go_by_the_client_and_not_by_nginx(house: House) -> None:
+    wrong = {"Authorization": "Bearer " + "x" * 32, "X-Forwarded-For": "203.0.113.9"}
+    transport = httpx.HTTPTransport(local_address="127.0.0.9")
+    with httpx.Client(base_url=house.url, trust_env=False, transport=transport) as stranger:
+        # Ten at each of the three replicas.
+        for _ in range(31):
+            last = stranger.get("/gh1/api/state", headers=wrong)
+        assert last.status_code == 429
+    said = "".join(replica.process.output for replica in house.replicas)
+    assert "wrong token from 127.0.0.9" in said
+    assert "203.0.113.9" not in said
+    assert httpx.get(f"{house.url}/gh1/api/state", headers=BEARER, trust_env=False).is_success
+
+
+# --- a replica goes -------------------------------------------------------------------------------
+
+
+@dataclass
+class Screen:
+    """A client that does as the README says: back after half a second, later where that fails."""
+
+    url: str
+    gaps_s: list[float] = field(default_factory=list)
+    returns: int = 0
+    failures: int = 0
+    is_over: bool = False
+    last_frame_s: float = 0.0
+    problem: Exception | None = None
+
+    def run(self) -> None:
+        try:
+            while not self.is_over:
+                try:
+                    with connect(self.url, additional_headers=BEARER, proxy=None) as socket:
+                        self._watch(socket)
+                except (ConnectionClosed, InvalidHandshake, OSError):
+                    self.returns += 1
+                    self._pause()
+        except Exception as error:  # noqa: BLE001  # told by the test
+            self.problem = error
+
+    def _pause(self) -> None:
+        until_s = time.monotonic() + PAUSE_S * 2 ** min(self.failures, 5)
+        wait_for(lambda: time.monotonic() > until_s or self.is_over, "the pause")
+        self.failures += 1
+
+    def _watch(self, socket: Any) -> None:
+        while not self.is_over:
+            socket.recv(timeout=PATIENCE_S)
+            now_s = time.monotonic()
+            self.failures = 0
+            if self.last_frame_s:
+                self.gaps_s.append(now_s - self.last_frame_s)
+            self.last_frame_s = now_s
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_clients_of_a_replica_that_stops_under_load_are_back_in_time(
+    house: House, number: signal.Signals
+) -> None:
+    screens = [Screen(ws(house)) for _ in range(CLIENTS)]
+    threads = [threading.Thread(target=screen.run) for screen in screens]
+    load = Load(f"{house.url}/gh1/api/field?sensor_type=co2&resolution=0.02")
+    threads.append(threading.Thread(target=load.run))
+    for thread in threads:
+        thread.start()
+    try:
+        wait_for(lambda: all(screen.gaps_s for screen in screens), "frames at all clients")
+        wait_for(lambda: load.answers > 10, "answers under load")
+        before = load.answers
+        house.replicas[0].process.send(number)
+        wait_for(lambda: sum(screen.returns for screen in screens) > 0, "clients cut off")
+        house.peer.observe(scan("after", {"co2": 1.0}, (2, 0)))
+        house.replicas[0].process.wait()
+        deadline = time.monotonic() + BACK_WITHIN_S
+        wait_for(
+            lambda: (
+                time.monotonic() > deadline
+                and all(screen.last_frame_s > deadline for screen in screens)
+            ),
+            "all clients to go on",
+        )
+        wait_for(lambda: load.answers > before + 10, "answers from the other two")
+    finally:
+        load.is_over = True
+        for screen in screens:
+            screen.is_over = True
+        for thread in threads:
+            thread.join()
+    assert [screen.problem for screen in screens] == [None] * CLIENTS
+    worst_s = max(gap for screen in screens for gap in screen.gaps_s)
+    print(f"longest without a frame: {worst_s:.2f} s")
+    assert worst_s < BACK_WITHIN_S
+    assert load.refused == [], "nginx asks another replica"
+
+
+@dataclass
+class Load:
+    """Somebody who asks for fields all the time."""
+
+    url: str
+    answers: int = 0
+    refused: list[int] = field(default_factory=list)
+    is_over: bool = False
+
+    def run(self) -> None:
+        with httpx.Client(trust_env=False, headers=BEARER, timeout=PATIENCE_S) as client:
+            while not self.is_over:
+                status = client.get(self.url).status_code
+                # 429: the limit for one client; 503: the good-bye of a replica that is told to end.
+                if status not in (200, 429, 503):
+                    self.refused.append(status)
+                self.answers += 1

@@ -24,7 +24,7 @@ const TABLE: Table = {
     ...['strings', 'clock', 'contract', 'geometry', 'domain', 'draw', 'store'],
     ...['npm:react', 'npm:d3-selection', 'npm:d3-zoom'],
   ],
-  export: ['strings', 'clock', 'domain', 'draw', 'store'],
+  export: ['strings', 'clock', 'domain', 'draw', 'store', 'map'],
   ui: [
     ...['strings', 'clock', 'contract', 'geometry', 'domain', 'draw', 'store', 'map', 'export'],
     ...['npm:react', 'npm:react-dom'],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
+import signal
 import socket
 import subprocess
 import sys
@@ -13,7 +14,7 @@ from collections.abc import Sequence
 from lupin_bridge.access.entrance import Entrance
 from lupin_bridge.access.middleware import Access
 from lupin_bridge.access.policy import exposure
-from lupin_bridge.access.tls import check_pair
+from lupin_bridge.access.tls import Certificates, check_pair
 from lupin_bridge.app import create_app
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.serving.server import BridgeServer, address_of, allow_connections, listen
@@ -85,12 +86,25 @@ async def _run(
     patrol = Patrol(patrol_args) if role == "demo" else None
     url = address_of(listener, "https" if access.secure else "http")
     print(f"lupin-twin: {url}", flush=True)  # noqa: T201  # for people and scripts
+    renewal = _follow_certificates(settings, server)
     try:
         await server.serve(sockets=[listener])
     finally:
+        if renewal is not None:
+            renewal.cancel()
         if patrol is not None:
             patrol.terminate()
         await asyncio.gather(bridge.stop(), *([] if patrol is None else [patrol.wait()]))
+
+
+def _follow_certificates(settings: Settings, server: BridgeServer) -> asyncio.Task[None] | None:
+    """Renew the certificate when its files change, and at once at SIGHUP."""
+    server.config.load()
+    if server.config.ssl is None:
+        return None
+    certificates = Certificates(settings.tls_cert, settings.tls_key, server.config.ssl)
+    asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, certificates.look)
+    return asyncio.create_task(certificates.watch(), name="certificates")
 
 
 def _warn_of_exposure(listener: socket.socket, access: Access) -> None:

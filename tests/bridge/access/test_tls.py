@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import ssl
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,6 +20,7 @@ from websockets.sync.client import connect
 from lupin_bridge.access.tls import TlsError, check_pair
 from tests.support.access import BEARER, TOKEN, Served, refused_start, served
 from tests.support.tls import Certificate, certificate
+from tests.support.waiting import wait_for
 from tests.support.web import Listener, ws_url
 
 
@@ -140,6 +142,74 @@ def test_old_versions_of_tls_are_refused(secure: Served, ours: Certificate) -> N
 def test_plain_http_gets_nowhere(secure: Served) -> None:
     with pytest.raises(httpx.TransportError):
         Served(secure.process, secure.url.replace("https", "http")).get("/healthz")
+
+
+# --- renewed ------------------------------------------------------------------------------------
+
+
+def renew(ours: Certificate, folder: Path) -> Certificate:
+    """Put a new pair into the place of the one that is served."""
+    folder.mkdir()
+    new = certificate(folder)
+    new.key.replace(ours.key)
+    new.cert.replace(ours.cert)
+    return Certificate(ours.cert, ours.key, new.trust)
+
+
+def is_trusted(live: Served, trust: ssl.SSLContext) -> bool:
+    try:
+        return Served(live.process, live.url, trust).get("/healthz").status_code == 200
+    except httpx.ConnectError:
+        return False
+
+
+@pytest.mark.parametrize("is_told", [True, False])
+def test_a_new_pair_is_served_to_whoever_connects_from_now_on(
+    tmp_path: Path, is_told: bool
+) -> None:
+    old = certificate(tmp_path)
+    with (
+        served(*old.options, trust=old.trust) as live,
+        connect(ws_url(live.url), ssl=old.trust, proxy=None) as connection,
+        live.client() as kept,
+    ):
+        frames = Listener(connection)
+        frames.until("state")
+        assert kept.get("/healthz").status_code == 200
+        new = renew(old, tmp_path / "new")
+        if is_told:
+            live.process.send(signal.SIGHUP)
+        wait_for(lambda: is_trusted(live, new.trust), "the new certificate")
+        assert not is_trusted(live, old.trust)
+        assert live.process.output.count("new connections get the TLS certificate") == 1
+        # Who was there before goes on.
+        frames.rest()
+        frames.until("state")
+        assert kept.get("/healthz").status_code == 200
+
+
+def test_a_broken_new_pair_is_told_once_and_the_old_one_goes_on(tmp_path: Path) -> None:
+    ours = certificate(tmp_path)
+    key = ours.key.read_bytes()
+    with served(*ours.options, trust=ours.trust) as live:
+        other = certificate(tmp_path, "other")
+        for content, said in (
+            (b"nonsense", "is no usable private key"),
+            (other.key.read_bytes(), "is not the key of"),
+            (None, "No such file or directory"),
+        ):
+            ours.key.unlink()
+            if content is not None:
+                ours.key.write_bytes(content)
+            for _ in range(3):
+                live.process.send(signal.SIGHUP)
+                assert is_trusted(live, ours.trust)
+            live.process.wait_for_output(said)
+            assert live.process.output.count(said) == 1
+        assert live.process.output.count("is refused, the old one goes on: --tls-key") == 3
+        ours.key.write_bytes(key)
+        live.process.wait_for_output("new connections get the TLS certificate")
+        assert is_trusted(live, ours.trust)
 
 
 def _authority(trust: ssl.SSLContext) -> bytes:

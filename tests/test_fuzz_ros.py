@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import random
 from collections.abc import Callable, Iterator
-from itertools import count
+from itertools import count, islice
 from typing import Any
 
 import pytest
@@ -24,6 +24,7 @@ from tests.support.hostile import (
     TEXTS,
     any_state,
     damaged,
+    long_lies,
 )
 from tests.support.live import attached, wait_until_ready
 from tests.support.messages import discovered, look, pose, scan
@@ -180,6 +181,21 @@ def test_bytes_that_are_no_message_are_survived(both: tuple[Bridge, Bridge], top
         survive(both, publish)
 
 
+@pytest.mark.parametrize("topic", ANY)
+def test_lengths_that_lie_cost_no_more_than_their_bytes(
+    both: tuple[Bridge, Bridge], topic: str
+) -> None:
+    message_type = type(ANY[topic](random.Random(topic)))
+
+    def publish(peer: Peer) -> None:
+        for lie in lot:
+            peer.publisher(topic, message_type).publish(lie)
+
+    every = iter(long_lies(message_type))
+    while lot := list(islice(every, 10)):
+        survive(both, publish)
+
+
 def test_requests_for_fields_of_any_numbers_are_answered(both: tuple[Bridge, Bridge]) -> None:
     chance = random.Random(3)
     numbers = (NAN, float("inf"), -1.0, 0.0, 1e-45, 0.1, 3e38, -3e38)
@@ -205,11 +221,14 @@ def test_a_bridge_apart_survives_a_twin_that_is_none() -> None:
         attached(process, peer) as live,
     ):
         topic = "/twin/state"
+        state_lies = long_lies(TwinState)
         peer.until(lambda: peer.node.count_subscribers(topic), "the bridge")
         memory = None
         for number in range(LOTS * LOT):
             state = any_state(chance)
-            if number % 2:
+            if number % LOT == 0:
+                peer.publisher(topic, TwinState, depth=1).publish(chance.choice(state_lies))
+            elif number % 2:
                 peer.publisher(topic, TwinState, depth=1).publish(damaged(state, chance))
             else:
                 peer.publish(topic, state, depth=1)

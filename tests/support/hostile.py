@@ -4,9 +4,16 @@ from __future__ import annotations
 
 import random
 from array import array
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
 
+import builtin_interfaces.msg
+import geometry_msgs.msg
+import lupin_msgs.msg
+import nav_msgs.msg
+import rcl_interfaces.msg
+import std_msgs.msg
+import type_description_interfaces.msg
 from geometry_msgs.msg import Point, Point32, Pose, Quaternion
 from lupin_msgs.msg import (
     DiscoveredTag,
@@ -19,6 +26,20 @@ from lupin_msgs.msg import (
 )
 from nav_msgs.msg import OccupancyGrid
 from rclpy.serialization import serialize_message
+
+# The messages of each package, for `lupin_twin.cdr`.
+PACKAGES: Final[Mapping[str, Any]] = {
+    module.__name__.partition(".")[0]: module
+    for module in (
+        builtin_interfaces.msg,
+        geometry_msgs.msg,
+        lupin_msgs.msg,
+        nav_msgs.msg,
+        rcl_interfaces.msg,
+        std_msgs.msg,
+        type_description_interfaces.msg,
+    )
+}
 
 NAN, INF = float("nan"), float("inf")
 DOUBLES: Final = (NAN, INF, -INF, 0.0, -0.0, 1e300, -1e300, 5e-324, 1.7976931348623157e308, 21.5)
@@ -172,3 +193,35 @@ def damaged(message: Any, chance: random.Random) -> bytes:
                 (b"\xff\xff\xff\xff", b"\x00\x00\x00\x7f", b"\xff" * 4)
             )
     return bytes(data)
+
+
+def lies(data: bytes, within: int | None = None) -> Iterator[bytes]:
+    """A message (CDR) with each of its words replaced by a length that its bytes do not hold.
+
+    `within`: each word of the first so many bytes.
+    """
+    for at in range(4, len(data) - 3 if within is None else within - 3, 4):
+        for claim in claims(data, at):
+            yield lie_at(data, at, claim)
+
+
+def long_lies(message_type: Any) -> list[bytes]:
+    """A message with half a million bytes behind it, each of its words a claim to them all."""
+    whole = serialize_message(message_type())
+    long = whole + bytes(500_000)
+    return [lie_at(long, at, claims(long, at)[0]) for at in range(4, len(whole) - 3, 4)]
+
+
+def claims(data: bytes, at: int) -> tuple[int, ...]:
+    """Lengths that the bytes behind the word at `at` do not hold.
+
+    As many elements as there are bytes is the worst: a deserialiser that asks for one byte an
+    element makes room for them all.
+    """
+    left = len(data) - at - 4
+    return (left, left // 2, left + 1, 2**31 - 1, 2**32 - 1)
+
+
+def lie_at(data: bytes, at: int, claim: int) -> bytes:
+    """A message (CDR, little-endian) whose word at `at` says `claim`."""
+    return data[:at] + claim.to_bytes(4, "little") + data[at + 4 :]

@@ -29,7 +29,7 @@ ROS = frozenset(
 )
 # The modules that know ROS; all others have to run, and be tested, without it.
 KNOW_ROS = {
-    "lupin_twin": {"cli", "convert", "habits", "node", "ros_parameters", "spinning"},
+    "lupin_twin": {"cli", "convert", "habits", "node", "ros_parameters", "shapes", "spinning"},
     "lupin_patrol": {"cli", "messages", "node"},
     "lupin_bridge": {"twin.ros_logs", "twin.ros_thread", "twin.web_node"},
 }
@@ -76,6 +76,8 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
         "twin_count": set(),
         "spinning": set(),
         "workers": set(),
+        "cdr": set(),
+        "shapes": {"cdr", "state"},
         "explored": {"grid"},
         "field_cache": {"grid"},
         "field_quality": {"state", "grid", "idw"},
@@ -83,7 +85,7 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
         "ingest": {"drops", "state"},
         "convert": {"state", "grid", "explored", "fields", "ingest"},
         "ros_parameters": {"parameters"},
-        "habits": {"drops", "ros_parameters", "throttle"},
+        "habits": {"cdr", "drops", "ros_parameters", "throttle"},
         "node": {
             "convert",
             "explored",
@@ -94,6 +96,7 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
             "ingest",
             "parameters",
             "ros_parameters",
+            "shapes",
             "state",
             "twin_count",
         },

@@ -12,9 +12,13 @@ from rclpy.context import Context
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 
+from lupin_twin.cdr import MessageShape
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.habits import WARNING_PERIOD_S, Habits, latched, read_message
+from tests.support.hostile import PACKAGES, lies
 from tests.support.messages import scan
+
+SHAPE = MessageShape(Observation, PACKAGES, max_bytes=1_000)
 
 
 class Logged:
@@ -58,16 +62,23 @@ def test_latched_is_reliable_transient_local_and_keeps_the_last() -> None:
 
 def test_a_message_is_read_up_to_its_limit_and_dropped_past_it() -> None:
     data = serialize_message(scan("1", {"co2": 1.0}))
-    read: Any = read_message(data, Observation, len(data))
+    read: Any = read_message(data, MessageShape(Observation, PACKAGES, max_bytes=len(data)))
     assert read.tag_reading.tag_id == "1"
-    drop = read_message(data, Observation, len(data) - 1)
+    drop = read_message(data, MessageShape(Observation, PACKAGES, max_bytes=len(data) - 1))
     assert drop == Drop(Reason.SIZE, f"{len(data)} bytes, the limit is {len(data) - 1}")
 
 
 def test_what_cannot_be_read_is_a_drop() -> None:
-    drop = read_message(serialize_message(scan("1", {"co2": 1.0}))[:50], Observation, 1_000)
+    drop = read_message(serialize_message(scan("1", {"co2": 1.0}))[:50], SHAPE)
     assert isinstance(drop, Drop)
     assert drop.reason is Reason.UNREADABLE
+
+
+def test_a_length_that_lies_is_told_of_by_its_field() -> None:
+    drops = (read_message(lie, SHAPE) for lie in lies(serialize_message(scan("1"))))
+    whys = [drop.why for drop in drops if isinstance(drop, Drop)]
+    for field in ("header.frame_id claims", "tag_reading.readings: ", "flower.flowers: "):
+        assert any(why.startswith(field) and why.endswith(" bytes are left") for why in whys), field
 
 
 def test_a_subscription_hands_on_messages_and_tells_of_the_others(
@@ -77,9 +88,8 @@ def test_a_subscription_hands_on_messages_and_tells_of_the_others(
     topic = habits.subscribe(
         "observations_topic",
         "some/observations",
-        Observation,
+        SHAPE,
         depth=3,
-        max_bytes=1_000,
         group=None,
         callback=taken.append,
     )

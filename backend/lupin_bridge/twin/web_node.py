@@ -10,13 +10,11 @@ from dataclasses import replace
 from hashlib import blake2b
 from typing import Any, Final
 
-from lupin_msgs.msg import TwinState
 from lupin_msgs.srv import GetField
-from nav_msgs.msg import OccupancyGrid
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 
-from lupin_twin import convert, ingest
+from lupin_twin import convert, ingest, shapes
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRequest
@@ -29,10 +27,6 @@ from lupin_twin.twin_count import TwinCount
 NODE_NAME: Final = "lupin_web"
 # DDS finds a twin's publisher and its service each on its own, one at times a little later.
 NEW_TWIN_S: Final = 2.0
-
-# 20,000 tags with all their flowers; a larger state is dropped before it becomes objects.
-MAX_STATE_BYTES: Final = 128_000_000
-MAX_MAP_BYTES: Final = 64_000_000
 
 # The twin's parameters that a consumer has to know too. They are not on the wire: where the twin's
 # are not the defaults, give both the same parameter file.
@@ -90,18 +84,12 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._topics: dict[str, str] = {}
         group = MutuallyExclusiveCallbackGroup()
         p = self.parameters
-        for parameter, message_type, max_bytes, callback in (
-            ("state_topic", TwinState, MAX_STATE_BYTES, self._take_state),
-            ("map_topic", OccupancyGrid, MAX_MAP_BYTES, self._take_map),
+        for parameter, shape, callback in (
+            ("state_topic", shapes.STATE, self._take_state),
+            ("map_topic", shapes.MAP, self._take_map),
         ):
             self._topics[parameter] = self.habits.subscribe(
-                parameter,
-                getattr(p, parameter),
-                message_type,
-                depth=1,
-                max_bytes=max_bytes,
-                group=group,
-                callback=callback,
+                parameter, getattr(p, parameter), shape, depth=1, group=group, callback=callback
             )
         with naming("field_service_name", p.field_service_name):
             self.field_client = self.create_client(

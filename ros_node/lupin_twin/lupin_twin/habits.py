@@ -1,6 +1,6 @@
 """What every node of the project does alike: latched QoS, guarded callbacks, throttled warnings.
 
-Also how a message is read: raw, so that its size is checked before it becomes objects, and one
+Also how a message is read: raw, so that its lengths are checked before it becomes objects, and one
 that cannot be read is told of with its topic.
 """
 
@@ -15,6 +15,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
+from lupin_twin.cdr import MessageShape, TooManyError
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.ros_parameters import naming
 from lupin_twin.throttle import Throttle
@@ -36,12 +37,16 @@ def latched(depth: int) -> QoSProfile:
     )
 
 
-def read_message(data: bytes, message_type: Any, max_bytes: int) -> Any | Drop:
-    """The message that `data` holds, serialised; a drop, where it is too large or none."""
-    if len(data) > max_bytes:
-        return Drop(Reason.SIZE, f"{len(data)} bytes, the limit is {max_bytes}")
+def read_message(data: bytes, shape: MessageShape) -> Any | Drop:
+    """The message that `data` holds, serialised; a drop, where it is too large or none.
+
+    Its lengths are checked first: ROS would make room for whatever they claim.
+    """
     try:
-        return deserialize_message(data, message_type)
+        shape.check(data)
+        return deserialize_message(data, shape.message_type)
+    except TooManyError as error:
+        return Drop(Reason.SIZE, str(error))
     except Exception as error:  # noqa: BLE001  # rclpy raises several kinds
         return Drop(Reason.UNREADABLE, str(error), "an unreadable message")
 
@@ -58,18 +63,17 @@ class Habits:
         self,
         parameter: str,
         topic: str,
-        message_type: Any,
+        shape: MessageShape,
         *,
         depth: int,
-        max_bytes: int,
         group: Any,
         callback: Callable[[Any], None],
     ) -> str:
         """Have `callback(message)` called, guarded, for each message on a latched topic.
 
         `parameter` is what gave the name. Returns the topic as ROS has resolved and remapped it:
-        that is the name in its graph, and in warnings. What weighs more than `max_bytes` serialised
-        is dropped before a single Python object is made of it.
+        that is the name in its graph, and in warnings. What is past the limits of `shape` is
+        dropped before a single object is made of it.
 
         Raises:
             lupin_twin.parameters.ParameterError: a name that ROS does not take.
@@ -78,7 +82,7 @@ class Habits:
 
         def take(data: bytes) -> None:
             name = str(subscription.topic_name)
-            message = read_message(data, message_type, max_bytes)
+            message = read_message(data, shape)
             if isinstance(message, Drop):
                 self.drop(message, name)
             else:
@@ -86,7 +90,7 @@ class Habits:
 
         with naming(parameter, topic):
             subscription = self._node.create_subscription(
-                message_type, topic, take, latched(depth), callback_group=group, raw=True
+                shape.message_type, topic, take, latched(depth), callback_group=group, raw=True
             )
         return str(subscription.topic_name)
 

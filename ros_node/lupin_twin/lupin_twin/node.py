@@ -10,14 +10,13 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
-from lupin_msgs.msg import DiscoveredTags, Observation, TwinState
+from lupin_msgs.msg import TwinState
 from lupin_msgs.srv import GetField
-from nav_msgs.msg import OccupancyGrid
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from lupin_twin import convert, ingest
+from lupin_twin import convert, ingest, shapes
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.field_cache import FieldCache
@@ -29,13 +28,6 @@ from lupin_twin.state import Snapshot, TwinStore
 from lupin_twin.twin_count import TwinCount
 
 NODE_NAME: Final = "lupin_twin"
-
-# What one serialised message may weigh. An observation with 2,000 flowers has some 150 kB, a
-# discovery of 20,000 tags 2.5 MB, a map of 4,000 × 4,000 cells 16 MB. A larger one is dropped
-# before a single Python object is made of it.
-MAX_OBSERVATION_BYTES: Final = 1_000_000
-MAX_DISCOVERED_TAGS_BYTES: Final = 8_000_000
-MAX_MAP_BYTES: Final = 64_000_000
 
 
 def field_rules(parameters: TwinParameters) -> FieldRules:
@@ -109,25 +101,13 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def _connect(self) -> None:
         p = self.parameters
         group = self._group
-        for parameter, message_type, depth, max_bytes, callback in (
-            ("observations_topic", Observation, 50, MAX_OBSERVATION_BYTES, self._on_observation),
-            (
-                "discovered_tags_topic",
-                DiscoveredTags,
-                50,
-                MAX_DISCOVERED_TAGS_BYTES,
-                self._on_discovered_tags,
-            ),
-            ("map_topic", OccupancyGrid, 1, MAX_MAP_BYTES, self._on_map),
+        for parameter, shape, depth, callback in (
+            ("observations_topic", shapes.OBSERVATION, 50, self._on_observation),
+            ("discovered_tags_topic", shapes.DISCOVERED_TAGS, 50, self._on_discovered_tags),
+            ("map_topic", shapes.MAP, 1, self._on_map),
         ):
             self._topics[parameter] = self.habits.subscribe(
-                parameter,
-                getattr(p, parameter),
-                message_type,
-                depth=depth,
-                max_bytes=max_bytes,
-                group=group,
-                callback=callback,
+                parameter, getattr(p, parameter), shape, depth=depth, group=group, callback=callback
             )
         with naming("state_topic", p.state_topic):
             self._state_publisher = self.create_publisher(TwinState, p.state_topic, latched(1))

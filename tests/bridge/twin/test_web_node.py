@@ -286,7 +286,7 @@ def test_a_state_that_breaks_the_callback_is_counted_and_the_next_one_is_taken(
     assert stage.take(peer, tag("2")).tags[0].tag_id == "2"
 
 
-@pytest.mark.parametrize(("topic", "limit"), [("/twin/state", 128_000_000), ("/map", 64_000_000)])
+@pytest.mark.parametrize(("topic", "limit"), [("/twin/state", 64_000_000), ("/map", 64_000_000)])
 def test_a_message_past_the_limit_is_dropped_before_it_is_read(
     stage: Stage, caplog: pytest.LogCaptureFixture, topic: str, limit: int
 ) -> None:

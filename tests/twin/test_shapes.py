@@ -1,0 +1,83 @@
+"""What is taken of each topic: each limit, and one past it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import Point32
+from lupin_msgs.msg import (
+    DiscoveredTag,
+    DiscoveredTags,
+    FlowerPoint,
+    Observation,
+    SensorReading,
+    TwinState,
+    TwinTagState,
+)
+from rclpy.serialization import serialize_message
+
+from lupin_twin import shapes
+from lupin_twin.cdr import MessageShape, TooManyError
+from lupin_twin.state import (
+    MAX_BLOOMS_PER_TAG,
+    MAX_FOOTPRINT_POINTS,
+    MAX_ITEMS,
+    MAX_SENSORS_PER_TAG,
+    MAX_TAGS,
+)
+
+
+def readings(count: int) -> Any:
+    msg = Observation()
+    msg.tag_reading.readings = [SensorReading()] * count
+    return msg
+
+
+def flowers(count: int) -> Any:
+    msg = Observation()
+    msg.flower.flowers = [FlowerPoint()] * count
+    return msg
+
+
+def corners(count: int) -> Any:
+    msg = Observation()
+    msg.flower.box_footprint.points = [Point32()] * count
+    return msg
+
+
+@pytest.mark.parametrize(
+    ("shape", "message", "limit", "name"),
+    [
+        (shapes.OBSERVATION, readings, MAX_SENSORS_PER_TAG, "tag_reading.readings"),
+        (shapes.OBSERVATION, flowers, MAX_BLOOMS_PER_TAG, "flower.flowers"),
+        (shapes.OBSERVATION, corners, MAX_FOOTPRINT_POINTS, "flower.box_footprint.points"),
+        (
+            shapes.DISCOVERED_TAGS,
+            lambda count: DiscoveredTags(tags=[DiscoveredTag()] * count),
+            MAX_TAGS,
+            "tags",
+        ),
+        (shapes.STATE, lambda count: TwinState(tags=[TwinTagState()] * count), MAX_TAGS, "tags"),
+    ],
+)
+def test_as_many_as_can_be_kept_are_taken_and_not_one_more(
+    shape: MessageShape, message: Callable[[int], Any], limit: int, name: str
+) -> None:
+    assert shape.check(serialize_message(message(limit)))
+    with pytest.raises(TooManyError, match=rf"^{name}: {limit + 1}, the limit is {limit}$"):
+        shape.check(serialize_message(message(limit + 1)))
+
+
+def test_a_state_holds_as_many_items_as_a_twin_keeps_and_not_one_more() -> None:
+    # One tag with all of them: of what kind they are, and whose, is all the same.
+    empty = serialize_message(TwinState(tags=[TwinTagState()]))
+    for count, is_taken in ((MAX_ITEMS + MAX_TAGS - 1, True), (MAX_ITEMS + MAX_TAGS, False)):
+        # The last sequence of the message: points of three float32.
+        data = empty[:-4] + count.to_bytes(4, "little") + bytes(12 * count)
+        if is_taken:
+            assert shapes.STATE.check(data) == len(data)
+        else:
+            with pytest.raises(TooManyError, match=r"^tags.box_footprint.points: more elements"):
+                shapes.STATE.check(data)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
+import os
 import signal
 import socket
 import subprocess
@@ -19,8 +20,10 @@ from lupin_bridge.app import create_app
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.serving.server import BridgeServer, address_of, allow_connections, listen
 from lupin_bridge.settings import SettingError, Settings
+from lupin_bridge.supervisor import Supervisor
 from lupin_bridge.twin.local_twin import LocalTwin
 from lupin_bridge.twin.ros_thread import RosStartError
+from lupin_bridge.twin.source import ailment
 from lupin_bridge.twin.web_twin import WebTwin
 from lupin_twin.parameters import ParameterError
 
@@ -73,11 +76,18 @@ async def _run(
         ) from error
     _warn_of_exposure(listener, access)
     allow_connections(settings.max_clients)
+    # Before a process is started that would inherit its variables.
+    supervisor = Supervisor(os.environ)
     make_source = WebTwin if role == "web" else LocalTwin
     source = make_source(ros_args=ros_args, timeout_s=settings.field_timeout_s)
     bridge = Bridge(source, settings)
     app = create_app(bridge, access=access, entrance=entrance)
-    server = BridgeServer(app, settings, bridge.say_goodbye)
+
+    def say_goodbye() -> None:
+        supervisor.stopping()
+        bridge.say_goodbye()
+
+    server = BridgeServer(app, settings, say_goodbye)
     await bridge.start()
     # The 100,000 objects of all modules are here to stay. Each full collection would walk through
     # them, 30 to 50 ms during which nobody is served.
@@ -86,10 +96,13 @@ async def _run(
     patrol = Patrol(patrol_args) if role == "demo" else None
     url = address_of(listener, "https" if access.secure else "http")
     print(f"lupin-twin: {url}", flush=True)  # noqa: T201  # for people and scripts
+    supervisor.ready(f"serving {url}")
+    living = asyncio.create_task(supervisor.keep_alive(lambda: ailment(source)), name="watchdog")
     renewal = _follow_certificates(settings, server)
     try:
         await server.serve(sockets=[listener])
     finally:
+        living.cancel()
         if renewal is not None:
             renewal.cancel()
         if patrol is not None:

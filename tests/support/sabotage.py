@@ -21,10 +21,10 @@ from tests.support.domains import ros_env
 from tests.support.processes import Process
 
 
-def sabotaged(domain: int, faults: Sequence[str], program: str, *args: str) -> Process:
+def sabotaged(domain: int, faults: Sequence[str], program: str, *args: str, **env: str) -> Process:
     """A process that runs a module with faults, each as it stands on the command line."""
     command = [sys.executable, "-m", "tests.support.sabotage", *faults, program, *args]
-    return Process(command, ros_env(domain))
+    return Process(command, ros_env(domain, **env))
 
 
 def main() -> None:

@@ -135,6 +135,7 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
 ROOMS: Mapping[str, set[str]] = {
     "logs": set(),
     "metrics": set(),
+    "supervisor": set(),
     "settings": {"logs"},
     "configuration": {"settings"},
     "serving": {"settings"},
@@ -156,7 +157,7 @@ ROOMS: Mapping[str, set[str]] = {
         "twin",
     },
     "app": {"access", "bridge", "routes", "serving", "stream"},
-    "roles": {"access", "app", "bridge", "serving", "settings", "twin"},
+    "roles": {"access", "app", "bridge", "serving", "settings", "supervisor", "twin"},
     "cli": {"configuration", "logs", "roles", "settings"},
     "openapi": {"app"},
 }

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Request, Response
 from lupin_bridge.metrics import CONTENT_TYPE
 from lupin_bridge.routes.tools import NEVER_KEEP, bridge_of, json_response, read_route
 from lupin_bridge.stream import schema
+from lupin_bridge.twin.source import ailment
 
 router = APIRouter()
 
@@ -18,19 +19,22 @@ router = APIRouter()
     summary="Is the bridge itself alive?",
     responses={
         200: {"model": schema.Health},
-        503: {"model": schema.Health, "description": "the ROS thread has ended: restart"},
+        503: {
+            "model": schema.Health,
+            "description": "the ROS thread has ended, or is stuck: restart",
+        },
     },
 )
 async def healthz(request: Request) -> Response:
-    """503 when the ROS thread has ended, for whoever restarts services."""
+    """503 when the ROS thread has ended or hangs in a callback, for whoever restarts services."""
     source = bridge_of(request).source
-    alive = source.is_alive
+    wrong = ailment(source)
     body = {
-        "ok": alive,
-        "message": "The ROS thread runs." if alive else "The ROS thread has ended. Restart.",
+        "ok": wrong is None,
+        "message": wrong or "The ROS thread runs.",
         "callback_errors": source.callback_errors,
     }
-    return json_response(orjson.dumps(body), 200 if alive else 503)
+    return json_response(orjson.dumps(body), 200 if wrong is None else 503)
 
 
 @read_route(

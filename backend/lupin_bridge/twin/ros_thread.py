@@ -26,6 +26,8 @@ log = logging.getLogger(__name__)
 # A stop waits this long for the ROS thread. A callback that computes a huge field takes longer
 # and cannot be interrupted: it is left behind, and the process ends without it (`cli.leave`).
 STOP_TIMEOUT_S = 0.9
+# How long after one heartbeat came back the next one is sent.
+BEAT_PERIOD_S = 1.0
 
 
 class RosStartError(RuntimeError):
@@ -77,6 +79,9 @@ class RosThread(Generic[NodeT, EventT]):
         self._node: NodeT | None = None
         self._newest: EventT | None = None
         self._calls_waiting = 0
+        self._beating: asyncio.Task[None] | None = None
+        # When the heartbeat was sent that has not come back yet; loop's clock.
+        self._beat_sent_s: float | None = None
         self._is_waking = False
         self._is_stopping = False
 
@@ -94,10 +99,13 @@ class RosThread(Generic[NodeT, EventT]):
         self._started = self._loop.create_future()
         self._thread.start()
         await self._started
+        self._beating = asyncio.create_task(self._beat(), name="heartbeat")
 
     async def stop(self) -> None:
         """Stop the node and join the thread."""
         was_stopping, self._is_stopping = self._is_stopping, True
+        if self._beating is not None:
+            self._beating.cancel()
         if not was_stopping and self._executor is not None and self._thread.is_alive():
             end_spinning(self._executor)
         # A callback that runs now ends first: not to be waited for on the loop.
@@ -109,6 +117,11 @@ class RosThread(Generic[NodeT, EventT]):
     def is_alive(self) -> bool:
         """Whether the thread runs."""
         return self._thread.is_alive()
+
+    @property
+    def stuck_s(self) -> float:
+        """How long a heartbeat through the thread has been on its way, s; 0: none is."""
+        return 0.0 if self._beat_sent_s is None else self._loop.time() - self._beat_sent_s
 
     @property
     def calls_waiting(self) -> int:
@@ -198,6 +211,15 @@ class RosThread(Generic[NodeT, EventT]):
             if self._executor is not None and not self._is_stopping:
                 self._executor.create_task(end)
             raise
+
+    async def _beat(self) -> None:
+        while self._executor is not None:
+            back = self._loop.create_future()
+            self._beat_sent_s = self._loop.time()
+            self._executor.create_task(self._to_loop, _settle, back, None, None)
+            await back
+            self._beat_sent_s = None
+            await asyncio.sleep(BEAT_PERIOD_S)
 
     def _require_node(self) -> NodeT:
         if self._node is None:

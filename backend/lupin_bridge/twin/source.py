@@ -5,12 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Final, Protocol
 
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRequest, FieldRules
 from lupin_twin.grid import FieldGrid
 from lupin_twin.state import Observation, Snapshot
+
+# What a callback may take at worst, on a slow machine: the largest state there is takes a second.
+STUCK_AFTER_S: Final = 10.0
 
 
 class TwinUnavailableError(RuntimeError):
@@ -76,6 +79,10 @@ class TwinSource(Protocol):
         """Whether the thread behind this source runs."""
 
     @property
+    def stuck_s(self) -> float:
+        """How long the thread has not answered a heartbeat, s; 0 between two."""
+
+    @property
     def calls_waiting(self) -> int:
         """Calls that wait for the ROS thread now."""
 
@@ -112,3 +119,12 @@ class TwinSource(Protocol):
 
     async def history(self, tag_id: str) -> tuple[Observation, ...] | None:
         """The last scans of a tag; None: no such tag."""
+
+
+def ailment(source: TwinSource) -> str | None:
+    """What is wrong with the thread behind a source so that only a restart helps; None: nothing."""
+    if not source.is_alive:
+        return "The ROS thread has ended. Restart."
+    if source.stuck_s >= STUCK_AFTER_S:
+        return f"The ROS thread has been stuck in a callback for {source.stuck_s:.0f} s. Restart."
+    return None

@@ -70,6 +70,11 @@ class WebTwin:
         return self._thread.is_alive
 
     @property
+    def stuck_s(self) -> float:
+        """How long the ROS thread has not answered a heartbeat, s."""
+        return self._thread.stuck_s
+
+    @property
     def calls_waiting(self) -> int:
         """Calls that wait for the ROS thread now."""
         return self._thread.calls_waiting

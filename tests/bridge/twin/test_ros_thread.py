@@ -124,6 +124,20 @@ def test_before_the_start_and_after_the_end_there_is_nobody_to_call(domain: int)
     run(domain, test())
 
 
+def test_a_heartbeat_tells_of_a_callback_that_hangs_and_that_it_goes_on(domain: int) -> None:
+    async def test() -> None:
+        async with Stage() as stage:
+            gate = threading.Event()
+            held = asyncio.create_task(stage.ros.call(lambda _: gate.wait(20.0)))
+            await until(lambda: stage.ros.stuck_s > 0.5, "a heartbeat that does not come back")
+            assert stage.ros.is_alive
+            gate.set()
+            await held
+            await until(lambda: stage.ros.stuck_s == 0.0, "it to come back")
+
+    run(domain, test())
+
+
 # --- towards the loop ---------------------------------------------------------------------------
 
 

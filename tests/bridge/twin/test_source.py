@@ -13,10 +13,12 @@ import pytest
 
 from lupin_bridge.twin.local_twin import LocalTwin
 from lupin_bridge.twin.source import (
+    STUCK_AFTER_S,
     Revised,
     TwinSource,
     TwinTimeoutError,
     TwinUnavailableError,
+    ailment,
 )
 from lupin_bridge.twin.web_twin import WebTwin
 from lupin_twin.fields import FieldRefused, FieldRequest
@@ -150,3 +152,26 @@ def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
             await source.field(REQUEST)
 
     run(domain, test())
+
+
+class Thread:
+    """What `ailment` looks at."""
+
+    def __init__(self, is_alive: bool, stuck_s: float) -> None:
+        self.is_alive, self.stuck_s = is_alive, stuck_s
+
+
+@pytest.mark.parametrize(
+    ("is_alive", "stuck_s", "said"),
+    [
+        (True, 0.0, None),
+        (True, STUCK_AFTER_S - 0.001, None),
+        (True, STUCK_AFTER_S, "The ROS thread has been stuck in a callback for 10 s. Restart."),
+        (False, 0.0, "The ROS thread has ended. Restart."),
+        (False, 60.0, "The ROS thread has ended. Restart."),
+    ],
+)
+def test_a_thread_that_only_a_restart_helps_is_told(
+    is_alive: bool, stuck_s: float, said: str | None
+) -> None:
+    assert ailment(Thread(is_alive, stuck_s)) == said  # type: ignore[arg-type]

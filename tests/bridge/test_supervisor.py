@@ -1,0 +1,174 @@
+"""What systemd is told, over the socket that it listens on."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from lupin_bridge.supervisor import Supervisor
+from lupin_bridge.twin.source import STUCK_AFTER_S
+from tests.support.messages import scan
+from tests.support.processes import lupin_twin, url_of
+from tests.support.ros import Peer
+from tests.support.sabotage import sabotaged
+from tests.support.waiting import PATIENCE_S, wait_for
+
+
+class Manager:
+    """The service manager's side: a datagram socket, and what has come."""
+
+    def __init__(self, address: str) -> None:
+        self.address = address
+        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.socket.bind(address.replace("@", "\0"))
+        self.socket.settimeout(PATIENCE_S)
+
+    def next(self, timeout_s: float = PATIENCE_S) -> dict[str, str]:
+        self.socket.settimeout(timeout_s)
+        lines = self.socket.recv(4096).decode().splitlines()
+        return dict(line.split("=", 1) for line in lines)
+
+    def rest(self) -> list[dict[str, str]]:
+        """What has come so far and was not read."""
+        found = []
+        try:
+            while True:
+                found.append(self.next(timeout_s=0.0))
+        except BlockingIOError:
+            return found
+
+
+@pytest.fixture(params=["path", "abstract"])
+def manager(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Manager]:
+    own = str(tmp_path / "notify") if request.param == "path" else f"@lupin-{tmp_path}"
+    manager = Manager(own)
+    yield manager
+    manager.socket.close()
+
+
+def test_it_tells_what_it_is_told_to_and_nothing_of_it_is_inherited(manager: Manager) -> None:
+    environment = {"NOTIFY_SOCKET": manager.address, "WATCHDOG_USEC": "30000000", "HOME": "/"}
+    supervisor = Supervisor(environment)
+    assert environment == {"HOME": "/"}
+    assert supervisor.watchdog_s == 30.0
+    supervisor.ready("serving http://127.0.0.1:8000")
+    assert manager.next() == {"READY": "1", "STATUS": "serving http://127.0.0.1:8000"}
+    supervisor.stopping()
+    assert manager.next() == {"STOPPING": "1"}
+    supervisor.close()
+    supervisor.stopping()
+    assert manager.rest() == []
+
+
+def test_it_is_alive_for_as_long_as_nothing_is_wrong(manager: Manager) -> None:
+    environment = {
+        "NOTIFY_SOCKET": manager.address,
+        "WATCHDOG_USEC": "30000",
+        "WATCHDOG_PID": str(os.getpid()),
+    }
+    supervisor = Supervisor(environment)
+    wrong: list[str] = []
+
+    async def live() -> None:
+        living = asyncio.create_task(supervisor.keep_alive(lambda: wrong[0] if wrong else None))
+        for _ in range(3):
+            assert await asyncio.to_thread(manager.next) == {"WATCHDOG": "1"}
+        wrong.append("stuck")
+        said = await asyncio.to_thread(manager.next)
+        while said == {"WATCHDOG": "1"}:
+            said = await asyncio.to_thread(manager.next)
+        assert said == {"STATUS": "stuck"}
+        assert await asyncio.to_thread(manager.next) == {"STATUS": "stuck"}
+        living.cancel()
+
+    asyncio.run(live())
+    supervisor.close()
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        {},
+        {"WATCHDOG_USEC": "1000", "WATCHDOG_PID": "1"},  # another process's watchdog
+        {"WATCHDOG_USEC": "soon"},
+        {"NOTIFY_SOCKET": "vsock:1:2"},
+        {"NOTIFY_SOCKET": "/nowhere/at/all"},
+    ],
+)
+def test_without_a_manager_there_is_nobody_to_tell(
+    environment: dict[str, str], caplog: pytest.LogCaptureFixture
+) -> None:
+    has_socket = "NOTIFY_SOCKET" in environment
+    supervisor = Supervisor(environment)
+    assert supervisor.watchdog_s == 0.0
+    supervisor.ready("x")
+    supervisor.stopping()
+    asyncio.run(supervisor.keep_alive(lambda: None))
+    assert len(caplog.messages) == has_socket, "said once"
+    supervisor.close()
+
+
+# --- the process ----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def listening(tmp_path: Path) -> Iterator[Manager]:
+    manager = Manager(str(tmp_path / "notify"))
+    yield manager
+    manager.socket.close()
+
+
+def test_the_bridge_is_ready_when_it_serves_and_says_when_it_stops(
+    domain: int, listening: Manager
+) -> None:
+    env = {"NOTIFY_SOCKET": listening.address, "WATCHDOG_USEC": "300000"}
+    with lupin_twin(domain, "demo", **env) as process:
+        said = listening.next()
+        assert said["READY"] == "1"
+        url = said["STATUS"].removeprefix("serving ")
+        answer = httpx.get(f"{url}/readyz", trust_env=False, timeout=PATIENCE_S)
+        assert answer.json()["reason"] == "live", "ROS is up by then"
+        for _ in range(3):
+            assert listening.next() == {"WATCHDOG": "1"}
+        (child,) = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        inherited = Path(f"/proc/{child}/environ").read_bytes()
+        assert b"NOTIFY_SOCKET" not in inherited
+        process.send(signal.SIGTERM)
+        wait_for(lambda: {"STOPPING": "1"} in listening.rest(), "the word that it stops")
+        assert process.wait() == 0
+
+
+def test_a_callback_that_hangs_is_told_to_health_checks_and_ends_the_watchdogs_words(
+    domain: int, listening: Manager
+) -> None:
+    faults = ("--hang", "lupin_twin.state:TwinStore.record:hang me")
+    env = {"NOTIFY_SOCKET": listening.address, "WATCHDOG_USEC": "1500000"}
+    with (
+        sabotaged(domain, faults, "lupin_bridge.cli", "serve", "--port", "0", **env) as process,
+        Peer(domain) as peer,
+    ):
+        url = url_of(process)
+
+        def health() -> httpx.Response:
+            return httpx.get(f"{url}/healthz", trust_env=False, timeout=PATIENCE_S)
+
+        assert health().json() == {
+            "ok": True, "message": "The ROS thread runs.", "callback_errors": 0,
+        }  # fmt: skip
+        peer.observe(scan("hang me", {"co2": 1.0}))
+        process.wait_for_output("hangs")
+        wait_for(lambda: health().status_code == 503, "health to tell")
+        message = health().json()["message"]
+        assert message.startswith("The ROS thread has been stuck in a callback for 1")
+        assert message.endswith("s. Restart.")
+        wait_for(lambda: any("stuck" in word.get("STATUS", "") for word in listening.rest()), "it")
+        assert not any("WATCHDOG" in word for word in listening.rest())
+        assert STUCK_AFTER_S < 20.0
+        assert process.stop() == 0

@@ -11,7 +11,7 @@ const RULES = [
   'src/structure.test.ts',
   'src/{domain,geometry}/**/*.test.ts',
   'src/connection/{backoff,latest,machine}.test.ts',
-  'src/contract/{frames,npy}.test.ts',
+  'src/contract/{check,frames,npy}.test.ts',
   'src/store/{create,memo,permalink,twin,view}.test.ts',
 ];
 

@@ -15,6 +15,7 @@ import './styles/bound.css';
 import './styles/paper.css';
 import './styles/kiosk.css';
 import './styles/frozen.css';
+import './styles/troubles.css';
 import './styles/forced.css';
 import './styles/print.css';
 import { startAddress } from './store/address';
@@ -24,6 +25,7 @@ import { startLoaders } from './store/loaders';
 import { keepSettings, openStorage, readSettings } from './store/settings';
 import { startTheme } from './store/theme';
 import { App } from './ui/App';
+import { ErrorBoundary } from './ui/ErrorBoundary';
 import { startShortcuts } from './ui/shortcuts';
 
 const storage = openStorage();
@@ -47,6 +49,8 @@ const root = document.getElementById('root');
 if (!root) throw new Error('index.html has no #root');
 createRoot(root).render(
   <StrictMode>
-    <App kiosk={kiosk} />
+    <ErrorBoundary kiosk={kiosk}>
+      <App kiosk={kiosk} />
+    </ErrorBoundary>
   </StrictMode>,
 );

@@ -34,6 +34,16 @@ export const S = {
     shutting_down: 'The server is shutting down.',
   } as const,
 
+  unread: (count: number): string =>
+    count === 1
+      ? 'A message from the bridge could not be read and was dropped.'
+      : `${count} messages from the bridge could not be read and were dropped.`,
+  unreadLast: (why: string): string => `The last: ${why}`,
+  failedTitle: 'The page has failed',
+  failedHint: 'What it shows is not to be relied on. The twin and the bridge are not affected.',
+  failedAgain: 'It is loaded anew by itself.',
+  reload: 'Reload',
+
   health: {
     healthy: 'Healthy',
     stressed: 'Stressed',

@@ -29,6 +29,7 @@ let link: Link;
 let frames: Frame[];
 let phases: Phase[];
 let refusals: number;
+let bad: string[];
 const socket = (index: number): FakeSocket => {
   const made = FakeSocket.made.at(index);
   if (!made) throw new Error(`no socket ${index}`);
@@ -42,12 +43,14 @@ beforeEach(() => {
   frames = [];
   phases = [];
   refusals = 0;
+  bad = [];
   link = connect('ws://test/ws/state', {
     onConnection: (connection: Connection) => {
       const phase = phaseOf(connection, performance.now());
       if (phases.at(-1) !== phase) phases.push(phase);
     },
     onFrame: (frame) => frames.push(frame),
+    onBad: (why) => bad.push(why),
     onRefused: () => (refusals += 1),
   });
 });
@@ -110,11 +113,47 @@ describe('socket shell', () => {
     expect(FakeSocket.made).toHaveLength(2);
   });
 
-  test('passes over what is no frame', () => {
+  test('what is no frame is dropped and told, and the connection goes on', () => {
     socket(0).onopen?.();
+    socket(0).speak(stateFrame([]));
     socket(0).onmessage?.({ data: 'nonsense' });
     socket(0).onmessage?.({ data: new ArrayBuffer(2) });
-    expect(frames).toEqual([]);
+    socket(0).onmessage?.({ data: '{"type":"state"}' });
+    expect(bad).toEqual([
+      'a message that is no JSON',
+      'a message that is no text',
+      'state.seq: is missing',
+    ]);
+    socket(0).speak(stateFrame([], { seq: 2 }));
+    expect(frames).toHaveLength(2);
+    expect(phases).toEqual(['connecting', 'live']);
+    expect(FakeSocket.made).toHaveLength(1);
+  });
+
+  test('a later server’s frame is passed over without a word', () => {
+    socket(0).onopen?.();
+    socket(0).onmessage?.({ data: '{"type":"weather"}' });
+    expect([frames, bad]).toEqual([[], []]);
+  });
+
+  test('one that says nothing that can be read is no connection', () => {
+    socket(0).onopen?.();
+    socket(0).speak(stateFrame([]));
+    for (let i = 0; i < 4; i++) {
+      vi.advanceTimersByTime(SILENCE_MS / 3);
+      socket(0).onmessage?.({ data: 'nonsense' });
+    }
+    expect(phases.at(-1)).toBe('stale');
+  });
+
+  test('a delta that is lost asks for a full state by a new connection', () => {
+    socket(0).onopen?.();
+    socket(0).speak(stateFrame([]));
+    socket(0).onmessage?.({ data: '{"type":"delta","seq":2,"base":1}' });
+    expect(bad).toEqual(['delta.revision: is missing']);
+    expect(socket(0).closed).toBe(true);
+    vi.advanceTimersByTime(1_000);
+    expect(FakeSocket.made).toHaveLength(2);
   });
 
   test('stopped is stopped', () => {

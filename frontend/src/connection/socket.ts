@@ -7,6 +7,8 @@ export interface ConnectionHandlers {
   /** The connection changed, or a deadline passed and its phase may have. */
   readonly onConnection: (connection: Connection) => void;
   readonly onFrame: (frame: Frame, connection: Connection) => void;
+  /** A message came that is no frame of the contract, and why it is none; it has been dropped. */
+  readonly onBad: (why: string) => void;
   /** A socket closed that never opened: the server is away, or it wants to know who is there. */
   readonly onRefused: () => void;
 }
@@ -60,8 +62,16 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
       if (!isOpened) handlers.onRefused();
     };
     socket.onmessage = ({ data }) => {
-      const frame = typeof data === 'string' ? parseFrame(data) : null;
-      if (!frame) return;
+      const parsed = parseFrame(data);
+      if (parsed.kind === 'passed over') return;
+      if (parsed.kind === 'bad') {
+        handlers.onBad(parsed.why);
+        // What it would have changed is lost, and later deltas build on it: a new connection
+        // begins with a full state.
+        if (parsed.isDelta) giveUp();
+        return;
+      }
+      const { frame } = parsed;
       send({ type: 'frame', now: now(), status: frame.type === 'status' ? frame : null });
       handlers.onFrame(frame, connection);
     };

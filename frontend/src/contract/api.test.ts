@@ -1,6 +1,6 @@
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
-import { fetchHistory, fetchMap, Refusal, route, stateSocketUrl } from './api';
+import { fetchHistory, fetchMap, fetchQuality, Refusal, route, stateSocketUrl } from './api';
 
 const { signal } = new AbortController();
 
@@ -19,7 +19,7 @@ describe('addresses', () => {
     let asked = '';
     vi.stubGlobal('fetch', (url: URL) => {
       asked = url.href;
-      return Promise.resolve(Response.json({}));
+      return Promise.resolve(Response.json({ tag_id: 'a/b?c', sensors: [] }));
     });
     await fetchHistory('a/b?c', signal);
     expect(asked).toMatch(/\/api\/tags\/a%2Fb%3Fc\/history$/);
@@ -37,5 +37,21 @@ describe('refusals', () => {
     const error: unknown = await fetchMap(signal).catch((reason: unknown) => reason);
     expect(error).toBeInstanceOf(Refusal);
     expect(error).toMatchObject({ status: 404, message });
+  });
+});
+
+describe('an answer that is none of the contract is an error that names the field', () => {
+  test.each([
+    [fetchMap, { info: null }, 'map.info: an object, not null'],
+    [fetchMap, { info: { resolution: '0.05' } }, 'map.info.resolution: a number, not "0.05"'],
+    [
+      (s: AbortSignal) => fetchHistory('1', s),
+      { tag_id: '1', sensors: [{ name: 'co2', values: [{ stamp: 7, value: 1 }] }] },
+      'history.sensors[0].values[0].stamp: an object, not 7',
+    ],
+    [(s: AbortSignal) => fetchQuality('co2', s), [], 'quality: an object, not a list of 0'],
+  ])('%#', async (fetchIt, body, message) => {
+    vi.stubGlobal('fetch', () => Promise.resolve(Response.json(body)));
+    await expect(fetchIt(signal)).rejects.toThrow(message);
   });
 });

@@ -1,4 +1,6 @@
 /** The bridge's routes. Addresses are relative to the page, so any path prefix works. */
+import { HISTORY, MAP, QUALITY } from './bodies';
+import type { Check } from './check';
 import { parseNpy } from './npy';
 import type { Field, FieldQuality, OccupancyGrid, TagHistory } from './types';
 
@@ -33,6 +35,14 @@ async function get(path: string, signal: AbortSignal, headers?: HeadersInit): Pr
   });
   if (!response.ok) throw new Refusal(response.status, await reasonOf(response));
   return response;
+}
+
+/** A body that has been checked: `T` is what the check makes of it. */
+async function read<T>(name: string, check: Check, response: Response): Promise<T> {
+  const body: unknown = await response.json();
+  const fault = check(body);
+  if (fault !== null) throw new Error(name + fault);
+  return body as T;
 }
 
 /** Both kinds of refusal in the contract carry their reason in one field. */
@@ -79,12 +89,12 @@ export async function fetchField(
 export async function fetchQuality(sensor: string, signal: AbortSignal): Promise<FieldQuality> {
   const parts = new URLSearchParams({ sensor_type: sensor });
   const response = await get(`api/field/quality?${parts.toString()}`, signal);
-  return (await response.json()) as FieldQuality;
+  return read<FieldQuality>('quality', QUALITY, response);
 }
 
 export async function fetchMap(signal: AbortSignal): Promise<OccupancyGrid> {
   const response = await get('api/map', signal);
-  return (await response.json()) as OccupancyGrid;
+  return read<OccupancyGrid>('map', MAP, response);
 }
 
 export async function fetchMapPicture(signal: AbortSignal): Promise<Blob> {
@@ -94,5 +104,5 @@ export async function fetchMapPicture(signal: AbortSignal): Promise<Blob> {
 
 export async function fetchHistory(tagId: string, signal: AbortSignal): Promise<TagHistory> {
   const response = await get(`api/tags/${encodeURIComponent(tagId)}/history`, signal);
-  return (await response.json()) as TagHistory;
+  return read<TagHistory>('history', HISTORY, response);
 }

@@ -1,38 +1,159 @@
-import { expect, test } from 'vitest';
+import { describe, expect, test } from 'vitest';
 
-import { stateFrame, wireTag } from '../testing/tags';
-import { parseFrame } from './frames';
+import { readings, stateFrame, wireTag } from '../testing/tags';
+import { MAX_FRAME_CHARS, MAX_TAGS, parseFrame } from './frames';
+import { MAX_SENSORS } from './shapes';
+import type { Frame } from './types';
 
-test('reads both kinds of frame', () => {
-  const frame = stateFrame([wireTag()]);
-  expect(parseFrame(JSON.stringify(frame))).toEqual(frame);
-  const status = {
-    type: 'status',
-    twin: 'offline',
-    reason: 'stale',
-    message: '',
-    state_age_seconds: 4,
-  };
-  expect(parseFrame(JSON.stringify(status))).toEqual(status);
+const status = {
+  type: 'status',
+  twin: 'offline',
+  reason: 'stale',
+  message: '',
+  state_age_seconds: 4,
+  has_map: false,
+};
+const header = { stamp: { sec: 1, nanosec: 0 }, frame_id: 'map' };
+const delta = { type: 'delta', seq: 2, base: 1, revision: 'r', header, changed: [], removed: [] };
+const bloom = {
+  position: { x: 1, y: null, z: 0 },
+  height_m: 0.2,
+  species: 'rose',
+  confidence: null,
+  anomaly: false,
+};
+const full = stateFrame([
+  wireTag({ readings: readings({ temperature: 20, co2: null }), flowers: [bloom] }),
+]);
+
+const parse = (message: unknown): ReturnType<typeof parseFrame> =>
+  parseFrame(JSON.stringify(message));
+const whyBad = (data: unknown): string => {
+  const parsed = parseFrame(data);
+  return parsed.kind === 'bad' ? parsed.why : `not bad but ${parsed.kind}`;
+};
+
+test.each([[full], [status], [delta], [{ ...delta, changed: full.state.tags, removed: ['x'] }]])(
+  'reads a frame of the contract, %#',
+  (frame) => {
+    expect(parse(frame)).toEqual({ kind: 'frame', frame });
+  },
+);
+
+test('fields and reasons of a later server do no harm', () => {
+  const later = { ...status, reason: 'on_holiday', more: [[[[]]]] };
+  expect(parse(later)).toEqual({ kind: 'frame', frame: later });
+  expect(parse({ type: 'weather' })).toEqual({ kind: 'passed over' });
+  // No frame's name, though every object has it.
+  expect(parse({ type: 'constructor' })).toEqual({ kind: 'passed over' });
 });
 
-test('reads a delta', () => {
-  const header = { stamp: { sec: 1, nanosec: 0 }, frame_id: 'map' };
-  const delta = { type: 'delta', seq: 2, base: 1, revision: 'r', header, changed: [], removed: [] };
-  expect(parseFrame(JSON.stringify(delta))).toEqual(delta);
-  expect(parseFrame(JSON.stringify({ ...delta, removed: null }))).toBeNull();
+/** Every field of a frame that holds one, as a path, and the frame with it set to something. */
+function mutations(frame: unknown, wrong: unknown): [string, unknown][] {
+  if (typeof frame !== 'object' || frame === null) return [];
+  return Object.entries(frame).flatMap(([key, value]: [string, unknown]) => {
+    const put = (next: unknown): unknown =>
+      Array.isArray(frame)
+        ? frame.map((each: unknown, index) => (String(index) === key ? next : each))
+        : { ...frame, [key]: next };
+    const deeper = mutations(value, wrong).map(([path, next]): [string, unknown] => [
+      `.${key}${path}`,
+      put(next),
+    ]);
+    return [[`.${key}`, put(wrong)] as [string, unknown], ...deeper];
+  });
+}
+
+const paths = (frame: unknown): string[] => mutations(frame, undefined).map(([path]) => path);
+
+describe('each field is checked', () => {
+  test.each([
+    ['a truth', true, /\.(anomaly|has_map)$/],
+    ['a list', [], /\.(tags|readings|flowers|points|changed|removed)$/],
+    ['an object', {}, /^$/],
+    ['a number as text', '21.5', /\.(type|revision|frame_id|tag_id|species|name|reason|message)$/],
+    ['nothing', undefined, /^$/],
+  ])('for %s in its place', (_, wrong, mayPass) => {
+    for (const frame of [full, { ...delta, changed: full.state.tags, removed: ['x'] }, status]) {
+      for (const [path, broken] of mutations(frame, wrong)) {
+        if (path === '.type' || mayPass.test(path) || path.endsWith('.removed.0')) continue;
+        expect(parse(broken).kind, path).toBe('bad');
+      }
+    }
+  });
+
+  test('null is no value but where one may be unknown', () => {
+    const nullable =
+      /\.(value|stale_seconds|species_confidence|confidence|height_m|x|y|z|w|state_age_seconds)$/;
+    expect(paths(full).some((path) => nullable.test(path))).toBe(true);
+    for (const frame of [full, status]) {
+      for (const [path, broken] of mutations(frame, null)) {
+        expect(parse(broken).kind, path).toBe(nullable.test(path) ? 'frame' : 'bad');
+      }
+    }
+  });
 });
 
 test.each([
-  'no json',
-  'null',
-  '7',
-  '[]',
-  '{"type":"delta"}',
-  '{"type":"state","revision":"r","state":{}}',
-  '{"type":"state","revision":"r","state":null}',
-  '{"type":"state","state":{"tags":[]}}',
-  '{"type":"status"}',
-])('passes over %s', (text) => {
-  expect(parseFrame(text)).toBeNull();
+  ['no json', 'a message that is no JSON'],
+  ['{"type":"state","seq":1', 'a message that is no JSON'],
+  [new ArrayBuffer(2), 'a message that is no text'],
+  ['null', 'frame: an object, not null'],
+  ['7', 'frame: an object, not 7'],
+  ['[]', 'frame: an object, not a list of 0'],
+  ['{"type":"delta"}', 'delta.seq: is missing'],
+  ['{"type":"state","seq":1,"revision":"r","state":null}', 'state.state: an object, not null'],
+  ['{"type":"state","seq":1e999,"revision":"r"}', 'state.seq: a number, not Infinity'],
+  [JSON.stringify({ ...status, twin: 'well' }), 'status.twin: one of live, offline, not "well"'],
+])('%s: what is wrong is named', (data, why) => {
+  expect(whyBad(data)).toBe(why);
+});
+
+test('a bad delta is known for one: what it would have changed is lost', () => {
+  expect(parse({ ...delta, removed: null })).toMatchObject({ kind: 'bad', isDelta: true });
+  expect(parse({ ...full, seq: null })).toMatchObject({ kind: 'bad', isDelta: false });
+});
+
+describe('what would stop the page is refused, at the limit and one past it', () => {
+  const house = (count: number, over: object = {}): Frame =>
+    stateFrame(
+      Array.from({ length: count }, (_, index) => wireTag({ tag_id: `t${index}`, ...over })),
+    );
+  const kinds = (count: number): Record<string, number> =>
+    Object.fromEntries(Array.from({ length: count }, (_, index) => [`s${index}`, 1]));
+
+  test('tags', () => {
+    // Short ones, as the text of so many is long.
+    const tags = (count: number): string => `[${Array(count).fill('{}').join()}]`;
+    const frame = (count: number): string =>
+      `{"type":"state","seq":1,"revision":"r","state":{"header":${JSON.stringify(header)},"tags":${tags(count)}}}`;
+    expect(whyBad(frame(MAX_TAGS))).toBe('state.state.tags[0].tag_id: is missing');
+    expect(whyBad(frame(MAX_TAGS + 1))).toBe(
+      `state.state.tags: ${MAX_TAGS + 1} entries, the limit is ${MAX_TAGS}`,
+    );
+  });
+
+  test('kinds of sensors, of one tag and of all', () => {
+    const one = (count: number): unknown => house(1, { readings: readings(kinds(count)) });
+    expect(parse(one(MAX_SENSORS)).kind).toBe('frame');
+    expect(parse(one(MAX_SENSORS + 1)).kind).toBe('bad');
+    const half = readings(kinds(MAX_SENSORS));
+    const two = stateFrame([
+      wireTag({ tag_id: 'a', readings: half }),
+      wireTag({ tag_id: 'b', readings: readings({ other: 1 }) }),
+    ]);
+    expect(whyBad(JSON.stringify(two))).toBe(
+      `state.state.tags[1].readings: more than ${MAX_SENSORS} kinds of sensors`,
+    );
+  });
+
+  test('characters', () => {
+    expect(whyBad(' '.repeat(MAX_FRAME_CHARS + 1))).toMatch(/the limit is 128000000$/);
+  });
+});
+
+test('a tag that is there twice is one too many', () => {
+  expect(whyBad(JSON.stringify(stateFrame([wireTag(), wireTag()])))).toBe(
+    'state.state.tags[1].tag_id: "1" a second time',
+  );
 });

@@ -1,4 +1,4 @@
-import { useEffect, useRef, type JSX } from 'react';
+import { useEffect, useRef, useState, type JSX } from 'react';
 
 import { S } from '../strings';
 import { runMap } from './controller';
@@ -9,10 +9,16 @@ export function MapView({ kiosk }: { kiosk: boolean }): JSX.Element {
   const still = useRef<HTMLCanvasElement>(null);
   const pins = useRef<HTMLCanvasElement>(null);
   const overlay = useRef<HTMLCanvasElement>(null);
+  const [failure, setFailure] = useState<{ readonly error: unknown } | null>(null);
+  // The page fails with its map: one that stands still beside a "Live" would be believed.
+  if (failure) throw failure.error;
   useEffect(() => {
     if (!element.current || !still.current || !pins.current || !overlay.current) return undefined;
     const canvases = { still: still.current, pins: pins.current, overlay: overlay.current };
-    return runMap(element.current, canvases, kiosk);
+    const onFailure = (error: unknown): void => {
+      setFailure({ error });
+    };
+    return runMap(element.current, canvases, kiosk, onFailure);
   }, [kiosk]);
   return (
     <div

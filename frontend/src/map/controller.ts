@@ -33,8 +33,23 @@ const TEXT_PX = 14;
 /** What is to be drawn anew; "view": nothing but the place and the scale changed. */
 type Part = 'still' | 'pins' | 'overlay' | 'view';
 
-/** `isFixed`: a wall screen, where nobody who brushes past chooses a tag or moves the map. */
-export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false): () => void {
+/**
+ * `isFixed`: a wall screen, where nobody who brushes past chooses a tag or moves the map.
+ * `onFailure` is told of what went wrong while drawing: the map then no longer shows what is.
+ */
+export function runMap(
+  element: HTMLElement,
+  canvases: Canvases,
+  isFixed = false,
+  onFailure: (error: unknown) => void = rethrow,
+): () => void {
+  const guarded = (work: () => void) => (): void => {
+    try {
+      work();
+    } catch (error) {
+      onFailure(error);
+    }
+  };
   const painter = new Painter(canvases, isDark() ? DARK : LIGHT);
   const calm = window.matchMedia('(prefers-reduced-motion: reduce)');
   const dirty = new Set<Part>();
@@ -81,7 +96,7 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
     if (frame === 0 && store.get().viewport.size.width > 0) frame = requestAnimationFrame(paint);
   };
 
-  const paint = (): void => {
+  const paint = guarded(() => {
     // It may be asked for before the frame that it was to have.
     cancelAnimationFrame(frame);
     frame = 0;
@@ -107,7 +122,7 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
       });
     }
     if (pulses.length > 0) spoil('overlay');
-  };
+  });
 
   const middle = (): CanvasPoint => {
     const { width, height } = store.get().viewport.size;
@@ -307,7 +322,7 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
   );
 
   const stops = [
-    store.subscribe(update),
+    store.subscribe(guarded(update)),
     onMapCommand(run),
     onThemeChange(() => {
       painter.setPalette(isDark() ? DARK : LIGHT);
@@ -334,6 +349,10 @@ export function runMap(element: HTMLElement, canvases: Canvases, isFixed = false
     cancelAnimationFrame(frame);
     camera.destroy();
   };
+}
+
+function rethrow(error: unknown): never {
+  throw error;
 }
 
 function newPulses({ snapshot }: Shown): Pulse[] {

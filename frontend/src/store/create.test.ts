@@ -15,3 +15,24 @@ test('tells of changes only, and only those who still listen', () => {
   expect(listener).toHaveBeenCalledTimes(1);
   expect(store.get()).toBe(3);
 });
+
+test('one listener that fails keeps the news from nobody else, and its failure is told', () => {
+  const failures: unknown[] = [];
+  vi.spyOn(globalThis, 'queueMicrotask').mockImplementation((task) => {
+    try {
+      task();
+    } catch (error) {
+      failures.push(error);
+    }
+  });
+  const store = createStore(1, (_, next: number) => next);
+  const listener = vi.fn();
+  const failure = new Error('broken');
+  store.subscribe(() => {
+    throw failure;
+  });
+  store.subscribe(listener);
+  store.dispatch(2);
+  expect(listener).toHaveBeenCalledTimes(1);
+  expect(failures).toEqual([failure]);
+});

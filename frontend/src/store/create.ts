@@ -19,7 +19,16 @@ export function createStore<State, Action>(
       const next = reduce(state, action);
       if (next === state) return;
       state = next;
-      for (const listener of [...listeners]) listener();
+      for (const listener of [...listeners]) {
+        try {
+          listener();
+        } catch (error) {
+          // One that fails keeps the news from nobody else; the browser tells of it.
+          queueMicrotask(() => {
+            throw error;
+          });
+        }
+      }
     },
     subscribe: (listener) => {
       listeners.add(listener);

@@ -92,3 +92,16 @@ test('the operator can try at once', () => {
   retryConnection();
   expect(FakeSocket.count).toBe(before + 1);
 });
+
+test('a bad message is told of for a minute after the last one', () => {
+  const unread = (): number | undefined => store.get().twin.unread?.count;
+  FakeSocket.last.onmessage?.({ data: 'null' });
+  vi.advanceTimersByTime(50_000);
+  expect(unread()).toBe(1);
+  // Meanwhile there is a new connection.
+  FakeSocket.last.onmessage?.({ data: 'null' });
+  vi.advanceTimersByTime(50_000);
+  expect(unread()).toBe(2);
+  vi.advanceTimersByTime(10_000);
+  expect(unread()).toBeUndefined();
+});

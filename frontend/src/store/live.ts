@@ -16,6 +16,9 @@ export function pauseMs(tags: number): number {
   return tags > 150 ? 1_000 : 250;
 }
 
+/** A message that could not be read is told of for so long after the last one. */
+const TOLD_MS = 60_000;
+
 let retry: (() => void) | null = null;
 
 /** Does not wait for the back-off any longer. */
@@ -29,6 +32,7 @@ export function startLive(): () => void {
   let isNew = false;
   let takenAt = -Infinity;
   let timer: ReturnType<typeof setTimeout> | undefined;
+  let forget: ReturnType<typeof setTimeout> | undefined;
   let greeted = -1;
 
   const take = (stateAgeSeconds: number | null): void => {
@@ -37,7 +41,19 @@ export function startLive(): () => void {
     if (!latest || !isNew) return;
     isNew = false;
     takenAt = now();
-    receive({ type: 'state', latest, now: arrivedAt, stateAgeSeconds });
+    try {
+      receive({ type: 'state', latest, now: arrivedAt, stateAgeSeconds });
+    } catch (error) {
+      // The check of frames let something through: the page goes on with what it has.
+      tellBad(String(error));
+      link.giveUp();
+    }
+  };
+
+  const tellBad = (why: string): void => {
+    receive({ type: 'unread', why });
+    clearTimeout(forget);
+    forget = setTimeout(receive, TOLD_MS, { type: 'unread', why: null });
   };
 
   const link = connect(stateSocketUrl(), {
@@ -45,6 +61,7 @@ export function startLive(): () => void {
       receive({ type: 'connection', connection, now: now() });
     },
     onRefused: () => void signInIfAsked(),
+    onBad: tellBad,
     onFrame: (frame, connection) => {
       if (frame.type === 'status') return;
       const isFirst = connection.epoch !== greeted;
@@ -70,6 +87,7 @@ export function startLive(): () => void {
   retry = link.retry;
   return () => {
     clearTimeout(timer);
+    clearTimeout(forget);
     link.stop();
     retry = null;
   };

@@ -28,6 +28,8 @@ export const NO_HOUSE: House = { snapshot: null, field: NOTHING, map: NOTHING, q
 export interface TwinState {
   readonly phase: Phase;
   readonly connection: Connection;
+  /** Messages of late that were no frames, and what was wrong with the last; null: none. */
+  readonly unread: { readonly count: number; readonly why: string } | null;
   /** As the frames tell it. */
   readonly latest: House;
   /** As it was at another moment, ROS seconds; null: nobody has asked. */
@@ -37,6 +39,7 @@ export interface TwinState {
 export const NO_TWIN: TwinState = {
   phase: 'connecting',
   connection: INITIAL,
+  unread: null,
   latest: NO_HOUSE,
   past: null,
 };
@@ -50,6 +53,8 @@ export type TwinAction =
       /** Set on the first frame of a connection: how old the state was when it was sent. */
       readonly stateAgeSeconds?: number | null;
     }
+  /** A message was dropped, for this reason; null: that was long ago. */
+  | { readonly type: 'unread'; readonly why: string | null }
   | { readonly type: 'field'; readonly field: Fetched<Field> }
   | { readonly type: 'map'; readonly map: Fetched<MapPicture> }
   | { readonly type: 'quality'; readonly quality: FieldQuality | null }
@@ -68,6 +73,11 @@ export function reduceTwin(state: TwinState, action: TwinAction): TwinState {
       return withLatest(state, {
         snapshot: snapshotOf(action.latest, arrivedAt, state.latest.snapshot),
       });
+    }
+    case 'unread': {
+      const { why } = action;
+      const count = (state.unread?.count ?? 0) + 1;
+      return { ...state, unread: why === null ? null : { count, why } };
     }
     case 'field':
       return withLatest(state, { field: action.field });

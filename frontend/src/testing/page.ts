@@ -26,6 +26,7 @@ export function showTags(tags: readonly TwinTagState[]): void {
   receive({ type: 'field', field: NOTHING });
   receive({ type: 'map', map: NOTHING });
   receive({ type: 'quality', quality: null });
+  receive({ type: 'unread', why: null });
   stamp += 1;
   const latest = stateFrame(tags, { sec: stamp, revision: `r${stamp}` });
   receive({ type: 'state', latest, now: performance.now() });

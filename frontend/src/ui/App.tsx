@@ -16,6 +16,7 @@ import { MapPanel } from './MapPanel';
 import { TagCard } from './TagCard';
 import { TagsPanel } from './TagsPanel';
 import { toast } from './toast';
+import { Troubles } from './Troubles';
 
 export function App({ kiosk }: { kiosk: boolean }): JSX.Element {
   const phase = useApp((state) => state.twin.phase);
@@ -52,7 +53,10 @@ export function App({ kiosk }: { kiosk: boolean }): JSX.Element {
         </a>
       )}
       <Header kiosk={kiosk} />
-      <FrozenBanner />
+      <div className="banners">
+        <FrozenBanner />
+        <Troubles />
+      </div>
       <PaperLine />
       <main className="panels">
         <MapPanel kiosk={kiosk} />

@@ -2,7 +2,7 @@ import type { JSX } from 'react';
 
 import type { TagHistory } from '../contract/types';
 import { readingText } from '../domain/format';
-import { rgbText, sensorColour } from '../domain/ramp';
+import { rangeOf, rgbText, sensorColour } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
 import type { TemperatureUnit } from '../domain/units';
 import { S } from '../strings';
@@ -20,9 +20,7 @@ const PAD = 3;
 
 /** Points of the line, oldest first, by time along x; gaps (no number) split it into pieces. */
 export function sparkLines(values: Values): SparkPoint[][] {
-  const known = values.flatMap(({ value }) => (value === null ? [] : [value]));
-  const low = Math.min(...known);
-  const high = Math.max(...known);
+  const { low, high } = rangeOf(values.map(({ value }) => value)) ?? { low: 0, high: 0 };
   const seconds = values.map(({ stamp }) => stamp.sec + stamp.nanosec / 1e9);
   const start = seconds[0] ?? 0;
   const length = (seconds.at(-1) ?? 0) - start;
@@ -57,12 +55,13 @@ export function Sparkline({
   values: Values;
   unit: TemperatureUnit;
 }): JSX.Element | null {
-  const known = values.flatMap(({ value }) => (value === null ? [] : [value]));
-  if (known.length < 2) return null;
+  const count = values.filter(({ value }) => value !== null).length;
+  const range = rangeOf(values.map(({ value }) => value));
+  if (!range || count < 2) return null;
   const label = S.cardHistory(
-    known.length,
-    readingText(sensor, Math.min(...known), unit),
-    readingText(sensor, Math.max(...known), unit),
+    count,
+    readingText(sensor, range.low, unit),
+    readingText(sensor, range.high, unit),
   );
   const pieces = sparkLines(values);
   const last = pieces.at(-1)?.at(-1);

@@ -1,0 +1,37 @@
+/** The messages that frames and answers are made of, field by field. */
+import { boolean, count, integer, list, numberOrNull, object, text } from './check';
+
+/** Kinds of sensors of one tag, and in one frame: each is a column of the table. */
+export const MAX_SENSORS = 256;
+const MAX_BLOOMS_PER_TAG = 10_000;
+const MAX_FOOTPRINT_POINTS = 1_000;
+
+export const TEXT = text(65_536);
+export const TIME = object({ sec: integer, nanosec: count });
+export const HEADER = object({ stamp: TIME, frame_id: TEXT });
+const POINT = object({ x: numberOrNull, y: numberOrNull, z: numberOrNull });
+const QUATERNION = object({ x: numberOrNull, y: numberOrNull, z: numberOrNull, w: numberOrNull });
+export const POSE = object({ position: POINT, orientation: QUATERNION });
+export const TAG = object({
+  tag_id: TEXT,
+  pose: POSE,
+  readings: list(object({ name: TEXT, value: numberOrNull }), MAX_SENSORS),
+  last_observed: TIME,
+  stale_seconds: numberOrNull,
+  species: TEXT,
+  species_confidence: numberOrNull,
+  anomaly: boolean,
+  flower_count: count,
+  bug_count: count,
+  flowers: list(
+    object({
+      position: POINT,
+      height_m: numberOrNull,
+      species: TEXT,
+      confidence: numberOrNull,
+      anomaly: boolean,
+    }),
+    MAX_BLOOMS_PER_TAG,
+  ),
+  box_footprint: object({ points: list(POINT, MAX_FOOTPRINT_POINTS) }),
+});

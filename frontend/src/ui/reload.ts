@@ -1,0 +1,93 @@
+/** How a page that has failed comes back by itself, and never in a hot loop. */
+import { timeOfDay } from '../clock';
+
+const KEY = 'lupin-twin.reload';
+const FIRST_MS = 5_000;
+const LONGEST_MS = 300_000;
+/** A page that held this long starts the back-off afresh when it fails. */
+const PROVEN_MS = 600_000;
+
+interface Kept {
+  readonly failures: number;
+  /** When the last of them was, ms since the epoch: a reload begins every other clock anew. */
+  readonly at: number;
+}
+
+type Session = Pick<Storage, 'getItem' | 'setItem'>;
+
+/**
+ * Notes a failure and gives the pause before the page is to be loaded anew: doubled with each one
+ * in a row, up to five minutes, and half of it left to chance, so that the screens of a house do not
+ * come all at once. Where nothing can be kept every pause is the longest.
+ *
+ * @param random from 0 to 1
+ */
+export function pauseAfterFailure(session: Session, now: number, random: number): number {
+  const before = read(session);
+  // A clock that was set back says nothing about how long the page has held.
+  const failures = before && now - before.at < PROVEN_MS ? before.failures + 1 : 1;
+  const isKept = keep(session, { failures, at: now });
+  const doubled = FIRST_MS * 2 ** Math.min(failures - 1, 10);
+  return (isKept ? Math.min(LONGEST_MS, doubled) : LONGEST_MS) * (0.5 + 0.5 * random);
+}
+
+function read(session: Session): Kept | null {
+  try {
+    const kept: unknown = JSON.parse(session.getItem(KEY) ?? 'null');
+    const { failures, at } = (kept ?? {}) as Partial<Kept>;
+    return Number.isSafeInteger(failures) && Number.isFinite(at) ? (kept as Kept) : null;
+  } catch {
+    return null;
+  }
+}
+
+function keep(session: Session, kept: Kept): boolean {
+  try {
+    session.setItem(KEY, JSON.stringify(kept));
+    return true;
+  } catch {
+    return false;
+  }
+}
+
+/** The tab's own storage, which a reload survives; where it is forbidden, one that refuses. */
+function openSession(): Session {
+  const refuse = (): never => {
+    throw new Error('no session storage');
+  };
+  try {
+    return window.sessionStorage;
+  } catch {
+    return { getItem: refuse, setItem: refuse };
+  }
+}
+
+/**
+ * Loads the page anew after the pause that is due. Only while its server answers: a browser's own
+ * error page would stay for ever.
+ */
+export function reloadByItself(
+  session: Session = openSession(),
+  reload: () => void = reloadNow,
+): () => void {
+  const gone = new AbortController();
+  const { signal } = gone;
+  const attempt = async (): Promise<void> => {
+    const url = new URL(window.location.href);
+    url.hash = '';
+    const answer = await fetch(url, { cache: 'no-store', signal }).catch(() => null);
+    if (signal.aborted) return;
+    if (answer?.ok) reload();
+    else timer = setTimeout(() => void attempt(), FIRST_MS);
+  };
+  const pause = pauseAfterFailure(session, timeOfDay(), Math.random());
+  let timer = setTimeout(() => void attempt(), pause);
+  return () => {
+    gone.abort();
+    clearTimeout(timer);
+  };
+}
+
+export const reloadNow = (): void => {
+  window.location.reload();
+};

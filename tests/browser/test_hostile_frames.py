@@ -1,0 +1,245 @@
+"""What no server should send: it is dropped, counted and told, and nothing blanks."""
+
+from __future__ import annotations
+
+import copy
+import json
+import re
+from collections.abc import Callable
+from typing import Any, Final
+
+import pytest
+from playwright.sync_api import Page, WebSocketRoute, expect
+
+from tests.browser.hmi import Hmi, OpenPage
+from tests.browser.house import TAGS
+from tests.support.web import Bridge
+
+Frame = dict[str, Any]
+
+
+class Tap:
+    """Stands in every state socket of a page: passes on what the server says, and adds to it."""
+
+    def __init__(self, page: Page) -> None:
+        self.sockets: list[WebSocketRoute] = []
+        self.states: list[Frame] = []
+        page.route_web_socket(re.compile("/ws/state"), self._meet)
+
+    def _meet(self, socket: WebSocketRoute) -> None:
+        self.sockets.append(socket)
+        server = socket.connect_to_server()
+
+        def on_message(message: str | bytes) -> None:
+            frame = json.loads(message)
+            if frame["type"] == "state":
+                self.states.append(frame)
+            socket.send(message)
+
+        server.on_message(on_message)
+
+    def say(self, message: str | bytes) -> None:
+        """Let the page hear this on its newest socket."""
+        self.sockets[-1].send(message)
+
+    def state(self) -> Frame:
+        """A copy of the last whole state."""
+        return copy.deepcopy(self.states[-1])
+
+
+def tag_with(**over: Any) -> Callable[[Frame], Any]:
+    """The state with its first tag so changed."""
+
+    def change(frame: Frame) -> Any:
+        frame["state"]["tags"][0].update(over)
+        return frame
+
+    return change
+
+
+def without(name: str) -> Callable[[Frame], Any]:
+    """The state whose first tag lacks a field."""
+
+    def change(frame: Frame) -> Any:
+        del frame["state"]["tags"][0][name]
+        return frame
+
+    return change
+
+
+READING: Final = {"name": "temperature", "value": 1.0, "observed_at": None, "stale_seconds": None}
+DEEP: Final = "[" * 100_000 + "]" * 100_000
+HOSTILE: Final[dict[str, Callable[[Frame], Any]]] = {
+    "null": lambda _: None,
+    "a number": lambda _: 7,
+    "a list": lambda _: [],
+    "no state": lambda frame: {**frame, "state": None},
+    "no tags": lambda frame: {**frame, "state": {"header": frame["state"]["header"]}},
+    "tags of null": lambda frame: {**frame, "state": {**frame["state"], "tags": [None]}},
+    "no header": lambda frame: {**frame, "state": {"tags": frame["state"]["tags"]}},
+    "a tag twice": lambda frame: {
+        **frame,
+        "state": {**frame["state"], "tags": frame["state"]["tags"][:1] * 2},
+    },
+    "an id that is a number": tag_with(tag_id=7),
+    "no id": without("tag_id"),
+    "no pose": without("pose"),
+    "a pose of text": tag_with(pose="here"),
+    "no orientation": tag_with(pose={"position": {"x": 1, "y": 1, "z": 0}}),
+    "readings of null": tag_with(readings=[None]),
+    "a reading in a reading": tag_with(readings=[{**READING, "value": [READING]}]),
+    "readings as an object": tag_with(readings={"temperature": 1}),
+    "NaN as text": tag_with(readings=[{**READING, "value": "NaN"}]),
+    "an age of text": tag_with(stale_seconds="Infinity"),
+    "a time of null": tag_with(last_observed=None),
+    "a species of numbers": tag_with(species=[1, 2]),
+    "a footprint of holes": tag_with(box_footprint={"points": [None] * 5}),
+    "a bloom nowhere": tag_with(flowers=[{"species": "rose"}]),
+    "sensors without end": tag_with(readings=[{**READING, "name": str(i)} for i in range(100_000)]),
+    "blooms without end": tag_with(flowers=[{}] * 100_000),
+    "a species without end": tag_with(species="x" * 10_000_000),
+    "tags without end": lambda frame: {
+        **frame,
+        "state": {**frame["state"], "tags": [{}] * 200_000},
+    },
+    "a status without a twin": lambda _: {"type": "status"},
+    "a status of another twin": lambda _: {"type": "status", "twin": {"live": True}},
+}
+
+
+@pytest.fixture
+def tapped(house: Bridge, open_page: OpenPage) -> tuple[Hmi, Tap]:
+    """A page that shows the whole house, and the tap in its socket."""
+    hmi = open_page(house.url, go=False)
+    tap = Tap(hmi.page)
+    hmi.go()
+    hmi.expect_rows(*TAGS)
+    hmi.expect_samples(3)
+    return hmi, tap
+
+
+def expect_told(hmi: Hmi, count: int, why: str | re.Pattern[str] = "") -> None:
+    """The page counts what it dropped, and says why it dropped the last."""
+    line = hmi.page.locator("[data-trouble=unread]")
+    number = "A message" if count == 1 else f"{count} messages"
+    expect(line).to_contain_text(f"{number} from the bridge could not be read")
+    expect(line).to_contain_text(why)
+
+
+def test_a_bad_frame_is_dropped_counted_and_told(tapped: tuple[Hmi, Tap]) -> None:
+    hmi, tap = tapped
+    expect(hmi.page.locator("[data-trouble]")).to_have_count(0)
+    tap.say("no json")
+    expect_told(hmi, 1, "a message that is no JSON")
+    told = 1
+    for name, change in HOSTILE.items():
+        tap.say(json.dumps(change(tap.state())))
+        told += 1
+        expect_told(hmi, told)
+        assert hmi.rows() == list(TAGS), name
+    # What JSON cannot say but a server may send, and what would exhaust a stack.
+    for text in (
+        json.dumps(tag_with(stale_seconds=float("nan"))(tap.state())),
+        json.dumps(tag_with(stale_seconds=0)(tap.state())).replace(
+            '"stale_seconds": 0', '"stale_seconds": 1e999'
+        ),
+        DEEP,
+        json.dumps(tap.state())[:-1],
+        b"\xa1\x00",
+    ):
+        tap.say(text)
+        told += 1
+        expect_told(hmi, told)
+    # All on one connection, which goes on.
+    assert len(tap.sockets) == 1
+    hmi.expect_phase("live")
+    hmi.expect_rows(*TAGS)
+    expect(hmi.cell("1", "temperature")).to_have_text("20.0")
+
+
+def test_what_is_deep_beside_the_contract_does_no_harm(tapped: tuple[Hmi, Tap]) -> None:
+    hmi, tap = tapped
+    frame = tap.state()
+    frame["state"]["tags"][0]["more"] = "DEEP"
+    frame["seq"] += 0.5
+    for _ in range(2):
+        tap.say(json.dumps(frame).replace('"DEEP"', DEEP))
+    hmi.expect_rows(*TAGS)
+    # Deltas of the server build on another frame now: a new connection puts that right.
+    hmi.expect(lambda: len(tap.sockets) == 2, "a new connection")
+    hmi.expect_phase("live")
+    hmi.expect_rows(*TAGS)
+    expect(hmi.test_id("failed-page")).to_have_count(0)
+
+
+def test_a_bad_delta_asks_for_a_full_state(tapped: tuple[Hmi, Tap]) -> None:
+    hmi, tap = tapped
+    state = tap.state()
+    delta = {
+        "type": "delta",
+        "seq": state["seq"] + 1,
+        "base": state["seq"],
+        "revision": "other",
+        "header": state["state"]["header"],
+        "changed": [{**state["state"]["tags"][0], "readings": "none"}],
+        "removed": [],
+    }
+    tap.say(json.dumps(delta))
+    expect_told(hmi, 1, "delta.changed[0].readings: a list")
+    hmi.expect(lambda: len(tap.states) == 2, "a full state on a new connection")
+    hmi.expect_phase("live")
+    hmi.expect_rows(*TAGS)
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [None, {}, {"tag_id": "1", "sensors": None}, {"tag_id": "1", "sensors": [{"name": 1}]}],
+)
+def test_a_history_that_is_none_leaves_the_card_as_it_is(
+    house: Bridge, open_page: OpenPage, answer: Any
+) -> None:
+    hmi = open_page(house.url, go=False)
+    asked: list[str] = []
+
+    def fulfill(route: Any) -> None:
+        asked.append(route.request.url)
+        route.fulfill(json=answer)
+
+    hmi.page.route(re.compile("/history"), fulfill)
+    hmi.go("tag=1")
+    expect(hmi.card("1").locator("[data-sensor=temperature]")).to_contain_text("20.0")
+    hmi.expect(lambda: len(asked) > 0, "the history asked for")
+    hmi.expect_samples(3)
+    expect(hmi.card("1")).to_be_visible()
+
+
+BREAK: Final = """() => {
+  window.stayed = true;
+  CanvasRenderingContext2D.prototype.clearRect = () => { throw new Error('no more canvas'); };
+}"""
+
+
+def test_a_page_that_fails_offers_to_be_loaded_anew(house: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(house.url)
+    hmi.expect_rows(*TAGS)
+    hmi.allow_noise("no more canvas")
+    hmi.page.evaluate(BREAK)
+    hmi.choose_sensor("Humidity")
+    failed = hmi.test_id("failed-page")
+    expect(failed).to_contain_text("Error: no more canvas")
+    assert hmi.page.evaluate("window.stayed") is True
+    failed.get_by_role("button", name="Reload").click()
+    hmi.expect_rows(*TAGS)
+    assert hmi.page.evaluate("window.stayed") is None
+
+
+def test_a_wall_screen_that_fails_comes_back_by_itself(house: Bridge, open_page: OpenPage) -> None:
+    wall = open_page(house.url, "sensor=humidity", "?kiosk=1")
+    wall.expect_samples(3)
+    wall.allow_noise("no more canvas")
+    wall.page.evaluate(BREAK)
+    wall.page.set_viewport_size({"width": 1000, "height": 700})
+    expect(wall.test_id("failed-page")).to_contain_text("loaded anew by itself")
+    wall.expect_samples(3)
+    assert wall.page.evaluate("window.stayed") is None
+    assert json.loads(wall.page.evaluate("sessionStorage['lupin-twin.reload']"))["failures"] == 1

@@ -18,6 +18,7 @@ PACKAGES = {
 }
 # These test what no single module does.
 ACROSS = (
+    "test_deploy",
     "test_docs",
     "test_fuzz_",
     "test_live_",

@@ -299,7 +299,7 @@ def test_a_bridge_for_a_twin_elsewhere_is_killed_and_its_successor_knows_what_th
 def sabotaged_serve() -> Iterator[Bridge]:
     faults = (
         "lupin_twin.state:TwinStore.record:boom-scan",
-        "lupin_twin.state:TwinStore.record_flower:boom-look",
+        "lupin_twin.state:TwinStore.record_look:boom-look",
         "lupin_twin.state:TwinStore.pin:boom-find",
         "lupin_twin.convert:map_of:width=13",
         "lupin_twin.convert:field_request:boom-field",

@@ -48,6 +48,12 @@ WIRE_FORMAT = {
         "FlowerPoint[] flowers · geometry_msgs/Polygon box_footprint"
     ),
     "msg/TwinState.msg": "std_msgs/Header header · TwinTagState[] tags",
+    "msg/TagTimes.msg": (
+        "string tag_id · string[] sensors · builtin_interfaces/Time[] observed_at · "
+        "builtin_interfaces/Time looked_at · builtin_interfaces/Time last_try · "
+        "uint8 last_try_status · string last_try_detail"
+    ),
+    "msg/TwinTimes.msg": "std_msgs/Header header · TagTimes[] tags",
     "srv/GetField.srv": (
         "string sensor_type · float32 resolution · float32 bbox_min_x · float32 bbox_min_y · "
         "float32 bbox_max_x · float32 bbox_max_y · --- · bool ok · string error_message · "

@@ -28,7 +28,7 @@ from lupin_twin.field_quality import leave_one_out  # noqa: E402
 from lupin_twin.fields import FieldEngine, FieldJob, FieldRequest, FieldRules  # noqa: E402
 from lupin_twin.grid import FieldGrid, cell_centres  # noqa: E402
 from lupin_twin.idw import FieldSample, compute_idw_field  # noqa: E402
-from lupin_twin.state import Observation, Pose, Reading, TagState, TwinStore  # noqa: E402
+from lupin_twin.state import Pose, Reading, Scan, TagState, TwinStore  # noqa: E402
 from tests.oracle_idw import value_at  # noqa: E402
 
 REACH_M = 1.5
@@ -218,7 +218,7 @@ def store_of(samples: Sequence[FieldSample]) -> TwinStore:
     store = TwinStore()
     for index, (x, y, value) in enumerate(samples):
         store.record(
-            Observation(
+            Scan(
                 tag_id=f"tag-{index}",
                 stamp_ns=0,
                 readings=(Reading("temperature", value),),

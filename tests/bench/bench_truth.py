@@ -24,6 +24,7 @@ from lupin_twin.field_cache import FieldCache
 from lupin_twin.field_quality import leave_one_out, painted_share
 from lupin_twin.fields import FieldEngine, FieldJob, FieldRequest
 from lupin_twin.grid import FieldGrid, cell_centres
+from lupin_twin.history import History
 from lupin_twin.node import field_rules
 from lupin_twin.parameters import TwinParameters
 from lupin_twin.state import TwinStore
@@ -53,13 +54,13 @@ def after_one_pass(day_speed: float) -> tuple[TwinStore, float]:
 def write(store: TwinStore, msg: Any) -> None:
     made = ingest.observation(convert.heard(msg), "map", 10**18)
     assert not isinstance(made, Drop)
-    ingest.apply(made, store)
+    ingest.apply(made, store, History())
 
 
 def pin_all(store: TwinStore, msg: Any) -> None:
     for pin in ingest.discoveries(convert.heard_tags(msg), "map", store.is_pinned):
         assert not isinstance(pin, Drop)
-        ingest.apply(pin, store)
+        ingest.apply(pin, store, History())
 
 
 def field_of(store: TwinStore, sensor: str) -> FieldGrid:

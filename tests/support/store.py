@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from lupin_twin.state import (
-    NANOSECONDS_PER_SECOND,
-    Flower,
-    FlowerObservation,
-    Observation,
-    Pose,
-    Reading,
-)
+from lupin_twin.state import NANOSECONDS_PER_SECOND, STATUS_OK, Flower, Look, Pose, Reading, Scan
 
 S = NANOSECONDS_PER_SECOND
+SCAN_FAILED = 2
 
 
 def at(x: float, y: float = 0.0) -> Pose:
@@ -24,15 +18,20 @@ def scan(
     at_s: float = 1.0,
     pose: Pose | None = None,
     succeeded: bool = True,
+    source: str = "",
     **readings: float,
-) -> Observation:
-    """A scan; keyword arguments are its readings."""
+) -> Scan:
+    """A scan; the other keyword arguments are its readings."""
     values = tuple(Reading(name, value) for name, value in readings.items())
-    return Observation(tag_id, round(at_s * S), values, pose, succeeded)
+    status = STATUS_OK if succeeded else SCAN_FAILED
+    return Scan(tag_id, round(at_s * S), values, pose, status, source=source)
 
 
-def look(
-    tag_id: str, at_s: float = 1.0, pose: Pose | None = None, **flower: object
-) -> FlowerObservation:
+def look(tag_id: str, at_s: float = 1.0, pose: Pose | None = None, **flower: object) -> Look:
     """A look at the flowers; keyword arguments are what was seen."""
-    return FlowerObservation(tag_id, round(at_s * S), Flower(**flower), pose)  # type: ignore[arg-type]
+    return Look(tag_id, round(at_s * S), Flower(**flower), pose)  # type: ignore[arg-type]
+
+
+def failed_look(tag_id: str, at_s: float = 1.0) -> Look:
+    """A look that saw no flowers."""
+    return Look(tag_id, round(at_s * S), None, status=SCAN_FAILED)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from array import array
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,20 +13,24 @@ from geometry_msgs.msg import Quaternion
 from hypothesis import given
 from hypothesis import strategies as st
 from lupin_msgs.msg import Observation as ObservationMsg
+from lupin_msgs.msg import TwinTimes
 from lupin_msgs.srv import GetField
 from rclpy.serialization import deserialize_message, serialize_message
+from std_msgs.msg import Header
 
-from lupin_twin import convert, ingest
+from lupin_twin import convert, history, ingest
 from lupin_twin.grid import FieldGrid
 from lupin_twin.ingest import HeardLook, HeardReading
 from lupin_twin.state import (
     NANOSECONDS_PER_SECOND,
+    STATUS_OK,
     Bloom,
     Flower,
     Pose,
     Reading,
     Snapshot,
     TagState,
+    Try,
 )
 from tests.support import messages
 
@@ -33,7 +38,7 @@ S = NANOSECONDS_PER_SECOND
 PINNED = TagState(
     tag_id="7",
     pose=Pose(1.0, 2.0, 3.0, 0.0, 0.0, 0.6, 0.8),
-    readings=(Reading("co2", 512.0), Reading("light", 900.0)),
+    readings=(Reading("co2", 512.0, 3 * S), Reading("light", 900.0, 5 * S + 7)),
     last_observed_ns=5 * S + 7,
     flower=Flower(
         species="rose",
@@ -44,15 +49,75 @@ PINNED = TagState(
         blooms=(Bloom(1.1, 2.2, 0.5, 0.25, "rose", 0.75, anomaly=True),),
         footprint=((0.0, 0.0, 0.0), (1.5, 0.0, 0.0), (1.5, 0.25, 0.0)),
     ),
+    looked_at_ns=4 * S,
+    last_try=Try(6 * S, 2, "not decoded"),
 )
 UNPINNED = TagState(tag_id="8")
 
 
 def test_a_state_survives_the_wire_and_back() -> None:
     snapshot = Snapshot(stamp_ns=9 * S, frame_id="map", tags=(PINNED, UNPINNED))
-    msg = convert.StateMessages().build(snapshot)
-    over_the_wire = deserialize_message(serialize_message(msg), type(msg))
-    assert convert.snapshot_of(over_the_wire) == snapshot
+    state = over_the_wire(convert.StateMessages().build(snapshot))
+    times = deserialize_message(convert.TimesMessages().build(snapshot), TwinTimes)
+    assert convert.snapshot_of(state, None, times) == snapshot
+
+
+def test_without_times_nothing_is_known_but_the_last_observation() -> None:
+    snapshot = Snapshot(stamp_ns=9 * S, frame_id="map", tags=(PINNED, UNPINNED))
+    heard = convert.snapshot_of(over_the_wire(convert.StateMessages().build(snapshot)))
+    assert not heard.has_times
+    [pinned, unpinned] = heard.tags
+    assert pinned.readings == tuple(replace(r, observed_at_ns=None) for r in PINNED.readings)
+    assert (pinned.last_observed_ns, pinned.looked_at_ns, pinned.last_try) == (
+        PINNED.last_observed_ns,
+        None,
+        None,
+    )
+    assert unpinned == UNPINNED
+
+
+def test_a_state_and_its_times_of_the_same_tags_keep_the_very_same_values() -> None:
+    snapshot = Snapshot(stamp_ns=9 * S, frame_id="map", tags=(PINNED, UNPINNED))
+    state = over_the_wire(convert.StateMessages().build(snapshot))
+    times = deserialize_message(convert.TimesMessages().build(snapshot), TwinTimes)
+    first = convert.snapshot_of(state, None, times)
+    second = convert.snapshot_of(state, first, times)
+    assert all(one is other for one, other in zip(first.tags, second.tags, strict=True))
+    times.tags[0].looked_at.sec += 1
+    third = convert.snapshot_of(state, second, times)
+    assert third.tags[0] is not second.tags[0]
+    assert third.tags[1] is second.tags[1]
+
+
+TEXT = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=9)
+STAMPS = st.integers(1, 2_000_000_000 * S)
+TAGS_WITH_TIMES = st.builds(
+    TagState,
+    tag_id=TEXT,
+    readings=st.lists(
+        st.builds(Reading, TEXT, st.just(1.0), STAMPS), max_size=4, unique_by=lambda r: r.name
+    ).map(tuple),
+    looked_at_ns=st.none() | STAMPS,
+    last_try=st.none() | st.builds(Try, STAMPS, st.integers(0, 255), TEXT),
+)
+
+
+@given(st.lists(TAGS_WITH_TIMES, max_size=4, unique_by=lambda tag: tag.tag_id), TEXT)
+def test_times_put_together_from_parts_are_those_that_ros_would_write(
+    tags: list[TagState], frame_id: str
+) -> None:
+    builder = convert.TimesMessages()
+    builder.build(Snapshot(S, frame_id, tuple(tags[:2])))
+    msg = deserialize_message(builder.build(Snapshot(9 * S + 7, frame_id, tuple(tags))), TwinTimes)
+    assert msg == TwinTimes(
+        header=Header(stamp=convert.time_msg(9 * S + 7), frame_id=frame_id),
+        tags=[convert.times_message(tag) for tag in tags],
+    )
+    assert [each.tag_id for each in msg.tags] == [tag.tag_id for tag in tags]
+
+
+def over_the_wire(msg: Any) -> Any:
+    return deserialize_message(serialize_message(msg), type(msg))
 
 
 def test_no_pose_is_published_as_w_zero_and_no_observation_as_infinitely_old() -> None:
@@ -127,10 +192,10 @@ def test_an_observation_of_another_kind_has_no_part(kind: int) -> None:
 
 
 def test_the_kinds_and_the_status_are_the_messages() -> None:
-    assert ingest.KIND_TAG_READING == ObservationMsg.KIND_TAG_READING
-    assert ingest.KIND_FLOWER == ObservationMsg.KIND_FLOWER
+    assert history.KIND_TAG_READING == ObservationMsg.KIND_TAG_READING
+    assert history.KIND_FLOWER == ObservationMsg.KIND_FLOWER
     assert ingest.KIND_ANOMALY == ObservationMsg.KIND_ANOMALY
-    assert ingest.STATUS_OK == ObservationMsg.STATUS_OK
+    assert STATUS_OK == ObservationMsg.STATUS_OK
 
 
 def test_discovered_tags_are_heard_and_a_pose_is_made_when_it_is_asked_for() -> None:

@@ -28,7 +28,7 @@ from lupin_twin.fields import (
 )
 from lupin_twin.grid import FieldGrid
 from lupin_twin.idw import Abandoned
-from lupin_twin.state import MAX_TEXT_LENGTH, Observation, Pose, Reading, TwinStore
+from lupin_twin.state import MAX_TEXT_LENGTH, Pose, Reading, Scan, TwinStore
 
 MAX_CELLS = 1_000_000
 
@@ -61,8 +61,8 @@ def engine_of(**changes: Any) -> FieldEngine:
     return FieldEngine(rules_of(**changes), FieldCache(max_bytes=64_000_000))
 
 
-def scan(tag_id: str, x: float, y: float, value: float) -> Observation:
-    return Observation(
+def scan(tag_id: str, x: float, y: float, value: float) -> Scan:
+    return Scan(
         tag_id=tag_id,
         stamp_ns=1,
         readings=(Reading("temperature", value),),
@@ -258,7 +258,7 @@ def test_sensor_that_nobody_reported_is_no_error(store: TwinStore) -> None:
 
 def test_every_write_that_can_change_a_field_makes_it_anew(store: TwinStore) -> None:
     engine = engine_of()
-    unpinned = Observation("d", stamp_ns=1, readings=(Reading("temperature", 40.0),))
+    unpinned = Scan("d", stamp_ns=1, readings=(Reading("temperature", 40.0),))
     store.record(unpinned)
     before = answer(engine, request_of(), store, None)
     store.record(scan("a", 0.5, 0.5, 11.0))

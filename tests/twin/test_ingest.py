@@ -10,16 +10,9 @@ import pytest
 from lupin_twin import ingest
 from lupin_twin.convert import pose_message, pose_of
 from lupin_twin.drops import Drop, Reason
+from lupin_twin.history import History, TagHistory
 from lupin_twin.ingest import Heard, HeardLook, HeardReading, HeardTags, Pin
-from lupin_twin.state import (
-    MAX_TEXT_LENGTH,
-    Flower,
-    FlowerObservation,
-    Observation,
-    Pose,
-    Reading,
-    TwinStore,
-)
+from lupin_twin.state import MAX_TEXT_LENGTH, Flower, Look, Pose, Reading, Scan, TwinStore
 from tests.support.store import S, at
 
 NOW_NS = 100 * S
@@ -29,12 +22,12 @@ READINGS = (Reading("co2", 1.0),)
 
 def heard_reading(tag_id: str = "1", pose: Pose | None = None, **changes: object) -> Heard:
     part = HeardReading(tag_id, 3 * S, READINGS, pose or at(1.0, 2.0))
-    return replace(Heard(0, 0, "map", 4 * S, part), **changes)  # type: ignore[arg-type]
+    return replace(Heard(0, "robot", 0, "", "map", 4 * S, part), **changes)  # type: ignore[arg-type]
 
 
 def heard_look(tag_id: str = "1", frame_id: str = "", **changes: object) -> Heard:
     part = HeardLook(tag_id, frame_id, Flower("rose", 0.9), at(1.0, 2.0))
-    return replace(Heard(1, 0, "map", 4 * S, part), **changes)  # type: ignore[arg-type]
+    return replace(Heard(1, "robot", 0, "", "map", 4 * S, part), **changes)  # type: ignore[arg-type]
 
 
 def reason_of(heard: Heard) -> Reason | None:
@@ -46,38 +39,52 @@ def reason_of(heard: Heard) -> Reason | None:
 
 
 def test_a_tag_reading_is_a_scan_with_its_pose_and_stamp() -> None:
-    assert ingest.observation(heard_reading(), "map", NOW_NS) == Observation(
-        "1", 4 * S, READINGS, at(1.0, 2.0)
+    assert ingest.observation(heard_reading(), "map", NOW_NS) == Scan(
+        "1", 4 * S, READINGS, at(1.0, 2.0), source="robot", own_stamp_ns=4 * S
     )
 
 
-def test_a_scan_without_a_stamp_was_made_when_its_sensors_were_read() -> None:
-    write = ingest.observation(heard_reading(stamp_ns=0), "map", NOW_NS)
-    assert isinstance(write, Observation)
-    assert write.stamp_ns == 3 * S
+@pytest.mark.parametrize(("own_s", "at_s"), [(0, 3), (101, 100)])
+def test_a_scan_without_a_stamp_was_made_when_its_sensors_were_read(own_s: int, at_s: int) -> None:
+    write = ingest.observation(heard_reading(stamp_ns=own_s * S), "map", NOW_NS)
+    assert isinstance(write, Scan)
+    assert (write.stamp_ns, write.own_stamp_ns) == (at_s * S, (own_s or 3) * S)
 
 
-def test_a_scan_that_is_not_ok_keeps_its_readings_and_loses_its_pose() -> None:
-    assert ingest.observation(heard_reading(status=SKIPPED), "map", NOW_NS) == Observation(
-        "1", 4 * S, READINGS, None, succeeded=False
+def test_a_scan_that_is_not_ok_keeps_its_readings_and_why_and_loses_its_pose() -> None:
+    heard = heard_reading(status=SKIPPED, status_detail="no time")
+    assert ingest.observation(heard, "map", NOW_NS) == Scan(
+        "1", 4 * S, READINGS, None, SKIPPED, "no time", "robot", 4 * S
     )
 
 
 def test_a_look_is_what_the_camera_made_of_it() -> None:
-    assert ingest.observation(heard_look(), "map", NOW_NS) == FlowerObservation(
-        "1", 4 * S, Flower("rose", 0.9), at(1.0, 2.0)
+    assert ingest.observation(heard_look(), "map", NOW_NS) == Look(
+        "1", 4 * S, Flower("rose", 0.9), at(1.0, 2.0), source="robot", own_stamp_ns=4 * S
     )
 
 
 def test_a_look_that_is_not_ok_is_a_failed_try_and_its_payload_nothing() -> None:
-    assert ingest.observation(heard_look(status=SKIPPED), "map", NOW_NS) == Observation(
-        "1", 4 * S, succeeded=False
+    heard = heard_look(status=SKIPPED, status_detail="dark")
+    assert ingest.observation(heard, "map", NOW_NS) == Look(
+        "1", 4 * S, None, None, SKIPPED, "dark", "robot", 4 * S
     )
+
+
+@pytest.mark.parametrize(("length", "kept"), [(256, 256), (257, 256), (10_000, 256)])
+def test_a_long_word_of_a_producer_is_cut_and_nothing_is_dropped_for_it(
+    length: int, kept: int
+) -> None:
+    heard = heard_reading(source="s" * length, status_detail="d" * length)
+    write = ingest.observation(heard, "map", NOW_NS)
+    assert isinstance(write, Scan)
+    assert (len(write.source), len(write.status_detail)) == (kept, kept)
+    assert write.source.endswith("…") == (length > kept)
 
 
 @pytest.mark.parametrize(("kind", "name"), [(2, "KIND_ANOMALY"), (77, "an unknown kind")])
 def test_other_kinds_are_dropped_by_their_name(kind: int, name: str) -> None:
-    drop = ingest.observation(Heard(kind, 0, "map", S, None), "map", NOW_NS)
+    drop = ingest.observation(Heard(kind, "robot", 0, "", "map", S, None), "map", NOW_NS)
     assert isinstance(drop, Drop)
     assert drop.reason is Reason.KIND
     assert drop.on("/t") == f"dropped an observation on /t: kind {kind} ({name}) is not a tag's"
@@ -178,14 +185,32 @@ def test_a_discovery_in_another_frame_is_dropped_once_whatever_it_holds() -> Non
 # --- writing ------------------------------------------------------------------------------------
 
 
-def test_what_is_written_is_in_the_store_and_what_it_refuses_is_a_drop() -> None:
-    store = TwinStore()
-    assert ingest.apply(Observation("1", S, READINGS), store) is None
-    assert ingest.apply(FlowerObservation("1", S, Flower("rose")), store) is None
-    assert ingest.apply(Pin("1", at(1.0)), store) is None
+def test_what_is_written_is_in_store_and_history_and_what_is_refused_is_in_neither() -> None:
+    store, history = TwinStore(), History()
+    assert ingest.apply(Scan("1", S, READINGS), store, history) is None
+    assert ingest.apply(Look("1", 2 * S, Flower("rose")), store, history) is None
+    assert ingest.apply(Pin("1", at(1.0)), store, history) is None
     [tag] = store.snapshot(S, "map").tags
-    assert (tag.readings, tag.flower.species, tag.pose) == (READINGS, "rose", at(1.0))
-    drop = ingest.apply(Pin("x" * (MAX_TEXT_LENGTH + 1), at(1.0)), store)
-    assert drop is not None
-    assert drop.reason is Reason.REJECTED
-    assert f"the limit is {MAX_TEXT_LENGTH}" in drop.why
+    assert ([r.value for r in tag.readings], tag.flower.species) == ([1.0], "rose")
+    assert tag.pose == at(1.0)
+    assert [tried.stamp_ns for tried in history.of("1").tries] == [S, 2 * S]
+    too_long = "x" * (MAX_TEXT_LENGTH + 1)
+    for write in (Pin(too_long, at(1.0)), Scan(too_long, S), Look(too_long, S, None)):
+        drop = ingest.apply(write, store, history)
+        assert drop is not None
+        assert drop.reason is Reason.REJECTED
+        assert f"the limit is {MAX_TEXT_LENGTH}" in drop.why
+    assert history.of(too_long) == TagHistory()
+
+
+def test_a_message_from_the_future_stays_as_old_as_when_it_was_heard_first() -> None:
+    """Heard again, latched, it must not make what it said look fresh."""
+    store, history = TwinStore(), History()
+    for now_s in (100, 160, 220):
+        heard = heard_reading(stamp_ns=10_000 * S)
+        write = ingest.observation(heard, "map", now_s * S)
+        assert isinstance(write, Scan)
+        ingest.apply(write, store, history)
+    [tag] = store.snapshot(220 * S, "map").tags
+    assert tag.last_observed_ns == 100 * S
+    assert [scan.stamp_ns for scan in history.of("1").scans] == [100 * S]

@@ -18,6 +18,7 @@ DEFAULTS = {
     "discovered_tags_topic": "/perception/discovered_tags",
     "map_topic": "/map",
     "state_topic": "/twin/state",
+    "times_topic": "/twin/times",
     "field_service_name": "/twin/get_field",
     "state_publish_rate_hz": 1.0,
     "frame_id": "map",

@@ -13,8 +13,10 @@ from lupin_msgs.msg import (
     FlowerPoint,
     Observation,
     SensorReading,
+    TagTimes,
     TwinState,
     TwinTagState,
+    TwinTimes,
 )
 from rclpy.serialization import serialize_message
 
@@ -60,6 +62,7 @@ def corners(count: int) -> Any:
             "tags",
         ),
         (shapes.STATE, lambda count: TwinState(tags=[TwinTagState()] * count), MAX_TAGS, "tags"),
+        (shapes.TIMES, lambda count: TwinTimes(tags=[TagTimes()] * count), MAX_TAGS, "tags"),
     ],
 )
 def test_as_many_as_can_be_kept_are_taken_and_not_one_more(

@@ -11,20 +11,22 @@ from lupin_twin import state
 from lupin_twin.state import (
     Bloom,
     Flower,
-    FlowerObservation,
-    Observation,
+    Look,
     Reading,
     Rejected,
+    Scan,
+    Try,
     TwinStore,
+    age_seconds,
 )
-from tests.support.store import S, at, look, scan
+from tests.support.store import S, at, failed_look, look, scan
 
 
-def write(store: TwinStore, observation: Observation | FlowerObservation) -> None:
-    if isinstance(observation, Observation):
+def write(store: TwinStore, observation: Scan | Look) -> None:
+    if isinstance(observation, Scan):
         store.record(observation)
     else:
-        store.record_flower(observation)
+        store.record_look(observation)
 
 
 def tag(store: TwinStore, tag_id: str) -> state.TagState:
@@ -51,7 +53,7 @@ def test_first_pose_wins_whoever_brings_it() -> None:
         store = TwinStore()
         writes = {
             "scan": lambda x, s=store: s.record(scan("1", pose=at(x))),
-            "look": lambda x, s=store: s.record_flower(look("1", pose=at(x))),
+            "look": lambda x, s=store: s.record_look(look("1", pose=at(x))),
             "pin": lambda x, s=store: s.pin("1", at(x)),
         }
         for x, name in enumerate((first, second, third)):
@@ -73,7 +75,7 @@ def test_a_tag_without_a_pose_takes_the_first_that_comes() -> None:
 def test_a_pin_touches_neither_readings_nor_species_nor_time() -> None:
     store = TwinStore()
     store.record(scan("1", at_s=3.0, co2=1.0))
-    store.record_flower(look("1", at_s=4.0, species="rose"))
+    store.record_look(look("1", at_s=4.0, species="rose"))
     before = tag(store, "1")
     store.pin("1", at(5.0))
     assert tag(store, "1") == dataclasses.replace(before, pose=at(5.0))
@@ -83,25 +85,66 @@ def test_flower_results_replace_and_leave_readings_alone() -> None:
     store = TwinStore()
     bloom = Bloom(0.0, 0.0, 0.0, 0.1, "rose", 0.9, anomaly=True)
     store.record(scan("1", co2=1.0))
-    store.record_flower(look("1", species="rose", anomaly=True, bug_count=2, blooms=(bloom,)))
-    store.record_flower(look("1", species="lupin"))
+    store.record_look(look("1", species="rose", anomaly=True, bug_count=2, blooms=(bloom,)))
+    store.record_look(look("1", species="lupin"))
     assert tag(store, "1").flower == Flower(species="lupin")
     assert [r.value for r in tag(store, "1").readings] == [1.0]
 
 
-def test_every_accepted_write_counts_one_and_a_refused_one_none() -> None:
+def test_a_write_counts_when_it_changes_what_is_shown_and_a_refused_one_never() -> None:
     store = TwinStore()
     store.record(scan("1", co2=1.0))
-    store.record(scan("1", succeeded=False))
-    store.record_flower(look("1"))
+    store.record_look(look("1", species="rose"))
     store.pin("2", at(1.0))
+    store.record(scan("tried", succeeded=False))
     assert store.observation_count == 4
     store.pin("2", at(2.0))
-    for refused in (scan("x" * 300), Observation("3", S, (Reading("n" * 300, 1.0),))):
+    for refused in (scan("x" * 300), Scan("3", S, (Reading("n" * 300, 1.0),))):
         with pytest.raises(Rejected):
             store.record(refused)
     assert store.observation_count == 4
-    assert {t.tag_id for t in store.snapshot(0, "map").tags} == {"1", "2"}
+    assert {t.tag_id for t in store.snapshot(0, "map").tags} == {"1", "2", "tried"}
+
+
+def test_a_write_that_changes_nothing_that_is_shown_does_not_count() -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=20.0, co2=1.0, light=math.nan))
+    store.record_look(look("1", at_s=20.0, species="rose", confidence=math.nan))
+    before = tag(store, "1")
+    store.record(scan("1", at_s=20.0, co2=1.0, light=math.nan))
+    store.record_look(look("1", at_s=20.0, species="rose", confidence=math.nan))
+    assert tag(store, "1") is before, "who looks for changes compares identities"
+    store.record(scan("1", at_s=10.0, co2=9.0))
+    store.record_look(look("1", at_s=10.0, species="lupin"))
+    store.record(scan("1", at_s=30.0, succeeded=False))
+    assert store.observation_count == 2
+    store.record(scan("1", at_s=10.0, pose=at(1.0), co2=9.0))
+    assert store.observation_count == 3, "it pins the tag"
+
+
+def test_the_last_try_is_kept_apart_from_what_was_observed() -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=10.0, co2=1.0))
+    assert tag(store, "1").last_try == Try(10 * S)
+    store.record(Scan("1", 30 * S, status=1, status_detail="blocked"))
+    store.record_look(failed_look("1", at_s=20.0))
+    kept = tag(store, "1")
+    assert kept.last_try == Try(30 * S, 1, "blocked")
+    assert (kept.last_observed_ns, kept.looked_at_ns) == (10 * S, None)
+    store.record_look(look("1", at_s=40.0))
+    assert tag(store, "1").last_try == Try(40 * S)
+    store.pin("2", at(1.0))
+    assert tag(store, "2").last_try is None
+
+
+def test_every_reading_has_its_own_time_and_a_look_makes_none_younger() -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=10.0, co2=1.0, light=2.0))
+    store.record_look(look("1", at_s=3610.0))
+    store.record(scan("1", at_s=7210.0, light=3.0))
+    kept = tag(store, "1")
+    assert kept.readings == (Reading("co2", 1.0, 10 * S), Reading("light", 3.0, 7210 * S))
+    assert (kept.looked_at_ns, kept.last_observed_ns) == (3610 * S, 7210 * S)
 
 
 def test_age_is_since_the_last_observation_and_never_negative() -> None:
@@ -109,6 +152,11 @@ def test_age_is_since_the_last_observation_and_never_negative() -> None:
     store.record(scan("1", at_s=100.0, co2=1.0))
     assert tag(store, "1").stale_seconds(130 * S) == 30.0
     assert tag(store, "1").stale_seconds(50 * S) == 0.0
+
+
+def test_an_age_is_of_a_moment_and_never_negative() -> None:
+    assert age_seconds(3 * S, 5 * S) == 2.0
+    assert age_seconds(5 * S, 3 * S) == 0.0
 
 
 def test_a_tag_never_observed_is_infinitely_old() -> None:
@@ -145,23 +193,11 @@ def test_samples_need_a_pose_and_a_finite_reading_and_keep_the_first_mention_ord
     assert math.isinf(readings["inf"])
 
 
-def test_history_keeps_the_last_scans_that_brought_readings() -> None:
-    store = TwinStore(buffer_len=2)
-    assert store.history("1") is None
-    store.pin("1", at(1.0))
-    assert store.history("1") == ()
-    scans = [scan("1", at_s=float(i), co2=float(i)) for i in range(3)]
-    for each in scans:
-        store.record(each)
-    store.record(scan("1", at_s=9.0, succeeded=False))
-    assert store.history("1") == (scans[1], scans[2])
-
-
 def test_bounds_name_the_value_and_the_limit() -> None:
     store = TwinStore()
     bloom = Bloom(0.0, 0.0, 0.0, 0.1, "rose", 0.9, anomaly=False)
-    too_many: list[Observation | FlowerObservation] = [
-        Observation("1", S, tuple(Reading(f"s{i}", 0.0) for i in range(65))),
+    too_many: list[Scan | Look] = [
+        Scan("1", S, tuple(Reading(f"s{i}", 0.0) for i in range(65))),
         look("1", blooms=(bloom,) * (state.MAX_BLOOMS_PER_TAG + 1)),
         look("1", footprint=((0.0, 0.0, 0.0),) * (state.MAX_FOOTPRINT_POINTS + 1)),
         look("1", species="r" * (state.MAX_TEXT_LENGTH + 1)),
@@ -195,7 +231,7 @@ def test_what_all_tags_hold_is_bounded_and_what_is_known_goes_on(
     bloom = Bloom(0.0, 0.0, 0.0, 0.1, "rose", 0.9, anomaly=False)
     store = TwinStore()
     store.record(scan("1", co2=1.0))
-    store.record_flower(look("2", blooms=(bloom, bloom), footprint=((0.0, 0.0, 0.0),)))
+    store.record_look(look("2", blooms=(bloom, bloom), footprint=((0.0, 0.0, 0.0),)))
     for one_too_many in (scan("1", light=1.0), scan("3", co2=1.0), look("1", blooms=(bloom,))):
         with pytest.raises(Rejected, match="of all tags: 5, the limit is 4"):
             write(store, one_too_many)
@@ -204,35 +240,15 @@ def test_what_all_tags_hold_is_bounded_and_what_is_known_goes_on(
     assert tag(store, "1").readings[0].value == 2.0
     store.pin("3", at(1.0))
     # A look with one flower less makes room for one reading more.
-    store.record_flower(look("2", blooms=(bloom,), footprint=((0.0, 0.0, 0.0),)))
+    store.record_look(look("2", blooms=(bloom,), footprint=((0.0, 0.0, 0.0),)))
     store.record(scan("3", co2=3.0))
     assert tag(store, "3").readings[0].value == 3.0
 
 
-def test_the_histories_of_all_tags_are_bounded_and_the_latest_readings_are_not(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(state, "MAX_HISTORY_READINGS", 5)
-    store = TwinStore()
-    first, second, third = (scan("1", at_s=i, co2=i, light=i) for i in (1.0, 2.0, 3.0))
-    for each in (first, second):
-        store.record(each)
-    other = scan("2", co2=4.0)
-    store.record(other)
-    store.record(third)
-    assert store.history("1") == (second, third)
-    store.record(scan("3", co2=5.0))
-    assert store.history("3") == ()
-    assert tag(store, "3").readings[0].value == 5.0
-    assert store.history("2") == (other,)
-
-
 def test_a_sensor_that_a_scan_names_many_times_is_kept_once() -> None:
     store = TwinStore()
-    store.record(Observation("1", S, tuple(Reading("co2", float(i)) for i in range(1_000))))
-    kept = (Reading("co2", 999.0),)
-    assert tag(store, "1").readings == kept
-    assert store.history("1") == (Observation("1", S, kept),)
+    store.record(Scan("1", S, tuple(Reading("co2", float(i)) for i in range(1_000))))
+    assert tag(store, "1").readings == (Reading("co2", 999.0, S),)
 
 
 def test_a_snapshot_stays_as_it_was() -> None:

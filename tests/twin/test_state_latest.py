@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from lupin_twin import state
-from lupin_twin.state import Flower, Observation, Reading, Rejected, TagState, TwinStore
-from tests.support.store import S, at, look, scan
+from lupin_twin.state import Flower, Look, Reading, Rejected, Scan, TagState, Try, TwinStore
+from tests.support.store import SCAN_FAILED, S, at, look, scan
 
 
 def tag(store: TwinStore, tag_id: str) -> TagState:
@@ -24,7 +25,6 @@ def test_an_older_scan_replaces_nothing_newer_and_adds_what_was_not_known() -> N
     kept = tag(store, "1")
     assert [(r.name, r.value) for r in kept.readings] == [("co2", 2.0), ("light", 1.0)]
     assert (kept.pose, kept.last_observed_ns) == (at(5.0), 20 * S)
-    assert store.observation_count == 2
     # Of each sensor its own time counts: light is known from 10 s only.
     store.record(scan("1", at_s=15.0, co2=3.0, light=3.0))
     assert [r.value for r in tag(store, "1").readings] == [2.0, 3.0]
@@ -32,14 +32,14 @@ def test_an_older_scan_replaces_nothing_newer_and_adds_what_was_not_known() -> N
 
 def test_an_older_look_replaces_no_newer_one_but_may_pin() -> None:
     store = TwinStore()
-    store.record_flower(look("1", at_s=20.0, species="rose", anomaly=True))
-    store.record_flower(look("1", at_s=10.0, pose=at(5.0), species="lupin"))
+    store.record_look(look("1", at_s=20.0, species="rose", anomaly=True))
+    store.record_look(look("1", at_s=10.0, pose=at(5.0), species="lupin"))
     kept = tag(store, "1")
     assert kept.flower == Flower(species="rose", anomaly=True)
     assert (kept.pose, kept.last_observed_ns) == (at(5.0), 20 * S)
     # A newer scan is no look: the flowers' own time counts.
     store.record(scan("1", at_s=40.0, co2=1.0))
-    store.record_flower(look("1", at_s=30.0, species="lupin"))
+    store.record_look(look("1", at_s=30.0, species="lupin"))
     assert tag(store, "1").flower == Flower(species="lupin")
     assert tag(store, "1").last_observed_ns == 40 * S
 
@@ -48,7 +48,7 @@ def test_of_equal_stamps_the_later_arrival_counts() -> None:
     store = TwinStore()
     for value, species in ((1.0, "rose"), (2.0, "lupin")):
         store.record(scan("1", at_s=5.0, co2=value))
-        store.record_flower(look("1", at_s=5.0, species=species))
+        store.record_look(look("1", at_s=5.0, species=species))
     assert tag(store, "1").readings[0].value == 2.0
     assert tag(store, "1").flower.species == "lupin"
 
@@ -60,30 +60,11 @@ def test_the_time_of_a_failed_scan_gives_way_to_any_observation() -> None:
     assert tag(store, "1").last_observed_ns == 10 * S
 
 
-def test_the_history_is_in_the_order_of_time_and_keeps_the_newest() -> None:
-    store = TwinStore(buffer_len=3)
-    scans = {at_s: scan("1", at_s=at_s, co2=at_s) for at_s in (1.0, 2.0, 3.0, 4.0)}
-    for at_s in (2.0, 4.0, 3.0):
-        store.record(scans[at_s])
-    assert store.history("1") == (scans[2.0], scans[3.0], scans[4.0])
-    store.record(scans[1.0])
-    assert store.history("1") == (scans[2.0], scans[3.0], scans[4.0])
-
-
-def test_scans_of_equal_stamps_stay_in_the_order_of_their_arrival() -> None:
-    store = TwinStore()
-    for number in range(4):
-        store.record(scan("1", at_s=5.0, co2=float(number)))
-    history = store.history("1")
-    assert history is not None
-    assert [kept.readings[0].value for kept in history] == [0.0, 1.0, 2.0, 3.0]
-
-
 def test_after_a_clock_that_went_back_all_ages_from_there_and_news_is_news() -> None:
     store = TwinStore()
     store.record(scan("1", at_s=40.0, co2=1.0))
     store.record(scan("1", at_s=3600.0, co2=2.0))
-    store.record_flower(look("1", at_s=3600.0, species="rose"))
+    store.record_look(look("1", at_s=3600.0, species="rose"))
     store.record(scan("before", at_s=40.0, co2=1.0))
     store.record(scan("tried", at_s=3600.0, succeeded=False))
     store.pin("never", at(1.0))
@@ -94,13 +75,26 @@ def test_after_a_clock_that_went_back_all_ages_from_there_and_news_is_news() -> 
     assert not store.hold_to(50 * S)
     ages = {t.tag_id: t.stale_seconds(60 * S) for t in store.snapshot(60 * S, "map").tags}
     assert ages == {"1": 10.0, "before": 20.0, "tried": 10.0, "never": math.inf}
-    assert [scan.stamp_ns for scan in store.history("1") or ()] == [40 * S, 50 * S]
+    tags = {t.tag_id: t for t in store.snapshot(60 * S, "map").tags}
+    assert tags["1"].readings == (Reading("co2", 2.0, 50 * S),)
+    assert (tags["1"].looked_at_ns, tags["1"].last_try) == (50 * S, Try(50 * S))
+    assert tags["tried"].last_try == Try(50 * S, SCAN_FAILED)
+    assert tags["before"].readings == (Reading("co2", 1.0, 40 * S),)
     assert store.observation_count == count
     store.record(scan("1", at_s=55.0, co2=3.0))
-    store.record_flower(look("1", at_s=55.0, species="lupin"))
+    store.record_look(look("1", at_s=55.0, species="lupin"))
     kept = tag(store, "1")
     assert (kept.readings[0].value, kept.flower.species) == (3.0, "lupin")
     assert kept.last_observed_ns == 55 * S
+
+
+def test_a_try_that_is_newer_than_all_that_was_observed_follows_the_clock_too() -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=10.0, co2=1.0))
+    store.record(scan("1", at_s=90.0, succeeded=False))
+    assert store.hold_to(50 * S)
+    assert tag(store, "1").last_try == Try(50 * S, SCAN_FAILED)
+    assert tag(store, "1").last_observed_ns == 10 * S
 
 
 def test_a_refused_write_leaves_no_stamp_behind(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -111,98 +105,149 @@ def test_a_refused_write_leaves_no_stamp_behind(monkeypatch: pytest.MonkeyPatch)
         with pytest.raises(Rejected):
             store.record(scan("1", at_s=9.0, co2=9.0, light=9.0))
     store.record(scan("1", at_s=2.0, co2=2.0))
-    assert tag(store, "1").readings == (Reading("co2", 2.0),)
+    assert tag(store, "1").readings == (Reading("co2", 2.0, 2 * S),)
     assert not store.hold_to(5 * S)
 
 
 # --- against a model ----------------------------------------------------------------------------
 
-writes = st.lists(
-    st.tuples(
-        st.sampled_from(["record", "fail", "flower", "pin", "clock"]),
-        st.sampled_from(["a", "b", "c"]),
-        st.integers(1, 100),
-        st.one_of(st.none(), st.floats(-5, 5)),
-        st.sets(st.sampled_from(["co2", "light"])),
+
+def plainest(writes: list[Write]) -> dict[str, TagState]:
+    """The state of each tag, from the list of all that was ever written: no rule but the order.
+
+    What has a time goes by it (of equal times, by arrival); poses and names go by arrival alone.
+    """
+    tags: dict[str, TagState] = {}
+    for tag_id in dict.fromkeys(write.tag_id for write in writes):
+        own = [write for write in writes if write.tag_id == tag_id]
+        names = dict.fromkeys(r.name for w in own if isinstance(w, Scan) for r in w.readings)
+        tried = sorted(own, key=lambda write: write.stamp_ns)
+        seen = [write for write in tried if brings(write)]
+        values = {
+            reading.name: Reading(reading.name, reading.value, write.stamp_ns)
+            for write in tried
+            if isinstance(write, Scan)
+            for reading in write.readings
+        }
+        looks = [w for w in tried if isinstance(w, Look) and w.flower is not None]
+        last_observed = seen[-1] if seen else tried[0]
+        tags[tag_id] = TagState(
+            tag_id,
+            next((write.pose for write in own if write.pose is not None), None),
+            tuple(values[name] for name in names),
+            last_observed.stamp_ns,
+            looks[-1].flower or Flower() if looks else Flower(),
+            looks[-1].stamp_ns if looks else None,
+            Try(tried[-1].stamp_ns, tried[-1].status, tried[-1].status_detail),
+        )
+    return tags
+
+
+def brings(write: Write) -> bool:
+    return (
+        write.succeeded or bool(write.readings) if isinstance(write, Scan) else bool(write.flower)
+    )
+
+
+def held(write: Write, now_ns: int) -> Write:
+    return replace(write, stamp_ns=min(write.stamp_ns, now_ns))
+
+
+Write = Scan | Look
+TAG_IDS = st.sampled_from(["a", "b"])
+STAMPS = st.integers(1, 30).map(lambda at_s: at_s * S)
+POSES = st.one_of(st.none(), st.integers(-5, 5).map(float).map(at))
+STATUS = st.sampled_from([0, 2])
+SENSORS = st.sets(st.sampled_from(["co2", "light"])).map(sorted)
+SCANS = st.builds(
+    lambda tag_id, stamp_ns, names, pose, status: Scan(
+        tag_id, stamp_ns, tuple(Reading(name, 0.0) for name in names), pose, status
     ),
-    max_size=30,
-)
+    TAG_IDS, STAMPS, SENSORS, POSES, STATUS,
+)  # fmt: skip
+LOOKS = st.builds(
+    lambda tag_id, stamp_ns, pose, status: Look(
+        tag_id, stamp_ns, None if status else Flower(), pose, status
+    ),
+    TAG_IDS, STAMPS, POSES, STATUS,
+)  # fmt: skip
+STEPS = st.lists(SCANS | LOOKS | st.integers(1, 30), max_size=25)
 
 
-class PlainTag:
-    """A tag as the list of all that was ever written, each with its time."""
-
-    def __init__(self) -> None:
-        self.pose: float | None = None
-        self.tried: int | None = None
-        self.seen: list[tuple[int, str, object]] = []
-
-    def latest(self, kind: str) -> object:
-        # max() gives the first of equals, so the list is turned: the last one that came.
-        of_kind = [(at_s, value) for at_s, what, value in reversed(self.seen) if what == kind]
-        return max(of_kind, key=lambda pair: pair[0], default=(0, None))[1]
-
-    @property
-    def last_observed(self) -> int | None:
-        return max((at_s for at_s, _, _ in self.seen), default=self.tried)
-
-    def hold_to(self, now_s: int) -> None:
-        # By time first: of what is equal from now on, the last in the list is the latest.
-        self.seen.sort(key=lambda entry: entry[0])
-        self.seen = [(min(at_s, now_s), kind, value) for at_s, kind, value in self.seen]
-        self.tried = None if self.tried is None else min(self.tried, now_s)
+def numbered(write: Write, number: int) -> Write:
+    """The write with a value of its own, so that it can be told from all others."""
+    if isinstance(write, Scan):
+        readings = tuple(replace(reading, value=float(number)) for reading in write.readings)
+        return replace(write, readings=readings, status_detail=str(number))
+    flower = None if write.flower is None else Flower(flower_count=number)
+    return replace(write, flower=flower, status_detail=str(number))
 
 
-Step = tuple[str, str, int, float | None, set[str]]
-
-
-def write(step: Step, number: int, store: TwinStore, plain: PlainTag) -> None:
-    """One step, to the store and to the model; `number` is the value that it writes."""
-    kind, tag_id, at_s, x, sensors = step
-    pose = None if x is None else at(x)
-    if kind == "record":
-        readings = tuple(Reading(name, float(number)) for name in sorted(sensors))
-        store.record(Observation(tag_id, at_s * S, readings, pose))
-        plain.seen += [(at_s, what, float(number)) for what in ("scan", *sensors)]
-    elif kind == "fail":
-        store.record(scan(tag_id, at_s, succeeded=False))
-        plain.tried = at_s if plain.last_observed is None else plain.tried
-    elif kind == "flower":
-        store.record_flower(look(tag_id, at_s, pose, flower_count=number))
-        plain.seen.append((at_s, "flower", number))
-    elif pose is not None:
-        store.pin(tag_id, pose)
-    if plain.pose is None and kind != "fail":
-        plain.pose = x
-
-
-def assert_same(kept: TagState, plain: PlainTag) -> None:
-    assert (None if kept.pose is None else kept.pose.x) == plain.pose
-    known = {sensor: plain.latest(sensor) for sensor in ("co2", "light")}
-    assert {r.name: r.value for r in kept.readings} == {
-        name: value for name, value in known.items() if value is not None
-    }
-    assert kept.flower.flower_count == (plain.latest("flower") or 0)
-    last_s = plain.last_observed
-    assert kept.last_observed_ns == (None if last_s is None else last_s * S)
-
-
-@given(writes)
-def test_against_the_plainest_store(steps: list[Step]) -> None:
-    """Any sequence of writes in any order of time, and of clocks that go back."""
+@given(STEPS)
+def test_against_the_plainest_store(steps: list[Write | int]) -> None:
+    """Any sequence of writes in any order of time, and of clocks that go back (the numbers)."""
     store = TwinStore()
-    model: dict[str, PlainTag] = {}
+    written: list[Write] = []
     for number, step in enumerate(steps):
-        kind, tag_id, at_s, x, _ = step
-        if kind == "clock":
-            store.hold_to(at_s * S)
-            for plain in model.values():
-                plain.hold_to(at_s)
-        elif kind != "pin" or x is not None:
-            write(step, number, store, model.setdefault(tag_id, PlainTag()))
-    tags = store.snapshot(0, "map").tags
-    assert [kept.tag_id for kept in tags] == list(model)
-    for kept, plain in zip(tags, model.values(), strict=True):
-        assert_same(kept, plain)
-        stamps = [past.stamp_ns for past in store.history(kept.tag_id) or ()]
-        assert stamps == sorted(stamps)
+        if isinstance(step, int):
+            store.hold_to(step * S)
+            # By time first: of what is equal from now on, the last in the list is the latest.
+            written = [held(write, step * S) for write in in_time(written)]
+            continue
+        write = numbered(step, number)
+        written.append(write)
+        before = {t.tag_id: t for t in store.snapshot(0, "map").tags}
+        count = store.observation_count
+        store.record(write) if isinstance(write, Scan) else store.record_look(write)
+        after = tag(store, write.tag_id)
+        shown = [as_shown(each) for each in (before.get(write.tag_id), after)]
+        assert store.observation_count == count + (shown[0] != shown[1])
+    kept = {t.tag_id: t for t in store.snapshot(0, "map").tags}
+    for tag_id, expected in plainest(written).items():
+        assert by_name(kept[tag_id]) == by_name(expected)
+
+
+def in_time(writes: list[Write]) -> list[Write]:
+    return sorted(writes, key=lambda write: write.stamp_ns)
+
+
+def by_name(state_of_tag: TagState) -> TagState:
+    """Without the order of the readings and the pose, which a clock that goes back leaves alone."""
+    readings = sorted(state_of_tag.readings, key=lambda reading: reading.name)
+    return replace(state_of_tag, readings=tuple(readings), pose=None)
+
+
+def as_shown(state_of_tag: TagState | None) -> object:
+    """What the state's message says of a tag."""
+    if state_of_tag is None:
+        return None
+    readings = tuple(replace(reading, observed_at_ns=None) for reading in state_of_tag.readings)
+    return replace(state_of_tag, readings=readings, looked_at_ns=None, last_try=None)
+
+
+@given(
+    st.lists(SCANS | LOOKS, max_size=12).flatmap(
+        lambda w: st.tuples(st.just(w), st.permutations(w))
+    )
+)
+def test_what_has_stamps_of_its_own_is_the_same_in_any_order(
+    orders: tuple[list[Write], list[Write]],
+) -> None:
+    """Poses apart, which the first to come keeps."""
+    unique = {(write.tag_id, write.stamp_ns): write for write in orders[0]}
+    states = []
+    for order in orders:
+        store = TwinStore()
+        for write in order:
+            if unique[write.tag_id, write.stamp_ns] is write:
+                store.record(write) if isinstance(write, Scan) else store.record_look(write)
+        states.append({t.tag_id: by_name(t) for t in store.snapshot(0, "map").tags})
+    assert states[0] == states[1]
+
+
+@pytest.mark.parametrize("name", ["a", "b"])
+def test_the_first_pose_stays(name: str) -> None:
+    store = TwinStore()
+    for x in range(3):
+        store.record(scan(name, at_s=9.0 - x, pose=at(float(x))))
+    assert tag(store, name).pose == at(0.0)

@@ -6,6 +6,7 @@ Pure: the time is an argument, seconds of a clock that never jumps.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 from lupin_bridge.rosbridge import protocol as rosbridge
@@ -99,7 +100,7 @@ class Session:
         """
         spellings = dict.fromkeys(topic for topic, _ in self._subscriptions)
         return b"".join(
-            frame.wire(f"rosbridge {topic}", JSON, lambda: rosbridge.publish(topic, frame.json))  # noqa: B023  # called at once
+            frame.wire(f"rosbridge {topic}", JSON, partial(_published, topic, frame))
             for topic in spellings
         )
 
@@ -155,3 +156,7 @@ class Session:
         if LEVELS.index(level) > LEVELS.index(self._level):
             return ()
         return (rosbridge.status(level, text, message_id),)
+
+
+def _published(topic: str, frame: StateFrame) -> bytes:
+    return rosbridge.publish(topic, frame.message_json)

@@ -78,21 +78,21 @@ async def state(request: Request) -> Response:
 @read_route(
     router,
     "/api/tags/{tag_id:path}/history",
-    summary="The last scans of one tag",
+    summary="The last scans and tries of one tag",
     responses={200: {"model": schema.TagHistory}, **_NO_TAG, **_UNAVAILABLE},
 )
 async def history(request: Request, tag_id: str) -> Response:
-    """The tag's last scans that brought readings, sensor by sensor, oldest first."""
+    """The tag's last scans that brought readings, sensor by sensor, and its last tries."""
     bridge = bridge_of(request)
     if bridge.latest is None:
         return error_response(_NO_TWIN, 503)
     try:
-        scans = await bridge.source.history(tag_id)
+        past = await bridge.source.history(tag_id)
     except TwinUnavailableError as error:
         return error_response(str(error), 503)
-    if scans is None:
+    if past is None:
         return _no_such_tag(tag_id, len(bridge.latest.snapshot.tags))
-    return json_response(orjson.dumps(state_json.history(tag_id, scans)))
+    return json_response(orjson.dumps(state_json.history(tag_id, past)))
 
 
 @read_route(

@@ -58,6 +58,7 @@ class StateFrame:
     base: StateFrame | None
     _writer: FrameWriter
     _json: bytes | None = None
+    _message_json: bytes | None = None
     _wires: dict[tuple[str, str], bytes] = field(default_factory=dict)
 
     @property
@@ -67,10 +68,18 @@ class StateFrame:
             self._json = self._writer.json.state(self.snapshot)
         return self._json
 
+    @property
+    def message_json(self) -> bytes:
+        """The state as JSON of lupin_msgs/TwinState, for who reads the message itself."""
+        if self._message_json is None:
+            self._message_json = self._writer.message_json.state(self.snapshot)
+        return self._message_json
+
     def let_go(self) -> None:
         """Keep only what a delta needs: or every frame ever made would stay in memory."""
         self.base = None
         self._json = None
+        self._message_json = None
         self._wires.clear()
 
     def full(self, encoding: str) -> bytes:
@@ -133,6 +142,7 @@ class FrameWriter:
 
     def __init__(self) -> None:
         self.json = StateJson()
+        self.message_json = StateJson(has_times=False)
         self._newest: StateFrame | None = None
 
     def state(self, snapshot: Snapshot, revision: str) -> StateFrame:
@@ -148,4 +158,6 @@ class FrameWriter:
             _writer=self,
         )
         self._newest = frame
+        self.json.keep_only(snapshot)
+        self.message_json.keep_only(snapshot)
         return frame

@@ -1,9 +1,9 @@
 """The web contract as types: what each route and each WebSocket frame carries.
 
 Names are those of the ROS messages (`lupin_msgs`), field by field, so that a consumer of the topic
-and a consumer of the web read the same thing. The OpenAPI document and the browser's TypeScript
-types are generated from here; the bytes themselves are written by `state_json` and
-`field_formats`, and a test holds them against these models.
+and a consumer of the web read the same thing; what `/twin/times` tells stands beside them. The
+OpenAPI document and the browser's TypeScript types are generated from here; the bytes themselves
+are written by `state_json` and `field.formats`, and a test holds them against these models.
 
 Positions are metres in the map frame; numbers that ROS carries as NaN or infinity are null.
 """
@@ -64,6 +64,10 @@ class SensorReading(Contract):
 
     name: str
     value: float | None
+    observed_at: Time | None = Field(description="ROS time; null: the twin does not tell")
+    stale_seconds: float | None = Field(
+        description="s since observed_at, as the tag's; null: not known"
+    )
 
 
 class FlowerPoint(Contract):
@@ -100,6 +104,18 @@ class TwinTagState(Contract):
     bug_count: int
     flowers: list[FlowerPoint]
     box_footprint: Polygon
+    looked_at: Time | None = Field(
+        description="ROS time at which the flowers were last seen; null: never, or not known"
+    )
+    last_try: Time | None = Field(
+        description="ROS time of the latest scan or look, with success or without; null: none, or "
+        "not known"
+    )
+    last_try_status: int | None = Field(
+        description="of the last try, as in lupin_msgs/Observation: 0 OK, 1 unreachable, 2 scan "
+        "failed, 3 skipped; null: as last_try"
+    )
+    last_try_detail: str = Field(description="why the last try was not OK, for a person to read")
 
 
 class TwinState(Contract):
@@ -122,8 +138,9 @@ class DeltaFrame(Contract):
     """WebSocket frame (`?delta=1`): what is not as in the frame numbered `base`.
 
     A client that has `base` replaces the `changed` tags, appends those it did not know, in this
-    order, and drops the `removed` ones. A tag's age in an unchanged tag is `header.stamp` less its
-    `last_observed`. A client that skipped a frame gets a full `StateFrame` instead.
+    order, and drops the `removed` ones. In an unchanged tag, its age is `header.stamp` less its
+    `last_observed`, and that of a reading less its `observed_at`. A client that skipped a frame
+    gets a full `StateFrame` instead.
     """
 
     type: Literal["delta"]
@@ -218,11 +235,27 @@ class SensorHistory(Contract):
     values: list[HistoryReading]
 
 
+class PastTry(Contract):
+    """One scan or look, with success or without."""
+
+    stamp: Time
+    status: int = Field(description="as in lupin_msgs/Observation: 0 is OK")
+    status_detail: str = Field(description="why the status is not OK, for a person to read")
+    kind: int | None = Field(
+        description="as in lupin_msgs/Observation: 0 scan, 1 look; null: a twin elsewhere does not "
+        "tell it of a try that failed"
+    )
+
+
 class TagHistory(Contract):
-    """The last scans of one tag (as many as the twin's `buffer_len`)."""
+    """The last scans and tries of one tag (as many of each as the twin's `buffer_len`)."""
 
     tag_id: str
+    is_known: bool = Field(
+        description="false: this twin does not tell what was observed when (no /twin/times)"
+    )
     sensors: list[SensorHistory]
+    tries: list[PastTry] = Field(description="oldest first")
 
 
 class Health(Contract):

@@ -1,36 +1,59 @@
 """Snapshot to JSON text: the names of the ROS messages, NaN and infinity as null.
 
-Pure. A tag's text is kept until the tag changes, but for its age, which changes in every frame: so
-the text of a tag is two pieces with the age between them, and a frame of thousands of unchanged
-tags is one join.
+Pure. A tag's text is kept until the tag changes, but for its ages, which change in every frame: so
+what is kept is a template with their places, and a frame of thousands of unchanged tags is one
+short formatting each. Readings of one scan are of one age, which is written once.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Final
 
 import orjson
 
+from lupin_twin.history import TagHistory
 from lupin_twin.state import (
     NANOSECONDS_PER_SECOND,
-    Observation,
     Pose,
     Snapshot,
     TagState,
+    age_seconds,
 )
 
-_AGE = b'"stale_seconds":'
-# An age to the millisecond: a browser shows seconds, and shorter numbers make shorter frames.
-_AGE_DECIMALS = 3
+# The key cannot occur inside a string: there its quotes would be escaped.
+_AGE: Final = b'"stale_seconds":'
+_NO_AGE: Final = _AGE + b"null"
+
+
+@dataclass(frozen=True, slots=True)
+class _Template:
+    """A tag's text with a `%b` for each age; `picks` says which of the ages of `stamps_ns`."""
+
+    tag: TagState
+    text: bytes
+    stamps_ns: tuple[int, ...]
+    picks: tuple[int, ...]
+
+    def at(self, now_ns: int) -> bytes:
+        """The text as of `now_ns`."""
+        if len(self.stamps_ns) == 1:  # a tag that was scanned, and nothing else since
+            return self.text % ((age(self.stamps_ns[0], now_ns),) * len(self.picks))
+        ages = [age(stamp_ns, now_ns) for stamp_ns in self.stamps_ns]
+        return self.text % tuple([ages[pick] for pick in self.picks])
 
 
 class StateJson:
-    """Writes snapshots as JSON and keeps the text of unchanged tags."""
+    """Writes snapshots as JSON and keeps the text of unchanged tags.
 
-    def __init__(self) -> None:
-        self._kept: dict[str, tuple[TagState, bytes, bytes]] = {}
+    `has_times`: as the web contract has it, with the time and the age of each reading, the last
+    look and the last try; without, as the ROS message has it.
+    """
+
+    def __init__(self, *, has_times: bool = True) -> None:
+        self._has_times = has_times
+        self._kept: dict[str, _Template] = {}
 
     def state(self, snapshot: Snapshot, now_ns: int | None = None) -> bytes:
         """The snapshot as JSON of `schema.TwinState`, ages as of `now_ns`, or of its own time."""
@@ -42,29 +65,53 @@ class StateJson:
         )
 
     def tag(self, tag: TagState, now_ns: int) -> bytes:
-        """One tag as JSON of `schema.TwinTagState`, its age as of `now_ns` (ROS time, ns)."""
+        """One tag as JSON of `schema.TwinTagState`, its ages as of `now_ns` (ROS time, ns)."""
         kept = self._kept.get(tag.tag_id)
-        if kept is None or kept[0] is not tag:
-            kept = (tag, *_split_at_age(orjson.dumps(tag_fields(tag))))
+        if kept is None or kept.tag is not tag:
+            kept = self._template(tag)
             self._kept[tag.tag_id] = kept
-        return kept[1] + age(tag.stale_seconds(now_ns)) + kept[2]
+        return kept.at(now_ns)
+
+    def keep_only(self, snapshot: Snapshot) -> None:
+        """Forget the tags that are not in it: a restarted twin may know others."""
+        if len(self._kept) > len(snapshot.tags):
+            ids = {tag.tag_id for tag in snapshot.tags}
+            self._kept = {tag_id: kept for tag_id, kept in self._kept.items() if tag_id in ids}
+
+    def _template(self, tag: TagState) -> _Template:
+        times = [r.observed_at_ns for r in tag.readings] if self._has_times else []
+        times.append(tag.last_observed_ns)
+        known = [stamp_ns for stamp_ns in times if stamp_ns is not None]
+        stamps_ns = tuple(dict.fromkeys(known))
+        places = iter(times)
+        text, *rest = orjson.dumps(self._fields(tag)).replace(b"%", b"%%").split(_NO_AGE)
+        for piece in rest:
+            text += (_NO_AGE if next(places) is None else _AGE + b"%b") + piece
+        return _Template(tag, text, stamps_ns, tuple(map(stamps_ns.index, known)))
+
+    def _fields(self, tag: TagState) -> dict[str, Any]:
+        fields = message_fields(tag)
+        if not self._has_times:
+            return fields
+        for reading, own in zip(fields["readings"], tag.readings, strict=True):
+            reading["observed_at"] = moment(own.observed_at_ns)
+            reading["stale_seconds"] = None
+        last = tag.last_try
+        return fields | {
+            "looked_at": moment(tag.looked_at_ns),
+            "last_try": None if last is None else moment(last.stamp_ns),
+            "last_try_status": None if last is None else last.status,
+            "last_try_detail": "" if last is None else last.detail,
+        }
 
 
-def _split_at_age(text: bytes) -> tuple[bytes, bytes]:
-    # The key cannot occur earlier inside a string: there its quotes would be escaped.
-    head, _, tail = text.partition(_AGE + b"null")
-    return head + _AGE, tail
+def age(stamp_ns: int, now_ns: int) -> bytes:
+    """An age as JSON, to the millisecond: a browser shows seconds, and short numbers are cheap."""
+    return b"%.3f" % age_seconds(stamp_ns, now_ns)
 
 
-def age(stale_seconds: float) -> bytes:
-    """An age as JSON; a tag never observed has none."""
-    if not math.isfinite(stale_seconds):
-        return b"null"
-    return b"%.*f" % (_AGE_DECIMALS, stale_seconds)
-
-
-def tag_fields(tag: TagState) -> dict[str, Any]:
-    """The fields of `schema.TwinTagState`, in the message's order, the age left at None."""
+def message_fields(tag: TagState) -> dict[str, Any]:
+    """The fields of lupin_msgs/TwinTagState, in the message's order, the age left at None."""
     flower = tag.flower
     return {
         "tag_id": tag.tag_id,
@@ -107,15 +154,20 @@ def stamp(stamp_ns: int) -> dict[str, int]:
     return {"sec": sec, "nanosec": nanosec}
 
 
+def moment(stamp_ns: int | None) -> dict[str, int] | None:
+    """`schema.Time`, or None for what never was, or when is not known."""
+    return None if stamp_ns is None else stamp(stamp_ns)
+
+
 def header(stamp_ns: int, frame_id: str) -> dict[str, Any]:
     """`schema.Header`."""
     return {"stamp": stamp(stamp_ns), "frame_id": frame_id}
 
 
-def history(tag_id: str, scans: Iterable[Observation]) -> dict[str, Any]:
-    """`schema.TagHistory` of scans, oldest first."""
+def history(tag_id: str, past: TagHistory) -> dict[str, Any]:
+    """`schema.TagHistory`."""
     sensors: dict[str, list[dict[str, Any]]] = {}
-    for scan in scans:
+    for scan in past.scans:
         for reading in scan.readings:
             value = reading.value if math.isfinite(reading.value) else None
             sensors.setdefault(reading.name, []).append(
@@ -123,5 +175,15 @@ def history(tag_id: str, scans: Iterable[Observation]) -> dict[str, Any]:
             )
     return {
         "tag_id": tag_id,
+        "is_known": past.is_known,
         "sensors": [{"name": name, "values": values} for name, values in sensors.items()],
+        "tries": [
+            {
+                "stamp": stamp(tried.stamp_ns),
+                "status": tried.what.status,
+                "status_detail": tried.what.detail,
+                "kind": tried.kind,
+            }
+            for tried in past.tries
+        ],
     }

@@ -13,8 +13,8 @@ from lupin_bridge.twin.source import CacheCounts, Revised, RevisedGrid, TwinName
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldJob, FieldRequest, FieldRules
 from lupin_twin.grid import FieldGrid
+from lupin_twin.history import TagHistory
 from lupin_twin.node import TwinNode
-from lupin_twin.state import Observation
 
 # A third of what counts as silence (`status.STALE_AFTER_S`).
 HEARTBEAT_S = 1.0
@@ -116,9 +116,9 @@ class LocalTwin:
         """A hit from the node's cache, or the field computed on a worker and handed back to it."""
         return await self._in_time(self._field(request))
 
-    async def history(self, tag_id: str) -> tuple[Observation, ...] | None:
-        """The last `buffer_len` scans of a tag."""
-        return await self._in_time(self._thread.call(lambda node: node.store.history(tag_id)))
+    async def history(self, tag_id: str) -> TagHistory | None:
+        """The last `buffer_len` scans, and as many tries, of a tag."""
+        return await self._in_time(self._thread.call(lambda node: node.history_of(tag_id)))
 
     async def _field(self, request: FieldRequest) -> RevisedGrid:
         def look_up(node: TwinNode) -> tuple[FieldGrid | FieldJob, str]:

@@ -10,7 +10,8 @@ from typing import Final, Protocol
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRequest, FieldRules
 from lupin_twin.grid import FieldGrid
-from lupin_twin.state import Observation, Snapshot
+from lupin_twin.history import TagHistory
+from lupin_twin.state import Snapshot
 
 # What a callback may take at worst, on a slow machine: the largest state there is takes a second.
 STUCK_AFTER_S: Final = 10.0
@@ -117,8 +118,8 @@ class TwinSource(Protocol):
 
         """
 
-    async def history(self, tag_id: str) -> tuple[Observation, ...] | None:
-        """The last scans of a tag; None: no such tag."""
+    async def history(self, tag_id: str) -> TagHistory | None:
+        """The last scans and tries of a tag; None: no such tag."""
 
 
 def ailment(source: TwinSource) -> str | None:

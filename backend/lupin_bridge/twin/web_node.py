@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from hashlib import blake2b
@@ -12,26 +11,34 @@ from typing import Any, Final
 
 from lupin_msgs.srv import GetField
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
+from lupin_bridge.twin.pairing import Pairing
 from lupin_twin import convert, ingest, shapes
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRequest
 from lupin_twin.habits import Habits
+from lupin_twin.history import History, TagHistory
 from lupin_twin.node import field_rules
 from lupin_twin.ros_parameters import declare, naming, naming_use_sim_time
-from lupin_twin.state import Observation, Snapshot, TagState
+from lupin_twin.state import Snapshot, TagState
 from lupin_twin.twin_count import TwinCount
 
 NODE_NAME: Final = "lupin_web"
 # DDS finds a twin's publisher and its service each on its own, one at times a little later.
 NEW_TWIN_S: Final = 2.0
 
+# How long a state waits for the times that a twin publishes right behind it. Without them it is
+# shown all the same, and when what was observed is not known.
+TIMES_PATIENCE_S: Final = 0.5
+
 # The twin's parameters that a consumer has to know too. They are not on the wire: where the twin's
 # are not the defaults, give both the same parameter file.
 SHARED_PARAMETERS: Final = (
     "state_topic",
+    "times_topic",
     "field_service_name",
     "map_topic",
     "frame_id",
@@ -55,10 +62,10 @@ def _digest_of_map(occupancy: OccupancyMap) -> int:
 
 
 class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
-    """Follows `/twin/state` and `/map`, and asks `/twin/get_field`.
+    """Follows `/twin/state` with its `/twin/times`, and `/map`, and asks `/twin/get_field`.
 
-    `on_state(snapshot)` is called for each state. Its tags are the very same values as in the one
-    before where nothing has changed.
+    `on_state(snapshot)` is called for each state, once its times are there. Its tags are the very
+    same values as in the one before where nothing has changed.
 
     Raises:
         lupin_twin.parameters.ParameterError: a parameter out of its range.
@@ -79,13 +86,15 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._publishers_since_s = -math.inf
         self._on_state = on_state
         self._newest: Snapshot | None = None
-        self._history: dict[str, deque[Observation]] = {}
+        self._pairing = Pairing()
         self._digests: dict[str, tuple[TagState, bytes]] = {}
         self._topics: dict[str, str] = {}
         group = MutuallyExclusiveCallbackGroup()
         p = self.parameters
+        self._history = History(p.buffer_len)
         for parameter, shape, callback in (
             ("state_topic", shapes.STATE, self._take_state),
+            ("times_topic", shapes.TIMES, self._take_times),
             ("map_topic", shapes.MAP, self._take_map),
         ):
             self._topics[parameter] = self.habits.subscribe(
@@ -95,6 +104,14 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self.field_client = self.create_client(
                 GetField, p.field_service_name, callback_group=group
             )
+
+        self._patience = self.create_timer(
+            TIMES_PATIENCE_S,
+            self.habits.guarded("the wait for times", self._show_without_times),
+            callback_group=group,
+            clock=Clock(clock_type=ClockType.STEADY_TIME),
+        )
+        self._patience.cancel()
 
     # --- for the source, on this node's thread ------------------------------------------------
 
@@ -126,25 +143,50 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         """Drop a request that nobody waits for any more, or it would be kept for ever."""
         self.field_client.remove_pending_request(future)
 
-    def history(self, tag_id: str) -> tuple[Observation, ...] | None:
-        """The last `buffer_len` readings of a tag that were seen from here; None: no such tag."""
+    def history_of(self, tag_id: str) -> TagHistory | None:
+        """The last scans and tries of a tag that were seen from here; None: no such tag."""
         if self._newest is None or all(tag.tag_id != tag_id for tag in self._newest.tags):
             return None
-        return tuple(self._history.get(tag_id, ()))
+        return self._history.of(tag_id) if self._newest.has_times else TagHistory(is_known=False)
 
     # --- callbacks ----------------------------------------------------------------------------
 
     def _take_state(self, msg: Any) -> None:
+        times = self._pairing.take_state(convert.nanoseconds(msg.header.stamp), msg)
+        if times is not None:
+            self._show(msg, times)
+        elif not self.count_publishers(self._topics["times_topic"]):
+            self._show_without_times()
+        elif self._patience.is_canceled():
+            self._patience.reset()
+
+    def _take_times(self, msg: Any) -> None:
+        state = self._pairing.take_times(convert.nanoseconds(msg.header.stamp), msg)
+        if state is not None:
+            self._show(state, msg)
+
+    def _show_without_times(self) -> None:
+        state = self._pairing.give_up_waiting()
+        if state is not None:
+            self._show(state, None)
+
+    def _show(self, msg: Any, times: Any) -> None:
+        self._patience.cancel()
         before = self._newest
-        snapshot = convert.snapshot_of(msg, before)
-        known = set() if before is None else set(map(id, before.tags))
-        for tag in snapshot.tags:
-            if id(tag) not in known:
-                self._remember(tag)
+        snapshot = convert.snapshot_of(msg, before, times)
+        if snapshot.has_times:
+            known = set() if before is None else set(map(id, before.tags))
+            for tag in snapshot.tags:
+                if id(tag) not in known:
+                    self._history.follow(tag)
         self._newest = snapshot
         self.digest = self._digest_of(snapshot.tags)
         if len(self._digests) > len(snapshot.tags):
             self._forget_all_but(snapshot.tags)
+        self._look_at_publishers()
+        self._on_state(snapshot)
+
+    def _look_at_publishers(self) -> None:
         topic = self._topics["state_topic"]
         publishers_digest = self._digest_of_publishers(topic)
         if publishers_digest != self.publishers_digest:
@@ -156,7 +198,6 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 f"{self.twins.value} nodes publish {topic}: what is shown is a mixture; "
                 "stop all twins but one, or give them ROS domains of their own",
             )
-        self._on_state(snapshot)
 
     def _take_map(self, msg: Any) -> None:
         # Kept, and told with the next state: a map is no sign of life of the twin.
@@ -174,27 +215,10 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     # --- small parts --------------------------------------------------------------------------
 
-    def _remember(self, tag: TagState) -> None:
-        if not tag.readings or tag.last_observed_ns is None:
-            return
-        history = self._history.setdefault(tag.tag_id, deque(maxlen=self.parameters.buffer_len))
-        at_ns = tag.last_observed_ns
-        if history and history[-1].stamp_ns > at_ns:
-            # The twin has followed a clock that went back, see `TwinStore.hold_to`.
-            held = [replace(scan, stamp_ns=min(scan.stamp_ns, at_ns)) for scan in history]
-            history.clear()
-            history.extend(held)
-            is_new = held[-1].readings != tag.readings
-        else:
-            is_new = not history or history[-1].stamp_ns != at_ns
-        if is_new:
-            history.append(Observation(tag.tag_id, at_ns, tag.readings))
-
     def _forget_all_but(self, tags: Sequence[TagState]) -> None:
         ids = {tag.tag_id for tag in tags}
-        for kept in (self._history, self._digests):
-            for tag_id in [tag_id for tag_id in kept if tag_id not in ids]:
-                del kept[tag_id]
+        self._history.forget_all_but(ids)
+        self._digests = {tag_id: kept for tag_id, kept in self._digests.items() if tag_id in ids}
 
     def _digest_of_publishers(self, topic: str) -> str:
         """The same in all replicas: DDS gives a publisher one id for all who see it."""
@@ -206,7 +230,8 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         for tag in tags:
             kept = self._digests.get(tag.tag_id)
             if kept is None or kept[0] is not tag:
-                text = repr((tag.tag_id, tag.pose, tag.readings))
+                readings = [(reading.name, reading.value) for reading in tag.readings]
+                text = repr((tag.tag_id, tag.pose, readings))
                 digest = blake2b(text.encode("utf-8", "surrogatepass"), digest_size=12).digest()
                 kept = (tag, digest)
                 self._digests[tag.tag_id] = kept

@@ -19,7 +19,8 @@ from lupin_bridge.twin.web_node import WebNode
 from lupin_twin import convert
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRefused, FieldRequest, FieldRules
-from lupin_twin.state import Observation, Snapshot
+from lupin_twin.history import TagHistory
+from lupin_twin.state import Snapshot
 
 # Requests on their way to the twin at once. It answers one after the other anyway; more would
 # only wait in DDS, where they cannot be taken back.
@@ -113,9 +114,9 @@ class WebTwin:
         """The latest map."""
         return self._thread.peek(lambda node: node.occupancy_map)
 
-    async def history(self, tag_id: str) -> tuple[Observation, ...] | None:
-        """The last readings of a tag that were seen from here: history is not on the wire."""
-        return await self._thread.call(lambda node: node.history(tag_id))
+    async def history(self, tag_id: str) -> TagHistory | None:
+        """The last scans and tries of a tag, as far as they were seen from here."""
+        return await self._thread.call(lambda node: node.history_of(tag_id))
 
     async def field(self, request: FieldRequest) -> RevisedGrid:
         """The field from the twin's service; identical requests in flight are asked once.

@@ -29,8 +29,8 @@ export interface paths {
             readonly cookie?: never;
         };
         /**
-         * The last scans of one tag
-         * @description The tag's last scans that brought readings, sensor by sensor, oldest first.
+         * The last scans and tries of one tag
+         * @description The tag's last scans that brought readings, sensor by sensor, and its last tries.
          */
         readonly get: operations["history_api_tags__tag_id__history_get"];
         readonly put?: never;
@@ -399,6 +399,28 @@ export interface components {
             readonly info: components["schemas"]["MapMetaData"];
         };
         /**
+         * PastTry
+         * @description One scan or look, with success or without.
+         */
+        readonly PastTry: {
+            readonly stamp: components["schemas"]["Time"];
+            /**
+             * Status
+             * @description as in lupin_msgs/Observation: 0 is OK
+             */
+            readonly status: number;
+            /**
+             * Status Detail
+             * @description why the status is not OK, for a person to read
+             */
+            readonly status_detail: string;
+            /**
+             * Kind
+             * @description as in lupin_msgs/Observation: 0 scan, 1 look; null: a twin elsewhere does not tell it of a try that failed
+             */
+            readonly kind: number | null;
+        };
+        /**
          * Point
          * @description Metres in the map frame: x right, y up, z above the floor.
          */
@@ -459,6 +481,13 @@ export interface components {
             readonly name: string;
             /** Value */
             readonly value: number | null;
+            /** @description ROS time; null: the twin does not tell */
+            readonly observed_at: components["schemas"]["Time"] | null;
+            /**
+             * Stale Seconds
+             * @description s since observed_at, as the tag's; null: not known
+             */
+            readonly stale_seconds: number | null;
         };
         /**
          * StatusFrame
@@ -515,13 +544,23 @@ export interface components {
         };
         /**
          * TagHistory
-         * @description The last scans of one tag (as many as the twin's `buffer_len`).
+         * @description The last scans and tries of one tag (as many of each as the twin's `buffer_len`).
          */
         readonly TagHistory: {
             /** Tag Id */
             readonly tag_id: string;
+            /**
+             * Is Known
+             * @description false: this twin does not tell what was observed when (no /twin/times)
+             */
+            readonly is_known: boolean;
             /** Sensors */
             readonly sensors: readonly components["schemas"]["SensorHistory"][];
+            /**
+             * Tries
+             * @description oldest first
+             */
+            readonly tries: readonly components["schemas"]["PastTry"][];
         };
         /**
          * Time
@@ -573,6 +612,20 @@ export interface components {
             /** Flowers */
             readonly flowers: readonly components["schemas"]["FlowerPoint"][];
             readonly box_footprint: components["schemas"]["Polygon"];
+            /** @description ROS time at which the flowers were last seen; null: never, or not known */
+            readonly looked_at: components["schemas"]["Time"] | null;
+            /** @description ROS time of the latest scan or look, with success or without; null: none, or not known */
+            readonly last_try: components["schemas"]["Time"] | null;
+            /**
+             * Last Try Status
+             * @description of the last try, as in lupin_msgs/Observation: 0 OK, 1 unreachable, 2 scan failed, 3 skipped; null: as last_try
+             */
+            readonly last_try_status: number | null;
+            /**
+             * Last Try Detail
+             * @description why the last try was not OK, for a person to read
+             */
+            readonly last_try_detail: string;
         };
         /** ValidationError */
         readonly ValidationError: {
@@ -611,8 +664,9 @@ export interface components {
          * @description WebSocket frame (`?delta=1`): what is not as in the frame numbered `base`.
          *
          *     A client that has `base` replaces the `changed` tags, appends those it did not know, in this
-         *     order, and drops the `removed` ones. A tag's age in an unchanged tag is `header.stamp` less its
-         *     `last_observed`. A client that skipped a frame gets a full `StateFrame` instead.
+         *     order, and drops the `removed` ones. In an unchanged tag, its age is `header.stamp` less its
+         *     `last_observed`, and that of a reading less its `observed_at`. A client that skipped a frame
+         *     gets a full `StateFrame` instead.
          */
         readonly DeltaFrame: {
             /**

@@ -16,6 +16,10 @@ export function wireTag(over: Partial<TwinTagState> = {}): TwinTagState {
     bug_count: 0,
     flowers: [],
     box_footprint: { points: [] },
+    looked_at: null,
+    last_try: null,
+    last_try_status: null,
+    last_try_detail: '',
     ...over,
   };
 }
@@ -23,7 +27,12 @@ export function wireTag(over: Partial<TwinTagState> = {}): TwinTagState {
 export const tag = (over: Partial<TwinTagState> = {}): Tag => tagOf(wireTag(over), 0);
 
 export const readings = (values: Record<string, number | null>): TwinTagState['readings'] =>
-  Object.entries(values).map(([name, value]) => ({ name, value }));
+  Object.entries(values).map(([name, value]) => ({
+    name,
+    value,
+    observed_at: { sec: 100, nanosec: 0 },
+    stale_seconds: 5,
+  }));
 
 export function stateFrame(
   tags: readonly TwinTagState[],

@@ -11,6 +11,7 @@ and would serialise a NumPy scalar as garbage.
 from __future__ import annotations
 
 import math
+import sys
 from array import array
 from collections.abc import Iterable
 from typing import Any, Final
@@ -19,22 +20,23 @@ import numpy as np
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, Point32, Polygon, Quaternion
 from geometry_msgs.msg import Pose as PoseMsg
-from lupin_msgs.msg import FlowerPoint, SensorReading, TwinState, TwinTagState
+from lupin_msgs.msg import (
+    FlowerPoint,
+    SensorReading,
+    TagTimes,
+    TwinState,
+    TwinTagState,
+    TwinTimes,
+)
 from lupin_msgs.srv import GetField
+from rclpy.serialization import serialize_message
 from std_msgs.msg import Header
 
 from lupin_twin.explored import OccupancyMap, occupancy_map
 from lupin_twin.fields import FieldRequest
 from lupin_twin.grid import FieldGrid
-from lupin_twin.ingest import (
-    KIND_FLOWER,
-    KIND_TAG_READING,
-    Heard,
-    HeardLook,
-    HeardReading,
-    HeardTags,
-    scanned_pose,
-)
+from lupin_twin.history import KIND_FLOWER, KIND_TAG_READING
+from lupin_twin.ingest import Heard, HeardLook, HeardReading, HeardTags, scanned_pose
 from lupin_twin.state import (
     NANOSECONDS_PER_SECOND,
     Bloom,
@@ -43,10 +45,13 @@ from lupin_twin.state import (
     Reading,
     Snapshot,
     TagState,
+    Try,
 )
 
 UINT16_MAX: Final = 65_535
 INT32_MAX: Final = 2_147_483_647
+# What stands before a serialised message: how it is encoded.
+_CDR_HEAD: Final = 4
 
 
 # --- time -----------------------------------------------------------------------------------
@@ -99,7 +104,9 @@ def heard(msg: Any) -> Heard:
     """lupin_msgs/Observation as values, with the part that its kind fills."""
     return Heard(
         kind=int(msg.kind),
+        source=msg.source,
         status=int(msg.status),
+        status_detail=msg.status_detail,
         frame_id=msg.header.frame_id,
         stamp_ns=nanoseconds(msg.header.stamp),
         part=_part(msg),
@@ -204,29 +211,55 @@ def field_request(request: Any) -> FieldRequest:
     )
 
 
-def snapshot_of(msg: Any, before: Snapshot | None = None) -> Snapshot:
+def snapshot_of(msg: Any, before: Snapshot | None = None, times: Any = None) -> Snapshot:
     """lupin_msgs/TwinState as a snapshot: the other direction of `StateMessages`.
 
-    A tag that is as it was in `before` is the very same value, as it is in the store's snapshots:
-    whoever looks for changes compares identities.
+    `times` is the lupin_msgs/TwinTimes of the same stamp: without it nothing is known of when what
+    was observed, but for the tag's last observation. A tag that is as it was in `before` is the
+    very same value, as it is in the store's snapshots: whoever looks for changes compares
+    identities.
     """
     known = {} if before is None else {tag.tag_id: tag for tag in before.tags}
+    of_tag = {} if times is None else {each.tag_id: each for each in times.tags}
     tags = []
-    for tag in map(_tag_state, msg.tags):
+    for tag in (_tag_state(each, of_tag.get(each.tag_id)) for each in msg.tags):
         same = known.get(tag.tag_id)
         tags.append(same if same is not None and same == tag else tag)
-    return Snapshot(nanoseconds(msg.header.stamp), msg.header.frame_id, tuple(tags))
+    return Snapshot(
+        nanoseconds(msg.header.stamp),
+        msg.header.frame_id,
+        tuple(tags),
+        has_times=times is not None,
+    )
 
 
-def _tag_state(tag: Any) -> TagState:
+def _tag_state(tag: Any, times: Any) -> TagState:
     never_observed = not math.isfinite(tag.stale_seconds)
+    observed_at: dict[str, int | None] = {}
+    looked_at_ns, last_try = None, None
+    if times is not None:
+        observed_at = dict(zip(times.sensors, map(_moment, times.observed_at), strict=False))
+        looked_at_ns = _moment(times.looked_at)
+        tried_ns = _moment(times.last_try)
+        if tried_ns is not None:
+            last_try = Try(tried_ns, int(times.last_try_status), times.last_try_detail)
     return TagState(
         tag_id=tag.tag_id,
         pose=scanned_pose(pose_of(tag.pose)),
-        readings=tuple(Reading(reading.name, float(reading.value)) for reading in tag.readings),
+        readings=tuple(
+            Reading(reading.name, float(reading.value), observed_at.get(reading.name))
+            for reading in tag.readings
+        ),
         last_observed_ns=None if never_observed else nanoseconds(tag.last_observed),
         flower=_flower(tag, shortest(tag.species_confidence)),
+        looked_at_ns=looked_at_ns,
+        last_try=last_try,
     )
+
+
+def _moment(stamp: Any) -> int | None:
+    """builtin_interfaces/Time as nanoseconds of ROS time; 0 is never."""
+    return nanoseconds(stamp) or None
 
 
 # --- what goes out --------------------------------------------------------------------------
@@ -257,6 +290,49 @@ class StateMessages:
             self._kept[tag.tag_id] = (tag, msg)
         msg.stale_seconds = tag.stale_seconds(now_ns)
         return msg
+
+
+class TimesMessages:
+    """Builds TwinTimes from snapshots, serialised, and keeps each tag's part until it changes.
+
+    With no number in it longer than four bytes, the parts fit together at any multiple of four:
+    ten thousand tags of which few have changed are one join.
+    """
+
+    def __init__(self) -> None:
+        self._kept: dict[str, tuple[TagState, bytes]] = {}
+
+    def build(self, snapshot: Snapshot) -> bytes:
+        """The snapshot's times as a serialised lupin_msgs/TwinTimes, to be published as it is."""
+        head = serialize_message(
+            TwinTimes(header=Header(stamp=time_msg(snapshot.stamp_ns), frame_id=snapshot.frame_id))
+        )
+        # It ends with the count of tags, none, which is aligned; there may be padding behind it.
+        end = _CDR_HEAD + -(-(len(head) - _CDR_HEAD) // 4) * 4
+        count = len(snapshot.tags).to_bytes(4, sys.byteorder)
+        return b"".join([head[: end - 4], count, *[self._tag(tag) for tag in snapshot.tags]])
+
+    def _tag(self, tag: TagState) -> bytes:
+        kept = self._kept.get(tag.tag_id)
+        if kept is None or kept[0] is not tag:
+            part = serialize_message(times_message(tag))[_CDR_HEAD:]
+            kept = (tag, part + bytes(-len(part) % 4))
+            self._kept[tag.tag_id] = kept
+        return kept[1]
+
+
+def times_message(tag: TagState) -> Any:
+    """One tag as lupin_msgs/TagTimes."""
+    last_try = tag.last_try or Try(0)
+    return TagTimes(
+        tag_id=tag.tag_id,
+        sensors=[reading.name for reading in tag.readings],
+        observed_at=[time_msg(reading.observed_at_ns or 0) for reading in tag.readings],
+        looked_at=time_msg(tag.looked_at_ns or 0),
+        last_try=time_msg(last_try.stamp_ns),
+        last_try_status=last_try.status,
+        last_try_detail=last_try.detail,
+    )
 
 
 def tag_message(tag: TagState) -> Any:

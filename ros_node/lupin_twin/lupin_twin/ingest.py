@@ -12,21 +12,21 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from lupin_twin.drops import Drop, Reason
+from lupin_twin.history import History
 from lupin_twin.state import (
+    MAX_TEXT_LENGTH,
+    STATUS_OK,
     Flower,
-    FlowerObservation,
-    Observation,
+    Look,
     Pose,
     Reading,
     Rejected,
+    Scan,
     TwinStore,
 )
 
-# lupin_msgs/Observation
-KIND_TAG_READING: Final = 0
-KIND_FLOWER: Final = 1
+# lupin_msgs/Observation; the other kinds are in `history`, which keeps them.
 KIND_ANOMALY: Final = 2
-STATUS_OK: Final = 0
 
 # The `w` of half a turn, which is 0, kept apart from the 0 that stands for no pose.
 HALF_TURN_W: Final = 1e-9
@@ -60,7 +60,9 @@ class Heard:
     """An observation as plain values; `part` is that of its kind, None where the kind has none."""
 
     kind: int
+    source: str
     status: int
+    status_detail: str
     frame_id: str
     stamp_ns: int
     part: HeardReading | HeardLook | None
@@ -86,7 +88,7 @@ class Pin:
     pose: Pose
 
 
-Write = Observation | FlowerObservation | Pin
+Write = Scan | Look | Pin
 
 
 def observation(heard: Heard, frame_id: str, now_ns: int) -> Write | Drop:
@@ -99,30 +101,29 @@ def observation(heard: Heard, frame_id: str, now_ns: int) -> Write | Drop:
     own_frame = part.frame_id if isinstance(part, HeardLook) else ""
     if dropped := wrong_frame(own_frame or heard.frame_id, frame_id) or no_tag_id(part.tag_id):
         return dropped
-    if isinstance(part, HeardLook):
-        return _look(heard, part, now_ns)
-    # Without a stamp in the header it was made when the sensors were read.
+    # Without a stamp in the header a scan was made when the sensors were read.
+    own_stamp_ns = heard.stamp_ns or (0 if isinstance(part, HeardLook) else part.stamp_ns)
     succeeded = heard.status == STATUS_OK
-    return Observation(
-        tag_id=part.tag_id,
-        stamp_ns=observed_at(heard.stamp_ns or part.stamp_ns, now_ns),
-        readings=part.readings,
+    write: Scan | Look
+    if isinstance(part, HeardLook):
+        # The payload of one that failed holds defaults, not a result: it would clear a pest unseen.
+        write = Look(part.tag_id, 0, part.flower if succeeded else None)
+    else:
+        write = Scan(part.tag_id, 0, part.readings)
+    return replace(
+        write,
+        stamp_ns=observed_at(own_stamp_ns, now_ns),
         pose=scanned_pose(part.pose) if succeeded else None,
-        succeeded=succeeded,
+        status=heard.status,
+        status_detail=_cut(heard.status_detail),
+        source=_cut(heard.source),
+        own_stamp_ns=own_stamp_ns,
     )
 
 
-def _look(heard: Heard, part: HeardLook, now_ns: int) -> Write:
-    stamp_ns = observed_at(heard.stamp_ns, now_ns)
-    if heard.status != STATUS_OK:
-        # The payload holds defaults, not a result; taken as one it would clear a pest unseen.
-        return Observation(tag_id=part.tag_id, stamp_ns=stamp_ns, succeeded=False)
-    return FlowerObservation(
-        tag_id=part.tag_id,
-        stamp_ns=stamp_ns,
-        flower=part.flower,
-        pose=scanned_pose(part.pose),
-    )
+def _cut(text: str) -> str:
+    """A producer's text, no longer than any that is kept: nothing is dropped for it."""
+    return text if len(text) <= MAX_TEXT_LENGTH else f"{text[: MAX_TEXT_LENGTH - 1]}…"
 
 
 def discoveries(
@@ -144,18 +145,20 @@ def discoveries(
             )
 
 
-def apply(write: Write, store: TwinStore) -> Drop | None:
-    """Write into the store; returns what the store refused."""
+def apply(write: Write, store: TwinStore, history: History) -> Drop | None:
+    """Write what is now, and what was; returns what the store refused."""
     try:
-        match write:
-            case Observation():
-                store.record(write)
-            case FlowerObservation():
-                store.record_flower(write)
-            case Pin():
-                store.pin(write.tag_id, write.pose)
+        if isinstance(write, Pin):
+            store.pin(write.tag_id, write.pose)
+            return None
+        write = history.dated(write)
+        if isinstance(write, Scan):
+            store.record(write)
+        else:
+            store.record_look(write)
     except Rejected as error:
         return Drop(Reason.REJECTED, str(error))
+    history.add(write)
     return None
 
 

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
-from lupin_msgs.msg import TwinState
+from lupin_msgs.msg import TwinState, TwinTimes
 from lupin_msgs.srv import GetField
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
@@ -22,6 +22,7 @@ from lupin_twin.explored import OccupancyMap
 from lupin_twin.field_cache import FieldCache
 from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused, FieldRules
 from lupin_twin.habits import Habits, latched
+from lupin_twin.history import History, TagHistory
 from lupin_twin.parameters import TwinParameters
 from lupin_twin.ros_parameters import declare, naming, naming_use_sim_time
 from lupin_twin.state import Snapshot, TwinStore
@@ -55,7 +56,8 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.habits = Habits(self)
         self.report = self.habits.report
         self.parameters = declare(self)
-        self.store = TwinStore(buffer_len=self.parameters.buffer_len)
+        self.store = TwinStore()
+        self.history = History(self.parameters.buffer_len)
         self.fields = FieldEngine(
             field_rules(self.parameters),
             FieldCache(max_bytes=int(self.parameters.field_cache_mb * 1e6)),
@@ -65,7 +67,8 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._map_revision = 0
         self._topics: dict[str, str] = {}
         self._listeners: list[Callable[[Snapshot], None]] = []
-        self._messages = convert.StateMessages()
+        self._states = convert.StateMessages()
+        self._times = convert.TimesMessages()
         self._group = MutuallyExclusiveCallbackGroup()
         self._connect()
         self._publish_state()
@@ -96,6 +99,10 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         """Every tag, now by ROS time."""
         return self.store.snapshot(self._now_ns(), self.parameters.frame_id)
 
+    def history_of(self, tag_id: str) -> TagHistory | None:
+        """The last scans and tries of a tag; None: no such tag."""
+        return self.history.of(tag_id) if self.store.knows(tag_id) else None
+
     # --- set-up -----------------------------------------------------------------------------
 
     def _connect(self) -> None:
@@ -111,6 +118,8 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
             )
         with naming("state_topic", p.state_topic):
             self._state_publisher = self.create_publisher(TwinState, p.state_topic, latched(1))
+        with naming("times_topic", p.times_topic):
+            self._times_publisher = self.create_publisher(TwinTimes, p.times_topic, latched(1))
         with naming("field_service_name", p.field_service_name):
             self.create_service(
                 GetField, p.field_service_name, self._on_get_field, callback_group=group
@@ -181,7 +190,8 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _publish_state(self) -> None:
         snapshot = self.snapshot()
-        self._state_publisher.publish(self._messages.build(snapshot))
+        self._state_publisher.publish(self._states.build(snapshot))
+        self._times_publisher.publish(self._times.build(snapshot))
         topic = self._state_publisher.topic_name
         if self.twins.see(int(self.count_publishers(topic)), time.monotonic()):
             self.habits.warn(
@@ -193,7 +203,9 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
     # --- small parts ------------------------------------------------------------------------
 
     def _apply(self, write: ingest.Write | Drop, topic: str) -> bool:
-        dropped = write if isinstance(write, Drop) else ingest.apply(write, self.store)
+        dropped = (
+            write if isinstance(write, Drop) else ingest.apply(write, self.store, self.history)
+        )
         if dropped is not None:
             self.habits.drop(dropped, topic)
         return dropped is None
@@ -207,6 +219,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def _now_ns(self) -> int:
         now_ns = int(self.get_clock().now().nanoseconds)
         if self.store.hold_to(now_ns):
+            self.history.hold_to(now_ns)
             self.habits.warn(
                 ("clock", 0),
                 "ROS time has gone back: all observations from later than now age from here on",

@@ -36,6 +36,9 @@ class TwinParameters:
     )
     map_topic: str = _parameter("/map", "topic of nav_msgs/OccupancyGrid to subscribe to")
     state_topic: str = _parameter("/twin/state", "topic of lupin_msgs/TwinState to publish")
+    times_topic: str = _parameter(
+        "/twin/times", "topic of lupin_msgs/TwinTimes to publish right behind the state"
+    )
     field_service_name: str = _parameter("/twin/get_field", "name of the GetField service")
     state_publish_rate_hz: float = _parameter(
         1.0, "how often the state is published, by the steady clock", 0.01, 100.0

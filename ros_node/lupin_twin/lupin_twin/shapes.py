@@ -56,3 +56,11 @@ STATE: Final = MessageShape(
     limits={"tags": MAX_TAGS},
     max_elements=MAX_TAGS + MAX_ITEMS,
 )
+# As many tags and readings, each reading with its name and its time.
+TIMES: Final = MessageShape(
+    lupin.TwinTimes,
+    _PACKAGES,
+    max_bytes=64_000_000,
+    limits={"tags": MAX_TAGS},
+    max_elements=MAX_TAGS + 2 * MAX_ITEMS,
+)

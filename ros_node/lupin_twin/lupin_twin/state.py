@@ -1,4 +1,4 @@
-"""Per-tag store: the latest of what the robot has seen at each AprilTag.
+"""Per-tag store: the latest of what the robot has seen at each AprilTag, and when it was seen.
 
 Pure: standard library only, no clock, no ROS, no lock. Time is an argument everywhere, as
 nanoseconds of ROS time (`get_clock().now()` on hardware, `/clock` in simulation). Positions are
@@ -11,8 +11,7 @@ itself belongs to one thread.
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 NANOSECONDS_PER_SECOND = 1_000_000_000
@@ -25,11 +24,12 @@ MAX_SENSORS_PER_TAG = 64
 MAX_TEXT_LENGTH = 256
 MAX_BLOOMS_PER_TAG = 2_000
 MAX_FOOTPRINT_POINTS = 64
-# And on all of it together, for those multiply. What the tags hold now, each reading, flower and
-# footprint point counted: 20,000 tags with ten sensors and forty flowers. What the histories hold:
-# 20,000 tags with three sensors and 32 scans. A reading with its name is some hundred bytes.
+# And on all of it together, for those multiply: each reading, flower and footprint point counted,
+# 20,000 tags with ten sensors and forty flowers. A reading with its name is some hundred bytes.
 MAX_ITEMS = 1_000_000
-MAX_HISTORY_READINGS = 2_000_000
+
+# lupin_msgs/Observation: the status of a try that brought what it should; others say why not.
+STATUS_OK = 0
 
 # The largest number that a field, which is float32, can hold.
 FLOAT32_MAX = 3.4028234663852886e38
@@ -62,10 +62,15 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One sensor's value, in the sensor's own unit (°C, %, ppm, lx); may be NaN or infinite."""
+    """One sensor's value, in the sensor's own unit (°C, %, ppm, lx); may be NaN or infinite.
+
+    `observed_at_ns` is ROS time; None in a scan, which has one stamp for all, and where it is not
+    known: a twin elsewhere may not tell it.
+    """
 
     name: str
     value: float
+    observed_at_ns: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,28 +103,53 @@ NO_FLOWER = Flower()
 
 
 @dataclass(frozen=True, slots=True)
-class Observation:
-    """One scan of a tag's sensors.
+class Scan:
+    """One scan of a tag's sensors, or the try of one.
 
-    `stamp_ns` is ROS time. `succeeded` is false for a scan that was tried and failed; such a scan
-    carries no pose, and readings only as far as they were taken.
+    `stamp_ns` is ROS time, never later than now; `own_stamp_ns` is what the producer said, 0 for
+    nothing, by which a message that is heard again is known. A try that failed (`status`) carries
+    no pose, and readings only as far as they were taken.
     """
 
     tag_id: str
     stamp_ns: int
     readings: tuple[Reading, ...] = ()
     pose: Pose | None = None
-    succeeded: bool = True
+    status: int = STATUS_OK
+    status_detail: str = ""
+    source: str = ""
+    own_stamp_ns: int = 0
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the scan brought all it should."""
+        return self.status == STATUS_OK
 
 
 @dataclass(frozen=True, slots=True)
-class FlowerObservation:
-    """One look at a tag's flowers; `stamp_ns` is ROS time."""
+class Look:
+    """One look at a tag's flowers, or the try of one: `flower` is None where nothing was learnt.
+
+    The other fields are those of `Scan`.
+    """
 
     tag_id: str
     stamp_ns: int
-    flower: Flower
+    flower: Flower | None
     pose: Pose | None = None
+    status: int = STATUS_OK
+    status_detail: str = ""
+    source: str = ""
+    own_stamp_ns: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Try:
+    """That a tag was tried, and how it went: scan or look, with success or without."""
+
+    stamp_ns: int
+    status: int = STATUS_OK
+    detail: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +157,8 @@ class TagState:
     """Everything known about one tag. Replaced as a whole on every write, never changed.
 
     `pose` is None until the tag is pinned. `last_observed_ns` is None for a tag that was
-    discovered and never scanned.
+    discovered and never scanned; it leaves out tries that brought nothing, unless there is nothing
+    else. `looked_at_ns` is when its flowers were last seen, `last_try` the latest try of any kind.
     """
 
     tag_id: str
@@ -135,6 +166,8 @@ class TagState:
     readings: tuple[Reading, ...] = ()
     last_observed_ns: int | None = None
     flower: Flower = NO_FLOWER
+    looked_at_ns: int | None = None
+    last_try: Try | None = None
 
     def stale_seconds(self, now_ns: int) -> float:
         """Seconds since the last observation: never negative, infinite for a tag never observed.
@@ -143,126 +176,105 @@ class TagState:
         """
         if self.last_observed_ns is None:
             return math.inf
-        return max(0, now_ns - self.last_observed_ns) / NANOSECONDS_PER_SECOND
+        return age_seconds(self.last_observed_ns, now_ns)
+
+    def shows_the_same_as(self, other: TagState) -> bool:
+        """Whether a field and the state's message show the same of both."""
+        return (
+            self.pose == other.pose
+            and self.last_observed_ns == other.last_observed_ns
+            and self.flower == other.flower
+            and len(self.readings) == len(other.readings)
+            and all(map(_same_value, self.readings, other.readings))
+        )
+
+    def held_to(self, now_ns: int) -> TagState:
+        """The tag, with nothing in it that is later than `now_ns`."""
+        return replace(
+            self,
+            readings=tuple(
+                replace(r, observed_at_ns=_held(r.observed_at_ns, now_ns)) for r in self.readings
+            ),
+            last_observed_ns=_held(self.last_observed_ns, now_ns),
+            looked_at_ns=_held(self.looked_at_ns, now_ns),
+            last_try=self.last_try
+            and replace(self.last_try, stamp_ns=min(self.last_try.stamp_ns, now_ns)),
+        )
 
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """Every tag at one moment, in the order in which the tags were first heard of."""
+    """Every tag at one moment, in the order in which the tags were first heard of.
+
+    Without `has_times`, nobody told when each reading, the flowers and the last try were.
+    """
 
     stamp_ns: int
     frame_id: str
     tags: tuple[TagState, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class _Stamps:
-    """When what is kept of a tag was observed (ROS time, ns): each reading, the flowers, anything.
-
-    `anything` leaves out scans that brought nothing.
-    """
-
-    readings: Mapping[str, int] = field(default_factory=dict)
-    flower: int | None = None
-    anything: int | None = None
-
-    def held_to(self, now_ns: int) -> _Stamps:
-        return _Stamps(
-            {name: min(stamp_ns, now_ns) for name, stamp_ns in self.readings.items()},
-            None if self.flower is None else min(self.flower, now_ns),
-            None if self.anything is None else min(self.anything, now_ns),
-        )
-
-
-_NO_STAMPS = _Stamps()
+    has_times: bool = True
 
 
 @dataclass(slots=True)
 class TwinStore:
-    """The latest of everything, per tag, and a short history of readings.
+    """The latest of everything, per tag.
 
     Latest is what has the latest stamp, whatever came first: of two producers whose messages were
     latched, either may be heard first. Of equal stamps the later arrival counts.
 
-    `buffer_len` bounds the history: that many scans per tag, and fewer once all tags together have
-    `MAX_HISTORY_READINGS`. What a tag is now is never given up for what others were.
+    `observation_count` grows with each write that changes what a field or the state shows.
     """
 
-    buffer_len: int = 32
     observation_count: int = field(default=0, init=False)
     _tags: dict[str, TagState] = field(default_factory=dict, init=False)
-    _stamps: dict[str, _Stamps] = field(default_factory=dict, init=False)
+    _observed: dict[str, int] = field(default_factory=dict, init=False)
     _newest_ns: int = field(default=0, init=False)
     _items: int = field(default=0, init=False)
-    _history: dict[str, deque[Observation]] = field(default_factory=dict, init=False)
-    _history_readings: int = field(default=0, init=False)
 
-    def record(self, observation: Observation) -> None:
+    def record(self, scan: Scan) -> None:
         """Keep a scan: its readings (latest per name), its time, its pose if the tag has none.
 
-        A scan that failed and brought nothing does not make what is known look younger: its time
-        counts only as long as nothing else was observed at the tag.
+        A scan that failed and brought nothing does not make what is known look younger: it is the
+        tag's last try, and its time counts as `last_observed_ns` only as long as nothing else was
+        observed at the tag.
 
         Raises:
             Rejected: a text or a list past its bound; nothing is kept then.
 
         """
-        check_texts(observation.tag_id, *(reading.name for reading in observation.readings))
-        tag, stamps = self._tag(observation.tag_id)
-        at_ns, kept_ns = observation.stamp_ns, stamps.readings
-        latest = {r.name: r for r in observation.readings if at_ns >= kept_ns.get(r.name, at_ns)}
-        readings = {reading.name: reading for reading in tag.readings} | latest
+        check_texts(scan.tag_id, *(reading.name for reading in scan.readings))
+        tag = self._tag(scan.tag_id)
+        readings = {reading.name: reading for reading in tag.readings}
+        for reading in scan.readings:
+            new = replace(reading, observed_at_ns=scan.stamp_ns)
+            kept = readings.setdefault(reading.name, new)
+            if not _is_later(kept.observed_at_ns, scan.stamp_ns) and not _same(kept, new):
+                readings[reading.name] = new
         check_length("readings of a tag", len(readings), MAX_SENSORS_PER_TAG)
-        if observation.succeeded or observation.readings:
-            stamps = replace(
-                stamps,
-                readings={**kept_ns, **dict.fromkeys(latest, at_ns)},
-                anything=_later(stamps.anything, at_ns),
-            )
-        tried_ns = at_ns if tag.last_observed_ns is None else tag.last_observed_ns
-        self._keep(
-            replace(
-                tag,
-                readings=tuple(readings.values()),
-                last_observed_ns=tried_ns if stamps.anything is None else stamps.anything,
-                pose=tag.pose or observation.pose,
-            ),
-            stamps,
-        )
-        if observation.readings:
-            self._remember(observation)
-        self.observation_count += 1
+        tag = replace(tag, readings=tuple(readings.values()), pose=tag.pose or scan.pose)
+        self._keep_try(tag, scan, brought=scan.succeeded or bool(scan.readings))
 
-    def record_flower(self, observation: FlowerObservation) -> None:
+    def record_look(self, look: Look) -> None:
         """Keep a look at the flowers: all of it replaces an earlier look; readings stay.
 
+        One that failed is the tag's last try, and changes nothing else.
+
         Raises:
             Rejected: a text or a list past its bound; nothing is kept then.
 
         """
-        flower = observation.flower
-        check_texts(observation.tag_id, flower.species, *(b.species for b in flower.blooms))
-        check_length("flowers of a tag", len(flower.blooms), MAX_BLOOMS_PER_TAG)
-        check_length("box_footprint points", len(flower.footprint), MAX_FOOTPRINT_POINTS)
-        tag, stamps = self._tag(observation.tag_id)
-        at_ns = observation.stamp_ns
-        if stamps.flower is not None and at_ns < stamps.flower:
-            flower = tag.flower
-        stamps = replace(
-            stamps,
-            flower=_later(stamps.flower, at_ns),
-            anything=_later(stamps.anything, at_ns),
-        )
-        self._keep(
-            replace(
-                tag,
-                flower=flower,
-                last_observed_ns=stamps.anything,
-                pose=tag.pose or observation.pose,
-            ),
-            stamps,
-        )
-        self.observation_count += 1
+        flower = look.flower
+        check_texts(look.tag_id)
+        if flower is not None:
+            check_texts(flower.species, *(b.species for b in flower.blooms))
+            check_length("flowers of a tag", len(flower.blooms), MAX_BLOOMS_PER_TAG)
+            check_length("box_footprint points", len(flower.footprint), MAX_FOOTPRINT_POINTS)
+        tag = self._tag(look.tag_id)
+        if flower is not None and not _is_later(tag.looked_at_ns, look.stamp_ns):
+            is_same = repr(flower) == repr(tag.flower)  # a NaN is not equal to itself
+            tag = replace(tag, flower=tag.flower if is_same else flower, looked_at_ns=look.stamp_ns)
+        tag = replace(tag, pose=tag.pose or look.pose)
+        self._keep_try(tag, look, brought=flower is not None)
 
     def pin(self, tag_id: str, pose: Pose) -> bool:
         """Give a discovered tag its place; False, and nothing changed, if it has one already.
@@ -275,11 +287,10 @@ class TwinStore:
 
         """
         check_texts(tag_id)
-        tag, stamps = self._tag(tag_id)
+        tag = self._tag(tag_id)
         if tag.pose is not None:
             return False
-        self._keep(replace(tag, pose=pose), stamps)
-        self.observation_count += 1
+        self._keep(replace(tag, pose=pose))
         return True
 
     def hold_to(self, now_ns: int) -> bool:
@@ -293,14 +304,14 @@ class TwinStore:
             return False
         self._newest_ns = now_ns
         for tag_id, tag in self._tags.items():
-            if tag.last_observed_ns is not None and tag.last_observed_ns > now_ns:
-                self._tags[tag_id] = replace(tag, last_observed_ns=now_ns)
-                self._stamps[tag_id] = self._stamps[tag_id].held_to(now_ns)
-                self._history[tag_id] = deque(
-                    replace(scan, stamp_ns=min(scan.stamp_ns, now_ns))
-                    for scan in self._history.get(tag_id, ())
-                )
+            if _is_later(_newest_of(tag), now_ns):
+                self._tags[tag_id] = tag.held_to(now_ns)
+        self._observed = {tag_id: min(at_ns, now_ns) for tag_id, at_ns in self._observed.items()}
         return True
+
+    def knows(self, tag_id: str) -> bool:
+        """Whether the tag was ever heard of."""
+        return tag_id in self._tags
 
     def is_pinned(self, tag_id: str) -> bool:
         """Whether the tag is known and has a pose."""
@@ -319,48 +330,72 @@ class TwinStore:
         """
         return samples_of(self._tags.values(), sensor_type)
 
-    def history(self, tag_id: str) -> tuple[Observation, ...] | None:
-        """The last `buffer_len` scans that brought readings, oldest first; None: unknown tag."""
-        if tag_id not in self._tags:
-            return None
-        return tuple(self._history.get(tag_id, ()))
-
-    def _tag(self, tag_id: str) -> tuple[TagState, _Stamps]:
+    def _tag(self, tag_id: str) -> TagState:
         known = self._tags.get(tag_id)
         if known is not None:
-            return known, self._stamps[tag_id]
+            return known
         check_length("tags", len(self._tags) + 1, MAX_TAGS)
-        return TagState(tag_id=tag_id), _NO_STAMPS
+        return TagState(tag_id=tag_id)
 
-    def _keep(self, tag: TagState, stamps: _Stamps) -> None:
+    def _keep_try(self, tag: TagState, tried: Scan | Look, brought: bool) -> None:
+        """Keep a tag with the times of what was tried; `brought`: something was observed."""
+        at_ns, observed_ns = tried.stamp_ns, self._observed.get(tag.tag_id)
+        if brought:
+            observed_ns = at_ns if observed_ns is None else max(observed_ns, at_ns)
+        if observed_ns is not None:
+            last_observed_ns = observed_ns
+        elif tag.last_observed_ns is None:
+            last_observed_ns = at_ns
+        else:
+            last_observed_ns = min(tag.last_observed_ns, at_ns)
+        last_try = tag.last_try
+        if last_try is None or at_ns >= last_try.stamp_ns:
+            last_try = Try(at_ns, tried.status, tried.status_detail)
+        self._keep(replace(tag, last_observed_ns=last_observed_ns, last_try=last_try))
+        if observed_ns is not None:
+            self._observed[tag.tag_id] = observed_ns
+
+    def _keep(self, tag: TagState) -> None:
         """Put a tag in the place of what it was, if there is room for what it grew by."""
         known = self._tags.get(tag.tag_id)
+        if known is not None and known == tag:
+            return  # the very same value stays: who looks for changes compares identities
         items = self._items + items_of(tag) - (0 if known is None else items_of(known))
         check_length("readings, flowers and footprint points of all tags", items, MAX_ITEMS)
         self._items = items
         self._tags[tag.tag_id] = tag
-        self._stamps[tag.tag_id] = stamps
-        # No stamp of a tag is later than its last observation.
-        self._newest_ns = _later(tag.last_observed_ns, self._newest_ns)
-
-    def _remember(self, scan: Observation) -> None:
-        """Put a scan in its tag's history by time, each sensor once; let the oldest ones go."""
-        latest = {reading.name: reading for reading in scan.readings}
-        history = self._history.setdefault(scan.tag_id, deque())
-        after = []
-        while history and history[-1].stamp_ns > scan.stamp_ns:
-            after.append(history.pop())
-        history.append(replace(scan, readings=tuple(latest.values())))
-        history.extend(reversed(after))
-        self._history_readings += len(latest)
-        while len(history) > self.buffer_len or (
-            history and self._history_readings > MAX_HISTORY_READINGS
-        ):
-            self._history_readings -= len(history.popleft().readings)
+        self._newest_ns = max(self._newest_ns, _newest_of(tag) or 0)
+        if known is None or not tag.shows_the_same_as(known):
+            self.observation_count += 1
 
 
-def _later(one_ns: int | None, other_ns: int) -> int:
-    return other_ns if one_ns is None else max(one_ns, other_ns)
+def age_seconds(observed_at_ns: int, now_ns: int) -> float:
+    """Seconds from a moment to `now_ns`, both ROS time in ns: never negative."""
+    return max(0, now_ns - observed_at_ns) / NANOSECONDS_PER_SECOND
+
+
+def _newest_of(tag: TagState) -> int | None:
+    """The latest stamp of a tag: none is later than its last observation or its last try."""
+    if tag.last_try is None:
+        return tag.last_observed_ns
+    return max(tag.last_try.stamp_ns, tag.last_observed_ns or 0)
+
+
+def _is_later(one_ns: int | None, other_ns: int) -> bool:
+    return one_ns is not None and one_ns > other_ns
+
+
+def _held(stamp_ns: int | None, now_ns: int) -> int | None:
+    return None if stamp_ns is None else min(stamp_ns, now_ns)
+
+
+def _same_value(one: Reading, other: Reading) -> bool:
+    is_same = one.value == other.value or (math.isnan(one.value) and math.isnan(other.value))
+    return one.name == other.name and is_same
+
+
+def _same(one: Reading, other: Reading) -> bool:
+    return one.observed_at_ns == other.observed_at_ns and _same_value(one, other)
 
 
 def items_of(tag: TagState) -> int:

@@ -8,6 +8,7 @@ from typing import Any
 from urllib.parse import quote
 
 import pytest
+from lupin_msgs.msg import Observation
 from websockets.exceptions import ConnectionClosedError
 
 from lupin_bridge.stream import schema
@@ -222,7 +223,10 @@ def test_one_tag_is_the_states(live: Bridge) -> None:
     live.peer.observe(scan("single", {"co2": 1.0}, at=(1, 2)))
     in_state = live.tag("single")
     alone = live.json("/api/tags/single")
-    assert {**alone, "stale_seconds": 0} == {**in_state, "stale_seconds": 0}
+    for each in (alone, in_state):
+        for aged in (each, *each["readings"]):
+            assert 0.0 <= aged.pop("stale_seconds") < 600.0
+    assert alone == in_state
 
 
 @pytest.mark.parametrize("path", ["/api/tags/nobody", "/api/tags/nobody/history"])
@@ -290,6 +294,34 @@ def test_a_history_holds_the_last_scans_and_no_look(live: Bridge) -> None:
     assert history(live, "past") == {"co2": [3.0, 4.0], "light": [900.0]}, "buffer_len is 3"
     values = live.json("/api/tags/past/history")["sensors"][0]["values"]
     assert values[0]["stamp"] == {"sec": 103, "nanosec": 0}
+
+
+def test_what_was_tried_and_when_what_was_observed_is_told(live: Bridge) -> None:
+    """10 s: a scan; 3610 s: a look; 7210 s: a scan of light alone; 7300 s: a try that failed."""
+    failed = scan("told", status=Observation.STATUS_SCAN_FAILED, stamp_s=7300.0)
+    failed.status_detail = "not decoded"
+    live.peer.observe(
+        scan("told", {"co2": 400.0, "light": 1.0}, stamp_s=10.0),
+        look("told", stamp_s=3610.0),
+        scan("told", {"light": 2.0}, stamp_s=7210.0),
+        failed,
+        scan("told", {"light": 2.0}, stamp_s=7210.0),
+    )
+    tag = live.tag("told", lambda tag: tag["last_try_status"])
+    assert [reading["observed_at"]["sec"] for reading in tag["readings"]] == [10, 7210]
+    co2, light = (reading["stale_seconds"] for reading in tag["readings"])
+    assert co2 - light == pytest.approx(7200.0)
+    assert light == pytest.approx(tag["stale_seconds"])
+    assert (tag["last_observed"]["sec"], tag["looked_at"]["sec"]) == (7210, 3610)
+    assert (tag["last_try"]["sec"], tag["last_try_status"]) == (7300, 2)
+    assert tag["last_try_detail"] == "not decoded"
+    past = live.json("/api/tags/told/history")
+    assert past["is_known"] is True
+    assert history(live, "told") == {"co2": [400.0], "light": [1.0, 2.0]}
+    assert [(each["stamp"]["sec"], each["status"], each["kind"]) for each in past["tries"]] == [
+        (3610, 0, 1), (7210, 0, 0), (7300, 2, 0),
+    ]  # fmt: skip
+    assert past["tries"][-1]["status_detail"] == "not decoded"
 
 
 def test_a_tag_that_was_never_scanned_has_an_empty_history(live: Bridge) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from geometry_msgs.msg import Point, Polygon, Pose, Quaternion
-from lupin_msgs.msg import FlowerPoint, SensorReading, TwinState, TwinTagState
+from lupin_msgs.msg import FlowerPoint, SensorReading, TagTimes, TwinState, TwinTagState
 from lupin_msgs.srv import GetField
 from nav_msgs.msg import MapMetaData, OccupancyGrid
 from pydantic import BaseModel, ValidationError
@@ -28,8 +28,6 @@ def names(message_type: Any) -> list[str]:
     ("model", "message_type"),
     [
         (schema.TwinState, TwinState),
-        (schema.TwinTagState, TwinTagState),
-        (schema.SensorReading, SensorReading),
         (schema.FlowerPoint, FlowerPoint),
         (schema.GetFieldResponse, GetField.Response),
         (schema.MapMetaData, MapMetaData),
@@ -44,6 +42,25 @@ def test_a_type_has_its_messages_fields_in_their_order(
     model: type[BaseModel], message_type: Any
 ) -> None:
     assert list(model.model_fields) == names(message_type)
+
+
+@pytest.mark.parametrize(
+    ("model", "message_type", "times"),
+    [
+        (
+            schema.TwinTagState,
+            TwinTagState,
+            ["looked_at", "last_try", "last_try_status", "last_try_detail"],
+        ),
+        (schema.SensorReading, SensorReading, ["observed_at", "stale_seconds"]),
+    ],
+)
+def test_behind_its_messages_fields_a_type_has_the_times(
+    model: type[BaseModel], message_type: Any, times: list[str]
+) -> None:
+    assert list(model.model_fields) == names(message_type) + times
+    told = set(names(TagTimes)) - {"tag_id", "sensors"}
+    assert set(times) - {"stale_seconds"} <= told
 
 
 def test_the_map_has_all_of_its_message_but_the_cells() -> None:
@@ -171,5 +188,9 @@ def as_json(value: Any) -> Any:
 def test_a_tag_on_the_web_is_the_tag_on_the_topic(live: Bridge, tag_id: str) -> None:
     message = as_json(live.peer.tag(tag_id))
     web = live.json(f"/api/tags/{tag_id}")
+    for name in ("looked_at", "last_try", "last_try_status", "last_try_detail"):
+        del web[name]
+    for reading in web["readings"]:
+        del reading["observed_at"], reading["stale_seconds"]
     assert (web.pop("stale_seconds") is None) == (message.pop("stale_seconds") is None)
     assert web == message

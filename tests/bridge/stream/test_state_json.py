@@ -13,13 +13,15 @@ from hypothesis import strategies as st
 
 from lupin_bridge.stream import schema, state_json
 from lupin_bridge.stream.state_json import StateJson
-from lupin_twin.state import Bloom, Flower, Observation, Pose, Reading, Snapshot, TagState
+from lupin_twin.history import PastScan, PastTry, TagHistory
+from lupin_twin.state import Bloom, Flower, Pose, Reading, Snapshot, TagState, Try
 
 ANY_NUMBER = st.floats(width=64)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 # A text that looks like the place at which the age goes must not be mistaken for it.
 TEXT = st.one_of(
-    st.text(st.characters(codec="utf-8"), max_size=12), st.just('"stale_seconds":null')
+    st.text(st.characters(codec="utf-8"), max_size=12),
+    st.sampled_from(['"stale_seconds":null', "%b", "100 %"]),
 )
 STAMP_NS = st.integers(0, 4_000_000_000_000_000_000)
 
@@ -41,9 +43,13 @@ TAGS = st.builds(
     TagState,
     tag_id=TEXT,
     pose=st.none() | POSES,
-    readings=st.lists(st.builds(Reading, TEXT, ANY_NUMBER), max_size=3).map(tuple),
+    readings=st.lists(st.builds(Reading, TEXT, ANY_NUMBER, st.none() | STAMP_NS), max_size=3).map(
+        tuple
+    ),
     last_observed_ns=st.none() | STAMP_NS,
     flower=FLOWERS,
+    looked_at_ns=st.none() | STAMP_NS,
+    last_try=st.none() | st.builds(Try, STAMP_NS, st.integers(0, 255), TEXT),
 )
 SNAPSHOTS = st.builds(
     Snapshot,
@@ -52,6 +58,7 @@ SNAPSHOTS = st.builds(
     tags=st.lists(TAGS, max_size=4, unique_by=lambda tag: tag.tag_id).map(tuple),
 )
 
+S = 1_000_000_000
 POSE = Pose(1.0, 2.0, 0.5, 0.0, 0.0, 0.0, 1.0)
 
 
@@ -67,14 +74,37 @@ def xyz(x: float, y: float, z: float) -> dict[str, float | None]:
     return {"x": number(x), "y": number(y), "z": number(z)}
 
 
-def plainly(snapshot: Snapshot) -> dict[str, Any]:
+def age(stamp_ns: int | None, now_ns: int) -> Any:
+    if stamp_ns is None:
+        return None
+    return pytest.approx(max(0, now_ns - stamp_ns) / 1e9, abs=0.00051)
+
+
+def times_of(tag: TagState) -> dict[str, Any]:
+    """What stands beside the message's own fields."""
+    last = tag.last_try
+    return {
+        "looked_at": None if tag.looked_at_ns is None else stamp(tag.looked_at_ns),
+        "last_try": None if last is None else stamp(last.stamp_ns),
+        "last_try_status": None if last is None else last.status,
+        "last_try_detail": "" if last is None else last.detail,
+    }
+
+
+def reading_of(reading: Reading, now_ns: int, has_times: bool) -> dict[str, Any]:
+    fields: dict[str, Any] = {"name": reading.name, "value": number(reading.value)}
+    if has_times:
+        at_ns = reading.observed_at_ns
+        fields["observed_at"] = None if at_ns is None else stamp(at_ns)
+        fields["stale_seconds"] = age(at_ns, now_ns)
+    return fields
+
+
+def plainly(snapshot: Snapshot, has_times: bool = True) -> dict[str, Any]:
     """The snapshot as the contract has it, written out once more."""
     tags = []
     for tag in snapshot.tags:
         pose, flower = tag.pose or Pose(0, 0, 0, 0, 0, 0, 0), tag.flower
-        age = None
-        if tag.last_observed_ns is not None:
-            age = max(0, snapshot.stamp_ns - tag.last_observed_ns) / 1e9
         tags.append(
             {
                 "tag_id": tag.tag_id,
@@ -82,9 +112,11 @@ def plainly(snapshot: Snapshot) -> dict[str, Any]:
                     "position": xyz(pose.x, pose.y, pose.z),
                     "orientation": {**xyz(pose.qx, pose.qy, pose.qz), "w": pose.qw},
                 },
-                "readings": [{"name": r.name, "value": number(r.value)} for r in tag.readings],
+                "readings": [
+                    reading_of(reading, snapshot.stamp_ns, has_times) for reading in tag.readings
+                ],
                 "last_observed": stamp(tag.last_observed_ns or 0),
-                "stale_seconds": age if age is None else pytest.approx(age, abs=0.00051),
+                "stale_seconds": age(tag.last_observed_ns, snapshot.stamp_ns),
                 "species": flower.species,
                 "species_confidence": number(flower.confidence),
                 "anomaly": flower.anomaly,
@@ -101,6 +133,7 @@ def plainly(snapshot: Snapshot) -> dict[str, Any]:
                     for bloom in flower.blooms
                 ],
                 "box_footprint": {"points": [xyz(*point) for point in flower.footprint]},
+                **(times_of(tag) if has_times else {}),
             }
         )
     return {
@@ -115,6 +148,13 @@ def test_any_snapshot_is_written_as_the_contract_has_it(snapshot: Snapshot) -> N
     text = StateJson().state(snapshot)
     assert json.loads(text, parse_constant=pytest.fail) == plainly(snapshot)
     schema.TwinState.model_validate_json(text, strict=True)
+
+
+@given(SNAPSHOTS)
+@settings(max_examples=50)
+def test_without_times_it_is_the_message_and_nothing_else(snapshot: Snapshot) -> None:
+    text = StateJson(has_times=False).state(snapshot)
+    assert json.loads(text, parse_constant=pytest.fail) == plainly(snapshot, has_times=False)
 
 
 @given(SNAPSHOTS, SNAPSHOTS)
@@ -136,12 +176,37 @@ def test_a_tag_that_did_not_change_gets_older_all_the_same() -> None:
     assert ages == [0.0, 2.5, 0.0]
 
 
+def test_every_reading_gets_older_by_its_own_time() -> None:
+    writer = StateJson()
+    readings = (Reading("co2", 1.0, 10 * S), Reading("light", 2.0, 7210 * S), Reading("no", 3.0))
+    tag = TagState("7", POSE, readings, last_observed_ns=7210 * S, looked_at_ns=3610 * S)
+    for now_s in (7210, 7300):
+        written = json.loads(writer.tag(tag, now_s * S))
+        ages = [reading["stale_seconds"] for reading in written["readings"]]
+        assert ages == [now_s - 10, now_s - 7210, None]
+        assert written["stale_seconds"] == now_s - 7210
+    assert written["readings"][0]["observed_at"] == {"sec": 10, "nanosec": 0}
+    assert written["readings"][2]["observed_at"] is None
+    assert written["looked_at"] == {"sec": 3610, "nanosec": 0}
+
+
+def test_tags_that_are_gone_are_forgotten() -> None:
+    """A twin that is started anew with other tags, again and again, must not fill the memory."""
+    writer = StateJson()
+    for turn in range(5):
+        snapshot = Snapshot(S, "map", tuple(TagState(f"{turn}-{i}") for i in range(3)))
+        writer.keep_only(snapshot)
+        writer.state(snapshot)
+    writer.keep_only(snapshot)
+    assert set(writer._kept) == {"4-0", "4-1", "4-2"}
+
+
 def test_a_tag_is_written_anew_when_it_was_replaced() -> None:
     writer = StateJson()
     tag = TagState("7", POSE, readings=(Reading("co2", 400.0),))
     writer.tag(tag, 0)
     changed = replace(tag, readings=(Reading("co2", 500.0),))
-    assert json.loads(writer.tag(changed, 0))["readings"] == [{"name": "co2", "value": 500.0}]
+    assert json.loads(writer.tag(changed, 0))["readings"][0]["value"] == 500.0
 
 
 def test_a_tag_never_observed_and_never_pinned_says_so() -> None:
@@ -159,13 +224,18 @@ def test_numbers_that_are_none_are_null() -> None:
 
 
 def test_a_history_is_sorted_by_sensor_and_keeps_its_order() -> None:
-    scans = [
-        Observation("7", 1_500_000_000, (Reading("co2", 400.0), Reading("light", 900.0))),
-        Observation("7", 2_000_000_000, (Reading("co2", math.nan),)),
-        Observation("7", 3_000_000_001, (Reading("light", 800.0),)),
-    ]
-    assert state_json.history("7", scans) == {
+    past = TagHistory(
+        (
+            PastScan(1_500_000_000, (Reading("co2", 400.0), Reading("light", 900.0))),
+            PastScan(2_000_000_000, (Reading("co2", math.nan),)),
+            PastScan(3_000_000_001, (Reading("light", 800.0),)),
+        ),
+        (PastTry(Try(S), 0), PastTry(Try(4 * S, 2, "not decoded"), None)),
+    )
+    written = state_json.history("7", past)
+    assert written == {
         "tag_id": "7",
+        "is_known": True,
         "sensors": [
             {
                 "name": "co2",
@@ -182,6 +252,19 @@ def test_a_history_is_sorted_by_sensor_and_keeps_its_order() -> None:
                 ],
             },
         ],
+        "tries": [
+            {"stamp": {"sec": 1, "nanosec": 0}, "status": 0, "status_detail": "", "kind": 0},
+            {
+                "stamp": {"sec": 4, "nanosec": 0},
+                "status": 2,
+                "status_detail": "not decoded",
+                "kind": None,
+            },
+        ],
     }
-    schema.TagHistory.model_validate(state_json.history("7", scans))
-    assert state_json.history("7", []) == {"tag_id": "7", "sensors": []}
+    schema.TagHistory.model_validate(written)
+
+
+def test_a_history_that_nobody_tells_is_not_known_rather_than_empty() -> None:
+    written = state_json.history("7", TagHistory(is_known=False))
+    assert written == {"tag_id": "7", "is_known": False, "sensors": [], "tries": []}

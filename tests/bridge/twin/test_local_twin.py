@@ -16,7 +16,7 @@ from lupin_bridge.twin.source import Revised, TwinTimeoutError
 from lupin_twin.fields import FieldJob, FieldRefused, FieldRequest
 from lupin_twin.grid import FieldGrid
 from lupin_twin.parameters import ParameterError
-from lupin_twin.state import Observation, Pose, Reading
+from lupin_twin.state import Pose, Reading, Scan
 from tests.support.inprocess import run
 from tests.support.waiting import PATIENCE_S, until
 
@@ -38,7 +38,7 @@ class Stage:
 
     async def record(self, tag_id: str, value: float) -> None:
         """Record a scan at (1, 1), as a callback would."""
-        scan = Observation(
+        scan = Scan(
             tag_id,
             1_000_000_000,
             (Reading("co2", value),),

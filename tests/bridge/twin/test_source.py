@@ -135,7 +135,7 @@ def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
 
             history = await source.history("1")
             assert history is not None
-            assert [(scan.stamp_ns, scan.readings[0].value) for scan in history] == [
+            assert [(scan.stamp_ns, scan.readings[0].value) for scan in history.scans] == [
                 (5_000_000_000, 400.0)
             ]
             assert await source.history("nobody") is None

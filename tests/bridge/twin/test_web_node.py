@@ -8,16 +8,19 @@ from typing import Any
 
 import pytest
 import rclpy
-from lupin_msgs.msg import SensorReading, TwinState, TwinTagState
+from lupin_msgs.msg import SensorReading, TwinState, TwinTagState, TwinTimes
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.serialization import deserialize_message
 
 from lupin_bridge.twin import ros_logs
 from lupin_bridge.twin.web_node import WebNode
 from lupin_twin import convert
 from lupin_twin.explored import OccupancyMap
+from lupin_twin.history import TagHistory
 from lupin_twin.parameters import ParameterError
-from lupin_twin.state import Snapshot
+from lupin_twin.state import NANOSECONDS_PER_SECOND as S
+from lupin_twin.state import Reading, Snapshot, TagState, Try
 from tests.support.messages import NO_POSE, occupancy_grid, pose
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
@@ -50,13 +53,26 @@ class Stage:
         return found
 
     def take(self, peer: Peer, *tags: Any) -> Snapshot:
-        """Let the twin publish a state, and return what the node makes of it."""
+        """Let a twin that tells no times publish a state, and return what the node makes of it."""
         self.stamp_s += 1
         message = TwinState(tags=list(tags))
         message.header.stamp.sec = self.stamp_s
         message.header.frame_id = "map"
         peer.publish("/twin/state", message, depth=1)
-        stamp_ns = self.stamp_s * 10**9
+        return self.told_of(self.stamp_s * S)
+
+    def take_with_times(self, peer: Peer, *tags: TagState) -> Snapshot:
+        """Let a twin publish a state and its times, and return what the node makes of them."""
+        self.stamp_s += 1
+        snapshot = Snapshot(self.stamp_s * S, "map", tags)
+        times = deserialize_message(convert.TimesMessages().build(snapshot), TwinTimes)
+        peer.publish("/twin/times", times, depth=1)
+        peer.publish("/twin/state", convert.StateMessages().build(snapshot), depth=1)
+        self.until(lambda: self.told and self.told[-1].has_times, "times")
+        return self.told_of(self.stamp_s * S)
+
+    def told_of(self, stamp_ns: int) -> Snapshot:
+        """The snapshot of that stamp."""
         self.until(lambda: self.told and self.told[-1].stamp_ns == stamp_ns, "the state")
         return self.told[-1]
 
@@ -156,50 +172,95 @@ def spare() -> None:
 # --- history ------------------------------------------------------------------------------------
 
 
+def scanned(at_s: int, value: float = 1.0, tag_id: str = "1") -> TagState:
+    """A tag as it is after one scan."""
+    at_ns = at_s * S
+    readings = (Reading("co2", value, at_ns),)
+    return TagState(tag_id, None, readings, at_ns, last_try=Try(at_ns))
+
+
+def co2(past: TagHistory | None) -> list[tuple[float, float]]:
+    assert past is not None
+    assert past.is_known
+    return [(scan.stamp_ns / S, scan.readings[0].value) for scan in past.scans]
+
+
 def test_history_is_what_was_seen_from_here(domain: int, peer: Peer) -> None:
     with stage_in(domain, "--ros-args", "-p", "buffer_len:=2") as stage:
-        assert stage.node.history("1") is None
-        for value in (1.0, 2.0, 2.0, 3.0):
-            message = tag("1", value)
-            message.last_observed.sec = 5 + int(value)
-            stage.take(peer, message)
-        history = stage.node.history("1")
-        assert history is not None
-        assert [(scan.stamp_ns // 10**9, scan.readings[0].value) for scan in history] == [
-            (7, 2.0),
-            (8, 3.0),
-        ]
-        stage.take(peer, tag("2"))
-        assert stage.node.history("1") is None
-        stage.take(peer, tag("2"), TwinTagState(tag_id="1", pose=NO_POSE))
-        assert stage.node.history("1") == (), "a successor that knows fewer tags starts anew"
+        assert stage.node.history_of("1") is None
+        for at_s, value in ((6, 1.0), (7, 2.0), (7, 2.0), (8, 3.0)):
+            stage.take_with_times(peer, scanned(at_s, value))
+        assert co2(stage.node.history_of("1")) == [(7.0, 2.0), (8.0, 3.0)]
+        stage.take_with_times(peer, scanned(1, tag_id="2"))
+        assert stage.node.history_of("1") is None
+        stage.take_with_times(peer, scanned(1, tag_id="2"), TagState("1"))
+        assert co2(stage.node.history_of("1")) == [], "a successor that knows fewer starts anew"
+
+
+def test_a_look_and_a_scan_of_one_sensor_restamp_no_other(stage: Stage, peer: Peer) -> None:
+    """10 s: both sensors; 3610 s: the flowers; 7210 s: light alone."""
+    both = (Reading("co2", 400.0, 10 * S), Reading("light", 1.0, 10 * S))
+    light = (both[0], Reading("light", 2.0, 7210 * S))
+    for state in (
+        TagState("1", None, both, 10 * S, last_try=Try(10 * S)),
+        TagState("1", None, both, 3610 * S, looked_at_ns=3610 * S, last_try=Try(3610 * S)),
+        TagState("1", None, light, 7210 * S, looked_at_ns=3610 * S, last_try=Try(7210 * S)),
+    ):
+        stage.take_with_times(peer, state)
+    past = stage.node.history_of("1")
+    assert past is not None
+    assert [(scan.stamp_ns // S, len(scan.readings)) for scan in past.scans] == [(10, 2), (7210, 1)]
+    assert [(each.stamp_ns // S, each.kind) for each in past.tries] == [
+        (10, 0),
+        (3610, 1),
+        (7210, 0),
+    ]
 
 
 def test_history_follows_a_clock_that_goes_back_as_the_twins_does(stage: Stage, peer: Peer) -> None:
     # The third is the twin's last reading held to the new time, the fourth a new one.
-    for value, sec in ((1.0, 100), (2.0, 200), (2.0, 7), (3.0, 9)):
-        message = tag("1", value)
-        message.last_observed.sec = sec
-        stage.take(peer, message)
-    history = stage.node.history("1")
-    assert history is not None
-    assert [(scan.stamp_ns // 10**9, scan.readings[0].value) for scan in history] == [
-        (7, 1.0),
-        (7, 2.0),
-        (9, 3.0),
-    ]
+    for at_s, value in ((100, 1.0), (200, 2.0), (7, 2.0), (9, 3.0)):
+        stage.take_with_times(peer, scanned(at_s, value))
+    assert co2(stage.node.history_of("1")) == [(7.0, 1.0), (7.0, 2.0), (9.0, 3.0)]
 
 
 def test_what_is_observed_as_the_clock_goes_back_is_in_the_history(
     stage: Stage, peer: Peer
 ) -> None:
-    for value, sec in ((1.0, 100), (2.0, 7)):
-        message = tag("1", value)
-        message.last_observed.sec = sec
-        stage.take(peer, message)
-    history = stage.node.history("1")
-    assert history is not None
-    assert [scan.readings[0].value for scan in history] == [1.0, 2.0]
+    for at_s, value in ((100, 1.0), (7, 2.0)):
+        stage.take_with_times(peer, scanned(at_s, value))
+    past = stage.node.history_of("1")
+    assert past is not None
+    assert {reading.value for scan in past.scans for reading in scan.readings} == {1.0, 2.0}
+
+
+# --- times --------------------------------------------------------------------------------------
+
+
+def test_a_twin_that_tells_no_times_has_no_history(stage: Stage, peer: Peer) -> None:
+    snapshot = stage.take(peer, tag("1"))
+    assert not snapshot.has_times
+    assert snapshot.tags[0].readings[0].observed_at_ns is None
+    assert stage.node.history_of("1") == TagHistory(is_known=False)
+    assert stage.node.history_of("2") is None
+
+
+def test_a_state_waits_for_its_times_and_for_no_others(stage: Stage, peer: Peer) -> None:
+    told = stage.take_with_times(peer, scanned(5))
+    assert told.tags[0].readings[0].observed_at_ns == 5 * S
+    count = len(stage.told)
+    # A state whose times are not there: it comes without them, since the twin must not seem dead.
+    late = Snapshot(90 * S, "map", (scanned(80, 7.0),))
+    peer.publish("/twin/state", convert.StateMessages().build(late), depth=1)
+    alone = stage.told_of(90 * S)
+    assert not alone.has_times
+    assert alone.tags[0].readings[0] == Reading("co2", 7.0)
+    assert len(stage.told) == count + 1
+    # And with them as soon as they come.
+    times = deserialize_message(convert.TimesMessages().build(late), TwinTimes)
+    peer.publish("/twin/times", times, depth=1)
+    stage.until(lambda: stage.told[-1].has_times, "the times")
+    assert stage.told[-1].tags[0].readings[0].observed_at_ns == 80 * S
 
 
 # --- maps ---------------------------------------------------------------------------------------
@@ -324,11 +385,12 @@ def test_twins_are_counted_by_the_name_that_the_topic_really_has(
         asked.append(topic)
         return 1
 
-    with stage_in(domain, "--ros-args", "-r", "/twin/state:=/r1/state") as stage:
+    remapped = ("-r", "/twin/state:=/r1/state", "-r", "/twin/times:=/r1/times")
+    with stage_in(domain, "--ros-args", *remapped) as stage:
         monkeypatch.setattr(stage.node, "count_publishers", count)
         peer.publish("/r1/state", TwinState(), depth=1)
-        stage.until(lambda: asked, "a state")
-    assert set(asked) == {"/r1/state"}
+        stage.until(lambda: "/r1/state" in asked, "a state")
+    assert set(asked) == {"/r1/state", "/r1/times"}
 
 
 def test_parameters_are_read_as_the_twin_reads_them(domain: int) -> None:

@@ -1,0 +1,276 @@
+"""What was observed at each tag before: its last scans, and its last tries of any kind.
+
+Pure: no clock, no ROS, no lock. One class keeps it for a twin, which hears every observation
+(`add`), and for whoever follows a twin's states and times (`follow`). Times are nanoseconds of ROS
+time.
+
+An observation is known by its kind, the stamp that its producer gave it, and its source: heard
+again, it is nothing new. Readings that come in parts, with one stamp, are one scan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container, Iterable
+from dataclasses import dataclass, field, replace
+from typing import Final, Generic, Protocol, TypeVar
+
+from lupin_twin.state import STATUS_OK, Look, Reading, Scan, TagState, Try
+
+# lupin_msgs/Observation
+KIND_TAG_READING: Final = 0
+KIND_FLOWER: Final = 1
+
+# What all tags keep together, each reading of a scan and each try counted: 20,000 tags with two
+# sensors, 32 scans and 32 tries. One is some hundred bytes.
+MAX_HISTORY_ITEMS: Final = 2_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class PastScan:
+    """Readings of one moment, each sensor once, by name; their own stamps are that of the scan."""
+
+    stamp_ns: int
+    readings: tuple[Reading, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PastTry:
+    """A try and its kind, None where that is not known: a twin does not tell it of a failed one."""
+
+    what: Try
+    kind: int | None
+
+    @property
+    def stamp_ns(self) -> int:
+        """When it was."""
+        return self.what.stamp_ns
+
+
+@dataclass(frozen=True, slots=True)
+class TagHistory:
+    """What is kept of one tag, oldest first; of equal stamps, in the order of arrival.
+
+    `is_known` is false where a twin tells no times: then there is no history, rather than none yet.
+    """
+
+    scans: tuple[PastScan, ...] = ()
+    tries: tuple[PastTry, ...] = ()
+    is_known: bool = True
+
+
+class _Past(Protocol):
+    @property
+    def stamp_ns(self) -> int: ...
+
+
+PastT = TypeVar("PastT", bound=_Past)
+# The stamp in the key of what a clock that went back has moved: no observation has it.
+_HELD: Final = -1
+# What an observation is known by: its kind, its producer's stamp (ns), its source.
+Key = tuple[int | None, int, str]
+
+
+@dataclass(slots=True)
+class _Line(Generic[PastT]):
+    """One tag's past of one sort, by time."""
+
+    entries: list[tuple[Key, PastT]] = field(default_factory=list)
+
+    def find(self, key: Key) -> int | None:
+        """The place of what is known by `key`; most often it is one of the newest."""
+        for index in range(len(self.entries) - 1, -1, -1):
+            if self.entries[index][0] == key:
+                return index
+        return None
+
+    def put(self, key: Key, past: PastT) -> None:
+        """Put something where it belongs; of equal stamps, what came later is later."""
+        index = len(self.entries)
+        while index and self.entries[index - 1][1].stamp_ns > past.stamp_ns:
+            index -= 1
+        self.entries.insert(index, (key, past))
+
+    def hold_to(self, now_ns: int, held: Callable[[PastT, int], PastT]) -> None:
+        """Nothing is later than `now_ns`. What was, is known by nothing: it comes again as new."""
+        self.entries = [
+            (key, past)
+            if past.stamp_ns <= now_ns
+            else ((key[0], _HELD, key[2]), held(past, now_ns))
+            for key, past in self.entries
+        ]
+
+    @property
+    def past(self) -> tuple[PastT, ...]:
+        return tuple(past for _, past in self.entries)
+
+
+@dataclass(slots=True)
+class _Tag:
+    scans: _Line[PastScan] = field(default_factory=_Line)
+    tries: _Line[PastTry] = field(default_factory=_Line)
+
+    @property
+    def items(self) -> int:
+        return len(self.tries.entries) + sum(len(scan.readings) for scan in self.scans.past)
+
+    @property
+    def newest_ns(self) -> int:
+        newest = [line.entries[-1][1].stamp_ns for line in (self.scans, self.tries) if line.entries]
+        return max(newest, default=0)
+
+
+class History:
+    """The last `buffer_len` scans that brought readings, and as many tries, of each tag.
+
+    Fewer, once all tags together have `MAX_HISTORY_ITEMS`: what is added to a tag then takes the
+    place of its own oldest.
+    """
+
+    def __init__(self, buffer_len: int = 32) -> None:
+        self._buffer_len = buffer_len
+        self._tags: dict[str, _Tag] = {}
+        self._items = 0
+
+    def of(self, tag_id: str) -> TagHistory:
+        """What is kept of a tag: nothing of one that was never tried."""
+        tag = self._tags.get(tag_id)
+        return TagHistory() if tag is None else TagHistory(tag.scans.past, tag.tries.past)
+
+    # --- a twin's own: every observation ------------------------------------------------------
+
+    def dated(self, write: Scan | Look) -> Scan | Look:
+        """`write`, made when it was first heard, if that was earlier than it seems to be now.
+
+        What has a stamp from the future counts as made on arrival: on its first one.
+        """
+        tag = self._tags.get(write.tag_id)
+        if tag is None or not write.own_stamp_ns > write.stamp_ns:
+            return write
+        index = tag.tries.find(_key(write))
+        if index is None:
+            return write
+        first_ns = tag.tries.entries[index][1].stamp_ns
+        return replace(write, stamp_ns=min(write.stamp_ns, first_ns))
+
+    def add(self, write: Scan | Look) -> None:
+        """Keep an observation, or add to what is kept of it."""
+        what = Try(write.stamp_ns, write.status, write.status_detail)
+        readings = write.readings if isinstance(write, Scan) else ()
+        self._add(write.tag_id, _key(write), what, readings)
+
+    def hold_to(self, now_ns: int) -> None:
+        """Follow a clock that has gone back, see `TwinStore.hold_to`."""
+        for tag in self._tags.values():
+            _hold(tag, now_ns)
+
+    # --- of a twin elsewhere: its states, one by one -------------------------------------------
+
+    def follow(self, tag: TagState) -> None:
+        """Keep what a tag's state, with its times, tells of what was observed when.
+
+        Of tries that lie closer together than two states, all but the last may be missed.
+        """
+        times = [r.observed_at_ns for r in tag.readings if r.observed_at_ns is not None]
+        if tag.looked_at_ns is not None:
+            times.append(tag.looked_at_ns)
+        if tag.last_try is not None:
+            times.append(tag.last_try.stamp_ns)
+        kept = self._tags.get(tag.tag_id)
+        if kept is not None and times and kept.newest_ns > max(times):
+            _hold(kept, max(times))  # the twin has followed a clock that went back
+        by_stamp: dict[int, list[Reading]] = {}
+        for reading in tag.readings:
+            if reading.observed_at_ns is not None and not _is_kept(kept, reading):
+                by_stamp.setdefault(reading.observed_at_ns, []).append(reading)
+        for stamp_ns, readings in sorted(by_stamp.items()):
+            self._add_scan(tag.tag_id, (KIND_TAG_READING, stamp_ns, ""), stamp_ns, readings)
+        known = () if kept is None else {past.what for past in kept.tries.past}
+        for past in _tries_of(tag):
+            if past.what in known:
+                continue
+            self._add_try(tag.tag_id, (past.kind, past.stamp_ns, ""), past)
+
+    def forget_all_but(self, tag_ids: Container[str]) -> None:
+        """Drop the tags that a restarted twin does not know."""
+        for tag_id in [tag_id for tag_id in self._tags if tag_id not in tag_ids]:
+            self._items -= self._tags.pop(tag_id).items
+
+    # --- both ----------------------------------------------------------------------------------
+
+    def _add(self, tag_id: str, key: Key, what: Try, readings: Iterable[Reading]) -> None:
+        self._add_try(tag_id, key, PastTry(what, key[0]))
+        if readings:
+            self._add_scan(tag_id, key, what.stamp_ns, readings)
+
+    def _add_scan(self, tag_id: str, key: Key, stamp_ns: int, readings: Iterable[Reading]) -> None:
+        tag = self._tags.setdefault(tag_id, _Tag())
+        line = tag.scans
+        latest = {r.name: Reading(r.name, r.value) for r in readings}
+        index = line.find(key)
+        if index is None:
+            line.put(key, PastScan(stamp_ns, _by_name(latest)))
+            self._items += len(latest)
+        else:
+            before = line.entries[index][1]
+            merged = {r.name: r for r in before.readings} | latest
+            line.entries[index] = (key, replace(before, readings=_by_name(merged)))
+            self._items += len(merged) - len(before.readings)
+        while line.entries and self._is_past_bounds(line):
+            self._items -= len(line.entries.pop(0)[1].readings)
+
+    def _add_try(self, tag_id: str, key: Key, past: PastTry) -> None:
+        line = self._tags.setdefault(tag_id, _Tag()).tries
+        index = line.find(key)
+        if index is not None:
+            stamp_ns = line.entries[index][1].stamp_ns
+            line.entries[index] = (key, replace(past, what=replace(past.what, stamp_ns=stamp_ns)))
+            return
+        line.put(key, past)
+        self._items += 1
+        while line.entries and self._is_past_bounds(line):
+            line.entries.pop(0)
+            self._items -= 1
+
+    def _is_past_bounds(self, line: _Line[PastT]) -> bool:
+        return len(line.entries) > self._buffer_len or self._items > MAX_HISTORY_ITEMS
+
+
+def _by_name(readings: dict[str, Reading]) -> tuple[Reading, ...]:
+    return tuple(readings[name] for name in sorted(readings))
+
+
+def _key(write: Scan | Look) -> Key:
+    kind = KIND_TAG_READING if isinstance(write, Scan) else KIND_FLOWER
+    return kind, write.own_stamp_ns or write.stamp_ns, write.source
+
+
+def _hold(tag: _Tag, now_ns: int) -> None:
+    tag.scans.hold_to(now_ns, lambda scan, at_ns: replace(scan, stamp_ns=at_ns))
+    tag.tries.hold_to(
+        now_ns, lambda past, at_ns: replace(past, what=replace(past.what, stamp_ns=at_ns))
+    )
+
+
+def _is_kept(tag: _Tag | None, reading: Reading) -> bool:
+    """Whether a scan of that moment has this reading: after a clock went back, not the last one."""
+    return tag is not None and any(
+        kept.name == reading.name and repr(kept.value) == repr(reading.value)
+        for scan in tag.scans.past
+        if scan.stamp_ns == reading.observed_at_ns
+        for kept in scan.readings
+    )
+
+
+def _tries_of(tag: TagState) -> list[PastTry]:
+    """The tries that a state is certain of: the last one, and the last look that saw flowers."""
+    last, tries = tag.last_try, []
+    if tag.looked_at_ns is not None and (last is None or tag.looked_at_ns != last.stamp_ns):
+        tries.append(PastTry(Try(tag.looked_at_ns), KIND_FLOWER))
+    if last is not None:
+        kind = None
+        if any(reading.observed_at_ns == last.stamp_ns for reading in tag.readings):
+            kind = KIND_TAG_READING
+        elif last.stamp_ns == tag.looked_at_ns and last.status == STATUS_OK:
+            kind = KIND_FLOWER
+        tries.append(PastTry(last, kind))
+    return tries

@@ -21,6 +21,7 @@ ACROSS = (
     "test_deploy",
     "test_docs",
     "test_fuzz_",
+    "test_install",
     "test_live_",
     "test_roslib",
     "test_structure_",

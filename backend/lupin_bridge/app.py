@@ -11,7 +11,7 @@ from lupin_bridge.access.entrance import ComesIn, Entrance
 from lupin_bridge.access.middleware import Access, AccessControl
 from lupin_bridge.access.security import ReadOnly
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.routes import docs_page
+from lupin_bridge.routes import docs_page, no_page
 from lupin_bridge.routes import field as routes_field
 from lupin_bridge.routes import health as routes_health
 from lupin_bridge.routes import map as routes_map
@@ -24,6 +24,11 @@ from lupin_bridge.serving.http_protocol import PieceByPiece
 from lupin_bridge.stream import schema
 
 STATIC_FOLDER = Path(__file__).parent / "static"
+
+
+def has_page(static_folder: Path = STATIC_FOLDER) -> bool:
+    """Whether the page was built before the bridge was installed."""
+    return (static_folder / "index.html").is_file()
 
 
 def create_app(
@@ -67,8 +72,10 @@ def create_app(
     app.add_middleware(AccessControl, access=access)
     app.add_middleware(ComesIn, entrance=entrance or Entrance())
     app.add_exception_handler(404, _not_found)
-    if static_folder.is_dir():
+    if has_page(static_folder):
         app.mount("/", StaticFiles(directory=static_folder, html=True), name="hmi")
+    else:
+        app.include_router(no_page.router)
     _describe_frames(app)
     return app
 

@@ -16,8 +16,9 @@ from lupin_bridge.access.entrance import Entrance
 from lupin_bridge.access.middleware import Access
 from lupin_bridge.access.policy import exposure
 from lupin_bridge.access.tls import Certificates, check_pair
-from lupin_bridge.app import create_app
+from lupin_bridge.app import create_app, has_page
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.routes import no_page
 from lupin_bridge.serving.server import BridgeServer, address_of, allow_connections, listen
 from lupin_bridge.settings import SettingError, Settings
 from lupin_bridge.supervisor import Supervisor
@@ -75,6 +76,8 @@ async def _run(
             f"cannot listen on {settings.host} port {settings.port}: {error.strerror}"
         ) from error
     _warn_of_exposure(listener, access)
+    if not has_page():
+        log.warning("the page was not built, / says so: %s", no_page.HOW)
     allow_connections(settings.max_clients)
     # Before a process is started that would inherit its variables.
     supervisor = Supervisor(os.environ)

@@ -105,10 +105,6 @@ def test_what_is_not_there_is_said_in_json(static: Path, path: str, built: bool)
     assert answer.headers["cache-control"] == "no-store"
 
 
-def test_without_a_built_page_the_root_says_where_to_look(tmp_path: Path) -> None:
-    assert "see /docs" in ask(tmp_path / "nonexistent", "GET", "/").json()["detail"]
-
-
 def test_a_long_path_is_cut_in_the_answer(tmp_path: Path) -> None:
     assert len(ask(tmp_path, "GET", "/" + "x" * 5_000).text) < 300
 

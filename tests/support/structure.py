@@ -159,7 +159,7 @@ ROOMS: Mapping[str, set[str]] = {
         "twin",
     },
     "app": {"access", "bridge", "routes", "serving", "stream"},
-    "roles": {"access", "app", "bridge", "serving", "settings", "supervisor", "twin"},
+    "roles": {"access", "app", "bridge", "routes", "serving", "settings", "supervisor", "twin"},
     "cli": {"configuration", "logs", "roles", "settings"},
     "openapi": {"app"},
 }

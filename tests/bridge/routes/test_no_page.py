@@ -1,0 +1,33 @@
+"""A bridge without its page says how to get it; with one, it does not."""
+
+from __future__ import annotations
+
+from html import escape
+from pathlib import Path
+
+import pytest
+
+from lupin_bridge.routes.no_page import HOW
+from tests.bridge.test_app import ask
+
+
+@pytest.mark.parametrize("method", ["GET", "HEAD"])
+def test_the_root_says_how_to_build_the_page(tmp_path: Path, method: str) -> None:
+    for folder in (tmp_path / "nowhere", tmp_path):  # an empty one is no page either
+        answer = ask(folder, method, "/")
+        assert answer.status_code == 503
+        assert answer.headers["cache-control"] == "no-store"
+        assert answer.headers["content-type"].startswith("text/html")
+        assert "default-src 'self'" in answer.headers["content-security-policy"]
+        assert (escape(HOW) in answer.text) == (method == "GET")
+
+
+def test_everything_else_is_where_it_is(tmp_path: Path) -> None:
+    assert ask(tmp_path, "GET", "/docs").status_code == 200
+    assert ask(tmp_path, "GET", "/nowhere").status_code == 404
+    assert ask(tmp_path, "POST", "/").status_code == 405
+
+
+def test_with_the_page_the_root_is_the_page(tmp_path: Path) -> None:
+    (tmp_path / "index.html").write_text("the page", encoding="utf-8")
+    assert ask(tmp_path, "GET", "/").text == "the page"

@@ -1,0 +1,84 @@
+"""`pip install .` from a fresh clone, with the page built and without."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import httpx
+import pytest
+
+from tests.support.domains import ros_env
+from tests.support.processes import Process, url_of
+from tests.support.waiting import PATIENCE_S
+
+ROOT = Path(__file__).parents[1]
+STATIC = Path("backend", "lupin_bridge", "static")
+
+
+@pytest.fixture(scope="module")
+def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What git has of the project, as it is in the work tree."""
+    folder = tmp_path_factory.mktemp("clone")
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+        cwd=ROOT, check=True, capture_output=True, text=True,
+    )  # fmt: skip
+    for name in filter(None, listed.stdout.split("\0")):
+        if name.startswith(("backend/", "pyproject.toml", "README.md", ".gitignore")):
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, folder / name)
+    # hatchling looks for what git ignores.
+    subprocess.run(["git", "init", "-q", folder], check=True)
+    return folder
+
+
+def installed(clone: Path, folder: Path) -> Path:
+    """The bridge's package alone, installed into a folder; its libraries are those of the tests."""
+    subprocess.run(
+        [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation",
+         "--no-index", "--target", folder, clone],
+        check=True, env={**os.environ, "PIP_DISABLE_PIP_VERSION_CHECK": "1"},
+    )  # fmt: skip
+    return folder
+
+
+def started(package: Path, domain: int) -> Process:
+    command = [sys.executable, "-m", "lupin_bridge.cli", "web", "--port", "0"]
+    return Process(command, ros_env(domain, PYTHONPATH=str(package)))
+
+
+def test_without_the_page_the_start_and_the_address_say_how_to_build_it(
+    clone: Path, domain: int, tmp_path: Path
+) -> None:
+    package = installed(clone, tmp_path)
+    assert not (package / "lupin_bridge" / "static").exists()
+    with started(package, domain) as process:
+        url = url_of(process)
+        for method in ("GET", "HEAD"):
+            answer = httpx.request(method, f"{url}/", trust_env=False, timeout=PATIENCE_S)
+            assert answer.status_code == 503
+            assert answer.headers["content-type"].startswith("text/html")
+            assert "npm ci &amp;&amp; npm run build" in answer.text or method == "HEAD"
+        assert "WARNING" in process.wait_for_output("npm ci && npm run build")
+        # The rest is there, what the package brings beside its modules included.
+        for path in ("/healthz", "/docs", "/signin.css"):
+            assert httpx.get(url + path, trust_env=False, timeout=PATIENCE_S).status_code == 200
+
+
+def test_with_the_page_it_is_in_the_package(clone: Path, domain: int, tmp_path: Path) -> None:
+    shutil.copytree(ROOT / STATIC, clone / STATIC)
+    try:
+        package = installed(clone, tmp_path)
+    finally:
+        shutil.rmtree(clone / STATIC)
+    with started(package, domain) as process:
+        url = url_of(process)
+        page = httpx.get(f"{url}/", trust_env=False, timeout=PATIENCE_S)
+        assert (page.status_code, "Lupin twin" in page.text) == (200, True)
+        for name in (part.split('"')[0] for part in page.text.split('="./')[1:]):
+            assert httpx.get(f"{url}/{name}", trust_env=False).status_code == 200, name
+        assert "was not built" not in process.output

@@ -13,6 +13,7 @@ from lupin_bridge.cli import ROLES
 from lupin_bridge.settings import option, table
 from lupin_patrol import cli as patrol_cli
 from lupin_twin.parameters import TwinParameters, describe
+from tests.support.structure import PACKAGES, ROOMS
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -93,7 +94,7 @@ def test_every_make_target_that_is_named_is_there() -> None:
     assert named <= targets
 
 
-@pytest.mark.parametrize("page", ["README.md", "backend/SECURITY.md"])
+@pytest.mark.parametrize("page", ["README.md", "backend/SECURITY.md", "backend/README.md"])
 def test_every_file_that_a_page_names_is_there(page: str) -> None:
     text = (ROOT / page).read_text(encoding="utf-8")
     links = re.findall(r"\]\(([^)#:]+)\)", text)
@@ -101,3 +102,14 @@ def test_every_file_that_a_page_names_is_there(page: str) -> None:
     for name in [*links, *paths]:
         base = ROOT if name in paths else (ROOT / page).parent
         assert (base / name).exists(), name
+
+
+def test_the_bridges_page_names_every_room_and_no_file_that_is_not_there() -> None:
+    text = (ROOT / "backend" / "README.md").read_text(encoding="utf-8")
+    bridge = PACKAGES["lupin_bridge"]
+    named = {name for cell in re.findall(r"`([^`]+)`", text) for name in cell.split()}
+    files = {name for name in named if re.fullmatch(r"[a-z_]+/[a-z_]+\.py", name)}
+    assert len(files) > 10
+    assert [name for name in sorted(files) if not (bridge / name).is_file()] == []
+    rooms = {f"{room}/" if (bridge / room).is_dir() else f"{room}.py" for room in ROOMS}
+    assert rooms - named == set()

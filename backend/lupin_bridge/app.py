@@ -66,7 +66,7 @@ def create_app(
         app.include_router(module.router)
     # The last one added is the first to be asked.
     if bridge is not None:
-        app.add_middleware(PieceByPiece, timeout_s=bridge.settings.client_timeout_s)
+        app.add_middleware(PieceByPiece)
         app.add_middleware(EndsWithTheBridge, goodbye=bridge.goodbye)
     app.add_middleware(ReadOnly)
     app.add_middleware(AccessControl, access=access)

@@ -4,19 +4,28 @@ from __future__ import annotations
 
 import json
 import logging
+import re
 import sys
 import time
+from collections import OrderedDict
+from collections.abc import Hashable
 from datetime import UTC, datetime
 from typing import Final
-
-from lupin_twin.throttle import Throttle
 
 TEXT: Final = "text"
 JSON: Final = "json"
 FORMATS: Final = (TEXT, JSON)
 LEVELS: Final = ("debug", "info", "warning", "error")
 
-WEB_SERVER_PERIOD_S: Final = 5.0
+# Of what is said again and again: so many at once of our own, and one a period from then on.
+AT_ONCE: Final = 20
+PERIOD_S: Final = 5.0
+# Of all that one logger says.
+LOGGER_AT_ONCE: Final = 200
+LOGGER_PERIOD_S: Final = 0.2
+MAX_KINDS: Final = 1_000
+
+_NUMBER: Final = re.compile(r"(?:0x)?[0-9a-f]*[0-9][0-9a-f]*", re.IGNORECASE)
 
 # uvicorn's words, with a trace that tells nothing: the bytes were a stranger's.
 _NO_TEXT: Final = "Invalid UTF-8 sequence received from client."
@@ -38,27 +47,65 @@ class JsonFormatter(logging.Formatter):
         return json.dumps(fields, ensure_ascii=False)
 
 
-class OnceInAWhile(logging.Filter):
-    """Lets a record through if none like it has come for `WEB_SERVER_PERIOD_S`.
+class Ration:
+    """So many of a kind at once, and one a period from then on; pure, the time is an argument.
 
-    For the web server's, some of which any stranger can cause as often as he likes.
+    Generic cell rate algorithm (ITU-T I.371), as in `serving.rate_limit`. Of `MAX_KINDS` kinds it
+    knows the last time, of the one longest unheard of no more.
+    """
+
+    def __init__(self, period_s: float) -> None:
+        self._period_s = period_s
+        # When all that was let through would have been at one a period, and what was not.
+        self._kinds: OrderedDict[Hashable, tuple[float, int]] = OrderedDict()
+
+    def __len__(self) -> int:
+        return len(self._kinds)
+
+    def ask(self, kind: Hashable, at_once: int, now_s: float) -> int | None:
+        """How many of the kind were held back since the last one, or None: this one is, too."""
+        through_s, held_back = self._kinds.pop(kind, (now_s, 0))
+        through_s = max(through_s, now_s) + self._period_s
+        is_let_through = through_s - now_s <= at_once * self._period_s
+        self._kinds[kind] = (
+            (through_s, 0) if is_let_through else (through_s - self._period_s, held_back + 1)
+        )
+        if len(self._kinds) > MAX_KINDS:
+            self._kinds.popitem(last=False)
+        return held_back if is_let_through else None
+
+
+class OnceInAWhile(logging.Filter):
+    """Lets few records of a kind through, and not too many of one logger, whatever their kinds.
+
+    Any stranger can cause some of them as often as he likes, and a disk is soon full. A kind is
+    what a record says without its numbers (addresses, sizes, ids), and of its lines the first.
     """
 
     def __init__(self) -> None:
         super().__init__()
-        self._throttle = Throttle(WEB_SERVER_PERIOD_S)
+        self._kinds = Ration(PERIOD_S)
+        self._loggers = Ration(LOGGER_PERIOD_S)
 
     def filter(self, record: logging.LogRecord) -> bool:
         """Whether to write the record; what it says of those before it is added."""
+        now_s = time.monotonic()
+        text = record.getMessage() if record.msg == "%s" else str(record.msg)
         error = record.exc_info[0] if record.exc_info else None
-        held_back = self._throttle.ask((record.msg, error), time.monotonic())
-        if held_back is None:
+        kind = (record.name, record.levelno, _NUMBER.sub("#", text[:200].partition("\n")[0]), error)
+        held_back = self._kinds.ask(kind, AT_ONCE if is_ours(record.name) else 1, now_s)
+        if held_back is None or self._loggers.ask(record.name, LOGGER_AT_ONCE, now_s) is None:
             return False
         if record.msg == _NO_TEXT:
-            record.exc_info = None
+            record.exc_info = record.exc_text = None
         if held_back:
             record.msg = f"{record.msg} ({held_back} more since the last time)"
         return True
+
+
+def is_ours(logger: str) -> bool:
+    """Whether a logger is the project's; a library's errors come with a page of trace each."""
+    return logger.startswith("lupin")
 
 
 def set_up(log_format: str, level: str = "info") -> None:
@@ -67,6 +114,8 @@ def set_up(log_format: str, level: str = "info") -> None:
     handler = logging.StreamHandler(sys.stderr)
     # What ROS's nodes log passes no logger of ours, but this.
     handler.setLevel(least)
+    # Here, and not at the root logger: what passes through others does not meet its filters.
+    handler.addFilter(OnceInAWhile())
     if log_format == JSON:
         handler.setFormatter(JsonFormatter())
     else:
@@ -78,4 +127,3 @@ def set_up(log_format: str, level: str = "info") -> None:
         logging.getLogger(ours).setLevel(least)
     # Its news (started, waiting, connection open) are ours to tell, once.
     logging.getLogger("uvicorn").setLevel(max(least, logging.WARNING))
-    logging.getLogger("uvicorn.error").addFilter(OnceInAWhile())

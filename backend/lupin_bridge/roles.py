@@ -11,6 +11,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 
 from lupin_bridge.access.entrance import Entrance
 from lupin_bridge.access.middleware import Access
@@ -78,7 +79,7 @@ async def _run(
     _warn_of_exposure(listener, access)
     if not has_page():
         log.warning("the page was not built, / says so: %s", no_page.HOW)
-    allow_connections(settings.max_clients)
+    settings = replace(settings, max_clients=allow_connections(settings.max_clients))
     # Before a process is started that would inherit its variables.
     supervisor = Supervisor(os.environ)
     make_source = WebTwin if role == "web" else LocalTwin

@@ -17,7 +17,6 @@ def untouched_root(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """`set_up` works on the root logger, which the test run has set up for itself."""
     monkeypatch.setattr(logging.root, "handlers", [])
     monkeypatch.setattr(logging.root, "level", logging.WARNING)
-    monkeypatch.setattr(logging.getLogger("uvicorn.error"), "filters", [])
     yield
     for name in ("lupin_bridge", "lupin_twin"):
         logging.getLogger(name).setLevel(logging.NOTSET)
@@ -74,7 +73,7 @@ def test_what_strangers_cause_is_logged_once_in_a_while(
     for _ in range(1_000):
         web_server.warning("Invalid HTTP request received.")
     web_server.warning("%s is another matter", "this")
-    now_s[0] += logs.WEB_SERVER_PERIOD_S
+    now_s[0] += logs.PERIOD_S
     web_server.warning("Invalid HTTP request received.")
     said = [line.partition(": ")[2] for line in capsys.readouterr().err.splitlines()]
     assert said == [
@@ -98,3 +97,68 @@ def test_each_of_our_own_errors_leaves_its_trace_and_a_strangers_bytes_leave_non
     assert "KeyError: 'ours too'" in err
     assert "Invalid UTF-8" in err
     assert "UnicodeDecodeError" not in err
+
+
+def said_by(name: str, capsys: pytest.CaptureFixture[str]) -> list[str]:
+    """What a logger has said so far, line by line."""
+    lines = capsys.readouterr().err.splitlines()
+    return [line.partition(f" {name}: ")[2] for line in lines if f" {name}: " in line]
+
+
+@pytest.mark.parametrize("name", ["lupin_bridge.access", "lupin_twin", "lupin_web"])
+def test_of_our_own_some_are_said_at_once(
+    name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s = [100.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now_s[0])
+    logs.set_up(logs.TEXT)
+    log = logging.getLogger(name)
+    for number in range(logs.AT_ONCE + 7):
+        log.warning("wrong token from %s", f"10.0.0.{number}")
+    log.warning("something else")
+    assert len(said_by(name, capsys)) == logs.AT_ONCE + 1
+    now_s[0] += logs.PERIOD_S
+    log.warning("wrong token from %s", "10.0.0.9")
+    log.warning("wrong token from %s", "10.0.0.9")
+    assert said_by(name, capsys) == ["wrong token from 10.0.0.9 (7 more since the last time)"]
+
+
+@pytest.mark.parametrize("name", ["asyncio", "uvicorn.error", "websockets.server", "nobodys"])
+def test_every_librarys_traces_are_rationed_whatever_numbers_stand_in_them(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    logs.set_up(logs.TEXT)
+    for number in range(1_000):
+        text = f"Fatal error on <Transport fd={number} at {number * 7919:#x}>\nprotocol: {number}"
+        logging.getLogger(name).error(text, exc_info=ValueError(str(number)))
+    assert capsys.readouterr().err.count("ValueError") == 1
+
+
+def test_one_logger_has_an_end_whatever_it_thinks_of(capsys: pytest.CaptureFixture[str]) -> None:
+    logs.set_up(logs.TEXT)
+    for number in range(10 * logs.LOGGER_AT_ONCE):
+        logging.getLogger("lupin_twin").warning("%s", "x" * number)
+    logging.getLogger("lupin_bridge").warning("is heard")
+    err = capsys.readouterr().err
+    assert logs.LOGGER_AT_ONCE <= err.count(" lupin_twin: ") <= logs.LOGGER_AT_ONCE + 50
+    assert "is heard" in err
+
+
+def test_a_ration_is_exact() -> None:
+    ration = logs.Ration(5.0)
+    assert [ration.ask("a", 2, 100.0) for _ in range(4)] == [0, 0, None, None]
+    assert ration.ask("b", 2, 100.0) == 0, "another kind has its own"
+    assert ration.ask("a", 2, 104.9) is None
+    assert ration.ask("a", 2, 105.0) == 3
+    assert ration.ask("a", 2, 105.0) is None
+    assert [ration.ask("a", 2, 200.0) for _ in range(3)] == [1, 0, None]
+
+
+def test_a_ration_keeps_no_more_kinds_than_its_limit() -> None:
+    ration = logs.Ration(5.0)
+    for number in range(3 * logs.MAX_KINDS):
+        ration.ask(number, 1, 100.0)
+        ration.ask("known", 1, 100.0)
+        assert len(ration) <= logs.MAX_KINDS
+    assert len(ration) == logs.MAX_KINDS
+    assert ration.ask("known", 1, 100.0) is None, "the one longest unheard of is forgotten"

@@ -51,6 +51,7 @@ LIBRARIES: Mapping[str, Mapping[str, set[str] | None]] = {
             "PIL",
             "cbor2",
             "fastapi",
+            "h11",
             "lupin_twin",
             "numpy",
             "orjson",

@@ -3,33 +3,42 @@
 uvicorn takes an answer whole and keeps what the socket does not take, and it waits for the rest of
 a request, for as long as the client likes. A few hundred connections that ask for a large field and
 never read would fill the memory, and some thousand that never finish asking use up all sockets.
+The times hold for the connection, and so for whatever is sent: answers of routes, and refusals of
+the doorman, of the framework and of this protocol alike.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
+import sys
 from collections.abc import Iterator
 from typing import Any, Final, cast
 
+import h11
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
 
-from lupin_bridge.serving.transports import bound_unsent, tear_down
+from lupin_bridge.serving.rate_limit import client_key
+from lupin_bridge.serving.refusal import refusal
+from lupin_bridge.serving.transports import CLOSE_GRACE_S, bound_unsent, tear_down
 
 log = logging.getLogger(__name__)
 
-HTTP_CONNECTION_KEY: Final = "http_connection"
-
 # What may wait for a reader; the next piece follows when the socket has taken this one.
 PIECE_BYTES: Final = 256 * 1024
+# The request's line and all header lines. The parser's own limit is one for what is incomplete: all
+# that comes at once, it would take, up to asyncio's 256 kB.
+MAX_HEAD_BYTES: Final = 32 * 1024
+# From here on the next piece has to wait. asyncio's own value, but over TLS, where it is 512 kB.
+HIGH_WATER_BYTES: Final = 64 * 1024
 
 
 class HttpConnection(H11Protocol):
-    """uvicorn's protocol, that also puts itself into `scope["state"]["http_connection"]`.
+    """uvicorn's protocol, with an end to every wait.
 
     A client has uvicorn's `timeout_keep_alive` for a whole request, from its connection or its last
-    answer on, however often it sends a byte.
+    answer on, however often it sends a byte; and as long to take a piece of what it has asked for.
     """
 
     def __init__(
@@ -39,25 +48,61 @@ class HttpConnection(H11Protocol):
         app_state: dict[str, Any],
         _loop: asyncio.AbstractEventLoop | None = None,
     ) -> None:
-        super().__init__(config, server_state, {**app_state, HTTP_CONNECTION_KEY: self}, _loop)
+        super().__init__(config, server_state, app_state, _loop)
+        self.address = ""
         self._deadline: asyncio.TimerHandle | None = None
+        self._reader_deadline: asyncio.TimerHandle | None = None
+        self._is_refused = False
+        self._is_handed_over = False
+        self._quiet_since_s = 0.0
+        # What has come and is not for the parser yet.
+        self._unheard = bytearray()
+
+    @property
+    def waiting_since_s(self) -> float | None:
+        """Since when the client has asked nothing, or taken nothing; None: it is being served."""
+        if self.transport.is_closing() or (self._is_at_work and self._reader_deadline is None):
+            return None
+        return self._quiet_since_s
 
     def connection_made(self, transport: Any) -> None:
         """Start to wait for a request."""
         super().connection_made(transport)
+        if self.client is not None:
+            self.address = client_key(self.client[0])
         bound_unsent(transport)
+        transport.set_write_buffer_limits(HIGH_WATER_BYTES)
         self._wait_for_request()
 
+    def data_received(self, data: bytes) -> None:
+        """Listen to a client, unless it was refused."""
+        self._unheard += data
+        self._listen()
+
     def on_response_complete(self) -> None:
-        """Start to wait for the next request."""
+        """Go on to the next request, and start to wait for it."""
         super().on_response_complete()
-        self._wait_for_request()
+        self._listen()
+        if not self._is_handed_over:
+            self._wait_for_request()
+
+    def pause_writing(self) -> None:
+        """Start to wait for the client to take what it has asked for."""
+        super().pause_writing()
+        self._quiet_since_s = self.loop.time()
+        self._reader_deadline = self.loop.call_later(self.timeout_keep_alive, self._give_up)
+
+    def resume_writing(self) -> None:
+        """It has taken it."""
+        super().resume_writing()
+        if self._reader_deadline is not None:
+            self._reader_deadline.cancel()
+            self._reader_deadline = None
 
     def handle_websocket_upgrade(self, event: Any) -> None:
         """Hand the connection over: it is not ours any more."""
+        self._is_handed_over = True
         self._stop_waiting()
-        # Or this object, and all it was parsed with, would live on in the WebSocket's scope.
-        del self.app_state[HTTP_CONNECTION_KEY]
         super().handle_websocket_upgrade(event)
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -65,24 +110,89 @@ class HttpConnection(H11Protocol):
         self._stop_waiting()
         super().connection_lost(exc)
 
+    def send_400_response(self, msg: str) -> None:
+        """Answer what is no HTTP, where that is still possible, and end.
+
+        uvicorn calls this with the parser's complaint at hand, and answers even where the answer
+        to the request has gone out before its body turned out to be none.
+        """
+        complaint = sys.exception()
+        if isinstance(complaint, h11.RemoteProtocolError) and complaint.error_status_hint == 431:
+            self._refuse(431, f"the request's head is too long: {complaint}")
+        else:
+            self._refuse(400, msg)
+
     def abort(self) -> None:
         """Tear the connection down and forget what was still to be sent."""
         tear_down(self.transport)
 
+    def _should_upgrade(self) -> bool:
+        # RFC 9110, section 7.8: an upgrade asked for in HTTP/1.0 is to be passed over.
+        return self.scope["http_version"] == "1.1" and super()._should_upgrade()
+
+    def _refuse(self, status: int, detail: str) -> None:
+        self._is_refused = True
+        if self.conn.our_state not in (h11.IDLE, h11.SEND_RESPONSE):
+            # An answer is on its way, or has gone: another one would be taken for a part of it.
+            self.transport.close()
+        else:
+            if self._is_at_work:
+                self.cycle.disconnected = True
+                self.cycle.message_event.set()
+            self.transport.write(refusal(status, detail))
+            # Closed at once, with more of the client's still on its way, the connection would be
+            # reset, and the answer lost.
+            if self.transport.can_write_eof():
+                self.transport.write_eof()
+            self.loop.call_later(CLOSE_GRACE_S, self.transport.close)
+        self._wait_for_request()
+
+    def _listen(self) -> None:
+        """Give the parser no more at a time than a whole head, and nothing of the next request.
+
+        It takes a whole head of any length; of one that is not all there, it has its limit.
+        """
+        while self._unheard and not self._is_over:
+            if self.conn.their_state not in (h11.IDLE, h11.SEND_BODY):
+                self.flow.pause_reading()  # until the answer has gone
+                return
+            room = MAX_HEAD_BYTES - len(self.conn.trailing_data[0])
+            data = bytes(self._unheard[:room])
+            del self._unheard[:room]
+            super().data_received(data)
+        if self._is_over:
+            self._unheard.clear()
+
+    @property
+    def _is_over(self) -> bool:
+        """Whether nothing more is listened to here."""
+        return self._is_refused or self._is_handed_over or self.transport.is_closing()
+
+    @property
+    def _is_at_work(self) -> bool:
+        cycle = cast("RequestResponseCycle | None", self.cycle)
+        return cycle is not None and not cycle.response_complete
+
     def _wait_for_request(self) -> None:
-        self._stop_waiting()
+        if self._deadline is not None:
+            self._deadline.cancel()
+        self._quiet_since_s = self.loop.time()
         self._deadline = self.loop.call_later(self.timeout_keep_alive, self._look_for_request)
 
     def _stop_waiting(self) -> None:
-        if self._deadline is not None:
-            self._deadline.cancel()
-            self._deadline = None
+        for deadline in (self._deadline, self._reader_deadline):
+            if deadline is not None:
+                deadline.cancel()
+        self._deadline = self._reader_deadline = None
 
     def _look_for_request(self) -> None:
-        self._deadline = None
-        cycle = cast("RequestResponseCycle | None", self.cycle)
-        if cycle is None or cycle.response_complete:
+        if not self._is_at_work or self._is_refused:
             self.abort()
+
+    def _give_up(self) -> None:
+        self._reader_deadline = None
+        log.warning("cut off a reader that took nothing for %g s", self.timeout_keep_alive)
+        self.abort()
 
 
 def pieces_of(message: Message) -> Iterator[Message]:
@@ -100,9 +210,8 @@ def pieces_of(message: Message) -> Iterator[Message]:
 class PieceByPiece:
     """ASGI middleware: an answer returns when its reader has taken all but the last piece."""
 
-    def __init__(self, app: ASGIApp, timeout_s: float) -> None:
+    def __init__(self, app: ASGIApp) -> None:
         self._app = app
-        self._timeout_s = timeout_s
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send the application's answers in pieces."""
@@ -110,18 +219,8 @@ class PieceByPiece:
             await self._app(scope, receive, send)
             return
 
-        async def send_in_time(message: Message) -> None:
-            # Small ones too: one behind the other, they are as much.
-            try:
-                async with asyncio.timeout(self._timeout_s):
-                    await send(message)
-            except TimeoutError:
-                log.warning("cut off a reader that took nothing for %g s", self._timeout_s)
-                scope["state"][HTTP_CONNECTION_KEY].abort()
-                await send(message)  # returns when the connection is gone
-
         async def send_in_pieces(message: Message) -> None:
             for piece in pieces_of(message):
-                await send_in_time(piece)
+                await send(piece)
 
         await self._app(scope, receive, send_in_pieces)

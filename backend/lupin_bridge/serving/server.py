@@ -10,12 +10,14 @@ import signal
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
 from uvicorn.server import HANDLED_SIGNALS
 
-from lupin_bridge.serving.http_protocol import HttpConnection
+from lupin_bridge.serving.acceptor import Acceptor, room_for_connections
+from lupin_bridge.serving.http_protocol import MAX_HEAD_BYTES, HttpConnection
 from lupin_bridge.serving.transports import tear_down
 from lupin_bridge.serving.ws_protocol import Connection
 from lupin_bridge.settings import Settings
@@ -32,6 +34,8 @@ SPARE_FILES = 512
 # connection, uvicorn cancels it.
 GOODBYE_S = 0.5
 GRACEFUL_SHUTDOWN_S = 1
+# uvicorn's main loop.
+TICKS_PER_S = 10
 
 
 class BridgeServer(uvicorn.Server):
@@ -42,6 +46,8 @@ class BridgeServer(uvicorn.Server):
             uvicorn.Config(
                 app,
                 http=HttpConnection,
+                # One less than fits: what fills it is too long, unless it is all.
+                h11_max_incomplete_event_size=MAX_HEAD_BYTES - 1,
                 ws=Connection,
                 ws_per_message_deflate=False,  # 2 ms against 30 ms of CPU for 50 clients a frame
                 ws_max_size=MAX_INBOUND_BYTES,
@@ -58,6 +64,47 @@ class BridgeServer(uvicorn.Server):
             )
         )
         self._say_goodbye = say_goodbye
+        # Connections that are being closed, and since when, s.
+        self._closing_since_s: dict[Any, float] = {}
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """As uvicorn, with a door of our own in front of each socket."""
+        await super().startup(sockets=[])
+        state, lifespan = self.server_state, self.lifespan
+
+        def make_protocol() -> HttpConnection:
+            return HttpConnection(self.config, state, lifespan.state)
+
+        acceptors: list[Any] = [
+            Acceptor(
+                listener,
+                make_protocol,
+                state.connections,  # type: ignore[arg-type]  # all of them are ours
+                room=room_for_connections(),
+                tls=self.config.ssl,
+                timeout_s=self.config.timeout_keep_alive,
+            )
+            for listener in sockets or []
+        ]
+        self.servers.extend(acceptors)
+
+    async def on_tick(self, counter: int) -> bool:
+        """Ten times a second: see that what is being closed ends."""
+        if counter % TICKS_PER_S == 0:
+            self._end_the_closing(asyncio.get_running_loop().time())
+        return await super().on_tick(counter)
+
+    def _end_the_closing(self, now_s: float) -> None:
+        """Tear down what has been closed, by whomever, and whose last bytes nobody takes."""
+        since_s = self._closing_since_s
+        self._closing_since_s = {
+            connection: since_s.get(connection, now_s)
+            for connection in self.server_state.connections
+            if connection.transport.is_closing()
+        }
+        for connection, start_s in self._closing_since_s.items():
+            if now_s - start_s >= self.config.timeout_keep_alive:
+                tear_down(connection.transport)
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -109,25 +156,33 @@ def listen(host: str, port: int) -> socket.socket:
     return listener
 
 
-def allow_connections(number: int) -> None:
+def allow_connections(number: int) -> int:
     """Raise this process's limit on open files to what so many clients need.
 
     The usual limit of 1,024 is there for programs that use select(2), which this is not.
+
+    Returns how many clients it will do for: fewer than `number` where the limit cannot be raised as
+    far, so that there is room beside them for those who ask, and for those who are told that the
+    house is full.
     """
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = number + SPARE_FILES
     if soft == resource.RLIM_INFINITY or soft >= wanted:
-        return
+        return number
     allowed = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
     resource.setrlimit(resource.RLIMIT_NOFILE, (allowed, hard))
-    if allowed < wanted:
-        log.warning(
-            "--max-clients is %d, but this process may open %d files (ulimit -Hn), of which it "
-            "keeps %d for itself: lower the one or raise the other",
-            number,
-            hard,
-            SPARE_FILES,
-        )
+    if allowed == wanted:
+        return number
+    fewer = max(1, min(number, max(allowed - SPARE_FILES, allowed // 4)))
+    log.warning(
+        "--max-clients is %d, but this process may open %d files (ulimit -Hn), of which it keeps "
+        "%d for itself: serving %d clients at most; raise the limit for more",
+        number,
+        hard,
+        allowed - fewer,
+        fewer,
+    )
+    return fewer
 
 
 def address_of(listener: socket.socket, scheme: str = "http") -> str:

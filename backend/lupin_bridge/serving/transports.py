@@ -11,6 +11,10 @@ from typing import Final
 # own it would hold 4 MB (tcp_wmem): for a slow reader, minutes of old states.
 UNSENT_BYTES: Final = 128 * 1024
 
+# How long a client that is told to go has to read the reason before its socket is torn down. Closed
+# at once, with more of the client's still on its way, it would be reset, and the reason lost.
+CLOSE_GRACE_S: Final = 1.0
+
 
 def bound_unsent(transport: asyncio.BaseTransport) -> None:
     """Let a connection's socket take no more than `UNSENT_BYTES` ahead of the network."""

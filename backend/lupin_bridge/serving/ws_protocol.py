@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import CloseCode
 from websockets.protocol import State
 
-from lupin_bridge.serving.transports import bound_unsent, tear_down
+from lupin_bridge.serving.rate_limit import client_key
+from lupin_bridge.serving.refusal import refusal
+from lupin_bridge.serving.transports import CLOSE_GRACE_S, tear_down
 
 CONNECTION_KEY = "connection"
 
@@ -23,10 +25,6 @@ CONNECTION_KEY = "connection"
 READ_BYTES = 8_192
 FRAMES_PER_S = 1_000
 FRAMES_AT_ONCE = 5_000
-
-# How long a client that is told to go has to read the reason before its socket is torn down. Closed
-# at once, with more of the client's still on its way, it would be reset, and the reason lost.
-CLOSE_GRACE_S = 1.0
 
 
 _READ_BUFFER = memoryview(bytearray(READ_BYTES))
@@ -46,7 +44,9 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         _loop: asyncio.AbstractEventLoop | None = None,
     ) -> None:
         super().__init__(config, server_state, {**app_state, CONNECTION_KEY: self}, _loop)
+        self.address = ""
         self.on_writable: Callable[[], None] | None = None
+        self._handshake_deadline: asyncio.TimerHandle | None = None
         # When all frames heard would be through at the allowed rate (ITU-T I.371).
         self._frames_through_s = 0.0
 
@@ -56,9 +56,40 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         Over TLS, asyncio keeps another 64 kB below the limit that can be set.
         """
         super().connection_made(transport)
-        bound_unsent(transport)
+        if self.client is not None:
+            self.address = client_key(self.client[0])
         # Not 0: asyncio's TLS transport stops at the limit, not past it, and would stop on nothing.
         self.transport.set_write_buffer_limits(high=1, low=0)
+        # What the client has asked for before, over HTTP, may still fill the socket. The transport
+        # has told so, or does now, to the protocol that it had then.
+        if self.transport.get_write_buffer_size() > 0:
+            self.writable.clear()
+        self._handshake_deadline = self.loop.call_later(
+            self.config.timeout_keep_alive, self._look_for_handshake
+        )
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget the connection."""
+        self._end_handshake()
+        super().connection_lost(exc)
+
+    @property
+    def waiting_since_s(self) -> float | None:
+        """None: whoever has got as far as this is not turned out for others."""
+        return None
+
+    def abort(self) -> None:
+        """Tear the connection down and forget what was still to be sent."""
+        tear_down(self.transport)
+
+    def data_received(self, data: bytes) -> None:
+        """Take bytes: first of all the whole request for the handshake, which may be refused."""
+        super().data_received(data)
+        if not self.handshake_initiated and not self.transport.is_closing():
+            # It is all there, and no request for the parser: uvicorn would wait for more, for ever.
+            self.handshake_complete = self.close_sent = True
+            self.transport.write(_refusal_of(self.conn.handshake_exc))
+            self.transport.close()
 
     def get_buffer(self, sizehint: int) -> memoryview:  # noqa: ARG002  # asyncio's suggestion
         """Where the next bytes go; shared by all connections, for they are read at once."""
@@ -94,6 +125,8 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         uvicorn would take it for one that the application forgot, and log an error for each.
         """
         await super().send(message)
+        if self.handshake_complete:
+            self._end_handshake()
         if message["type"] == "websocket.http.response.body" and self.close_sent:
             self.handshake_complete = True
 
@@ -139,9 +172,37 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         else:
             self.loop.call_later(CLOSE_GRACE_S, tear_down, self.transport)
 
+    def _end_handshake(self) -> None:
+        if self._handshake_deadline is not None:
+            self._handshake_deadline.cancel()
+            self._handshake_deadline = None
+
+    def _look_for_handshake(self) -> None:
+        self._handshake_deadline = None
+        self.abort()
+
     def _say_last_words(self) -> None:
         """Write the close frame that the protocol has ready, and end after the grace."""
         self.transport.write(b"".join(self.conn.data_to_send()))
         self.close_sent = True
         # uvicorn's own: with it, the end of the application is not yet that of the connection.
         self.close_timer = self.loop.call_later(CLOSE_GRACE_S, tear_down, self.transport)
+
+
+# By their names, which are not the same ones in all versions.
+_REFUSED_AS: Final = {
+    "RequestLineTooLong": 414,
+    "HeaderLineTooLong": 431,
+    "TooManyHeaders": 431,
+    "SecurityError": 431,
+}
+
+
+def _refusal_of(error: Exception | None) -> bytes:
+    """The answer to a request that the parser did not take for a handshake."""
+    causes = [cause for cause in (error, error and error.__cause__) if cause is not None]
+    known = (_REFUSED_AS.get(type(cause).__name__) for cause in causes)
+    status = next((status for status in known if status is not None), 400)
+    return refusal(
+        status, f"this is no request for a WebSocket: {causes[-1] if causes else 'unknown'}"[:500]
+    )

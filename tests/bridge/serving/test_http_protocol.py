@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.serving.http_protocol import HTTP_CONNECTION_KEY, PIECE_BYTES, PieceByPiece
+from lupin_bridge.serving.http_protocol import PIECE_BYTES, PieceByPiece
 from tests.support.access import Served, served
 from tests.support.waiting import PATIENCE_S, wait_for
 
@@ -28,28 +28,20 @@ TIMEOUT_S = 3
 
 
 class Reader:
-    """A connection that takes `takes` messages and then waits until it is torn down."""
+    """Takes whatever is sent."""
 
-    def __init__(self, takes: int | None = None) -> None:
+    def __init__(self) -> None:
         self.messages: list[dict[str, Any]] = []
-        self.gone = asyncio.Event()
-        self._takes = takes
 
     async def send(self, message: Any) -> None:
-        if self._takes is not None and len(self.messages) >= self._takes:
-            await self.gone.wait()
-            return
         self.messages.append(message)
-
-    def abort(self) -> None:
-        self.gone.set()
 
     @property
     def body(self) -> bytes:
         return b"".join(message.get("body", b"") for message in self.messages)
 
 
-def answer(reader: Reader, *bodies: bytes, timeout_s: float = PATIENCE_S) -> None:
+def answer(reader: Reader, *bodies: bytes) -> None:
     """Send an answer of these bodies to a reader."""
 
     async def app(_scope: Any, _receive: Any, send: Any) -> None:
@@ -61,8 +53,7 @@ def answer(reader: Reader, *bodies: bytes, timeout_s: float = PATIENCE_S) -> Non
     async def receive() -> Any:
         raise AssertionError("nobody asked")
 
-    scope = {"type": "http", "state": {HTTP_CONNECTION_KEY: reader}}
-    asyncio.run(PieceByPiece(app, timeout_s)(scope, receive, reader.send))
+    asyncio.run(PieceByPiece(app)({"type": "http"}, receive, reader.send))
 
 
 def test_a_large_body_goes_out_in_pieces_that_add_up_to_it() -> None:
@@ -90,20 +81,6 @@ def test_a_streamed_body_goes_on_after_a_large_part() -> None:
     assert [message["more_body"] for message in reader.messages[1:]].count(False) == 1
 
 
-def test_who_takes_nothing_is_torn_off_and_the_answer_returns() -> None:
-    reader = Reader(takes=3)
-    answer(reader, b"x" * (10 * PIECE_BYTES), timeout_s=0.05)
-    assert reader.gone.is_set()
-    assert len(reader.body) == 2 * PIECE_BYTES
-
-
-def test_who_takes_none_of_many_small_answers_is_torn_off_too() -> None:
-    reader = Reader(takes=0)
-    answer(reader, b"small", timeout_s=0.05)
-    assert reader.gone.is_set()
-    assert reader.messages == []
-
-
 def test_websockets_pass_through() -> None:
     seen: list[Any] = []
 
@@ -111,7 +88,7 @@ def test_websockets_pass_through() -> None:
         seen.append(arguments)
 
     given: Any = ({"type": "websocket"}, object(), object())
-    asyncio.run(PieceByPiece(app, 1.0)(*given))
+    asyncio.run(PieceByPiece(app)(*given))
     assert seen == [given]
 
 

@@ -67,29 +67,35 @@ def test_ipv6_has_brackets_in_its_address() -> None:
 
 
 @pytest.mark.parametrize(
-    ("soft", "hard", "expected"),
+    ("limits", "expected", "clients"),
     [
-        (1_024, 20_000, 5_512),
-        (8_000, 20_000, 8_000),
-        (1_024, 4_096, 4_096),
-        (1_024, resource.RLIM_INFINITY, 5_512),
-        (resource.RLIM_INFINITY, resource.RLIM_INFINITY, resource.RLIM_INFINITY),
+        ((1_024, 20_000), 5_512, 5_000),
+        ((1_024, 5_512), 5_512, 5_000),
+        ((1_024, 5_511), 5_511, 4_999),
+        ((8_000, 20_000), 8_000, 5_000),
+        ((5_511, 5_511), 5_511, 4_999),
+        ((5_512, 5_512), 5_512, 5_000),
+        ((1_024, 4_096), 4_096, 3_584),
+        ((256, 256), 256, 64),
+        ((1_024, resource.RLIM_INFINITY), 5_512, 5_000),
+        ((resource.RLIM_INFINITY, resource.RLIM_INFINITY), resource.RLIM_INFINITY, 5_000),
     ],
 )
 def test_it_may_open_as_many_files_as_clients_need_and_says_where_it_may_not(
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
-    soft: int,
-    hard: int,
+    limits: tuple[int, int],
     expected: int,
+    clients: int,
 ) -> None:
-    limits = [(soft, hard)]
-    monkeypatch.setattr(resource, "getrlimit", lambda _: limits[-1])
-    monkeypatch.setattr(resource, "setrlimit", lambda _, both: limits.append(both))
-    allow_connections(5_000)
-    assert limits[-1] == (expected, hard)
-    names_all = "--max-clients is 5000, but this process may open 4096 files" in caplog.text
-    assert names_all == (hard == 4_096)
+    _, hard = limits
+    history = [limits]
+    monkeypatch.setattr(resource, "getrlimit", lambda _: history[-1])
+    monkeypatch.setattr(resource, "setrlimit", lambda _, both: history.append(both))
+    assert allow_connections(5_000) == clients
+    assert history[-1] == (expected, hard)
+    said = f"--max-clients is 5000, but this process may open {hard} files"
+    assert (said in caplog.text) == (clients < 5_000) == (f"serving {clients} " in caplog.text)
 
 
 def test_an_address_in_use_is_refused_and_nothing_stays_open() -> None:

@@ -1,0 +1,176 @@
+"""The door: connections are taken off the listening socket as long as there are files for them.
+
+asyncio's own server knows no limit. Out of files, it logs an error for each place in its backlog
+and tries all of them again a second later, ever more at once: 97 MB of log in half a minute.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import logging
+import resource
+import socket
+import ssl
+from collections.abc import Callable, Collection
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from lupin_bridge.serving.crowd import Guest, whom_to_turn_out
+from lupin_bridge.serving.rate_limit import client_key
+from lupin_twin.throttle import Throttle
+
+log = logging.getLogger(__name__)
+
+# Files that stay free for the rest of the process: DDS, the page's files.
+KEPT_FILES: Final = 64
+# However few files there are: with fewer connections nobody could be served at all.
+MIN_CONNECTIONS: Final = 8
+# Between two turns of the event loop; the others have to be served too.
+AT_ONCE: Final = 64
+# Of a full house, so much is turned out at once: who is to go costs a look at everybody.
+TURNED_OUT: Final = 1 / 16
+RETRY_S: Final = 0.25
+COMPLAINT_PERIOD_S: Final = 30.0
+
+_NO_FILES: Final = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
+
+
+def room_for_connections() -> int:
+    """How many connections this process's limit on open files leaves room for."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if limit == resource.RLIM_INFINITY:
+        limit = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+    if limit == resource.RLIM_INFINITY:
+        return 1 << 20
+    return max(MIN_CONNECTIONS, limit - len(list(Path("/proc/self/fd").iterdir())) - KEPT_FILES)
+
+
+@dataclass(eq=False, slots=True)
+class _Arrival:
+    """A connection that has no protocol yet: TLS is being agreed on."""
+
+    address: str
+    waiting_since_s: float | None
+    task: asyncio.Task[None] | None = None
+
+    def abort(self) -> None:
+        if self.task is not None:
+            self.task.cancel()
+
+
+class Acceptor:
+    """Takes connections and turns them out; uvicorn closes it as it would an `asyncio.Server`.
+
+    `guests` are all connections with a protocol. A handshake of TLS, and its end, may take
+    `timeout_s`.
+    """
+
+    def __init__(
+        self,
+        listener: socket.socket,
+        make_protocol: Callable[[], asyncio.BaseProtocol],
+        guests: Collection[Guest],
+        *,
+        room: int,
+        tls: ssl.SSLContext | None,
+        timeout_s: float,
+    ) -> None:
+        self._listener = listener
+        self._make_protocol = make_protocol
+        self._guests = guests
+        self._room = room
+        self._options: dict[str, Any] = {}
+        if tls is not None:
+            self._options = {
+                "ssl": tls,
+                "ssl_handshake_timeout": timeout_s,
+                "ssl_shutdown_timeout": timeout_s,
+            }
+        self._arrivals: set[_Arrival] = set()
+        self._complaints = Throttle(COMPLAINT_PERIOD_S)
+        self._retry: asyncio.TimerHandle | None = None
+        self._loop = asyncio.get_running_loop()
+        self._resume()
+
+    def close(self) -> None:
+        """Take no more, and give up on who has no protocol yet."""
+        if self._retry is not None:
+            self._retry.cancel()
+        self._loop.remove_reader(self._listener)
+        for arrival in self._arrivals:
+            arrival.abort()
+
+    async def wait_closed(self) -> None:
+        """Until those have gone."""
+        tasks = [arrival.task for arrival in self._arrivals if arrival.task is not None]
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    def _resume(self) -> None:
+        self._retry = None
+        self._loop.add_reader(self._listener, self._take)
+
+    def _pause(self) -> None:
+        self._loop.remove_reader(self._listener)
+        self._retry = self._loop.call_later(RETRY_S, self._resume)
+
+    def _take(self) -> None:
+        """Take who waits outside."""
+        for _ in range(AT_ONCE):
+            if len(self._guests) + len(self._arrivals) >= self._room:
+                # Whoever is turned out has left by the next turn of the event loop.
+                if not self._make_room():
+                    self._pause()
+                return
+            try:
+                connection, _ = self._listener.accept()
+            except (BlockingIOError, InterruptedError, ConnectionAbortedError):
+                return
+            except OSError as error:
+                if error.errno not in _NO_FILES:
+                    raise
+                self._complain("no new connections for now: %s", error.strerror)
+                self._make_room()
+                self._pause()
+                return
+            connection.setblocking(False)
+            self._let_in(connection)
+
+    def _let_in(self, connection: socket.socket) -> None:
+        arrival = _Arrival(_address_of(connection), self._loop.time())
+        self._arrivals.add(arrival)
+        arrival.task = self._loop.create_task(self._agree(connection))
+        arrival.task.add_done_callback(lambda _: self._arrivals.discard(arrival))
+
+    async def _agree(self, connection: socket.socket) -> None:
+        with suppress(OSError):  # no TLS, none in time, or gone: asyncio has closed it
+            await self._loop.connect_accepted_socket(
+                self._make_protocol, connection, **self._options
+            )
+
+    def _make_room(self) -> bool:
+        everybody: list[Guest] = [*self._guests, *self._arrivals]
+        chosen = whom_to_turn_out(everybody, max(1, int(self._room * TURNED_OUT)))
+        for guest in chosen:
+            guest.abort()
+        self._complain(
+            "%d connections are open, and there are files for %d: turned out the %d that have "
+            "waited longest",
+            len(everybody),
+            self._room,
+            len(chosen),
+        )
+        return bool(chosen)
+
+    def _complain(self, text: str, *values: object) -> None:
+        if self._complaints.ask(text, self._loop.time()) is not None:
+            log.warning(text, *values)
+
+
+def _address_of(connection: socket.socket) -> str:
+    try:
+        return client_key(connection.getpeername()[0])
+    except OSError:
+        return ""  # it has gone already

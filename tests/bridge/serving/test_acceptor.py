@@ -1,0 +1,129 @@
+"""The door of a bridge that may open few files: whoever is stuck in it makes room for others."""
+
+from __future__ import annotations
+
+import resource
+import socket
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+
+import pytest
+
+from lupin_bridge.serving.acceptor import KEPT_FILES, MIN_CONNECTIONS, room_for_connections
+from tests.support import raw_http
+from tests.support.access import Served
+from tests.support.domains import own_domain, ros_env
+from tests.support.proc_stat import open_files
+from tests.support.processes import Process, url_of
+from tests.support.waiting import wait_for
+from tests.support.web import deaf_client
+
+FILES = 256
+STUCK = 250
+GET = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n"
+
+
+@contextmanager
+def frugal(*options: str) -> Iterator[Served]:
+    """`lupin-twin serve` that may open no more than `FILES` files."""
+    shell = ["/bin/sh", "-c", f'ulimit -n {FILES} && exec "$@"', "sh"]
+    command = [sys.executable, "-m", "lupin_bridge.cli", "serve", "--port", "0", *options]
+    with own_domain() as domain, Process([*shell, *command], ros_env(domain)) as process:
+        live = Served(process, url_of(process))
+        assert live.get("/healthz").status_code == 200
+        yield live
+        assert "Traceback" not in process.output
+        assert len(process.output) < 4_000, "one line for all of them"
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        b"",
+        b"GET /ws/state HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: ",
+        GET.replace(b"Connection: close\r\n", b""),
+    ],
+    ids=["nothing", "half a request", "a request, and no more"],
+)
+def test_who_asks_for_nothing_makes_room_for_who_does(said: bytes) -> None:
+    # No deadline ends them: they wait for an hour.
+    with frugal("--client-timeout-s", "3600") as live, ExitStack() as stack:
+        kept = open_files(live.process.pid)
+        for _ in range(STUCK):
+            stack.enter_context(raw_http.connect(live.url)).sendall(said)
+        for _ in range(20):
+            assert raw_http.status(raw_http.answer(live.url, GET)) == 200
+        assert live.handshake() == 101
+        assert open_files(live.process.pid) <= FILES - KEPT_FILES // 2
+        assert open_files(live.process.pid) >= kept
+        live.process.wait_for_output("turned out the ")
+
+
+def test_one_address_crowds_out_none_but_itself() -> None:
+    with frugal("--client-timeout-s", "3600") as live, ExitStack() as stack:
+        quiet = stack.enter_context(raw_http.connect(live.url, "127.0.7.1"))
+        quiet.sendall(GET[:-2])
+        for _ in range(2 * STUCK):
+            stack.enter_context(raw_http.connect(live.url, "127.0.7.2"))
+        live.process.wait_for_output("turned out the ")
+        quiet.sendall(GET[-2:])
+        assert raw_http.status(raw_http.heard(quiet)) == 200
+
+
+def test_websockets_leave_room_for_requests_and_stay() -> None:
+    with frugal() as live, ExitStack() as stack:
+        line = live.process.wait_for_output("--max-clients is 5000")
+        listeners = [stack.enter_context(deaf_client(live.url)) for _ in range(FILES)]
+        for _ in range(20):
+            assert raw_http.status(raw_http.answer(live.url, GET)) == 200
+        served_clients = int(line.rpartition("serving ")[2].split()[0])
+        assert FILES // 8 < served_clients < FILES // 2
+
+        def open_websockets() -> int:
+            text = live.get("/metrics").text
+            return int(float(text.partition("\nlupin_clients ")[2].split()[0]))
+
+        wait_for(
+            lambda: open_websockets() == served_clients, "as many clients as there is room for"
+        )
+        assert len(listeners) == FILES
+
+
+def test_out_of_files_it_waits_says_so_once_and_recovers() -> None:
+    with frugal("--client-timeout-s", "3600") as live, ExitStack() as stack:
+        pid = live.process.pid
+        # All files that it may have are open, as far as it can tell, and no connection among them.
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (open_files(pid) - 1, FILES))
+        waiting = [stack.enter_context(raw_http.connect(live.url)) for _ in range(50)]
+        for client in waiting:
+            client.sendall(GET)
+        live.process.wait_for_output("no new connections for now: Too many open files")
+        length, start_s = len(live.process.output), time.monotonic()
+        wait_for(lambda: time.monotonic() > start_s + 2.0, "some more tries")
+        assert len(live.process.output) <= length + 200
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (FILES, FILES))
+        assert all(raw_http.status(raw_http.heard(client)) == 200 for client in waiting)
+        assert live.process.output.count("no new connections") == 1
+
+
+def test_room_is_what_the_limit_leaves(monkeypatch: pytest.MonkeyPatch) -> None:
+    limits = [(10_000, 10_000)]
+    monkeypatch.setattr(resource, "getrlimit", lambda _: limits[-1])
+    room = room_for_connections()
+    assert 9_000 < room < 10_000 - KEPT_FILES
+    limits.append((10_100, 10_100))
+    assert room_for_connections() == room + 100
+    limits.append((KEPT_FILES, KEPT_FILES))
+    assert room_for_connections() == MIN_CONNECTIONS
+    limits.append((resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+    assert room_for_connections() > 100_000
+
+
+def test_who_goes_before_he_is_let_in_does_no_harm() -> None:
+    with frugal() as live:
+        for _ in range(200):
+            with raw_http.connect(live.url) as client, suppress(OSError):
+                client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+        assert raw_http.status(raw_http.answer(live.url, GET)) == 200

@@ -1,0 +1,61 @@
+"""An HTTP client that can say what no proper client would: bytes in, bytes out."""
+
+from __future__ import annotations
+
+import socket
+import ssl
+from contextlib import suppress
+from urllib.parse import urlsplit
+
+from tests.support.waiting import PATIENCE_S
+
+UPGRADE = (
+    b"Host: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"
+)
+
+
+def connect(url: str, source: str = "", *, room: int | None = None) -> socket.socket:
+    """A connection to a bridge; `source` is our own address, `room` what it takes unread, bytes."""
+    address = urlsplit(url)
+    client = socket.socket()
+    try:
+        if room is not None:
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, room)
+        client.settimeout(PATIENCE_S)
+        client.bind((source, 0))
+        client.connect((address.hostname, address.port))
+    except BaseException:
+        client.close()
+        raise
+    return client
+
+
+def heard(client: socket.socket) -> bytes:
+    """All that comes until the connection ends."""
+    blocks = []
+    with suppress(ConnectionError):
+        while block := client.recv(65_536):
+            blocks.append(block)
+    return b"".join(blocks)
+
+
+def answer(url: str, said: bytes, trust: ssl.SSLContext | None = None) -> bytes:
+    """All that comes after this was said, until the other side ends the connection."""
+    with connect(url) as plain:
+        if trust is None:
+            plain.sendall(said)
+            return heard(plain)
+        with trust.wrap_socket(plain, server_hostname="127.0.0.1") as client:
+            client.sendall(said)
+            return heard(client)
+
+
+def status(said: bytes) -> int:
+    """The status of an answer; 0: there is none."""
+    return int(said.split(b" ", 2)[1]) if said.startswith(b"HTTP/1.1 ") else 0
+
+
+def is_over(client: socket.socket) -> bool:
+    """Whether the other side has closed or reset a connection (tcp.h: 1 is ESTABLISHED)."""
+    return client.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 1)[0] != 1

@@ -1,0 +1,223 @@
+"""Connections that never come to anything: each is answered, or ended, and none stays."""
+
+from __future__ import annotations
+
+import ssl
+from collections.abc import Iterator
+from contextlib import ExitStack, suppress
+
+import orjson
+import pytest
+
+from lupin_bridge.serving.http_protocol import MAX_HEAD_BYTES
+from tests.support import raw_http
+from tests.support.access import TOKEN, Served, served
+from tests.support.proc_stat import open_files, peak_mb, reset_peak, resident_mb
+from tests.support.raw_http import UPGRADE, status
+from tests.support.tls import certificate
+from tests.support.waiting import wait_for
+
+TIMEOUT_S = 2
+# What a few thousand refusals may cost, however few of them are read.
+MEMORY_MB = 15.0
+
+
+@pytest.fixture(scope="module")
+def plain() -> Iterator[Served]:
+    with served("--client-timeout-s", str(TIMEOUT_S)) as running:
+        yield running
+        assert "Traceback" not in running.process.output
+
+
+@pytest.fixture(scope="module")
+def secret(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    """With a token, and over TLS."""
+    files = certificate(tmp_path_factory.mktemp("tls"))
+    options = ("--client-timeout-s", str(TIMEOUT_S), *files.options)
+    with served(*options, trust=files.trust, LUPIN_TOKEN=TOKEN) as running:
+        yield running
+        assert "Traceback" not in running.process.output
+
+
+def asked(*lines: bytes, version: bytes = b"1.1") -> bytes:
+    """A request for a WebSocket with further header lines."""
+    head = b"GET /ws/state HTTP/" + version + b"\r\n" + UPGRADE
+    return head + b"".join(line + b"\r\n" for line in lines) + b"\r\n"
+
+
+# --- handshakes ---------------------------------------------------------------------------------
+
+NO_HANDSHAKES = {
+    "a body": (asked(b"Content-Length: 1"), 400),
+    "a body that has come": (asked(b"Content-Length: 1") + b"x", 400),
+    "chunks": (asked(b"Transfer-Encoding: chunked"), 400),
+    "chunks that have come": (asked(b"Transfer-Encoding: chunked") + b"1\r\nx\r\n0\r\n\r\n", 400),
+    "a long cookie": (asked(b"Cookie: " + b"x" * 9_000), 431),
+    "many headers": (asked(*(b"X-%d: y" % i for i in range(130))), 431),
+    "a long line": (
+        UPGRADE.join((b"GET /ws/state?" + b"x" * 9_000 + b" HTTP/1.1\r\n", b"\r\n")),
+        414,
+    ),
+    "a long head": (asked(*(b"X-%d: " % i + b"y" * 7_000 for i in range(12))), 431),
+    "a bad key": (asked().replace(b"dGhlIHNhbXBsZSBub25jZQ==", b"dGhl"), 400),
+    "no key": (asked().replace(b"Sec-WebSocket-Key", b"X-Key"), 400),
+    "two keys": (asked(b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ=="), 400),
+    "no version": (asked().replace(b"Sec-WebSocket-Version", b"X-Version"), 400),
+    "another version": (asked().replace(b"Version: 13", b"Version: 8"), 400),
+    "another method": (asked().replace(b"GET", b"PUT", 1), 405),
+    "HTTP/1.0": (asked(version=b"1.0"), 404),
+    "no text": (asked(b"X-Bytes: \xff\xfe", b"Content-Length: \xb9"), 400),
+}
+
+
+@pytest.mark.parametrize("name", NO_HANDSHAKES)
+def test_what_is_no_handshake_is_answered_and_ended(plain: Served, name: str) -> None:
+    said, expected = NO_HANDSHAKES[name]
+    heard = raw_http.answer(plain.url, said)
+    assert status(heard) == expected, heard
+    assert heard.count(b"HTTP/1.1") == 1
+
+
+@pytest.mark.parametrize("name", ["a body", "a long cookie", "many headers", "a bad key"])
+def test_over_tls_and_with_a_token_too(secret: Served, name: str) -> None:
+    said, expected = NO_HANDSHAKES[name]
+    assert isinstance(secret.trust, ssl.SSLContext)
+    assert status(raw_http.answer(secret.url, said, secret.trust)) == expected
+
+
+def test_a_refusal_says_why(plain: Served) -> None:
+    body = raw_http.answer(plain.url, asked(b"Content-Length: 1")).partition(b"\r\n\r\n")[2]
+    assert orjson.loads(body) == {
+        "detail": "this is no request for a WebSocket: unsupported request body"
+    }
+
+
+@pytest.mark.parametrize("said", [b"", b"\x16\x03\x01", b"\x16\x03\x01\x02\x00\x01\x00", b"GET"])
+def test_who_never_agrees_on_tls_is_gone_after_the_timeout(secret: Served, said: bytes) -> None:
+    files = open_files(secret.process.pid)
+    with ExitStack() as stack:
+        clients = [stack.enter_context(raw_http.connect(secret.url)) for _ in range(20)]
+        for client in clients:
+            client.sendall(said)
+        wait_for(lambda: all(map(raw_http.is_over, clients)), "their end", 20.0)
+        wait_for(lambda: open_files(secret.process.pid) <= files, "the end of their files")
+
+
+# --- heads --------------------------------------------------------------------------------------
+
+
+def head_of(length: int, line: int) -> bytes:
+    """A whole request of so many bytes, with header lines of `line` bytes each."""
+    head = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n"
+    room = length - len(head) - 2
+    head += b"".join(b"X: %b\r\n" % (b"y" * (line - 5)) for _ in range(room // line - 1))
+    head += b"X: %b\r\n" % (b"y" * (length - len(head) - 7))
+    return head + b"\r\n"
+
+
+@pytest.mark.parametrize("line", [6, 100, 10_000])
+@pytest.mark.parametrize("first", [b"", b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"])
+def test_a_head_has_a_limit_however_it_comes(plain: Served, line: int, first: bytes) -> None:
+    answers = 2 if first else 1
+    for extra, expected in ((0, b" 200 "), (1, b" 431 "), (200_000, b" 431 ")):
+        said = head_of(MAX_HEAD_BYTES + extra, line)
+        assert len(said) == MAX_HEAD_BYTES + extra
+        heard = raw_http.answer(plain.url, first + said)
+        heads = [part[:5] for part in heard.split(b"HTTP/1.1")[1:]]
+        assert heads == [b" 200 "] * (answers - 1) + [expected]
+
+
+def test_requests_one_behind_the_other_are_all_answered(plain: Served) -> None:
+    one = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 40000\r\n\r\n" + bytes(
+        40_000
+    )
+    last = b"GET /nowhere HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\nGET / and more"
+    heard = raw_http.answer(plain.url, one * 20 + last)
+    assert (heard.count(b"HTTP/1.1 200"), heard.count(b"HTTP/1.1")) == (20, 21)
+
+
+# --- refusals that nobody reads -----------------------------------------------------------------
+
+HOST = b"Host: 127.0.0.1\r\n\r\n"
+REFUSED = {
+    "401": b"GET /api/state HTTP/1.1\r\n" + HOST,
+    "401, HEAD": b"HEAD /api/state HTTP/1.1\r\n" + HOST,
+    "403": b"GET /api/state HTTP/1.1\r\nHost: evil.example\r\n\r\n",
+    "404": b"GET /signin/nowhere HTTP/1.1\r\n" + HOST,
+    "404, HEAD": b"HEAD /nowhere HTTP/1.1\r\n" + HOST,
+    "405": b"POST /healthz HTTP/1.1\r\nContent-Length: 0\r\n" + HOST,
+    "429": b"GET /api/state HTTP/1.1\r\nAuthorization: Bearer wrong\r\n" + HOST,
+    "400": b"GET /healthz HTTP/1.1\r\n" + HOST + b"no HTTP\r\n\r\n",
+    "400, field": b"GET /api/field?sensor_type= HTTP/1.1\r\n" + HOST,
+    "answers": b"GET /healthz HTTP/1.1\r\n" + HOST,
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+@pytest.mark.parametrize("over", ["tcp", "tls and a token"])
+def test_who_reads_no_refusal_is_gone_after_the_timeout(
+    plain: Served, secret: Served, name: str, over: str
+) -> None:
+    live = plain if over == "tcp" else secret
+    pid = live.process.pid
+    files, memory = open_files(pid), resident_mb(pid)
+    reset_peak(pid)
+    with ExitStack() as stack:
+        for _ in range(3):
+            client = stack.enter_context(raw_http.connect(live.url, room=4_096))
+            if isinstance(live.trust, ssl.SSLContext):
+                client = stack.enter_context(
+                    live.trust.wrap_socket(client, server_hostname="127.0.0.1")
+                )
+            client.settimeout(0.2)
+            with suppress(OSError):  # it may not be listened to any more
+                client.sendall(REFUSED[name] * 3_000)
+        wait_for(lambda: open_files(pid) <= files, "their end")
+        assert peak_mb(pid) - memory < MEMORY_MB
+
+
+def test_a_body_that_turns_out_to_be_none_after_the_answer_leaves_no_trace(plain: Served) -> None:
+    said = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n\r\n"
+    before = len(plain.process.output)
+    for _ in range(200):
+        with raw_http.connect(plain.url) as client:
+            client.sendall(said)
+            assert client.recv(1) == b"H"
+            client.sendall(b"zz\r\n")
+            assert raw_http.heard(client).count(b"HTTP/1.1") == 0
+    assert len(plain.process.output) - before < 2_000
+
+
+def test_a_body_that_turns_out_to_be_none_before_the_answer_is_answered_once(plain: Served) -> None:
+    said = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n"
+    heard = raw_http.answer(plain.url, said)
+    assert (status(heard), heard.count(b"HTTP/1.1")) == (400, 1)
+
+
+# --- from one protocol to the other -------------------------------------------------------------
+
+
+def test_a_websocket_behind_an_answer_that_nobody_reads_keeps_nothing(plain: Served) -> None:
+    pid = plain.process.pid
+    files, memory = open_files(pid), resident_mb(pid)
+    field = (
+        b"GET /api/field.npy?sensor_type=co2&resolution=0.01&bbox_min_x=0&bbox_min_y=0"
+        b"&bbox_max_x=%d&bbox_max_y=1 HTTP/1.1\r\n" + HOST
+    )
+    with ExitStack() as stack:
+        for width in range(1, 20):
+            client = stack.enter_context(raw_http.connect(plain.url, room=4_096))
+            client.sendall(field % width + asked())
+        wait_for(lambda: open_files(pid) <= files, "their end")
+        assert peak_mb(pid) - memory < 2 * MEMORY_MB
+
+
+def test_a_websocket_after_an_answer_stays(plain: Served) -> None:
+    with raw_http.connect(plain.url) as client:
+        client.sendall(b"GET /healthz HTTP/1.1\r\n" + HOST + asked())
+        seen = b""
+        # Heartbeats: longer than a request may take.
+        while seen.count(b'"type":"state"') < 2 * TIMEOUT_S + 1:
+            block = client.recv(65_536)
+            assert block, seen
+            seen += block

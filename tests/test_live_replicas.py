@@ -15,7 +15,7 @@ from tests.support.messages import look, occupancy_grid, scan
 from tests.support.processes import OFTEN, lupin_twin, twin_node
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
-from tests.support.web import Bridge, tag_ids
+from tests.support.web import Bridge, tag_ids, without_ages
 
 FIELD: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.25}
 CACHED = ("/api/field.json", "/api/field.npy", "/api/field.png")
@@ -59,14 +59,6 @@ def pictures_agree(first: Bridge, second: Bridge) -> bool:
     """Whether both have the same map, which the second can only have from the newest."""
     ours, theirs = first.get("/api/map.png"), second.get("/api/map.png")
     return theirs.status_code == 200 and ours.content == theirs.content
-
-
-def without_ages(state: Any) -> Any:
-    """A state as it stays while nothing is observed."""
-    return [
-        {name: value for name, value in tag.items() if name != "stale_seconds"}
-        for tag in state["tags"]
-    ]
 
 
 def test_both_serve_the_same_and_the_end_of_one_is_not_the_others(

@@ -1,4 +1,4 @@
-"""The 1 Hz tick: building and publishing the state of a big greenhouse, few tags changed or all."""
+"""The 1 Hz tick: the state and the times of a big greenhouse, few tags changed or all; its JSON."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from functools import partial
 from typing import Any
 
 import rclpy
-from lupin_msgs.msg import TwinState
+from lupin_msgs.msg import TwinState, TwinTimes
 from rclpy.context import Context
 
+from lupin_bridge.stream.state_json import StateJson
 from lupin_twin import convert
 from lupin_twin.habits import latched
-from lupin_twin.state import Flower, Pose, Reading, Snapshot, TagState
+from lupin_twin.state import Flower, Pose, Reading, Snapshot, TagState, Try
 from tests.support.domains import own_domain
 
 S = 1_000_000_000
@@ -26,9 +27,14 @@ def tags(count: int) -> tuple[TagState, ...]:
         TagState(
             tag_id=str(i),
             pose=Pose(i * 0.1, 1.0, 0.3, 0.0, 0.0, 0.0, 1.0),
-            readings=(Reading("temperature", 20.0 + i % 7), Reading("humidity", 60.0)),
-            last_observed_ns=S,
+            readings=(
+                Reading("temperature", 20.0 + i % 7, S + i),
+                Reading("humidity", 60.0, S + i),
+            ),
+            last_observed_ns=S + i,
             flower=Flower("rose", 0.9, flower_count=3, footprint=((0.0, 0.0, 0.0),) * 4),
+            looked_at_ns=S + i,
+            last_try=Try(S + i),
         )
         for i in range(count)
     )
@@ -48,33 +54,46 @@ def timed_ms(run: Callable[[], object]) -> float:
     return (time.perf_counter() - start) * 1e3
 
 
-def measure(count: int, publisher: Any) -> None:
-    kept = convert.StateMessages()
-    rebuilt, few, published = [], [], []
+def measure(count: int, state: Any, times: Any) -> None:
+    states, parts, text = convert.StateMessages(), convert.TimesMessages(), StateJson()
+    columns: list[list[float]] = [[] for _ in range(6)]
     now = tags(count)
-    kept.build(Snapshot(S, "map", now))
+    first = Snapshot(S, "map", now)
+    for warm_up in (states.build, parts.build, text.state):
+        warm_up(first)
     for turn in range(2, 12):
         now = few_changed(now, turn)
         snapshot = Snapshot(turn * S, "map", now)
-        rebuilt.append(timed_ms(partial(convert.StateMessages().build, snapshot)))
-        few.append(timed_ms(partial(kept.build, snapshot)))
-        published.append(timed_ms(partial(publisher.publish, kept.build(snapshot))))
-    build, publish = statistics.median(few), statistics.median(published)
+        steps: tuple[Callable[[], object], ...] = (
+            partial(convert.StateMessages().build, snapshot),
+            partial(states.build, snapshot),
+            lambda snapshot=snapshot: state.publish(states.build(snapshot)),  # type: ignore[misc]
+            partial(parts.build, snapshot),
+            lambda snapshot=snapshot: times.publish(parts.build(snapshot)),  # type: ignore[misc]
+            partial(text.state, snapshot),
+        )
+        for column, step in zip(columns, steps, strict=True):
+            column.append(timed_ms(step))
+    rebuilt, build, publish, build_times, publish_times, json = map(statistics.median, columns)
     print(
-        f"{count:>7}{statistics.median(rebuilt):>14.1f}{build:>14.1f}{publish:>10.1f}"
-        f"{build + publish:>10.1f}"
+        f"{count:>7}{rebuilt:>14.1f}{build:>14.1f}{build + publish:>12.1f}"
+        f"{build_times + publish_times:>12.1f}{json:>8.1f}"
     )
 
 
 def main() -> None:
-    print(f"\n{'tags':>7}{'all rebuilt':>14}{'1 % changed':>14}{'publish':>10}{'tick':>10}  (ms)")
+    print(
+        f"\n{'tags':>7}{'all rebuilt':>14}{'1 % changed':>14}{'state tick':>12}"
+        f"{'times tick':>12}{'JSON':>8}  (ms)"
+    )
     with own_domain() as domain:
         context = Context()
         rclpy.init(args=[], context=context, domain_id=domain)
         node = rclpy.create_node("bench_tick", context=context)
-        publisher = node.create_publisher(TwinState, "/twin/state", latched(1))
+        state = node.create_publisher(TwinState, "/twin/state", latched(1))
+        times = node.create_publisher(TwinTimes, "/twin/times", latched(1))
         for count in (30, 1_000, 10_000):
-            measure(count, publisher)
+            measure(count, state, times)
         node.destroy_node()
         rclpy.try_shutdown(context=context)
 

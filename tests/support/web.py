@@ -97,6 +97,15 @@ def tag_ids(state: dict[str, Any]) -> list[str]:
     return [tag["tag_id"] for tag in state["tags"]]
 
 
+def without_ages(state: dict[str, Any]) -> list[dict[str, Any]]:
+    """The tags of a state as they stay while nothing is observed."""
+    tags = []
+    for tag in state["tags"]:
+        readings = [{**reading, "stale_seconds": 0} for reading in tag["readings"]]
+        tags.append({**tag, "stale_seconds": 0, "readings": readings})
+    return tags
+
+
 @contextmanager
 def listener(
     url: str, subprotocols: Sequence[str] | None = None, **query: Any

@@ -38,9 +38,10 @@ class _Template:
 
     def at(self, now_ns: int) -> bytes:
         """The text as of `now_ns`."""
-        if len(self.stamps_ns) == 1:  # a tag that was scanned, and nothing else since
-            return self.text % ((age(self.stamps_ns[0], now_ns),) * len(self.picks))
-        ages = [age(stamp_ns, now_ns) for stamp_ns in self.stamps_ns]
+        # To the millisecond: a browser shows seconds, and short numbers make short frames.
+        ages = [b"%.3f" % age_seconds(stamp_ns, now_ns) for stamp_ns in self.stamps_ns]
+        if len(ages) == 1:  # a tag that was scanned, and nothing else since
+            return self.text % tuple(ages * len(self.picks))
         return self.text % tuple([ages[pick] for pick in self.picks])
 
 
@@ -103,11 +104,6 @@ class StateJson:
             "last_try_status": None if last is None else last.status,
             "last_try_detail": "" if last is None else last.detail,
         }
-
-
-def age(stamp_ns: int, now_ns: int) -> bytes:
-    """An age as JSON, to the millisecond: a browser shows seconds, and short numbers are cheap."""
-    return b"%.3f" % age_seconds(stamp_ns, now_ns)
 
 
 def message_fields(tag: TagState) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import random
 from collections.abc import Iterator
 
 import pytest
+from lupin_msgs.msg import TwinTagState
 from websockets.exceptions import ConnectionClosed
 
 from lupin_bridge.rosbridge.session import MAX_BURST
@@ -58,7 +59,12 @@ def test_who_subscribes_gets_the_current_state_at_once_and_then_every_change(
     served = house.json("/api/state")["tags"]
     told = {tag["tag_id"]: tag for tag in first["msg"]["tags"]}
     for tag in served:
-        assert told[tag["tag_id"]] | {"stale_seconds": 0} == tag | {"stale_seconds": 0}
+        message = told[tag["tag_id"]]
+        assert list(message) == list(TwinTagState.get_fields_and_field_types())
+        as_told = {name: tag[name] for name in message} | {
+            "readings": [{"name": r["name"], "value": r["value"]} for r in tag["readings"]]
+        }
+        assert message | {"stale_seconds": 0} == as_told | {"stale_seconds": 0}
     observed(house, "next")
     ros.until_tag("next")
 

@@ -8,8 +8,6 @@ import os
 import signal
 import sys
 import tempfile
-import threading
-import time
 from collections.abc import Sequence
 from dataclasses import Field
 from typing import Any, NoReturn
@@ -22,12 +20,11 @@ from lupin_bridge.configuration import (
     take_token,
 )
 from lupin_bridge.settings import SettingError, Settings, one_of, option, table
+from lupin_twin.leaving import leave
 
 log = logging.getLogger(__name__)
 
 USAGE_ERROR = 2
-# An idle worker ends at once when it is told to; who takes longer is at work.
-IDLE_WORKERS_END_S = 0.1
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -55,25 +52,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 def command() -> NoReturn:
     """`main` as a process of its own."""
     leave(main())
-
-
-def leave(code: int) -> NoReturn:
-    """End the process, whatever its other threads are computing.
-
-    Python waits at its end for every worker of a pool, daemon or not, and numpy cannot be
-    interrupted: a large field would hold up Ctrl-C for as long as it takes. So where, and only
-    where, a thread is still at work, the process ends without Python's (and DDS's) tidying up.
-    """
-    deadline_s = time.monotonic() + IDLE_WORKERS_END_S
-    others = [thread for thread in threading.enumerate() if thread is not threading.main_thread()]
-    for thread in others:
-        thread.join(max(0.0, deadline_s - time.monotonic()))
-    if any(thread.is_alive() for thread in others):
-        logging.shutdown()
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(code)
-    sys.exit(code)
 
 
 def split_ros_args(argv: Sequence[str]) -> tuple[list[str], list[str]]:

@@ -19,5 +19,5 @@ setup(
         ("share/lupin_twin/launch", ["launch/twin.launch.py"]),
         ("share/lupin_twin/config", ["config/twin.yaml"]),
     ],
-    entry_points={"console_scripts": ["twin_node = lupin_twin.cli:main"]},
+    entry_points={"console_scripts": ["twin_node = lupin_twin.cli:command"]},
 )

@@ -78,6 +78,10 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
         "spinning": set(),
         "workers": set(),
         "cdr": set(),
+        "gaps": set(),
+        "leaving": set(),
+        "deferred": set(),
+        "field_desk": {"field_cache", "fields", "grid", "workers"},
         "shapes": {"cdr", "state"},
         "explored": {"grid"},
         "field_cache": {"grid"},
@@ -87,13 +91,16 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
         "ingest": {"drops", "history", "state"},
         "convert": {"state", "grid", "explored", "fields", "history", "ingest"},
         "ros_parameters": {"parameters"},
-        "habits": {"cdr", "drops", "ros_parameters", "throttle"},
+        "habits": {"cdr", "drops", "gaps", "ros_parameters", "throttle"},
         "node": {
             "convert",
+            "deferred",
             "explored",
             "drops",
             "field_cache",
+            "field_desk",
             "fields",
+            "grid",
             "habits",
             "history",
             "ingest",
@@ -102,8 +109,9 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
             "shapes",
             "state",
             "twin_count",
+            "workers",
         },
-        "cli": {"node", "parameters", "spinning", "stop_signals"},
+        "cli": {"leaving", "node", "parameters", "spinning", "stop_signals"},
     },
     "lupin_patrol": {
         "chance": set(),
@@ -201,6 +209,11 @@ PURE_EXCEPT: Mapping[str, set[str]] = {
     "lupin_twin.idw": {"sys"},  # float_info
     # It has no ROS and does no input or output, but it is threads and order in time.
     "lupin_twin.workers": {"concurrent.futures", "threading", "time"},
+    "lupin_twin.field_desk": {
+        "concurrent.futures",
+        "queue",
+    },  # where the workers' results come back
+    "lupin_twin.leaving": {"logging", "os", "sys", "threading", "time"},  # the end of a process
     "lupin_twin.stop_signals": {"signal"},  # which is what it is about
     # Values and errors of modules that do more than that.
     "lupin_bridge.access.credentials": {"lupin_bridge.settings.SettingError"},

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 from lupin_msgs.msg import DiscoveredTag, DiscoveredTags
+from lupin_msgs.srv import GetField
 from rclpy.serialization import serialize_message
 
+from lupin_twin.field_desk import MAX_FIELDS
 from tests.support.domains import own_domain
 from tests.support.messages import scan
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
@@ -73,3 +77,124 @@ def test_a_length_that_lies_delays_no_state_and_takes_no_memory(strained: Strain
     peer.tag("after")
     assert peak_mb(pid) - before_mb < 40.0
     assert pause_s < 1.0, "a tick of the default rate"
+
+
+HEAVY = {
+    "resolution": 0.01,
+    "bbox_min_x": 0.0,
+    "bbox_min_y": 0.0,
+    "bbox_max_x": 10.0,
+    "bbox_max_y": 10.0,
+}
+
+
+@pytest.fixture
+def wide() -> Iterator[Strained]:
+    """A twin whose every tag reaches every cell: 10^6 cells with 150 tags take seconds."""
+    reach = ("-p", "idw_falloff_radius_m:=20.0", "-p", "idw_max_distance_m:=20.0")
+    rate = ("-p", f"state_publish_rate_hz:={1 / BEAT_S}")
+    with (
+        own_domain() as domain,
+        twin_node(domain, "--ros-args", *rate, *reach, "-p", "idw_power:=2.5") as process,
+        Peer(domain) as peer,
+    ):
+        peer.wait_for_twin()
+        peer.listen()
+        for number in range(150):
+            peer.observe(scan(f"tag {number}", {"co2": 400.0}, (number % 15, number // 15)))
+            if number % 40 == 39:
+                peer.tag(f"tag {number}")
+        peer.tag("tag 149")
+        yield Strained(process, peer)
+
+
+def ask(strained: Strained, **request: float) -> Any:
+    """Begin a call of the service; the future of its response."""
+    client = strained.peer.node.create_client(GetField, "/twin/get_field")
+    strained.peer.until(client.service_is_ready, "the service")
+    return client.call_async(GetField.Request(sensor_type="co2", **{**HEAVY, **request}))
+
+
+def shifted(number: int) -> dict[str, float]:
+    """Another field of the same size."""
+    return {"bbox_min_x": -0.25 * number, "bbox_max_x": 10.0 - 0.25 * number}
+
+
+def test_a_heavy_field_holds_up_no_observation_and_no_state(wide: Strained) -> None:
+    peer = wide.peer
+    heavy = [ask(wide), ask(wide)]
+    start_s = time.monotonic()
+    sent = 0
+
+    def send_and_look() -> bool:
+        # Two hundred within a second or so, and for as long as it computes.
+        nonlocal sent
+        if sent < 200:
+            peer.observe(scan("counted", {f"s{sent % 50}": float(sent)}))
+            sent += 1
+        return sent == 200 and all(future.done() for future in heavy)
+
+    pause_s = wide.longest_pause_s(send_and_look, "the heavy fields")
+    took_s = time.monotonic() - start_s
+    peer.tag("counted", lambda tag: readings(tag) == {f"s{n}": 150.0 + n for n in range(50)})
+    assert "lost" not in wide.process.output
+    assert pause_s < min(1.0, took_s)
+    first, second = (future.result() for future in heavy)
+    assert first.ok
+    assert first.width * first.height == 1_000_000
+    assert first.values == second.values
+
+
+def readings(tag: Any) -> dict[str, float]:
+    return {reading.name: reading.value for reading in tag.readings}
+
+
+def test_a_cheap_field_does_not_wait_behind_heavy_ones(wide: Strained) -> None:
+    heavy = [ask(wide, **shifted(number)) for number in range(6)]
+    cheap = ask(wide, resolution=1.0)
+    wide.peer.until(cheap.done, "the cheap field")
+    assert not all(future.done() for future in heavy)
+    assert cheap.result().ok
+
+
+def test_more_fields_than_can_wait_are_refused_with_the_reason(wide: Strained) -> None:
+    client = wide.peer.node.create_client(GetField, "/twin/get_field")
+    wide.peer.until(client.service_is_ready, "the service")
+    asked = []
+    for number in range(MAX_FIELDS + 20):
+        request = {**HEAVY, **shifted(number)}
+        asked.append(client.call_async(GetField.Request(sensor_type="co2", **request)))
+        if number % 5 == 4:  # a service holds ten requests
+            wide.peer.spin_briefly()
+
+    def refusal() -> Any:
+        answers = [future.result() for future in asked if future.done()]
+        return next((answer for answer in answers if not answer.ok), None)
+
+    refused = wide.peer.until(refusal, "a refusal")
+    assert "fields are being computed, which is the limit" in refused.error_message
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_within_two_seconds_whatever_is_computed(
+    wide: Strained, number: signal.Signals
+) -> None:
+    for x in range(4):
+        ask(wide, **shifted(x))
+    cheap = ask(wide, resolution=1.0)
+    wide.peer.until(cheap.done, "the cheap field: the heavy ones are being computed")
+    start_s = time.monotonic()
+    assert wide.process.stop(number) == 0
+    assert time.monotonic() - start_s < 2.0
+
+
+def test_messages_that_came_too_fast_are_counted_and_told_of(strained: Strained) -> None:
+    strained.peer.observe(scan("fast"))
+    strained.peer.tag("fast")
+    strained.process.freeze()
+    for number in range(200):
+        strained.peer.observe(scan("fast", {"co2": float(number)}))
+    strained.process.thaw()
+    strained.peer.tag("fast", lambda tag: readings(tag) == {"co2": 199.0})
+    line = strained.process.wait_for_output("on /floranova/observations: they came faster")
+    assert "lost 1" in line

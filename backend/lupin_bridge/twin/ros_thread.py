@@ -24,7 +24,7 @@ from lupin_twin.spinning import end_spinning, spin_until_shutdown
 log = logging.getLogger(__name__)
 
 # A stop waits this long for the ROS thread. A callback that computes a huge field takes longer
-# and cannot be interrupted: it is left behind, and the process ends without it (`cli.leave`).
+# and cannot be interrupted: it is left behind, and the process ends without it (`leave`).
 STOP_TIMEOUT_S = 0.9
 # How long after one heartbeat came back the next one is sent.
 BEAT_PERIOD_S = 1.0

@@ -6,8 +6,10 @@ import signal
 import sys
 from collections.abc import Sequence
 from threading import Event, Thread, main_thread
+from typing import NoReturn
 
 from lupin_twin import stop_signals
+from lupin_twin.leaving import leave
 
 USAGE_ERROR = 2
 
@@ -30,6 +32,11 @@ def main(args: Sequence[str] | None = None) -> int:
         return _refuse(str(error))
     finally:
         rclpy.try_shutdown()
+
+
+def command() -> NoReturn:
+    """`main` as a process of its own."""
+    leave(main())
 
 
 def _run() -> int:
@@ -66,4 +73,4 @@ def _refuse(reason: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    command()

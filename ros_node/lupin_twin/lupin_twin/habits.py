@@ -17,6 +17,7 @@ from rclpy.serialization import deserialize_message
 
 from lupin_twin.cdr import MessageShape, TooManyError
 from lupin_twin.drops import Drop, Reason
+from lupin_twin.gaps import Gaps
 from lupin_twin.ros_parameters import naming
 from lupin_twin.throttle import Throttle
 
@@ -56,6 +57,7 @@ class Habits:
 
     def __init__(self, node: Node) -> None:
         self.callback_errors = 0
+        self.lost = 0
         self._node = node
         self._throttle = Throttle(WARNING_PERIOD_S)
 
@@ -79,9 +81,16 @@ class Habits:
             lupin_twin.parameters.ParameterError: a name that ROS does not take.
 
         """
+        gaps = Gaps()
 
-        def take(data: bytes) -> None:
+        def take(data: bytes, info: dict[str, Any]) -> None:
             name = str(subscription.topic_name)
+            number = info["publication_sequence_number"]
+            # Of depth 1, the newest is wanted and nothing else.
+            if depth > 1 and number is not None:
+                lost = gaps.see(number, lambda: int(self._node.count_publishers(name)))
+                if lost:
+                    self.lose(lost, name)
             message = read_message(data, shape)
             if isinstance(message, Drop):
                 self.drop(message, name)
@@ -97,6 +106,15 @@ class Habits:
     def drop(self, drop: Drop, topic: str) -> None:
         """Tell of something that was dropped."""
         self.warn((drop.reason, (topic, drop.case)), drop.on(topic))
+
+    def lose(self, count: int, topic: str) -> None:
+        """Count and tell of messages that came faster than they were read."""
+        self.lost += count
+        self.warn(
+            ("lost", topic),
+            f"lost {count} messages on {topic}: they came faster than they were read, "
+            f"{self.lost} lost in all",
+        )
 
     def warn(self, key: tuple[str, object], text: str) -> None:
         """Log a warning, at most one a period for each key, and how many were held back."""

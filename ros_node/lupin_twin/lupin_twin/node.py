@@ -17,16 +17,20 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from lupin_twin import convert, ingest, shapes
+from lupin_twin.deferred import Later, allow_later
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.field_cache import FieldCache
+from lupin_twin.field_desk import FieldDesk
 from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused, FieldRules
+from lupin_twin.grid import FieldGrid
 from lupin_twin.habits import Habits, latched
 from lupin_twin.history import History, TagHistory
 from lupin_twin.parameters import TwinParameters
 from lupin_twin.ros_parameters import declare, naming, naming_use_sim_time
 from lupin_twin.state import Snapshot, TwinStore
 from lupin_twin.twin_count import TwinCount
+from lupin_twin.workers import Workers
 
 NODE_NAME: Final = "lupin_twin"
 
@@ -70,6 +74,11 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._states = convert.StateMessages()
         self._times = convert.TimesMessages()
         self._group = MutuallyExclusiveCallbackGroup()
+        self._workers = Workers("field")
+        computed = self.create_guard_condition(
+            self.habits.guarded("get_field", self._on_computed), self._group
+        )
+        self._desk = FieldDesk(self.fields, self._workers, computed.trigger)
         self._connect()
         self._publish_state()
 
@@ -121,9 +130,10 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         with naming("times_topic", p.times_topic):
             self._times_publisher = self.create_publisher(TwinTimes, p.times_topic, latched(1))
         with naming("field_service_name", p.field_service_name):
-            self.create_service(
+            service = self.create_service(
                 GetField, p.field_service_name, self._on_get_field, callback_group=group
             )
+        allow_later(service)
         self._every(1.0 / p.state_publish_rate_hz, "state timer", self._publish_state)
 
     def _every(self, period_s: float, what: str, callback: Callable[[], None]) -> None:
@@ -175,18 +185,35 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
             answer = self.fields.lookup(
                 convert.field_request(request), self.store, self.occupancy_map
             )
-            if isinstance(answer, FieldJob):
-                job, answer = answer, answer.compute()
-                self.fields.keep(job, answer)
-            return convert.fill_field_response(response, answer)
-        except FieldRefused as error:
-            reason = str(error)
+            if not isinstance(answer, FieldJob):
+                return convert.fill_field_response(response, answer)
+            # Longer than a tick, perhaps: not on this thread, where messages wait.
+            later = Later()
+            self._desk.ask(
+                answer, lambda field: later.answer(self._field_response(response, field))
+            )
         except Exception as error:  # noqa: BLE001  # the caller must not wait for ever
-            self.report("get_field", error)
-            reason = f"the twin failed to compute the field: {error}"
+            return self._field_response(response, error)
+        return later
+
+    def _on_computed(self) -> None:
+        self._desk.deliver()
+
+    def _field_response(self, response: Any, field: FieldGrid | Exception) -> Any:
+        if not isinstance(field, Exception):
+            return convert.fill_field_response(response, field)
         refusal = convert.refusal()
-        refusal.error_message = reason
+        if isinstance(field, FieldRefused):
+            refusal.error_message = str(field)
+        else:
+            self.report("get_field", field)
+            refusal.error_message = f"the twin failed to compute the field: {field}"
         return refusal
+
+    def destroy_node(self) -> None:
+        """End the workers too; what they compute is for nobody then."""
+        self._workers.close()
+        super().destroy_node()
 
     def _publish_state(self) -> None:
         snapshot = self.snapshot()

@@ -14,7 +14,6 @@ import httpx
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from lupin_bridge.cli import IDLE_WORKERS_END_S
 from lupin_bridge.roles import PATROL_STOP_S
 from lupin_bridge.serving.server import (
     GOODBYE_S,
@@ -25,6 +24,7 @@ from lupin_bridge.serving.server import (
     listen,
 )
 from lupin_bridge.twin.ros_thread import STOP_TIMEOUT_S
+from lupin_twin.leaving import IDLE_WORKERS_END_S
 from tests.support.inprocess import run, running
 from tests.support.live import attached, wait_until_ready
 from tests.support.processes import Process, lupin_twin, twin_node, url_of

@@ -8,6 +8,7 @@ const here = (path: string): string => fileURLToPath(new URL(path, import.meta.u
 const BRIDGE = process.env['LUPIN_BRIDGE'] ?? 'http://127.0.0.1:8000';
 
 const RULES = [
+  'src/clock.test.ts',
   'src/structure.test.ts',
   'src/{domain,geometry}/**/*.test.ts',
   'src/connection/{backoff,latest,machine}.test.ts',

@@ -141,6 +141,8 @@ export const S = {
   pestCount: (count: number): string => counted(count, 'bug', 'bugs'),
   notOnMap: 'No pin',
   notOnMapLong: 'No position known yet, so the tag has no pin on the map.',
+  ageUnknown: 'not known',
+  ageUnknownLong: 'How old this is nobody knows until the twin tells its time anew.',
   neverObserved: 'never',
   neverObservedLong: 'Discovered, but not scanned yet.',
   noSensor: '–',

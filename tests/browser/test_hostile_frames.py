@@ -224,7 +224,7 @@ def test_a_page_that_fails_offers_to_be_loaded_anew(house: Bridge, open_page: Op
     hmi.expect_rows(*TAGS)
     hmi.allow_noise("no more canvas")
     hmi.page.evaluate(BREAK)
-    hmi.choose_sensor("Humidity")
+    hmi.page.set_viewport_size({"width": 1000, "height": 700})
     failed = hmi.test_id("failed-page")
     expect(failed).to_contain_text("Error: no more canvas")
     assert hmi.page.evaluate("window.stayed") is True

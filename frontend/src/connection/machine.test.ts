@@ -108,7 +108,30 @@ describe('phases', () => {
       { type: 'opened', now: 10_000 },
       { type: 'frame', now: 10_001, status: null },
     );
-    expect(phaseOf(connection, 10_002)).toBe('live');
+    expect(phaseOf(connection, 10_002)).toBe('reconnecting');
+    const told: ConnectionEvent = { type: 'frame', now: 10_003, status: status('live') };
+    expect(phaseOf(step(connection, told).connection, 10_004)).toBe('live');
+  });
+
+  test('a state alone is not live: how old it is its status says', () => {
+    const { connection } = run(...started.slice(0, 2), { type: 'frame', now: 24, status: null });
+    expect(phaseOf(connection, 30)).toBe('connecting');
+  });
+
+  test('after a lapse nothing is live before a state has come anew', () => {
+    const lapsed = step(live, { type: 'lapse', now: 100 });
+    expect(lapsed.command).toBe('reopen');
+    expect(phaseOf(lapsed.connection, 100)).toBe('reconnecting');
+    const waiting = step(live, closed(50)).connection;
+    expect(step(waiting, { type: 'lapse', now: 60 }).command).toBe('reopen');
+  });
+
+  test('a frame that waited for a page that stood still is not believed', () => {
+    const frame = (now: number): ConnectionEvent => ({ type: 'frame', now, status: null });
+    expect(step(live, frame(25 + DEAD_MS - 1)).command).toBeNull();
+    const late = step(live, frame(25 + DEAD_MS));
+    expect(late.command).toBe('reopen');
+    expect(phaseOf(late.connection, 25 + DEAD_MS)).toBe('reconnecting');
   });
 });
 

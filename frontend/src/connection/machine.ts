@@ -55,6 +55,8 @@ export type ConnectionEvent =
   | { readonly type: 'broken'; readonly now: number; readonly random: number }
   /** The tab became visible, or the operator does not want to wait. */
   | { readonly type: 'wake'; readonly now: number }
+  /** The machine slept, or its clock was set: what still comes may be old, and so are deadlines. */
+  | { readonly type: 'lapse'; readonly now: number }
   /** The network returned: an attempt that is under way began without it. */
   | { readonly type: 'online'; readonly now: number }
   /** A deadline of `nextDeadline` may have passed. */
@@ -91,6 +93,8 @@ export function step(connection: Connection, event: ConnectionEvent): Step {
       });
     case 'frame':
       if (socket.kind !== 'open') return stay(connection);
+      // It has waited for a page that stood still, nobody knows how long.
+      if (silence(socket, now) >= DEAD_MS) return open(connection, now);
       return stay({
         ...connection,
         status: event.status ?? connection.status,
@@ -107,6 +111,8 @@ export function step(connection: Connection, event: ConnectionEvent): Step {
       return socket.kind === 'open'
         ? { connection: fail(connection, now, null, event.random), command: 'drop' }
         : stay(connection);
+    case 'lapse':
+      return open(connection, now);
     case 'online':
       return socket.kind === 'opening'
         ? open(connection, now)
@@ -174,7 +180,8 @@ export function phaseOf(connection: Connection, now: number): Phase {
   if (socket.kind === 'open' && socket.lastFrameAt !== null) {
     if (silence(socket, now) >= SILENCE_MS) return 'stale';
     if (status?.twin === 'offline') return 'offline';
-    if (socket.hasState) return 'live';
+    // How old the state is that comes first, its status says.
+    if (socket.hasState && status) return 'live';
   }
   const first = connection.epoch <= (socket.kind === 'open' ? 1 : 0) && connection.failures === 0;
   return first ? 'connecting' : 'reconnecting';

@@ -1,6 +1,8 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
+import { onLapse } from '../clock';
 import type { Frame } from '../contract/types';
+import { status } from '../testing/page';
 import { stateFrame } from '../testing/tags';
 import { phaseOf, SILENCE_MS, type Connection, type Phase } from './machine';
 import { connect, type Link } from './socket';
@@ -63,6 +65,7 @@ afterEach(() => {
 describe('socket shell', () => {
   test('goes live, goes stale without a word, and reconnects by itself', () => {
     socket(0).onopen?.();
+    socket(0).speak(status());
     socket(0).speak(stateFrame([]));
     expect(phases).toEqual(['connecting', 'live']);
     vi.advanceTimersByTime(SILENCE_MS + 10);
@@ -95,8 +98,9 @@ describe('socket shell', () => {
     socket(0).onclose?.({ code: 1012 });
     vi.advanceTimersByTime(1_000);
     socket(-1).onopen?.();
+    socket(-1).speak(status());
     socket(-1).speak(stateFrame([], { seq: 1 }));
-    expect(frames).toHaveLength(2);
+    expect(frames).toHaveLength(3);
     expect(phases.at(-1)).toBe('live');
   });
 
@@ -115,6 +119,7 @@ describe('socket shell', () => {
 
   test('what is no frame is dropped and told, and the connection goes on', () => {
     socket(0).onopen?.();
+    socket(0).speak(status());
     socket(0).speak(stateFrame([]));
     socket(0).onmessage?.({ data: 'nonsense' });
     socket(0).onmessage?.({ data: new ArrayBuffer(2) });
@@ -125,7 +130,7 @@ describe('socket shell', () => {
       'state.seq: is missing',
     ]);
     socket(0).speak(stateFrame([], { seq: 2 }));
-    expect(frames).toHaveLength(2);
+    expect(frames).toHaveLength(3);
     expect(phases).toEqual(['connecting', 'live']);
     expect(FakeSocket.made).toHaveLength(1);
   });
@@ -138,6 +143,7 @@ describe('socket shell', () => {
 
   test('one that says nothing that can be read is no connection', () => {
     socket(0).onopen?.();
+    socket(0).speak(status());
     socket(0).speak(stateFrame([]));
     for (let i = 0; i < 4; i++) {
       vi.advanceTimersByTime(SILENCE_MS / 3);
@@ -148,11 +154,28 @@ describe('socket shell', () => {
 
   test('a delta that is lost asks for a full state by a new connection', () => {
     socket(0).onopen?.();
+    socket(0).speak(status());
     socket(0).speak(stateFrame([]));
     socket(0).onmessage?.({ data: '{"type":"delta","seq":2,"base":1}' });
     expect(bad).toEqual(['delta.revision: is missing']);
     expect(socket(0).closed).toBe(true);
     vi.advanceTimersByTime(1_000);
+    expect(FakeSocket.made).toHaveLength(2);
+  });
+
+  test('what waits in a socket as the machine wakes is not heard: a new connection is made', () => {
+    vi.useFakeTimers({ toFake: ['setTimeout', 'clearTimeout', 'performance', 'Date'] });
+    const unhear = onLapse(link.lapse);
+    socket(0).onopen?.();
+    socket(0).speak(status());
+    socket(0).speak(stateFrame([]));
+    vi.setSystemTime(Date.now() + 3_600_000);
+    const { onmessage } = socket(0);
+    onmessage?.({ data: JSON.stringify(stateFrame([], { seq: 2 })) });
+    unhear();
+    expect(frames).toHaveLength(2);
+    expect(phases).toEqual(['connecting', 'live', 'reconnecting']);
+    expect(socket(0).closed).toBe(true);
     expect(FakeSocket.made).toHaveLength(2);
   });
 

@@ -18,6 +18,8 @@ export interface Link {
   readonly retry: () => void;
   /** Gives the present connection up, for what it sends cannot be used. */
   readonly giveUp: () => void;
+  /** Makes a new connection: time has lapsed, and what waits in the present one may be old. */
+  readonly lapse: () => void;
   readonly stop: () => void;
 }
 
@@ -51,17 +53,28 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
 
   const open = (): void => {
     let isOpened = false;
-    socket = new WebSocket(url);
-    socket.onopen = () => {
-      isOpened = true;
-      send({ type: 'opened', now: now() });
+    const own = new WebSocket(url);
+    socket = own;
+    // A look at the clock may find that time has lapsed, and end this very socket.
+    const look = (): number | null => {
+      const at = now();
+      return socket === own ? at : null;
     };
-    socket.onclose = ({ code }) => {
+    own.onopen = () => {
+      const at = look();
+      if (at === null) return;
+      isOpened = true;
+      send({ type: 'opened', now: at });
+    };
+    own.onclose = ({ code }) => {
+      if (look() === null) return;
       socket = null;
       send({ type: 'closed', now: now(), code, random: Math.random() });
       if (!isOpened) handlers.onRefused();
     };
-    socket.onmessage = ({ data }) => {
+    own.onmessage = ({ data }) => {
+      const at = look();
+      if (at === null) return;
       const parsed = parseFrame(data);
       if (parsed.kind === 'passed over') return;
       if (parsed.kind === 'bad') {
@@ -72,7 +85,8 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
         return;
       }
       const { frame } = parsed;
-      send({ type: 'frame', now: now(), status: frame.type === 'status' ? frame : null });
+      send({ type: 'frame', now: at, status: frame.type === 'status' ? frame : null });
+      if (look() === null) return;
       handlers.onFrame(frame, connection);
     };
   };
@@ -82,6 +96,9 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
   };
   const giveUp = (): void => {
     send({ type: 'broken', now: now(), random: Math.random() });
+  };
+  const lapse = (): void => {
+    send({ type: 'lapse', now: now() });
   };
   const wake = (): void => {
     if (document.visibilityState === 'visible') retry();
@@ -102,5 +119,5 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
     clearTimeout(timer);
     drop();
   };
-  return { retry, giveUp, stop };
+  return { retry, giveUp, lapse, stop };
 }

@@ -6,19 +6,23 @@ const FAINTEST = 0.35;
 
 /**
  * How ages go on in what is shown: with the browser's clock; or not, as of one moment (a past
- * one, ms on the monotonic clock).
+ * one, ms on the monotonic clock); or nobody knows.
  */
-export type Ageing = { readonly kind: 'growing' } | { readonly kind: 'as-of'; readonly at: number };
+export type Ageing =
+  | { readonly kind: 'growing' }
+  | { readonly kind: 'as-of'; readonly at: number }
+  | { readonly kind: 'unknown' };
 
 export const GROWING: Ageing = { kind: 'growing' };
+export const AGES_UNKNOWN: Ageing = { kind: 'unknown' };
 
-/** Seconds since a moment on the monotonic clock; null: there was none. */
+/** Seconds since a moment on the monotonic clock; null: there was none, or nobody knows. */
 export function ageSeconds(
   observedAt: number | null,
   now: number,
   ageing: Ageing = GROWING,
 ): number | null {
-  if (observedAt === null) return null;
+  if (observedAt === null || ageing.kind === 'unknown') return null;
   const asOf = ageing.kind === 'as-of' ? ageing.at : now;
   return Math.max(0, asOf - observedAt) / 1000;
 }

@@ -1,9 +1,12 @@
-import { afterEach, beforeEach, expect, test, vi } from 'vitest';
+import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
+import { now } from '../clock';
 import type { Frame } from '../contract/types';
+import { ageSeconds } from '../domain/age';
 import { status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { store } from './app';
+import { selectShown } from './moment';
 import { pauseMs, retryConnection, startLive } from './live';
 
 class FakeSocket {
@@ -70,6 +73,7 @@ test('of many frames the newest is taken, a few times a second', () => {
 test('deltas are put together; one that does not fit makes a new connection', () => {
   const header = { stamp: { sec: 50, nanosec: 0 }, frame_id: 'map' };
   const delta = { type: 'delta', revision: 'd', header, changed: [], removed: [] } as const;
+  FakeSocket.last.speak(status());
   FakeSocket.last.speak(stateFrame([wireTag()], { seq: 1, sec: 49 }));
   FakeSocket.last.speak({ ...delta, seq: 2, base: 1 });
   vi.advanceTimersByTime(300);
@@ -95,13 +99,91 @@ test('the operator can try at once', () => {
 
 test('a bad message is told of for a minute after the last one', () => {
   const unread = (): number | undefined => store.get().twin.unread?.count;
+  const pass = (seconds: number): void => {
+    for (let i = 0; i < seconds; i++) {
+      FakeSocket.last.speak(status());
+      vi.advanceTimersByTime(1_000);
+    }
+  };
   FakeSocket.last.onmessage?.({ data: 'null' });
-  vi.advanceTimersByTime(50_000);
+  pass(50);
   expect(unread()).toBe(1);
-  // Meanwhile there is a new connection.
   FakeSocket.last.onmessage?.({ data: 'null' });
-  vi.advanceTimersByTime(50_000);
+  pass(59);
   expect(unread()).toBe(2);
-  vi.advanceTimersByTime(10_000);
+  pass(1);
   expect(unread()).toBeUndefined();
+});
+
+describe('a machine that slept for an hour', () => {
+  const HOUR = 3_600_000;
+  // Of each test's own: a state that is sent again is as old as it was.
+  let sec = 100_000;
+  const ageing = (): string => selectShown(store.get()).ageing.kind;
+  const age = (): number | null => {
+    const { snapshot, ageing: how } = selectShown(store.get());
+    return ageSeconds(snapshot?.tags[0]?.observedAt ?? null, now(), how);
+  };
+  const wake = (): void => {
+    // The wall clock went on, the monotonic one stood still.
+    vi.setSystemTime(Date.now() + HOUR);
+    now();
+  };
+  const tagAged = (seconds: number): ReturnType<typeof wireTag> =>
+    wireTag({ stale_seconds: seconds });
+
+  beforeEach(() => {
+    stop();
+    sec += 10_000;
+    vi.useFakeTimers({ toFake: ['setTimeout', 'clearTimeout', 'performance', 'Date'] });
+    stop = startLive();
+    FakeSocket.last.onopen?.();
+    FakeSocket.last.speak(status());
+    FakeSocket.last.speak(stateFrame([tagAged(5)], { sec }));
+    expect(store.get().twin.phase).toBe('live');
+    expect(age()).toBe(5);
+  });
+
+  test('shows no age and no “Live” before a fresh state has come', () => {
+    const before = FakeSocket.count;
+    wake();
+    expect([ageing(), age()]).toEqual(['unknown', null]);
+    expect(store.get().twin.phase).toBe('reconnecting');
+    expect(FakeSocket.count).toBe(before + 1);
+    FakeSocket.last.onopen?.();
+    expect([ageing(), store.get().twin.phase]).toEqual(['unknown', 'reconnecting']);
+    FakeSocket.last.speak(status());
+    expect([ageing(), store.get().twin.phase]).toEqual(['unknown', 'reconnecting']);
+    FakeSocket.last.speak(stateFrame([tagAged(3_605)], { sec: sec + 3_600 }));
+    expect([age(), store.get().twin.phase]).toEqual([3_605, 'live']);
+  });
+
+  test('does not make the old state of a twin that is gone younger', () => {
+    wake();
+    FakeSocket.last.onopen?.();
+    FakeSocket.last.speak(status({ twin: 'offline', reason: 'stale', state_age_seconds: 3_600 }));
+    FakeSocket.last.speak(stateFrame([tagAged(5)], { sec }));
+    expect(age()).toBe(3_605);
+    expect(store.get().twin.phase).toBe('offline');
+  });
+
+  test('takes nothing that came before it slept and was not shown yet', () => {
+    FakeSocket.last.speak(stateFrame([tagAged(6)], { seq: 2, sec: sec + 1, revision: 'waits' }));
+    expect(revision()).not.toBe('waits');
+    vi.setSystemTime(Date.now() + HOUR);
+    // The timer that was to show it is the first to look at the clock.
+    vi.advanceTimersByTime(300);
+    expect(revision()).not.toBe('waits');
+    expect(ageing()).toBe('unknown');
+  });
+});
+
+test('a state is taken once its connection has said how old it is', () => {
+  FakeSocket.last.speak(stateFrame([wireTag()], { sec: 77, revision: 'unsaid' }));
+  vi.advanceTimersByTime(2_000);
+  expect(revision()).not.toBe('unsaid');
+  FakeSocket.last.speak(status({ state_age_seconds: 12 }));
+  expect(revision()).toBe('unsaid');
+  const { snapshot } = selectShown(store.get());
+  expect(now() - (snapshot?.takenAt ?? 0)).toBeCloseTo(14_000, -1);
 });

@@ -1,5 +1,5 @@
 /** The page's one connection, and what its frames do to the store. */
-import { now } from '../clock';
+import { now, onLapse } from '../clock';
 import { latestAfter } from '../connection/latest';
 import { signInIfAsked } from '../connection/session';
 import { connect } from '../connection/socket';
@@ -33,14 +33,18 @@ export function startLive(): () => void {
   let takenAt = -Infinity;
   let timer: ReturnType<typeof setTimeout> | undefined;
   let forget: ReturnType<typeof setTimeout> | undefined;
+  /** The connection that `latest` came on, and the last one whose first state was taken. */
+  let heardOn = -1;
   let greeted = -1;
 
   const take = (stateAgeSeconds: number | null): void => {
     clearTimeout(timer);
     timer = undefined;
+    // First, for it may find that time has lapsed: what waits here is then of no known age.
+    const at = now();
     if (!latest || !isNew) return;
     isNew = false;
-    takenAt = now();
+    takenAt = at;
     try {
       receive({ type: 'state', latest, now: arrivedAt, stateAgeSeconds });
     } catch (error) {
@@ -63,29 +67,41 @@ export function startLive(): () => void {
     onRefused: () => void signInIfAsked(),
     onBad: tellBad,
     onFrame: (frame, connection) => {
-      if (frame.type === 'status') return;
-      const isFirst = connection.epoch !== greeted;
-      const next = latestAfter(isFirst ? null : latest, frame);
-      if (!next) {
-        link.giveUp();
-        return;
+      const { epoch, status } = connection;
+      if (frame.type !== 'status') {
+        const at = now();
+        const next = latestAfter(heardOn === epoch ? latest : null, frame);
+        if (!next) {
+          link.giveUp();
+          return;
+        }
+        latest = next;
+        heardOn = epoch;
+        isNew = true;
+        arrivedAt = at;
       }
-      latest = next;
-      isNew = true;
-      arrivedAt = now();
-      if (isFirst) {
+      if (!latest || heardOn !== epoch || !status) return;
+      if (greeted !== epoch) {
         // The first state may be an old one that the bridge kept; its status says how old.
-        greeted = connection.epoch;
-        take(connection.status?.state_age_seconds ?? null);
+        greeted = epoch;
+        take(status.state_age_seconds);
         return;
       }
+      if (frame.type === 'status') return;
       const pause = pauseMs(latest.state.tags.length) - (arrivedAt - takenAt);
       if (pause <= 0) take(null);
       else timer ??= setTimeout(take, pause, null);
     },
   });
   retry = link.retry;
+  const unhear = onLapse(() => {
+    latest = null;
+    isNew = false;
+    receive({ type: 'lapse' });
+    link.lapse();
+  });
   return () => {
+    unhear();
     clearTimeout(timer);
     clearTimeout(forget);
     link.stop();

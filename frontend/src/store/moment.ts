@@ -2,7 +2,7 @@
  * What the page shows: a function of what came and of the moment to show. Table, card, legend,
  * map, notices and exports all ask here, so that another moment moves them all at once.
  */
-import { GROWING, type Ageing } from '../domain/age';
+import { AGES_UNKNOWN, GROWING, type Ageing } from '../domain/age';
 import type { Snapshot, Tag } from '../domain/twin';
 import type { AppState } from './app';
 import { memoLast, memoOne } from './memo';
@@ -19,11 +19,17 @@ export interface Shown extends House {
 
 /** The same object for the same data and moment. A moment that is not here yet shows nothing. */
 export function shownAt(twin: TwinState, moment: Moment): Shown {
-  if (moment === null) return shownNow(twin.latest);
+  if (moment === null) return (twin.isTimeLost ? shownTimeless : shownNow)(twin.latest);
   return shownThen(twin.past?.at === moment ? twin.past.house : NO_HOUSE, moment);
 }
 
 const shownNow = memoOne((house: House): Shown => ({ ...house, moment: null, ageing: GROWING }));
+
+const shownTimeless = memoOne((house: House): Shown => ({
+  ...house,
+  moment: null,
+  ageing: AGES_UNKNOWN,
+}));
 
 const shownThen = memoLast((house: House, moment: number): Shown => ({
   ...house,

@@ -1,6 +1,7 @@
 import { describe, expect, test } from 'vitest';
 
 import { step, INITIAL } from '../connection/machine';
+import { status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { NO_TWIN, reduceTwin } from './twin';
 
@@ -36,6 +37,7 @@ test('a frame that only moves the clock is no reason to render', () => {
   const open = [
     { type: 'start', now: 0 } as const,
     { type: 'opened', now: 1 } as const,
+    { type: 'frame', now: 2, status: status() } as const,
     { type: 'frame', now: 2, status: null } as const,
   ].reduce((connection, event) => step(connection, event).connection, INITIAL);
   const live = reduceTwin(NO_TWIN, { type: 'connection', connection: open, now: 3 });

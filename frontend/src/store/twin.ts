@@ -28,6 +28,8 @@ export const NO_HOUSE: House = { snapshot: null, field: NOTHING, map: NOTHING, q
 export interface TwinState {
   readonly phase: Phase;
   readonly connection: Connection;
+  /** Time has lapsed since the newest state: how old it is nobody knows. */
+  readonly isTimeLost: boolean;
   /** Messages of late that were no frames, and what was wrong with the last; null: none. */
   readonly unread: { readonly count: number; readonly why: string } | null;
   /** As the frames tell it. */
@@ -39,6 +41,7 @@ export interface TwinState {
 export const NO_TWIN: TwinState = {
   phase: 'connecting',
   connection: INITIAL,
+  isTimeLost: false,
   unread: null,
   latest: NO_HOUSE,
   past: null,
@@ -53,6 +56,8 @@ export type TwinAction =
       /** Set on the first frame of a connection: how old the state was when it was sent. */
       readonly stateAgeSeconds?: number | null;
     }
+  /** The machine slept, or its clock was set. */
+  | { readonly type: 'lapse' }
   /** A message was dropped, for this reason; null: that was long ago. */
   | { readonly type: 'unread'; readonly why: string | null }
   | { readonly type: 'field'; readonly field: Fetched<Field> }
@@ -70,10 +75,13 @@ export function reduceTwin(state: TwinState, action: TwinAction): TwinState {
     case 'state': {
       // No comparison of seq: one socket delivers in order, and a restarted server counts anew.
       const arrivedAt = action.now - (action.stateAgeSeconds ?? 0) * 1000;
-      return withLatest(state, {
-        snapshot: snapshotOf(action.latest, arrivedAt, state.latest.snapshot),
-      });
+      // What was there before a lapse says nothing about how old a state that is sent again is.
+      const before = state.isTimeLost ? null : state.latest.snapshot;
+      const snapshot = snapshotOf(action.latest, arrivedAt, before);
+      return withLatest({ ...state, isTimeLost: false }, { snapshot });
     }
+    case 'lapse':
+      return { ...state, isTimeLost: true };
     case 'unread': {
       const { why } = action;
       const count = (state.unread?.count ?? 0) + 1;

@@ -56,6 +56,7 @@ export function goLost(): void {
     now,
     { type: 'start', now },
     { type: 'opened', now },
+    { type: 'frame', now, status: status() },
     { type: 'frame', now, status: null },
     { type: 'closed', now, code: 1006, random: 1 },
   );

@@ -18,6 +18,7 @@ export function offlineReason(status: StatusFrame | null): string {
 export function FrozenBanner(): JSX.Element | null {
   const phase = useApp((state) => state.twin.phase);
   const takenAt = useApp((state) => selectNewest(state).snapshot?.takenAt);
+  const isTimeLost = useApp((state) => state.twin.isTimeLost);
   const connection = useApp((state) => state.twin.connection);
   const now = useNow();
   if (phase === 'live' || takenAt === undefined) return null;
@@ -27,9 +28,11 @@ export function FrozenBanner(): JSX.Element | null {
     <div className="frozen" role="alert" data-testid="frozen">
       <strong>{S.frozenSince(clockText(epochOf(takenAt)))}</strong>
       {/* What counts on by itself is not read out each second. */}
-      <span aria-hidden="true" className="frozen-age">
-        {S.agoSuffix(ageText(Math.max(0, now - takenAt) / 1000))}
-      </span>
+      {!isTimeLost && (
+        <span aria-hidden="true" className="frozen-age">
+          {S.agoSuffix(ageText(Math.max(0, now - takenAt) / 1000))}
+        </span>
+      )}
       <span className="frozen-why">
         {phase === 'offline' ? offlineReason(connection.status) : S.frozenWhy[phase]}
       </span>

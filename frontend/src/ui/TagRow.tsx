@@ -114,6 +114,13 @@ export function Age({
     const age = ageSeconds(observedAt, now, ageing);
     return age === null ? null : format(age);
   });
+  if (ageing.kind === 'unknown' && observedAt !== null) {
+    return (
+      <span className="age faint" title={S.ageUnknownLong}>
+        {S.ageUnknown}
+      </span>
+    );
+  }
   return text === null ? (
     <span className="age faint" title={S.neverObservedLong}>
       {S.neverObserved}

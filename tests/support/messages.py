@@ -20,6 +20,9 @@ def pose(x: float = 0.0, y: float = 0.0, z: float = 0.0, w: float = 1.0) -> Any:
 
 NO_POSE = pose(w=0.0)
 
+# What ROS tells with a message, here of one that came at once.
+INFO = {"source_timestamp": 0, "received_timestamp": 0, "publication_sequence_number": None}
+
 
 def scan(
     tag_id: str,

@@ -16,7 +16,7 @@ from lupin_twin.cdr import MessageShape
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.habits import WARNING_PERIOD_S, Habits, latched, read_message
 from tests.support.hostile import PACKAGES, lies
-from tests.support.messages import scan
+from tests.support.messages import INFO, scan
 
 SHAPE = MessageShape(Observation, PACKAGES, max_bytes=1_000)
 
@@ -95,8 +95,9 @@ def test_a_subscription_hands_on_messages_and_tells_of_the_others(
     )
     assert topic == "/some/observations"
     [subscription] = [s for s in habits._node.subscriptions if s.topic_name == topic]
-    subscription.callback(serialize_message(scan("1")))
-    subscription.callback(bytes(1_001))
+    subscription.callback(serialize_message(scan("1")), INFO)
+    subscription.callback(bytes(1_001), INFO | {"received_timestamp": 1_500_000_000})
+    assert habits.published_ago_s == 1.5
     assert [msg.tag_reading.tag_id for msg in taken] == ["1"]
     assert logged.lines == [
         "dropped a message on /some/observations: 1001 bytes, the limit is 1000"

@@ -78,6 +78,19 @@ def test_the_same_observation_heard_three_times_is_one() -> None:
     ]
 
 
+def test_what_was_heard_is_known_by_kind_stamp_and_source() -> None:
+    history = History()
+    history.add(scan("1", at_s=5.0, source="a", co2=1.0))
+    assert history.knows(scan("1", at_s=5.0, source="a", co2=9.0))
+    for other in (
+        scan("2", at_s=5.0, source="a"),
+        scan("1", at_s=6.0, source="a"),
+        scan("1", at_s=5.0, source="b"),
+        replace(look("1", at_s=5.0), source="a"),
+    ):
+        assert not history.knows(other)
+
+
 def test_two_sources_at_one_moment_are_two_in_the_order_of_their_arrival() -> None:
     history = History()
     for number in range(4):

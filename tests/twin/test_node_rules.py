@@ -17,7 +17,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
 
 from lupin_twin.fields import FieldRules
 from lupin_twin.node import TwinNode
-from tests.support.messages import discovered, look, occupancy_grid, pose, scan
+from tests.support.messages import INFO, discovered, look, occupancy_grid, pose, scan
 from tests.support.ros import Peer
 
 SOURCES = [file for folder in ("ros_node", "backend") for file in Path(folder).rglob("*.py")]
@@ -144,12 +144,12 @@ def test_the_frame_of_a_discovery_is_looked_at_before_its_tags(stage: Stage) -> 
 @pytest.mark.parametrize("topic", LIMITS)
 def test_a_message_of_one_byte_too_many_is_dropped_unread(stage: Stage, topic: str) -> None:
     take = stage.subscription(topic).callback
-    take(bytes(LIMITS[topic] + 1))
+    take(bytes(LIMITS[topic] + 1), INFO)
     assert stage.warnings == [
         f"dropped a message on {topic}: {LIMITS[topic] + 1} bytes, the limit is {LIMITS[topic]}"
     ]
     # Of all zeros, one that fits is an empty message: nothing more is said about its size.
-    take(bytes(LIMITS[topic]))
+    take(bytes(LIMITS[topic]), INFO)
     assert not any("bytes" in warning for warning in stage.warnings[1:])
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 from lupin_msgs.msg import Observation, TwinTimes
 
+from lupin_twin.node import LATCHED_AFTER_S
 from tests.support.messages import look, scan
 from tests.support.processes import OFTEN, twin_node
 from tests.support.ros import Peer, latched
@@ -19,6 +21,43 @@ def paired(states: list[Any], times: list[Any]) -> tuple[Any, Any] | None:
     """A state and the times of the same stamp."""
     by_stamp = {stamp_of(each): each for each in times}
     return next(((s, by_stamp[stamp_of(s)]) for s in states if stamp_of(s) in by_stamp), None)
+
+
+def test_a_robot_whose_clock_stepped_back_is_warned_of_by_name(domain: int) -> None:
+    """It is not ignored in silence, and what it says is in the history where it belongs."""
+    with twin_node(domain, *OFTEN) as twin, Peer(domain) as robot:
+        robot.wait_for_twin()
+        robot.observe(
+            scan("1", {"co2": 1.0}, stamp_s=2000.0), scan("1", {"co2": 1.0}, stamp_s=1990)
+        )
+        robot.tag("1")
+        assert "late stamps" not in twin.output
+        robot.observe(*(scan("1", {"co2": 2.0}, stamp_s=1400.0 + i) for i in range(10)))
+        robot.until(lambda: "late stamps" in twin.output, "a warning")
+        robot.observe(scan("marker"))
+        robot.tag("marker")
+        [kept] = [tag for tag in robot.states[-1].tags if tag.tag_id == "1"]
+        [line] = [line for line in twin.output.splitlines() if "late stamps" in line]
+    assert "WARN" in line
+    assert "late stamps on /floranova/observations: 6 observations in a row from source" in line
+    assert "'test'" in line
+    assert "by 596 s" in line
+    assert kept.readings[0].value == 1.0
+
+
+def test_what_two_robots_of_one_name_have_latched_is_warned_of_by_none(domain: int) -> None:
+    """Each has latched the same hour; to the twin that starts, the second goes through it again."""
+    with Peer(domain, "one") as one, Peer(domain, "two") as two:
+        for robot, tag_id in ((one, "a"), (two, "b")):
+            robot.observe(*(scan(tag_id, {"co2": 1.0}, stamp_s=1000.0 + i) for i in range(40)))
+        latched_at_s = time.monotonic()
+        one.until(lambda: time.monotonic() > latched_at_s + 2 * LATCHED_AFTER_S, "an old latch")
+        with twin_node(domain, *OFTEN) as twin:
+            one.state(lambda state: len(state.tags) == 2, "both tags")
+            for robot in (one, two):
+                robot.observe(scan(f"marker {robot.node.get_name()}"))
+            one.state(lambda state: len(state.tags) == 4, "both markers")
+            assert "late stamps" not in twin.output
 
 
 def test_the_times_come_with_the_state_latched_and_with_its_stamp(domain: int) -> None:

@@ -58,6 +58,8 @@ class Habits:
     def __init__(self, node: Node) -> None:
         self.callback_errors = 0
         self.lost = 0
+        # How long before it was received the message in hand was published, s, by the two clocks.
+        self.published_ago_s = 0.0
         self._node = node
         self._throttle = Throttle(WARNING_PERIOD_S)
 
@@ -85,6 +87,7 @@ class Habits:
 
         def take(data: bytes, info: dict[str, Any]) -> None:
             name = str(subscription.topic_name)
+            self.published_ago_s = (info["received_timestamp"] - info["source_timestamp"]) / 1e9
             number = info["publication_sequence_number"]
             # Of depth 1, the newest is wanted and nothing else.
             if depth > 1 and number is not None:

@@ -138,6 +138,11 @@ class History:
 
     # --- a twin's own: every observation ------------------------------------------------------
 
+    def knows(self, write: Scan | Look) -> bool:
+        """Whether the very same observation was heard before, as far as that is kept."""
+        tag = self._tags.get(write.tag_id)
+        return tag is not None and tag.tries.find(_key(write)) is not None
+
     def dated(self, write: Scan | Look) -> Scan | Look:
         """`write`, made when it was first heard, if that was earlier than it seems to be now.
 
@@ -239,9 +244,13 @@ def _by_name(readings: dict[str, Reading]) -> tuple[Reading, ...]:
     return tuple(readings[name] for name in sorted(readings))
 
 
+def kind_of(write: Scan | Look) -> int:
+    """The kind of observation that it is, as in lupin_msgs/Observation."""
+    return KIND_TAG_READING if isinstance(write, Scan) else KIND_FLOWER
+
+
 def _key(write: Scan | Look) -> Key:
-    kind = KIND_TAG_READING if isinstance(write, Scan) else KIND_FLOWER
-    return kind, write.own_stamp_ns or write.stamp_ns, write.source
+    return kind_of(write), write.own_stamp_ns or write.stamp_ns, write.source
 
 
 def _hold(tag: _Tag, now_ns: int) -> None:

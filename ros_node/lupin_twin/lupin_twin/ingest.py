@@ -91,7 +91,7 @@ class Pin:
 Write = Scan | Look | Pin
 
 
-def observation(heard: Heard, frame_id: str, now_ns: int) -> Write | Drop:
+def observation(heard: Heard, frame_id: str, now_ns: int) -> Scan | Look | Drop:
     """What an observation writes at `now_ns`, where poses have to be in `frame_id`."""
     part = heard.part
     if part is None:

@@ -25,14 +25,18 @@ from lupin_twin.field_desk import FieldDesk
 from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused, FieldRules
 from lupin_twin.grid import FieldGrid
 from lupin_twin.habits import Habits, latched
-from lupin_twin.history import History, TagHistory
+from lupin_twin.history import History, TagHistory, kind_of
+from lupin_twin.lateness import Lateness
 from lupin_twin.parameters import TwinParameters
 from lupin_twin.ros_parameters import declare, naming, naming_use_sim_time
-from lupin_twin.state import Snapshot, TwinStore
+from lupin_twin.state import Look, Scan, Snapshot, TwinStore
 from lupin_twin.twin_count import TwinCount
 from lupin_twin.workers import Workers
 
 NODE_NAME: Final = "lupin_twin"
+
+# What was published so long before it was received comes out of a publisher's latch.
+LATCHED_AFTER_S: Final = 0.5
 
 
 def field_rules(parameters: TwinParameters) -> FieldRules:
@@ -62,6 +66,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.parameters = declare(self)
         self.store = TwinStore()
         self.history = History(self.parameters.buffer_len)
+        self.lateness = Lateness()
         self.fields = FieldEngine(
             field_rules(self.parameters),
             FieldCache(max_bytes=int(self.parameters.field_cache_mb * 1e6)),
@@ -151,8 +156,25 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def _on_observation(self, msg: Any) -> None:
         topic = self._topics["observations_topic"]
         write = ingest.observation(convert.heard(msg), self.parameters.frame_id, self._now_ns())
+        if isinstance(write, Drop):
+            self.habits.drop(write, topic)
+            return
+        is_news = not self.history.knows(write)
         if self._apply(write, topic):
+            if is_news:
+                self._look_at_stamp(write, topic)
             self._tell_listeners()
+
+    def _look_at_stamp(self, write: Scan | Look, topic: str) -> None:
+        late = self.lateness.see(
+            write.source,
+            kind_of(write),
+            write.stamp_ns,
+            was_latched=self.habits.published_ago_s > LATCHED_AFTER_S,
+            now_s=time.monotonic(),
+        )
+        if late is not None:
+            self.habits.warn(("late", late.counted_as), f"late stamps on {topic}: {late}")
 
     def _on_discovered_tags(self, msg: Any) -> None:
         topic = self._topics["discovered_tags_topic"]
@@ -247,6 +269,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         now_ns = int(self.get_clock().now().nanoseconds)
         if self.store.hold_to(now_ns):
             self.history.hold_to(now_ns)
+            self.lateness.hold_to(now_ns)
             self.habits.warn(
                 ("clock", 0),
                 "ROS time has gone back: all observations from later than now age from here on",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 from fastapi import FastAPI, Request, Response
@@ -98,6 +99,7 @@ def _describe_frames(app: FastAPI) -> None:
     """Add the WebSocket frames, which OpenAPI has no place for, to the document's schemas."""
     plain = app.openapi
 
+    @cache
     def with_frames() -> dict[str, object]:
         document = plain()
         schemas = document.setdefault("components", {}).setdefault("schemas", {})

@@ -7,16 +7,17 @@ import contextlib
 import logging
 import math
 import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Hashable, Iterator
 
-from lupin_bridge.field.limits import FieldLimits
 from lupin_bridge.metrics import Metrics, Sample
+from lupin_bridge.serving.admission import Admission
 from lupin_bridge.serving.goodbye import Goodbye
+from lupin_bridge.serving.kept import Answer, Kept
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import FrameWriter
 from lupin_bridge.stream.hub import Client, Hub, next_beat_s
 from lupin_bridge.stream.status import Liveness, Status
+from lupin_bridge.twin.shared import Shared
 from lupin_bridge.twin.source import Revised, TwinSource
 from lupin_twin.state import NANOSECONDS_PER_SECOND
 
@@ -44,16 +45,18 @@ class Bridge:
         self._clock = clock
         self.source = source
         self.settings = settings
-        # Large fields and pictures are written off the loop.
-        self.pool = ThreadPoolExecutor(max_workers=2, thread_name_prefix="encode")
         self._liveness = Liveness()
         self.hub = Hub(settings.max_clients, settings.client_timeout_s, self._liveness.status)
-        self.field_limits = FieldLimits(
+        self.admission = Admission(
             settings.field_rate_hz, settings.field_concurrency, settings.field_total_concurrency
         )
+        self.kept = Kept()
+        self.answering: Shared[Answer] = Shared()
         self.goodbye = Goodbye()
         self.frames = FrameWriter()
         self.metrics = Metrics(self._measure)
+        self.kept_state: Hashable = None
+        self.state_number = 0
         self._latest: Revised | None = None
         self._told: Status | None = None
         self._pushed: Revised | None = None
@@ -82,7 +85,6 @@ class Bridge:
         if self._push_timer is not None:
             self._push_timer.cancel()
         await self.source.stop()
-        self.pool.shutdown(wait=False, cancel_futures=True)
 
     def say_goodbye(self) -> None:
         """Tell every client that the bridge is about to go, those who wait for an answer too."""
@@ -140,7 +142,7 @@ class Bridge:
         )
         yield "lupin_tags", len(tags)
         yield "lupin_tags_pinned", sum(tag.pose is not None for tag in tags)
-        yield "lupin_fields_computing", self.field_limits.being_computed
+        yield "lupin_fields_computing", self.admission.being_computed
         yield "lupin_field_cache_hits", cache.hits
         yield "lupin_field_cache_misses", cache.misses
         yield "lupin_field_cache_entries", cache.entries
@@ -150,6 +152,7 @@ class Bridge:
 
     def _on_state(self, state: Revised) -> None:
         self._latest = state
+        self.state_number += 1
         now_s = self._clock()
         self._liveness.last_state_s = now_s
         self._liveness.twin_count = self.source.twin_count()

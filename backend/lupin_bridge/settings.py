@@ -43,16 +43,22 @@ class Settings:
         30.0, "a client that takes nothing for this long is closed", 1.0, 3_600.0
     )
     field_timeout_s: float = _setting(
-        10.0, "a field request that takes longer ends in 504", 0.1, 600.0
+        10.0, "a computed answer that takes longer ends in 504, and its work with it", 0.1, 600.0
     )
     field_rate_hz: float = _setting(
-        20.0, "field requests a second and client; two seconds' worth at once", 0.1, 10_000.0
+        20.0,
+        "fields and other answers computed a second and client; two seconds' worth at once",
+        0.1,
+        10_000.0,
     )
     field_concurrency: int = _setting(
-        8, "field requests in flight for one client; a browser makes six", 1, 1_000
+        8, "such requests in flight for one client; a browser makes six", 1, 1_000
     )
     field_total_concurrency: int = _setting(
-        32, "field requests being computed for all clients together", 1, 10_000
+        32,
+        "answers being computed for all clients together; large ones take three quarters at most",
+        1,
+        10_000,
     )
     allow_host: tuple[str, ...] = _setting(
         (), "another name of the bridge, such as twin.example; may be given more than once"

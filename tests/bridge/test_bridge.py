@@ -22,6 +22,7 @@ from lupin_bridge.twin.source import CacheCounts, Revised
 from lupin_twin.fields import FieldJob
 from lupin_twin.grid import FieldGrid
 from lupin_twin.state import Snapshot, TagState
+from lupin_twin.workers import ShouldStop
 from tests.bridge.stream.test_frames import received
 from tests.support.inprocess import Running, run, running
 from tests.support.messages import scan
@@ -274,9 +275,9 @@ def test_while_a_field_is_made_states_are_answered_and_frames_keep_coming(
 
     compute, write = FieldJob.compute, field_formats.write
 
-    def held_compute(job: FieldJob) -> FieldGrid:
+    def held_compute(job: FieldJob, should_stop: ShouldStop) -> FieldGrid:
         hold()
-        return compute(job)
+        return compute(job, should_stop)
 
     def held_write(*args: Any) -> bytes:
         hold()

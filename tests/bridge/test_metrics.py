@@ -39,8 +39,8 @@ def test_every_metric_is_there_and_follows_what_happens(domain: int) -> None:
             client.recv()
             peer.observe(scan("1", {"co2": 500.0}, at=(1, 1)), scan("2", {"co2": 500.0}))
             wait_for(lambda: scrape(url)["lupin_tags"] == 2.0, "both tags")
-            for _ in range(2):
-                httpx.get(f"{url}/api/field.json", params=CO2, timeout=PATIENCE_S)
+            for suffix in ("json", "npy", "json"):
+                httpx.get(f"{url}/api/field.{suffix}", params=CO2, timeout=PATIENCE_S)
             after = scrape(url)
         assert (after["lupin_clients"], after["lupin_tags_pinned"]) == (1.0, 1.0)
         assert after["lupin_frames_sent_total"] >= 2.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -17,6 +17,7 @@ from lupin_bridge.field.sensors import max_alpha, sensor
 from lupin_twin.field_quality import leave_one_out, painted_share
 from lupin_twin.fields import FieldRules
 from lupin_twin.grid import FieldGrid
+from lupin_twin.idw import never
 from lupin_twin.state import TagState
 
 # Palette index 0 is "not known"; the ramp has the other 255.
@@ -82,15 +83,25 @@ def write_json(grid: FieldGrid) -> bytes:
 
 
 def write_quality(
-    grid: FieldGrid, tags: Sequence[TagState], sensor_type: str, rules: FieldRules
+    grid: FieldGrid,
+    tags: Sequence[TagState],
+    sensor_type: str,
+    rules: FieldRules,
+    should_stop: Callable[[], bool] = never,
 ) -> bytes:
-    """`schema.FieldQuality` of a field and of the tags that it was made from."""
+    """`schema.FieldQuality` of a field and of the tags that it was made from.
+
+    Raises:
+        lupin_twin.idw.Abandoned: `should_stop`, asked now and then, said so.
+
+    """
     quality = leave_one_out(
         tags,
         sensor_type,
         falloff_radius_m=rules.falloff_radius_m,
         max_distance_m=rules.max_distance_m,
         power=rules.idw_power,
+        should_stop=should_stop,
     )
     return orjson.dumps(
         {

@@ -2,32 +2,60 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Coroutine
 from html import escape
-from typing import Any
+from typing import Any, Final
 
 import orjson
 from fastapi import APIRouter, Request, Response
 
+from lupin_bridge.bridge import Bridge
+from lupin_bridge.routes.computing import kept_or_computed, made, or_refusal
 from lupin_bridge.routes.tools import JSON_TYPE, REVALIDATE, read_route
+from lupin_bridge.serving.kept import Answer
 
 router = APIRouter()
+
+# What writing either document takes, roughly, s.
+_WRITE_S: Final = 0.02
 
 
 @read_route(router, "/openapi.json", include_in_schema=False)
 async def openapi(request: Request) -> Response:
     """The OpenAPI document."""
-    document = request.app.openapi()
-    if prefix := request.scope.get("root_path", ""):
-        document = {**document, "servers": [{"url": prefix}]}
-    body = orjson.dumps(document, option=orjson.OPT_INDENT_2)
-    return Response(body, headers=REVALIDATE, media_type=JSON_TYPE)
+    app, prefix = request.app, request.scope.get("root_path", "")
+
+    def write() -> bytes:
+        document = app.openapi()
+        if prefix:
+            document = {**document, "servers": [{"url": prefix}]}
+        return orjson.dumps(document, option=orjson.OPT_INDENT_2)
+
+    return await _written_once(request, f"openapi {prefix}", write, JSON_TYPE)
 
 
 @read_route(router, "/docs", include_in_schema=False)
 async def docs(request: Request) -> Response:
     """The OpenAPI document for people."""
-    page = render(request.app.openapi(), str(request.base_url).rstrip("/"))
-    return Response(page, headers=REVALIDATE, media_type="text/html; charset=utf-8")
+    app, base_url = request.app, str(request.base_url).rstrip("/")
+
+    def write() -> bytes:
+        return render(app.openapi(), base_url).encode()
+
+    return await _written_once(request, f"docs {base_url}", write, "text/html; charset=utf-8")
+
+
+async def _written_once(
+    request: Request, key: str, write: Callable[[], bytes], media_type: str
+) -> Response:
+    bridge: Bridge | None = request.app.state.bridge
+    if bridge is None:
+        return Response(write(), headers=REVALIDATE, media_type=media_type)
+
+    def compute() -> Coroutine[Any, Any, Answer]:
+        return made(bridge, key, write, media_type, cost=_WRITE_S, headers=REVALIDATE)
+
+    return await or_refusal(kept_or_computed(request, key, compute))
 
 
 def render(document: dict[str, Any], base_url: str) -> str:

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import asyncio
-import time
-from collections.abc import Awaitable, Callable
-from contextlib import ExitStack
-from typing import Any
+from collections.abc import Awaitable
+from typing import Any, Final
 
 from fastapi import APIRouter, Request, Response
-from starlette.types import Receive, Scope, Send
 
-from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.field import formats as field_formats
 from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import JSON, NPY, PNG, FieldFormat
-from lupin_bridge.field.limits import BusyError, ClientLimitError
+from lupin_bridge.routes.computing import (
+    field_answer,
+    is_large,
+    kept_or_computed,
+    on_worker,
+    or_refusal,
+)
 from lupin_bridge.routes.tools import (
     JSON_TYPE,
     REVALIDATE,
@@ -26,14 +27,18 @@ from lupin_bridge.routes.tools import (
     list_header,
     read_route,
 )
+from lupin_bridge.serving.admission import ClientLimitError
+from lupin_bridge.serving.kept import Answer
 from lupin_bridge.stream import schema
-from lupin_bridge.twin.source import TwinTimeoutError, TwinUnavailableError
-from lupin_twin.fields import FieldRefused, check_request, default_box
+from lupin_twin.fields import FieldRefused, FieldRequest, check_request, default_box
 from lupin_twin.state import MAX_TEXT_LENGTH
 
 router = APIRouter()
 
 _NUMBER = {"type": "number"}
+
+# What judging a tag by its neighbours takes, roughly and at worst.
+_JUDGE_TAG_S: Final = 20e-6
 
 
 def _parameter(name: str, schema_: dict[str, Any], description: str, required: bool = False) -> Any:
@@ -145,67 +150,28 @@ async def _field(request: Request, field_format: FieldFormat) -> Response:
 
 async def _refusing(answer: Awaitable[Response]) -> Response:
     """Wait for an answer; what stands in its way becomes the answer."""
-    try:
-        return await answer
-    except FieldRefused as error:
-        return json_response(field_formats.refusal_json(str(error)), 400)
-    except ClientLimitError as error:
-        return json_response(field_formats.refusal_json(str(error)), 429, error.headers)
-    except BusyError as error:
-        return error_response(str(error), 503, error.headers)
-    except TwinTimeoutError as error:
-        return error_response(str(error), 504)
-    except TwinUnavailableError as error:
-        return error_response(str(error), 503, {"Retry-After": "3"})
 
-
-class _FieldResponse(Response):
-    """An answer that lets go of its place in the limits once the client has taken it, or left."""
-
-    let_go: Callable[[], None] | None = None
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def as_get_field_does() -> Response:
         try:
-            await super().__call__(scope, receive, send)
-        finally:
-            if self.let_go is not None:
-                self.let_go()
+            return await answer
+        except FieldRefused as error:
+            return json_response(field_formats.refusal_json(str(error)), 400)
+        except ClientLimitError as error:
+            return json_response(field_formats.refusal_json(str(error)), 429, error.headers)
 
-
-async def _limited(request: Request, compute: Callable[[], Awaitable[_FieldResponse]]) -> Response:
-    """Compute within the client's and everybody's limits."""
-    bridge = bridge_of(request)
-    limits = bridge.field_limits
-    with ExitStack() as held:
-        held.enter_context(limits.request(client_of(request), time.monotonic()))
-        with limits.computing(), bridge.metrics.field_seconds.time():
-            response = await compute()
-        response.let_go = held.pop_all().close
-    return response
+    return await or_refusal(as_get_field_does())
 
 
 async def _quality(request: Request) -> Response:
     bridge = bridge_of(request)
     query = field_query.parse(request.query_params.multi_items())
     asked = query.request(_box_of_all_tags(bridge))
-    rules = bridge.source.rules()
-    check_request(asked, rules.max_grid_cells)
+    check_request(asked, bridge.source.rules().max_grid_cells)
     field_query.check_scale(query, JSON, 1, 1)
-    tag = field_query.etag(bridge.source.revision(), asked, "quality", 1)
-    if field_query.matches(list_header(request, "if-none-match"), tag):
-        return Response(status_code=304, headers={"ETag": tag, **REVALIDATE})
-
-    async def compute() -> _FieldResponse:
-        result = await bridge.source.field(asked)
-        tags = () if bridge.latest is None else bridge.latest.snapshot.tags
-        loop = asyncio.get_running_loop()
-        body = await loop.run_in_executor(
-            bridge.pool, field_formats.write_quality, result.grid, tags, asked.sensor_type, rules
-        )
-        tag = field_query.etag(result.revision, asked, "quality", 1)
-        return _FieldResponse(body, headers={"ETag": tag, **REVALIDATE}, media_type=JSON_TYPE)
-
-    return await _limited(request, compute)
+    tag = field_query.etag(_revision_of_quality(bridge), asked, "quality", 1)
+    return _not_modified(request, tag) or await kept_or_computed(
+        request, tag, lambda: _quality_answer(bridge, asked)
+    )
 
 
 async def _answer(bridge: Bridge, request: Request, field_format: FieldFormat) -> Response:
@@ -215,32 +181,45 @@ async def _answer(bridge: Bridge, request: Request, field_format: FieldFormat) -
     max_cells = source.rules().max_grid_cells
     width, height = check_request(asked, max_cells)
     field_query.check_scale(query, field_format, width * height, max_cells)
-    known = list_header(request, "if-none-match")
     tag = field_query.etag(source.revision(), asked, field_format.name, query.scale)
-    if field_query.matches(known, tag):
+    return _not_modified(request, tag) or await kept_or_computed(
+        request, tag, lambda: field_answer(bridge, asked, field_format, query.scale)
+    )
+
+
+def _not_modified(request: Request, tag: str) -> Response | None:
+    if field_query.matches(list_header(request, "if-none-match"), tag):
         return Response(status_code=304, headers={"ETag": tag, **REVALIDATE})
+    return None
 
-    async def compute() -> _FieldResponse:
-        result = await source.field(asked)
-        # The revision that the field was made from, which may be newer than the one just compared.
-        tag = field_query.etag(result.revision, asked, field_format.name, query.scale)
-        loop = asyncio.get_running_loop()
-        body = await loop.run_in_executor(
-            bridge.pool,
-            field_formats.write,
-            result.grid,
-            field_format,
-            asked.sensor_type,
-            query.scale,
-        )
-        headers = field_query.headers(
-            field_formats.metadata(result.grid, asked.sensor_type),
-            f"{asked.sensor_type}.{field_format.name}",
-        )
-        headers |= {"ETag": tag, **REVALIDATE}
-        return _FieldResponse(body, headers=headers, media_type=field_format.media_type)
 
-    return await _limited(request, compute)
+async def _quality_answer(bridge: Bridge, asked: FieldRequest) -> Answer:
+    rules = bridge.source.rules()
+    with (
+        bridge.admission.computing(is_large=is_large(bridge, asked)),
+        bridge.metrics.field_seconds.time(),
+    ):
+        result = await bridge.source.field(asked)
+        latest = bridge.latest
+        tags = () if latest is None else latest.snapshot.tags
+        body = await on_worker(
+            bridge,
+            lambda should_stop: field_formats.write_quality(
+                result.grid, tags, asked.sensor_type, rules, should_stop
+            ),
+            len(tags) * _JUDGE_TAG_S,
+        )
+    # Of both that it was made from: the tags' state comes on a way of its own.
+    revision = f"{result.revision} {'' if latest is None else latest.revision}"
+    tag = field_query.etag(revision, asked, "quality", 1)
+    answer = Answer(body, JSON_TYPE, {"ETag": tag, **REVALIDATE})
+    bridge.kept.put(tag, answer)
+    return answer
+
+
+def _revision_of_quality(bridge: Bridge) -> str:
+    latest = bridge.latest
+    return f"{bridge.source.revision()} {'' if latest is None else latest.revision}"
 
 
 def _box_of_all_tags(bridge: Bridge) -> field_query.Box:

@@ -6,7 +6,9 @@ import orjson
 from fastapi import APIRouter, Request, Response
 
 from lupin_bridge.metrics import CONTENT_TYPE
+from lupin_bridge.routes.computing import computed_response, or_refusal
 from lupin_bridge.routes.tools import NEVER_KEEP, bridge_of, json_response, read_route
+from lupin_bridge.serving.kept import Answer
 from lupin_bridge.stream import schema
 from lupin_bridge.twin.source import ailment
 
@@ -45,8 +47,12 @@ async def healthz(request: Request) -> Response:
 )
 async def metrics(request: Request) -> Response:
     """Clients, frames, latencies, fields, and the ROS thread, in Prometheus' text format."""
-    text = bridge_of(request).metrics.text()
-    return Response(text, headers=NEVER_KEEP, media_type=CONTENT_TYPE)
+    bridge = bridge_of(request)
+
+    async def compute() -> Answer:
+        return Answer(bridge.metrics.text(), CONTENT_TYPE, NEVER_KEEP)
+
+    return await or_refusal(computed_response(request, "metrics", compute))
 
 
 @read_route(

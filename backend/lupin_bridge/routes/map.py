@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
+from typing import Final
 
 from fastapi import APIRouter, Request, Response
 
 from lupin_bridge.field.query import matches
+from lupin_bridge.routes.computing import kept_or_computed, made, or_refusal
 from lupin_bridge.routes.tools import (
     JSON_TYPE,
     REVALIDATE,
@@ -17,14 +18,17 @@ from lupin_bridge.routes.tools import (
 )
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.map_picture import map_json, map_png
-from lupin_bridge.twin.source import TwinUnavailableError
 
 router = APIRouter()
+
+# What drawing a cell takes, roughly and at worst.
+_DRAW_CELL_S: Final = 50e-9
 
 _NO_MAP = {
     304: {"description": "the ETag still holds"},
     404: {"model": schema.ErrorMessage, "description": "no map has come yet"},
-    503: {"model": schema.ErrorMessage, "description": "the twin is not there"},
+    429: {"model": schema.ErrorMessage, "description": "this client asks for too much"},
+    503: {"model": schema.ErrorMessage, "description": "the twin is not there, or busy"},
 }
 
 
@@ -36,7 +40,7 @@ _NO_MAP = {
 )
 async def occupancy_map(request: Request) -> Response:
     """The map without its cells."""
-    return await _map(request, "json")
+    return await or_refusal(_map(request, "json"))
 
 
 @read_route(
@@ -50,15 +54,12 @@ async def occupancy_map(request: Request) -> Response:
 )
 async def map_picture(request: Request) -> Response:
     """One pixel a cell, the grid's last row on top, unknown cells transparent."""
-    return await _map(request, "png")
+    return await or_refusal(_map(request, "png"))
 
 
 async def _map(request: Request, kind: str) -> Response:
     bridge = bridge_of(request)
-    try:
-        occupancy = bridge.source.occupancy_map()
-    except TwinUnavailableError as error:
-        return error_response(str(error), 503)
+    occupancy = bridge.source.occupancy_map()
     if occupancy is None:
         return error_response("no map has come yet on the twin's map_topic", 404)
     # A replica that started later has the same map with a later stamp, which is in the JSON.
@@ -68,6 +69,16 @@ async def _map(request: Request, kind: str) -> Response:
         return Response(status_code=304, headers=headers)
     if kind == "json":
         return Response(map_json(occupancy), headers=headers, media_type=JSON_TYPE)
-    loop = asyncio.get_running_loop()
-    picture = await loop.run_in_executor(bridge.pool, map_png, occupancy)
-    return Response(picture, headers=headers, media_type="image/png")
+    key = headers["ETag"]
+    return await kept_or_computed(
+        request,
+        key,
+        lambda: made(
+            bridge,
+            key,
+            lambda: map_png(occupancy),
+            "image/png",
+            cost=occupancy.cells.size * _DRAW_CELL_S,
+            headers=headers,
+        ),
+    )

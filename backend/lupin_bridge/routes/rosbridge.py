@@ -21,10 +21,13 @@ from fastapi import APIRouter, WebSocket
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.field import formats as field_formats
-from lupin_bridge.field.limits import FieldLimitError
+from lupin_bridge.field import query as field_query
+from lupin_bridge.field.formats import JSON
 from lupin_bridge.rosbridge.protocol import service_failure, service_response
 from lupin_bridge.rosbridge.services import FieldCall
 from lupin_bridge.rosbridge.session import Session, TooManyMessages
+from lupin_bridge.routes.computing import field_answer
+from lupin_bridge.serving.admission import AdmissionError
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.stream.hub import CLOSE_POLICY, CLOSE_TRY_AGAIN_LATER, Client
@@ -134,18 +137,21 @@ class _Conversation:
 
     async def _answer(self, field_call: FieldCall, limit_s: float) -> None:
         deadline_s = asyncio.get_running_loop().time() + limit_s
-        call, limits = field_call.call, self._bridge.field_limits
+        call = field_call.call
         async with self._running:
             with ExitStack() as held:
                 try:
-                    held.enter_context(limits.request(self._address, time.monotonic()))
                     async with asyncio.timeout_at(deadline_s):
-                        values = await self._values(field_call.request)
+                        values = await self._values(field_call.request, held)
                     response = service_response(call.id, call.service, values, result=True)
                 except TimeoutError:
                     text = f"{call.service} did not answer within {limit_s:g} s"
                     response = service_failure(call.id, call.service, text)
-                except (FieldLimitError, TwinUnavailableError) as error:
+                except FieldRefused as error:
+                    # The service has answered, and the answer is no: as over ROS, `ok` says so.
+                    values = field_formats.refusal_json(str(error))
+                    response = service_response(call.id, call.service, values, result=True)
+                except (AdmissionError, TwinUnavailableError) as error:
                     response = service_failure(call.id, call.service, str(error))
                 except Exception:
                     log.exception("a call of %s met an error", call.service)
@@ -153,14 +159,14 @@ class _Conversation:
                     response = service_failure(call.id, call.service, text)
                 await self._send(response)
 
-    async def _values(self, request: FieldRequest) -> bytes:
+    async def _values(self, request: FieldRequest, held: ExitStack) -> bytes:
         bridge = self._bridge
-        with bridge.field_limits.computing(), bridge.metrics.field_seconds.time():
-            try:
-                result = await bridge.source.field(request)
-            except FieldRefused as error:
-                # The service has answered, and the answer is no: as over ROS, `ok` false says so.
-                return field_formats.refusal_json(str(error))
-            return await asyncio.get_running_loop().run_in_executor(
-                bridge.pool, field_formats.write_json, result.grid
-            )
+        # Under the key of the same field over HTTP: it is the same body.
+        key = field_query.etag(bridge.source.revision(), request, JSON.name, 1)
+        if (lent := bridge.kept.lend(key)) is not None:
+            answer, give_back = lent
+            give_back()  # the reply holds a copy of its own
+            return answer.body
+        held.enter_context(bridge.admission.request(self._address, time.monotonic()))
+        answer = await bridge.answering.get(key, lambda: field_answer(bridge, request, JSON))
+        return answer.body

@@ -2,22 +2,46 @@
 
 from __future__ import annotations
 
+import time
+from typing import Final
+
 import orjson
 from fastapi import APIRouter, Request, Response, WebSocket
 
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.routes.tools import bridge_of, error_response, json_response, read_route
+from lupin_bridge.routes.computing import (
+    computed_response,
+    kept_or_computed,
+    on_worker,
+    or_refusal,
+)
+from lupin_bridge.routes.tools import (
+    JSON_TYPE,
+    NEVER_KEEP,
+    bridge_of,
+    error_response,
+    json_response,
+    read_route,
+)
+from lupin_bridge.serving.kept import Answer
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.stream import listen_query, schema, state_json
 from lupin_bridge.stream.frames import ENCODINGS
 from lupin_bridge.stream.hub import CLOSE_POLICY, CLOSE_TRY_AGAIN_LATER, Client
 from lupin_bridge.stream.listen_query import ListenRefused
-from lupin_bridge.twin.source import TwinUnavailableError
 
 router = APIRouter()
 
+# How long the ages of an answer hold: they are shown in seconds.
+AGES_HOLD_S: Final = 0.2
+# What writing a scan of a history takes, roughly and at worst.
+_WRITE_SCAN_S: Final = 20e-6
+
 _NO_TWIN = "no twin has been heard yet"
-_UNAVAILABLE = {503: {"model": schema.ErrorMessage, "description": "no twin was heard yet"}}
+_UNAVAILABLE = {
+    503: {"model": schema.ErrorMessage, "description": "no twin was heard yet, or it is busy"}
+}
+_TOO_MUCH = {429: {"model": schema.ErrorMessage, "description": "this client asks for too much"}}
 _NO_TAG = {404: {"model": schema.ErrorMessage, "description": "no such tag"}}
 
 
@@ -62,7 +86,7 @@ async def ws_state(websocket: WebSocket) -> None:
     router,
     "/api/state",
     summary="The current state of every tag",
-    responses={200: {"model": schema.TwinState}, **_UNAVAILABLE},
+    responses={200: {"model": schema.TwinState}, **_TOO_MUCH, **_UNAVAILABLE},
 )
 async def state(request: Request) -> Response:
     """The newest TwinState with the message's own field names, and ages as of this answer."""
@@ -70,7 +94,19 @@ async def state(request: Request) -> Response:
     latest = bridge.latest
     if latest is None:
         return error_response(_NO_TWIN, 503)
-    return json_response(bridge.frames.json.state(latest.snapshot, bridge.ros_time_ns))
+    # The newest state always, its ages a little older at most: so thousands of tags that thousands
+    # of clients ask for are written a few times a second.
+    key = ("state", bridge.state_number, int(time.monotonic() / AGES_HOLD_S))
+
+    async def compute() -> Answer:
+        with bridge.admission.computing():
+            body = bridge.frames.json.state(latest.snapshot, bridge.ros_time_ns)
+        answer = Answer(body, JSON_TYPE, NEVER_KEEP)
+        bridge.kept.put(key, answer, instead_of=bridge.kept_state)
+        bridge.kept_state = key
+        return answer
+
+    return await or_refusal(kept_or_computed(request, key, compute))
 
 
 # An id may hold a slash, which is decoded before the routes are tried: hence :path, and the longer
@@ -79,20 +115,32 @@ async def state(request: Request) -> Response:
     router,
     "/api/tags/{tag_id:path}/history",
     summary="The last scans and tries of one tag",
-    responses={200: {"model": schema.TagHistory}, **_NO_TAG, **_UNAVAILABLE},
+    responses={200: {"model": schema.TagHistory}, **_NO_TAG, **_TOO_MUCH, **_UNAVAILABLE},
 )
 async def history(request: Request, tag_id: str) -> Response:
     """The tag's last scans that brought readings, sensor by sensor, and its last tries."""
     bridge = bridge_of(request)
     if bridge.latest is None:
         return error_response(_NO_TWIN, 503)
+    number_of_tags = len(bridge.latest.snapshot.tags)
+
+    async def compute() -> Answer:
+        with bridge.admission.computing():
+            past = await bridge.source.history(tag_id)
+            if past is None:
+                raise _NoSuchTagError
+            body = await on_worker(
+                bridge,
+                lambda _: orjson.dumps(state_json.history(tag_id, past)),
+                (len(past.scans) + len(past.tries)) * _WRITE_SCAN_S,
+            )
+        return Answer(body, JSON_TYPE, NEVER_KEEP)
+
+    key = ("history", bridge.state_number, tag_id)
     try:
-        past = await bridge.source.history(tag_id)
-    except TwinUnavailableError as error:
-        return error_response(str(error), 503)
-    if past is None:
-        return _no_such_tag(tag_id, len(bridge.latest.snapshot.tags))
-    return json_response(orjson.dumps(state_json.history(tag_id, past)))
+        return await or_refusal(computed_response(request, key, compute))
+    except _NoSuchTagError:
+        return _no_such_tag(tag_id, number_of_tags)
 
 
 @read_route(
@@ -111,6 +159,10 @@ async def tag(request: Request, tag_id: str) -> Response:
         if candidate.tag_id == tag_id:
             return json_response(bridge.frames.json.tag(candidate, bridge.ros_time_ns))
     return _no_such_tag(tag_id, len(latest.snapshot.tags))
+
+
+class _NoSuchTagError(KeyError):
+    """The twin knows no tag of that id."""
 
 
 def _no_such_tag(tag_id: str, known: int) -> Response:

@@ -26,7 +26,7 @@ from lupin_bridge.serving.transports import CLOSE_GRACE_S, bound_unsent, tear_do
 log = logging.getLogger(__name__)
 
 # What may wait for a reader; the next piece follows when the socket has taken this one.
-PIECE_BYTES: Final = 256 * 1024
+PIECE_BYTES: Final = 64 * 1024
 # The request's line and all header lines. The parser's own limit is one for what is incomplete: all
 # that comes at once, it would take, up to asyncio's 256 kB.
 MAX_HEAD_BYTES: Final = 32 * 1024
@@ -201,6 +201,7 @@ def pieces_of(message: Message) -> Iterator[Message]:
     if len(body) <= PIECE_BYTES:
         yield message
         return
+    body = memoryview(body)  # a piece is a view: of one body for a hundred readers there is one
     for start in range(0, len(body), PIECE_BYTES):
         yield {**message, "body": body[start : start + PIECE_BYTES], "more_body": True}
     # uvicorn waits before it writes: the empty end waits for the last piece.

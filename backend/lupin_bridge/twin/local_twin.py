@@ -5,16 +5,17 @@ from __future__ import annotations
 import asyncio
 import uuid
 from collections.abc import Callable, Coroutine, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
 from lupin_bridge.twin.ros_thread import RosThread
+from lupin_bridge.twin.shared import Shared
 from lupin_bridge.twin.source import CacheCounts, Revised, RevisedGrid, TwinNames, TwinTimeoutError
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldJob, FieldRequest, FieldRules
 from lupin_twin.grid import FieldGrid
 from lupin_twin.history import TagHistory
 from lupin_twin.node import TwinNode
+from lupin_twin.workers import Workers
 
 # A third of what counts as silence (`status.STALE_AFTER_S`).
 HEARTBEAT_S = 1.0
@@ -31,9 +32,8 @@ class LocalTwin:
         # A restarted server must never match an ETag of its predecessor, whose counts it repeats.
         self._identity = uuid.uuid4().hex[:12]
         self._thread: RosThread[TwinNode, Revised]
-        # Two, so that one heavy field does not hold up all the others.
-        self._pool = ThreadPoolExecutor(max_workers=2, thread_name_prefix="field")
-        self._computing: dict[object, asyncio.Task[FieldGrid]] = {}
+        self.workers = Workers("work")
+        self._computing: Shared[FieldGrid] = Shared()
 
     async def start(
         self, on_state: Callable[[Revised], None], on_death: Callable[[], None]
@@ -54,7 +54,7 @@ class LocalTwin:
 
     async def stop(self) -> None:
         """Stop the ROS thread and the workers."""
-        self._pool.shutdown(wait=False, cancel_futures=True)
+        self.workers.close()
         await self._thread.stop()
 
     @property
@@ -127,27 +127,12 @@ class LocalTwin:
 
         answer, revision = await self._thread.call(look_up)
         if isinstance(answer, FieldJob):
-            answer = await self._compute_once(answer)
+            job = answer
+            answer = await self._computing.get(job.key, lambda: self._compute(job))
         return RevisedGrid(answer, revision)
 
-    async def _compute_once(self, job: FieldJob) -> FieldGrid:
-        """Identical requests in flight share one computation; who leaves does not end it."""
-        task = self._computing.get(job.key)
-        if task is None:
-            task = asyncio.create_task(self._compute(job))
-            self._computing[job.key] = task
-
-            def forget(done: asyncio.Task[FieldGrid]) -> None:
-                del self._computing[job.key]
-                if not done.cancelled():
-                    done.exception()  # looked at, should all who waited have left
-
-            task.add_done_callback(forget)
-        return await asyncio.shield(task)
-
     async def _compute(self, job: FieldJob) -> FieldGrid:
-        loop = asyncio.get_running_loop()
-        grid = await loop.run_in_executor(self._pool, job.compute)
+        grid = await asyncio.wrap_future(self.workers.submit(job.compute, job.cost_s))
         await self._thread.call(lambda node: node.fields.keep(job, grid))
         return grid
 

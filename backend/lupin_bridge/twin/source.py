@@ -12,6 +12,7 @@ from lupin_twin.fields import FieldRequest, FieldRules
 from lupin_twin.grid import FieldGrid
 from lupin_twin.history import TagHistory
 from lupin_twin.state import Snapshot
+from lupin_twin.workers import Workers
 
 # What a callback may take at worst, on a slow machine: the largest state there is takes a second.
 STUCK_AFTER_S: Final = 10.0
@@ -61,7 +62,12 @@ class TwinNames:
 
 
 class TwinSource(Protocol):
-    """A twin in this process, or one elsewhere. Everything here is called on the event loop."""
+    """A twin in this process, or one elsewhere. Everything here is called on the event loop.
+
+    `workers` is where this process does what takes longer than a tick; `stop` closes it.
+    """
+
+    workers: Workers
 
     async def start(
         self, on_state: Callable[[Revised], None], on_death: Callable[[], None]

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from lupin_bridge.twin.ros_thread import RosThread
+from lupin_bridge.twin.shared import Shared
 from lupin_bridge.twin.source import (
     CacheCounts,
     Revised,
@@ -21,6 +22,7 @@ from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRefused, FieldRequest, FieldRules
 from lupin_twin.history import TagHistory
 from lupin_twin.state import Snapshot
+from lupin_twin.workers import Workers
 
 # Requests on their way to the twin at once. It answers one after the other anyway; more would
 # only wait in DDS, where they cannot be taken back.
@@ -36,7 +38,8 @@ class WebTwin:
         self._ros_args = ros_args
         self._timeout_s = timeout_s
         self._thread: RosThread[WebNode, Revised]
-        self._asking: dict[tuple[str, FieldRequest], asyncio.Task[RevisedGrid]] = {}
+        self.workers = Workers("work")
+        self._asking: Shared[RevisedGrid] = Shared()
         self._slots = asyncio.Semaphore(MAX_REQUESTS)
 
     async def start(
@@ -57,7 +60,8 @@ class WebTwin:
         await self._thread.start()
 
     async def stop(self) -> None:
-        """Stop the ROS thread."""
+        """Stop the ROS thread and the workers."""
+        self.workers.close()
         await self._thread.stop()
 
     @property
@@ -125,12 +129,9 @@ class WebTwin:
         the field from before.
         """
         revision = self.revision()
-        task = self._asking.get((revision, request))
-        if task is None:
-            task = asyncio.create_task(self._ask_once(revision, request))
-            self._asking[revision, request] = task
-            task.add_done_callback(lambda _: self._asking.pop((revision, request), None))
-        return await asyncio.shield(task)
+        return await self._asking.get(
+            (revision, request), lambda: self._ask_once(revision, request)
+        )
 
     async def _find_service(self) -> None:
         while not await self._thread.call(lambda node: node.field_client.service_is_ready()):

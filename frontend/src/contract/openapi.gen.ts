@@ -201,7 +201,7 @@ export interface paths {
         };
         /**
          * Is the bridge itself alive?
-         * @description 503 when the ROS thread has ended, for whoever restarts services.
+         * @description 503 when the ROS thread has ended or hangs in a callback, for whoever restarts services.
          */
         readonly get: operations["healthz_healthz_get"];
         readonly put?: never;
@@ -719,7 +719,16 @@ export interface operations {
                     readonly "application/json": components["schemas"]["TwinState"];
                 };
             };
-            /** @description no twin was heard yet */
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description no twin was heard yet, or it is busy */
             readonly 503: {
                 headers: {
                     readonly [name: string]: unknown;
@@ -768,7 +777,16 @@ export interface operations {
                     readonly "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
-            /** @description no twin was heard yet */
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description no twin was heard yet, or it is busy */
             readonly 503: {
                 headers: {
                     readonly [name: string]: unknown;
@@ -817,7 +835,7 @@ export interface operations {
                     readonly "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
-            /** @description no twin was heard yet */
+            /** @description no twin was heard yet, or it is busy */
             readonly 503: {
                 headers: {
                     readonly [name: string]: unknown;
@@ -1261,7 +1279,16 @@ export interface operations {
                     readonly "application/json": components["schemas"]["ErrorMessage"];
                 };
             };
-            /** @description the twin is not there */
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description the twin is not there, or busy */
             readonly 503: {
                 headers: {
                     readonly [name: string]: unknown;
@@ -1306,7 +1333,16 @@ export interface operations {
                     readonly "application/json": components["schemas"]["ErrorMessage"];
                 };
             };
-            /** @description the twin is not there */
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description the twin is not there, or busy */
             readonly 503: {
                 headers: {
                     readonly [name: string]: unknown;
@@ -1335,7 +1371,7 @@ export interface operations {
                     readonly "application/json": components["schemas"]["Health"];
                 };
             };
-            /** @description the ROS thread has ended: restart */
+            /** @description the ROS thread has ended, or is stuck: restart */
             readonly 503: {
                 headers: {
                     readonly [name: string]: unknown;

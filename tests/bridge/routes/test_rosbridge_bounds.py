@@ -30,8 +30,16 @@ from tests.support.waiting import until
 
 
 def calls(count: int) -> list[str]:
+    """Calls for as many fields: the same one would be asked of the twin once."""
     return [
-        json.dumps({"op": "call_service", "service": FIELD, "id": f"{n}", "args": FIELD_ARGS})
+        json.dumps(
+            {
+                "op": "call_service",
+                "service": FIELD,
+                "id": f"{n}",
+                "args": {**FIELD_ARGS, "sensor_type": f"sensor {n}"},
+            }
+        )
         for n in range(count)
     ]
 

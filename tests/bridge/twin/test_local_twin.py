@@ -6,6 +6,7 @@ import asyncio
 import threading
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from lupin_twin.fields import FieldJob, FieldRefused, FieldRequest
 from lupin_twin.grid import FieldGrid
 from lupin_twin.parameters import ParameterError
 from lupin_twin.state import Pose, Reading, Scan
+from lupin_twin.workers import ShouldStop
 from tests.support.inprocess import run
 from tests.support.waiting import PATIENCE_S, until
 
@@ -65,13 +67,13 @@ def stage_of(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
         stage = Stage(twin)
         compute = FieldJob.compute
 
-        def watched(job: FieldJob) -> FieldGrid:
+        def watched(job: FieldJob, should_stop: ShouldStop) -> FieldGrid:
             stage.computed.append(job.request)
             if job.request in stage.held:
                 stage.gate.wait(20.0)
             if stage.failure is not None:
                 raise stage.failure
-            return compute(job)
+            return compute(job, should_stop)
 
         monkeypatch.setattr(FieldJob, "compute", watched)
         await twin.start(stage.told.append, lambda: None)
@@ -202,6 +204,32 @@ def test_an_error_that_nobody_waits_for_any_more_is_no_warning(
             await until(lambda: not stage.twin._computing, "the end of the computation")
 
     run(domain, test())  # fails on what the event loop has to log
+
+
+def test_a_computation_that_nobody_waits_for_is_taken_back(
+    domain: int, stage_of: Callable[..., Any]
+) -> None:
+    """Off the queue, or out of its thread: whoever came last has not computed for nobody."""
+
+    async def test() -> None:
+        async with stage_of() as stage:
+            workers = stage.twin.workers
+            large = [replace(REQUEST, resolution=0.002 + n / 1e6) for n in range(4)]
+            for number in range(10):  # enough to make a million cells dear
+                await stage.record(str(number), 400.0)
+            stage.held |= set(large)
+            tasks = [asyncio.create_task(stage.twin.field(request)) for request in large]
+            await until(lambda: workers.running == workers.waiting == 2, "two of four at work")
+            for task in tasks:
+                task.cancel()
+            await until(lambda: workers.waiting == 0, "an empty queue")
+            assert workers.abandoned == 4
+            stage.gate.set()
+            await until(lambda: workers.running == 0, "the end of both at work")
+            assert len(stage.computed) == 2, "what was in the queue never began"
+            assert stage.twin.cache_counts().entries == 0, "neither was computed to its end"
+
+    run(domain, test())
 
 
 def test_a_refusal_is_get_fields_own(domain: int, stage_of: Callable[..., Any]) -> None:

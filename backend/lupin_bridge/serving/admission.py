@@ -1,8 +1,10 @@
-"""How many field requests may be in flight, and how often each client may ask. Pure.
+"""One rule of admission for every answer that has to be computed. Pure.
 
-Nothing waits for a turn: a request past a bound is refused at once, so that nothing piles up. A
-client's own requests count until it has taken the answer, all requests together until the answer
-is written: a client that does not read holds up nobody but itself.
+What is kept already passes without it. Nothing waits for a turn: a request past a bound is refused
+at once, so that nothing piles up. A client's own requests count until it has taken the answer, all
+computations together until the answer is written: a client that does not read holds up nobody but
+itself. Large computations leave a quarter of the places to the small ones, which are soon done: a
+flood of the dearest fields keeps nobody from a cheap answer.
 """
 
 from __future__ import annotations
@@ -18,8 +20,15 @@ from lupin_bridge.serving.rate_limit import RateLimit
 # A page that opens asks for several fields at once; seconds' worth of field_rate_hz.
 BURST_S: Final = 2.0
 
+# Why something was refused, as it is counted.
+IN_FLIGHT: Final = "client_in_flight"
+RATE: Final = "client_rate"
+LARGE: Final = "large_in_flight"
+TOTAL: Final = "total_in_flight"
+REASONS: Final = (IN_FLIGHT, RATE, LARGE, TOTAL)
 
-class FieldLimitError(RuntimeError):
+
+class AdmissionError(RuntimeError):
     """One request too many; the message names the limit and its setting."""
 
     def __init__(self, message: str, retry_after_s: float) -> None:
@@ -32,28 +41,31 @@ class FieldLimitError(RuntimeError):
         return {"Retry-After": str(max(1, math.ceil(self.retry_after_s)))}
 
 
-class ClientLimitError(FieldLimitError):
+class ClientLimitError(AdmissionError):
     """One client asks too much."""
 
 
-class BusyError(FieldLimitError):
+class BusyError(AdmissionError):
     """All clients together ask too much."""
 
 
-class FieldLimits:
+class Admission:
     """The requests in flight. Belongs to the event loop."""
 
     def __init__(self, rate_hz: float, concurrency: int, total_concurrency: int) -> None:
+        self.refused: Counter[str] = Counter()
         self._rate_hz = rate_hz
         self._concurrency = concurrency
         self._total_concurrency = total_concurrency
+        self._large_concurrency = total_concurrency - total_concurrency // 4
         self._rate = RateLimit(rate_hz, rate_hz * BURST_S)
         self._in_flight: Counter[str] = Counter()
         self._computing = 0
+        self._large = 0
 
     @property
     def being_computed(self) -> int:
-        """How many requests keep the twin and the encoders busy now."""
+        """How many computations keep the twin and the workers busy now."""
         return self._computing
 
     @contextmanager
@@ -65,16 +77,18 @@ class FieldLimits:
 
         """
         if self._in_flight[client] >= self._concurrency:
+            self.refused[IN_FLIGHT] += 1
             raise ClientLimitError(
-                f"{client} has {self._concurrency} field requests in flight, the limit "
-                "(field_concurrency)",
+                f"{client} has {self._concurrency} requests for computed answers in flight, the "
+                "limit (field_concurrency)",
                 1.0,
             )
         wait_s = self._rate.take(client, now_s)
         if wait_s > 0.0:
+            self.refused[RATE] += 1
             raise ClientLimitError(
-                f"{client} asks for more than {self._rate_hz:g} fields a second, the limit "
-                "(field_rate_hz)",
+                f"{client} asks for more than {self._rate_hz:g} computed answers a second, the "
+                "limit (field_rate_hz)",
                 wait_s,
             )
         self._in_flight[client] += 1
@@ -86,21 +100,31 @@ class FieldLimits:
                 del self._in_flight[client]
 
     @contextmanager
-    def computing(self) -> Iterator[None]:
-        """The part of a request that keeps the twin and the encoders busy.
+    def computing(self, *, is_large: bool = False) -> Iterator[None]:
+        """What keeps the twin and the workers busy, once for all who wait for it.
 
         Raises:
             BusyError: one more than there may be at once.
 
         """
         if self._computing >= self._total_concurrency:
+            self.refused[TOTAL] += 1
             raise BusyError(
-                f"{self._total_concurrency} fields are being computed, the limit "
+                f"{self._total_concurrency} answers are being computed, the limit "
                 "(field_total_concurrency)",
                 1.0,
             )
+        if is_large and self._large >= self._large_concurrency:
+            self.refused[LARGE] += 1
+            raise BusyError(
+                f"{self._large_concurrency} large answers are being computed, the limit (three "
+                "quarters of field_total_concurrency)",
+                1.0,
+            )
         self._computing += 1
+        self._large += is_large
         try:
             yield
         finally:
             self._computing -= 1
+            self._large -= is_large

@@ -1,0 +1,217 @@
+"""How every answer that has to be computed comes about.
+
+It is admitted, computed once for all who ask the same, within its time, and only as long as
+somebody waits; what can be kept is kept, and costs nothing when it is asked for again.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable, Coroutine, Hashable, Mapping
+from contextlib import ExitStack
+from typing import Any, Final, TypeVar
+
+from fastapi import Request, Response
+from starlette.types import Receive, Scope, Send
+
+from lupin_bridge.access.middleware import client_of
+from lupin_bridge.bridge import Bridge
+from lupin_bridge.field import formats as field_formats
+from lupin_bridge.field import query as field_query
+from lupin_bridge.field.formats import FieldFormat
+from lupin_bridge.routes.tools import NEVER_KEEP, REVALIDATE, bridge_of, error_response
+from lupin_bridge.serving.admission import AdmissionError, BusyError
+from lupin_bridge.serving.kept import Answer
+from lupin_bridge.twin.source import TwinTimeoutError, TwinUnavailableError
+from lupin_twin.fields import FieldRequest, cost_s
+from lupin_twin.workers import SMALL_S, ShouldStop
+
+ResultT = TypeVar("ResultT")
+
+# What writing takes, roughly and at worst, for each cell or pixel.
+_WRITE_CELL_S: Final = 50e-9
+# nginx's "client closed request"; nobody gets it.
+CLIENT_GONE: Final = 499
+
+
+class LentResponse(Response):
+    """An answer that gives something back once its client has taken it, or left."""
+
+    give_back: Callable[[], None] | None = None
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send it."""
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            if self.give_back is not None:
+                self.give_back()
+
+
+def kept_response(bridge: Bridge, key: Hashable) -> LentResponse | None:
+    """The answer that is kept under a key: it costs nothing, and passes. None: nothing is."""
+    lent = bridge.kept.lend(key)
+    if lent is None:
+        return None
+    answer, give_back = lent
+    return _response(answer, give_back)
+
+
+async def kept_or_computed(
+    request: Request, key: Hashable, compute: Callable[[], Coroutine[Any, Any, Answer]]
+) -> Response:
+    """`kept_response`, or else `computed_response`."""
+    return kept_response(bridge_of(request), key) or await computed_response(request, key, compute)
+
+
+async def computed_response(
+    request: Request, key: Hashable, compute: Callable[[], Coroutine[Any, Any, Answer]]
+) -> Response:
+    """The answer that `compute` makes, or the one under way under the same key.
+
+    Raises:
+        AdmissionError: past a limit of the client.
+        Exception: whatever `compute` raised; `refusal` makes an answer of what it may.
+
+    """
+    bridge = bridge_of(request)
+    with ExitStack() as held:
+        held.enter_context(bridge.admission.request(client_of(request), time.monotonic()))
+        answer = await while_client_waits(
+            request, within_time(bridge, bridge.answering.get(key, compute))
+        )
+        if answer is None:
+            return Response(status_code=CLIENT_GONE)
+        return _response(answer, held.pop_all().close)
+
+
+def _response(answer: Answer, give_back: Callable[[], None]) -> LentResponse:
+    response = LentResponse(answer.body, headers=dict(answer.headers), media_type=answer.media_type)
+    response.give_back = give_back
+    return response
+
+
+async def within_time(bridge: Bridge, work: Awaitable[ResultT]) -> ResultT:
+    """What `work` gives, within `field_timeout_s`.
+
+    Raises:
+        TwinTimeoutError: it took longer; it is cancelled.
+
+    """
+    limit_s = bridge.settings.field_timeout_s
+    try:
+        async with asyncio.timeout(limit_s):
+            return await work
+    except TimeoutError:
+        raise TwinTimeoutError(
+            f"the answer was not there within {limit_s:g} s (field_timeout_s)"
+        ) from None
+
+
+async def while_client_waits(
+    request: Request, work: Coroutine[Any, Any, ResultT]
+) -> ResultT | None:
+    """What `work` gives; None: the client has left, and the work was cancelled."""
+    working = asyncio.create_task(work)
+    leaving = asyncio.create_task(_client_left(request))
+    try:
+        await asyncio.wait((working, leaving), return_when=asyncio.FIRST_COMPLETED)
+        return await working if working.done() else None
+    finally:
+        working.cancel()
+        leaving.cancel()
+
+
+async def _client_left(request: Request) -> None:
+    while (await request.receive())["type"] != "http.disconnect":
+        pass
+
+
+async def on_worker(
+    bridge: Bridge, work: Callable[[ShouldStop], ResultT], cost: float = 0.0
+) -> ResultT:
+    """What `work(should_stop)` gives, off the loop; `cost` is an estimate, s."""
+    return await asyncio.wrap_future(bridge.source.workers.submit(work, cost))
+
+
+async def made(
+    bridge: Bridge,
+    key: Hashable,
+    write: Callable[[], bytes],
+    media_type: str,
+    *,
+    cost: float = 0.0,
+    headers: Mapping[str, str] = NEVER_KEEP,
+) -> Answer:
+    """What `write` makes on a worker (`cost`: an estimate, s), and kept.
+
+    Raises:
+        BusyError: one computation too many.
+
+    """
+    with bridge.admission.computing(is_large=cost > SMALL_S):
+        body = await on_worker(bridge, lambda _: write(), cost)
+    answer = Answer(body, media_type, headers)
+    bridge.kept.put(key, answer)
+    return answer
+
+
+async def or_refusal(answer: Awaitable[Response]) -> Response:
+    """Wait for an answer; what stands in its way becomes the answer."""
+    try:
+        return await answer
+    except AdmissionError as error:
+        status = 503 if isinstance(error, BusyError) else 429
+        return error_response(str(error), status, error.headers)
+    except TwinTimeoutError as error:
+        return error_response(str(error), 504)
+    except TwinUnavailableError as error:
+        return error_response(str(error), 503, {"Retry-After": "3"})
+
+
+# --- fields -------------------------------------------------------------------------------------
+
+
+def is_large(bridge: Bridge, asked: FieldRequest) -> bool:
+    """Whether a field may take long: as if every tag had a reading and none was computed before.
+
+    Raises:
+        lupin_twin.fields.FieldRefused: a bad request.
+
+    """
+    tags = 0 if bridge.latest is None else len(bridge.latest.snapshot.tags)
+    return cost_s(asked, tags, bridge.source.rules()) > SMALL_S
+
+
+async def field_answer(
+    bridge: Bridge, asked: FieldRequest, field_format: FieldFormat, scale: int = 1
+) -> Answer:
+    """The field in a format, with its ETag; it is kept.
+
+    Raises:
+        lupin_twin.fields.FieldRefused: a bad request.
+        BusyError: one computation too many.
+        TwinUnavailableError: nobody there to compute it.
+
+    """
+    with (
+        bridge.admission.computing(is_large=is_large(bridge, asked)),
+        bridge.metrics.field_seconds.time(),
+    ):
+        result = await bridge.source.field(asked)
+        # The revision that the field was made from, which may be newer than the one asked at.
+        tag = field_query.etag(result.revision, asked, field_format.name, scale)
+        grid = result.grid
+        body = await on_worker(
+            bridge,
+            lambda _: field_formats.write(grid, field_format, asked.sensor_type, scale),
+            grid.width * grid.height * scale**2 * _WRITE_CELL_S,
+        )
+    headers = field_query.headers(
+        field_formats.metadata(grid, asked.sensor_type),
+        f"{asked.sensor_type}.{field_format.name}",
+    )
+    answer = Answer(body, field_format.media_type, {**headers, "ETag": tag, **REVALIDATE})
+    bridge.kept.put(tag, answer)
+    return answer

@@ -1,0 +1,268 @@
+"""Computed answers: once for all, only while somebody waits, and the small ones never behind."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import AsyncIterator, Callable
+from contextlib import ExitStack, asynccontextmanager
+from typing import Any
+from urllib.parse import urlencode
+
+import httpx
+import numpy as np
+import pytest
+
+from lupin_bridge.routes import map as routes_map
+from lupin_bridge.routes.state import AGES_HOLD_S
+from lupin_bridge.serving.http_protocol import PIECE_BYTES
+from lupin_bridge.settings import Settings
+from lupin_bridge.stream.state_json import StateJson
+from lupin_twin.explored import OccupancyMap, occupancy_map
+from lupin_twin.fields import FieldJob
+from lupin_twin.grid import FieldGrid
+from lupin_twin.node import TwinNode
+from lupin_twin.state import Pose, Reading, Scan
+from lupin_twin.workers import LARGE_THREADS, ShouldStop
+from tests.support.inprocess import Running, run, running
+from tests.support.waiting import PATIENCE_S, until
+from tests.support.web import deaf_client
+
+EAGER = Settings(field_rate_hz=10_000.0, field_concurrency=1_000)
+
+
+def field(sensor: str = "co2", cells: int = 4, suffix: str = "json") -> str:
+    """The path of a field of so many cells a side, over 4 m."""
+    query = {
+        "sensor_type": sensor,
+        "resolution": 4.0 / cells,
+        "bbox_min_x": 0.0,
+        "bbox_min_y": 0.0,
+        "bbox_max_x": 4.0,
+        "bbox_max_y": 4.0,
+    }
+    return f"/api/field.{suffix}?{urlencode(query)}"
+
+
+# A million cells, and 20 tags that reach all of them.
+LARGE = 1_000
+
+
+@asynccontextmanager
+async def house(settings: Settings = EAGER) -> AsyncIterator[Running]:
+    """A bridge whose twin knows 20 tags."""
+    async with running(settings) as it:
+
+        def fill(node: TwinNode) -> None:
+            for number in range(20):
+                pose = Pose(2.0 + number / 100, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+                names = ("co2", *(f"co2 {n}" for n in range(60)))
+                readings = tuple(Reading(name, 400.0) for name in names)
+                node.store.record(Scan(str(number), 1_000_000_000, readings, pose))
+
+        await it.in_ros_thread(fill)
+        await until(
+            lambda: it.bridge.latest is not None and len(it.bridge.latest.snapshot.tags) == 20,
+            "the tags",
+        )
+        yield it
+
+
+class Held:
+    """Computations of large fields that wait at a gate, or until nobody waits for them."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.gate = threading.Event()
+        self.begun: list[str] = []
+        compute = FieldJob.compute
+
+        def held(job: FieldJob, should_stop: ShouldStop) -> FieldGrid:
+            self.begun.append(job.request.sensor_type)
+            while job.request.resolution < 0.1 and not should_stop():
+                if self.gate.wait(0.01):
+                    break
+            return compute(job, should_stop)
+
+        monkeypatch.setattr(FieldJob, "compute", held)
+
+
+@pytest.fixture
+def held(monkeypatch: pytest.MonkeyPatch) -> Held:
+    return Held(monkeypatch)
+
+
+def ask(it: Running, *paths: str) -> list[asyncio.Task[httpx.Response]]:
+    return [asyncio.create_task(it.http.get(path)) for path in paths]
+
+
+# --- the small are never behind the large ---------------------------------------------------------
+
+
+def test_a_flood_of_the_dearest_fields_does_not_hold_up_a_tiny_one(domain: int, held: Held) -> None:
+    async def test() -> None:
+        async with house() as it:
+            flood = ask(it, *(field(f"co2 {n}", LARGE) for n in range(40)))
+            workers = it.bridge.source.workers
+            await until(lambda: workers.waiting == 24 - LARGE_THREADS, "a queue that is full")
+            refused = [task for task in flood if task.done()]
+            tiny = await it.http.get(field("co2 50"))
+            assert tiny.status_code == 200
+            assert workers.waiting == 24 - LARGE_THREADS, "it passed them all"
+            assert len(refused) == 16
+            for task in refused:
+                answer = await task
+                assert (answer.status_code, answer.headers["retry-after"]) == (503, "1")
+                assert "24 large answers are being computed" in answer.json()["detail"]
+            held.gate.set()
+            assert sorted([(await task).status_code for task in flood]) == [200] * 24 + [503] * 16
+
+    run(domain, test())
+
+
+# --- only while somebody waits --------------------------------------------------------------------
+
+
+def test_a_client_that_leaves_takes_its_work_along(domain: int, held: Held) -> None:
+    async def test() -> None:
+        async with house() as it:
+            paths = [field(f"co2 {n}", LARGE) for n in range(6)]
+            leaving = ask(it, *paths)
+            workers = it.bridge.source.workers
+            await until(lambda: workers.waiting == 6 - LARGE_THREADS, "work")
+            at_work = list(held.begun)
+            (staying,) = ask(it, field(at_work[0], LARGE))
+            await until(lambda: it.bridge.admission._in_flight["127.0.0.1"] == 7, "who stays")
+            for task in leaving:
+                task.cancel()
+            await until(lambda: (workers.waiting, workers.running) == (0, 1), "the others' end")
+            assert workers.abandoned == 5
+            held.gate.set()
+            assert (await staying).status_code == 200
+            assert held.begun == at_work, "computed once, for who stayed"
+
+    run(domain, test())
+
+
+def test_a_time_out_ends_the_work_too(domain: int, held: Held) -> None:
+    async def test() -> None:
+        settings = Settings(field_rate_hz=10_000.0, field_timeout_s=0.2)
+        async with house(settings) as it:
+            answers = await asyncio.gather(*ask(it, *(field(f"co2 {n}", LARGE) for n in range(4))))
+            assert [answer.status_code for answer in answers] == [504] * 4
+            assert "0.2 s (field_timeout_s)" in answers[0].json()["detail"]
+            workers = it.bridge.source.workers
+            await until(lambda: (workers.waiting, workers.running) == (0, 0), "the end of it all")
+            assert workers.abandoned == 4
+            assert it.bridge.admission.being_computed == 0
+
+    run(domain, test())
+
+
+# --- once for all ---------------------------------------------------------------------------------
+
+
+def test_identical_requests_take_one_place_and_one_computation(domain: int, held: Held) -> None:
+    async def test() -> None:
+        async with house() as it:
+            asked = ask(it, *[field("co2", LARGE)] * 30, field("co2", LARGE, "npy"))
+            await until(lambda: it.bridge.admission._in_flight["127.0.0.1"] == 31, "all of them")
+            await until(lambda: it.bridge.admission.being_computed == 2, "a body each")
+            held.gate.set()
+            answers = await asyncio.gather(*asked)
+            assert {answer.status_code for answer in answers} == {200}
+            assert held.begun == ["co2"], "and one field"
+
+    run(domain, test())
+
+
+def count(monkeypatch: pytest.MonkeyPatch, where: Any, name: str) -> list[int]:
+    """The calls of a function, which does what it did before."""
+    calls: list[int] = []
+    plain: Callable[..., Any] = getattr(where, name)
+
+    def counted(*args: Any, **named: Any) -> Any:
+        calls.append(1)
+        return plain(*args, **named)
+
+    monkeypatch.setattr(where, name, counted)
+    return calls
+
+
+def test_the_state_is_written_a_few_times_a_second_and_never_old(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = count(monkeypatch, StateJson, "state")
+
+    async def test() -> None:
+        async with house() as it:
+            loop = asyncio.get_running_loop()
+            written.clear()
+            began_s, before = loop.time(), it.bridge.state_number
+            for _ in range(20):
+                await asyncio.gather(*ask(it, *["/api/state"] * 10))
+            states = it.bridge.state_number - before + 1
+            most = states + (loop.time() - began_s) / AGES_HOLD_S + 1
+            # The frames' own of each state beside the answers.
+            assert len(written) <= most + states
+            entries = [key for key in it.bridge.kept._entries if "state" in str(key)]
+            assert len(entries) == 1, "the ones before have gone"
+            pose = Pose(1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+            new = Scan("new", 1, (), pose)
+
+            await it.in_ros_thread(lambda node: node.store.record(new))
+            await until(lambda: len(it.bridge.latest.snapshot.tags) == 21, "the new tag")  # type: ignore[union-attr]
+            assert "new" in (await it.http.get("/api/state")).text
+
+    run(domain, test())
+
+
+def large_map() -> OccupancyMap:
+    """4 million cells of noise, whose picture takes some 3 MB."""
+    side = 2_000
+    cells = np.random.default_rng(1).integers(-1, 101, side * side, dtype=np.int8)
+    return occupancy_map(
+        frame_id="map",
+        stamp_ns=0,
+        width=side,
+        height=side,
+        resolution=0.05,
+        origin_x=0.0,
+        origin_y=0.0,
+        origin_yaw=0.0,
+        data=cells,
+        revision=1,
+    )
+
+
+def test_a_hundred_readers_of_a_map_that_do_not_read_hold_one_picture_and_two_pieces_each(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn = count(monkeypatch, routes_map, "map_png")
+
+    async def test() -> None:
+        async with house() as it:
+            stack, occupancy = ExitStack(), large_map()
+            monkeypatch.setattr(it.twin, "occupancy_map", lambda: occupancy)
+            size = len((await it.http.get("/api/map.png")).content)
+            assert size > 2_000_000
+            for _ in range(100):
+                stack.enter_context(deaf_client(it.url, "/api/map.png"))
+            (entry,) = [
+                entry
+                for entry in it.bridge.kept._entries.values()
+                if entry.answer.media_type == "image/png"
+            ]
+            await until(lambda: entry.readers == 100, "all of them to be answered")
+            server = it.server.server_state.connections
+            await until(
+                lambda: sum(c.transport.get_write_buffer_size() > 0 for c in server) == 100,
+                "sockets that are full",
+            )
+            assert len(drawn) == 1
+            unsent = [connection.transport.get_write_buffer_size() for connection in server]
+            assert max(unsent) <= 2 * PIECE_BYTES, "one at the socket, one behind it"
+            tiny = await asyncio.wait_for(it.http.get(field("co2 7")), PATIENCE_S)
+            assert tiny.status_code == 200
+            stack.close()
+
+    run(domain, test())

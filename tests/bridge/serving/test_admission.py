@@ -1,0 +1,240 @@
+"""Answers that are computed: how many and how often, each client by itself and all together."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Iterator
+from contextlib import ExitStack, suppress
+
+import pytest
+
+from lupin_bridge.serving.admission import (
+    BURST_S,
+    IN_FLIGHT,
+    LARGE,
+    RATE,
+    TOTAL,
+    Admission,
+    BusyError,
+    ClientLimitError,
+)
+from lupin_bridge.settings import Settings
+from lupin_bridge.stream import schema
+from tests.support.access import Served, served
+from tests.support.inprocess import run, running
+
+ROUTES = ("/api/field", "/api/field.json", "/api/field.png", "/api/field.npy", "/api/field/quality")
+QUERY = "?sensor_type=co2&resolution=1&bbox_min_x=0&bbox_min_y=0&bbox_max_x=4&bbox_max_y=4"
+COMPUTED = ("/api/state", "/api/tags/1/history", "/metrics", "/docs")
+
+
+# --- the rules ----------------------------------------------------------------------------------
+
+
+def test_a_client_has_its_number_in_flight_and_the_next_is_refused_by_name() -> None:
+    admission = Admission(rate_hz=1000.0, concurrency=2, total_concurrency=10)
+    with admission.request("a", 0.0):
+        with admission.request("a", 0.0), admission.request("b", 0.0):
+            with pytest.raises(ClientLimitError) as refused, admission.request("a", 0.0):
+                pytest.fail("let in")
+            assert str(refused.value) == (
+                "a has 2 requests for computed answers in flight, the limit (field_concurrency)"
+            )
+            assert refused.value.headers == {"Retry-After": "1"}
+        with admission.request("a", 0.0):
+            pass
+
+
+def test_a_request_that_fails_gives_its_place_back() -> None:
+    admission = Admission(rate_hz=1000.0, concurrency=1, total_concurrency=1)
+    for _ in range(3):
+        with pytest.raises(ZeroDivisionError), admission.request("a", 0.0), admission.computing():
+            raise ZeroDivisionError
+
+
+def test_a_client_has_its_rate_and_is_told_when_to_come_back() -> None:
+    admission = Admission(rate_hz=0.5, concurrency=9, total_concurrency=9)
+    with admission.request("a", 0.0):
+        pass
+    with pytest.raises(ClientLimitError) as refused, admission.request("a", 0.25):
+        pytest.fail("let in")
+    assert (
+        str(refused.value)
+        == "a asks for more than 0.5 computed answers a second, the limit (field_rate_hz)"
+    )
+    assert refused.value.retry_after_s == pytest.approx(1.75)
+    assert refused.value.headers == {"Retry-After": "2"}
+    with admission.request("b", 0.25), admission.request("a", 2.0):
+        pass
+
+
+def test_a_request_refused_for_its_number_costs_no_turn() -> None:
+    admission = Admission(rate_hz=1.0, concurrency=1, total_concurrency=9)
+    with admission.request("a", 0.0):
+        for _ in range(100):
+            with pytest.raises(ClientLimitError, match="in flight"), admission.request("a", 0.0):
+                pytest.fail("let in")
+    with admission.request("a", 0.0):
+        pass
+
+
+def test_all_together_have_a_number_too() -> None:
+    admission = Admission(rate_hz=1.0, concurrency=1, total_concurrency=2)
+    with admission.computing():
+        with admission.computing(), pytest.raises(BusyError) as refused, admission.computing():
+            pytest.fail("let in")
+        assert str(refused.value) == (
+            "2 answers are being computed, the limit (field_total_concurrency)"
+        )
+        with admission.computing():
+            pass
+
+
+def test_large_computations_leave_a_quarter_of_the_places_to_small_ones() -> None:
+    admission = Admission(rate_hz=1.0, concurrency=1, total_concurrency=8)
+    with ExitStack() as taken:
+        for _ in range(6):
+            taken.enter_context(admission.computing(is_large=True))
+        with pytest.raises(BusyError) as refused, admission.computing(is_large=True):
+            pytest.fail("let in")
+        assert str(refused.value) == (
+            "6 large answers are being computed, the limit (three quarters of "
+            "field_total_concurrency)"
+        )
+        for _ in range(2):
+            taken.enter_context(admission.computing())
+        with pytest.raises(BusyError, match="8 answers are being computed"), admission.computing():
+            pytest.fail("let in")
+        assert admission.refused == {LARGE: 1, TOTAL: 1}
+    with admission.computing(is_large=True):
+        assert admission.being_computed == 1
+
+
+@pytest.mark.parametrize("total", [1, 2, 3])
+def test_few_places_are_for_large_computations_too(total: int) -> None:
+    admission = Admission(rate_hz=1.0, concurrency=1, total_concurrency=total)
+    with ExitStack() as taken:
+        for _ in range(total):
+            taken.enter_context(admission.computing(is_large=True))
+
+
+def test_refusals_are_counted_by_reason() -> None:
+    admission = Admission(rate_hz=1.0, concurrency=1, total_concurrency=1)
+    with admission.request("a", 0.0), suppress(ClientLimitError), admission.request("a", 0.0):
+        pytest.fail("let in")
+    for _ in range(3):
+        with suppress(ClientLimitError), admission.request("a", 0.0):
+            pass
+    assert admission.refused == {IN_FLIGHT: 1, RATE: 2}
+
+
+def test_clients_that_are_gone_leave_nothing_behind() -> None:
+    admission = Admission(rate_hz=1000.0, concurrency=1, total_concurrency=1)
+    for number in range(100):
+        with admission.request(f"client {number}", 0.0):
+            assert len(admission._in_flight) == 1
+    assert not admission._in_flight
+
+
+# --- at the routes ------------------------------------------------------------------------------
+
+RATE_HZ = 0.1
+BURST = max(1, math.floor(RATE_HZ * BURST_S))
+
+
+@pytest.fixture(scope="module")
+def slow() -> Iterator[Served]:
+    with served("--field-rate-hz", str(RATE_HZ)) as running_bridge:
+        yield running_bridge
+
+
+@pytest.mark.parametrize("route", ROUTES)
+def test_every_route_of_a_field_has_the_limit(slow: Served, route: str) -> None:
+    with slow.client(address=f"127.0.1.{ROUTES.index(route) + 1}") as client:
+        query = QUERY.replace("co2", route)
+        first = client.get(route + query)
+        assert first.status_code == 200
+        assert client.get(route + query).content == first.content, "what is kept costs nothing"
+        second = client.get(route + QUERY.replace("co2", f"other {route}"))
+        assert second.status_code == 429
+        assert 1 <= int(second.headers["retry-after"]) <= 1 / RATE_HZ
+        refusal = schema.GetFieldResponse.model_validate_json(second.content)
+        assert not refusal.ok
+        assert (refusal.values, refusal.width, refusal.sample_count) == ([], 0, 0)
+        assert "for more than 0.1 computed answers a second, the limit (field_rate_hz)" in (
+            refusal.error_message
+        )
+
+
+def test_what_needs_no_computing_costs_no_turn(slow: Served) -> None:
+    with slow.client(address="127.0.2.1") as client:
+        for _ in range(5):
+            assert client.get("/api/field?sensor_type=co2&resolution=-1").status_code == 400
+        tag = client.get("/api/field" + QUERY).headers["etag"]
+        for _ in range(5):
+            known = client.get("/api/field" + QUERY, headers={"If-None-Match": tag})
+            assert (known.status_code, known.content) == (304, b"")
+        assert client.get("/api/field" + QUERY.replace("co2", "another")).status_code == 429
+
+
+@pytest.mark.parametrize("route", COMPUTED)
+def test_every_other_answer_that_is_computed_has_it_too(slow: Served, route: str) -> None:
+    address = f"127.0.4.{COMPUTED.index(route) + 1}"
+    with slow.client(address=address) as client:
+        assert client.get("/api/field.npy" + QUERY.replace("co2", address)).status_code == 200
+        answer = client.get(route, headers={"Host": f"localhost:{COMPUTED.index(route) + 1}"})
+        assert answer.status_code == 429
+        assert 1 <= int(answer.headers["retry-after"]) <= 1 / RATE_HZ
+        detail = schema.ErrorMessage.model_validate_json(answer.content).detail
+        assert detail == (
+            f"{address} asks for more than 0.1 computed answers a second, the limit (field_rate_hz)"
+        )
+
+
+@pytest.mark.parametrize("route", ["/docs", "/openapi.json"])
+def test_what_is_written_once_passes(slow: Served, route: str) -> None:
+    with slow.client(address=f"127.0.5.{len(route)}") as client:
+        assert [client.get(route).status_code for _ in range(5)] == [200] * 5
+
+
+def test_a_client_past_its_limit_holds_up_no_other(slow: Served) -> None:
+    with slow.client("127.0.3.1") as greedy, slow.client("127.0.3.2") as modest:
+        fields = [f"/api/field{QUERY.replace('co2', f'greedy {n}')}" for n in range(20)]
+        answers = [greedy.get(field).status_code for field in fields]
+        assert answers == [200] * BURST + [429] * (20 - BURST)
+        assert modest.get(fields[-1]).status_code == 200
+
+
+def test_with_all_places_taken_it_is_503_until_one_is_free(domain: int) -> None:
+    async def test() -> None:
+        async with running(Settings(field_total_concurrency=2)) as it:
+            with ExitStack() as taken:
+                for _ in range(2):
+                    taken.enter_context(it.bridge.admission.computing())
+                busy = await it.http.get("/api/field" + QUERY)
+                assert it.bridge.admission.refused == {TOTAL: 1}
+                assert busy.status_code == 503
+                assert busy.headers["retry-after"] == "1"
+                assert "the limit (field_total_concurrency)" in busy.json()["detail"]
+            free = await asyncio.gather(*(it.http.get("/api/field" + QUERY) for _ in range(2)))
+            assert [answer.status_code for answer in free] == [200, 200]
+
+    run(domain, test())
+
+
+def test_a_place_is_held_until_the_twin_has_answered_and_then_given_back(domain: int) -> None:
+    """Of a twin that does not answer, no more clients wait than the limit allows."""
+
+    async def never(_work: object) -> None:
+        await asyncio.Event().wait()
+
+    async def test() -> None:
+        async with running(Settings(field_concurrency=3, field_timeout_s=0.5)) as it:
+            it.twin._thread.call = never  # type: ignore[method-assign, assignment]
+            fields = [f"/api/field{QUERY.replace('co2', f'{n}')}" for n in range(8)]
+            answers = await asyncio.gather(*map(it.http.get, fields))
+            assert sorted(answer.status_code for answer in answers) == [429] * 5 + [504] * 3
+            assert not it.bridge.admission._in_flight
+
+    run(domain, test())

@@ -25,7 +25,7 @@ BENCH_ENV := ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_LOG_DIR=$(CURDIR)/$(DON
 
 say = @printf '\033[1m==> %s\033[0m\n'
 
-.PHONY: help setup run test lint types unit hmi-test bench bench-live clean
+.PHONY: help setup run check quick test lint types unit hmi-test bench bench-live clean
 
 help: ## what there is
 	@grep -E '^[a-z-]+:.*## ' Makefile | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -76,6 +76,15 @@ $(DONE)/tools: .ci/tools | $(DONE)/checked
 	@touch $@
 
 # --- checks ------------------------------------------------------------------------------------
+
+# Two at a time, for none of them keeps two cores busy all along.
+check: setup ## the quick checks: lint, types, and every test that needs neither ROS nor a browser
+	@$(MAKE) --no-print-directory -j 2 --output-sync=target lint types hmi-test quick
+	$(say) 'quick checks passed; `make test` is the whole'
+
+quick: setup ## Python tests that need neither ROS nor a browser
+	$(say) 'Python tests without ROS and browser'
+	@$(TEST_ENV) $(BIN)/pytest -q -n 2 --dist worksteal --quick tests
 
 test: setup $(DONE)/tools lint types hmi-test unit ## every check: lint, types, unit, real ROS, browser
 	$(say) 'all checks passed'

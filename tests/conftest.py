@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
 from tests.support.domains import own_domain
+from tests.support.needs import is_quick, let_nothing_in
 from tests.support.shared_memory import remove_what_the_dead_left
 
 # Before anything imports rclpy: ROS would swallow a field of the wrong type, and leave the machine.
@@ -18,6 +20,22 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 # How long an example takes is the machine's business.
 settings.register_profile("here", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("here")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--quick", action="store_true", help="only tests that need neither ROS nor a browser"
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if config.getoption("--quick"):
+        let_nothing_in()
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Under --quick, not even imported; None: for others to decide."""
+    return True if config.getoption("--quick") and not is_quick(collection_path) else None
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

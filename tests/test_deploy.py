@@ -12,6 +12,7 @@ from lupin_bridge.cli import USAGE_ERROR, _parser, split_ros_args
 from lupin_bridge.configuration import settings_from
 from lupin_bridge.settings import variable
 from lupin_bridge.twin.source import STUCK_AFTER_S
+from tests.support.programs import program
 
 DEPLOY = Path(__file__).parents[1] / "backend" / "deploy"
 UNIT = DEPLOY / "lupin-twin.service"
@@ -36,7 +37,7 @@ def test_systemd_finds_nothing_wrong_with_the_unit(tmp_path: Path) -> None:
     checked = tmp_path / UNIT.name
     checked.write_bytes(UNIT.read_bytes())
     result = subprocess.run(
-        ["systemd-analyze", "verify", checked], capture_output=True, text=True, check=False
+        [program("systemd-analyze"), "verify", checked], capture_output=True, text=True, check=False
     )
     # What it does not know it tells of, and goes on.
     assert (result.returncode, result.stderr) == (0, "")

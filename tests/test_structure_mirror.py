@@ -23,6 +23,7 @@ ACROSS = (
     "test_fuzz_",
     "test_install",
     "test_live_",
+    "test_quick",
     "test_roslib",
     "test_structure_",
     "test_support_",

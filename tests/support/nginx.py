@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-import shutil
 import socket
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from tests.support.processes import Process
+from tests.support.programs import program
 from tests.support.waiting import wait_for
 
 CONFIGURATION = Path(__file__).parents[2] / "backend" / "deploy" / "nginx.conf"
@@ -41,10 +41,8 @@ def nginx(folder: Path, upstreams: Sequence[int]) -> Iterator[str]:
         port = free.getsockname()[1]
     file = folder / "nginx.conf"
     file.write_text(configured(folder, port, upstreams), encoding="utf-8")
-    program = shutil.which("nginx", path=f"{os.environ['PATH']}:/usr/sbin")
-    assert program is not None, "nginx is needed: .ci/tools installs it"
     own = f"daemon off; pid {folder / 'pid'}; error_log stderr warn;"
-    command = [program, "-p", str(folder), "-e", "stderr", "-c", str(file), "-g", own]
+    command = [program("nginx"), "-p", str(folder), "-e", "stderr", "-c", str(file), "-g", own]
     with Process(command, os.environ) as process:
 
         def listens() -> bool:

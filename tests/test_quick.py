@@ -1,0 +1,74 @@
+"""What `make check` runs: all that needs neither ROS nor a browser, and nothing that does."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.support.needs import OUTSIDE, TESTS, is_quick
+
+FILES = sorted(TESTS.rglob("test_*.py"))
+
+
+@pytest.mark.parametrize(
+    ("name", "quick"),
+    [
+        ("twin/test_idw.py", True),
+        ("twin/test_node.py", False),  # imports rclpy
+        ("bridge/access/test_policy.py", True),
+        ("bridge/access/test_middleware.py", False),  # starts a bridge
+        ("bridge/test_settings.py", True),
+        ("bridge/test_supervisor.py", False),
+        ("browser/test_geometry.py", False),
+        ("test_deploy.py", False),  # asks systemd
+        ("test_docs.py", True),  # the command's module, which imports ROS when it runs
+        ("test_live_nginx.py", False),
+        ("test_structure_imports.py", True),
+        ("browser", False),
+        ("bridge", True),
+    ],
+)
+def test_what_a_file_needs_is_read_off_its_imports(name: str, quick: bool) -> None:
+    assert is_quick(TESTS / name) == quick
+
+
+def test_a_need_is_found_through_any_module_and_not_in_functions(tmp_path: Path) -> None:
+    for text, quick in (
+        ("import numpy", True),
+        ("import rclpy.node", False),
+        ("from tests.support import processes", False),
+        ("from tests.support.web import bridge", False),
+        ("from lupin_bridge import roles", False),
+        ("try:\n    import rclpy\nexcept ImportError:\n    pass", False),
+        ("def test():\n    import rclpy", True),
+    ):
+        file = tmp_path / f"{len(list(tmp_path.iterdir()))}.py"
+        file.write_text(text, encoding="utf-8")
+        assert is_quick(file) == quick, text
+
+
+def test_a_good_part_is_quick_and_none_of_it_is_lost() -> None:
+    quick = [file for file in FILES if is_quick(file)]
+    assert len(FILES) / 3 < len(quick) < len(FILES)
+    result = subprocess.run(
+        [sys.executable, "-m", "pytest", "--quick", "--collect-only", "-qq", TESTS],
+        capture_output=True, text=True, check=False, cwd=TESTS.parent,
+    )  # fmt: skip
+    assert result.returncode == 0, result.stdout
+    collected = {line.partition(":")[0] for line in result.stdout.splitlines() if ": " in line}
+    assert collected == {file.relative_to(TESTS.parent).as_posix() for file in quick}
+
+
+@pytest.mark.parametrize("name", sorted(OUTSIDE))
+def test_what_is_not_to_be_had_cannot_be_imported_by_a_quick_test(
+    name: str, tmp_path: Path
+) -> None:
+    script = f"from tests.support.needs import let_nothing_in\nlet_nothing_in()\nimport {name}\n"
+    result = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False,
+        cwd=TESTS.parent,
+    )  # fmt: skip
+    assert f"ImportError: {name} is not for the quick tests" in result.stderr

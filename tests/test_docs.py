@@ -71,6 +71,7 @@ def test_every_topic_is_named_with_its_qos() -> None:
         (parameters.state_topic, 1),
     ):
         assert f"reliable, transient local, depth {depth}" in str(rows_by_name(topic))
+    assert "with the same stamp" in str(rows_by_name(parameters.times_topic))
     assert parameters.field_service_name in README
     assert documented == {}  # topics stand in the second column
 
@@ -94,7 +95,16 @@ def test_every_make_target_that_is_named_is_there() -> None:
     assert named <= targets
 
 
-@pytest.mark.parametrize("page", ["README.md", "backend/SECURITY.md", "backend/README.md"])
+@pytest.mark.parametrize(
+    "page",
+    [
+        "README.md",
+        "backend/SECURITY.md",
+        "backend/README.md",
+        "ros_node/README.md",
+        "tests/README.md",
+    ],
+)
 def test_every_file_that_a_page_names_is_there(page: str) -> None:
     text = (ROOT / page).read_text(encoding="utf-8")
     links = re.findall(r"\]\(([^)#:]+)\)", text)
@@ -113,3 +123,18 @@ def test_the_bridges_page_names_every_room_and_no_file_that_is_not_there() -> No
     assert [name for name in sorted(files) if not (bridge / name).is_file()] == []
     rooms = {f"{room}/" if (bridge / room).is_dir() else f"{room}.py" for room in ROOMS}
     assert rooms - named == set()
+
+
+def test_the_ros_packages_page_names_every_module_of_the_twin_and_none_that_is_not_there() -> None:
+    text = (ROOT / "ros_node" / "README.md").read_text(encoding="utf-8")
+    modules = {file.name for file in PACKAGES["lupin_twin"].glob("*.py")} - {"__init__.py"}
+    assert set(re.findall(r"(?<=`)\w+\.py(?=`)", text)) - {"oracle_idw.py"} == modules
+
+
+def test_the_tests_page_names_every_folder_and_no_file_that_is_not_there() -> None:
+    text = (ROOT / "tests" / "README.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`([\w/*]+(?:\.py|/))`", text))
+    folders = {f"{path.parent.name}/" for path in (ROOT / "tests").glob("*/__init__.py")}
+    assert folders <= named
+    for name in named:
+        assert list((ROOT / "tests").glob(name)), name

@@ -203,14 +203,14 @@ class Twin:
         self.own.add(write)
         self.tell()
 
-    def tell(self) -> None:
+    def tell(self, *, clock_went_back: bool = False) -> None:
         for tag in self.store.snapshot(0, "map").tags:
-            self.followed.follow(tag)
+            self.followed.follow(tag, clock_went_back=clock_went_back)
 
     def hold_to(self, now_ns: int) -> None:
         if self.store.hold_to(now_ns):
             self.own.hold_to(now_ns)
-            self.tell()
+            self.tell(clock_went_back=True)
 
 
 def test_who_follows_a_twin_sees_what_was_really_scanned_when() -> None:
@@ -251,6 +251,18 @@ def test_who_follows_a_twin_follows_its_clock_back() -> None:
     twin.write(scan("1", at_s=60.0, co2=1.0))
     assert twin.followed.of("1").scans == twin.own.of("1").scans
     assert stamps_s(twin.followed.of("1").scans) == [40.0, 50.0, 60.0]
+
+
+def test_a_twin_that_was_started_anew_and_knows_less_moves_nothing() -> None:
+    history, successor = History(), Twin()
+    for at_s in (1000.0, 2800.0):
+        twin = Twin()
+        twin.write(scan("1", at_s=at_s, co2=at_s))
+        history.follow(twin.store.snapshot(0, "map").tags[0])
+    successor.write(scan("1", at_s=1000.0, co2=1000.0))
+    history.follow(successor.store.snapshot(0, "map").tags[0])
+    assert values(history, "co2") == [(1000.0, 1000.0), (2800.0, 2800.0)]
+    assert stamps_s(history.of("1").tries) == [1000.0, 2800.0]
 
 
 def test_without_times_there_is_nothing_to_follow() -> None:

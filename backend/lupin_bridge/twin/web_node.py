@@ -176,9 +176,10 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         snapshot = convert.snapshot_of(msg, before, times)
         if snapshot.has_times:
             known = set() if before is None else set(map(id, before.tags))
+            went_back = before is not None and snapshot.stamp_ns < before.stamp_ns
             for tag in snapshot.tags:
                 if id(tag) not in known:
-                    self._history.follow(tag)
+                    self._history.follow(tag, clock_went_back=went_back)
         self._newest = snapshot
         self.digest = self._digest_of(snapshot.tags)
         if len(self._digests) > len(snapshot.tags):

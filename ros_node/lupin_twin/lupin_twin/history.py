@@ -113,11 +113,6 @@ class _Tag:
     def items(self) -> int:
         return len(self.tries.entries) + sum(len(scan.readings) for scan in self.scans.past)
 
-    @property
-    def newest_ns(self) -> int:
-        newest = [line.entries[-1][1].stamp_ns for line in (self.scans, self.tries) if line.entries]
-        return max(newest, default=0)
-
 
 class History:
     """The last `buffer_len` scans that brought readings, and as many tries, of each tag.
@@ -170,19 +165,16 @@ class History:
 
     # --- of a twin elsewhere: its states, one by one -------------------------------------------
 
-    def follow(self, tag: TagState) -> None:
+    def follow(self, tag: TagState, *, clock_went_back: bool = False) -> None:
         """Keep what a tag's state, with its times, tells of what was observed when.
 
+        `clock_went_back`: since the state before, so that the twin has moved what was later than
+        now. A state that merely knows less is that of a twin that was started anew.
         Of tries that lie closer together than two states, all but the last may be missed.
         """
-        times = [r.observed_at_ns for r in tag.readings if r.observed_at_ns is not None]
-        if tag.looked_at_ns is not None:
-            times.append(tag.looked_at_ns)
-        if tag.last_try is not None:
-            times.append(tag.last_try.stamp_ns)
         kept = self._tags.get(tag.tag_id)
-        if kept is not None and times and kept.newest_ns > max(times):
-            _hold(kept, max(times))  # the twin has followed a clock that went back
+        if clock_went_back and kept is not None and (times := _times_of(tag)):
+            _hold(kept, max(times))
         by_stamp: dict[int, list[Reading]] = {}
         for reading in tag.readings:
             if reading.observed_at_ns is not None and not _is_kept(kept, reading):
@@ -268,6 +260,15 @@ def _is_kept(tag: _Tag | None, reading: Reading) -> bool:
         if scan.stamp_ns == reading.observed_at_ns
         for kept in scan.readings
     )
+
+
+def _times_of(tag: TagState) -> list[int]:
+    times = [r.observed_at_ns for r in tag.readings if r.observed_at_ns is not None]
+    if tag.looked_at_ns is not None:
+        times.append(tag.looked_at_ns)
+    if tag.last_try is not None:
+        times.append(tag.last_try.stamp_ns)
+    return times
 
 
 def _tries_of(tag: TagState) -> list[PastTry]:

@@ -21,7 +21,7 @@ from lupin_twin.history import TagHistory
 from lupin_twin.parameters import ParameterError
 from lupin_twin.state import NANOSECONDS_PER_SECOND as S
 from lupin_twin.state import Reading, Snapshot, TagState, Try
-from tests.support.messages import NO_POSE, occupancy_grid, pose
+from tests.support.messages import INFO, NO_POSE, occupancy_grid, pose
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
 
@@ -61,9 +61,9 @@ class Stage:
         peer.publish("/twin/state", message, depth=1)
         return self.told_of(self.stamp_s * S)
 
-    def take_with_times(self, peer: Peer, *tags: TagState) -> Snapshot:
+    def take_with_times(self, peer: Peer, *tags: TagState, at_s: int | None = None) -> Snapshot:
         """Let a twin publish a state and its times, and return what the node makes of them."""
-        self.stamp_s += 1
+        self.stamp_s = self.stamp_s + 1 if at_s is None else at_s
         snapshot = Snapshot(self.stamp_s * S, "map", tags)
         times = deserialize_message(convert.TimesMessages().build(snapshot), TwinTimes)
         peer.publish("/twin/times", times, depth=1)
@@ -219,8 +219,8 @@ def test_a_look_and_a_scan_of_one_sensor_restamp_no_other(stage: Stage, peer: Pe
 
 def test_history_follows_a_clock_that_goes_back_as_the_twins_does(stage: Stage, peer: Peer) -> None:
     # The third is the twin's last reading held to the new time, the fourth a new one.
-    for at_s, value in ((100, 1.0), (200, 2.0), (7, 2.0), (9, 3.0)):
-        stage.take_with_times(peer, scanned(at_s, value))
+    for now_s, at_s, value in ((101, 100, 1.0), (201, 200, 2.0), (7, 7, 2.0), (10, 9, 3.0)):
+        stage.take_with_times(peer, scanned(at_s, value), at_s=now_s)
     assert co2(stage.node.history_of("1")) == [(7.0, 1.0), (7.0, 2.0), (9.0, 3.0)]
 
 
@@ -228,7 +228,7 @@ def test_what_is_observed_as_the_clock_goes_back_is_in_the_history(
     stage: Stage, peer: Peer
 ) -> None:
     for at_s, value in ((100, 1.0), (7, 2.0)):
-        stage.take_with_times(peer, scanned(at_s, value))
+        stage.take_with_times(peer, scanned(at_s, value), at_s=at_s)
     past = stage.node.history_of("1")
     assert past is not None
     assert {reading.value for scan in past.scans for reading in scan.readings} == {1.0, 2.0}
@@ -354,7 +354,7 @@ def test_a_message_past_the_limit_is_dropped_before_it_is_read(
     ros_logs.forward()
     (subscription,) = [s for s in stage.node.subscriptions if s.topic_name == topic]
     for size in (limit, limit + 1):
-        subscription.callback(bytes(size))
+        subscription.callback(bytes(size), INFO)
     dropped = [record.message for record in caplog.records if "dropped a message" in record.message]
     assert dropped == [
         f"dropped a message on {topic}: {limit + 1} bytes, the limit is {limit}",

@@ -56,7 +56,16 @@ def test_every_setting_is_named_with_its_default() -> None:
 
 def test_every_route_is_named_and_none_that_is_not_there() -> None:
     documented = set(rows("Ask it over HTTP and WebSocket"))
-    served = {"/", "/ws/state", "/rosbridge", "/signin", "/api/signin", "/docs", "/openapi.json"}
+    served = {
+        "/",
+        "/ws/state",
+        "/rosbridge",
+        "/signin",
+        "/api/signin",
+        "/api/signout",
+        "/docs",
+        "/openapi.json",
+    }
     served |= set(create_app(None).openapi()["paths"])
     assert documented == served
 

@@ -20,6 +20,7 @@ from websockets.exceptions import ConnectionClosed
 from lupin_bridge.serving.server import MAX_INBOUND_BYTES
 from lupin_bridge.serving.ws_protocol import FRAMES_AT_ONCE, FRAMES_PER_S
 from tests.bench.bench_live import Server, serving
+from tests.support import raw_http
 from tests.support.proc_stat import open_files, peak_mb, reset_peak, resident_mb
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Listener, bridge, deaf_client, listener
@@ -252,3 +253,32 @@ def test_one_client_too_many_is_told_so_and_may_come_when_another_has_gone() -> 
         wait_for(is_let_in, "the place that has become free")
         for client in inside[1:]:
             client.until("state")
+
+
+@pytest.mark.parametrize("path", [b"/ws/state", b"/rosbridge"])
+def test_one_address_does_not_keep_the_places_from_the_others(path: bytes) -> None:
+    hello = b"GET %b HTTP/1.1\r\n%b\r\n" % (path, raw_http.UPGRADE)
+    with bridge("--max-clients", "4") as live, ExitStack() as stack:
+        greedy = [stack.enter_context(live.listen()) for _ in range(4)]
+        for client in greedy:
+            client.until("state")
+        others = []
+        for number in range(2):
+            other = stack.enter_context(raw_http.connect(live.url, f"127.0.9.{number}"))
+            other.sendall(hello)
+            others.append(other)
+            with pytest.raises(ConnectionClosed) as closed:
+                greedy.pop().until("never", lambda _: False)
+            assert closed.value.rcvd is not None
+            assert closed.value.rcvd.code == 1013
+            assert f"the limit, {4 - number} of them from here" in closed.value.rcvd.reason
+        with live.listen() as refused, pytest.raises(ConnectionClosed) as closed:
+            refused.next()
+        assert closed.value.rcvd is not None
+        assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (
+            1013,
+            "4 clients are connected, the limit",
+        )
+        for client in greedy:
+            client.until("state")
+        assert not any(map(is_over, others))

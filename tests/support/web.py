@@ -37,6 +37,7 @@ ROUTES = {
     "/healthz": True,
     "/readyz": True,
     "/metrics": True,
+    "/api/session": True,
     "/openapi.json": False,
     "/docs": False,
 }

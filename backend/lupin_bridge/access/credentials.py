@@ -1,8 +1,8 @@
 """The bearer token, and the browser session that it opens. Pure.
 
 A session's cookie is stateless, so that it survives a restart and holds at every replica that has
-the same token: its expiry, and an HMAC (RFC 2104) of that under a key derived from the token. A
-new token ends every session.
+the same token: its end, its name, and an HMAC (RFC 2104) of both under a key derived from the
+token. A new token ends every session.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import hmac
 import re
+from dataclasses import dataclass
 from typing import Final
 
 from lupin_bridge.settings import SettingError
@@ -21,7 +22,17 @@ _TOKEN: Final = re.compile(r"[A-Za-z0-9._~+/-]+=*")
 # Long enough for a shift's screen not to ask daily, short enough for a lost tablet to forget.
 SESSION_S: Final = 7 * 24 * 3600
 
-_COOKIE: Final = re.compile(r"(?P<expires>[0-9]{1,12})\.(?P<mac>[0-9a-f]{64})")
+_COOKIE: Final = re.compile(
+    r"(?P<session>(?P<ends>[0-9]{1,12})\.(?P<name>[0-9a-f]{32}))\.(?P<mac>[0-9a-f]{64})"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class BrowserSession:
+    """A browser that has signed in; `ends_s` is in s since the epoch."""
+
+    name: str
+    ends_s: int
 
 
 class TokenError(SettingError):
@@ -59,17 +70,22 @@ class Credentials:
         right = hmac.compare_digest(_digest(given.strip().encode()), self._digest)
         return right and scheme.lower() == "bearer"
 
-    def cookie(self, now_s: float) -> str:
-        """A session's cookie from `now_s` on, s since the epoch."""
-        expires = int(now_s) + SESSION_S
-        return f"{expires}.{self._mac(str(expires))}"
+    def cookie(self, name: str, now_s: float) -> str:
+        """The cookie of a session from `now_s` on, s since the epoch.
 
-    def accepts_cookie(self, value: str, now_s: float) -> bool:
-        """Whether a cookie is one of ours that has not expired."""
-        match = _COOKIE.fullmatch(value)
-        if match is None or int(match["expires"]) <= now_s:
-            return False
-        return hmac.compare_digest(match["mac"].encode(), self._mac(match["expires"]).encode())
+        `name` is 32 hexadecimal digits that no other session has.
+        """
+        session = f"{int(now_s) + SESSION_S}.{name}"
+        return f"{session}.{self._mac(session)}"
+
+    def session_of(self, cookie: str, now_s: float) -> BrowserSession | None:
+        """The session that a cookie stands for; None: it is none of ours, or has ended."""
+        match = _COOKIE.fullmatch(cookie)
+        if match is None or int(match["ends"]) <= now_s:
+            return None
+        if not hmac.compare_digest(match["mac"].encode(), self._mac(match["session"]).encode()):
+            return None
+        return BrowserSession(match["name"], int(match["ends"]))
 
     def _mac(self, text: str) -> str:
         return hmac.new(self._key, text.encode(), hashlib.sha256).hexdigest()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import math
 import time
@@ -12,20 +13,26 @@ import orjson
 from starlette.datastructures import MutableHeaders
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from websockets.frames import CloseCode
 
 from lupin_bridge.access import cookies
 from lupin_bridge.access.cookies import CookieTooLong
-from lupin_bridge.access.credentials import Credentials
+from lupin_bridge.access.credentials import BrowserSession, Credentials
 from lupin_bridge.access.entrance import path_of
 from lupin_bridge.access.policy import AccessPolicy, Asked, HostError, OriginError
 from lupin_bridge.access.security import with_security_headers
+from lupin_bridge.access.sessions import Sessions
 from lupin_bridge.serving.rate_limit import RateLimit, client_key
+from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.settings import SettingError, Settings
 
 log = logging.getLogger(__name__)
 
 # What a browser needs to sign in, and what a supervisor needs to see that the process lives.
 OPEN_PATHS: Final = frozenset({"/signin", "/signin.js", "/signin.css", "/healthz"})
+
+# In a request's state: the session that it was let in by, where it was one.
+SESSION_KEY: Final = "session"
 
 # Wrong tokens an address may send at once, and a minute from then on.
 GUESS_BURST: Final = 10
@@ -44,6 +51,7 @@ class Access:
     policy: AccessPolicy = field(default_factory=AccessPolicy)
     credentials: Credentials | None = None
     secure: bool = False
+    sessions: Sessions = field(default_factory=Sessions)
 
     @classmethod
     def of(cls, settings: Settings, token: str | None) -> Self:
@@ -85,17 +93,42 @@ class AccessControl:
         if self._access.policy.origins:
             send = _with_cors(send, verdict.foreign)
         if verdict.refusal is not None:
-            refusal: _Refusal | None = _Refusal(403, verdict.refusal)
+            refusal = _Refusal(403, verdict.refusal)
         elif verdict.foreign is not None and _is_preflight(request):
             refusal = _Refusal(204, "", _PREFLIGHT_HEADERS)
         else:
-            refusal = self._check_credentials(request)
-        if refusal is None:
-            await self._app(_without_cookies(scope), receive, send)
-        else:
-            await refusal.send(scope, receive, send)
+            checked = self._check_credentials(request)
+            if not isinstance(checked, _Refusal):
+                await self._let_in(checked, scope, receive, send)
+                return
+            refusal = checked
+        await refusal.send(scope, receive, send)
 
-    def _check_credentials(self, request: HTTPConnection) -> _Refusal | None:
+    async def _let_in(
+        self, session: BrowserSession | None, scope: Scope, receive: Receive, send: Send
+    ) -> None:
+        scope = _without_cookies(scope)
+        if session is None:
+            await self._app(scope, receive, send)
+            return
+        scope["state"] = {**scope.get("state", {}), SESSION_KEY: session}
+        if scope["type"] == "http":
+            await self._app(scope, receive, send)
+            return
+        connection: Connection = scope["state"][CONNECTION_KEY]
+
+        def close() -> None:
+            connection.dismiss(CloseCode.POLICY_VIOLATION, "the session has ended: sign in again")
+
+        timer = asyncio.get_running_loop().call_later(session.ends_s - time.time(), close)
+        try:
+            with self._access.sessions.holds(session, close):
+                await self._app(scope, receive, send)
+        finally:
+            timer.cancel()
+
+    def _check_credentials(self, request: HTTPConnection) -> _Refusal | BrowserSession | None:
+        """The session that the request is let in by, None: by another right, or why it is not."""
         credentials = self._access.credentials
         path = path_of(request.scope)
         if credentials is None or path in OPEN_PATHS:
@@ -108,8 +141,10 @@ class AccessControl:
             values = cookies.values_of(credentials.cookie_name, request.scope["headers"])
         except CookieTooLong as error:
             return _Refusal(431, str(error))
-        if any(credentials.accepts_cookie(value, time.time()) for value in values):
-            return None
+        for value in values:
+            session = credentials.session_of(value, time.time())
+            if session is not None and not self._access.sessions.has_ended(session):
+                return session
         if _wants_page(request):
             # Relative, for a bridge behind a path prefix.
             location = "../" * (path.count("/") - 1) + "signin"
@@ -192,6 +227,7 @@ def _asked(request: HTTPConnection) -> Asked:
         origins=headers.getlist("origin"),
         fetch_site=headers.get("sec-fetch-site", ""),
         fetch_mode=headers.get("sec-fetch-mode", ""),
+        fetch_dest=headers.get("sec-fetch-dest", ""),
     )
 
 

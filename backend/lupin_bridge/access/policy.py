@@ -9,7 +9,8 @@ foreign pages from reading, or computing, anything through it:
 - Origin (RFC 6454): a request that a page makes in CORS mode, or for a WebSocket, names the page's
   origin. It has to be this bridge's own, or one that the operator has allowed.
 - Sec-Fetch-Site (W3C Fetch Metadata): a request without Origin that a foreign page makes, for an
-  `<img>` say, is turned away as well. The page could not read the answer, only make us compute it.
+  `<img>` or an `<iframe>` say, is turned away as well. The page could not read the answer, only
+  make us compute it.
 
 Programs other than browsers send neither Origin nor Sec-Fetch-Site and are not concerned.
 """
@@ -78,7 +79,7 @@ def parse_host(text: str) -> str:
 class Asked:
     """What a request says of where it comes from; headers in the order of their appearance.
 
-    `scheme` is http or https, for WebSockets too; `fetch_site` and `fetch_mode` are "" if absent.
+    `scheme` is http or https, for WebSockets too; the values of Sec-Fetch headers are "" if absent.
     """
 
     scheme: str
@@ -86,6 +87,7 @@ class Asked:
     origins: Sequence[str] = ()
     fetch_site: str = ""
     fetch_mode: str = ""
+    fetch_dest: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,8 +126,10 @@ class AccessPolicy:
             )
         if asked.origins:
             return self._judge_origin(asked, authority)
-        # A navigation shows our page to a person; the page that led there does not see it.
-        if asked.fetch_site in ("cross-site", "same-site") and asked.fetch_mode != "navigate":
+        # A link shows our page to a person; the page that led there does not see it. A frame, or an
+        # object, is a navigation too, of which the person need not see anything.
+        is_link = asked.fetch_mode == "navigate" and asked.fetch_dest == "document"
+        if asked.fetch_site in ("cross-site", "same-site") and not is_link:
             return Verdict(
                 "a page of another origin asks without naming itself: load it in CORS mode "
                 "(<img crossorigin>, or fetch) and start the bridge with --allow-origin for it"

@@ -46,7 +46,7 @@ async def rosbridge(websocket: WebSocket) -> None:
     """The read-only part of the rosbridge v2 protocol."""
     bridge: Bridge = websocket.app.state.bridge
     await websocket.accept()
-    if bridge.hub.is_full:
+    if not bridge.hub.make_place(client_of(websocket)):
         limit = bridge.hub.max_clients
         await websocket.close(CLOSE_TRY_AGAIN_LATER, f"{limit} clients are connected, the limit")
         return
@@ -64,6 +64,7 @@ class _Conversation:
         self._session = Session(bridge.source.names())
         self._client = Client(
             self._connection,
+            address=self._address,
             strict_interval=True,
             wants_status=False,
             wants_state=False,

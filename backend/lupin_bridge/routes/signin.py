@@ -1,17 +1,26 @@
-"""Signing in with a browser: a small page, and the exchange of the token for a session cookie."""
+"""Signing in with a browser, and out: a small page, and the token for a session's cookie."""
 
 from __future__ import annotations
 
+import secrets
 import time
 from functools import cache
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal, TypedDict
 
+import orjson
 from fastapi import APIRouter, Request, Response
 
-from lupin_bridge.access.credentials import SESSION_S
-from lupin_bridge.access.middleware import Access
-from lupin_bridge.routes.tools import NEVER_KEEP, REVALIDATE, error_response, read_route
+from lupin_bridge.access.credentials import SESSION_S, BrowserSession
+from lupin_bridge.access.middleware import SESSION_KEY, Access
+from lupin_bridge.routes.tools import (
+    NEVER_KEEP,
+    REVALIDATE,
+    error_response,
+    json_response,
+    read_route,
+)
+from lupin_bridge.stream import schema
 
 router = APIRouter()
 
@@ -35,14 +44,47 @@ async def sign_in(request: Request) -> Response:
     response = Response(status_code=204, headers=NEVER_KEEP)
     response.set_cookie(
         access.credentials.cookie_name,
-        access.credentials.cookie(time.time()),
+        access.credentials.cookie(secrets.token_hex(16), time.time()),
         max_age=SESSION_S,
-        path=f"{request.scope.get('root_path', '')}/",
-        secure=request.scope["scheme"] == "https",
-        httponly=True,
-        samesite="strict",
+        **_place_of(request),
     )
     return response
+
+
+@read_route(router, "/api/signout", include_in_schema=False)
+async def sign_out(request: Request) -> Response:
+    """End the session that the request comes with, and everything that it has open.
+
+    Only for pages of our own: a link, a picture or a prefetch elsewhere signs nobody out. To ask
+    how it would be (HEAD) does not, either.
+    """
+    access = _access_of(request)
+    if access.credentials is None:
+        return error_response("this bridge asks for no token: there is nothing to sign out of", 404)
+    site = request.headers.get("sec-fetch-site", "")
+    if site in ("cross-site", "same-site") or "sec-purpose" in request.headers:
+        return error_response("signing out is for the pages of this bridge", 403)
+    response = Response(status_code=204, headers=NEVER_KEEP)
+    if request.method == "GET":
+        session = _session_of(request)
+        if session is not None:
+            access.sessions.sign_out(session, time.time())
+        response.delete_cookie(access.credentials.cookie_name, **_place_of(request))
+    return response
+
+
+@read_route(
+    router,
+    "/api/session",
+    summary="Is this a session that can be signed out of?",
+    responses={200: {"model": schema.Session}},
+)
+async def session_route(request: Request) -> Response:
+    """Whether the request came with a session, and how long that still lasts."""
+    session = _session_of(request)
+    left_s = None if session is None else max(0.0, session.ends_s - time.time())
+    body = {"can_sign_out": session is not None, "seconds_left": left_s}
+    return json_response(orjson.dumps(body))
 
 
 @read_route(router, "/signin", include_in_schema=False)
@@ -63,6 +105,28 @@ async def style() -> Response:
 async def script() -> Response:
     """The page's script."""
     return _file("signin.js", "text/javascript; charset=utf-8")
+
+
+class _Place(TypedDict):
+    path: str
+    secure: bool
+    httponly: bool
+    samesite: Literal["strict"]
+
+
+def _place_of(request: Request) -> _Place:
+    """Where a browser keeps the cookie, and when it sends it along."""
+    return {
+        "path": f"{request.scope.get('root_path', '')}/",
+        "secure": request.scope["scheme"] == "https",
+        "httponly": True,
+        "samesite": "strict",
+    }
+
+
+def _session_of(request: Request) -> BrowserSession | None:
+    session: BrowserSession | None = request.scope["state"].get(SESSION_KEY)
+    return session
 
 
 def _access_of(request: Request) -> Access:

@@ -8,6 +8,7 @@ from typing import Final
 import orjson
 from fastapi import APIRouter, Request, Response, WebSocket
 
+from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.routes.computing import (
     computed_response,
@@ -61,13 +62,14 @@ async def ws_state(websocket: WebSocket) -> None:
     # What is selected is what is sent: a query may ask for JSON although CBOR was offered.
     chosen = query.encoding if query.encoding in offered else None
     await websocket.accept(subprotocol=chosen)
-    if bridge.hub.is_full:
+    if not bridge.hub.make_place(client_of(websocket)):
         limit = bridge.hub.max_clients
         await websocket.close(CLOSE_TRY_AGAIN_LATER, f"{limit} clients are connected, the limit")
         return
     connection: Connection = getattr(websocket.state, CONNECTION_KEY)
     client = Client(
         connection,
+        address=client_of(websocket),
         encoding=query.encoding,
         delta=query.delta,
         min_interval_s=query.min_interval_s,

@@ -11,6 +11,7 @@ are arguments.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Protocol
@@ -64,10 +65,12 @@ class Client:
     """One listener: what it asked for, what it has got, and since when its socket is full.
 
     `min_interval_s` is the time between two frames: now and then a tenth less, on average right;
-    never less where `strict_interval`. `wire` writes a frame as this client reads it.
+    never less where `strict_interval`. `wire` writes a frame as this client reads it. `address` is
+    the one whose share of the places it takes.
     """
 
     connection: Writable
+    address: str = ""
     encoding: str = JSON
     delta: bool = False
     min_interval_s: float = 0.0
@@ -93,7 +96,9 @@ class Hub:
         self.bytes_sent = 0
         self.clients_dismissed = 0
         self._client_timeout_s = client_timeout_s
-        self._clients: set[Client] = set()
+        # In the order in which they came.
+        self._clients: dict[Client, None] = {}
+        self._parties: Counter[str] = Counter()
         self._frame: StateFrame | None = None
         self._status_at = status_at
         self._status_wires: dict[str, bytes] = {}
@@ -102,10 +107,25 @@ class Hub:
     def __len__(self) -> int:
         return len(self._clients)
 
-    @property
-    def is_full(self) -> bool:
-        """Whether one more client would be one too many."""
-        return len(self._clients) >= self.max_clients
+    def make_place(self, address: str) -> bool:
+        """Whether a client from this address may join.
+
+        One address may have all places that nobody else wants. Where they are all taken, the
+        newest client of the address with the most gives its own to who has at least two fewer.
+        """
+        if len(self._clients) < self.max_clients:
+            return True
+        largest, size = max(self._parties.items(), key=lambda party: party[1], default=("", 0))
+        if size < self._parties[address] + 2:
+            return False
+        newest = next(client for client in reversed(self._clients) if client.address == largest)
+        self.leave(newest)
+        self.clients_dismissed += 1
+        newest.connection.dismiss(
+            CLOSE_TRY_AGAIN_LATER,
+            f"{self.max_clients} clients are connected, the limit, {size} of them from here",
+        )
+        return True
 
     @property
     def blocked(self) -> int:
@@ -114,12 +134,17 @@ class Hub:
 
     def join(self, client: Client, now_s: float) -> None:
         """Add a client and give it the status and the current state at once, in that order."""
-        self._clients.add(client)
+        self._clients[client] = None
+        self._parties[client.address] += 1
         self.serve(client, now_s)
 
     def leave(self, client: Client) -> None:
         """Forget a client; harmless if it has left already."""
-        self._clients.discard(client)
+        if client in self._clients:
+            del self._clients[client]
+            self._parties[client.address] -= 1
+            if not self._parties[client.address]:
+                del self._parties[client.address]
 
     def publish(self, frame: StateFrame, now_s: float) -> None:
         """Make this the newest frame and give it to everyone who can take it."""

@@ -266,6 +266,13 @@ class Health(Contract):
     callback_errors: int
 
 
+class Session(Contract):
+    """`/api/session`: whether `/api/signout` would end it, and how long it lasts otherwise, s."""
+
+    can_sign_out: bool
+    seconds_left: float | None
+
+
 class ErrorMessage(Contract):
     """Body of a refusal outside the field routes."""
 

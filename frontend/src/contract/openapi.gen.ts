@@ -252,6 +252,26 @@ export interface paths {
         readonly patch?: never;
         readonly trace?: never;
     };
+    readonly "/api/session": {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        /**
+         * Is this a session that can be signed out of?
+         * @description Whether the request came with a session, and how long that still lasts.
+         */
+        readonly get: operations["session_route_api_session_get"];
+        readonly put?: never;
+        readonly post?: never;
+        readonly delete?: never;
+        readonly options?: never;
+        readonly head?: never;
+        readonly patch?: never;
+        readonly trace?: never;
+    };
 }
 export type webhooks = Record<string, never>;
 export interface components {
@@ -488,6 +508,16 @@ export interface components {
              * @description s since observed_at, as the tag's; null: not known
              */
             readonly stale_seconds: number | null;
+        };
+        /**
+         * Session
+         * @description `/api/session`: whether `/api/signout` would end it, and how long it lasts otherwise, s.
+         */
+        readonly Session: {
+            /** Can Sign Out */
+            readonly can_sign_out: boolean;
+            /** Seconds Left */
+            readonly seconds_left: number | null;
         };
         /**
          * StatusFrame
@@ -1427,6 +1457,26 @@ export interface operations {
                 };
                 content: {
                     readonly "application/json": components["schemas"]["StatusFrame"];
+                };
+            };
+        };
+    };
+    readonly session_route_api_session_get: {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        readonly requestBody?: never;
+        readonly responses: {
+            /** @description Successful Response */
+            readonly 200: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["Session"];
                 };
             };
         };

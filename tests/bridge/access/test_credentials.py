@@ -8,11 +8,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.access.credentials import MIN_TOKEN_LENGTH, SESSION_S, Credentials, TokenError
+from lupin_bridge.access.credentials import (
+    MIN_TOKEN_LENGTH,
+    SESSION_S,
+    BrowserSession,
+    Credentials,
+    TokenError,
+)
 
 TOKEN = "correct-horse~battery.staple/42+x="
 OURS = Credentials(TOKEN)
 NOW_S = 1_700_000_000.0
+NAME = "0123456789abcdef" * 2
 
 
 @pytest.mark.parametrize("token", ["", "short", "x" * (MIN_TOKEN_LENGTH - 1)])
@@ -66,44 +73,52 @@ def test_anything_else_is_not(header: str) -> None:
 
 
 def test_a_session_lasts_until_it_ends() -> None:
-    cookie = OURS.cookie(NOW_S)
-    assert OURS.accepts_cookie(cookie, NOW_S)
-    assert OURS.accepts_cookie(cookie, NOW_S + SESSION_S - 1)
-    assert not OURS.accepts_cookie(cookie, NOW_S + SESSION_S)
+    cookie = OURS.cookie(NAME, NOW_S)
+    session = BrowserSession(NAME, int(NOW_S) + SESSION_S)
+    assert OURS.session_of(cookie, NOW_S) == session
+    assert OURS.session_of(cookie, NOW_S + SESSION_S - 1)
+    assert not OURS.session_of(cookie, NOW_S + SESSION_S)
 
 
 def test_a_session_holds_at_every_replica_and_after_a_restart() -> None:
     other = Credentials(TOKEN)
-    assert other.accepts_cookie(OURS.cookie(NOW_S), NOW_S)
+    assert other.session_of(OURS.cookie(NAME, NOW_S), NOW_S)
     assert other.cookie_name == OURS.cookie_name
 
 
 def test_a_new_token_ends_every_session() -> None:
     other = Credentials(TOKEN + "=")
-    assert not other.accepts_cookie(OURS.cookie(NOW_S), NOW_S)
+    assert not other.session_of(OURS.cookie(NAME, NOW_S), NOW_S)
     assert other.cookie_name != OURS.cookie_name
 
 
 def test_a_cookie_cannot_be_made_to_last_longer() -> None:
-    expires, _, mac = OURS.cookie(NOW_S).partition(".")
-    for later in (f"{int(expires) + 1}", f"{expires}0", f"0{expires}"):
-        assert not OURS.accepts_cookie(f"{later}.{mac}", NOW_S)
+    ends, _, rest = OURS.cookie(NAME, NOW_S).partition(".")
+    for later in (f"{int(ends) + 1}", f"{ends}0", f"0{ends}"):
+        assert not OURS.session_of(f"{later}.{rest}", NOW_S)
+
+
+def test_nor_to_be_another_session() -> None:
+    ends, name, mac = OURS.cookie(NAME, NOW_S).split(".")
+    for other in (name[::-1], name.upper(), name[:-1], f"{name}0", ""):
+        assert not OURS.session_of(f"{ends}.{other}.{mac}", NOW_S)
+    assert not OURS.session_of(f"{ends}.{mac}", NOW_S)
 
 
 def test_a_cookie_is_neither_the_token_nor_a_plain_hash_of_it() -> None:
-    cookie = OURS.cookie(NOW_S)
-    assert re.fullmatch(r"[0-9]+\.[0-9a-f]{64}", cookie)
+    cookie = OURS.cookie(NAME, NOW_S)
+    assert re.fullmatch(rf"[0-9]+\.{NAME}\.[0-9a-f]{{64}}", cookie)
     assert TOKEN not in cookie
 
 
 @given(st.text(max_size=100))
 def test_no_other_text_is_a_cookie(text: str) -> None:
-    assert not OURS.accepts_cookie(text, NOW_S)
+    assert not OURS.session_of(text, NOW_S)
 
 
 @pytest.mark.parametrize("mac", ["0" * 64, "", "f" * 63, "F" * 64, "\u0660" * 64])
 def test_a_made_up_mac_is_refused(mac: str) -> None:
-    assert not OURS.accepts_cookie(f"{int(NOW_S) + 60}.{mac}", NOW_S)
+    assert not OURS.session_of(f"{int(NOW_S) + 60}.{NAME}.{mac}", NOW_S)
 
 
 def test_credentials_do_not_show_the_token() -> None:

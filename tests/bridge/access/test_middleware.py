@@ -151,8 +151,11 @@ def test_a_picture_in_a_foreign_page_is_not_even_computed(open_bridge: Served) -
     answer = open_bridge.get("/api/field.png?sensor_type=co2", hidden)
     assert answer.status_code == 403
     assert "asks without naming itself" in refusal_of(answer)
-    link = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "navigate"}
-    assert open_bridge.get("/", link).status_code == 200
+    frame = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "navigate"}
+    for dest in ("iframe", "frame", "embed", "object"):
+        framed = open_bridge.get("/api/field?sensor_type=co2", {**frame, "Sec-Fetch-Dest": dest})
+        assert framed.status_code == 403
+    assert open_bridge.get("/", {**frame, "Sec-Fetch-Dest": "document"}).status_code == 200
 
 
 # --- the token ----------------------------------------------------------------------------------

@@ -219,22 +219,30 @@ def test_any_text_is_an_origin_or_none(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("site", "mode", "passes"),
+    ("site", "mode", "dest", "passes"),
     [
-        ("", "", True),  # not a browser, or one without TLS beyond localhost
-        ("none", "navigate", True),  # typed into the address bar
-        ("same-origin", "cors", True),
-        ("same-origin", "no-cors", True),
-        ("cross-site", "navigate", True),  # a link, which no page can read through
-        ("same-site", "navigate", True),
-        ("cross-site", "no-cors", False),  # <img>, <script>, <link>
-        ("same-site", "no-cors", False),  # the same from another port of this host
+        ("", "", "", True),  # not a browser, or one without TLS beyond localhost
+        ("none", "navigate", "document", True),  # typed into the address bar
+        ("same-origin", "cors", "empty", True),
+        ("same-origin", "no-cors", "image", True),
+        ("same-origin", "navigate", "iframe", True),  # whom the page frames, it may
+        ("cross-site", "navigate", "document", True),  # a link, which no page can read through
+        ("same-site", "navigate", "document", True),
+        ("cross-site", "no-cors", "image", False),  # <img>, <script>, <link>
+        ("same-site", "no-cors", "image", False),  # the same from another port of this host
+        ("cross-site", "navigate", "iframe", False),
+        ("same-site", "navigate", "iframe", False),
+        ("cross-site", "navigate", "frame", False),
+        ("cross-site", "navigate", "embed", False),
+        ("cross-site", "navigate", "object", False),
+        ("cross-site", "navigate", "", False),
+        ("cross-site", "no-cors", "document", False),
     ],
 )
 def test_a_foreign_page_that_does_not_name_itself_gets_nothing(
-    site: str, mode: str, passes: bool
+    site: str, mode: str, dest: str, passes: bool
 ) -> None:
-    asked = Asked(scheme="http", hosts=["127.0.0.1"], fetch_site=site, fetch_mode=mode)
+    asked = Asked("http", ["127.0.0.1"], fetch_site=site, fetch_mode=mode, fetch_dest=dest)
     refusal = POLICY.judge(asked).refusal
     assert (refusal is None) == passes
     assert passes or "--allow-origin" in str(refusal)

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import re
+import secrets
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from http.cookies import Morsel, SimpleCookie
 
 import httpx
 import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
 
-from lupin_bridge.access.credentials import SESSION_S
+from lupin_bridge.access.credentials import SESSION_S, Credentials
 from tests.support.access import BEARER, TOKEN, Served, served
+from tests.support.waiting import PATIENCE_S
 
 
 @pytest.fixture(scope="module")
@@ -115,3 +120,130 @@ def test_without_a_token_there_is_nothing_to_sign_in_to() -> None:
         assert exchange.status_code == 404
         assert "asks for no token" in exchange.json()["detail"]
         assert "set-cookie" not in exchange.headers
+
+
+# --- signing out --------------------------------------------------------------------------------
+
+SAME_ORIGIN = {"Sec-Fetch-Site": "same-origin", "Sec-Fetch-Mode": "cors", "Sec-Fetch-Dest": "empty"}
+
+
+def session(closed: Served) -> dict[str, str]:
+    """The Cookie header of a new session."""
+    cookie = cookie_of(closed.get("/api/signin", BEARER))
+    return {"Cookie": f"{cookie.key}={cookie.value}"}
+
+
+def ending_in(seconds: float) -> dict[str, str]:
+    """The Cookie header of a session that lasts so much longer."""
+    ours = Credentials(TOKEN)
+    name = secrets.token_hex(16)
+    return {"Cookie": f"{ours.cookie_name}={ours.cookie(name, time.time() + seconds - SESSION_S)}"}
+
+
+@contextmanager
+def listening(closed: Served, headers: dict[str, str], path: str) -> Iterator[ClientConnection]:
+    """A WebSocket of that session."""
+    url = closed.url.replace("http", "ws", 1) + path
+    with connect(url, additional_headers=headers, proxy=None, ping_interval=None) as connection:
+        if path == "/rosbridge":
+            connection.send('{"op": "subscribe", "topic": "/twin/state"}')
+        connection.recv(timeout=PATIENCE_S)
+        yield connection
+
+
+def last_word(connection: ClientConnection) -> tuple[int, str]:
+    """The code and the reason with which a WebSocket is closed."""
+    try:
+        while True:
+            connection.recv(timeout=PATIENCE_S)
+    except ConnectionClosed as closed:
+        return (0, "") if closed.rcvd is None else (closed.rcvd.code, closed.rcvd.reason)
+
+
+SIGNED_OUT = (1008, "the session has ended: sign in again")
+
+
+def test_signing_out_ends_the_session_here_and_in_the_browser(closed: Served) -> None:
+    mine, other = session(closed), session(closed)
+    assert mine != other, "two sessions, of the same second too"
+    answer = closed.get("/api/signout", {**mine, **SAME_ORIGIN})
+    assert (answer.status_code, answer.content) == (204, b"")
+    assert answer.headers["cache-control"] == "no-store"
+    cookie = cookie_of(answer)
+    assert (cookie.key, cookie.value) == (mine["Cookie"].partition("=")[0], "")
+    assert int(cookie["max-age"]) == 0
+    assert (cookie["path"], bool(cookie["httponly"])) == ("/", True)
+    assert closed.get("/api/state", mine).status_code == 401
+    assert closed.handshake(headers=mine) == 401
+    assert closed.get("/api/signout", mine).status_code == 401, "and that once"
+    assert closed.get("/api/state", other).status_code == 200
+
+
+@pytest.mark.parametrize("path", ["/ws/state", "/rosbridge"])
+def test_signing_out_closes_what_the_session_has_open_and_nothing_else(
+    closed: Served, path: str
+) -> None:
+    mine, other = session(closed), session(closed)
+    with (
+        listening(closed, mine, path) as first,
+        listening(closed, mine, path) as second,
+        listening(closed, other, path) as theirs,
+        listening(closed, BEARER, path) as program,
+    ):
+        assert closed.get("/api/signout", mine).status_code == 204
+        assert last_word(first) == last_word(second) == SIGNED_OUT
+        for unconcerned in (theirs, program):
+            unconcerned.ping().wait(PATIENCE_S)
+            unconcerned.recv(timeout=PATIENCE_S)
+
+
+@pytest.mark.parametrize("path", ["/ws/state", "/rosbridge"])
+def test_a_session_that_ends_by_itself_closes_what_it_has_open(closed: Served, path: str) -> None:
+    start_s = time.time()
+    with listening(closed, ending_in(3.0), path) as connection:
+        assert last_word(connection) == SIGNED_OUT
+    assert time.time() - start_s >= 2.0, "and not before: its end is in whole seconds"
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors", "Sec-Fetch-Dest": "image"},
+        {"Sec-Fetch-Site": "same-site", "Sec-Fetch-Mode": "no-cors", "Sec-Fetch-Dest": "image"},
+        {"Sec-Fetch-Site": "same-site", "Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": "document"},
+        {
+            "Sec-Fetch-Site": "cross-site",
+            "Sec-Fetch-Mode": "navigate",
+            "Sec-Fetch-Dest": "document",
+        },
+        {"Sec-Fetch-Site": "same-origin", "Sec-Purpose": "prefetch"},
+        {"Origin": "http://evil.example"},
+    ],
+)
+def test_no_other_page_signs_anybody_out(closed: Served, headers: dict[str, str]) -> None:
+    mine = session(closed)
+    answer = closed.get("/api/signout", {**mine, **headers})
+    assert answer.status_code == 403
+    assert "set-cookie" not in answer.headers
+    assert closed.get("/api/state", mine).status_code == 200
+
+
+def test_to_ask_for_the_head_signs_nobody_out(closed: Served) -> None:
+    mine = session(closed)
+    answer = closed.get("/api/signout", mine, method="HEAD")
+    assert (answer.status_code, "set-cookie" in answer.headers) == (204, False)
+    assert closed.get("/api/state", mine).status_code == 200
+
+
+def test_a_page_is_told_whether_it_can_sign_out(closed: Served) -> None:
+    told = closed.get("/api/session", session(closed)).json()
+    assert told["can_sign_out"]
+    assert SESSION_S - 600 < told["seconds_left"] <= SESSION_S
+    program = {"can_sign_out": False, "seconds_left": None}
+    assert closed.get("/api/session", BEARER).json() == program
+    assert closed.get("/api/session").status_code == 401
+    with served() as live:
+        assert live.get("/api/session").json() == program
+        answer = live.get("/api/signout")
+        assert answer.status_code == 404
+        assert "asks for no token" in answer.json()["detail"]

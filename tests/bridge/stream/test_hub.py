@@ -149,12 +149,49 @@ def test_who_has_left_gets_nothing_more(stage: Stage) -> None:
 def test_the_hub_is_full_at_its_limit_and_has_room_when_somebody_leaves() -> None:
     stage = Stage(max_clients=2)
     first = stage.join(Socket())
-    fullness = [stage.hub.is_full]
+    has_room = [stage.hub.make_place("")]
     stage.join(Socket())
-    fullness.append(stage.hub.is_full)
+    has_room.append(stage.hub.make_place(""))
     stage.hub.leave(first)
-    fullness.append(stage.hub.is_full)
-    assert (fullness, len(stage.hub)) == ([False, True, False], 1)
+    has_room.append(stage.hub.make_place(""))
+    assert (has_room, len(stage.hub)) == ([True, False, True], 1)
+
+
+def crowd(**parties: int) -> tuple[Stage, dict[str, list[Socket]]]:
+    """A full house of parties by their address, who came one party after the other."""
+    stage = Stage(max_clients=sum(parties.values()))
+    sockets = {address: [Socket() for _ in range(size)] for address, size in parties.items()}
+    for address, party in sockets.items():
+        for socket in party:
+            stage.join(socket, address=address)
+    return stage, sockets
+
+
+def test_in_a_full_house_the_newest_of_the_largest_party_gives_its_place_to_a_smaller_one() -> None:
+    stage, sockets = crowd(one=1, many=4, two=2)
+    assert stage.hub.make_place("another")
+    assert sockets["many"][-1].dismissed == (
+        1013,
+        "7 clients are connected, the limit, 4 of them from here",
+    )
+    assert [s.dismissed for party in sockets.values() for s in party].count(None) == 6
+    assert (len(stage.hub), stage.hub.clients_dismissed) == (6, 1)
+
+
+@pytest.mark.parametrize(("mine", "gets_a_place"), [(0, True), (1, True), (2, False), (3, False)])
+def test_only_to_who_has_two_fewer(mine: int, gets_a_place: bool) -> None:
+    stage, _ = crowd(mine=mine, many=3)
+    assert stage.hub.make_place("mine") == gets_a_place
+    assert len(stage.hub) == mine + 3 - gets_a_place
+
+
+def test_one_address_may_have_all_places_and_no_more() -> None:
+    stage, sockets = crowd(many=3)
+    assert not stage.hub.make_place("many")
+    assert all(socket.dismissed is None for socket in sockets["many"])
+    assert stage.hub.make_place("other")
+    stage.join(Socket(), address="other")
+    assert not stage.hub.make_place("many"), "it does not get it back"
 
 
 # --- slow clients -------------------------------------------------------------------------------

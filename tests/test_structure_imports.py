@@ -15,6 +15,7 @@ from tests.support.structure import (
     ARROWS,
     CLAIMS_PURITY,
     KNOW_ROS,
+    KNOW_THE_DISK,
     LIBRARIES,
     MODULES,
     PACKAGES,
@@ -186,12 +187,16 @@ def test_one_module_crosses_between_the_ros_thread_and_the_loop() -> None:
 
 
 def pure_modules() -> set[str]:
-    """Those that say so of themselves, and all of the twin's that do not know ROS."""
+    """Those that say so of themselves, and all of the twin's that know neither ROS nor the disk."""
     return {
         name
         for name, text in MODULES.items()
         if CLAIMS_PURITY.search(ast.get_docstring(ast.parse(text)) or "")
-        or (name.startswith("lupin_twin.") and name.partition(".")[2] not in KNOW_ROS["lupin_twin"])
+        or (
+            name.startswith("lupin_twin.")
+            and name.partition(".")[2] not in KNOW_ROS["lupin_twin"]
+            and name not in KNOW_THE_DISK
+        )
     }
 
 

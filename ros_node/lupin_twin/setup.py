@@ -7,7 +7,7 @@ setup(
     version="0.1.0",
     description="Digital twin of a greenhouse as a ROS 2 node.",
     license="Apache-2.0",
-    python_requires=">=3.10",
+    python_requires=">=3.11",
     packages=find_packages(),
     package_data={"lupin_twin": ["py.typed"]},
     # The messages come from lupin_msgs, rclpy from ROS (apt) or the ROS wheels (PyPI): naming

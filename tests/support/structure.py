@@ -35,6 +35,24 @@ KNOW_ROS = {
 }
 # What the patrol may use of the twin: how a node behaves, and nothing of what a twin knows.
 SHARED_WITH_PATROL = {"lupin_twin.habits", "lupin_twin.spinning", "lupin_twin.stop_signals"}
+# Those of the twin that know the disk, threads and clocks, and still no ROS.
+KNOW_THE_DISK = {
+    f"lupin_twin.journal.{module}"
+    for module in (
+        "appending",
+        "file",
+        "lock",
+        "pending",
+        "reading",
+        "restoring",
+        "retention",
+        "rollups",
+        "salvage",
+        "schema",
+        "syncing",
+        "writer",
+    )
+}
 # What else a package may use, and in which modules: None is all of them. The bridge may use what
 # its own dependencies list.
 LIBRARIES: Mapping[str, Mapping[str, set[str] | None]] = {
@@ -91,6 +109,49 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
         "lateness": set(),
         "ingest": {"drops", "history", "state"},
         "convert": {"state", "grid", "explored", "fields", "history", "ingest"},
+        "journal": set(),
+        "journal.rows": {"state"},
+        "journal.packing": {"state"},
+        "journal.condition": set(),
+        "journal.runs": set(),
+        "journal.pending": {"journal.rows"},
+        "journal.lock": set(),
+        "journal.schema": set(),
+        "journal.syncing": {"journal.schema"},
+        "journal.appending": {"journal.packing", "journal.rows", "journal.runs"},
+        "journal.reading": {"journal.packing", "journal.rows", "journal.runs", "state"},
+        "journal.restoring": {"journal.packing", "journal.reading", "journal.rows", "journal.runs"},
+        "journal.rollups": {"journal.packing", "journal.reading"},
+        "journal.retention": {"journal.rollups"},
+        "journal.salvage": {
+            "journal.packing",
+            "journal.reading",
+            "journal.rollups",
+            "journal.schema",
+        },
+        "journal.file": {
+            "journal.appending",
+            "journal.reading",
+            "journal.restoring",
+            "journal.retention",
+            "journal.rollups",
+            "journal.rows",
+            "journal.runs",
+            "journal.salvage",
+            "journal.schema",
+            "journal.syncing",
+        },
+        "journal.writer": {
+            "journal.condition",
+            "journal.file",
+            "journal.lock",
+            "journal.pending",
+            "journal.restoring",
+            "journal.retention",
+            "journal.rows",
+            "journal.runs",
+            "journal.schema",
+        },
         "ros_parameters": {"parameters"},
         "habits": {"cdr", "drops", "gaps", "ros_parameters", "throttle"},
         "node": {
@@ -202,6 +263,7 @@ PURE_STANDARD = frozenset(
         "struct",
         "typing",
         "urllib.parse",
+        "zlib",
     }
 )
 # And of libraries: what computes, and nothing that serves.

@@ -1,0 +1,51 @@
+"""How the journal is doing, as one value for whoever tells it.
+
+Pure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class JournalState(StrEnum):
+    """What the journal is at. Only in `recording` is everything kept as promised."""
+
+    OFF = "off"
+    STARTING = "starting"
+    RECORDING = "recording"
+    SLOW = "slow"  # the disk does not keep up: what is waiting is not safe yet
+    FAILING = "failing"  # nothing can be written; tried again and again
+    IN_USE = "in_use"  # another process writes this file
+    FOREIGN = "foreign"  # the file is somebody else's, or of a newer version
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """The state, a sentence about it, and counts since the twin started.
+
+    `waiting` rows are handed over and not written yet, the oldest of them for `behind_s`. `lost`
+    rows were given up because too many were waiting, `refused` rows could not be written by
+    their own fault, `repeated` ones were there already. `set_aside` names the last damaged file.
+    """
+
+    state: JournalState
+    detail: str = ""
+    path: str = ""
+    written: int = 0
+    repeated: int = 0
+    waiting: int = 0
+    behind_s: float = 0.0
+    lost: int = 0
+    refused: int = 0
+    file_bytes: int = 0
+    set_aside: str = ""
+
+    @property
+    def is_well(self) -> bool:
+        """Whether nothing has to be told."""
+        return self.state in (JournalState.OFF, JournalState.STARTING, JournalState.RECORDING)
+
+
+OFF = Condition(JournalState.OFF, "no journal is kept")

@@ -1,0 +1,138 @@
+"""Rows and journals for tests."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from lupin_twin.journal.condition import Condition, JournalState
+from lupin_twin.journal.file import JournalFile
+from lupin_twin.journal.reading import ending
+from lupin_twin.journal.restoring import Restored
+from lupin_twin.journal.retention import Limits
+from lupin_twin.journal.rows import LookRow, PinRow, Row, ScanRow
+from lupin_twin.journal.runs import Clock, Run
+from lupin_twin.journal.schema import open_reader
+from lupin_twin.journal.writer import Journal
+from lupin_twin.state import Bloom, Flower, Pose, Reading
+from tests.support.waiting import wait_for
+
+SECOND = 1_000_000_000
+NOW = 1_763_700_000 * SECOND
+LIMITS = Limits(days=36_500, max_bytes=4_000_000_000)
+CLOCK = Clock(NOW, NOW, is_simulated=False)
+
+
+def scan(
+    tag_id: str = "7", at_ns: int = NOW, *, source: str = "robot", **readings: float
+) -> ScanRow:
+    """A scan that worked."""
+    return ScanRow(
+        tag_id,
+        at_ns,
+        at_ns + 1000,
+        tuple(Reading(name, value) for name, value in (readings or {"temperature": 21.5}).items()),
+        source=source,
+        mission="m1",
+    )
+
+
+def look(tag_id: str = "7", at_ns: int = NOW, *, anomaly: bool = False) -> LookRow:
+    """A look at two flowers."""
+    flower = Flower(
+        species="lupin",
+        confidence=0.9,
+        anomaly=anomaly,
+        flower_count=2,
+        bug_count=int(anomaly),
+        blooms=(
+            Bloom(1.1, 2.2, 0.3, 0.25, "lupin", 0.8, anomaly=False),
+            Bloom(1.2, 2.1, 0.4, 0.5, "rose", 0.7, anomaly=anomaly),
+        ),
+        footprint=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.1)),
+    )
+    return LookRow(tag_id, at_ns, at_ns + 2000, flower, source="robot", mission="m1")
+
+
+def pin(tag_id: str = "7", at_ns: int = NOW, x: float = 1.5) -> PinRow:
+    """A place."""
+    return PinRow(tag_id, at_ns, at_ns + 1000, Pose(x, 2.5, 0.0, 0.0, 0.0, 0.0, 1.0))
+
+
+@contextmanager
+def opened(path: Path, limits: Limits = LIMITS) -> Iterator[JournalFile]:
+    """A journal's file, in this thread."""
+    file = JournalFile(path, limits, is_sound=None)
+    try:
+        yield file
+    finally:
+        file.close()
+
+
+def _run(file: JournalFile, now: Clock | None) -> Run:
+    """The run that `now` belongs to; without it the last one, or one that begins at `NOW`."""
+    last = None if now else ending(file._connection, is_simulated=False)
+    return file.first_run(now or (CLOCK if last is None else last.last))
+
+
+def kept(path: Path, rows: Iterable[Row], now: Clock | None = None) -> tuple[int, int]:
+    """Write rows, in one life of a twin; returns what `JournalFile.append` does."""
+    with opened(path) as file:
+        run = _run(file, now)
+        return file.append([(run, row) for row in rows])
+
+
+def restored(path: Path, now: Clock | None = None, scans: int = 32) -> Restored:
+    """What a twin that starts now gets to know."""
+    with opened(path) as file:
+        return file.restore(_run(file, now), scans)
+
+
+def known(path: Path, now: Clock | None = None) -> set[Row]:
+    """The rows of that."""
+    return set(restored(path, now).rows)
+
+
+def select(path: Path, sql: str) -> list[tuple[object, ...]]:
+    """What a reader sees."""
+    connection = open_reader(path)
+    try:
+        return connection.execute(sql).fetchall()
+    finally:
+        connection.close()
+
+
+def is_whole(path: Path) -> bool:
+    """Whether SQLite finds nothing wrong with a file."""
+    connection = sqlite3.connect(path)
+    try:
+        return connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+    finally:
+        connection.close()
+
+
+@contextmanager
+def recording(
+    path: Path, now: Clock = CLOCK, *, limits: Limits = LIMITS, **options: int
+) -> Iterator[Journal]:
+    """A journal at work, its clock begun."""
+    journal = Journal(path, "/test/lupin_twin", limits, **options)
+    try:
+        journal.begin(now, 32)
+        yield journal
+    finally:
+        journal.close(30.0)
+
+
+def wait_state(journal: Journal, state: JournalState, part: str = "") -> Condition:
+    """Wait until the journal is in a state, and says a part of a sentence."""
+
+    def look_at() -> Condition | None:
+        condition = journal.condition
+        return condition if condition.state is state and part in condition.detail else None
+
+    found = wait_for(look_at, f"a journal that is {state.value} ({part}): {journal.condition}")
+    assert found is not None
+    return found

@@ -1,0 +1,43 @@
+"""A process that does nothing but hand rows to a journal, until its input ends.
+
+Each row's number is in its stamp, and is noted in the file `marks` beside the journal once it was
+handed over. What the journal says of itself goes to the standard output.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+import time
+from pathlib import Path
+
+from lupin_twin.journal import file
+from lupin_twin.journal.writer import Journal
+from tests.support.journal import CLOCK, LIMITS, NOW, scan
+
+
+def main(path: Path, rows_a_second: int, log_bytes: int) -> None:
+    """Feed the journal."""
+    file._LOG_BYTES = log_bytes  # type: ignore[misc]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    marks = os.open(path.with_name("marks"), os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+    journal = Journal(path, "/child", LIMITS)
+    journal.begin(CLOCK)
+    journal.take_restored(10.0)
+    number, begun, told = 0, time.monotonic(), ""
+    while not select.select([sys.stdin], [], [], 1 / rows_a_second)[0]:
+        while number < (time.monotonic() - begun) * rows_a_second:
+            number += 1
+            journal.write(scan(str(number % 30), NOW + number, a=number / 7, b=1.0))
+            os.write(marks, b"%d\n" % number)
+        condition = journal.condition
+        say = f"{condition.state.value}\t{condition.written}\t{condition.lost}\t{condition.detail}"
+        if say != told:
+            told = say
+            print(say, flush=True)
+    journal.close(10.0)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))

@@ -1,0 +1,174 @@
+"""What a disk can do to the journal: run full, turn read-only, be slow, lose power."""
+
+from __future__ import annotations
+
+import random
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from tests.support.disk import Disk, after_power_cut, build, notes
+from tests.support.journal import NOW, is_whole, select
+from tests.support.waiting import wait_for
+
+ROOT = Path(__file__).parents[1]
+SECOND = 1_000_000_000
+RATE = 200
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build(tmp_path_factory.mktemp("disk"))
+
+
+@pytest.fixture
+def disk(tmp_path: Path, library: Path) -> Disk:
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    return Disk(folder, library, tmp_path / "control")
+
+
+class Told:
+    """What the child has said of its journal."""
+
+    def __init__(self, child: subprocess.Popen[str]) -> None:
+        self.last = ("", 0, 0, "")
+        self._child = child
+        self._thread = threading.Thread(target=self._read)
+        self._thread.start()
+
+    def _read(self) -> None:
+        assert self._child.stdout is not None
+        for line in self._child.stdout:
+            state, written, lost, detail = line.rstrip("\n").split("\t")
+            self.last = (state, int(written), int(lost), detail)
+
+    def join(self) -> None:
+        self._thread.join()
+
+    def wait(self, state: str, part: str = "", written: int = 0) -> None:
+        wait_for(
+            lambda: self.last[0] == state and part in self.last[3] and self.last[1] >= written,
+            f"a journal that is {state} ({part}), {written} rows written",
+        )
+
+
+@contextmanager
+def feeding(disk: Disk, log_bytes: int = 8_000_000) -> Iterator[Told]:
+    """A child that hands rows over; ends it by ending its input."""
+    command = [sys.executable, "-m", "tests.support.journal_child"]
+    child = subprocess.Popen(
+        [*command, str(disk.folder / "j.sqlite"), str(RATE), str(log_bytes)],
+        env=disk.env,
+        cwd=ROOT,
+        text=True,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
+    told = Told(child)
+    try:
+        yield told
+    finally:
+        assert child.stdin is not None
+        child.stdin.close()
+        try:
+            child.wait(20)
+        finally:
+            child.kill()
+            told.join()
+            child.wait()
+            if child.stdout is not None:
+                child.stdout.close()
+
+
+def numbers(path: Path) -> list[int]:
+    rows = select(path, "SELECT stamp_ns FROM scan ORDER BY id")
+    return [stamp - NOW for (stamp,) in rows if isinstance(stamp, int)]
+
+
+def test_a_full_disk_is_told_and_what_waits_is_written_when_there_is_room(disk: Disk) -> None:
+    with feeding(disk) as told:
+        told.wait("recording", written=50)
+        disk.be("full")
+        told.wait("failing", "full")
+        disk.be("well")
+        told.wait("recording", written=told.last[1] + 200)
+    found = numbers(disk.folder / "j.sqlite")
+    assert found == list(range(1, len(found) + 1))
+
+
+def test_a_disk_that_is_full_from_the_start_heals_too(disk: Disk) -> None:
+    disk.be("full")
+    with feeding(disk) as told:
+        told.wait("failing")
+        disk.be("well")
+        told.wait("recording", written=100)
+    found = numbers(disk.folder / "j.sqlite")
+    assert found == list(range(1, len(found) + 1))
+
+
+def test_a_read_only_folder_is_told_and_heals(disk: Disk) -> None:
+    disk.be("readonly")
+    with feeding(disk) as told:
+        told.wait("failing", "Read-only file system")
+        disk.be("well")
+        told.wait("recording", written=100)
+    found = numbers(disk.folder / "j.sqlite")
+    assert found == list(range(1, len(found) + 1))
+
+
+def test_a_slow_sync_delays_no_commit(disk: Disk) -> None:
+    with feeding(disk) as told:
+        told.wait("recording", written=50)
+        disk.be("slow-sync")
+        told.wait("recording", written=told.last[1] + 300)
+        assert told.last[2] == 0
+        disk.be("well")
+
+
+def test_a_slow_disk_is_told_and_nothing_is_lost(disk: Disk) -> None:
+    with feeding(disk) as told:
+        told.wait("recording", written=50)
+        disk.be("slow-write")
+        told.wait("slow", "the disk is slow: the journal is 2 s behind")
+        disk.be("well")
+        told.wait("recording", written=told.last[1] + 200)
+    found = numbers(disk.folder / "j.sqlite")
+    assert found == list(range(1, len(found) + 1))
+
+
+@pytest.mark.parametrize("log_bytes", [50_000, 8_000_000])
+def test_a_power_cut_costs_at_most_the_last_second(
+    disk: Disk, tmp_path: Path, log_bytes: int
+) -> None:
+    """At any moment, what was handed over a second before is on the disk.
+
+    The disk notes every write and every sync in their order; the files are rebuilt as of a moment
+    from what was synced by then, and from nothing else. A short log is put into the file, and begun
+    anew, many times.
+    """
+    disk.log = tmp_path / "log"
+    with feeding(disk, log_bytes=log_bytes) as told:
+        told.wait("recording", written=6 * RATE)
+    done = notes(disk.log)
+    handed_over = [
+        (note.at_ns, int(note.data))
+        for note in done
+        if note.kind == "W" and note.name.endswith("/marks")
+    ]
+    first_ns = next(at_ns for at_ns, number in handed_over if number == RATE)
+    moments = [index for index, note in enumerate(done) if note.at_ns > first_ns]
+    for cut in random.Random(1).sample(moments, 25):
+        into = tmp_path / f"cut{cut}"
+        into.mkdir()
+        after_power_cut(done[: cut + 1], into)
+        safe = [number for at_ns, number in handed_over if at_ns < done[cut].at_ns - SECOND]
+        found = numbers(into / "j.sqlite")
+        assert found == list(range(1, len(found) + 1))
+        assert len(found) >= (safe[-1] if safe else 0), f"cut at operation {cut}"
+        assert is_whole(into / "j.sqlite")

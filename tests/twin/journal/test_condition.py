@@ -1,0 +1,17 @@
+from __future__ import annotations
+
+import pytest
+
+from lupin_twin.journal.condition import OFF, Condition, JournalState
+
+WELL = {JournalState.OFF, JournalState.STARTING, JournalState.RECORDING}
+
+
+@pytest.mark.parametrize("state", JournalState)
+def test_what_does_not_keep_its_promise_has_to_be_told(state: JournalState) -> None:
+    assert Condition(state).is_well == (state in WELL)
+
+
+def test_off_says_so() -> None:
+    assert OFF.state is JournalState.OFF
+    assert OFF.detail == "no journal is kept"

@@ -1,0 +1,23 @@
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from lupin_twin.journal.lock import InUse, Lock
+
+
+def test_a_second_holder_is_refused_by_name(tmp_path: Path) -> None:
+    journal = tmp_path / "j.sqlite"
+    with (
+        Lock(journal, "/house/lupin_twin"),
+        pytest.raises(InUse, match=rf"{journal} is in use by /house/lupin_twin.*{os.getpid()}"),
+    ):
+        Lock(journal, "/other/lupin_twin")
+
+
+def test_what_is_let_go_of_can_be_held(tmp_path: Path) -> None:
+    for _ in range(2):
+        with Lock(tmp_path / "j.sqlite", "a twin"):
+            pass

@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+from lupin_twin.journal.pending import Entry, Pending
+from tests.support.journal import scan
+
+
+def entry(number: int) -> Entry:
+    return Entry(1, scan(at_ns=number), float(number))
+
+
+def test_what_is_put_is_taken_in_order() -> None:
+    pending = Pending()
+    for number in range(3):
+        pending.put(entry(number))
+    assert pending.arrived.is_set()
+    assert pending.take(2) == [entry(0), entry(1)]
+    assert pending.arrived.is_set()
+    assert pending.take(2) == [entry(2)]
+    assert not pending.arrived.is_set()
+
+
+def test_at_its_bound_nothing_is_lost_and_past_it_the_oldest() -> None:
+    pending = Pending(max_weight=6)  # a scan of one reading weighs 2
+    for number in range(3):
+        pending.put(entry(number))
+    assert pending.counts() == (3, 0, 0.0)
+    pending.put(entry(3))
+    assert pending.counts() == (3, 1, 1.0)
+    assert pending.take(9) == [entry(1), entry(2), entry(3)]
+
+
+def test_what_is_put_back_is_the_oldest_again_and_lost_first() -> None:
+    pending = Pending(max_weight=6)
+    for number in range(3):
+        pending.put(entry(number))
+    taken = pending.take(2)
+    pending.put(entry(3))
+    pending.put_back(taken)
+    assert pending.counts() == (3, 1, 1.0)
+    assert pending.take(9) == [entry(1), entry(2), entry(3)]
+
+
+def test_one_that_weighs_more_than_all_may_is_kept_alone() -> None:
+    pending = Pending(max_weight=1)
+    pending.put(entry(0))
+    assert pending.take(1) == [entry(0)]
+    assert pending.counts() == (0, 0, None)

@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from lupin_twin.journal.schema import open_writer
+from lupin_twin.journal.syncing import Syncing
+from tests.support.waiting import wait_for
+
+
+def test_what_is_written_is_synced_once_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[str] = []
+    sync = os.fdatasync
+
+    def watched(descriptor: int) -> None:
+        synced.append(str(Path(f"/proc/self/fd/{descriptor}").readlink()))
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fdatasync", watched)
+    path = tmp_path / "j.sqlite"
+    connection = open_writer(path)
+    connection.execute("INSERT INTO tag (tag_id) VALUES ('7')")
+    syncing = Syncing(path, period_s=0.01)
+    try:
+        for count in (1, 2):
+            syncing.has_written()
+            wait_for(lambda count=count: len(synced) == count, "a sync")  # type: ignore[misc]
+    finally:
+        syncing.close()
+        connection.close()
+    assert set(synced) == {f"{path}-wal"}
+
+
+def test_a_failed_sync_is_told_with_the_next_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(descriptor: int) -> None:
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(os, "fdatasync", fail)
+    path = tmp_path / "j.sqlite"
+    connection = open_writer(path)
+    connection.execute("INSERT INTO tag (tag_id) VALUES ('7')")
+    syncing = Syncing(path, period_s=0.0)
+    syncing.has_written()
+    wait_for(lambda: not syncing._thread.is_alive(), "the end of the thread")
+    with pytest.raises(OSError, match="Input/output"):
+        syncing.has_written()
+    syncing.close()
+    connection.close()

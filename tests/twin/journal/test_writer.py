@@ -1,0 +1,201 @@
+from __future__ import annotations
+
+import gc
+import os
+import sqlite3
+import statistics
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from lupin_twin.journal.condition import JournalState
+from lupin_twin.journal.file import JournalFile
+from lupin_twin.journal.retention import Limits
+from lupin_twin.journal.rows import Row
+from lupin_twin.journal.runs import Clock, Run
+from lupin_twin.journal.schema import DamagedFile
+from lupin_twin.journal.writer import Journal
+from tests.support.journal import (
+    CLOCK,
+    LIMITS,
+    NOW,
+    SECOND,
+    known,
+    pin,
+    recording,
+    scan,
+    select,
+    wait_state,
+)
+from tests.support.waiting import wait_for
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "state" / "j.sqlite"
+
+
+def count(path: Path) -> int:
+    ((rows,),) = select(path, "SELECT count(*) FROM scan")
+    assert isinstance(rows, int)
+    return rows
+
+
+def test_what_is_handed_over_is_written_and_known_after_a_restart(path: Path) -> None:
+    rows: set[Row] = {pin(), *(scan(str(n)) for n in range(1000))}
+    with recording(path) as journal:
+        assert journal.take_restored(30.0) is not None
+        for row in rows:
+            journal.write(row)
+        wait_for(lambda: journal.condition.written == 1001, "all rows")
+    with recording(path) as journal:
+        restored = journal.take_restored(30.0)
+        assert restored is not None
+        assert set(restored.rows) == rows
+        assert restored.count == 1001
+        assert journal.take_restored() is None
+        journal.write(scan("5"))
+        wait_for(lambda: journal.condition.repeated == 1, "a row that is there already")
+
+
+def test_what_is_waiting_when_the_twin_ends_is_written(path: Path) -> None:
+    with recording(path) as journal:
+        for n in range(2000):
+            journal.write(scan(at_ns=NOW + n))
+    assert not path.with_name("j.sqlite-wal").exists()
+    assert count(path) == 2000
+
+
+def test_before_the_clock_begins_nothing_is_written_and_nothing_lost(path: Path) -> None:
+    journal = Journal(path, "/twin", LIMITS)
+    wait_state(journal, JournalState.RECORDING)
+    journal.write(scan("early"))
+    assert journal.take_restored() is None
+    journal.begin(CLOCK)
+    wait_for(lambda: journal.condition.written == 1, "the row")
+    journal.close(30.0)
+    assert known(path) == {scan("early")}
+
+
+def test_rows_belong_to_the_clock_by_which_they_were_heard(path: Path) -> None:
+    with recording(path, Clock(5 * SECOND, NOW, is_simulated=True)) as journal:
+        journal.write(scan("a", 9 * SECOND))
+        journal.begin(Clock(2 * SECOND, NOW + 9 * SECOND, is_simulated=True))
+        journal.write(scan("b", 3 * SECOND))
+    assert select(path, "SELECT tag_id, run FROM scans ORDER BY id") == [("a", 1), ("b", 2)]
+    assert select(path, "SELECT id, follows, carries FROM run") == [(1, None, 0), (2, 1, 2)]
+
+
+def test_a_second_twin_is_refused_by_name_and_takes_over_when_the_first_has_ended(
+    path: Path,
+) -> None:
+    with recording(path) as first:
+        wait_state(first, JournalState.RECORDING)
+        second = Journal(path, "/second", LIMITS)
+        second.begin(CLOCK)
+        assert second.take_restored(30.0) is None
+        said = wait_state(second, JournalState.IN_USE).detail
+        assert said == f"the journal {path} is in use by /test/lupin_twin (process {os.getpid()})"
+        second.write(scan("2"))
+    wait_for(lambda: second.condition.written == 1, "the second's row")
+    assert wait_state(second, JournalState.RECORDING).is_well
+    second.close(30.0)
+
+
+def test_a_database_of_somebody_else_is_told_and_left(path: Path) -> None:
+    path.parent.mkdir()
+    connection = sqlite3.connect(path)
+    connection.execute("CREATE TABLE theirs (x)")
+    connection.close()
+    before = path.read_bytes()
+    with recording(path) as journal:
+        journal.write(scan())
+        wait_state(journal, JournalState.FOREIGN, "not a journal of lupin-twin")
+    assert path.read_bytes() == before
+
+
+def test_a_damaged_file_is_set_aside_and_the_twin_goes_on(path: Path) -> None:
+    path.parent.mkdir()
+    path.write_text("nothing of the kind" * 1000)
+    with recording(path) as journal:
+        journal.write(scan())
+        wait_for(lambda: journal.condition.written == 1, "the row")
+        condition = wait_state(journal, JournalState.RECORDING, "set aside as")
+        assert Path(condition.set_aside).read_text() == "nothing of the kind" * 1000
+    assert known(path) == {scan()}
+
+
+def test_damage_that_is_met_while_it_records_has_the_file_set_aside_too(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    append = JournalFile.append
+
+    def meet_damage(file: JournalFile, rows: Sequence[tuple[Run, Row]]) -> tuple[int, int]:
+        monkeypatch.setattr(JournalFile, "append", append)
+        raise DamagedFile("as SQLite finds it")
+
+    with recording(path) as journal:
+        journal.write(scan("1"))
+        wait_for(lambda: journal.condition.written == 1, "the row")
+        monkeypatch.setattr(JournalFile, "append", meet_damage)
+        journal.write(scan("2"))
+        condition = wait_state(journal, JournalState.RECORDING, "set aside as")
+        assert Path(condition.set_aside).exists()
+        wait_for(lambda: journal.condition.written == 2, "the row after it")
+    assert known(path) == {scan("1"), scan("2")}
+
+
+def test_a_file_that_is_removed_is_made_anew(path: Path) -> None:
+    with recording(path) as journal:
+        journal.write(scan("1"))
+        wait_for(lambda: journal.condition.written == 1, "the row")
+        for file in path.parent.glob("j.sqlite*"):
+            if not file.name.endswith(".lock"):
+                file.unlink()
+        wait_for(path.exists, "a new file")
+        journal.write(scan("2"))
+        wait_for(lambda: journal.condition.written == 2, "the row after it")
+    assert known(path) == {scan("2")}
+
+
+def test_what_is_too_much_is_lost_oldest_first_and_told(path: Path) -> None:
+    path.mkdir(parents=True)  # a folder cannot be written to
+    with recording(path, max_weight=20) as journal:
+        wait_state(journal, JournalState.FAILING)
+        for n in range(15):
+            journal.write(scan(str(n)))
+        condition = wait_state(journal, JournalState.FAILING, "5 observations were lost to it")
+        assert (condition.lost, condition.waiting) == (5, 10)
+        path.rmdir()
+        wait_for(lambda: journal.condition.written == 10, "healing")
+        assert wait_state(journal, JournalState.RECORDING).is_well
+    assert known(path) == {scan(str(n)) for n in range(5, 15)}
+
+
+def test_handing_over_takes_microseconds_while_the_writer_writes(path: Path) -> None:
+    rows = [scan(str(n % 500), NOW + n, a=n / 7, b=1.0, c=2.0, d=3.0, e=4.0) for n in range(10_000)]
+    with recording(path) as journal:
+        wait_state(journal, JournalState.RECORDING)
+        took = []
+        gc.disable()
+        for row in rows:
+            begun = time.perf_counter_ns()
+            journal.write(row)
+            took.append(time.perf_counter_ns() - begun)
+        gc.enable()
+    assert statistics.median(took) < 20_000
+    assert count(path) == 10_000
+
+
+def test_age_and_size_are_kept_to(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lupin_twin.journal.file._PURGE_EVERY_S", 0.0)
+    monkeypatch.setattr("lupin_twin.journal.file._FOLD_EVERY_S", 0.0)
+    old = time.time_ns() - 3 * 86_400 * SECOND
+    with recording(path, Clock(old, old, is_simulated=False), limits=Limits(1.0, 10**9)) as journal:
+        for n in range(1000):
+            journal.write(scan(at_ns=old + n))
+        wait_for(lambda: journal.condition.written == 1000, "all rows")
+        wait_for(lambda: count(path) == 0, "the purge")
+        assert journal.condition.state is JournalState.RECORDING

@@ -8,14 +8,16 @@ import logging
 import math
 import time
 from collections.abc import Callable, Hashable, Iterator
+from typing import Final
 
 from lupin_bridge.metrics import Metrics, Sample
 from lupin_bridge.serving.admission import Admission
 from lupin_bridge.serving.goodbye import Goodbye
 from lupin_bridge.serving.kept import Answer, Kept
+from lupin_bridge.serving.rate_limit import RateLimit
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import FrameWriter
-from lupin_bridge.stream.hub import Client, Hub, next_beat_s
+from lupin_bridge.stream.hub import Client, Hub
 from lupin_bridge.stream.status import Liveness, Status
 from lupin_bridge.twin.shared import Shared
 from lupin_bridge.twin.source import Revised, TwinSource
@@ -31,6 +33,12 @@ WATCH_PERIOD_S = 0.2
 # A heartbeat this soon after a frame is spared. With one heartbeat a second, two frames are never
 # farther apart than 1.8 s; a browser calls 3 s silence.
 HEARTBEAT_SPARED_S = 0.8
+
+# Frames that may go out one right behind the other where the mean rate allows it. With one, a
+# single late change would shift the beat, and of a producer that keeps to the rate every change
+# after it would wait for its slot.
+PACE_BURST: Final = 2.0
+_EVERYBODY: Final = ""
 
 
 class Bridge:
@@ -61,7 +69,7 @@ class Bridge:
         self._told: Status | None = None
         self._pushed: Revised | None = None
         self._pushed_s = 0.0
-        self._next_push_s = 0.0
+        self._pace = RateLimit(settings.max_rate_hz, PACE_BURST)
         self._push_timer: asyncio.TimerHandle | None = None
         self._watch: asyncio.Task[None] | None = None
 
@@ -161,11 +169,16 @@ class Bridge:
             return  # it will take this state along
         if self._is_old_news(state, now_s):
             return
-        if now_s >= self._next_push_s:
-            self._push()
-        else:
+        self._push_when_due()
+
+    def _push_when_due(self) -> None:
+        self._push_timer = None
+        wait_s = self._pace.take(_EVERYBODY, self._clock())
+        if wait_s > 0.0:
             loop = asyncio.get_running_loop()
-            self._push_timer = loop.call_later(self._next_push_s - now_s, self._push)
+            self._push_timer = loop.call_later(wait_s, self._push_when_due)
+        else:
+            self._push()
 
     def _is_old_news(self, state: Revised, now_s: float) -> bool:
         """Whether this is a mere heartbeat, and a frame has just gone out.
@@ -181,13 +194,11 @@ class Bridge:
         )
 
     def _push(self) -> None:
-        self._push_timer = None
         state = self._latest
         if state is None:
             return
         now_s = self._clock()
         self._pushed, self._pushed_s = state, now_s
-        self._next_push_s = next_beat_s(self._next_push_s, now_s, 1.0 / self.settings.max_rate_hz)
         self._tell_status()
         self.hub.publish(self.frames.state(state.snapshot, state.revision), now_s)
         self.metrics.push_seconds.observe(time.monotonic() - state.made_s)

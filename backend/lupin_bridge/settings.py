@@ -36,7 +36,7 @@ class Settings:
     host: str = _setting("127.0.0.1", "address to listen on; other machines need 0.0.0.0 or ::")
     port: int = _setting(8000, "port to listen on; 0: any free one", 0, 65_535)
     max_rate_hz: float = _setting(
-        10.0, "state frames a second at most, however fast the twin changes", 0.1, 100.0
+        10.0, "state frames a second on average at most, however fast the twin changes", 0.1, 100.0
     )
     max_clients: int = _setting(5_000, "WebSocket clients at most", 1, 100_000)
     client_timeout_s: float = _setting(

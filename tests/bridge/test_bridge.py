@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
 import math
 import threading
@@ -12,6 +13,8 @@ from pathlib import Path
 from typing import Any, Self
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from websockets.asyncio.client import connect
 
 from lupin_bridge.bridge import Bridge
@@ -106,44 +109,88 @@ class Stage:
 # --- pace ---------------------------------------------------------------------------------------
 
 
-def test_a_change_goes_out_at_once_and_the_next_by_the_beat(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    now_s, waits_s = 100.0, list[float]()
+class Beat:
+    """A bridge whose clock and whose timer for the next frame are the test's."""
 
-    async def test() -> None:
-        nonlocal now_s
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now_s = 100.0
+        self.waits_s: list[float] = []
+        self._monkeypatch = monkeypatch
+        self._number = 0
+        self.stage: Stage
+
+    def hold(self, stage: Stage) -> None:
+        self.stage = stage
         loop = asyncio.get_running_loop()
         call_later = loop.call_later
-        async with Stage(clock=lambda: now_s, max_rate_hz=20.0) as stage:
 
-            def noting(delay_s: float, callback: Any, *args: Any, **more: Any) -> Any:
-                if callback == stage.bridge._push:
-                    waits_s.append(delay_s)
-                    delay_s = 1_000_000.0  # the test lets it happen
-                return call_later(delay_s, callback, *args, **more)
+        def noting(delay_s: float, callback: Any, *args: Any, **more: Any) -> Any:
+            if callback == stage.bridge._push_when_due:
+                self.waits_s.append(delay_s)
+                delay_s = 1_000_000.0  # the test lets it happen
+            return call_later(delay_s, callback, *args, **more)
 
-            monkeypatch.setattr(loop, "call_later", noting)
-            number = 0
-            # (when changes come, how long they have to wait)
-            for comes_s, wait_s in (
-                (100.0, None),
-                (100.01, 0.035),  # a tenth of the interval is forgiven
-                (100.06, 0.035),  # the one before went out at 100.045
-                (200.0, None),
-                (200.02, 0.025),  # a pause is not made up for
-            ):
-                now_s = comes_s
-                for _ in range(3 if wait_s else 1):
-                    number += 1
-                    stage.script.tell(state(number))
-                assert (stage.ear.states[-1]["revision"] == f"r{number}") == (wait_s is None)
-                if wait_s is not None:
-                    assert waits_s == [pytest.approx(wait_s)], "one wait for all three"
-                    now_s += waits_s.pop()
-                    stage.bridge._push()
-                    assert stage.ear.states[-1]["revision"] == f"r{number}"
-        assert [frame["seq"] for frame in stage.ear.states] == [1, 2, 3, 4, 5]
+        self._monkeypatch.setattr(loop, "call_later", noting)
+
+    def change(self, at_s: float) -> float:
+        """Tell a change; how long it has waited once it is out."""
+        self.now_s = at_s
+        self._number += 1
+        newest = f"r{self._number}"
+        self.stage.script.tell(state(self._number))
+        while self.stage.ear.states[-1]["revision"] != newest:
+            self.now_s += self.waits_s.pop()
+            self.stage.bridge._push_when_due()
+        return self.now_s - at_s
+
+
+def test_two_changes_go_out_at_once_and_the_next_by_the_rate(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def test() -> None:
+        beat = Beat(monkeypatch)
+        async with Stage(clock=lambda: beat.now_s, max_rate_hz=20.0) as stage:
+            beat.hold(stage)
+            waits = [beat.change(at_s) for at_s in (100.0, 100.01, 100.02, 100.08, 200.0, 200.01)]
+            assert waits == pytest.approx([0.0, 0.0, 0.03, 0.02, 0.0, 0.0])
+            assert beat.change(200.02) == pytest.approx(0.03), "a pause is made up for by one"
+
+    asyncio.run(test())
+
+
+def test_of_a_producer_that_keeps_to_the_rate_no_change_waits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """However late single ones are, by up to an interval: the others are not held to their beat."""
+
+    async def test() -> None:
+        beat = Beat(monkeypatch)
+        late_s = [0.0, 0.09, 0.0, 0.03, 0.0, 0.099, 0.0, 0.0] * 20
+        async with Stage(clock=lambda: beat.now_s, max_rate_hz=10.0) as stage:
+            beat.hold(stage)
+            waits = [beat.change(100.0 + n / 10 + late) for n, late in enumerate(late_s)]
+            assert waits == [0.0] * len(late_s)
+
+    asyncio.run(test())
+
+
+@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(pauses_s=st.lists(st.floats(0.0, 0.3), min_size=1, max_size=60))
+def test_the_mean_rate_is_kept_whatever_the_producer_does(
+    monkeypatch: pytest.MonkeyPatch, pauses_s: list[float]
+) -> None:
+    async def test() -> None:
+        beat, sent_s = Beat(monkeypatch), list[float]()
+        async with Stage(clock=lambda: beat.now_s, max_rate_hz=10.0) as stage:
+            beat.hold(stage)
+            at_s = 100.0
+            for pause_s in pauses_s:
+                at_s = max(at_s + pause_s, beat.now_s)
+                at_s += beat.change(at_s)
+                sent_s.append(at_s)
+        for first, last in itertools.combinations(range(len(sent_s)), 2):
+            frames = last - first + 1
+            assert frames <= (sent_s[last] - sent_s[first]) * 10.0 + 2.0 + 1e-6
 
     asyncio.run(test())
 
@@ -155,7 +202,7 @@ def test_what_a_frame_carries_is_the_newest_of_all_that_came_since_the_last() ->
                 stage.script.tell(state(number))
             await until(lambda: stage.ear.states[-1]["revision"] == "r100", "the newest")
             assert stage.ear.states[0]["revision"] == "r1"
-            assert len(stage.ear.states) <= 3
+            assert len(stage.ear.states) <= 4
             assert stage.bridge.latest == state(100)
 
     asyncio.run(test())
@@ -251,6 +298,7 @@ def test_who_asked_for_a_low_rate_gets_the_newest_although_nothing_more_happens(
             stage.bridge.join(Client(rare, min_interval_s=0.3))
             for number in range(1, 6):
                 stage.script.tell(state(number))
+            now_s += 0.1
             await until(lambda: stage.ear.states[-1]["revision"] == "r5", "the newest")
             assert [frame["revision"] for frame in rare.states] == ["r1"]
             now_s += 0.3

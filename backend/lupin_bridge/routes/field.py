@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Callable, Coroutine, Hashable
 from typing import Any, Final
 
 from fastapi import APIRouter, Request, Response
@@ -12,9 +12,11 @@ from lupin_bridge.field import formats as field_formats
 from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import JSON, NPY, PNG, FieldFormat
 from lupin_bridge.routes.computing import (
+    LentResponse,
+    computed_response,
     field_answer,
     is_large,
-    kept_or_computed,
+    kept_response,
     on_worker,
     or_refusal,
 )
@@ -30,6 +32,7 @@ from lupin_bridge.routes.tools import (
 from lupin_bridge.serving.admission import ClientLimitError
 from lupin_bridge.serving.kept import Answer
 from lupin_bridge.stream import schema
+from lupin_bridge.twin.source import Revised
 from lupin_twin.fields import FieldRefused, FieldRequest, check_request, default_box
 from lupin_twin.state import MAX_TEXT_LENGTH
 
@@ -168,10 +171,12 @@ async def _quality(request: Request) -> Response:
     asked = query.request(_box_of_all_tags(bridge))
     check_request(asked, bridge.source.rules().max_grid_cells)
     field_query.check_scale(query, JSON, 1, 1)
-    tag = field_query.etag(_revision_of_quality(bridge), asked, "quality", 1)
-    return _not_modified(request, tag) or await kept_or_computed(
-        request, tag, lambda: _quality_answer(bridge, asked)
+    revision = bridge.source.field_revision(asked)
+    tag = revision and field_query.etag(
+        _revision_of_quality(revision, bridge.latest), asked, "quality", 1
     )
+    key = (bridge.source.revision(), asked, "quality")
+    return await _unless_known(request, tag, key, lambda: _quality_answer(bridge, asked))
 
 
 async def _answer(bridge: Bridge, request: Request, field_format: FieldFormat) -> Response:
@@ -181,16 +186,42 @@ async def _answer(bridge: Bridge, request: Request, field_format: FieldFormat) -
     max_cells = source.rules().max_grid_cells
     width, height = check_request(asked, max_cells)
     field_query.check_scale(query, field_format, width * height, max_cells)
-    tag = field_query.etag(source.revision(), asked, field_format.name, query.scale)
-    return _not_modified(request, tag) or await kept_or_computed(
-        request, tag, lambda: field_answer(bridge, asked, field_format, query.scale)
+    revision = source.field_revision(asked)
+    tag = revision and field_query.etag(revision, asked, field_format.name, query.scale)
+    key = (source.revision(), asked, field_format.name, query.scale)
+    return await _unless_known(
+        request, tag, key, lambda: field_answer(bridge, asked, field_format, query.scale)
     )
 
 
-def _not_modified(request: Request, tag: str) -> Response | None:
-    if field_query.matches(list_header(request, "if-none-match"), tag):
-        return Response(status_code=304, headers={"ETag": tag, **REVALIDATE})
-    return None
+async def _unless_known(
+    request: Request,
+    tag: str | None,
+    key: Hashable,
+    compute: Callable[[], Coroutine[Any, Any, Answer]],
+) -> Response:
+    """304 for who has the answer, which `tag` names where that is known without computing."""
+    if tag is not None:
+        if _has(request, tag):
+            return _not_modified(tag)
+        kept = kept_response(bridge_of(request), tag)
+        if kept is not None:
+            return kept
+    response = await computed_response(request, key, compute)
+    made = response.headers.get("etag")
+    if made is not None and _has(request, made):
+        if isinstance(response, LentResponse) and response.give_back is not None:
+            response.give_back()
+        return _not_modified(made)
+    return response
+
+
+def _has(request: Request, tag: str) -> bool:
+    return field_query.matches(list_header(request, "if-none-match"), tag)
+
+
+def _not_modified(tag: str) -> Response:
+    return Response(status_code=304, headers={"ETag": tag, **REVALIDATE})
 
 
 async def _quality_answer(bridge: Bridge, asked: FieldRequest) -> Answer:
@@ -209,17 +240,15 @@ async def _quality_answer(bridge: Bridge, asked: FieldRequest) -> Answer:
             ),
             len(tags) * _JUDGE_TAG_S,
         )
-    # Of both that it was made from: the tags' state comes on a way of its own.
-    revision = f"{result.revision} {'' if latest is None else latest.revision}"
-    tag = field_query.etag(revision, asked, "quality", 1)
+    tag = field_query.etag(_revision_of_quality(result.revision, latest), asked, "quality", 1)
     answer = Answer(body, JSON_TYPE, {"ETag": tag, **REVALIDATE})
     bridge.kept.put(tag, answer)
     return answer
 
 
-def _revision_of_quality(bridge: Bridge) -> str:
-    latest = bridge.latest
-    return f"{bridge.source.revision()} {'' if latest is None else latest.revision}"
+def _revision_of_quality(field_revision: str, latest: Revised | None) -> str:
+    """Of both that it is made of: the tags' state comes on a way of its own."""
+    return f"{field_revision} {'' if latest is None else latest.revision}"
 
 
 def _box_of_all_tags(bridge: Bridge) -> field_query.Box:

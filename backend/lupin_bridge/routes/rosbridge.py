@@ -163,11 +163,13 @@ class _Conversation:
     async def _values(self, request: FieldRequest, held: ExitStack) -> bytes:
         bridge = self._bridge
         # Under the key of the same field over HTTP: it is the same body.
-        key = field_query.etag(bridge.source.revision(), request, JSON.name, 1)
-        if (lent := bridge.kept.lend(key)) is not None:
+        revision = bridge.source.field_revision(request)
+        tag = revision and field_query.etag(revision, request, JSON.name, 1)
+        if tag and (lent := bridge.kept.lend(tag)) is not None:
             answer, give_back = lent
             give_back()  # the reply holds a copy of its own
             return answer.body
         held.enter_context(bridge.admission.request(self._address, time.monotonic()))
+        key = (bridge.source.revision(), request, JSON.name, 1)
         answer = await bridge.answering.get(key, lambda: field_answer(bridge, request, JSON))
         return answer.body

@@ -86,6 +86,10 @@ class LocalTwin:
         """The process's identity, the observation count and the map's revision."""
         return self._thread.peek(self._revision_of)
 
+    def field_revision(self, request: FieldRequest) -> str | None:  # noqa: ARG002  # all alike
+        """The revision now: here every field is made of the store as it stands."""
+        return self.revision()
+
     def twin_count(self) -> int:
         """How many nodes publish the state topic, ours included."""
         return self._thread.peek(lambda node: node.twins.value)

@@ -47,7 +47,7 @@ class CacheCounts:
 
 @dataclass(frozen=True, slots=True)
 class RevisedGrid:
-    """A field and the revision that it was computed from."""
+    """A field and its revision: that of what it was computed from, or of its content."""
 
     grid: FieldGrid
     revision: str
@@ -99,6 +99,12 @@ class TwinSource(Protocol):
 
     def revision(self) -> str:
         """The revision now: opaque, changes exactly when a field could."""
+
+    def field_revision(self, request: FieldRequest) -> str | None:
+        """The revision of the field asked for now; None: only the answer will tell.
+
+        What is claimed here holds for the field: two different ones never have the same.
+        """
 
     def twin_count(self) -> int:
         """How many nodes publish the state topic; more than 1 is a mistake."""

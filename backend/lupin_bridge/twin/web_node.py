@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from hashlib import blake2b
+from operator import is_
 from typing import Any, Final
 
 from lupin_msgs.srv import GetField
@@ -61,6 +62,10 @@ def _digest_of_map(occupancy: OccupancyMap) -> int:
     return int.from_bytes(digest.digest())
 
 
+def _are_the_very_same(before: Sequence[TagState], after: Sequence[TagState]) -> bool:
+    return len(before) == len(after) and all(map(is_, before, after))
+
+
 class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
     """Follows `/twin/state` with its `/twin/times`, and `/map`, and asks `/twin/get_field`.
 
@@ -83,6 +88,8 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.occupancy_map: OccupancyMap | None = None
         self.digest = ""
         self.publishers_digest = ""
+        # Counts the changes heard of that a field may depend on.
+        self.epoch = 0
         self._publishers_since_s = -math.inf
         self._on_state = on_state
         self._newest: Snapshot | None = None
@@ -129,6 +136,11 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         """
         map_revision = 0 if self.occupancy_map is None else self.occupancy_map.revision
         return f"{self.publishers_digest}-{self.digest}-{map_revision:x}"
+
+    @property
+    def tag_count(self) -> int:
+        """Tags that the newest state has."""
+        return 0 if self._newest is None else len(self._newest.tags)
 
     @property
     def has_new_twin(self) -> bool:
@@ -182,6 +194,8 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
                     self._history.follow(tag, clock_went_back=went_back)
         self._newest = snapshot
         self.digest = self._digest_of(snapshot.tags)
+        if before is None or not _are_the_very_same(before.tags, snapshot.tags):
+            self.epoch += 1
         if len(self._digests) > len(snapshot.tags):
             self._forget_all_but(snapshot.tags)
         self._look_at_publishers()
@@ -192,6 +206,7 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         publishers_digest = self._digest_of_publishers(topic)
         if publishers_digest != self.publishers_digest:
             self.publishers_digest = publishers_digest
+            self.epoch += 1
             self._publishers_since_s = time.monotonic()
         if self.twins.see(int(self.count_publishers(topic)), time.monotonic()):
             self.habits.warn(
@@ -213,6 +228,7 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
             return
         if self.occupancy_map is None or not new.shows_the_same_as(self.occupancy_map):
             self.occupancy_map = replace(new, revision=_digest_of_map(new))
+            self.epoch += 1
 
     # --- small parts --------------------------------------------------------------------------
 

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import time
+from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from typing import Any
+from contextlib import AbstractAsyncContextManager, nullcontext
+from dataclasses import dataclass
+from hashlib import blake2b
+from typing import Any, Final
 
 from lupin_bridge.twin.ros_thread import RosThread
 from lupin_bridge.twin.shared import Shared
@@ -19,16 +24,24 @@ from lupin_bridge.twin.source import (
 from lupin_bridge.twin.web_node import WebNode
 from lupin_twin import convert
 from lupin_twin.explored import OccupancyMap
-from lupin_twin.fields import FieldRefused, FieldRequest, FieldRules
+from lupin_twin.fields import FieldRefused, FieldRequest, FieldRules, cost_s
 from lupin_twin.history import TagHistory
 from lupin_twin.state import Snapshot
-from lupin_twin.workers import Workers
+from lupin_twin.workers import SMALL_S, Workers
 
 # Requests on their way to the twin at once. It answers one after the other anyway; more would
 # only wait in DDS, where they cannot be taken back.
 MAX_REQUESTS = 4
 
 SERVICE_LOOK_S = 0.02
+
+# How long an answer stands for the twin's field while nothing is heard of a change. There are some
+# that no state tells: a map that reached the twin later than this process.
+TRUST_S: Final = 5.0
+# A page asks for a few fields; so many may be told without asking the twin.
+MAX_TRUSTED: Final = 256
+# What reading a cell of an answer takes, roughly and at worst.
+_READ_CELL_S: Final = 10e-9
 
 
 class WebTwin:
@@ -40,7 +53,10 @@ class WebTwin:
         self._thread: RosThread[WebNode, Revised]
         self.workers = Workers("work")
         self._asking: Shared[RevisedGrid] = Shared()
+        self._trusted: OrderedDict[FieldRequest, _Trusted] = OrderedDict()
         self._slots = asyncio.Semaphore(MAX_REQUESTS)
+        # One way is left to the small, which would wait behind the large otherwise.
+        self._large_slots = asyncio.Semaphore(MAX_REQUESTS - 1)
 
     async def start(
         self, on_state: Callable[[Revised], None], on_death: Callable[[], None]
@@ -122,16 +138,45 @@ class WebTwin:
         """The last scans and tries of a tag, as far as they were seen from here."""
         return await self._thread.call(lambda node: node.history_of(tag_id))
 
+    def field_revision(self, request: FieldRequest) -> str | None:
+        """That of the last answer, as long as nothing was heard that could have changed it.
+
+        An answer may hold what no state has told yet, so it is known by its content. It is at least
+        as new as the state at which it was asked for, and stands for the field until the next
+        change, or for `TRUST_S`.
+        """
+        trusted = self._trusted.get(request)
+        if trusted is None:
+            return None
+        if trusted.epoch != self._epoch() or time.monotonic() > trusted.until_s:
+            del self._trusted[request]
+            return None
+        return trusted.revision
+
     async def field(self, request: FieldRequest) -> RevisedGrid:
         """The field from the twin's service; identical requests in flight are asked once.
 
-        Identical is what was asked at the same revision: who has heard of a change must not get
-        the field from before.
+        Identical is what was asked with no change heard of in between: who has heard of one must
+        not get the field from before.
         """
-        revision = self.revision()
-        return await self._asking.get(
-            (revision, request), lambda: self._ask_once(revision, request)
-        )
+        epoch = self._epoch()
+        return await self._asking.get((epoch, request), lambda: self._ask_once(epoch, request))
+
+    def _epoch(self) -> int:
+        return self._thread.peek(lambda node: node.epoch)
+
+    def _trust(self, request: FieldRequest, epoch: int, revision: str) -> None:
+        if epoch != self._epoch():
+            return  # it was asked for before a change, and nobody knows how long before
+        self._trusted[request] = _Trusted(epoch, revision, time.monotonic() + TRUST_S)
+        self._trusted.move_to_end(request)
+        if len(self._trusted) > MAX_TRUSTED:
+            self._trusted.popitem(last=False)
+
+    def _lane(self, request: FieldRequest) -> AbstractAsyncContextManager[Any]:
+        tags = self._thread.peek(lambda node: node.tag_count)
+        is_large = cost_s(request, tags, self.rules()) > SMALL_S
+        return self._large_slots if is_large else nullcontext()
 
     async def _find_service(self) -> None:
         while not await self._thread.call(lambda node: node.field_client.service_is_ready()):
@@ -140,9 +185,9 @@ class WebTwin:
                 raise TwinUnavailableError(f"no twin offers {service}: is it running?")
             await asyncio.sleep(SERVICE_LOOK_S)
 
-    async def _ask_once(self, revision: str, request: FieldRequest) -> RevisedGrid:
+    async def _ask_once(self, epoch: int, request: FieldRequest) -> RevisedGrid:
         try:
-            async with asyncio.timeout(self._timeout_s), self._slots:
+            async with asyncio.timeout(self._timeout_s), self._lane(request), self._slots:
                 await self._find_service()
                 response = await self._thread.ask(
                     lambda node: node.request_field(request),
@@ -154,4 +199,29 @@ class WebTwin:
             ) from None
         if not response.ok:
             raise FieldRefused(response.error_message)
-        return RevisedGrid(convert.grid_of(response), revision)
+        result = await asyncio.wrap_future(
+            self.workers.submit(
+                lambda _: _revised(response), response.width * response.height * _READ_CELL_S
+            )
+        )
+        self._trust(request, epoch, result.revision)
+        return result
+
+
+@dataclass(frozen=True, slots=True)
+class _Trusted:
+    """The revision of an answer that was asked for in `epoch`, and until when it stands, s."""
+
+    epoch: int
+    revision: str
+    until_s: float
+
+
+def _revised(response: Any) -> RevisedGrid:
+    """The grid of an answer, and a digest of it: the same in all replicas."""
+    grid = convert.grid_of(response)
+    values = grid.values
+    about = (grid.width, grid.height, grid.origin_x, grid.origin_y, grid.resolution)
+    digest = blake2b(repr((about, grid.sample_count)).encode(), digest_size=12)
+    digest.update(values.data)
+    return RevisedGrid(grid, digest.hexdigest())

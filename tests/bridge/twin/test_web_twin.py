@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Iterator
+import io
+import time
+from collections.abc import AsyncIterator, Iterator, Sized
 from contextlib import asynccontextmanager, contextmanager
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
+import httpx
 import numpy as np
 import pytest
 from lupin_msgs.msg import SensorReading, TwinState, TwinTagState
 from lupin_msgs.srv import GetField
 
-from lupin_bridge.twin import web_node
+from lupin_bridge.twin import web_node, web_twin
 from lupin_bridge.twin.source import Revised, TwinTimeoutError, TwinUnavailableError
-from lupin_bridge.twin.web_twin import MAX_REQUESTS, WebTwin
+from lupin_bridge.twin.web_twin import MAX_REQUESTS, TRUST_S, WebTwin
 from lupin_twin.fields import FieldRefused, FieldRequest
 from tests.support.inprocess import run
+from tests.support.live import attached, wait_until_ready
+from tests.support.messages import scan
+from tests.support.processes import lupin_twin, twin_node
 from tests.support.ros import Peer
-from tests.support.waiting import PATIENCE_S, until
+from tests.support.waiting import PATIENCE_S, until, wait_for
 
 REQUEST = FieldRequest("co2", 0.5, 0.0, 0.0, 1.0, 0.5)
 
@@ -169,10 +177,162 @@ def test_identical_requests_in_flight_are_asked_once_and_a_change_is_asked_for_a
                 assert len(service.asked) == 2
                 assert {result.grid.value_max for result in old} == {1.0}
                 assert {result.grid.value_max for result in new} == {2.0}
-                assert {result.revision for result in new} == {told[-1].revision}
+                assert len({result.revision for result in old}) == 1
                 assert old[0].revision != new[0].revision
+                assert twin.field_revision(REQUEST) == new[0].revision
 
     run(domain, test())
+
+
+def state_of(value: float, seconds: int = 0) -> TwinState:
+    reading = SensorReading(name="co2", value=value)
+    state = TwinState(tags=[TwinTagState(tag_id="1", readings=[reading])])
+    state.tags[0].last_observed.sec = state.header.stamp.sec = seconds
+    return state
+
+
+def has_more_than(things: Sized, number: int) -> bool:
+    return len(things) > number
+
+
+def test_an_answer_stands_for_the_field_until_something_else_is_heard(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def test() -> None:
+        with service_in(domain) as service:
+            async with started() as (twin, told), service.answering():
+                await found(twin)
+                assert twin.field_revision(REQUEST) is None, "nothing was answered yet"
+                service.peer.publish("/twin/state", state_of(1.0), depth=1)
+                await until(lambda: told, "a state")
+                first = await twin.field(REQUEST)
+                assert twin.field_revision(REQUEST) == first.revision
+                assert twin.field_revision(replace(REQUEST, resolution=0.25)) is None
+                # The service knows more by now than any state has told: another answer.
+                second = await twin.field(REQUEST)
+                assert second.revision != first.revision
+                assert twin.field_revision(REQUEST) == second.revision
+                # A value that comes back to what it was is a change all the same.
+                for value in (2.0, 1.0):
+                    before = len(told)
+                    service.peer.publish("/twin/state", state_of(value), depth=1)
+                    await until(partial(has_more_than, told, before), "the change")
+                    assert twin.field_revision(REQUEST) is None
+                assert told[-1].revision == told[0].revision
+                # And there are changes that no state tells.
+                await twin.field(REQUEST)
+                now_s = time.monotonic()
+                monkeypatch.setattr(time, "monotonic", lambda: now_s + TRUST_S + 1.0)
+                assert twin.field_revision(REQUEST) is None
+
+    run(domain, test())
+
+
+def test_an_answer_that_came_after_a_change_stands_for_nothing(domain: int) -> None:
+    """It may be from before: nobody knows, and a 304 by it would be a lie."""
+
+    async def test() -> None:
+        with service_in(domain) as service:
+            async with started() as (twin, told):
+                await found(twin)
+                asked = asyncio.create_task(twin.field(REQUEST))
+                await until(lambda: pending(twin), "the request to be on its way")
+                service.peer.publish("/twin/state", state_of(1.0), depth=1)
+                await until(lambda: told, "the change")
+                async with service.answering():
+                    await asked
+                assert twin.field_revision(REQUEST) is None
+
+    run(domain, test())
+
+
+def test_so_many_answers_stand_and_the_oldest_goes_first(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(web_twin, "MAX_TRUSTED", 2)
+
+    async def test() -> None:
+        with service_in(domain) as service:
+            async with started() as (twin, _), service.answering():
+                await found(twin)
+                requests = [FieldRequest("co2", 0.5, 0.0, 0.0, 1.0, n) for n in (1, 2, 3)]
+                for request in requests:
+                    await twin.field(request)
+                known = [twin.field_revision(request) is not None for request in requests]
+                assert known == [False, True, True]
+
+    run(domain, test())
+
+
+def test_a_small_field_does_not_wait_behind_large_ones(domain: int) -> None:
+    async def test() -> None:
+        with service_in(domain) as service:
+            async with started() as (twin, told):
+                await found(twin)
+                tags = [TwinTagState(tag_id=f"{number}") for number in range(50)]
+                service.peer.publish("/twin/state", TwinState(tags=tags), depth=1)
+                await until(lambda: told, "as many tags as make a field dear")
+                large = [FieldRequest("co2", 0.002, n, 0.0, n + 2.0, 1.0) for n in range(8)]
+                tasks = [asyncio.create_task(twin.field(request)) for request in large]
+                await until(lambda: pending(twin) == MAX_REQUESTS - 1, "large ones on their way")
+                small = asyncio.create_task(twin.field(REQUEST))
+                await until(lambda: pending(twin) == MAX_REQUESTS, "the small one beside them")
+                async with service.answering():
+                    await asyncio.gather(small, *tasks)
+
+    run(domain, test())
+
+
+# --- one tag, one field: with a real twin, while observations come -------------------------------
+
+
+def test_one_tag_never_covers_two_fields_and_no_stale_one_is_confirmed(domain: int) -> None:
+    """A twin that tells its state every 3 s, and answers GetField from what it has by then."""
+    box = {"bbox_min_x": 0.0, "bbox_min_y": 0.0, "bbox_max_x": 2.0, "bbox_max_y": 2.0}
+    query: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.5, **box}
+    with (
+        twin_node(domain, "--ros-args", "-p", "state_publish_rate_hz:=0.33"),
+        lupin_twin(domain, "web", "--field-rate-hz", "10000") as process,
+        Peer(domain) as peer,
+        attached(process, peer) as live,
+    ):
+        wait_until_ready(live)
+        peer.observe(scan("1", {"co2": 0.0}, at=(1.0, 1.0)))
+        live.tag("1")
+        wait_for(lambda: live.get("/api/field", **query).status_code == 200, "the service")
+        bodies: dict[str, bytes] = {}
+
+        def ask(suffix: str, known: str | None = None) -> httpx.Response:
+            headers = {} if known is None else {"If-None-Match": known}
+            answer = live.get(f"/api/field.{suffix}", headers, **query)
+            if answer.status_code == 304:
+                assert known == answer.headers["etag"]
+            else:
+                assert answer.status_code == 200
+                tag = answer.headers["etag"]
+                assert bodies.setdefault(tag, answer.content) == answer.content, (
+                    "one tag, one field"
+                )
+            return answer
+
+        def twin_has(value: float) -> bool:
+            return bool(peer.get_field(**query).value_max == value)
+
+        def is_at(value: float, tag: Any) -> bool:
+            return bool(tag["readings"][0]["value"] == value)
+
+        for value in range(1, 6):
+            before = ask("json")
+            peer.observe(scan("1", {"co2": float(value)}))
+            wait_for(partial(twin_has, value), "the twin to have it")
+            # Asked in another format, nobody has answered it since: the twin's own word of now.
+            fresh = ask("npy")
+            assert np.nanmax(np.load(io.BytesIO(fresh.content))) in (value, value - 1)
+            ask("json")
+            live.tag("1", partial(is_at, value))
+            after = ask("json", before.headers["etag"])
+            assert (after.status_code, after.json()["value_max"]) == (200, value), "not confirmed"
+            assert ask("json", after.headers["etag"]).status_code == 304
 
 
 def test_only_so_many_requests_are_on_their_way_at_once(domain: int) -> None:

@@ -18,10 +18,11 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 from lupin_bridge.serving.server import MAX_INBOUND_BYTES
-from lupin_bridge.serving.ws_protocol import FRAMES_AT_ONCE, FRAMES_PER_S
+from lupin_bridge.serving.ws_protocol import FRAMES_AT_ONCE, FRAMES_PER_S, MAX_PIECES
 from tests.bench.bench_live import Server, serving
 from tests.support import raw_http
 from tests.support.proc_stat import open_files, peak_mb, reset_peak, resident_mb
+from tests.support.raw_ws import CLOSE, CONT, TEXT, RawClient, masked
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Listener, bridge, deaf_client, listener
 
@@ -229,6 +230,18 @@ def test_a_message_past_the_limit_is_one_in_pieces_too(server: Server, healthy: 
             loud.until("never", lambda _: False)
         assert closed.value.rcvd is not None
         assert closed.value.rcvd.code == 1009
+
+
+@pytest.mark.parametrize("path", ["/ws/state", "/rosbridge"])
+def test_a_message_has_a_limit_of_pieces_however_small(server: Server, path: str) -> None:
+    piece = masked(CONT, b"", fin=False)
+    begin = masked(TEXT, b"", fin=False) + piece * (MAX_PIECES - 2)
+    bye = masked(CLOSE, b"\x03\xe8")
+    with RawClient(url(server), path) as most:
+        assert most.say(begin + masked(CONT, b"") + bye)[-1] == (CLOSE, b"\x03\xe8")
+    with RawClient(url(server), path) as endless:
+        said = endless.say(begin + piece + masked(CONT, b""))
+        assert said[-1] == (CLOSE, b"\x03\xf0sent a message in more than %d pieces" % MAX_PIECES)
 
 
 def test_one_client_too_many_is_told_so_and_may_come_when_another_has_gone() -> None:

@@ -34,6 +34,10 @@ OPEN_PATHS: Final = frozenset({"/signin", "/signin.js", "/signin.css", "/healthz
 # In a request's state: the session that it was let in by, where it was one.
 SESSION_KEY: Final = "session"
 
+# Path and query. The longest that means something has a tag's name of a few hundred; each segment
+# of a path is looked for on the disk, and each parameter is taken apart.
+MAX_TARGET_BYTES: Final = 4_096
+
 # Wrong tokens an address may send at once, and a minute from then on.
 GUESS_BURST: Final = 10
 GUESSES_PER_MINUTE: Final = 10
@@ -76,7 +80,10 @@ class Access:
 
 
 class AccessControl:
-    """ASGI middleware: 403 for foreign hosts and pages, 401 and 429 for whoever has no token."""
+    """ASGI middleware: 403 for foreign hosts and pages, 401 and 429 for whoever has no token.
+
+    And 414 for an address that is far too long.
+    """
 
     def __init__(self, app: ASGIApp, access: Access) -> None:
         self._app = app
@@ -87,6 +94,11 @@ class AccessControl:
         """Pass a request on, or refuse it."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
+            return
+        length = len(scope.get("raw_path") or b"") + len(scope["query_string"])
+        if length > MAX_TARGET_BYTES:
+            detail = f"the address has {length} bytes, the limit is {MAX_TARGET_BYTES}"
+            await _Refusal(414, detail).send(scope, receive, send)
             return
         request = HTTPConnection(scope)
         verdict = self._access.policy.judge(_asked(request))

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
-from websockets.frames import CloseCode
+from websockets.frames import CloseCode, Frame
 from websockets.protocol import State
 
 from lupin_bridge.serving.rate_limit import client_key
@@ -25,6 +25,9 @@ CONNECTION_KEY = "connection"
 READ_BYTES = 8_192
 FRAMES_PER_S = 1_000
 FRAMES_AT_ONCE = 5_000
+# Of one message. The parser bounds what they weigh, and not how many they are: empty ones without
+# an end would be kept, every one.
+MAX_PIECES = 1_000
 
 
 _READ_BUFFER = memoryview(bytearray(READ_BYTES))
@@ -129,6 +132,16 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
             self._end_handshake()
         if message["type"] == "websocket.http.response.body" and self.close_sent:
             self.handshake_complete = True
+
+    def handle_cont(self, event: Frame) -> None:
+        """Take a further piece of a message."""
+        if len(self.frames) < MAX_PIECES:
+            super().handle_cont(event)
+        else:
+            self.transport.pause_reading()
+            self.dismiss(
+                CloseCode.POLICY_VIOLATION, f"sent a message in more than {MAX_PIECES} pieces"
+            )
 
     def handle_ping(self) -> None:
         """Answer a ping, unless its sender does not read: unread answers would only pile up."""

@@ -8,7 +8,12 @@ from pathlib import Path
 import httpx
 import pytest
 
-from lupin_bridge.access.middleware import GUESS_BURST, OPEN_PATHS, Access
+from lupin_bridge.access.middleware import (
+    GUESS_BURST,
+    MAX_TARGET_BYTES,
+    OPEN_PATHS,
+    Access,
+)
 from lupin_bridge.settings import SettingError, Settings
 from lupin_bridge.stream import schema
 from tests.support.access import BEARER, TOKEN, Served, refused_start, served
@@ -156,6 +161,18 @@ def test_a_picture_in_a_foreign_page_is_not_even_computed(open_bridge: Served) -
         framed = open_bridge.get("/api/field?sensor_type=co2", {**frame, "Sec-Fetch-Dest": dest})
         assert framed.status_code == 403
     assert open_bridge.get("/", {**frame, "Sec-Fetch-Dest": "document"}).status_code == 200
+
+
+def test_an_address_has_a_limit(open_bridge: Served) -> None:
+    for path in ("/" + "a/" * 2_047 + "b", "/api/field?" + "a&" * 2_042 + "b"):
+        room = MAX_TARGET_BYTES - len(path.replace("?", ""))
+        longest = path + "b" * room
+        assert open_bridge.get(longest).status_code in (400, 404)
+        refused = open_bridge.get(longest + "b")
+        assert refused.status_code == 414
+        assert refusal_of(refused) == (
+            f"the address has {MAX_TARGET_BYTES + 1} bytes, the limit is {MAX_TARGET_BYTES}"
+        )
 
 
 # --- the token ----------------------------------------------------------------------------------

@@ -252,6 +252,13 @@ def test_an_id_of_another_kind_is_refused_and_not_repeated(message_id: object) -
     assert refused.id is None
 
 
+@pytest.mark.parametrize("name", ["topic", "type", "id"])
+def test_a_name_as_long_as_the_limit_is_none_too_long(name: str) -> None:
+    longest = "x" * MAX_NAME_LENGTH
+    request = parse(json.dumps({"op": "subscribe", "topic": TOPIC, name: longest}))
+    assert getattr(request, name) == longest
+
+
 @pytest.mark.parametrize("name", ["id", "topic", "type", "op"])
 def test_a_long_name_is_refused_and_not_repeated(name: str) -> None:
     message = {"op": "subscribe", "topic": TOPIC, name: "x" * (MAX_NAME_LENGTH + 1)}
@@ -275,6 +282,12 @@ def test_deep_nesting_is_not_even_read(opening: str, closing: str) -> None:
     text = str(refusal(nested(MAX_BRACKETS)))
     assert text == "the message opens 1001 brackets, the limit is 1000"
     assert "brackets" in str(refusal("[" * MAX_MESSAGE_LENGTH))
+
+
+@pytest.mark.parametrize(("length", "is_whole"), [(62, True), (63, False)])
+def test_a_value_is_quoted_whole_up_to_64_characters(length: int, is_whole: bool) -> None:
+    quoted = repr("x" * length)
+    assert rosbridge.shown("x" * length) == (quoted if is_whole else quoted[:63] + "…")
 
 
 def test_a_refusal_quotes_little_of_what_was_sent() -> None:

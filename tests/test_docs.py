@@ -79,8 +79,8 @@ def test_every_topic_is_named_with_its_qos() -> None:
         (parameters.map_topic, 1),
         (parameters.state_topic, 1),
     ):
-        assert f"reliable, transient local, depth {depth}" in str(rows_by_name(topic))
-    assert "with the same stamp" in str(rows_by_name(parameters.times_topic))
+        assert f"reliable, transient local, depth {depth}" in str(rows_by_name(f"/{topic}"))
+    assert "with the same stamp" in str(rows_by_name(f"/{parameters.times_topic}"))
     assert parameters.field_service_name in README
     assert documented == {}  # topics stand in the second column
 

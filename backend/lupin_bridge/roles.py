@@ -43,7 +43,8 @@ def run(
 ) -> None:
     """Run a role until a signal ends it; `token` is what clients have to know, if anything.
 
-    `patrol_args` are the options of the patrol, in the role `demo`.
+    `patrol_args` are the options of the patrol, in the role `demo`; it gets `ros_args` too, so that
+    a namespace or a remapping holds for both.
 
     Raises:
         SettingError: a setting, a parameter or an argument of ROS with which it cannot run.
@@ -97,7 +98,7 @@ async def _run(
     # them, 30 to 50 ms during which nobody is served.
     gc.collect()
     gc.freeze()
-    patrol = Patrol(patrol_args) if role == "demo" else None
+    patrol = Patrol([*patrol_args, *ros_args]) if role == "demo" else None
     url = address_of(listener, "https" if access.secure else "http")
     print(f"lupin-twin: {url}", flush=True)  # noqa: T201  # for people and scripts
     supervisor.ready(f"serving {url}")

@@ -230,6 +230,15 @@ def test_a_bad_argument_is_refused_in_one_line(
         assert named in line
 
 
+def test_without_the_simulator_it_says_what_to_install(domain: int) -> None:
+    command = "import sys; sys.modules['greenhouse_sim'] = None; from lupin_patrol.cli import main;"
+    with Process([sys.executable, "-c", f"{command} sys.exit(main())"], ros_env(domain)) as process:
+        assert process.wait() == 2
+        [line] = process.output.splitlines()
+    assert line.startswith("patrol_node: error: the simulator is missing")
+    assert "pip install mdp-greenhouse" in line
+
+
 def test_what_it_latches_is_as_deep_as_the_contract_says(domain: int) -> None:
     with ros_domain(domain):
         rclpy.init(args=[])

@@ -1,7 +1,7 @@
 """The product with faults built in, for tests: nothing in the product knows of them.
 
 `python -m tests.support.sabotage [--raise MODULE:NAME:MARKER[:TIMES]] [--hang MODULE:NAME:MARKER]
-[--shadow-s S] PROGRAM ...` runs the module PROGRAM with the arguments behind it. `--raise`, as
+PROGRAM ...` runs the module PROGRAM with the arguments behind it. `--raise`, as
 often as wanted, lets a function or method fail when the marker occurs in its arguments' text, TIMES
 times (1 without it), and work otherwise; with `--hang` it says "hangs" and never comes back.
 """
@@ -31,7 +31,6 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--raise", dest="faults", action="append", default=[])
     parser.add_argument("--hang", dest="hangs", action="append", default=[])
-    parser.add_argument("--shadow-s", type=float)
     parser.add_argument("program")
     parser.add_argument("args", nargs=argparse.REMAINDER)
     options = parser.parse_args()
@@ -41,8 +40,6 @@ def main() -> None:
     for hang in options.hangs:
         module, path, marker = hang.split(":")
         sabotage(module, path, marker, 1, never_come_back)
-    if options.shadow_s is not None:
-        import_module("lupin_twin.twin_count").TwinCount.__init__.__defaults__ = (options.shadow_s,)
     sys.argv = [options.program, *options.args]
     runpy.run_module(options.program, run_name="__main__", alter_sys=True)
 

@@ -14,12 +14,12 @@ from lupin_twin.parameters import ParameterError, TwinParameters, describe
 
 # DESIGN's table, and field_cache_mb.
 DEFAULTS = {
-    "observations_topic": "/floranova/observations",
-    "discovered_tags_topic": "/perception/discovered_tags",
-    "map_topic": "/map",
-    "state_topic": "/twin/state",
-    "times_topic": "/twin/times",
-    "field_service_name": "/twin/get_field",
+    "observations_topic": "floranova/observations",
+    "discovered_tags_topic": "perception/discovered_tags",
+    "map_topic": "map",
+    "state_topic": "twin/state",
+    "times_topic": "twin/times",
+    "field_service_name": "twin/get_field",
     "state_publish_rate_hz": 1.0,
     "frame_id": "map",
     "buffer_len": 32,

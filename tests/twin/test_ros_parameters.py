@@ -13,7 +13,7 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 
 from lupin_twin.parameters import ParameterError, TwinParameters
-from lupin_twin.ros_parameters import declare, naming, naming_use_sim_time, unknown_overrides
+from lupin_twin.ros_parameters import declare, naming, naming_own_parameters, unknown_overrides
 
 
 @contextmanager
@@ -57,6 +57,14 @@ def test_an_override_of_no_parameter_is_known_by_name(domain: int) -> None:
         assert unknown_overrides(node) == ["idw_pwoer"]
 
 
+def test_what_another_node_of_the_twins_reads_has_to_be_right_too(domain: int) -> None:
+    with (
+        node_with(domain, "idw_power:=abc") as node,
+        pytest.raises(ParameterError, match="parameter idw_power is 'abc'"),
+    ):
+        declare(node, ["buffer_len"])
+
+
 def test_complaints_name_the_parameter(domain: int) -> None:
     with (
         node_with(domain) as node,
@@ -66,7 +74,13 @@ def test_complaints_name_the_parameter(domain: int) -> None:
         node.create_subscription(Time, "a b", lambda _: None, 1)
     with (
         pytest.raises(ParameterError, match=r"parameter use_sim_time is no bool: .*'5'"),
-        naming_use_sim_time(),
+        naming_own_parameters(),
         node_with(domain, "use_sim_time:=5"),
+    ):
+        pass
+    with (
+        pytest.raises(ParameterError, match="parameter start_type_description_service is no bool"),
+        naming_own_parameters(),
+        node_with(domain, "start_type_description_service:=5"),
     ):
         pass

@@ -23,7 +23,7 @@ from lupin_twin.fields import FieldRequest
 from lupin_twin.habits import Habits
 from lupin_twin.history import History, TagHistory
 from lupin_twin.node import field_rules
-from lupin_twin.ros_parameters import declare, naming, naming_use_sim_time
+from lupin_twin.ros_parameters import declare, naming, naming_own_parameters
 from lupin_twin.state import Snapshot, TagState
 from lupin_twin.twin_count import TwinCount
 
@@ -78,7 +78,7 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
     """
 
     def __init__(self, on_state: Callable[[Snapshot], None], *, context: Any = None) -> None:
-        with naming_use_sim_time():
+        with naming_own_parameters():
             super().__init__(NODE_NAME, context=context)
         self.habits = Habits(self)
         self.report = self.habits.report
@@ -99,13 +99,19 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         group = MutuallyExclusiveCallbackGroup()
         p = self.parameters
         self._history = History(p.buffer_len)
-        for parameter, shape, callback in (
-            ("state_topic", shapes.STATE, self._take_state),
-            ("times_topic", shapes.TIMES, self._take_times),
-            ("map_topic", shapes.MAP, self._take_map),
+        for parameter, shape, callback, on_number in (
+            ("state_topic", shapes.STATE, self._take_state, self.twins.hear),
+            ("times_topic", shapes.TIMES, self._take_times, None),
+            ("map_topic", shapes.MAP, self._take_map, None),
         ):
             self._topics[parameter] = self.habits.subscribe(
-                parameter, getattr(p, parameter), shape, depth=1, group=group, callback=callback
+                parameter,
+                getattr(p, parameter),
+                shape,
+                depth=1,
+                group=group,
+                callback=callback,
+                on_number=on_number,
             )
         with naming("field_service_name", p.field_service_name):
             self.field_client = self.create_client(
@@ -208,7 +214,7 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self.publishers_digest = publishers_digest
             self.epoch += 1
             self._publishers_since_s = time.monotonic()
-        if self.twins.see(int(self.count_publishers(topic)), time.monotonic()):
+        if self.twins.see(int(self.count_publishers(topic))):
             self.habits.warn(
                 ("twins", 0),
                 f"{self.twins.value} nodes publish {topic}: what is shown is a mixture; "

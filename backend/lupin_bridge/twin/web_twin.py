@@ -181,7 +181,7 @@ class WebTwin:
     async def _find_service(self) -> None:
         while not await self._thread.call(lambda node: node.field_client.service_is_ready()):
             if not self._thread.peek(lambda node: node.has_new_twin):
-                service = self._thread.peek(lambda node: node.parameters.field_service_name)
+                service = self.names().field_service
                 raise TwinUnavailableError(f"no twin offers {service}: is it running?")
             await asyncio.sleep(SERVICE_LOOK_S)
 

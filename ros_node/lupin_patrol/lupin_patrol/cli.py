@@ -65,7 +65,14 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 def main() -> int:
     """Run the node until it is stopped or done; returns the exit code."""
     stop_signals.block()  # before anything slow is imported
-    from greenhouse_sim.simulator import GreenhouseSimulator  # noqa: PLC0415  # see above
+    try:
+        from greenhouse_sim.simulator import GreenhouseSimulator  # noqa: PLC0415  # see above
+    except ModuleNotFoundError as error:
+        # colcon and apt know nothing of it: on a robot, nobody has installed it yet.
+        return _refuse(
+            f"the simulator is missing ({error}): python3 -m pip install mdp-greenhouse, on a "
+            "robot into a virtual environment made with --system-site-packages"
+        )
     from rclpy.utilities import remove_ros_args  # noqa: PLC0415
 
     from lupin_patrol.mission import Mission  # noqa: PLC0415

@@ -68,13 +68,13 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.habits = Habits(self)
         self._frame_id = self._name("frame_id", "map")
         self.observations = self._latched(
-            Observation, "observations_topic", "/floranova/observations", OBSERVATIONS_DEPTH
+            Observation, "observations_topic", "floranova/observations", OBSERVATIONS_DEPTH
         )
         # Each message holds all that came before, so the newest alone is worth keeping.
         self._discovered_tags = self._latched(
-            DiscoveredTags, "discovered_tags_topic", "/perception/discovered_tags", 1
+            DiscoveredTags, "discovered_tags_topic", "perception/discovered_tags", 1
         )
-        self._map = self._latched(OccupancyGrid, "map_topic", "/map", 1)
+        self._map = self._latched(OccupancyGrid, "map_topic", "map", 1)
 
     def publish(self, event: Event) -> None:
         """Tell the world what happened, now."""

@@ -1,4 +1,7 @@
-"""Start the twin: `ros2 launch lupin_twin twin.launch.py [use_sim_time:=true] [params_file:=…]`."""
+"""Start the twin: `ros2 launch lupin_twin twin.launch.py [namespace:=gh1] [use_sim_time:=true]`.
+
+`params_file:=…` names a file of parameters.
+"""
 
 from pathlib import Path
 
@@ -17,6 +20,11 @@ def generate_launch_description() -> LaunchDescription:
         [
             DeclareLaunchArgument(
                 "params_file", default_value=str(default_params), description="parameters, YAML"
+            ),
+            DeclareLaunchArgument(
+                "namespace",
+                default_value="",
+                description="moves the node, its topics and its services, such as gh1",
             ),
             DeclareLaunchArgument(
                 "use_sim_time",
@@ -38,6 +46,7 @@ def twin(context: LaunchContext) -> list[Node]:
             package="lupin_twin",
             executable="twin_node",
             name="lupin_twin",
+            namespace=LaunchConfiguration("namespace"),
             output="screen",
             parameters=parameters,
         )

@@ -72,11 +72,13 @@ class Habits:
         depth: int,
         group: Any,
         callback: Callable[[Any], None],
+        on_number: Callable[[int], None] | None = None,
     ) -> str:
         """Have `callback(message)` called, guarded, for each message on a latched topic.
 
         `parameter` is what gave the name. Returns the topic as ROS has resolved and remapped it:
-        that is the name in its graph, and in warnings. What is past the limits of `shape` is
+        that is the name in its graph, and in warnings. `on_number` hears the number that each
+        message has from its publisher, counted from 1. What is past the limits of `shape` is
         dropped before a single object is made of it.
 
         Raises:
@@ -89,6 +91,8 @@ class Habits:
             name = str(subscription.topic_name)
             self.published_ago_s = (info["received_timestamp"] - info["source_timestamp"]) / 1e9
             number = info["publication_sequence_number"]
+            if on_number is not None and number is not None:
+                on_number(number)
             # Of depth 1, the newest is wanted and nothing else.
             if depth > 1 and number is not None:
                 lost = gaps.see(number, lambda: int(self._node.count_publishers(name)))

@@ -15,6 +15,7 @@ from lupin_msgs.srv import GetField
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from lupin_twin import convert, ingest, shapes
 from lupin_twin.deferred import Later, allow_later
@@ -28,7 +29,7 @@ from lupin_twin.habits import Habits, latched
 from lupin_twin.history import History, TagHistory, kind_of
 from lupin_twin.lateness import Lateness
 from lupin_twin.parameters import TwinParameters
-from lupin_twin.ros_parameters import declare, naming, naming_use_sim_time
+from lupin_twin.ros_parameters import declare, naming, naming_own_parameters
 from lupin_twin.state import Look, Scan, Snapshot, TwinStore
 from lupin_twin.twin_count import TwinCount
 from lupin_twin.workers import Workers
@@ -59,7 +60,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
     """
 
     def __init__(self, *, context: Any = None, cli_args: Sequence[str] | None = None) -> None:
-        with naming_use_sim_time():
+        with naming_own_parameters():
             super().__init__(NODE_NAME, context=context, cli_args=cli_args)
         self.habits = Habits(self)
         self.report = self.habits.report
@@ -73,6 +74,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         )
         self.occupancy_map: OccupancyMap | None = None
         self.twins = TwinCount()
+        self._others: Any = None
         self._map_revision = 0
         self._topics: dict[str, str] = {}
         self._listeners: list[Callable[[Snapshot], None]] = []
@@ -85,6 +87,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         )
         self._desk = FieldDesk(self.fields, self._workers, computed.trigger)
         self._connect()
+        self._say_start()
         self._publish_state()
 
     # --- for the bridge, on this node's thread ----------------------------------------------
@@ -140,6 +143,15 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
             )
         allow_later(service)
         self._every(1.0 / p.state_publish_rate_hz, "state timer", self._publish_state)
+
+    def _say_start(self) -> None:
+        # Who waits for a twin that hears nothing looks for a name or a domain that is another.
+        self.get_logger().info(
+            f"{self.get_fully_qualified_name()} in ROS domain {self.context.get_domain_id()} hears "
+            f"{', '.join(self._topics.values())} and publishes "
+            f"{self._state_publisher.topic_name}; poses are in frame "
+            f"{self.parameters.frame_id!r}"
+        )
 
     def _every(self, period_s: float, what: str, callback: Callable[[], None]) -> None:
         # The steady clock: a paused simulation is no reason to look dead. Stamps and ages in the
@@ -242,12 +254,29 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._state_publisher.publish(self._states.build(snapshot))
         self._times_publisher.publish(self._times.build(snapshot))
         topic = self._state_publisher.topic_name
-        if self.twins.see(int(self.count_publishers(topic)), time.monotonic()):
+        publishers = int(self.count_publishers(topic))
+        self._listen_for_others(publishers > 1)
+        if self.twins.see(publishers):
             self.habits.warn(
                 ("twins", 0),
                 f"{self.twins.value} nodes publish {topic}: consumers get a mixture; "
                 "stop all twins but one, or give them ROS domains of their own",
             )
+
+    def _listen_for_others(self, wanted: bool) -> None:
+        """Hear the states that are published, ours too: a dead twin's shadow publishes none."""
+        if wanted and self._others is None:
+            self._others = self.create_subscription(
+                TwinState,
+                self.parameters.state_topic,
+                lambda _, info: self.twins.hear(int(info["publication_sequence_number"])),
+                QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE),
+                callback_group=self._group,
+                raw=True,
+            )
+        elif not wanted and self._others is not None:
+            self.destroy_subscription(self._others)
+            self._others = None
 
     # --- small parts ------------------------------------------------------------------------
 

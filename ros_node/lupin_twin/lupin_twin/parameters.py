@@ -29,17 +29,17 @@ class TwinParameters:
     """
 
     observations_topic: str = _parameter(
-        "/floranova/observations", "topic of lupin_msgs/Observation to subscribe to"
+        "floranova/observations", "topic of lupin_msgs/Observation to subscribe to"
     )
     discovered_tags_topic: str = _parameter(
-        "/perception/discovered_tags", "topic of lupin_msgs/DiscoveredTags to subscribe to"
+        "perception/discovered_tags", "topic of lupin_msgs/DiscoveredTags to subscribe to"
     )
-    map_topic: str = _parameter("/map", "topic of nav_msgs/OccupancyGrid to subscribe to")
-    state_topic: str = _parameter("/twin/state", "topic of lupin_msgs/TwinState to publish")
+    map_topic: str = _parameter("map", "topic of nav_msgs/OccupancyGrid to subscribe to")
+    state_topic: str = _parameter("twin/state", "topic of lupin_msgs/TwinState to publish")
     times_topic: str = _parameter(
-        "/twin/times", "topic of lupin_msgs/TwinTimes to publish right behind the state"
+        "twin/times", "topic of lupin_msgs/TwinTimes to publish right behind the state"
     )
-    field_service_name: str = _parameter("/twin/get_field", "name of the GetField service")
+    field_service_name: str = _parameter("twin/get_field", "name of the GetField service")
     state_publish_rate_hz: float = _parameter(
         1.0, "how often the state is published, by the steady clock", 0.01, 100.0
     )

@@ -48,16 +48,23 @@ def declare(node: Any, names: Iterable[str] = ALL_NAMES) -> TwinParameters:
         ).value
     for name in unknown_overrides(node):
         node.get_logger().warning(f"parameter {name} is unknown and has no effect")
+    # What another node of the twin's reads from the same file has to be right here as well.
+    given = {name: value for name, value in _overrides(node).items() if name in ALL_NAMES}
+    TwinParameters(**given)
     return TwinParameters(**values)
 
 
 def unknown_overrides(node: Any) -> list[str]:
     """Names that were set for a node (`-p`, a file) and that neither it nor the twin has."""
+    return sorted(
+        name for name in _overrides(node) if name not in ALL_NAMES and not node.has_parameter(name)
+    )
+
+
+def _overrides(node: Any) -> dict[str, Any]:
     # rclpy has no public way to see an override without declaring it.
     overrides = node._parameter_overrides  # noqa: SLF001
-    return sorted(
-        name for name in overrides if name not in ALL_NAMES and not node.has_parameter(name)
-    )
+    return {name: parameter.value for name, parameter in overrides.items()}
 
 
 @contextmanager
@@ -71,9 +78,13 @@ def naming(parameter: str, value: str) -> Iterator[None]:
 
 
 @contextmanager
-def naming_use_sim_time() -> Iterator[None]:
-    """Turn rclpy's complaint about its own parameter, made with the node, into one of ours."""
+def naming_own_parameters() -> Iterator[None]:
+    """Turn rclpy's complaint about its own parameters, made with the node, into one of ours.
+
+    They are `use_sim_time` and `start_type_description_service`.
+    """
     try:
         yield
     except InvalidParameterTypeException as error:
-        raise ParameterError(f"parameter use_sim_time is no bool: {error}") from error
+        name = str(error).rpartition(": ")[2]
+        raise ParameterError(f"parameter {name} is no bool: {error}") from error

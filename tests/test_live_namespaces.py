@@ -1,0 +1,75 @@
+"""Two greenhouses in one ROS domain, each below its namespace: nothing of one in the other."""
+
+from __future__ import annotations
+
+import httpx
+
+from tests.support.messages import look, occupancy_grid, scan
+from tests.support.processes import Process, lupin_twin, twin_node, url_of
+from tests.support.ros import Peer
+from tests.support.waiting import wait_for
+from tests.support.web import listener, tag_ids
+
+FIELD = {"sensor_type": "co2", "resolution": "0.5"}
+
+
+def below(namespace: str) -> tuple[str, ...]:
+    return ("--ros-args", "-r", f"__ns:={namespace}")
+
+
+def fill(robot: Peer, namespace: str, tag_id: str, co2: float) -> None:
+    """What one house's robot tells, on its own topics."""
+    robot.publish(f"{namespace}/floranova/observations", scan(tag_id, {"co2": co2}, (0, 0)))
+    robot.publish(f"{namespace}/floranova/observations", look(tag_id, "lupin"))
+    robot.publish(f"{namespace}/map", occupancy_grid([[0, 0], [0, 0]]), depth=1)
+
+
+def answers(process: Process, tag_id: str) -> tuple[list[str], dict[str, object]]:
+    """The tags and the field of a bridge, once it has this tag and finds the twin's service."""
+    with listener(url_of(process)) as client, httpx.Client(base_url=url_of(process)) as http:
+        client.until_tag(tag_id)
+        field = wait_for(
+            lambda: (
+                answer
+                if (answer := http.get("/api/field.json", params=FIELD)).status_code == 200
+                and answer.json()["sample_count"]
+                else None
+            ),
+            "a field",
+        )
+        assert field is not None
+        wait_for(lambda: http.get("/api/map").status_code == 200, "the map")
+        return tag_ids(http.get("/api/state").json()), field.json()
+
+
+def test_two_houses_in_one_domain_do_not_mix(domain: int) -> None:
+    with (
+        twin_node(domain, *below("/gh1")) as first,
+        lupin_twin(domain, "serve", *below("/gh2")) as second,
+        lupin_twin(domain, "web", *below("/gh1")) as web,
+        Peer(domain) as robot,
+    ):
+        fill(robot, "/gh1", "one", 400.0)
+        fill(robot, "/gh2", "two", 900.0)
+        fill(robot, "", "root", 100.0)
+        ours, field = answers(web, "one")
+        assert (ours, field["value_max"]) == (["one"], 400.0)
+        theirs, field = answers(second, "two")
+        assert (theirs, field["value_max"]) == (["two"], 900.0)
+        # What it hears and tells is the first that a twin says.
+        first.wait_for_output("/gh1/lupin_twin in ROS domain")
+        for name in ("/gh1/floranova/observations", "/gh1/perception/discovered_tags", "/gh1/map"):
+            assert name in first.output
+        assert "nodes publish" not in first.output + second.output + web.output
+        # Of the root's names, nothing is heard and nothing told.
+        graph = dict(robot.node.get_topic_names_and_types())
+        assert {"/gh1/twin/state", "/gh1/twin/times", "/gh2/twin/state"} <= graph.keys()
+        assert "/twin/state" not in graph
+
+
+def test_the_demo_below_a_namespace_takes_its_patrol_along(domain: int) -> None:
+    with (
+        lupin_twin(domain, "demo", "--speed", "20", *below("/gh1")) as demo,
+        listener(url_of(demo)) as screen,
+    ):
+        screen.until("state", lambda frame: len(tag_ids(frame["state"])) > 3)

@@ -108,7 +108,11 @@ def test_one_callback_group_keeps_all_callbacks_apart(stage: Stage) -> None:
     node.add_listener(lambda _: None, heartbeat_s=1.0)
     ours = [
         *(stage.subscription(topic) for topic in DEPTHS),
-        *(service for service in node.services if service.srv_name == node.parameters.field_service_name),
+        *(
+            service
+            for service in node.services
+            if service.srv_name == node.parameters.field_service_name
+        ),
         *node.timers,
     ]
     assert len(ours) == 3 + 1 + 2

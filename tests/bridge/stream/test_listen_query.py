@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.stream.listen_query import ListenQuery, ListenRefused, parse
+from lupin_bridge.stream.listen_query import MIN_RATE_HZ, ListenQuery, ListenRefused, parse
 
 MAX_REASON_BYTES = 123  # RFC 6455, section 5.5, less the two of the code
 
@@ -80,3 +80,11 @@ def test_every_refusal_fits_into_a_close_frame(query: list[tuple[str, str]]) -> 
     except ListenRefused as refused:
         reason = str(refused)
     assert len(reason.encode()) <= MAX_REASON_BYTES
+
+
+def test_the_lowest_rate_is_one_and_anything_lower_is_not() -> None:
+    assert parse([("max_rate_hz", "0.01")]).max_rate_hz == MIN_RATE_HZ
+    with pytest.raises(
+        ListenRefused, match=r"max_rate_hz is '0.00999', expected a number from 0.01"
+    ):
+        parse([("max_rate_hz", "0.00999")])

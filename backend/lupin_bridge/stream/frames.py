@@ -13,6 +13,7 @@ import cbor2
 import orjson
 from websockets.frames import Frame, Opcode
 
+from lupin_bridge.stream.state_cbor import StateCbor, array, mapping
 from lupin_bridge.stream.state_json import StateJson, header
 from lupin_bridge.stream.status import Status
 from lupin_twin.state import Snapshot, TagState
@@ -31,18 +32,17 @@ def binary_frame(payload: bytes) -> bytes:
     return Frame(Opcode.BINARY, payload).serialize(mask=False)
 
 
-def _cbor_frame(json_payload: bytes) -> bytes:
-    # By way of the JSON: what the two encodings say is the same to the last field.
-    return binary_frame(cbor2.dumps(orjson.loads(json_payload)))
-
-
-_WRITERS: Final[Mapping[str, Callable[[bytes], bytes]]] = {JSON: text_frame, CBOR: _cbor_frame}
-ENCODINGS: Final = tuple(_WRITERS)
+_FRAMES: Final[Mapping[str, Callable[[bytes], bytes]]] = {JSON: text_frame, CBOR: binary_frame}
+ENCODINGS: Final = tuple(_FRAMES)
 
 
 def status_frame(status: Status, encoding: str = JSON) -> bytes:
     """A status as a WebSocket frame."""
-    return _WRITERS[encoding](orjson.dumps(status.frame()))
+    payload = orjson.dumps(status.frame())
+    if encoding == CBOR:
+        # By way of the JSON: what the two encodings say is the same to the last field.
+        payload = cbor2.dumps(orjson.loads(payload))
+    return _FRAMES[encoding](payload)
 
 
 @dataclass(slots=True, eq=False)
@@ -84,17 +84,17 @@ class StateFrame:
 
     def full(self, encoding: str) -> bytes:
         """`schema.StateFrame` as a WebSocket frame."""
-        return self.wire("full", encoding, self._full)
+        return self.wire("full", encoding, self._full if encoding == JSON else self._full_cbor)
 
     def delta(self, encoding: str) -> bytes:
         """`schema.DeltaFrame` as a WebSocket frame: only what is not as in `base`."""
-        return self.wire("delta", encoding, self._delta)
+        return self.wire("delta", encoding, self._delta if encoding == JSON else self._delta_cbor)
 
     def wire(self, kind: str, encoding: str, payload: Callable[[], bytes]) -> bytes:
         """The frame of this kind in this encoding, from `payload()` if it is the first call."""
         key = (kind, encoding)
         if key not in self._wires:
-            self._wires[key] = _WRITERS[encoding](payload())
+            self._wires[key] = _FRAMES[encoding](payload())
         return self._wires[key]
 
     def _full(self) -> bytes:
@@ -120,6 +120,32 @@ class StateFrame:
             orjson.dumps(removed),
         )
 
+    def _full_cbor(self) -> bytes:
+        return mapping(
+            [
+                ("type", cbor2.dumps("state")),
+                ("seq", cbor2.dumps(self.seq)),
+                ("revision", cbor2.dumps(self.revision)),
+                ("state", self._writer.cbor.state(self.snapshot)),
+            ]
+        )
+
+    def _delta_cbor(self) -> bytes:
+        assert self.base is not None  # the hub asks only then
+        changed, removed = difference(self.base.snapshot.tags, self.snapshot.tags)
+        stamp_ns = self.snapshot.stamp_ns
+        return mapping(
+            [
+                ("type", cbor2.dumps("delta")),
+                ("seq", cbor2.dumps(self.seq)),
+                ("base", cbor2.dumps(self.base.seq)),
+                ("revision", cbor2.dumps(self.revision)),
+                ("header", cbor2.dumps(header(stamp_ns, self.snapshot.frame_id))),
+                ("changed", array([self._writer.cbor.tag(tag, stamp_ns) for tag in changed])),
+                ("removed", cbor2.dumps(removed)),
+            ]
+        )
+
 
 def difference(
     before: Sequence[TagState], after: Sequence[TagState]
@@ -142,6 +168,7 @@ class FrameWriter:
 
     def __init__(self) -> None:
         self.json = StateJson()
+        self.cbor = StateCbor()
         self.message_json = StateJson(has_times=False)
         self._newest: StateFrame | None = None
 
@@ -159,5 +186,6 @@ class FrameWriter:
         )
         self._newest = frame
         self.json.keep_only(snapshot)
+        self.cbor.keep_only(snapshot)
         self.message_json.keep_only(snapshot)
         return frame

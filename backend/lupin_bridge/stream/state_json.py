@@ -8,8 +8,9 @@ short formatting each. Readings of one scan are of one age, which is written onc
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, ClassVar
 
 import orjson
 
@@ -22,10 +23,6 @@ from lupin_twin.state import (
     age_seconds,
 )
 
-# The key cannot occur inside a string: there its quotes would be escaped.
-_AGE: Final = b'"stale_seconds":'
-_NO_AGE: Final = _AGE + b"null"
-
 
 @dataclass(frozen=True, slots=True)
 class _Template:
@@ -36,10 +33,9 @@ class _Template:
     stamps_ns: tuple[int, ...]
     picks: tuple[int, ...]
 
-    def at(self, now_ns: int) -> bytes:
+    def at(self, now_ns: int, write_age: Callable[[float], bytes]) -> bytes:
         """The text as of `now_ns`."""
-        # To the millisecond: a browser shows seconds, and short numbers make short frames.
-        ages = [b"%.3f" % age_seconds(stamp_ns, now_ns) for stamp_ns in self.stamps_ns]
+        ages = [write_age(age_seconds(stamp_ns, now_ns)) for stamp_ns in self.stamps_ns]
         if len(ages) == 1:  # a tag that was scanned, and nothing else since
             return self.text % tuple(ages * len(self.picks))
         return self.text % tuple([ages[pick] for pick in self.picks])
@@ -71,7 +67,23 @@ class StateJson:
         if kept is None or kept.tag is not tag:
             kept = self._template(tag)
             self._kept[tag.tag_id] = kept
-        return kept.at(now_ns)
+        return kept.at(now_ns, self.write_age)
+
+    # --- what another encoding writes in another way ----------------------------------------------
+
+    null: ClassVar[bytes] = b"null"
+    # It cannot occur inside a string: there the quotes of the key would be escaped.
+    no_age: ClassVar[bytes] = b'"stale_seconds":null'
+
+    @staticmethod
+    def write(fields: dict[str, Any]) -> bytes:
+        """A tag's fields, NaN and infinity as null."""
+        return orjson.dumps(fields)
+
+    @staticmethod
+    def write_age(stale_seconds: float) -> bytes:
+        """To the millisecond: a browser shows seconds, and short numbers make short frames."""
+        return b"%.3f" % stale_seconds
 
     def keep_only(self, snapshot: Snapshot) -> None:
         """Forget the tags that are not in it: a restarted twin may know others."""
@@ -85,9 +97,11 @@ class StateJson:
         known = [stamp_ns for stamp_ns in times if stamp_ns is not None]
         stamps_ns = tuple(dict.fromkeys(known))
         places = iter(times)
-        text, *rest = orjson.dumps(self._fields(tag)).replace(b"%", b"%%").split(_NO_AGE)
+        no_age = self.no_age
+        key = no_age[: -len(self.null)]
+        text, *rest = self.write(self._fields(tag)).replace(b"%", b"%%").split(no_age)
         for piece in rest:
-            text += (_NO_AGE if next(places) is None else _AGE + b"%b") + piece
+            text += (no_age if next(places) is None else key + b"%b") + piece
         return _Template(tag, text, stamps_ns, tuple(map(stamps_ns.index, known)))
 
     def _fields(self, tag: TagState) -> dict[str, Any]:

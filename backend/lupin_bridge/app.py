@@ -22,6 +22,7 @@ from lupin_bridge.routes import state as routes_state
 from lupin_bridge.routes.tools import error_response
 from lupin_bridge.serving.goodbye import EndsWithTheBridge
 from lupin_bridge.serving.http_protocol import PieceByPiece
+from lupin_bridge.serving.metering import Metered
 from lupin_bridge.stream import schema
 
 STATIC_FOLDER = Path(__file__).parent / "static"
@@ -72,6 +73,8 @@ def create_app(
     app.add_middleware(ReadOnly)
     app.add_middleware(AccessControl, access=access)
     app.add_middleware(ComesIn, entrance=entrance or Entrance())
+    if bridge is not None:
+        app.add_middleware(Metered, note=bridge.note_answer)
     app.add_exception_handler(404, _not_found)
     if has_page(static_folder):
         app.mount("/", StaticFiles(directory=static_folder, html=True), name="hmi")

@@ -7,13 +7,15 @@ import contextlib
 import logging
 import math
 import time
-from collections.abc import Callable, Hashable, Iterator
+from collections import Counter
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from typing import Final
 
 from lupin_bridge.metrics import Metrics, Sample
 from lupin_bridge.serving.admission import Admission
 from lupin_bridge.serving.goodbye import Goodbye
 from lupin_bridge.serving.kept import Answer, Kept
+from lupin_bridge.serving.metering import route_class
 from lupin_bridge.serving.rate_limit import RateLimit
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import FrameWriter
@@ -62,7 +64,8 @@ class Bridge:
         self.answering: Shared[Answer] = Shared()
         self.goodbye = Goodbye()
         self.frames = FrameWriter()
-        self.metrics = Metrics(self._measure)
+        self.http_answers: Counter[str] = Counter()
+        self.metrics = Metrics(self._measure, self._count)
         self.kept_state: Hashable = None
         self.state_number = 0
         self._latest: Revised | None = None
@@ -129,6 +132,15 @@ class Bridge:
         """A listener's socket is free again."""
         self.hub.serve(client, self._clock())
 
+    def note_answer(self, path: str, status: int, seconds: float) -> None:
+        """An HTTP answer has begun."""
+        self.http_answers[str(status)] += 1
+        self.metrics.http_seconds.labels(route_class(path)).observe(seconds)
+
+    def _count(self) -> Iterator[tuple[str, Mapping[str, int]]]:
+        yield "lupin_admission_refused", self.admission.refused
+        yield "lupin_http_answers", self.http_answers
+
     def _measure(self) -> Iterator[Sample]:
         hub, source, status = self.hub, self.source, self.status
         tags = () if self._latest is None else self._latest.snapshot.tags
@@ -151,6 +163,7 @@ class Bridge:
         yield "lupin_tags", len(tags)
         yield "lupin_tags_pinned", sum(tag.pose is not None for tag in tags)
         yield "lupin_fields_computing", self.admission.being_computed
+        yield "lupin_work_abandoned", source.workers.abandoned
         yield "lupin_field_cache_hits", cache.hits
         yield "lupin_field_cache_misses", cache.misses
         yield "lupin_field_cache_entries", cache.entries

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Final
 
 from prometheus_client import CollectorRegistry, Histogram, ProcessCollector, generate_latest
@@ -36,6 +36,12 @@ COUNTERS: Final = {
     "lupin_ros_callback_errors": "errors met by ROS callbacks",
     "lupin_field_cache_hits": "fields served from the cache",
     "lupin_field_cache_misses": "fields that had to be computed",
+    "lupin_work_abandoned": "computations that were ended because nobody waited any more",
+}
+# The same, each with a label of its own.
+LABELLED: Final = {
+    "lupin_admission_refused": ("reason", "computed answers refused, by the limit they met"),
+    "lupin_http_answers": ("status", "HTTP answers of the routes, by status"),
 }
 HISTOGRAMS: Final = {
     "lupin_push_seconds": (
@@ -51,13 +57,25 @@ _SECONDS: Final = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0,
 class Metrics(Collector):
     """The bridge's metrics; `read` gives a sample of each gauge and counter at each scrape."""
 
-    def __init__(self, read: Callable[[], Iterable[Sample]]) -> None:
+    def __init__(
+        self,
+        read: Callable[[], Iterable[Sample]],
+        read_labelled: Callable[[], Iterable[tuple[str, Mapping[str, int]]]] = tuple,
+    ) -> None:
         self._read = read
+        self._read_labelled = read_labelled
         self._registry = CollectorRegistry()
         self._registry.register(self)
         ProcessCollector(registry=self._registry)
         self.push_seconds = self._histogram("lupin_push_seconds")
         self.field_seconds = self._histogram("lupin_field_seconds")
+        self.http_seconds = Histogram(
+            "lupin_http_seconds",
+            "from a request until its answer began",
+            ["route"],
+            buckets=_SECONDS,
+            registry=self._registry,
+        )
 
     def describe(self) -> Iterable[Metric]:
         """Nothing: the registry would scrape at once, before there is anything to read."""
@@ -70,6 +88,12 @@ class Metrics(Collector):
                 yield GaugeMetricFamily(name, GAUGES[name], value)
             else:
                 yield CounterMetricFamily(name, COUNTERS[name], value)
+        for name, counts in self._read_labelled():
+            label, documentation = LABELLED[name]
+            family = CounterMetricFamily(name, documentation, labels=[label])
+            for name_of, count in counts.items():
+                family.add_metric([name_of], count)
+            yield family
 
     def text(self) -> bytes:
         """Everything in Prometheus' text format, version 0.0.4."""

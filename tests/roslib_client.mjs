@@ -58,7 +58,8 @@ const scenarios = {
       known: await call({ sensor_type: 'temperature', resolution: 0.5, ...BOX }),
       refused: await call({ sensor_type: 'temperature' }),
       failed: await call({ sensor_type: 'temperature', colour: 'red' }),
-      late: await call({ sensor_type: 'temperature', resolution: 0.5, ...BOX }, 1e-9),
+      // Another field than the known one, which is kept and there at once.
+      late: await call({ sensor_type: 'temperature', resolution: 0.3, ...BOX }, 1e-9),
     };
   },
 

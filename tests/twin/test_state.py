@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 
 import pytest
 
@@ -193,20 +194,51 @@ def test_samples_need_a_pose_and_a_finite_reading_and_keep_the_first_mention_ord
     assert math.isinf(readings["inf"])
 
 
-def test_bounds_name_the_value_and_the_limit() -> None:
+BLOOM = Bloom(0.0, 0.0, 0.0, 0.1, "rose", 0.9, anomaly=False)
+# What makes a write of a size, and the size that it may have.
+BOUNDED: dict[str, tuple[Callable[[int], Scan | Look], int]] = {
+    "readings": (
+        lambda n: Scan("1", S, tuple(Reading(f"s{i}", 0.0) for i in range(n))),
+        state.MAX_SENSORS_PER_TAG,
+    ),
+    "blooms": (lambda n: look("1", blooms=(BLOOM,) * n), state.MAX_BLOOMS_PER_TAG),
+    "footprint": (
+        lambda n: look("1", footprint=((0.0, 0.0, 0.0),) * n),
+        state.MAX_FOOTPRINT_POINTS,
+    ),
+    "the tag_id of a scan": (lambda n: Scan("t" * n, S), state.MAX_TEXT_LENGTH),
+    "a sensor's name": (
+        lambda n: Scan("1", S, (Reading("s" * n, 0.0),)),
+        state.MAX_TEXT_LENGTH,
+    ),
+    "the tag_id of a look": (lambda n: look("t" * n), state.MAX_TEXT_LENGTH),
+    "species": (lambda n: look("1", species="r" * n), state.MAX_TEXT_LENGTH),
+    "a bloom's species": (
+        lambda n: look("1", blooms=(dataclasses.replace(BLOOM, species="r" * n),)),
+        state.MAX_TEXT_LENGTH,
+    ),
+}
+
+
+@pytest.mark.parametrize("what", BOUNDED)
+def test_a_bound_belongs_to_what_is_allowed_and_one_more_is_refused_by_both_numbers(
+    what: str,
+) -> None:
+    make, limit = BOUNDED[what]
     store = TwinStore()
-    bloom = Bloom(0.0, 0.0, 0.0, 0.1, "rose", 0.9, anomaly=False)
-    too_many: list[Scan | Look] = [
-        Scan("1", S, tuple(Reading(f"s{i}", 0.0) for i in range(65))),
-        look("1", blooms=(bloom,) * (state.MAX_BLOOMS_PER_TAG + 1)),
-        look("1", footprint=((0.0, 0.0, 0.0),) * (state.MAX_FOOTPRINT_POINTS + 1)),
-        look("1", species="r" * (state.MAX_TEXT_LENGTH + 1)),
-        look("1", blooms=(dataclasses.replace(bloom, species="r" * 257),)),
-    ]
-    for observation in too_many:
-        with pytest.raises(Rejected, match="limit is"):
-            write(store, observation)
-    assert store.snapshot(0, "map").tags == ()
+    write(store, make(limit))
+    before = store.snapshot(0, "map").tags
+    assert len(before) == 1
+    with pytest.raises(Rejected, match=rf"{limit + 1}\b.*limit is {limit}$"):
+        write(store, make(limit + 1))
+    assert store.snapshot(0, "map").tags == before
+
+
+def test_a_pinned_tags_id_is_bounded_like_a_scanned_ones() -> None:
+    store = TwinStore()
+    store.pin("t" * state.MAX_TEXT_LENGTH, at(1.0))
+    with pytest.raises(Rejected, match="limit is"):
+        store.pin("t" * (state.MAX_TEXT_LENGTH + 1), at(1.0))
 
 
 def test_one_tag_too_many_is_refused_and_the_known_ones_go_on(
@@ -228,11 +260,10 @@ def test_what_all_tags_hold_is_bounded_and_what_is_known_goes_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(state, "MAX_ITEMS", 4)
-    bloom = Bloom(0.0, 0.0, 0.0, 0.1, "rose", 0.9, anomaly=False)
     store = TwinStore()
     store.record(scan("1", co2=1.0))
-    store.record_look(look("2", blooms=(bloom, bloom), footprint=((0.0, 0.0, 0.0),)))
-    for one_too_many in (scan("1", light=1.0), scan("3", co2=1.0), look("1", blooms=(bloom,))):
+    store.record_look(look("2", blooms=(BLOOM, BLOOM), footprint=((0.0, 0.0, 0.0),)))
+    for one_too_many in (scan("1", light=1.0), scan("3", co2=1.0), look("1", blooms=(BLOOM,))):
         with pytest.raises(Rejected, match="of all tags: 5, the limit is 4"):
             write(store, one_too_many)
     assert [t.tag_id for t in store.snapshot(0, "map").tags] == ["1", "2"]
@@ -240,7 +271,7 @@ def test_what_all_tags_hold_is_bounded_and_what_is_known_goes_on(
     assert tag(store, "1").readings[0].value == 2.0
     store.pin("3", at(1.0))
     # A look with one flower less makes room for one reading more.
-    store.record_look(look("2", blooms=(bloom,), footprint=((0.0, 0.0, 0.0),)))
+    store.record_look(look("2", blooms=(BLOOM,), footprint=((0.0, 0.0, 0.0),)))
     store.record(scan("3", co2=3.0))
     assert tag(store, "3").readings[0].value == 3.0
 

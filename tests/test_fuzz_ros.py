@@ -74,7 +74,7 @@ def survive(both: tuple[Bridge, Bridge], hostile: Callable[[Peer], object]) -> N
     mark = float(next(_marks))
     twin.peer.observe(scan("mark", {"co2": mark}, (1, 1)))
     for live in both:
-        live.tag("mark", lambda tag: {"name": "co2", "value": mark} in tag["readings"])
+        live.tag("mark", lambda tag: [r["value"] for r in tag["readings"]] == [mark])
         check(live)
     assert peak_mb(twin.process.pid) - memory < MEMORY_MB
 

@@ -28,6 +28,8 @@ from tests.support.processes import lupin_twin, twin_node
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, until, wait_for
 
+# A state every 3 s.
+SLOW = ("--ros-args", "-p", "state_publish_rate_hz:=0.33")
 REQUEST = FieldRequest("co2", 0.5, 0.0, 0.0, 1.0, 0.5)
 
 
@@ -286,12 +288,39 @@ def test_a_small_field_does_not_wait_behind_large_ones(domain: int) -> None:
 # --- one tag, one field: with a real twin, while observations come -------------------------------
 
 
+def test_two_fields_of_a_real_twin_never_have_one_revision(domain: int) -> None:
+    """Answers between two states hold what no state has told yet."""
+    request = FieldRequest("co2", 0.5, 0.0, 0.0, 2.0, 2.0)
+
+    async def test(peer: Peer) -> None:
+        async with started() as (twin, told):
+            await until(lambda: told, "a state")
+            known: dict[str, float] = {}
+            epochs = set()
+            for value in range(1, 8):
+                peer.observe(scan("1", {"co2": float(value)}, at=(1.0, 1.0)))
+                while True:
+                    epochs.add(twin._epoch())
+                    answer = await twin.field(request)
+                    assert known.setdefault(answer.revision, answer.grid.value_max) == (
+                        answer.grid.value_max
+                    )
+                    assert twin.field_revision(request) in (answer.revision, None)
+                    if answer.grid.value_max == value:
+                        break
+            assert len(known) >= 7
+            assert len(epochs) < 7, "more than one field between two states"
+
+    with twin_node(domain, *SLOW), Peer(domain) as peer:
+        run(domain, test(peer))
+
+
 def test_one_tag_never_covers_two_fields_and_no_stale_one_is_confirmed(domain: int) -> None:
     """A twin that tells its state every 3 s, and answers GetField from what it has by then."""
     box = {"bbox_min_x": 0.0, "bbox_min_y": 0.0, "bbox_max_x": 2.0, "bbox_max_y": 2.0}
     query: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.5, **box}
     with (
-        twin_node(domain, "--ros-args", "-p", "state_publish_rate_hz:=0.33"),
+        twin_node(domain, *SLOW),
         lupin_twin(domain, "web", "--field-rate-hz", "10000") as process,
         Peer(domain) as peer,
         attached(process, peer) as live,
@@ -321,7 +350,7 @@ def test_one_tag_never_covers_two_fields_and_no_stale_one_is_confirmed(domain: i
         def is_at(value: float, tag: Any) -> bool:
             return bool(tag["readings"][0]["value"] == value)
 
-        for value in range(1, 6):
+        for value in range(1, 4):
             before = ask("json")
             peer.observe(scan("1", {"co2": float(value)}))
             wait_for(partial(twin_has, value), "the twin to have it")

@@ -12,7 +12,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 from lupin_bridge.stream.status import STALE_AFTER_S
-from lupin_bridge.twin.source import Revised, TwinTimeoutError
+from lupin_bridge.twin.source import Told, TwinTimeoutError
 from lupin_bridge.twin.web_twin import MAX_REQUESTS, WebTwin
 from lupin_twin.fields import FieldRequest
 from tests.support.domains import own_domain
@@ -167,7 +167,7 @@ def test_field_requests_to_a_twin_that_does_not_answer_are_bounded_and_forgotten
 ) -> None:
     async def test() -> None:
         source = WebTwin(ros_args=(), timeout_s=1.0)
-        states: list[Revised] = []
+        states: list[Told] = []
         await source.start(states.append, lambda: None)
         node = source._thread._require_node()
         pending: dict[Any, Any] = node.field_client._pending_requests

@@ -22,7 +22,9 @@ from lupin_bridge.stream.frames import FrameWriter
 from lupin_bridge.stream.hub import Client, Hub
 from lupin_bridge.stream.status import Liveness, Status
 from lupin_bridge.twin.shared import Shared
-from lupin_bridge.twin.source import Revised, TwinSource
+from lupin_bridge.twin.source import Told, TwinSource
+from lupin_twin.counts import LOST, Counts
+from lupin_twin.drops import Reason
 from lupin_twin.state import NANOSECONDS_PER_SECOND
 
 log = logging.getLogger(__name__)
@@ -68,9 +70,9 @@ class Bridge:
         self.metrics = Metrics(self._measure, self._count)
         self.kept_state: Hashable = None
         self.state_number = 0
-        self._latest: Revised | None = None
+        self._latest: Told | None = None
         self._told: Status | None = None
-        self._pushed: Revised | None = None
+        self._pushed: Told | None = None
         self._pushed_s = 0.0
         self._pace = RateLimit(settings.max_rate_hz, PACE_BURST)
         self._push_timer: asyncio.TimerHandle | None = None
@@ -106,7 +108,7 @@ class Bridge:
     # --- for the routes -----------------------------------------------------------------------
 
     @property
-    def latest(self) -> Revised | None:
+    def latest(self) -> Told | None:
         """The newest state, before any pacing; None while no twin was heard."""
         return self._latest
 
@@ -116,10 +118,13 @@ class Bridge:
         return self._liveness.status(self._clock())
 
     @property
-    def ros_time_ns(self) -> int:
-        """ROS time now, as far as it is known: the newest state's, and the time since it came."""
+    def ros_time_ns(self) -> int | None:
+        """ROS time now: the newest state's, and the time since it came; None: it is not known."""
         if self._latest is None or self._liveness.last_state_s is None:
-            return 0
+            return None
+        snapshot = self._latest.snapshot
+        if snapshot.clock != "running":  # paused: it stands
+            return snapshot.now_ns
         since_s = self._clock() - self._liveness.last_state_s
         return self._latest.snapshot.stamp_ns + int(since_s * NANOSECONDS_PER_SECOND)
 
@@ -140,6 +145,8 @@ class Bridge:
     def _count(self) -> Iterator[tuple[str, Mapping[str, int]]]:
         yield "lupin_admission_refused", self.admission.refused
         yield "lupin_http_answers", self.http_answers
+        counts = Counts() if self._latest is None else self._latest.counts
+        yield "lupin_dropped", {str(why): counts.dropped.get(why, 0) for why in (*Reason, LOST)}
 
     def _measure(self) -> Iterator[Sample]:
         hub, source, status = self.hub, self.source, self.status
@@ -171,13 +178,15 @@ class Bridge:
 
     # --- from the source ----------------------------------------------------------------------
 
-    def _on_state(self, state: Revised) -> None:
+    def _on_state(self, state: Told) -> None:
         self._latest = state
         self.state_number += 1
         now_s = self._clock()
         self._liveness.last_state_s = now_s
-        self._liveness.twin_count = self.source.twin_count()
-        self._liveness.has_map = self.source.occupancy_map() is not None
+        self._liveness.twin_count = state.twin_count
+        self._liveness.has_map = state.occupancy_map is not None
+        self._liveness.clock = state.snapshot.clock
+        self._liveness.drops = state.counts.recent
         if self._push_timer is not None:
             return  # it will take this state along
         if self._is_old_news(state, now_s):
@@ -193,7 +202,7 @@ class Bridge:
         else:
             self._push()
 
-    def _is_old_news(self, state: Revised, now_s: float) -> bool:
+    def _is_old_news(self, state: Told, now_s: float) -> bool:
         """Whether this is a mere heartbeat, and a frame has just gone out.
 
         It would tell nobody anything, and a change right behind it would have to wait for its turn.

@@ -28,6 +28,11 @@ export const S = {
   },
   offlineWhy: {
     live: '',
+    paused: '',
+    no_clock:
+      'The twin has no time: nothing comes on /clock. How old the readings are is not known.',
+    clock_stopped:
+      'The twin’s time has stopped: nothing comes on /clock any more. How old the readings are is not known.',
     never_seen: 'The bridge has not heard from any twin yet. Is it running in this ROS domain?',
     stale: 'The twin has stopped publishing. Check that it still runs.',
     thread_dead: 'The bridge has lost its ROS thread and has to be restarted.',

@@ -9,6 +9,7 @@ import math
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -21,7 +22,7 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.field import formats as field_formats
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.hub import Client
-from lupin_bridge.twin.source import CacheCounts, Revised
+from lupin_bridge.twin.source import CacheCounts, Told
 from lupin_twin.fields import FieldJob
 from lupin_twin.grid import FieldGrid
 from lupin_twin.state import Snapshot, TagState
@@ -38,25 +39,16 @@ class Script:
     """A source that tells what the test makes it tell. What a real one does, others test."""
 
     def __init__(self) -> None:
-        self.tell: Callable[[Revised], None]
+        self.tell: Callable[[Told], None]
         self.die: Callable[[], None]
         self.is_alive = True
-        self.twins = 1
         self.calls_waiting = self.callback_errors = 0
 
-    async def start(
-        self, on_state: Callable[[Revised], None], on_death: Callable[[], None]
-    ) -> None:
+    async def start(self, on_state: Callable[[Told], None], on_death: Callable[[], None]) -> None:
         self.tell, self.die = on_state, on_death
 
     async def stop(self) -> None:
         self.is_alive = False
-
-    def twin_count(self) -> int:
-        return self.twins
-
-    def occupancy_map(self) -> None:
-        return None
 
     def cache_counts(self) -> CacheCounts:
         return CacheCounts()
@@ -85,9 +77,9 @@ class Ear:
         return [frame["reason"] for frame in self.heard if frame["type"] == "status"]
 
 
-def state(number: int) -> Revised:
+def state(number: int) -> Told:
     """The state after so many changes."""
-    return Revised(Snapshot(number, "map", (TagState(f"t{number}"),)), f"r{number}")
+    return Told(Snapshot(number, "map", (TagState(f"t{number}"),)), f"r{number}")
 
 
 class Stage:
@@ -213,7 +205,7 @@ def test_a_heartbeat_right_after_a_frame_tells_nobody_anything_and_is_spared() -
         async with Stage(max_rate_hz=100.0) as stage:
             stage.script.tell(state(1))
             for _ in range(3):
-                stage.script.tell(Revised(state(1).snapshot, "r1"))
+                stage.script.tell(Told(state(1).snapshot, "r1"))
             stage.script.tell(state(2))
             await until(lambda: len(stage.ear.states) == 2, "the change")
             assert stage.ear.states[-1]["revision"] == "r2"
@@ -253,8 +245,7 @@ def test_a_second_twin_is_told_of(caplog: pytest.LogCaptureFixture) -> None:
     async def test() -> None:
         async with Stage() as stage:
             stage.script.tell(state(1))
-            stage.script.twins = 2
-            stage.script.tell(state(2))
+            stage.script.tell(replace(state(2), twin_count=2))
             told = stage.ear.heard[-1] if stage.ear.reasons[-1] == "live" else {}
             await until(
                 lambda: any("2 twins" in f.get("message", "") for f in stage.ear.heard), "it"

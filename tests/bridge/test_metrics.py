@@ -37,11 +37,18 @@ def test_every_metric_is_there_and_follows_what_happens(domain: int) -> None:
         peer.wait_for_twin()
         with connect(url.replace("http", "ws") + "/ws/state") as client:
             client.recv()
+            peer.observe(scan("1", frame_id="odom"), scan("1", frame_id="odom"))
             peer.observe(scan("1", {"co2": 500.0}, at=(1, 1)), scan("2", {"co2": 500.0}))
             wait_for(lambda: scrape(url)["lupin_tags"] == 2.0, "both tags")
             for suffix in ("json", "npy", "json"):
                 httpx.get(f"{url}/api/field.{suffix}", params=CO2, timeout=PATIENCE_S)
             after = scrape(url)
+            text = httpx.get(f"{url}/metrics", timeout=PATIENCE_S).text
+            assert 'lupin_dropped_total{reason="frame"} 2.0' in text
+            assert 'lupin_dropped_total{reason="lost"} 0.0' in text
+            [drop] = httpx.get(f"{url}/readyz", timeout=PATIENCE_S).json()["drops"]
+            assert (drop["reason"], drop["count"]) == ("frame", 2)
+            assert "'odom'" in drop["message"]
         assert (after["lupin_clients"], after["lupin_tags_pinned"]) == (1.0, 1.0)
         assert after["lupin_frames_sent_total"] >= 2.0
         assert after["lupin_bytes_sent_total"] > 100.0

@@ -196,5 +196,5 @@ def test_messages_that_came_too_fast_are_counted_and_told_of(strained: Strained)
         strained.peer.observe(scan("fast", {"co2": float(number)}))
     strained.process.thaw()
     strained.peer.tag("fast", lambda tag: readings(tag) == {"co2": 199.0})
-    line = strained.process.wait_for_output("on /floranova/observations: they came faster")
+    line = strained.process.wait_for_output("on /floranova/observations: they came too fast")
     assert "lost 1" in line

@@ -32,7 +32,7 @@ from lupin_bridge.routes.tools import (
 from lupin_bridge.serving.admission import ClientLimitError
 from lupin_bridge.serving.kept import Answer
 from lupin_bridge.stream import schema
-from lupin_bridge.twin.source import Revised
+from lupin_bridge.twin.source import Told
 from lupin_twin.fields import FieldRefused, FieldRequest, check_request, default_box
 from lupin_twin.state import MAX_TEXT_LENGTH
 
@@ -246,7 +246,7 @@ async def _quality_answer(bridge: Bridge, asked: FieldRequest) -> Answer:
     return answer
 
 
-def _revision_of_quality(field_revision: str, latest: Revised | None) -> str:
+def _revision_of_quality(field_revision: str, latest: Told | None) -> str:
     """Of both that it is made of: the tags' state comes on a way of its own."""
     return f"{field_revision} {'' if latest is None else latest.revision}"
 

@@ -116,7 +116,7 @@ class StateFrame:
             self.base.seq,
             orjson.dumps(self.revision),
             orjson.dumps(header(stamp_ns, self.snapshot.frame_id)),
-            b",".join([self._writer.json.tag(tag, stamp_ns) for tag in changed]),
+            b",".join([self._writer.json.tag(tag, self.snapshot.now_ns) for tag in changed]),
             orjson.dumps(removed),
         )
 
@@ -141,7 +141,10 @@ class StateFrame:
                 ("base", cbor2.dumps(self.base.seq)),
                 ("revision", cbor2.dumps(self.revision)),
                 ("header", cbor2.dumps(header(stamp_ns, self.snapshot.frame_id))),
-                ("changed", array([self._writer.cbor.tag(tag, stamp_ns) for tag in changed])),
+                (
+                    "changed",
+                    array([self._writer.cbor.tag(tag, self.snapshot.now_ns) for tag in changed]),
+                ),
                 ("removed", cbor2.dumps(removed)),
             ]
         )

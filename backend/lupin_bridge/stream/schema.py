@@ -152,17 +152,38 @@ class DeltaFrame(Contract):
     removed: list[str] = Field(description="tag_ids; a restarted twin knows fewer tags")
 
 
+class RecentDrop(Contract):
+    """Messages of the last minutes that the twin dropped or lost, for one reason."""
+
+    reason: str
+    message: str = Field(description="the last of them, for a person to read")
+    count: int
+
+
 class StatusFrame(Contract):
     """WebSocket frame, and the body of `/readyz`: whether the twin behind the bridge is alive."""
 
     type: Literal["status"]
     twin: Literal["live", "offline"]
-    reason: Literal["live", "never_seen", "stale", "thread_dead", "shutting_down"]
+    reason: Literal[
+        "live",
+        "paused",
+        "no_clock",
+        "clock_stopped",
+        "never_seen",
+        "stale",
+        "thread_dead",
+        "shutting_down",
+    ] = Field(
+        description="paused: simulated time stands, and is told to, the twin is live; no_clock, "
+        "clock_stopped: the twin's time does not run, no age is known, and it counts as offline"
+    )
     message: str = Field(description="for a person to read")
     state_age_seconds: float | None = Field(
         description="s since the bridge got its last state, by its own clock; null: never"
     )
     has_map: bool = Field(description="false: /api/map answers 404, no map has come yet")
+    drops: list[RecentDrop] = Field(description="what the twin did not take in lately, by reason")
 
 
 class GetFieldResponse(Contract):

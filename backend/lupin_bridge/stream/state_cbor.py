@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Final
 import cbor2
 import orjson
 
-from lupin_bridge.stream.state_json import StateJson, header
+from lupin_bridge.stream.state_json import OWN_TIME, StateJson, header
 from lupin_twin.state import Snapshot
 
 # Major types (RFC 8949, section 3.1).
@@ -64,10 +64,10 @@ class StateCbor(StateJson):
         """The number that JSON has."""
         return struct.pack(">Bd", _FLOAT64, round(stale_seconds, 3))
 
-    def state(self, snapshot: Snapshot, now_ns: int | None = None) -> bytes:
+    def state(self, snapshot: Snapshot, now_ns: int | None = OWN_TIME) -> bytes:
         """The snapshot as CBOR of `schema.TwinState`, ages as of `now_ns`, or of its own time."""
-        if now_ns is None:
-            now_ns = snapshot.stamp_ns
+        if now_ns == OWN_TIME:
+            now_ns = snapshot.now_ns
         return mapping(
             [
                 ("header", cbor2.dumps(header(snapshot.stamp_ns, snapshot.frame_id))),

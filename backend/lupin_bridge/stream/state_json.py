@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final
 
 import orjson
 
@@ -23,6 +23,9 @@ from lupin_twin.state import (
     age_seconds,
 )
 
+# In place of a moment: that of the snapshot itself.
+OWN_TIME: Final = -1
+
 
 @dataclass(frozen=True, slots=True)
 class _Template:
@@ -33,8 +36,10 @@ class _Template:
     stamps_ns: tuple[int, ...]
     picks: tuple[int, ...]
 
-    def at(self, now_ns: int, write_age: Callable[[float], bytes]) -> bytes:
-        """The text as of `now_ns`."""
+    def at(self, now_ns: int | None, write_age: Callable[[float], bytes], no_age: bytes) -> bytes:
+        """The text as of `now_ns`; None: now is not known, and no age is."""
+        if now_ns is None:
+            return self.text % ((no_age,) * len(self.picks))
         ages = [write_age(age_seconds(stamp_ns, now_ns)) for stamp_ns in self.stamps_ns]
         if len(ages) == 1:  # a tag that was scanned, and nothing else since
             return self.text % tuple(ages * len(self.picks))
@@ -52,22 +57,25 @@ class StateJson:
         self._has_times = has_times
         self._kept: dict[str, _Template] = {}
 
-    def state(self, snapshot: Snapshot, now_ns: int | None = None) -> bytes:
-        """The snapshot as JSON of `schema.TwinState`, ages as of `now_ns`, or of its own time."""
-        if now_ns is None:
-            now_ns = snapshot.stamp_ns
+    def state(self, snapshot: Snapshot, now_ns: int | None = OWN_TIME) -> bytes:
+        """The snapshot as JSON of `schema.TwinState`, ages as of `now_ns`, or of its own time.
+
+        None: now is not known, and no age is.
+        """
+        if now_ns == OWN_TIME:
+            now_ns = snapshot.now_ns
         return b'{"header":%b,"tags":[%b]}' % (
             orjson.dumps(header(snapshot.stamp_ns, snapshot.frame_id)),
             b",".join([self.tag(tag, now_ns) for tag in snapshot.tags]),
         )
 
-    def tag(self, tag: TagState, now_ns: int) -> bytes:
+    def tag(self, tag: TagState, now_ns: int | None) -> bytes:
         """One tag as JSON of `schema.TwinTagState`, its ages as of `now_ns` (ROS time, ns)."""
         kept = self._kept.get(tag.tag_id)
         if kept is None or kept.tag is not tag:
             kept = self._template(tag)
             self._kept[tag.tag_id] = kept
-        return kept.at(now_ns, self.write_age)
+        return kept.at(now_ns, self.write_age, self.null)
 
     # --- what another encoding writes in another way ----------------------------------------------
 

@@ -8,14 +8,37 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from lupin_twin.counts import Recent
+from lupin_twin.state import ClockState
+
 # The twin publishes at least once a second (parameter state_publish_rate_hz, default 1); three
 # missed publications are no accident.
 STALE_AFTER_S = 3.0
 
-Reason = Literal["live", "never_seen", "stale", "thread_dead", "shutting_down"]
+Reason = Literal[
+    "live",
+    "paused",
+    "no_clock",
+    "clock_stopped",
+    "never_seen",
+    "stale",
+    "thread_dead",
+    "shutting_down",
+]
+_OF_CLOCK: dict[ClockState, Reason] = {
+    "running": "live",
+    "paused": "paused",
+    "stopped": "clock_stopped",
+    "none": "no_clock",
+}
 
 _MESSAGES: dict[Reason, str] = {
     "live": "The twin is live.",
+    "paused": "The twin is live, and its simulated time is paused.",
+    "no_clock": "The twin has no time: nothing has come on /clock yet. Ages are not known. "
+    "Start the simulation, or the twin without use_sim_time.",
+    "clock_stopped": "The twin's time has stopped: nothing comes on /clock any more. Ages are not "
+    "known. Check the simulation.",
     "never_seen": "No twin has been heard yet. Start it, or check ROS_DOMAIN_ID.",
     "stale": "The twin has fallen silent. Check that its process runs and is reachable.",
     "thread_dead": "The bridge's ROS thread has ended. Restart the bridge.",
@@ -35,11 +58,12 @@ class Status:
     state_age_s: float | None
     twin_count: int = 1
     has_map: bool = False
+    drops: tuple[Recent, ...] = ()
 
     @property
     def is_live(self) -> bool:
         """Whether what the bridge serves is current."""
-        return self.reason == "live"
+        return self.reason in ("live", "paused")
 
     @property
     def message(self) -> str:
@@ -53,7 +77,12 @@ class Status:
 
     def is_news_after(self, before: Status | None) -> bool:
         """Whether clients have to be told, who were told `before`."""
-        return before is None or self.says_more_than(before) or before.has_map is not self.has_map
+        return (
+            before is None
+            or self.says_more_than(before)
+            or before.has_map is not self.has_map
+            or _about(before.drops) != _about(self.drops)
+        )
 
     def says_more_than(self, before: Status) -> bool:
         """Whether a person has to be told, who was told `before`."""
@@ -68,7 +97,16 @@ class Status:
             "message": self.message,
             "state_age_seconds": None if self.state_age_s is None else round(self.state_age_s, 3),
             "has_map": self.has_map,
+            "drops": [
+                {"reason": drop.reason, "message": drop.message, "count": drop.count}
+                for drop in self.drops
+            ],
         }
+
+
+def _about(drops: tuple[Recent, ...]) -> dict[str, int]:
+    """How often each, roughly: a stream of drops is no stream of statuses."""
+    return {drop.reason: drop.count.bit_length() for drop in drops}
 
 
 @dataclass(slots=True)
@@ -79,13 +117,15 @@ class Liveness:
     last_state_s: float | None = None
     twin_count: int = 1
     has_map: bool = False
+    clock: ClockState = "running"
+    drops: tuple[Recent, ...] = ()
     thread_dead: bool = False
     shutting_down: bool = False
 
     def status(self, now_s: float) -> Status:
         """The status at `now_s`."""
         age = None if self.last_state_s is None else max(0.0, now_s - self.last_state_s)
-        return Status(self._reason(age), age, self.twin_count, self.has_map)
+        return Status(self._reason(age), age, self.twin_count, self.has_map, self.drops)
 
     def _reason(self, age_s: float | None) -> Reason:
         if self.shutting_down:
@@ -94,4 +134,4 @@ class Liveness:
             return "thread_dead"
         if age_s is None:
             return "never_seen"
-        return "live" if age_s < self.stale_after_s else "stale"
+        return _OF_CLOCK[self.clock] if age_s < self.stale_after_s else "stale"

@@ -9,12 +9,13 @@ from typing import Any, TypeVar
 
 from lupin_bridge.twin.ros_thread import RosThread
 from lupin_bridge.twin.shared import Shared
-from lupin_bridge.twin.source import CacheCounts, Revised, RevisedGrid, TwinNames, TwinTimeoutError
+from lupin_bridge.twin.source import CacheCounts, RevisedGrid, Told, TwinNames, TwinTimeoutError
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldJob, FieldRequest, FieldRules
 from lupin_twin.grid import FieldGrid
 from lupin_twin.history import TagHistory
 from lupin_twin.node import TwinNode
+from lupin_twin.state import Snapshot
 from lupin_twin.workers import Workers
 
 # A third of what counts as silence (`status.STALE_AFTER_S`).
@@ -31,20 +32,28 @@ class LocalTwin:
         self._timeout_s = timeout_s
         # A restarted server must never match an ETag of its predecessor, whose counts it repeats.
         self._identity = uuid.uuid4().hex[:12]
-        self._thread: RosThread[TwinNode, Revised]
+        self._thread: RosThread[TwinNode, Told]
         self.workers = Workers("work")
         self._computing: Shared[FieldGrid] = Shared()
 
-    async def start(
-        self, on_state: Callable[[Revised], None], on_death: Callable[[], None]
-    ) -> None:
+    async def start(self, on_state: Callable[[Told], None], on_death: Callable[[], None]) -> None:
         """Start the ROS thread with its node; see `TwinSource.start`."""
 
-        def make_node(context: Any, post: Callable[[Revised], None]) -> TwinNode:
+        def make_node(context: Any, post: Callable[[Told], None]) -> TwinNode:
             node = TwinNode(context=context)
-            node.add_listener(
-                lambda snapshot: post(Revised(snapshot, self._revision_of(node))), HEARTBEAT_S
-            )
+
+            def tell(snapshot: Snapshot) -> None:
+                post(
+                    Told(
+                        snapshot,
+                        self._revision_of(node),
+                        node.twins.value,
+                        node.occupancy_map,
+                        node.habits.counts(),
+                    )
+                )
+
+            node.add_listener(tell, HEARTBEAT_S)
             return node
 
         self._thread = RosThread(
@@ -89,10 +98,6 @@ class LocalTwin:
     def field_revision(self, request: FieldRequest) -> str | None:  # noqa: ARG002  # all alike
         """The revision now: here every field is made of the store as it stands."""
         return self.revision()
-
-    def twin_count(self) -> int:
-        """How many nodes publish the state topic, ours included."""
-        return self._thread.peek(lambda node: node.twins.value)
 
     def rules(self) -> FieldRules:
         """The node's parameters for fields."""

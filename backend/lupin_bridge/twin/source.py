@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final, Protocol
 
+from lupin_twin.counts import Counts
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRequest, FieldRules
 from lupin_twin.grid import FieldGrid
@@ -27,11 +28,18 @@ class TwinTimeoutError(TwinUnavailableError):
 
 
 @dataclass(frozen=True, slots=True)
-class Revised:
-    """A snapshot, the revision that it belongs to, and when it was made (monotonic clock)."""
+class Told:
+    """All that the ROS thread tells the loop, as of one moment; immutable.
+
+    `revision` is the snapshot's, `twin_count` how many nodes publish the state, `made_s` when it
+    was told (monotonic clock).
+    """
 
     snapshot: Snapshot
     revision: str
+    twin_count: int = 1
+    occupancy_map: OccupancyMap | None = None
+    counts: Counts = field(default_factory=Counts)
     made_s: float = field(default_factory=time.monotonic, compare=False)
 
 
@@ -69,9 +77,7 @@ class TwinSource(Protocol):
 
     workers: Workers
 
-    async def start(
-        self, on_state: Callable[[Revised], None], on_death: Callable[[], None]
-    ) -> None:
+    async def start(self, on_state: Callable[[Told], None], on_death: Callable[[], None]) -> None:
         """Start; `on_state` gets every change (the newest, where they come fast)."""
 
     async def stop(self) -> None:
@@ -105,9 +111,6 @@ class TwinSource(Protocol):
 
         What is claimed here holds for the field: two different ones never have the same.
         """
-
-    def twin_count(self) -> int:
-        """How many nodes publish the state topic; more than 1 is a mistake."""
 
     def rules(self) -> FieldRules:
         """The rules by which fields are made, and their limit."""

@@ -17,6 +17,7 @@ from rclpy.node import Node
 
 from lupin_bridge.twin.pairing import Pairing
 from lupin_twin import convert, ingest, shapes
+from lupin_twin.clock_watch import StampWatch
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRequest
@@ -94,6 +95,7 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._on_state = on_state
         self._newest: Snapshot | None = None
         self._pairing = Pairing()
+        self._stamp_watch = StampWatch()
         self._digests: dict[str, tuple[TagState, bytes]] = {}
         self._topics: dict[str, str] = {}
         group = MutuallyExclusiveCallbackGroup()
@@ -192,6 +194,12 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._patience.cancel()
         before = self._newest
         snapshot = convert.snapshot_of(msg, before, times)
+        clock = self._stamp_watch.look(
+            snapshot.stamp_ns,
+            time.monotonic(),
+            ages_are_known=not any(math.isnan(tag.stale_seconds) for tag in msg.tags),
+        )
+        snapshot = replace(snapshot, clock=clock)
         if snapshot.has_times:
             known = set() if before is None else set(map(id, before.tags))
             went_back = before is not None and snapshot.stamp_ns < before.stamp_ns

@@ -15,8 +15,8 @@ from lupin_bridge.twin.ros_thread import RosThread
 from lupin_bridge.twin.shared import Shared
 from lupin_bridge.twin.source import (
     CacheCounts,
-    Revised,
     RevisedGrid,
+    Told,
     TwinNames,
     TwinTimeoutError,
     TwinUnavailableError,
@@ -50,7 +50,7 @@ class WebTwin:
     def __init__(self, *, ros_args: Sequence[str], timeout_s: float) -> None:
         self._ros_args = ros_args
         self._timeout_s = timeout_s
-        self._thread: RosThread[WebNode, Revised]
+        self._thread: RosThread[WebNode, Told]
         self.workers = Workers("work")
         self._asking: Shared[RevisedGrid] = Shared()
         self._trusted: OrderedDict[FieldRequest, _Trusted] = OrderedDict()
@@ -58,14 +58,20 @@ class WebTwin:
         # One way is left to the small, which would wait behind the large otherwise.
         self._large_slots = asyncio.Semaphore(MAX_REQUESTS - 1)
 
-    async def start(
-        self, on_state: Callable[[Revised], None], on_death: Callable[[], None]
-    ) -> None:
+    async def start(self, on_state: Callable[[Told], None], on_death: Callable[[], None]) -> None:
         """Start the ROS thread with its node; see `TwinSource.start`."""
 
-        def make_node(context: Any, post: Callable[[Revised], None]) -> WebNode:
+        def make_node(context: Any, post: Callable[[Told], None]) -> WebNode:
             def pass_on(snapshot: Snapshot) -> None:
-                post(Revised(snapshot, node.revision))
+                post(
+                    Told(
+                        snapshot,
+                        node.revision,
+                        node.twins.value,
+                        node.occupancy_map,
+                        node.habits.counts(),
+                    )
+                )
 
             node = WebNode(pass_on, context=context)
             return node
@@ -108,10 +114,6 @@ class WebTwin:
     def revision(self) -> str:
         """A digest of poses and readings, and the map's revision."""
         return self._thread.peek(lambda node: node.revision)
-
-    def twin_count(self) -> int:
-        """How many nodes publish the state topic."""
-        return self._thread.peek(lambda node: node.twins.value)
 
     def rules(self) -> FieldRules:
         """The twin's parameters for fields, as far as this process was given the same."""

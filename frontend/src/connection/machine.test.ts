@@ -21,6 +21,7 @@ const status = (twin: StatusFrame['twin']): StatusFrame => ({
   message: '',
   state_age_seconds: 0,
   has_map: true,
+  drops: [],
 });
 
 /** Runs events one after another. */

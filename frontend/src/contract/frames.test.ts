@@ -12,6 +12,7 @@ const status = {
   message: '',
   state_age_seconds: 4,
   has_map: false,
+  drops: [{ reason: 'frame', message: 'dropped a message', count: 3 }],
 };
 const header = { stamp: { sec: 1, nanosec: 0 }, frame_id: 'map' };
 const delta = { type: 'delta', seq: 2, base: 1, revision: 'r', header, changed: [], removed: [] };
@@ -69,7 +70,7 @@ const paths = (frame: unknown): string[] => mutations(frame, undefined).map(([pa
 describe('each field is checked', () => {
   test.each([
     ['a truth', true, /\.(anomaly|has_map)$/],
-    ['a list', [], /\.(tags|readings|flowers|points|changed|removed)$/],
+    ['a list', [], /\.(tags|readings|flowers|points|changed|removed|drops)$/],
     ['an object', {}, /^$/],
     ['a number as text', '21.5', /\.(type|revision|frame_id|tag_id|species|name|reason|message)$/],
     ['nothing', undefined, /^$/],

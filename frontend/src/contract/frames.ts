@@ -8,6 +8,9 @@ export const MAX_FRAME_CHARS = 128_000_000;
 /** More than a twin keeps; beyond it a page would stand still. */
 export const MAX_TAGS = 50_000;
 
+/** Why messages may have been dropped; there are a dozen. */
+const MAX_REASONS = 100;
+
 /** No tag twice, and no more kinds of sensors than a table can have columns. */
 const apart: Check = (value) => {
   const tags = value as readonly TwinTagState[];
@@ -33,6 +36,7 @@ const FRAMES: Readonly<Record<Frame['type'], Check>> = {
     message: TEXT,
     state_age_seconds: numberOrNull,
     has_map: boolean,
+    drops: list(object({ reason: TEXT, message: TEXT, count: number }), MAX_REASONS),
   }),
   state: object({ seq: number, revision: TEXT, state: object({ header: HEADER, tags: TAGS }) }),
   delta: object({

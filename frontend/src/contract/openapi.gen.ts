@@ -483,6 +483,21 @@ export interface components {
             readonly w: number | null;
         };
         /**
+         * RecentDrop
+         * @description Messages of the last minutes that the twin dropped or lost, for one reason.
+         */
+        readonly RecentDrop: {
+            /** Reason */
+            readonly reason: string;
+            /**
+             * Message
+             * @description the last of them, for a person to read
+             */
+            readonly message: string;
+            /** Count */
+            readonly count: number;
+        };
+        /**
          * SensorHistory
          * @description The past values of one sensor at one tag, oldest first.
          */
@@ -536,9 +551,10 @@ export interface components {
             readonly twin: "live" | "offline";
             /**
              * Reason
+             * @description paused: simulated time stands, and is told to, the twin is live; no_clock, clock_stopped: the twin's time does not run, no age is known, and it counts as offline
              * @enum {string}
              */
-            readonly reason: "live" | "never_seen" | "stale" | "thread_dead" | "shutting_down";
+            readonly reason: "live" | "paused" | "no_clock" | "clock_stopped" | "never_seen" | "stale" | "thread_dead" | "shutting_down";
             /**
              * Message
              * @description for a person to read
@@ -554,6 +570,11 @@ export interface components {
              * @description false: /api/map answers 404, no map has come yet
              */
             readonly has_map: boolean;
+            /**
+             * Drops
+             * @description what the twin did not take in lately, by reason
+             */
+            readonly drops: readonly components["schemas"]["RecentDrop"][];
         };
         /**
          * TagError

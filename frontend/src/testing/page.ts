@@ -14,6 +14,7 @@ export const status = (over: Partial<StatusFrame> = {}): StatusFrame => ({
   message: '',
   state_age_seconds: 0,
   has_map: true,
+  drops: [],
   ...over,
 });
 

@@ -234,7 +234,7 @@ def snapshot_of(msg: Any, before: Snapshot | None = None, times: Any = None) -> 
 
 
 def _tag_state(tag: Any, times: Any) -> TagState:
-    never_observed = not math.isfinite(tag.stale_seconds)
+    never_observed = math.isinf(tag.stale_seconds)  # NaN is an age that is not known
     observed_at: dict[str, int | None] = {}
     looked_at_ns, last_try = None, None
     if times is not None:
@@ -278,10 +278,10 @@ class StateMessages:
         """The snapshot as lupin_msgs/TwinState; only tags that changed are built anew."""
         return TwinState(
             header=Header(stamp=time_msg(snapshot.stamp_ns), frame_id=snapshot.frame_id),
-            tags=[self._tag(tag, snapshot.stamp_ns) for tag in snapshot.tags],
+            tags=[self._tag(tag, snapshot.now_ns) for tag in snapshot.tags],
         )
 
-    def _tag(self, tag: TagState, now_ns: int) -> Any:
+    def _tag(self, tag: TagState, now_ns: int | None) -> Any:
         kept = self._kept.get(tag.tag_id)
         if kept is not None and kept[0] is tag:
             msg = kept[1]

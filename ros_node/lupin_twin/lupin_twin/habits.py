@@ -16,6 +16,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.serialization import deserialize_message
 
 from lupin_twin.cdr import MessageShape, TooManyError
+from lupin_twin.counts import Counts, Tally
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.gaps import Gaps
 from lupin_twin.ros_parameters import naming
@@ -56,8 +57,7 @@ class Habits:
     """What one node says and counts; belongs to its thread."""
 
     def __init__(self, node: Node) -> None:
-        self.callback_errors = 0
-        self.lost = 0
+        self.tally = Tally()
         # How long before it was received the message in hand was published, s, by the two clocks.
         self.published_ago_s = 0.0
         self._node = node
@@ -111,16 +111,25 @@ class Habits:
         return str(subscription.topic_name)
 
     def drop(self, drop: Drop, topic: str) -> None:
-        """Tell of something that was dropped."""
+        """Count and tell of something that was dropped."""
+        self.tally.drop(drop, topic, time.monotonic())
         self.warn((drop.reason, (topic, drop.case)), drop.on(topic))
+
+    @property
+    def callback_errors(self) -> int:
+        """Errors met by callbacks so far."""
+        return self.tally.callback_errors
+
+    def counts(self) -> Counts:
+        """All that was dropped, lost and met so far."""
+        return self.tally.value(time.monotonic())
 
     def lose(self, count: int, topic: str) -> None:
         """Count and tell of messages that came faster than they were read."""
-        self.lost += count
+        self.tally.lose(count, topic, time.monotonic())
         self.warn(
             ("lost", topic),
-            f"lost {count} messages on {topic}: they came faster than they were read, "
-            f"{self.lost} lost in all",
+            f"lost {count} messages on {topic}: they came too fast to be read",
         )
 
     def warn(self, key: tuple[str, object], text: str) -> None:
@@ -143,7 +152,7 @@ class Habits:
 
     def report(self, what: str, error: Exception) -> None:
         """Count and log an error of a callback, with its trace, throttled."""
-        self.callback_errors += 1
+        self.tally.callback_errors += 1
         if self._throttle.ask(("error", what), time.monotonic()) is not None:
             trace = "".join(traceback.format_exception(error))
             self._node.get_logger().error(

@@ -7,7 +7,8 @@ group; so the store and the cache need no lock.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 from lupin_msgs.msg import TwinState, TwinTimes
@@ -16,8 +17,10 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock as ClockMessage
 
 from lupin_twin import convert, ingest, shapes
+from lupin_twin.clock_watch import ClockWatch
 from lupin_twin.deferred import Later, allow_later
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.explored import OccupancyMap
@@ -30,11 +33,19 @@ from lupin_twin.history import History, TagHistory, kind_of
 from lupin_twin.lateness import Lateness
 from lupin_twin.parameters import TwinParameters
 from lupin_twin.ros_parameters import declare, naming, naming_own_parameters
-from lupin_twin.state import Look, Scan, Snapshot, TwinStore
+from lupin_twin.state import ClockState, Look, Scan, Snapshot, TwinStore
 from lupin_twin.twin_count import TwinCount
 from lupin_twin.workers import Workers
 
 NODE_NAME: Final = "lupin_twin"
+# How often it is looked at whether ROS time runs, s, however rarely the state is published.
+CLOCK_LOOK_S: Final = 0.5
+CLOCK_SAYS: Final[Mapping[ClockState, str]] = {
+    "running": "ROS time runs",
+    "paused": "ROS time is paused: /clock is published and stands",
+    "stopped": "ROS time has stopped, nothing comes on /clock: ages are not known until it does",
+    "none": "there is no ROS time yet (use_sim_time, and nothing on /clock): ages are not known",
+}
 
 # What was published so long before it was received comes out of a publisher's latch.
 LATCHED_AFTER_S: Final = 0.5
@@ -75,6 +86,9 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.occupancy_map: OccupancyMap | None = None
         self.twins = TwinCount()
         self._others: Any = None
+        self._clock_watch = ClockWatch()
+        self._clock_subscription: Any = None
+        self._clock_told: ClockState = "running"
         self._map_revision = 0
         self._topics: dict[str, str] = {}
         self._listeners: list[Callable[[Snapshot], None]] = []
@@ -113,8 +127,9 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._every(heartbeat_s, "heartbeat", lambda: listener(self.snapshot()))
 
     def snapshot(self) -> Snapshot:
-        """Every tag, now by ROS time."""
-        return self.store.snapshot(self._now_ns(), self.parameters.frame_id)
+        """Every tag, now by ROS time, and whether that runs."""
+        snapshot = self.store.snapshot(self._now_ns(), self.parameters.frame_id)
+        return replace(snapshot, clock=self._clock_watch.state)
 
     def history_of(self, tag_id: str) -> TagHistory | None:
         """The last scans and tries of a tag; None: no such tag."""
@@ -142,6 +157,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 GetField, p.field_service_name, self._on_get_field, callback_group=group
             )
         allow_later(service)
+        self._every(CLOCK_LOOK_S, "clock timer", self._look_at_clock)
         self._every(1.0 / p.state_publish_rate_hz, "state timer", self._publish_state)
 
     def _say_start(self) -> None:
@@ -294,8 +310,37 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
             for listener in self._listeners:
                 listener(snapshot)
 
+    def _look_at_clock(self) -> None:
+        before = self._clock_watch.state
+        self._now_ns()
+        if self._clock_watch.state != before:
+            self._tell_listeners()
+
+    def _watch_clock(self, now_ns: int, *, is_simulated: bool) -> None:
+        watch = self._clock_watch
+        state = watch.look(now_ns, time.monotonic(), is_simulated=is_simulated)
+        if state != self._clock_told:
+            self._clock_told = state
+            log = self.get_logger()
+            (log.warning if state in ("none", "stopped") else log.info)(CLOCK_SAYS[state])
+        # Only while it stands: a simulator that runs may tell the time a thousand times a second.
+        if watch.wants_to_listen and self._clock_subscription is None:
+            self._clock_subscription = self.create_subscription(
+                ClockMessage,
+                "/clock",
+                lambda _: watch.hear(time.monotonic()),
+                QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
+                callback_group=self._group,
+                raw=True,
+            )
+        elif not watch.wants_to_listen and self._clock_subscription is not None:
+            self.destroy_subscription(self._clock_subscription)
+            self._clock_subscription = None
+
     def _now_ns(self) -> int:
-        now_ns = int(self.get_clock().now().nanoseconds)
+        clock = self.get_clock()
+        now_ns = int(clock.now().nanoseconds)
+        self._watch_clock(now_ns, is_simulated=bool(clock.ros_time_is_active))
         if self.store.hold_to(now_ns):
             self.history.hold_to(now_ns)
             self.lateness.hold_to(now_ns)

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 NANOSECONDS_PER_SECOND = 1_000_000_000
 
@@ -169,14 +170,15 @@ class TagState:
     looked_at_ns: int | None = None
     last_try: Try | None = None
 
-    def stale_seconds(self, now_ns: int) -> float:
+    def stale_seconds(self, now_ns: int | None) -> float:
         """Seconds since the last observation: never negative, infinite for a tag never observed.
 
-        What was observed after `now_ns` has the age 0; `TwinStore.hold_to` leaves no such thing.
+        NaN where now is not known. What was observed after `now_ns` has the age 0;
+        `TwinStore.hold_to` leaves no such thing.
         """
         if self.last_observed_ns is None:
             return math.inf
-        return age_seconds(self.last_observed_ns, now_ns)
+        return math.nan if now_ns is None else age_seconds(self.last_observed_ns, now_ns)
 
     def shows_the_same_as(self, other: TagState) -> bool:
         """Whether a field and the state's message show the same of both."""
@@ -202,6 +204,10 @@ class TagState:
         )
 
 
+# Paused: it stands, and is told to; stopped: it stands, and nobody says so; none: never started.
+ClockState = Literal["running", "paused", "stopped", "none"]
+
+
 @dataclass(frozen=True, slots=True)
 class Snapshot:
     """Every tag at one moment, in the order in which the tags were first heard of.
@@ -213,6 +219,12 @@ class Snapshot:
     frame_id: str
     tags: tuple[TagState, ...]
     has_times: bool = True
+    clock: ClockState = "running"
+
+    @property
+    def now_ns(self) -> int | None:
+        """The moment that ages count from; None: the clock does not run, and they are not known."""
+        return self.stamp_ns if self.clock in ("running", "paused") else None
 
 
 @dataclass(slots=True)

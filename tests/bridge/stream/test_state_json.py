@@ -7,14 +7,16 @@ import math
 from dataclasses import replace
 from typing import Any
 
+import cbor2
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lupin_bridge.stream import schema, state_json
+from lupin_bridge.stream.state_cbor import StateCbor
 from lupin_bridge.stream.state_json import StateJson
 from lupin_twin.history import PastScan, PastTry, TagHistory
-from lupin_twin.state import Bloom, Flower, Pose, Reading, Snapshot, TagState, Try
+from lupin_twin.state import Bloom, ClockState, Flower, Pose, Reading, Snapshot, TagState, Try
 
 ANY_NUMBER = st.floats(width=64)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
@@ -268,3 +270,16 @@ def test_a_history_is_sorted_by_sensor_and_keeps_its_order() -> None:
 def test_a_history_that_nobody_tells_is_not_known_rather_than_empty() -> None:
     written = state_json.history("7", TagHistory(is_known=False))
     assert written == {"tag_id": "7", "is_known": False, "sensors": [], "tries": []}
+
+
+@pytest.mark.parametrize("clock", ["none", "stopped"])
+def test_without_a_clock_that_runs_no_age_is_known(clock: ClockState) -> None:
+    tag = TagState("1", readings=(Reading("co2", 1.0, S),), last_observed_ns=S)
+    snapshot = Snapshot(9 * S, "map", (tag,), clock=clock)
+    state = json.loads(StateJson().state(snapshot))
+    assert state == cbor2.loads(StateCbor().state(snapshot))
+    [told] = state["tags"]
+    assert (told["stale_seconds"], told["readings"][0]["stale_seconds"]) == (None, None)
+    assert told["readings"][0]["observed_at"] == {"sec": 1, "nanosec": 0}
+    paused = json.loads(StateJson().state(replace(snapshot, clock="paused")))
+    assert paused["tags"][0]["stale_seconds"] == 8.0

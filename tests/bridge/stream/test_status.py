@@ -9,6 +9,8 @@ import pytest
 from lupin_bridge.bridge import WATCH_PERIOD_S
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.status import STALE_AFTER_S, Liveness, Reason, Status
+from lupin_twin.counts import Recent
+from lupin_twin.state import ClockState
 
 
 def test_a_twin_is_live_until_it_was_silent_for_the_limit() -> None:
@@ -49,7 +51,7 @@ def test_the_reason_nearest_to_the_cure_comes_first() -> None:
 @pytest.mark.parametrize("age_s", [None, 1.23456])
 def test_every_status_has_a_frame_of_the_contract(reason: Reason, age_s: float | None) -> None:
     frame = schema.StatusFrame.model_validate(Status(reason, age_s).frame())
-    assert (frame.twin == "live") == (reason == "live")
+    assert (frame.twin == "live") == (reason in ("live", "paused"))
     assert frame.reason == reason
     assert frame.has_map is False
     assert frame.message
@@ -83,3 +85,33 @@ def test_what_is_news_for_clients_and_what_for_people() -> None:
     mapped = Status("live", 0.1, has_map=True)
     assert mapped.is_news_after(live)
     assert not mapped.says_more_than(live)
+
+
+@pytest.mark.parametrize(
+    ("clock", "reason"),
+    [
+        ("running", "live"),
+        ("paused", "paused"),
+        ("stopped", "clock_stopped"),
+        ("none", "no_clock"),
+    ],
+)
+def test_a_clock_that_does_not_run_is_said_unless_the_twin_is_silent(
+    clock: ClockState, reason: Reason
+) -> None:
+    liveness = Liveness(last_state_s=0.0, clock=clock)
+    assert liveness.status(0.1).reason == reason
+    assert liveness.status(10.0).reason == "stale"
+
+
+def test_what_was_dropped_is_news_when_it_grows_much_and_when_it_is_long_ago() -> None:
+    def status(count: int) -> Status:
+        return Status("live", 0.1, drops=(Recent("frame", "dropped a message", count),))
+
+    assert status(1).is_news_after(Status("live", 0.1))
+    assert status(4).is_news_after(status(3))
+    assert not status(5).is_news_after(status(4))
+    assert Status("live", 0.1).is_news_after(status(1))
+    assert not status(1).says_more_than(Status("live", 0.1))
+    [drop] = schema.StatusFrame.model_validate(status(5).frame()).drops
+    assert (drop.reason, drop.message, drop.count) == ("frame", "dropped a message", 5)

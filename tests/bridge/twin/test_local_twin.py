@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from lupin_bridge.twin.local_twin import LocalTwin
-from lupin_bridge.twin.source import Revised, TwinTimeoutError
+from lupin_bridge.twin.source import Told, TwinTimeoutError
 from lupin_twin.fields import FieldJob, FieldRefused, FieldRequest
 from lupin_twin.grid import FieldGrid
 from lupin_twin.parameters import ParameterError
@@ -32,7 +32,7 @@ class Stage:
 
     def __init__(self, twin: LocalTwin) -> None:
         self.twin = twin
-        self.told: list[Revised] = []
+        self.told: list[Told] = []
         self.computed: list[FieldRequest] = []
         self.held: set[FieldRequest] = set()
         self.gate = threading.Event()

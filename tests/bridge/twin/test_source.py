@@ -14,7 +14,7 @@ import pytest
 from lupin_bridge.twin.local_twin import LocalTwin
 from lupin_bridge.twin.source import (
     STUCK_AFTER_S,
-    Revised,
+    Told,
     TwinSource,
     TwinTimeoutError,
     TwinUnavailableError,
@@ -50,8 +50,8 @@ def test_a_time_out_is_a_kind_of_not_being_there() -> None:
 
 
 def test_when_a_state_was_made_is_no_part_of_what_it_is() -> None:
-    first = Revised(snapshot=None, revision="r", made_s=1.0)  # type: ignore[arg-type]
-    assert first == Revised(snapshot=None, revision="r", made_s=2.0)  # type: ignore[arg-type]
+    first = Told(snapshot=None, revision="r", made_s=1.0)  # type: ignore[arg-type]
+    assert first == Told(snapshot=None, revision="r", made_s=2.0)  # type: ignore[arg-type]
 
 
 class Stage:
@@ -59,13 +59,13 @@ class Stage:
 
     def __init__(self, source: TwinSource, peer: Peer) -> None:
         self.source, self.peer = source, peer
-        self.told: list[Revised] = []
+        self.told: list[Told] = []
         self.deaths: list[None] = []
 
-    async def tag(self, tag_id: str, has_pose: bool | None = None) -> Revised:
+    async def tag(self, tag_id: str, has_pose: bool | None = None) -> Told:
         """The first state told that has the tag, with or without a pose as asked."""
 
-        def look() -> Revised | None:
+        def look() -> Told | None:
             newest = self.told[-1] if self.told else None
             for tag in () if newest is None else newest.snapshot.tags:
                 if tag.tag_id == tag_id and has_pose in (None, tag.pose is not None):
@@ -139,7 +139,7 @@ def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
                 (5_000_000_000, 400.0)
             ]
             assert await source.history("nobody") is None
-            assert source.twin_count() == 1
+            assert stage.told[-1].twin_count == 1
             assert source.names().state_topic == "/twin/state"
             assert source.rules().max_grid_cells == 1000
             assert (source.callback_errors, source.calls_waiting) == (0, 0)

@@ -18,7 +18,7 @@ from lupin_msgs.msg import SensorReading, TwinState, TwinTagState
 from lupin_msgs.srv import GetField
 
 from lupin_bridge.twin import web_node, web_twin
-from lupin_bridge.twin.source import Revised, TwinTimeoutError, TwinUnavailableError
+from lupin_bridge.twin.source import Told, TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.twin.web_twin import MAX_REQUESTS, TRUST_S, WebTwin
 from lupin_twin.fields import FieldRefused, FieldRequest
 from tests.support.inprocess import run
@@ -77,8 +77,8 @@ def service_in(domain: int) -> Iterator[Service]:
 
 
 @asynccontextmanager
-async def started(timeout_s: float = 20.0) -> AsyncIterator[tuple[WebTwin, list[Revised]]]:
-    twin, told = WebTwin(ros_args=(), timeout_s=timeout_s), list[Revised]()
+async def started(timeout_s: float = 20.0) -> AsyncIterator[tuple[WebTwin, list[Told]]]:
+    twin, told = WebTwin(ros_args=(), timeout_s=timeout_s), list[Told]()
     await twin.start(told.append, lambda: None)
     try:
         yield twin, told

@@ -1,0 +1,79 @@
+"""Whether ROS time runs, told from ROS time, a steady clock and the messages on `/clock`. Pure.
+
+Ages by a clock that does not run are no ages: an observation of an hour ago would look new for as
+long as nobody moves the clock. So whoever shows an age asks here first.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from lupin_twin.state import ClockState
+
+# A clock that has not moved for so long, s of steady time, does not run.
+STANDS_AFTER_S: Final = 3.0
+# From here on it is worth listening whether `/clock` still comes.
+LISTEN_AFTER_S: Final = 1.0
+
+
+class ClockWatch:
+    """Follows one clock; times are ROS time in ns, and s of a clock that never jumps."""
+
+    def __init__(self) -> None:
+        self.state: ClockState = "none"
+        self.wants_to_listen = False
+        self._last_ns = 0
+        self._moved_s = 0.0
+        self._heard_s: float | None = None
+
+    def hear(self, now_s: float) -> None:
+        """A message came on `/clock`, whatever it says."""
+        self._heard_s = now_s
+
+    def look(self, ros_ns: int, now_s: float, *, is_simulated: bool) -> ClockState:
+        """Note the time, and tell how the clock does.
+
+        A clock that is not simulated is the system's, and runs. One that is simulated and was never
+        set is at 0.
+        """
+        if ros_ns != self._last_ns:
+            self._last_ns, self._moved_s = ros_ns, now_s
+        standing_s = now_s - self._moved_s
+        self.wants_to_listen = is_simulated and ros_ns > 0 and standing_s >= LISTEN_AFTER_S
+        if not self.wants_to_listen:
+            self._heard_s = None
+        self.state = self._state(ros_ns, now_s, standing_s, is_simulated=is_simulated)
+        return self.state
+
+    def _state(
+        self, ros_ns: int, now_s: float, standing_s: float, *, is_simulated: bool
+    ) -> ClockState:
+        if not is_simulated:
+            return "running"
+        if ros_ns <= 0:
+            return "none"
+        if standing_s < STANDS_AFTER_S:
+            return "running"
+        is_heard = self._heard_s is not None and now_s - self._heard_s < STANDS_AFTER_S
+        return "paused" if is_heard else "stopped"
+
+
+class StampWatch:
+    """Tells how a twin's clock does by its states alone, for who hears them from elsewhere."""
+
+    def __init__(self) -> None:
+        self._last_ns: int | None = None
+        self._moved_s = 0.0
+
+    def look(self, stamp_ns: int, now_s: float, *, ages_are_known: bool) -> ClockState:
+        """Note a state's stamp; `ages_are_known`: the twin gave no age as NaN.
+
+        One whose stamp stands and that still gives ages knows why it stands.
+        """
+        if stamp_ns != self._last_ns:
+            self._last_ns, self._moved_s = stamp_ns, now_s
+        if stamp_ns <= 0:
+            return "none"
+        if not ages_are_known:
+            return "stopped"
+        return "running" if now_s - self._moved_s < STANDS_AFTER_S else "paused"

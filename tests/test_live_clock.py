@@ -1,0 +1,80 @@
+"""A twin whose clock does not run says so, and gives no age: over DDS, in `serve` and in `web`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from rosgraph_msgs.msg import Clock
+
+from tests.support.domains import own_domain
+from tests.support.live import attached
+from tests.support.messages import scan
+from tests.support.processes import lupin_twin
+from tests.support.web import Bridge, bridge
+
+SIM_TIME = ("--ros-args", "-p", "use_sim_time:=true", "-p", "state_publish_rate_hz:=10.0")
+
+
+@pytest.fixture
+def both() -> Iterator[tuple[Bridge, Bridge]]:
+    with (
+        own_domain() as domain,
+        bridge(*SIM_TIME, domain=domain) as twin,
+        lupin_twin(domain, "web") as process,
+        attached(process, twin.peer) as apart,
+    ):
+        yield twin, apart
+
+
+def tick(live: Bridge, seconds: int) -> None:
+    clock = Clock()
+    clock.clock.sec = seconds
+    live.peer.publish("/clock", clock, depth=1)
+
+
+def reason(live: Bridge) -> tuple[int, str]:
+    answer = live.get("/readyz")
+    return answer.status_code, answer.json()["reason"]
+
+
+def test_the_clock_never_starts_runs_is_paused_stops_and_runs_again(
+    both: tuple[Bridge, Bridge],
+) -> None:
+    twin, _ = both
+    until = twin.peer.until
+    twin.peer.observe(scan("1", {"co2": 1.0}, stamp_s=1_000.0))
+    for live in both:
+        until(lambda live=live: reason(live) == (503, "no_clock"), "no clock")  # type: ignore[misc]
+        assert live.tag("1")["stale_seconds"] is None
+
+    seconds = 4_600
+
+    def runs(live: Bridge) -> bool:
+        nonlocal seconds
+        seconds += 1
+        tick(twin, seconds)
+        return reason(live) == (200, "live")
+
+    for live in both:
+        until(lambda live=live: runs(live), "a clock that runs")  # type: ignore[misc]
+        assert live.tag("1")["stale_seconds"] >= 3_600.0
+
+    def stands(live: Bridge) -> bool:
+        tick(twin, seconds)
+        return reason(live) == (200, "paused")
+
+    for live in both:
+        until(lambda live=live: stands(live), "a clock that is paused")  # type: ignore[misc]
+        age = live.tag("1")["stale_seconds"]
+        assert age == live.tag("1")["stale_seconds"] >= 3_600.0
+
+    for live in both:
+        # Observations go on; the newest of them is no younger for that.
+        twin.peer.observe(scan("1", {"co2": 2.0}, stamp_s=float(seconds)))
+        until(lambda live=live: reason(live) == (503, "clock_stopped"), "a clock that stopped")  # type: ignore[misc]
+        until(lambda live=live: live.tag("1")["stale_seconds"] is None, "no age")  # type: ignore[misc]
+
+    for live in both:
+        until(lambda live=live: runs(live), "a clock that runs again")  # type: ignore[misc]
+    assert "nothing comes on /clock" in twin.process.output

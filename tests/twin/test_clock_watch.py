@@ -1,0 +1,84 @@
+from __future__ import annotations
+
+from lupin_twin.clock_watch import LISTEN_AFTER_S, STANDS_AFTER_S, ClockWatch, StampWatch
+from lupin_twin.state import ClockState
+
+S = 1_000_000_000
+BIT = 1e-6
+
+
+def look(watch: ClockWatch, ros_s: float, now_s: float) -> ClockState:
+    return watch.look(int(ros_s * S), now_s, is_simulated=True)
+
+
+def test_the_systems_clock_runs() -> None:
+    watch = ClockWatch()
+    for now_s in (0.0, 100.0):
+        assert watch.look(7 * S, now_s, is_simulated=False) == "running"
+        assert not watch.wants_to_listen
+
+
+def test_a_simulated_clock_that_was_never_set_is_none_however_long() -> None:
+    watch = ClockWatch()
+    assert [look(watch, 0, now_s) for now_s in (0.0, 1.0, 1000.0)] == ["none"] * 3
+    assert not watch.wants_to_listen
+
+
+def test_a_clock_that_stands_for_three_seconds_has_stopped() -> None:
+    watch = ClockWatch()
+    assert look(watch, 5, 10.0) == "running"
+    assert look(watch, 5, 10.0 + STANDS_AFTER_S - BIT) == "running"
+    assert look(watch, 5, 10.0 + STANDS_AFTER_S) == "stopped"
+    assert look(watch, 6, 20.0) == "running"
+
+
+def test_one_that_stands_and_is_still_told_is_paused() -> None:
+    watch = ClockWatch()
+    look(watch, 5, 10.0)
+    look(watch, 5, 12.0)
+    watch.hear(12.5)
+    assert look(watch, 5, 13.0) == "paused"
+    assert look(watch, 5, 12.5 + STANDS_AFTER_S - BIT) == "paused"
+    assert look(watch, 5, 12.5 + STANDS_AFTER_S) == "stopped"
+    watch.hear(16.0)
+    assert look(watch, 5, 16.5) == "paused"
+    assert look(watch, 5.1, 17.0) == "running"
+
+
+def test_what_was_heard_before_the_clock_stood_still_counts_no_more() -> None:
+    watch = ClockWatch()
+    look(watch, 5, 10.0)
+    watch.hear(10.1)
+    look(watch, 6, 10.2)
+    assert look(watch, 6, 10.2 + STANDS_AFTER_S) == "stopped"
+
+
+def test_it_listens_only_while_the_clock_stands() -> None:
+    watch = ClockWatch()
+    look(watch, 5, 10.0)
+    wants = [watch.wants_to_listen]
+    for ros_s, now_s in ((5, 10.0 + LISTEN_AFTER_S - BIT), (5, 10.0 + LISTEN_AFTER_S), (6, 12.0)):
+        look(watch, ros_s, now_s)
+        wants.append(watch.wants_to_listen)
+    assert wants == [False, False, True, False]
+
+
+def test_a_clock_that_goes_back_runs() -> None:
+    watch = ClockWatch()
+    look(watch, 500, 10.0)
+    assert look(watch, 500, 14.0) == "stopped"
+    assert look(watch, 1, 14.5) == "running"
+
+
+def test_by_its_states_alone_a_clock_runs_stands_or_was_never_set() -> None:
+    def look(stamp: int, now_s: float, known: bool = True) -> ClockState:
+        return watch.look(stamp * S, now_s, ages_are_known=known)
+
+    watch = StampWatch()
+    assert look(0, 0.0) == "none"
+    assert look(0, 10.0, known=False) == "none"
+    assert look(5, 11.0) == "running"
+    assert look(5, 11.0 + STANDS_AFTER_S - BIT) == "running"
+    assert look(5, 11.0 + STANDS_AFTER_S) == "paused"
+    assert look(5, 15.0, known=False) == "stopped"
+    assert look(6, 16.0) == "running"

@@ -46,7 +46,7 @@ def test_the_same_file_means_the_same_to_both(
     with (
         Peer(domain) as peer,
         twin_node(domain, *file, *renaming),
-        lupin_twin(domain, "web", *file) as process,
+        lupin_twin(domain, "web", *file, *renaming[2:]) as process,  # the namespace
         attached(process, peer) as web,
     ):
         peer.publish("/site/map", occupancy_grid([[0, 0]], frame_id="site"), depth=1)

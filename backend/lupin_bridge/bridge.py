@@ -23,7 +23,7 @@ from lupin_bridge.stream.hub import Client, Hub
 from lupin_bridge.stream.status import Liveness, Status
 from lupin_bridge.twin.shared import Shared
 from lupin_bridge.twin.source import Told, TwinSource
-from lupin_twin.counts import LOST, Counts
+from lupin_twin.counts import LATE, LOST, Counts
 from lupin_twin.drops import Reason
 from lupin_twin.state import NANOSECONDS_PER_SECOND
 
@@ -146,7 +146,10 @@ class Bridge:
         yield "lupin_admission_refused", self.admission.refused
         yield "lupin_http_answers", self.http_answers
         counts = Counts() if self._latest is None else self._latest.counts
-        yield "lupin_dropped", {str(why): counts.dropped.get(why, 0) for why in (*Reason, LOST)}
+        yield (
+            "lupin_dropped",
+            {str(why): counts.dropped.get(why, 0) for why in (*Reason, LOST, LATE)},
+        )
 
     def _measure(self) -> Iterator[Sample]:
         hub, source, status = self.hub, self.source, self.status

@@ -155,7 +155,7 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
             "journal.schema",
         },
         "ros_parameters": {"parameters"},
-        "habits": {"cdr", "counts", "drops", "gaps", "ros_parameters", "throttle"},
+        "habits": {"cdr", "counts", "drops", "gaps", "lateness", "ros_parameters", "throttle"},
         "node": {
             "clock_watch",
             "convert",

@@ -12,7 +12,10 @@ def test_what_is_dropped_is_counted_by_its_reason() -> None:
         tally.drop(FRAME, "/t", 0.0)
     tally.drop(Drop(Reason.SIZE, "9 bytes, the limit is 8"), "/t", 1.0)
     tally.lose(7, "/t", 2.0)
-    assert tally.value(2.0).dropped == {"frame": 3, "size": 1, "lost": 7}
+    tally.late(6, "late stamps on /t", 2.0)
+    counts = tally.value(2.0)
+    assert counts.dropped == {"frame": 3, "size": 1, "lost": 7, "late_stamp": 6}
+    assert counts.recent[-1] == Recent("late_stamp", "late stamps on /t", 6)
 
 
 def test_what_is_recent_is_told_with_the_last_of_its_kind_and_forgotten() -> None:

@@ -45,9 +45,10 @@ def test_a_clock_that_stepped_back_is_told_after_a_few_and_counted_with_them(rob
     robot.says(1000.0, 1001.0)
     assert robot.says(*(400.0 + i for i in range(FEW))) == []
     assert robot.lateness.counts == {}
-    assert robot.says(410.0) == [Late("robot", FEW + 1, 591.0, "robot")]
+    assert robot.says(410.0) == [Late("robot", FEW + 1, 591.0, "robot", FEW + 1)]
     assert robot.lateness.counts == {"robot": FEW + 1}
-    assert [late.run for late in robot.says(411.0, 412.0)] == [FEW + 2, FEW + 3]
+    more = robot.says(411.0, 412.0)
+    assert [(late.run, late.news) for late in more] == [(FEW + 2, 1), (FEW + 3, 1)]
     assert robot.lateness.counts == {"robot": FEW + 3}
     assert robot.says(1002.0) == [], "it has caught up"
     assert robot.says(*(400.0 + i for i in range(FEW))) == []

@@ -17,6 +17,7 @@ from lupin_twin.drops import Drop
 RECENT_S: Final = 300.0
 _BUCKET_S: Final = 10.0
 LOST: Final = "lost"
+LATE: Final = "late_stamp"
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +55,10 @@ class Tally:
     def lose(self, count: int, topic: str, now_s: float) -> None:
         """Count messages that came faster than they were read."""
         self._count(LOST, f"lost messages on {topic}: they came too fast", count, now_s)
+
+    def late(self, count: int, said: str, now_s: float) -> None:
+        """Count observations whose stamps are behind their producer's own earlier ones."""
+        self._count(LATE, said, count, now_s)
 
     def value(self, now_s: float) -> Counts:
         """The counts now."""

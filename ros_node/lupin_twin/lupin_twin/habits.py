@@ -19,6 +19,7 @@ from lupin_twin.cdr import MessageShape, TooManyError
 from lupin_twin.counts import Counts, Tally
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.gaps import Gaps
+from lupin_twin.lateness import Late
 from lupin_twin.ros_parameters import naming
 from lupin_twin.throttle import Throttle
 
@@ -131,6 +132,12 @@ class Habits:
             ("lost", topic),
             f"lost {count} messages on {topic}: they came too fast to be read",
         )
+
+    def late(self, late: Late, topic: str) -> None:
+        """Count and tell of a producer whose stamps stay behind its own earlier ones."""
+        said = f"late stamps on {topic}: {late}"
+        self.tally.late(late.news, said, time.monotonic())
+        self.warn(("late", late.counted_as), said)
 
     def warn(self, key: tuple[str, object], text: str) -> None:
         """Log a warning, at most one a period for each key, and how many were held back."""

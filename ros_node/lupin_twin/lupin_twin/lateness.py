@@ -31,13 +31,15 @@ OTHERS: Final = "(others)"
 class Late:
     """More than a few in a row that are behind: how many, and by how much the last of them, s.
 
-    `counted_as` is one of few names: that of the source, or `OTHERS`.
+    `counted_as` is one of few names: that of the source, or `OTHERS`. `news` is how many have been
+    counted just now: the first time, the whole run.
     """
 
     source: str
     run: int
     behind_s: float
     counted_as: str
+    news: int = 1
 
     def __str__(self) -> str:
         """What to tell the operator."""
@@ -82,8 +84,9 @@ class Lateness:
         stream.last_s = now_s
         if stream.run <= FEW:
             return None
-        name = self._count(source, stream.run if stream.run == FEW + 1 else 1)
-        return Late(source, stream.run, (stream.newest_ns - stamp_ns) / 1e9, name)
+        news = stream.run if stream.run == FEW + 1 else 1
+        name = self._count(source, news)
+        return Late(source, stream.run, (stream.newest_ns - stamp_ns) / 1e9, name, news)
 
     def hold_to(self, now_ns: int) -> None:
         """Follow a clock that has gone back for all, and nobody is late by it."""

@@ -202,7 +202,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
             now_s=time.monotonic(),
         )
         if late is not None:
-            self.habits.warn(("late", late.counted_as), f"late stamps on {topic}: {late}")
+            self.habits.late(late, topic)
 
     def _on_discovered_tags(self, msg: Any) -> None:
         topic = self._topics["discovered_tags_topic"]

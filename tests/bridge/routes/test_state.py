@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from typing import Any
 from urllib.parse import quote
@@ -13,6 +14,7 @@ from websockets.exceptions import ConnectionClosedError
 
 from lupin_bridge.stream import schema
 from tests.support.messages import discovered, look, pose, scan
+from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge, tag_ids
 
 # The twin itself publishes once in 100 s: what comes earlier was caused by a change, or is the
@@ -322,6 +324,27 @@ def test_what_was_tried_and_when_what_was_observed_is_told(live: Bridge) -> None
         (3610, 0, 1), (7210, 0, 0), (7300, 2, 0),
     ]  # fmt: skip
     assert past["tries"][-1]["status_detail"] == "not decoded"
+
+
+def test_a_producer_whose_stamps_stay_behind_is_told_in_the_status_and_counted(
+    live: Bridge,
+) -> None:
+    messages = [scan("late", {"co2": 1.0}, stamp_s=2000.0)]
+    messages += [scan("late", {"co2": 2.0}, stamp_s=1400.0 + i) for i in range(8)]
+    for message in messages:
+        message.source = "stepped back"
+    live.peer.observe(*messages)
+
+    def late() -> int:
+        drops = live.json("/readyz")["drops"]
+        return sum(each["count"] for each in drops if "'stepped back'" in each["message"])
+
+    # Other tests' robots go back in time too.
+    wait_for(lambda: late() >= 8, "the late stamps")
+    [counted] = re.findall(
+        r'lupin_dropped\w*{reason="late_stamp"} (\S+)', live.get("/metrics").text
+    )
+    assert float(counted) >= 8
 
 
 def test_a_tag_that_was_never_scanned_has_an_empty_history(live: Bridge) -> None:

@@ -22,6 +22,7 @@ ROS = frozenset(
         "builtin_interfaces",
         "geometry_msgs",
         "nav_msgs",
+        "diagnostic_msgs",
         "rcl_interfaces",
         "rosgraph_msgs",
         "std_msgs",
@@ -99,6 +100,7 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
         "gaps": set(),
         "counts": {"drops"},
         "clock_watch": {"state"},
+        "diagnostics": {"counts", "state"},
         "leaving": set(),
         "deferred": set(),
         "field_desk": {"field_cache", "fields", "grid", "workers"},
@@ -110,7 +112,7 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
         "history": {"state"},
         "lateness": set(),
         "ingest": {"drops", "history", "state"},
-        "convert": {"state", "grid", "explored", "fields", "history", "ingest"},
+        "convert": {"diagnostics", "state", "grid", "explored", "fields", "history", "ingest"},
         "journal": set(),
         "journal.rows": {"state"},
         "journal.packing": {"state"},
@@ -160,6 +162,7 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
             "clock_watch",
             "convert",
             "deferred",
+            "diagnostics",
             "explored",
             "drops",
             "field_cache",
@@ -280,6 +283,7 @@ PURE_EXCEPT: Mapping[str, set[str]] = {
     "lupin_twin.field_desk": {
         "concurrent.futures",
         "queue",
+        "time",
     },  # where the workers' results come back
     "lupin_twin.leaving": {"logging", "os", "sys", "threading", "time"},  # the end of a process
     "lupin_twin.stop_signals": {"signal"},  # which is what it is about

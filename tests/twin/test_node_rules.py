@@ -115,7 +115,7 @@ def test_one_callback_group_keeps_all_callbacks_apart(stage: Stage) -> None:
         ),
         *node.timers,
     ]
-    assert len(ours) == 3 + 1 + 3
+    assert len(ours) == 3 + 1 + 4
     assert isinstance(node._group, MutuallyExclusiveCallbackGroup)
     assert {id(each.callback_group) for each in ours} == {id(node._group)}
 

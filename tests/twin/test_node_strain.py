@@ -8,13 +8,14 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lupin_msgs.msg import DiscoveredTag, DiscoveredTags
 from lupin_msgs.srv import GetField
 from rclpy.serialization import serialize_message
 
 from lupin_twin.field_desk import MAX_FIELDS
 from tests.support.domains import own_domain
-from tests.support.messages import scan
+from tests.support.messages import discovered, occupancy_grid, scan
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
 from tests.support.processes import Process, twin_node
 from tests.support.ros import Peer
@@ -198,3 +199,24 @@ def test_messages_that_came_too_fast_are_counted_and_told_of(strained: Strained)
     strained.peer.tag("fast", lambda tag: readings(tag) == {"co2": 199.0})
     line = strained.process.wait_for_output("on /floranova/observations: they came too fast")
     assert "lost 1" in line
+
+
+def test_the_twin_says_on_diagnostics_how_it_is(strained: Strained) -> None:
+    peer = strained.peer
+    heard: list[Any] = []
+    peer.node.create_subscription(DiagnosticArray, "/diagnostics", heard.append, 10)
+
+    def levels() -> dict[str, bytes]:
+        return {status.name: status.level for status in heard[-1].status} if heard else {}
+
+    inputs, drops = "/lupin_twin: inputs", "/lupin_twin: drops"
+    peer.until(lambda: levels().get(inputs) == DiagnosticStatus.STALE, "no observation yet")
+    assert levels()["/lupin_twin: clock"] == DiagnosticStatus.OK
+    peer.observe(scan("1", frame_id="odom"))
+    peer.until(lambda: levels()[drops] == DiagnosticStatus.WARN, "the drop")
+    [told] = [status for status in heard[-1].status if status.name == drops]
+    assert {pair.key: pair.value for pair in told.values}["frame"] == "1"
+    for topic, message in (("/perception/discovered_tags", discovered({})), ("/map", None)):
+        peer.publish(topic, message or occupancy_grid([[0]]))
+    peer.observe(scan("1", {"co2": 1.0}))
+    peer.until(lambda: levels()[inputs] == DiagnosticStatus.OK, "all inputs")

@@ -6,6 +6,7 @@ through a queue, and `deliver` takes them on the desk's own thread.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from queue import Empty, SimpleQueue
@@ -27,15 +28,18 @@ Reply = Callable[[FieldGrid | Exception], None]
 class FieldDesk:
     """Takes jobs, and hands each field, or the error it met, to all who asked for it.
 
+    `computed` counts the fields, `slowest_s` is the longest that one took, waiting included.
     `wake()` is called in a worker's thread, when `deliver` has something to do.
     """
 
     def __init__(self, engine: FieldEngine, workers: Workers, wake: Callable[[], None]) -> None:
+        self.computed = 0
+        self.slowest_s = 0.0
         self._engine = engine
         self._workers = workers
         self._wake = wake
         self._waiting: dict[FieldKey, list[Reply]] = {}
-        self._done: SimpleQueue[tuple[FieldJob, Future[FieldGrid]]] = SimpleQueue()
+        self._done: SimpleQueue[tuple[FieldJob, float, Future[FieldGrid]]] = SimpleQueue()
 
     @property
     def computing(self) -> int:
@@ -62,17 +66,18 @@ class FieldDesk:
             )
         self._waiting[job.key] = [reply]
         future = self._workers.submit(job.compute, job.cost_s)
-        future.add_done_callback(lambda done: self._put(job, done))
+        asked_s = time.monotonic()
+        future.add_done_callback(lambda done: self._put(job, asked_s, done))
 
-    def _put(self, job: FieldJob, done: Future[Any]) -> None:
-        self._done.put((job, done))
+    def _put(self, job: FieldJob, asked_s: float, done: Future[Any]) -> None:
+        self._done.put((job, asked_s, done))
         self._wake()
 
     def deliver(self) -> None:
         """Hand out what has been computed, and keep it."""
         while True:
             try:
-                job, done = self._done.get_nowait()
+                job, asked_s, done = self._done.get_nowait()
             except Empty:
                 return
             if done.cancelled():  # the workers were closed
@@ -83,6 +88,8 @@ class FieldDesk:
             if error is None:
                 answer = done.result()
                 self._engine.keep(job, answer)
+                self.computed += 1
+                self.slowest_s = max(self.slowest_s, time.monotonic() - asked_s)
             else:
                 answer = error if isinstance(error, Exception) else RuntimeError(repr(error))
             for reply in self._waiting.pop(job.key, ()):

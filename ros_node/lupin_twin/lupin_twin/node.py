@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
+from diagnostic_msgs.msg import DiagnosticArray
 from lupin_msgs.msg import TwinState, TwinTimes
 from lupin_msgs.srv import GetField
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -22,6 +23,7 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from lupin_twin import convert, ingest, shapes
 from lupin_twin.clock_watch import ClockWatch
 from lupin_twin.deferred import Later, allow_later
+from lupin_twin.diagnostics import Health, findings
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.field_cache import FieldCache
@@ -40,6 +42,7 @@ from lupin_twin.workers import Workers
 NODE_NAME: Final = "lupin_twin"
 # How often it is looked at whether ROS time runs, s, however rarely the state is published.
 CLOCK_LOOK_S: Final = 0.5
+DIAGNOSTICS_PERIOD_S: Final = 1.0
 CLOCK_SAYS: Final[Mapping[ClockState, str]] = {
     "running": "ROS time runs",
     "paused": "ROS time is paused: /clock is published and stands",
@@ -87,6 +90,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.twins = TwinCount()
         self._others: Any = None
         self._clock_watch = ClockWatch()
+        self._observed_s: float | None = None
         self._clock_subscription: Any = None
         self._clock_told: ClockState = "running"
         self._map_revision = 0
@@ -157,6 +161,8 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 GetField, p.field_service_name, self._on_get_field, callback_group=group
             )
         allow_later(service)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._every(DIAGNOSTICS_PERIOD_S, "diagnostics timer", self._publish_diagnostics)
         self._every(CLOCK_LOOK_S, "clock timer", self._look_at_clock)
         self._every(1.0 / p.state_publish_rate_hz, "state timer", self._publish_state)
 
@@ -189,6 +195,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
             return
         is_news = not self.history.knows(write)
         if self._apply(write, topic):
+            self._observed_s = time.monotonic()
             if is_news:
                 self._look_at_stamp(write, topic)
             self._tell_listeners()
@@ -264,6 +271,23 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         """End the workers too; what they compute is for nobody then."""
         self._workers.close()
         super().destroy_node()
+
+    def _publish_diagnostics(self) -> None:
+        now_s = time.monotonic()
+        health = Health(
+            clock=self._clock_watch.state,
+            counts=self.habits.counts(),
+            inputs={topic: int(self.count_publishers(topic)) for topic in self._topics.values()},
+            observed_ago_s=None if self._observed_s is None else now_s - self._observed_s,
+            late=self.lateness.counts,
+            twins=self.twins.value,
+            fields_computing=self._desk.computing,
+            fields_computed=self._desk.computed,
+            slowest_field_s=self._desk.slowest_s,
+        )
+        self._diagnostics.publish(
+            convert.diagnostics(findings(health), self.get_fully_qualified_name(), self._now_ns())
+        )
 
     def _publish_state(self) -> None:
         snapshot = self.snapshot()

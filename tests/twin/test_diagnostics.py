@@ -1,0 +1,77 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from lupin_twin.counts import Counts, Recent
+from lupin_twin.diagnostics import ERROR, OK, STALE, WARN, Finding, Health, findings
+
+WELL = Health(
+    clock="running",
+    counts=Counts(),
+    inputs={"/floranova/observations": 1},
+    observed_ago_s=2.0,
+    late={},
+    twins=1,
+    fields_computing=0,
+    fields_computed=3,
+    slowest_field_s=0.25,
+)
+FRAME = Recent("frame", "its frame is 'odom'", 12)
+
+
+def found(name: str, **changes: Any) -> Finding:
+    [finding] = [each for each in findings(replace(WELL, **changes)) if each.name == name]
+    return finding
+
+
+def test_a_twin_that_is_well_is_ok_in_all() -> None:
+    levels = {finding.name: finding.level for finding in findings(WELL)}
+    assert levels == dict.fromkeys(
+        ("clock", "inputs", "drops", "queues", "stamps", "fields", "twins"), OK
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "level", "words"),
+    [
+        ("clock", {"clock": "paused"}, WARN, "paused"),
+        ("clock", {"clock": "stopped"}, ERROR, "stopped"),
+        ("clock", {"clock": "none"}, ERROR, "no ROS time"),
+        ("inputs", {"observed_ago_s": None}, STALE, "no observation"),
+        ("inputs", {"inputs": {"/map": 0}}, WARN, "nobody publishes /map"),
+        ("drops", {"counts": Counts({"frame": 40}, 0, (FRAME,))}, WARN, "12 lately"),
+        ("drops", {"counts": Counts({"frame": 40})}, OK, "nothing lately"),
+        ("drops", {"counts": Counts(callback_errors=1)}, WARN, "nothing lately"),
+        (
+            "queues",
+            {"counts": Counts({"lost": 5}, 0, (Recent("lost", "", 5),))},
+            WARN,
+            "5 messages",
+        ),
+        ("queues", {"counts": Counts({"lost": 5})}, OK, "nothing lost"),
+        ("stamps", {"late": {"robot": 9}}, WARN, "behind"),
+        ("twins", {"twins": 2}, ERROR, "2 twins"),
+    ],
+)
+def test_what_is_not_well_has_its_level(
+    name: str, changes: dict[str, Any], level: int, words: str
+) -> None:
+    finding = found(name, **changes)
+    assert finding.level == level
+    assert words in finding.message
+
+
+def test_the_numbers_are_there() -> None:
+    counts = Counts({"frame": 40, "lost": 5}, 0, (FRAME,))
+    values = {
+        "frame": "40",
+        "lately: frame": "12",
+        "callback errors": "0",
+    }
+    assert found("drops", counts=counts).values == values
+    assert found("queues", counts=counts).values == {"lost": "5"}
+    assert found("fields").values == {"computed": "3", "slowest, s": "0.250"}
+    assert found("inputs").values["last observation, s ago"] == "2.0"

@@ -78,3 +78,4 @@ def test_the_clock_never_starts_runs_is_paused_stops_and_runs_again(
     for live in both:
         until(lambda live=live: runs(live), "a clock that runs again")  # type: ignore[misc]
     assert "nothing comes on /clock" in twin.process.output
+    assert twin.json("/healthz")["callback_errors"] == 0

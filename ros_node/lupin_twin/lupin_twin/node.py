@@ -345,8 +345,11 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         state = watch.look(now_ns, time.monotonic(), is_simulated=is_simulated)
         if state != self._clock_told:
             self._clock_told = state
-            log = self.get_logger()
-            (log.warning if state in ("none", "stopped") else log.info)(CLOCK_SAYS[state])
+            # Two lines: rclpy lets one line log at one level only.
+            if state in ("none", "stopped"):
+                self.get_logger().warning(CLOCK_SAYS[state])
+            else:
+                self.get_logger().info(CLOCK_SAYS[state])
         # Only while it stands: a simulator that runs may tell the time a thousand times a second.
         if watch.wants_to_listen and self._clock_subscription is None:
             self._clock_subscription = self.create_subscription(

@@ -155,6 +155,7 @@ class Bridge:
         hub, source, status = self.hub, self.source, self.status
         tags = () if self._latest is None else self._latest.snapshot.tags
         cache = source.cache_counts()
+        journal = source.journal()
         yield "lupin_clients", len(hub)
         yield "lupin_clients_blocked", hub.blocked
         yield "lupin_clients_dismissed", hub.clients_dismissed
@@ -178,6 +179,12 @@ class Bridge:
         yield "lupin_field_cache_misses", cache.misses
         yield "lupin_field_cache_entries", cache.entries
         yield "lupin_field_cache_bytes", cache.bytes
+        yield "lupin_journal_recording", journal.state == "recording"
+        yield "lupin_journal_rows", journal.written
+        yield "lupin_journal_rows_lost", journal.lost
+        yield "lupin_journal_rows_waiting", journal.waiting
+        yield "lupin_journal_behind_seconds", journal.behind_s
+        yield "lupin_journal_file_bytes", journal.file_bytes
 
     # --- from the source ----------------------------------------------------------------------
 

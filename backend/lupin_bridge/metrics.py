@@ -26,6 +26,10 @@ GAUGES: Final = {
     "lupin_fields_computing": "field requests being computed now",
     "lupin_field_cache_entries": "fields in the cache",
     "lupin_field_cache_bytes": "memory of the fields in the cache",
+    "lupin_journal_recording": "1 while the journal keeps what is observed, as promised",
+    "lupin_journal_rows_waiting": "observations that are not in the journal yet",
+    "lupin_journal_behind_seconds": "for how long the oldest of those has been waiting",
+    "lupin_journal_file_bytes": "size of the journal on the disk",
 }
 # Written with `_total` behind the name, as Prometheus wants it.
 COUNTERS: Final = {
@@ -37,6 +41,8 @@ COUNTERS: Final = {
     "lupin_field_cache_hits": "fields served from the cache",
     "lupin_field_cache_misses": "fields that had to be computed",
     "lupin_work_abandoned": "computations that were ended because nobody waited any more",
+    "lupin_journal_rows": "observations written to the journal",
+    "lupin_journal_rows_lost": "observations given up because the journal could not be written",
 }
 # The same, each with a label of its own.
 LABELLED: Final = {

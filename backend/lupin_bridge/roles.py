@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import json
 import logging
 import os
 import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from lupin_bridge.access.entrance import Entrance
@@ -27,6 +28,7 @@ from lupin_bridge.twin.local_twin import LocalTwin
 from lupin_bridge.twin.ros_thread import RosStartError
 from lupin_bridge.twin.source import ailment
 from lupin_bridge.twin.web_twin import WebTwin
+from lupin_twin.memory import state_folder
 from lupin_twin.parameters import ParameterError
 
 log = logging.getLogger("lupin_bridge")
@@ -83,6 +85,8 @@ async def _run(
     settings = replace(settings, max_clients=allow_connections(settings.max_clients))
     # Before a process is started that would inherit its variables.
     supervisor = Supervisor(os.environ)
+    if role == "demo":
+        ros_args = [*demo_journal(os.environ, patrol_args), *ros_args]
     make_source = WebTwin if role == "web" else LocalTwin
     source = make_source(ros_args=ros_args, timeout_s=settings.field_timeout_s)
     bridge = Bridge(source, settings)
@@ -113,6 +117,20 @@ async def _run(
         if patrol is not None:
             patrol.terminate()
         await asyncio.gather(bridge.stop(), *([] if patrol is None else [patrol.wait()]))
+
+
+def demo_journal(environ: Mapping[str, str], patrol_args: Sequence[str]) -> list[str]:
+    """ROS arguments that keep a demo's journal apart from a real twin's, and seeds from each other.
+
+    Whatever is given after them counts instead.
+    """
+    seeds = [word for word in patrol_args if word.startswith("--seed=")]
+    seed = seeds[-1].partition("=")[2] if seeds else "0"
+    try:
+        path = state_folder(environ) / f"demo-seed-{seed}.sqlite"
+    except RuntimeError:
+        return []
+    return ["--ros-args", "-p", f"journal:={json.dumps(str(path))}", "--"]
 
 
 def _follow_certificates(settings: Settings, server: BridgeServer) -> asyncio.Task[None] | None:

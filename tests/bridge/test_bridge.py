@@ -25,6 +25,7 @@ from lupin_bridge.stream.hub import Client
 from lupin_bridge.twin.source import CacheCounts, Told
 from lupin_twin.fields import FieldJob
 from lupin_twin.grid import FieldGrid
+from lupin_twin.journal.condition import OFF, Condition
 from lupin_twin.state import Snapshot, TagState
 from lupin_twin.workers import ShouldStop
 from tests.bridge.stream.test_frames import received
@@ -49,6 +50,9 @@ class Script:
 
     async def stop(self) -> None:
         self.is_alive = False
+
+    def journal(self) -> Condition:
+        return OFF
 
     def cache_counts(self) -> CacheCounts:
         return CacheCounts()

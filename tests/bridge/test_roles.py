@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from lupin_bridge.roles import demo_journal
 from lupin_bridge.serving.server import listen
 from tests.support.messages import scan
 from tests.support.processes import Process, lupin_twin, url_of
@@ -158,3 +159,14 @@ def test_a_patrol_that_ends_by_itself_is_told(domain: int) -> None:
         demo.wait_for_output("the patrol has ended with code 2")
         assert "argument --speed" in demo.output
         assert demo.stop() == 0
+
+
+def test_a_demo_keeps_a_journal_of_its_own_by_seed() -> None:
+    env = {"XDG_STATE_HOME": "/state"}
+    for patrol_args, name in (([], "demo-seed-0"), (["--seed=3"], "demo-seed-3")):
+        assert demo_journal(env, patrol_args) == [
+            "--ros-args",
+            "-p",
+            f'journal:="/state/lupin-twin/{name}.sqlite"',
+            "--",
+        ]

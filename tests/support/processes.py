@@ -29,7 +29,7 @@ class Process:
         self._output = tempfile.NamedTemporaryFile("w+", suffix=".log", delete=False)  # noqa: SIM115
         self._process = subprocess.Popen(
             command,
-            env=dict(env),
+            env={**env, **_state_of_its_own(env)},
             stdin=subprocess.DEVNULL,
             stdout=self._output,
             stderr=subprocess.STDOUT,
@@ -133,3 +133,12 @@ def lupin_twin(domain: int, role: str, *args: str, **env: str) -> Process:
 def url_of(process: Process) -> str:
     """The address that a `lupin-twin` process announces once it serves."""
     return process.wait_for_output("lupin-twin: http").partition(": ")[2].strip()
+
+
+def _state_of_its_own(env: Mapping[str, str]) -> dict[str, str]:
+    """A folder for what a process keeps, unless it was given one: it begins with no memory."""
+    state = os.environ["XDG_STATE_HOME"]
+    if env.get("XDG_STATE_HOME", state) != state:
+        return {}
+    Path(state).mkdir(exist_ok=True)
+    return {"XDG_STATE_HOME": tempfile.mkdtemp(dir=state)}

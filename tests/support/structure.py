@@ -53,7 +53,7 @@ KNOW_THE_DISK = {
         "syncing",
         "writer",
     )
-}
+} | {"lupin_twin.memory"}
 # What else a package may use, and in which modules: None is all of them. The bridge may use what
 # its own dependencies list.
 LIBRARIES: Mapping[str, Mapping[str, set[str] | None]] = {
@@ -100,7 +100,7 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
         "gaps": set(),
         "counts": {"drops"},
         "clock_watch": {"state"},
-        "diagnostics": {"counts", "state"},
+        "diagnostics": {"counts", "journal.condition", "state"},
         "leaving": set(),
         "deferred": set(),
         "field_desk": {"field_cache", "fields", "grid", "workers"},
@@ -158,8 +158,22 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
         },
         "ros_parameters": {"parameters"},
         "habits": {"cdr", "counts", "drops", "gaps", "lateness", "ros_parameters", "throttle"},
+        "memory": {
+            "drops",
+            "history",
+            "ingest",
+            "state",
+            "journal.condition",
+            "journal.restoring",
+            "journal.retention",
+            "journal.rows",
+            "journal.runs",
+            "journal.writer",
+        },
         "node": {
             "clock_watch",
+            "journal.runs",
+            "memory",
             "convert",
             "deferred",
             "diagnostics",

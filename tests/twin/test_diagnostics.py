@@ -7,6 +7,7 @@ import pytest
 
 from lupin_twin.counts import Counts, Recent
 from lupin_twin.diagnostics import ERROR, OK, STALE, WARN, Finding, Health, findings
+from lupin_twin.journal.condition import Condition, JournalState
 
 WELL = Health(
     clock="running",
@@ -30,7 +31,7 @@ def found(name: str, **changes: Any) -> Finding:
 def test_a_twin_that_is_well_is_ok_in_all() -> None:
     levels = {finding.name: finding.level for finding in findings(WELL)}
     assert levels == dict.fromkeys(
-        ("clock", "inputs", "drops", "queues", "stamps", "fields", "twins"), OK
+        ("clock", "inputs", "drops", "queues", "stamps", "fields", "journal", "twins"), OK
     )
 
 
@@ -75,3 +76,12 @@ def test_the_numbers_are_there() -> None:
     assert found("queues", counts=counts).values == {"lost": "5"}
     assert found("fields").values == {"computed": "3", "slowest, s": "0.250"}
     assert found("inputs").values["last observation, s ago"] == "2.0"
+
+
+def test_a_journal_that_cannot_be_written_is_an_error_and_one_that_is_off_is_none() -> None:
+    failing = Condition(JournalState.FAILING, "the disk is full", "/j.sqlite", lost=3)
+    [told] = [f for f in findings(replace(WELL, journal=failing)) if f.name == "journal"]
+    assert (told.level, told.message) == (ERROR, "the disk is full")
+    assert told.values["lost"] == "3"
+    [told] = [f for f in findings(WELL) if f.name == "journal"]
+    assert (told.level, told.message) == (OK, "no journal is kept")

@@ -29,6 +29,9 @@ DEFAULTS = {
     "clip_to_explored": False,
     "max_grid_cells": 1_000_000,
     "field_cache_mb": 64.0,
+    "journal": "",
+    "journal_days": 90.0,
+    "journal_max_mb": 4000.0,
 }
 
 
@@ -102,3 +105,9 @@ def test_every_parameter_is_described() -> None:
         description, limits = describe(spec.name)
         assert description
         assert bool(limits) == (type(spec.default) in (int, float))
+
+
+def test_a_plain_off_which_yaml_reads_as_false_is_the_journals_off() -> None:
+    assert TwinParameters(journal=False).journal == "off"  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match="parameter journal is True"):
+        TwinParameters(journal=True)  # type: ignore[arg-type]

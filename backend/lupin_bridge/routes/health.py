@@ -60,11 +60,18 @@ async def metrics(request: Request) -> Response:
     "/readyz",
     summary="Is there a live twin behind the bridge?",
     responses={
-        200: {"model": schema.StatusFrame},
-        503: {"model": schema.StatusFrame, "description": "never seen, silent, or dead"},
+        200: {"model": schema.Readiness},
+        503: {"model": schema.Readiness, "description": "never seen, silent, or dead"},
     },
 )
 async def readyz(request: Request) -> Response:
-    """The status as WebSocket clients are told it; 503 while the twin is offline."""
-    status = bridge_of(request).status
-    return json_response(orjson.dumps(status.frame()), 200 if status.is_live else 503)
+    """The status as WebSocket clients are told it; 503 while the twin is offline.
+
+    A journal that cannot be written is told, and is no reason for 503: the twin goes on without.
+    """
+    bridge = bridge_of(request)
+    journal = bridge.source.journal()
+    body = bridge.status.frame() | {
+        "journal": {"state": journal.state.value, "detail": journal.detail}
+    }
+    return json_response(orjson.dumps(body), 200 if bridge.status.is_live else 503)

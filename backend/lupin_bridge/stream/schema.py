@@ -186,6 +186,19 @@ class StatusFrame(Contract):
     drops: list[RecentDrop] = Field(description="what the twin did not take in lately, by reason")
 
 
+class Journal(Contract):
+    """How the twin's journal does."""
+
+    state: Literal["off", "starting", "recording", "slow", "failing", "in_use", "foreign"]
+    detail: str = Field(description="for a person to read")
+
+
+class Readiness(StatusFrame):
+    """The status, and what a replica with a twin of its own can tell beside it."""
+
+    journal: Journal
+
+
 class GetFieldResponse(Contract):
     """GetField's response. A refusal has `ok` false, the reason, and everything else zero."""
 

@@ -14,6 +14,7 @@ from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldJob, FieldRequest, FieldRules
 from lupin_twin.grid import FieldGrid
 from lupin_twin.history import TagHistory
+from lupin_twin.journal.condition import Condition
 from lupin_twin.node import TwinNode
 from lupin_twin.state import Snapshot
 from lupin_twin.workers import Workers
@@ -111,6 +112,10 @@ class LocalTwin:
                 node.resolve_service_name(node.parameters.field_service_name),
             )
         )
+
+    def journal(self) -> Condition:
+        """The node's journal."""
+        return self._thread.peek(lambda node: node.memory.condition)
 
     def cache_counts(self) -> CacheCounts:
         """The node's cache of fields."""

@@ -12,6 +12,7 @@ from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRequest, FieldRules
 from lupin_twin.grid import FieldGrid
 from lupin_twin.history import TagHistory
+from lupin_twin.journal.condition import Condition
 from lupin_twin.state import Snapshot
 from lupin_twin.workers import Workers
 
@@ -120,6 +121,9 @@ class TwinSource(Protocol):
 
     def cache_counts(self) -> CacheCounts:
         """How the cache of fields does; all 0 where it is not in this process."""
+
+    def journal(self) -> Condition:
+        """How the journal does; off where it is not in this process."""
 
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map, if any has come."""

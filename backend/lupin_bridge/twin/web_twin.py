@@ -26,6 +26,7 @@ from lupin_twin import convert
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRefused, FieldRequest, FieldRules, cost_s
 from lupin_twin.history import TagHistory
+from lupin_twin.journal.condition import OFF, Condition
 from lupin_twin.state import Snapshot
 from lupin_twin.workers import SMALL_S, Workers
 
@@ -127,6 +128,10 @@ class WebTwin:
                 node.resolve_service_name(node.parameters.field_service_name),
             )
         )
+
+    def journal(self) -> Condition:
+        """Off: the journal is the twin's, elsewhere."""
+        return OFF
 
     def cache_counts(self) -> CacheCounts:
         """Nothing: the cache is the twin's."""

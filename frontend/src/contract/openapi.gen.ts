@@ -242,6 +242,8 @@ export interface paths {
         /**
          * Is there a live twin behind the bridge?
          * @description The status as WebSocket clients are told it; 503 while the twin is offline.
+         *
+         *     A journal that cannot be written is told, and is no reason for 503: the twin goes on without.
          */
         readonly get: operations["readyz_readyz_get"];
         readonly put?: never;
@@ -397,6 +399,22 @@ export interface components {
             readonly value: number | null;
         };
         /**
+         * Journal
+         * @description How the twin's journal does.
+         */
+        readonly Journal: {
+            /**
+             * State
+             * @enum {string}
+             */
+            readonly state: "off" | "starting" | "recording" | "slow" | "failing" | "in_use" | "foreign";
+            /**
+             * Detail
+             * @description for a person to read
+             */
+            readonly detail: string;
+        };
+        /**
          * MapMetaData
          * @description Size and place of the occupancy grid; resolution in m a cell.
          */
@@ -483,6 +501,49 @@ export interface components {
             readonly w: number | null;
         };
         /**
+         * Readiness
+         * @description The status, and what a replica with a twin of its own can tell beside it.
+         */
+        readonly Readiness: {
+            /**
+             * Type
+             * @constant
+             */
+            readonly type: "status";
+            /**
+             * Twin
+             * @enum {string}
+             */
+            readonly twin: "live" | "offline";
+            /**
+             * Reason
+             * @description paused: simulated time stands, and is told to, the twin is live; no_clock, clock_stopped: the twin's time does not run, no age is known, and it counts as offline
+             * @enum {string}
+             */
+            readonly reason: "live" | "paused" | "no_clock" | "clock_stopped" | "never_seen" | "stale" | "thread_dead" | "shutting_down";
+            /**
+             * Message
+             * @description for a person to read
+             */
+            readonly message: string;
+            /**
+             * State Age Seconds
+             * @description s since the bridge got its last state, by its own clock; null: never
+             */
+            readonly state_age_seconds: number | null;
+            /**
+             * Has Map
+             * @description false: /api/map answers 404, no map has come yet
+             */
+            readonly has_map: boolean;
+            /**
+             * Drops
+             * @description what the twin did not take in lately, by reason
+             */
+            readonly drops: readonly components["schemas"]["RecentDrop"][];
+            readonly journal: components["schemas"]["Journal"];
+        };
+        /**
          * RecentDrop
          * @description Messages of the last minutes that the twin dropped or lost, for one reason.
          */
@@ -533,48 +594,6 @@ export interface components {
             readonly can_sign_out: boolean;
             /** Seconds Left */
             readonly seconds_left: number | null;
-        };
-        /**
-         * StatusFrame
-         * @description WebSocket frame, and the body of `/readyz`: whether the twin behind the bridge is alive.
-         */
-        readonly StatusFrame: {
-            /**
-             * Type
-             * @constant
-             */
-            readonly type: "status";
-            /**
-             * Twin
-             * @enum {string}
-             */
-            readonly twin: "live" | "offline";
-            /**
-             * Reason
-             * @description paused: simulated time stands, and is told to, the twin is live; no_clock, clock_stopped: the twin's time does not run, no age is known, and it counts as offline
-             * @enum {string}
-             */
-            readonly reason: "live" | "paused" | "no_clock" | "clock_stopped" | "never_seen" | "stale" | "thread_dead" | "shutting_down";
-            /**
-             * Message
-             * @description for a person to read
-             */
-            readonly message: string;
-            /**
-             * State Age Seconds
-             * @description s since the bridge got its last state, by its own clock; null: never
-             */
-            readonly state_age_seconds: number | null;
-            /**
-             * Has Map
-             * @description false: /api/map answers 404, no map has come yet
-             */
-            readonly has_map: boolean;
-            /**
-             * Drops
-             * @description what the twin did not take in lately, by reason
-             */
-            readonly drops: readonly components["schemas"]["RecentDrop"][];
         };
         /**
          * TagError
@@ -742,6 +761,48 @@ export interface components {
              * @description tag_ids; a restarted twin knows fewer tags
              */
             readonly removed: readonly string[];
+        };
+        /**
+         * StatusFrame
+         * @description WebSocket frame, and the body of `/readyz`: whether the twin behind the bridge is alive.
+         */
+        readonly StatusFrame: {
+            /**
+             * Type
+             * @constant
+             */
+            readonly type: "status";
+            /**
+             * Twin
+             * @enum {string}
+             */
+            readonly twin: "live" | "offline";
+            /**
+             * Reason
+             * @description paused: simulated time stands, and is told to, the twin is live; no_clock, clock_stopped: the twin's time does not run, no age is known, and it counts as offline
+             * @enum {string}
+             */
+            readonly reason: "live" | "paused" | "no_clock" | "clock_stopped" | "never_seen" | "stale" | "thread_dead" | "shutting_down";
+            /**
+             * Message
+             * @description for a person to read
+             */
+            readonly message: string;
+            /**
+             * State Age Seconds
+             * @description s since the bridge got its last state, by its own clock; null: never
+             */
+            readonly state_age_seconds: number | null;
+            /**
+             * Has Map
+             * @description false: /api/map answers 404, no map has come yet
+             */
+            readonly has_map: boolean;
+            /**
+             * Drops
+             * @description what the twin did not take in lately, by reason
+             */
+            readonly drops: readonly components["schemas"]["RecentDrop"][];
         };
     };
     responses: never;
@@ -1468,7 +1529,7 @@ export interface operations {
                     readonly [name: string]: unknown;
                 };
                 content: {
-                    readonly "application/json": components["schemas"]["StatusFrame"];
+                    readonly "application/json": components["schemas"]["Readiness"];
                 };
             };
             /** @description never seen, silent, or dead */
@@ -1477,7 +1538,7 @@ export interface operations {
                     readonly [name: string]: unknown;
                 };
                 content: {
-                    readonly "application/json": components["schemas"]["StatusFrame"];
+                    readonly "application/json": components["schemas"]["Readiness"];
                 };
             };
         };

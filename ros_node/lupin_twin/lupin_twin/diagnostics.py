@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from lupin_twin.counts import LOST, Counts
+from lupin_twin.journal.condition import OFF as NO_JOURNAL
+from lupin_twin.journal.condition import Condition
 from lupin_twin.state import ClockState
 
 # diagnostic_msgs/DiagnosticStatus
@@ -43,6 +45,7 @@ class Health:
     fields_computing: int
     fields_computed: int
     slowest_field_s: float
+    journal: Condition = NO_JOURNAL
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +93,21 @@ def findings(health: Health) -> Iterator[Finding]:
         OK,
         f"{health.fields_computing} being computed",
         {"computed": str(health.fields_computed), "slowest, s": f"{health.slowest_field_s:.3f}"},
+    )
+    journal = health.journal
+    yield Finding(
+        "journal",
+        OK if journal.is_well else ERROR,
+        journal.detail,
+        {
+            "state": journal.state.value,
+            "file": journal.path,
+            "written": str(journal.written),
+            "waiting": str(journal.waiting),
+            "lost": str(journal.lost),
+            "refused": str(journal.refused),
+            "set aside": journal.set_aside,
+        },
     )
     several = health.twins > 1
     yield Finding(

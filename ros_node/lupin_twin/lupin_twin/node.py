@@ -6,6 +6,7 @@ group; so the store and the cache need no lock.
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -32,8 +33,10 @@ from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused, FieldRules
 from lupin_twin.grid import FieldGrid
 from lupin_twin.habits import Habits, latched
 from lupin_twin.history import History, TagHistory, kind_of
+from lupin_twin.journal.runs import Clock as RunClock
 from lupin_twin.lateness import Lateness
-from lupin_twin.parameters import TwinParameters
+from lupin_twin.memory import Memory, journal_path, open_journal
+from lupin_twin.parameters import ParameterError, TwinParameters
 from lupin_twin.ros_parameters import declare, naming, naming_own_parameters
 from lupin_twin.state import ClockState, Look, Scan, Snapshot, TwinStore
 from lupin_twin.twin_count import TwinCount
@@ -81,6 +84,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.parameters = declare(self)
         self.store = TwinStore()
         self.history = History(self.parameters.buffer_len)
+        self.memory = self._memory()
         self.lateness = Lateness()
         self.fields = FieldEngine(
             field_rules(self.parameters),
@@ -141,6 +145,21 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     # --- set-up -----------------------------------------------------------------------------
 
+    def _memory(self) -> Memory:
+        p = self.parameters
+        try:
+            path = journal_path(
+                p.journal, os.environ, self.context.get_domain_id(), self.get_namespace()
+            )
+        except RuntimeError as error:
+            raise ParameterError(
+                f"parameter journal is empty, and there is no home to keep one in: {error}"
+            ) from error
+        journal = open_journal(
+            path, self.get_fully_qualified_name(), p.journal_days, p.journal_max_mb
+        )
+        return Memory(self.store, self.history, journal, p.buffer_len)
+
     def _connect(self) -> None:
         p = self.parameters
         group = self._group
@@ -194,7 +213,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self.habits.drop(write, topic)
             return
         is_news = not self.history.knows(write)
-        if self._apply(write, topic):
+        if self._apply(write, topic, msg.mission_id):
             self._observed_s = time.monotonic()
             if is_news:
                 self._look_at_stamp(write, topic)
@@ -268,13 +287,15 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         return refusal
 
     def destroy_node(self) -> None:
-        """End the workers too; what they compute is for nobody then."""
+        """End the workers and the journal too; what they compute is for nobody then."""
         self._workers.close()
+        self.memory.close()
         super().destroy_node()
 
     def _publish_diagnostics(self) -> None:
         now_s = time.monotonic()
         health = Health(
+            journal=self.memory.condition,
             clock=self._clock_watch.state,
             counts=self.habits.counts(),
             inputs={topic: int(self.count_publishers(topic)) for topic in self._topics.values()},
@@ -320,9 +341,9 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     # --- small parts ------------------------------------------------------------------------
 
-    def _apply(self, write: ingest.Write | Drop, topic: str) -> bool:
+    def _apply(self, write: ingest.Write | Drop, topic: str, mission: str = "") -> bool:
         dropped = (
-            write if isinstance(write, Drop) else ingest.apply(write, self.store, self.history)
+            write if isinstance(write, Drop) else self.memory.apply(write, time.time_ns(), mission)
         )
         if dropped is not None:
             self.habits.drop(dropped, topic)
@@ -368,6 +389,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         clock = self.get_clock()
         now_ns = int(clock.now().nanoseconds)
         self._watch_clock(now_ns, is_simulated=bool(clock.ros_time_is_active))
+        self._follow(now_ns, is_simulated=bool(clock.ros_time_is_active))
         if self.store.hold_to(now_ns):
             self.history.hold_to(now_ns)
             self.lateness.hold_to(now_ns)
@@ -376,3 +398,9 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 "ROS time has gone back: all observations from later than now age from here on",
             )
         return now_ns
+
+    def _follow(self, now_ns: int, *, is_simulated: bool) -> None:
+        self.memory.follow(RunClock(now_ns, time.time_ns(), is_simulated))
+        condition = self.memory.condition
+        if not condition.is_well:
+            self.habits.warn(("journal", condition.state), f"journal: {condition.detail}")

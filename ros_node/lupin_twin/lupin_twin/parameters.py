@@ -12,9 +12,22 @@ class ParameterError(ValueError):
 
 
 def _parameter(
-    default: Any, description: str, low: float | None = None, high: float = math.inf
+    default: Any,
+    description: str,
+    low: float | None = None,
+    high: float = math.inf,
+    *,
+    may_be_empty: bool = False,
 ) -> Any:
-    return field(default=default, metadata={"description": description, "low": low, "high": high})
+    return field(
+        default=default,
+        metadata={
+            "description": description,
+            "low": low,
+            "high": high,
+            "may_be_empty": may_be_empty,
+        },
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +71,18 @@ class TwinParameters:
     max_grid_cells: int = _parameter(1_000_000, "largest field served, cells", 1, 100_000_000)
     field_cache_mb: float = _parameter(64.0, "memory for computed fields, MB", 0.0, 100_000.0)
 
+    journal: str = _parameter(
+        "",
+        "file that keeps what was observed; off: none; empty: the user's, by domain and namespace",
+        may_be_empty=True,
+    )
+    journal_days: float = _parameter(
+        90.0, "how long scans and looks are kept in the journal, days", 0.01, 36_500.0
+    )
+    journal_max_mb: float = _parameter(
+        4000.0, "size past which the journal gives up its oldest scans, MB", 10.0, 1e7
+    )
+
     def __post_init__(self) -> None:
         for spec in fields(self):
             value = _checked(spec.name, getattr(self, spec.name), spec.default, spec.metadata)
@@ -67,13 +92,15 @@ class TwinParameters:
 def _checked(name: str, value: object, default: object, metadata: Any) -> object:
     expected: Final = type(default)
     # YAML and the command line read 2 as an integer; where a number is meant, so it is a number.
+    if name == "journal" and value is False:
+        value = "off"  # what YAML makes of a plain off
     if expected is float and type(value) is int:
         value = float(value)
     if type(value) is not expected:
         raise ParameterError(
             f"parameter {name} is {value!r} ({type(value).__name__}), expected {expected.__name__}"
         )
-    if isinstance(value, str) and not value:
+    if isinstance(value, str) and not value and not metadata["may_be_empty"]:
         raise ParameterError(f"parameter {name} is empty, expected a name")
     if isinstance(value, int | float) and not isinstance(value, bool):
         low, high = metadata["low"], metadata["high"]

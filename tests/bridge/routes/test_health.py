@@ -22,7 +22,7 @@ def test_a_live_bridge_is_healthy_and_ready() -> None:
     with bridge() as live:
         health = schema.Health.model_validate(live.json("/healthz"))
         assert (health.ok, health.callback_errors) == (True, 0)
-        ready = schema.StatusFrame.model_validate(live.json("/readyz"))
+        ready = schema.Readiness.model_validate(live.json("/readyz"))
         assert (ready.twin, ready.reason) == ("live", "live")
         assert ready.state_age_seconds is not None
         for path in ("/healthz", "/readyz"):

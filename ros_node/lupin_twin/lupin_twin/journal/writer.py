@@ -154,8 +154,8 @@ class Journal:
             is_last = False
             while not is_last:
                 is_last = self._stop.is_set()
-                self._write(file, is_last=is_last)
                 self._catch_up(file)
+                self._write(file, is_last=is_last)
                 has_more = file.look_after() if not is_last else False
                 self._tell(JournalState.RECORDING, self._summary(), file.size())
                 if not is_last and not self._pending.arrived.wait(0.0 if has_more else _IDLE_S):

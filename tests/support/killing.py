@@ -1,0 +1,69 @@
+"""A twin that is killed at a random moment under 200 observations a second, and started again."""
+
+from __future__ import annotations
+
+import random
+import signal
+import time
+from pathlib import Path
+from typing import Any
+
+from tests.support.messages import scan
+from tests.support.processes import OFTEN, twin_node
+from tests.support.ros import Peer
+
+TAGS = 30
+RATE = 200
+# What a client was shown so long before is safe.
+SAFE_S = 0.1
+
+
+def kill_and_look(domain: int, journal: Path, chance: random.Random, first: int) -> int:
+    """One round: observe, kill, start again, compare. Values count from `first`; returns the next.
+
+    Raises:
+        AssertionError: something that was shown is not known any more.
+
+    """
+    ros_args = (*OFTEN, "-p", f"journal:={journal}")
+    number = first
+    shown: list[tuple[float, dict[str, float]]] = []
+    with twin_node(domain, *ros_args) as twin, Peer(domain, "robot") as robot:
+        robot.listen()
+        robot.wait_for_twin()
+        begun = time.monotonic()
+        end = begun + chance.uniform(0.3, 1.5)
+        while (now := time.monotonic()) < end:
+            while number - first < (now - begun) * RATE:
+                number += 1
+                robot.observe(
+                    scan(
+                        str(number % TAGS),
+                        {"count": number},
+                        at=(number % TAGS, 1.0),
+                        stamp_s=time.time(),
+                    )
+                )
+            robot.spin_briefly()
+            if robot.states:
+                shown.append((time.monotonic(), counts(robot.states[-1])))
+        killed = time.monotonic()
+        twin.send(signal.SIGKILL)
+    # Nobody is there who would tell it again.
+    safe: dict[str, float] = {}
+    for at, state in shown:
+        if at <= killed - SAFE_S:
+            safe = state
+    with twin_node(domain, *ros_args), Peer(domain, "client") as client:
+        client.listen()
+        known = counts(client.state(lambda state: True, "the first state"))
+    lost = {
+        tag: (value, known.get(tag)) for tag, value in safe.items() if known.get(tag, 0) < value
+    }
+    assert not lost, f"shown and not known any more: {lost}"
+    return number
+
+
+def counts(state: Any) -> dict[str, float]:
+    """The count at each tag of a state."""
+    return {tag.tag_id: tag.readings[0].value for tag in state.tags if tag.readings}

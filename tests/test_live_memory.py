@@ -1,0 +1,69 @@
+"""What a twin still knows after it was killed, started again, or started twice."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+from tests.support.journal import is_whole, select
+from tests.support.killing import kill_and_look
+from tests.support.messages import discovered, look, pose, scan
+from tests.support.processes import OFTEN, twin_node
+from tests.support.ros import Peer
+
+ROUNDS = 4
+
+
+def test_a_killed_twin_knows_all_that_was_shown_100_ms_before(domain: int, tmp_path: Path) -> None:
+    chance, number, journal = random.Random(7), 0, tmp_path / "j.sqlite"
+    for _ in range(ROUNDS):
+        number = kill_and_look(domain, journal, chance, number)
+    assert number > 100
+    assert is_whole(journal)
+    twice = "SELECT 1 FROM scans GROUP BY run, tag_id, kind, stamp_ns, source HAVING count(*) > 1"
+    assert select(journal, twice) == []
+
+
+def test_latched_observations_heard_again_are_not_written_twice(
+    domain: int, tmp_path: Path
+) -> None:
+    journal = tmp_path / "j.sqlite"
+    ros_args = (*OFTEN, "-p", f"journal:={journal}")
+    with Peer(domain) as robot:
+        for _ in range(3):
+            with twin_node(domain, *ros_args) as twin:
+                robot.observe(
+                    scan("1", {"t": 21.5}, at=(1.0, 2.0), stamp_s=1_700_000_000.0),
+                    look("1", bug_count=1, anomaly=True, stamp_s=1_700_000_001.0),
+                )
+                robot.discover(discovered({"2": pose(3.0, 4.0)}))
+                robot.tag("2")
+                tag = robot.tag("1", lambda tag: tag.bug_count == 1)
+                robot.states.clear()
+                twin.stop()  # it writes what is waiting
+        assert tag.readings[0].value == 21.5
+    rows = {
+        table: select(journal, f"SELECT count(*) FROM {table}") for table in ("scan", "look", "pin")
+    }
+    assert rows == {"scan": [(1,)], "look": [(1,)], "pin": [(2,)]}
+
+
+def test_off_keeps_nothing(domain: int, tmp_path: Path) -> None:
+    for known in (False, False):
+        with twin_node(domain, *OFTEN, "-p", "journal:=off"), Peer(domain) as client:
+            client.listen()
+            assert bool(client.state(lambda state: True, "a state").tags) is known
+            client.observe(scan("1", {"t": 1.0}))
+            client.tag("1")
+
+
+def test_a_second_twin_on_the_same_journal_says_who_has_it_and_goes_on(
+    domain: int, tmp_path: Path
+) -> None:
+    ros_args = ("-p", f"journal:={tmp_path / 'j.sqlite'}")
+    with twin_node(domain, *OFTEN, *ros_args), Peer(domain) as client:
+        client.listen()
+        client.state(lambda state: True, "a state")
+        with twin_node(domain, *OFTEN, *ros_args, "-r", "__node:=second") as second:
+            second.wait_for_output("is in use by /lupin_twin (process")
+            assert second.exit_code is None

@@ -85,10 +85,10 @@ async def _run(
     settings = replace(settings, max_clients=allow_connections(settings.max_clients))
     # Before a process is started that would inherit its variables.
     supervisor = Supervisor(os.environ)
-    if role == "demo":
-        ros_args = [*demo_journal(os.environ, patrol_args), *ros_args]
+    # The twin's alone: the patrol keeps nothing.
+    own_args = demo_journal(os.environ, patrol_args) if role == "demo" else []
     make_source = WebTwin if role == "web" else LocalTwin
-    source = make_source(ros_args=ros_args, timeout_s=settings.field_timeout_s)
+    source = make_source(ros_args=[*own_args, *ros_args], timeout_s=settings.field_timeout_s)
     bridge = Bridge(source, settings)
     app = create_app(bridge, access=access, entrance=entrance)
 

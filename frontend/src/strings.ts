@@ -242,6 +242,8 @@ export const S = {
     no: 'no',
   },
   paper: (taken: string, printed: string): string => `As of ${taken}, printed ${printed}`,
+  paperRest: (printed: number, all: number): string =>
+    `Printed are the first ${printed} of ${all} tags. The table as CSV has all of them.`,
   paperRange: (sensor: string, range: string): string => `${sensor} ${range}`,
   fileName: (kind: string, stamp: string): string => `lupin-twin-${kind}-${stamp}`,
 } as const;

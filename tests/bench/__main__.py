@@ -5,8 +5,8 @@ from __future__ import annotations
 import importlib
 import sys
 
-# In the order of the way through the system: field, truth, tick, bridge, page.
-BENCHES = ("bench_field", "bench_truth", "bench_tick", "bench_bridge", "bench_page")
+# In the order of the way through the system: field, truth, tick, bridge, page, large houses.
+BENCHES = ("bench_field", "bench_truth", "bench_tick", "bench_bridge", "bench_page", "bench_house")
 
 
 def main() -> int:

@@ -4,6 +4,7 @@ import { readings, tag } from '../testing/tags';
 import { houseHealth } from './health';
 import { sensorNamed } from './sensors';
 import { filterRows, rowsOf, sortRows, tableCsv, type Row } from './table';
+import { compareIds } from './twin';
 
 const tags = [
   tag({
@@ -22,11 +23,13 @@ const tags = [
   }),
 ];
 const rows = rowsOf(tags, houseHealth(tags));
+/** As `sortRows` wants them. */
+const byId = [...rows].sort((a, b) => compareIds(a.tag.id, b.tag.id));
 const ids = (list: readonly Row[]): string[] => list.map((row) => row.tag.id);
 
 describe('sorting', () => {
   test('ids by number', () => {
-    expect(ids(sortRows(rows, { column: 'tag', descending: false }))).toEqual([
+    expect(ids(sortRows(byId, { column: 'tag', descending: false }))).toEqual([
       '1',
       '2',
       '9',
@@ -35,8 +38,8 @@ describe('sorting', () => {
   });
 
   test('what has no value is last in both directions', () => {
-    const up = ids(sortRows(rows, { column: 'temperature', descending: false }));
-    const down = ids(sortRows(rows, { column: 'temperature', descending: true }));
+    const up = ids(sortRows(byId, { column: 'temperature', descending: false }));
+    const down = ids(sortRows(byId, { column: 'temperature', descending: true }));
     expect(up).toEqual(['2', '10', '1', '9']);
     expect(down).toEqual(['10', '2', '1', '9']);
   });
@@ -47,7 +50,20 @@ describe('sorting', () => {
     ['age', '9'],
     ['species', '2'],
   ])('by %s, highest first', (column, first) => {
-    expect(ids(sortRows(rows, { column, descending: true }))[0]).toBe(first);
+    expect(ids(sortRows(byId, { column, descending: true }))[0]).toBe(first);
+  });
+
+  test('equals stay in the order of their ids, whatever the direction', () => {
+    for (const descending of [false, true]) {
+      expect(ids(sortRows(byId, { column: 'flowers', descending }))).toEqual(['2', '9', '10', '1']);
+    }
+    expect(ids(sortRows(byId, { column: 'tag', descending: true }))).toEqual(['10', '9', '2', '1']);
+  });
+
+  test('texts are sorted as a person would', () => {
+    const named = ['b10', 'b9', 'a'].map((species, i) => tag({ tag_id: String(i), species }));
+    const some = rowsOf(named, houseHealth(named));
+    expect(ids(sortRows(some, { column: 'species', descending: false }))).toEqual(['2', '1', '0']);
   });
 });
 

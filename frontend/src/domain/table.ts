@@ -43,25 +43,31 @@ export function sortKey({ tag, health }: Row, column: string): Key {
   }
 }
 
+/** `rows` are in the order of their ids, and equals stay in it. */
 export function sortRows(
   rows: readonly Row[],
   { column, descending }: { readonly column: string; readonly descending: boolean },
 ): Row[] {
+  if (column === 'tag') return descending ? [...rows].reverse() : [...rows];
   const direction = descending ? -1 : 1;
-  return [...rows].sort((a, b) => {
-    const ka = sortKey(a, column);
-    const kb = sortKey(b, column);
-    if (ka === null || kb === null) {
-      if (ka !== kb) return ka === null ? 1 : -1;
-    } else {
-      const order =
-        typeof ka === 'number' && typeof kb === 'number'
-          ? ka - kb
-          : compareIds(String(ka), String(kb));
-      if (order !== 0) return direction * order;
-    }
-    return compareIds(a.tag.id, b.tag.id);
-  });
+  const keys = rows.map((row) => sortKey(row, column));
+  const ranks = textRanks(keys);
+  return rows
+    .map((row, index) => {
+      const key = keys[index] ?? null;
+      return { row, rank: typeof key === 'string' ? (ranks.get(key) ?? 0) : key };
+    })
+    .sort((a, b) => {
+      if (a.rank !== null && b.rank !== null) return direction * (a.rank - b.rank);
+      return Number(a.rank === null) - Number(b.rank === null);
+    })
+    .map(({ row }) => row);
+}
+
+/** The place of each text among all: few texts have many rows, and a collator is slow. */
+function textRanks(keys: readonly Key[]): ReadonlyMap<string, number> {
+  const texts = new Set(keys.filter((key) => typeof key === 'string'));
+  return new Map([...texts].sort(compareIds).map((text, rank) => [text, rank]));
 }
 
 /** Rows of that health, or of any, in which every word of the text occurs. */
@@ -71,6 +77,7 @@ export function filterRows(
   health: HealthStatus | null,
 ): readonly Row[] {
   const words = text.toLowerCase().split(/\s+/).filter(Boolean);
+  if (words.length === 0 && health === null) return rows;
   return rows.filter(
     (row) =>
       (health === null || row.health.status === health) &&
@@ -78,7 +85,18 @@ export function filterRows(
   );
 }
 
-function haystack({ tag, health }: Row): string {
+/** A tag is searched with each letter that is typed, and its health follows from it. */
+const haystacks = new WeakMap<Tag, string>();
+
+function haystack(row: Row): string {
+  const known = haystacks.get(row.tag);
+  if (known !== undefined) return known;
+  const text = haystackOf(row);
+  haystacks.set(row.tag, text);
+  return text;
+}
+
+function haystackOf({ tag, health }: Row): string {
   return [
     tag.id,
     tag.species || S.unclassified,

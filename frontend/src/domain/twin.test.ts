@@ -105,4 +105,21 @@ describe('snapshot', () => {
     const again = { ...b, last_observed: { sec: 101, nanosec: 0 } };
     expect(snapshotOf(stateFrame([a, again, found]), 1, first).fresh).toEqual(['b']);
   });
+
+  test('a frame that changes nothing keeps the very list; one that changes a tag, the others', () => {
+    const wires = ['1', '2', '10'].map((tag_id) => wireTag({ tag_id }));
+    const first = snapshotOf(stateFrame(wires, { sec: 1 }), 1_000, null);
+    const beat = snapshotOf(stateFrame(structuredClone(wires), { sec: 2 }), 1_100, first);
+    expect(beat).not.toBe(first);
+    expect(beat.tags).toBe(first.tags);
+    const read = [...wires.slice(1), wireTag({ tag_id: '1', readings: readings({ co2: 1 }) })];
+    const news = snapshotOf(stateFrame(read, { sec: 3 }), 1_200, beat);
+    expect(news.tags.map(({ id }) => id)).toEqual(['1', '2', '10']);
+    expect(news.tags.map((tag, i) => tag === first.tags[i])).toEqual([false, true, true]);
+    const gone = snapshotOf(stateFrame(wires.slice(1), { sec: 4 }), 1_300, beat);
+    expect(gone.tags.map(({ id }) => id)).toEqual(['2', '10']);
+    const other = [wireTag({ tag_id: '11' }), ...wires.slice(0, 2)];
+    const swapped = snapshotOf(stateFrame(other, { sec: 5 }), 1_400, beat);
+    expect(swapped.tags.map(({ id }) => id)).toEqual(['1', '2', '11']);
+  });
 });

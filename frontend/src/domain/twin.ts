@@ -32,6 +32,7 @@ export interface Tag {
 
 /** The greenhouse at one moment. */
 export interface Snapshot {
+  /** By their ids; the same list as before if nothing but the time went on. */
   readonly tags: readonly Tag[];
   /** Changes exactly when a field or the map could have changed. */
   readonly revision: string;
@@ -130,16 +131,32 @@ export function snapshotOf(latest: Latest, arrivedAt: number, before: Snapshot |
   const repeated = before?.stamp === stamp;
   const takenAt = repeated ? Math.min(before.takenAt, arrivedAt) : arrivedAt;
   const known = new Map(before?.tags.map((tag) => [tag.id, tag]));
-  const tags = latest.state.tags
-    .map((wire) => sharedTag(known.get(wire.tag_id), wire, takenAt))
-    .sort((a, b) => compareIds(a.id, b.id));
+  const tags = inOrder(
+    latest.state.tags.map((wire) => sharedTag(known.get(wire.tag_id), wire, takenAt)),
+    known,
+    before?.tags ?? [],
+  );
   return {
     tags,
     revision: latest.revision,
     stamp,
     takenAt,
-    fresh: before ? freshTags(known, tags) : [],
+    fresh: before && tags !== before.tags ? freshTags(known, tags) : [],
   };
+}
+
+/** By their ids. The very list of before if each tag is the very same: then nothing is redrawn. */
+function inOrder(
+  tags: readonly Tag[],
+  known: ReadonlyMap<string, Tag>,
+  before: readonly Tag[],
+): readonly Tag[] {
+  if (tags.length === before.length && tags.every((tag) => known.has(tag.id))) {
+    if (tags.every((tag) => known.get(tag.id) === tag)) return before;
+    const now = new Map(tags.map((tag) => [tag.id, tag]));
+    if (now.size === before.length) return before.map((tag) => now.get(tag.id) ?? tag);
+  }
+  return [...tags].sort((a, b) => compareIds(a.id, b.id));
 }
 
 function freshTags(before: ReadonlyMap<string, Tag>, now: readonly Tag[]): string[] {

@@ -3,20 +3,23 @@ import { describe, expect, test } from 'vitest';
 import { GROWING } from '../domain/age';
 import { houseHealth } from '../domain/health';
 import { sensorNamed } from '../domain/sensors';
-import { readings, snapshot, tag } from '../testing/tags';
+import { readings, tag } from '../testing/tags';
 import type { Tag } from '../domain/twin';
 import { buildScene, type Scene } from './scene';
 
-const scene = (tags: readonly Tag[], now = 0): Scene =>
-  buildScene({
-    snapshot: snapshot(tags),
-    health: houseHealth(tags),
-    sensor: sensorNamed('temperature'),
-    range: { low: 10, high: 30 },
-    unit: 'C',
-    now,
-    ageing: GROWING,
-  });
+const scene = (tags: readonly Tag[], now = 0, before: Scene | null = null): Scene =>
+  buildScene(
+    {
+      tags,
+      health: houseHealth(tags),
+      sensor: sensorNamed('temperature'),
+      range: { low: 10, high: 30 },
+      unit: 'C',
+      now,
+      ageing: GROWING,
+    },
+    before,
+  );
 
 describe('pins', () => {
   test('none for a tag without a pose', () => {
@@ -81,4 +84,18 @@ test('blooms carry their species’ look', () => {
   const [a, b, c] = blooms.map(({ look }) => String(look.colour));
   expect(a).toBe(c);
   expect(a).not.toBe(b);
+});
+
+test('what looks the same is the same object: the scene, or of its pins those that do', () => {
+  const value = (tag_id: string, temperature: number): Tag =>
+    tag({ tag_id, readings: readings({ temperature }) });
+  const tags = [value('1', 20), value('2', 21)];
+  const first = scene(tags, 0);
+  expect(scene(tags, 5_000, first)).toBe(first);
+  const next = scene([value('1', 20), value('2', 29)], 5_000, first);
+  expect(next).not.toBe(first);
+  expect(next.pins[0]).toBe(first.pins[0]);
+  expect(next.pins[1]).not.toBe(first.pins[1]);
+  // Half an hour later they have faded.
+  expect(scene(tags, 1_800_000, first)).not.toBe(first);
 });

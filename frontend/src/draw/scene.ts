@@ -6,7 +6,7 @@ import { fraction, type Range } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
 import { speciesLooks, UNKNOWN_SPECIES, type BloomLook } from '../domain/species';
 import { shown } from '../domain/text';
-import type { Snapshot } from '../domain/twin';
+import type { Tag } from '../domain/twin';
 import type { TemperatureUnit } from '../domain/units';
 import type { MapPoint } from '../geometry/coordinates';
 
@@ -45,7 +45,7 @@ export interface Scene {
 }
 
 export interface SceneInput {
-  readonly snapshot: Snapshot;
+  readonly tags: readonly Tag[];
   readonly health: HouseHealth;
   readonly sensor: Sensor;
   readonly range: Range | null;
@@ -55,31 +55,68 @@ export interface SceneInput {
   readonly ageing: Ageing;
 }
 
-export function buildScene(input: SceneInput): Scene {
-  const { snapshot } = input;
-  const looks = speciesLooks(snapshotSpecies(snapshot));
+interface Planted {
+  readonly blooms: readonly BloomDot[];
+  readonly boxes: readonly (readonly MapPoint[])[];
+}
+
+/** What neither fades nor follows the sensor: worked out once for the same tags. */
+const plantedBy = new WeakMap<readonly Tag[], Planted>();
+
+function planted(tags: readonly Tag[]): Planted {
+  const known = plantedBy.get(tags);
+  if (known) return known;
+  const looks = speciesLooks(speciesOf(tags));
   const boxes = new Map<string, readonly MapPoint[]>();
   const blooms: BloomDot[] = [];
-  const pins: Pin[] = [];
-  for (const tag of snapshot.tags) {
+  for (const tag of tags) {
     if (tag.footprint.length >= 3) {
       boxes.set(tag.footprint.map(({ x, y }) => `${x},${y}`).join(' '), tag.footprint);
     }
     for (const { at, species } of tag.blooms) {
       blooms.push({ at, look: looks.get(species) ?? UNKNOWN_SPECIES });
     }
-    if (tag.at) pins.push(pinOf(tag, tag.at, input));
   }
-  return { pins, blooms, boxes: [...boxes.values()] };
+  const all = { blooms, boxes: [...boxes.values()] };
+  plantedBy.set(tags, all);
+  return all;
 }
 
+/** The scene; the one before if that looks the very same, and of its pins those that do. */
+export function buildScene(input: SceneInput, before: Scene | null = null): Scene {
+  const known = new Map(before?.pins.map((pin) => [pin.id, pin]));
+  const pins: Pin[] = [];
+  for (const tag of input.tags) {
+    if (!tag.at) continue;
+    const pin = pinOf(tag, tag.at, input);
+    const old = known.get(tag.id);
+    pins.push(old && samePin(old, pin) ? old : pin);
+  }
+  const { blooms, boxes } = planted(input.tags);
+  const isSame =
+    before?.blooms === blooms &&
+    before.pins.length === pins.length &&
+    pins.every((pin, index) => pin === before.pins[index]);
+  return isSame ? before : { pins, blooms, boxes };
+}
+
+const samePin = (a: Pin, b: Pin): boolean =>
+  a.at.x === b.at.x &&
+  a.at.y === b.at.y &&
+  a.kind === b.kind &&
+  a.share === b.share &&
+  a.strength === b.strength &&
+  a.pest === b.pest &&
+  a.priority === b.priority &&
+  a.texts.length === b.texts.length &&
+  a.texts.every((text, index) => text === b.texts[index]);
+
 function pinOf(
-  tag: Snapshot['tags'][number],
+  tag: Tag,
   at: MapPoint,
   { health, sensor, range, unit, now, ageing }: SceneInput,
 ): Pin {
   const value = tag.readings.get(sensor.name);
-  const id = shown(tag.id, 12);
   const strength = freshness(ageSeconds(tag.observedAt, now, ageing));
   const status = health.byTag.get(tag.id)?.status;
   return {
@@ -89,7 +126,7 @@ function pinOf(
     share: value == null || !range ? 0 : quantised(fraction(range, value), COLOUR_STEPS),
     strength: quantised(strength, FADE_STEPS),
     pest: tag.anomaly,
-    texts: value == null ? [id] : [`${id} · ${readingText(sensor, value, unit)}`, id],
+    texts: textsOf(tag, sensor, value, unit),
     priority:
       (tag.anomaly ? 4 : 0) +
       (value == null ? 0 : 2) +
@@ -97,10 +134,28 @@ function pinOf(
   };
 }
 
-/** Every species in a snapshot: the planters' and those of single blooms. */
-export function snapshotSpecies(snapshot: Snapshot): Set<string> {
+/** A tag that is looked at again and again has the same texts as long as it is the same. */
+const textsBy = new WeakMap<Tag, { readonly of: string; readonly texts: readonly string[] }>();
+
+function textsOf(
+  tag: Tag,
+  sensor: Sensor,
+  value: number | null | undefined,
+  unit: TemperatureUnit,
+): readonly string[] {
+  const of = `${sensor.name} ${unit}`;
+  const known = textsBy.get(tag);
+  if (known?.of === of) return known.texts;
+  const id = shown(tag.id, 12);
+  const texts = value == null ? [id] : [`${id} · ${readingText(sensor, value, unit)}`, id];
+  textsBy.set(tag, { of, texts });
+  return texts;
+}
+
+/** Every species of some tags: the planters' and those of single blooms. */
+export function speciesOf(tags: readonly Tag[]): Set<string> {
   const names = new Set<string>();
-  for (const tag of snapshot.tags) {
+  for (const tag of tags) {
     if (tag.species) names.add(tag.species);
     for (const bloom of tag.blooms) if (bloom.species) names.add(bloom.species);
   }

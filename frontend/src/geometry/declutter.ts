@@ -101,7 +101,7 @@ const contains = (outer: Box, inner: Box): boolean =>
 
 /** Boxes by the squares they touch, so that a thousand labels do not cost a million checks. */
 class Buckets {
-  readonly #boxes = new Map<string, Box[]>();
+  readonly #boxes = new Map<number, Box[]>();
 
   add(box: Box): void {
     for (const key of keys(box)) {
@@ -126,10 +126,13 @@ class Buckets {
   }
 }
 
-function* keys(box: Box): Generator<string> {
+/** Squares on one side of the map's origin, and so half of those in a row. */
+const HALF = 2 ** 25;
+
+function* keys(box: Box): Generator<number> {
   for (let i = Math.floor(box.left / BUCKET); i <= Math.floor(box.right / BUCKET); i++) {
     for (let j = Math.floor(box.top / BUCKET); j <= Math.floor(box.bottom / BUCKET); j++) {
-      yield `${i}:${j}`;
+      yield (i + HALF) * 2 * HALF + j + HALF;
     }
   }
 }

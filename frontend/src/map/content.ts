@@ -3,7 +3,7 @@ import type { Field } from '../contract/types';
 import { fieldCorners } from '../domain/field';
 import type { Tag } from '../domain/twin';
 import type { Box } from '../geometry/clear';
-import { boundsOf, type Bounds, type MapPoint } from '../geometry/coordinates';
+import { boundsOf, corners, type Bounds, type MapPoint } from '../geometry/coordinates';
 import { memoOne } from '../store/memo';
 import type { Shown } from '../store/moment';
 
@@ -16,7 +16,8 @@ const NO_TAGS: readonly Tag[] = [];
 
 const places = memoOne((tags: readonly Tag[]) => {
   const pins = tags.flatMap((tag) => (tag.at ? [tag.at] : []));
-  return { pins, points: [...pins, ...tags.flatMap((tag) => tag.footprint)] };
+  const bounds = boundsOf([...pins, ...tags.flatMap((tag) => tag.footprint)]);
+  return { pins, corners: bounds ? corners(bounds) : [] };
 });
 
 /**
@@ -25,11 +26,11 @@ const places = memoOne((tags: readonly Tag[]) => {
  * the next one is on its way, the last one's stands in for it.
  */
 export function contentOf({ snapshot, map }: Shown, field: Field | null): Content | null {
-  const { pins, points } = places(snapshot?.tags ?? NO_TAGS);
+  const { pins, corners: planted } = places(snapshot?.tags ?? NO_TAGS);
   const bounds = boundsOf([
-    ...points,
+    ...planted,
     // A field whose tags are gone is one of a twin before this one.
-    ...(field && points.length > 0 ? fieldCorners(field) : []),
+    ...(field && planted.length > 0 ? fieldCorners(field) : []),
     ...(map.value?.known ?? []),
   ]);
   return bounds && { bounds, pins };

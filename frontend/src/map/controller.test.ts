@@ -11,6 +11,7 @@ import { runMap } from './controller';
 import { pinUnderMouse, pointedAt } from './pointer';
 
 let element: HTMLElement;
+let still: HTMLCanvasElement;
 let pins: HTMLCanvasElement;
 let overlay: HTMLCanvasElement;
 let stop: () => void;
@@ -30,7 +31,8 @@ const start = (isFixed = false): void => {
   const canvas = (): HTMLCanvasElement => document.createElement('canvas');
   overlay = canvas();
   pins = canvas();
-  stop = runMap(element, { still: canvas(), pins, overlay }, isFixed);
+  still = canvas();
+  stop = runMap(element, { still, pins, overlay }, isFixed);
   paint();
 };
 /** Runs what waits for the next frame. */
@@ -311,4 +313,34 @@ test('a font that comes late is drawn with', () => {
   expect(labels?.calls.length).toBeGreaterThan(before ?? NaN);
   // The labels' pictures are painted anew, not copied.
   expect(made).toHaveBeenCalledWith('canvas');
+});
+
+describe('nothing is drawn anew but what changed', () => {
+  const strokes = (canvas: HTMLCanvasElement): number =>
+    FakeContext.recordOf(canvas)?.calls.length ?? 0;
+  const all = (): number[] => [still, pins, overlay].map(strokes);
+
+  test('a mouse that moves over pins leaves all below the mark alone', () => {
+    start();
+    const [stillBefore, pinsBefore, overlayBefore = 0] = all();
+    pointer('pointermove', ...place(1, 1));
+    paint();
+    expect(store.get().view.hovered).toBe('a');
+    pointer('pointermove', ...place(3, 2));
+    paint();
+    expect(store.get().view.hovered).toBe('b');
+    const [stillAfter, pinsAfter, overlayAfter] = all();
+    expect([stillAfter, pinsAfter]).toEqual([stillBefore, pinsBefore]);
+    expect(overlayAfter).toBeGreaterThan(overlayBefore);
+  });
+
+  test('a heartbeat that changes nothing asks for no frame', () => {
+    start();
+    const { snapshot } = store.get().twin.latest;
+    const tags = (snapshot?.tags ?? []).map(({ wire }) => structuredClone(wire));
+    const later = { sec: 9_000, revision: snapshot?.revision ?? '' };
+    receive({ type: 'state', latest: stateFrame(tags, later), now: performance.now() });
+    expect(store.get().twin.latest.snapshot).not.toBe(snapshot);
+    expect(frames).toEqual([]);
+  });
 });

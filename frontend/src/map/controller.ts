@@ -13,9 +13,10 @@ import {
   type MapPoint,
   type View,
 } from '../geometry/coordinates';
-import { nearest } from '../geometry/nearest';
+import { Grid, nearest } from '../geometry/nearest';
 import { act, moveViewport, store } from '../store/app';
 import { selectRange } from '../store/derived';
+import { memoOne } from '../store/memo';
 import { selectShown, selectTag, type Shown } from '../store/moment';
 import { isDark, isPrinting, onThemeChange } from '../store/theme';
 import { MapCamera } from './camera';
@@ -32,6 +33,8 @@ const TEXT_PX = 14;
 
 /** What is to be drawn anew; "view": nothing but the place and the scale changed. */
 type Part = 'still' | 'pins' | 'overlay' | 'view';
+
+const pinGrid = memoOne((pins: readonly Pin[]) => new Grid(pins));
 
 /**
  * `isFixed`: a wall screen, where nobody who brushes past chooses a tag or moves the map.
@@ -138,7 +141,7 @@ export function runMap(
     const house = selectShown(state);
     const last = selectShown(before);
     lastField = house.field.value ?? lastField;
-    const changedTags = house.snapshot !== last.snapshot;
+    const changedTags = house.snapshot?.tags !== last.snapshot?.tags;
     // What was news at another moment is none.
     if (changedTags && house.snapshot && house.moment === null && !calm.matches) {
       pulses = [...pulses, ...newPulses(house)];
@@ -159,9 +162,9 @@ export function runMap(
       state.settings !== before.settings
     )
       spoil('pins', 'overlay');
-    if (view.selected !== before.view.selected || view.hovered !== before.view.hovered) {
-      spoil('pins', 'overlay');
-    }
+    // A mark follows the mouse, and nothing below it is drawn anew.
+    if (view.hovered !== before.view.hovered) spoil('overlay');
+    if (view.selected !== before.view.selected) spoil('pins', 'overlay');
     const { selected } = view;
     if (selected !== null && selected !== before.view.selected) {
       // Once the card is there, which covers part of the map on a phone.
@@ -183,7 +186,7 @@ export function runMap(
   const pinAt = (point: CanvasPoint, reach: number): Pin | null => {
     const state = store.get();
     if (!state.view.layers.has('pins')) return null;
-    return nearest(painter.scene(state, now()).pins, state.viewport.view, point, reach);
+    return nearest(pinGrid(painter.scene(state, now()).pins), state.viewport.view, point, reach);
   };
 
   const hover = (pin: Pin | null): void => {
@@ -309,7 +312,7 @@ export function runMap(
 
   // Pins fade while nothing arrives: look again now and then.
   const fading = setInterval(() => {
-    spoil('pins');
+    if (painter.hasFaded(store.get(), now())) spoil('pins');
   }, 5_000);
   // Not `fonts.ready`: that is so while nothing is asked for, and the font comes after it.
   document.fonts.addEventListener(

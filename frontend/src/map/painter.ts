@@ -4,7 +4,7 @@ import { fieldPixels, smoothDetail } from '../domain/field';
 import type { HouseHealth } from '../domain/health';
 import { sensorColour, type Range } from '../domain/ramp';
 import { sensorNamed } from '../domain/sensors';
-import type { Snapshot } from '../domain/twin';
+import type { Tag } from '../domain/twin';
 import type { TemperatureUnit } from '../domain/units';
 import { drawCrosshair, drawMark, drawPulses, type Pulse } from '../draw/overlay';
 import type { Palette } from '../draw/palette';
@@ -41,7 +41,7 @@ import { placeLabels, type Room } from '../geometry/declutter';
 import type { AppState } from '../store/app';
 import { selectHealth, selectRange } from '../store/derived';
 import { memoLast } from '../store/memo';
-import { selectShown, selectTags } from '../store/moment';
+import { selectShown, selectTag, selectTags } from '../store/moment';
 import type { MapPicture } from '../store/picture';
 
 export interface Canvases {
@@ -52,8 +52,6 @@ export interface Canvases {
 
 /** Fading is worked out anew this often even when nothing else changes, ms. */
 const FADE_TICK_MS = 5_000;
-
-const EMPTY_SCENE: Scene = { pins: [], blooms: [], boxes: [] };
 
 /**
  * Puts the state on three canvases: the still layers, the pins, and what moves by itself. It
@@ -73,6 +71,8 @@ export class Painter {
   #ruler = contextOf(newCanvas(1, 1));
   /** Where labels found their places when the map last came to rest, and at which scale. */
   #room: (Room & { readonly scale: number }) | null = null;
+  #lastScene: Scene | null = null;
+  #paintedScene: Scene | null = null;
   readonly #stillBuffer = new PanBuffer();
   readonly #pinBuffer = new PanBuffer();
 
@@ -169,14 +169,14 @@ export class Painter {
   #drawPins(surface: Surface, view: View, state: AppState, now: number): void {
     const { layers } = state.view;
     const scene = this.scene(state, now);
+    this.#paintedScene = scene;
     if (layers.has('blooms')) drawBlooms(surface, view, scene.blooms, this.#sprites, this.#palette);
     if (!layers.has('pins')) return;
     const colour = sensorColour(sensorNamed(state.view.sensor));
     drawPins(surface, view, scene.pins, colour, this.#sprites, this.#palette);
     if (!layers.has('labels')) return;
-    const first = state.view.selected ?? state.view.hovered;
     const room = this.#room?.scale === view.scale ? this.#room : null;
-    const labels = this.#labels(scene, view.scale, first, this.#widths, room);
+    const labels = this.#labels(scene, view.scale, state.view.selected, this.#widths, room);
     drawLabels(surface, view, labels, this.#sprites, this.#palette, this.#textScale);
   }
 
@@ -193,20 +193,24 @@ export class Painter {
     if (state.view.layers.has('pins')) {
       drawPulses(surface, view, moving.pulses, moving.now, this.#palette);
     }
-    for (const tag of selectTags(state)) {
-      if (!tag.at) continue;
-      if (tag.id === state.view.selected) drawMark(surface, view, tag.at, true, this.#palette);
-      else if (tag.id === state.view.hovered) drawMark(surface, view, tag.at, false, this.#palette);
+    const { selected, hovered } = state.view;
+    for (const tagId of new Set([hovered, selected])) {
+      const at = tagId === null ? null : selectTag(state, tagId)?.at;
+      if (at) drawMark(surface, view, at, tagId === selected, this.#palette);
     }
     if (moving.crosshair) drawCrosshair(surface, this.#palette);
   }
 
+  /** Whether pins look otherwise by now than they were painted. */
+  hasFaded(state: AppState, now: number): boolean {
+    return this.scene(state, now) !== this.#paintedScene;
+  }
+
+  /** The same object as long as it looks the same. */
   scene(state: AppState, now: number): Scene {
-    const { snapshot, ageing } = selectShown(state);
-    if (!snapshot) return EMPTY_SCENE;
     return this.#scene(
-      snapshot,
-      ageing,
+      selectTags(state),
+      selectShown(state).ageing,
       selectHealth(state),
       state.view.sensor,
       selectRange(state),
@@ -217,23 +221,18 @@ export class Painter {
 
   readonly #scene = memoLast(
     (
-      snapshot: Snapshot,
+      tags: readonly Tag[],
       ageing: Ageing,
       health: HouseHealth,
       sensor: string,
       range: Range | null,
       unit: TemperatureUnit,
       tick: number,
-    ) =>
-      buildScene({
-        snapshot,
-        ageing,
-        health,
-        sensor: sensorNamed(sensor),
-        range,
-        unit,
-        now: Math.max(tick * FADE_TICK_MS, snapshot.takenAt),
-      }),
+    ) => {
+      const look = { tags, ageing, health, sensor: sensorNamed(sensor), range, unit };
+      this.#lastScene = buildScene({ ...look, now: tick * FADE_TICK_MS }, this.#lastScene);
+      return this.#lastScene;
+    },
   );
 
   readonly #labels = memoLast(

@@ -7,10 +7,10 @@ import { RAMP, sensorNamed, type Sensor } from '../domain/sensors';
 import { speciesLooks, UNKNOWN_SPECIES, type BloomLook } from '../domain/species';
 import { shown } from '../domain/text';
 import { differenceToShown, unitOf, type TemperatureUnit } from '../domain/units';
-import { snapshotSpecies } from '../draw/scene';
+import { speciesOf } from '../draw/scene';
 import { useApp } from '../store/app';
 import { selectRange } from '../store/derived';
-import { selectShown, selectSnapshot, selectTags } from '../store/moment';
+import { selectShown, selectTags } from '../store/moment';
 import { S } from '../strings';
 import { RangeControl } from './RangeControl';
 
@@ -124,12 +124,9 @@ function Ramp({
 
 /** What pins and dots mean. */
 function Keys(): JSX.Element {
-  const snapshot = useApp(selectSnapshot);
-  const species = useMemo(
-    () => (snapshot ? [...speciesLooks(snapshotSpecies(snapshot))] : []),
-    [snapshot],
-  );
-  const unknown = snapshot?.tags.some((tag) => tag.blooms.some((bloom) => bloom.species === ''));
+  const tags = useApp(selectTags);
+  const species = useMemo(() => [...speciesLooks(speciesOf(tags))], [tags]);
+  const unknown = tags.some((tag) => tag.blooms.some((bloom) => bloom.species === ''));
   return (
     // May scroll on a phone, so the keyboard must be able to reach it.
     // eslint-disable-next-line jsx-a11y/no-noninteractive-tabindex

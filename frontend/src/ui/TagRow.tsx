@@ -15,6 +15,8 @@ import { Icon } from './Icon';
 import { useTicking } from './useNow';
 
 interface Props {
+  /** Its place among all rows, from 0. */
+  readonly index: number;
   readonly tag: Tag;
   readonly health: TagHealth;
   readonly sensors: readonly Sensor[];
@@ -25,6 +27,7 @@ interface Props {
 }
 
 export const TagRow = memo(function TagRow({
+  index,
   tag,
   health,
   sensors,
@@ -35,6 +38,7 @@ export const TagRow = memo(function TagRow({
 }: Props): JSX.Element {
   return (
     <tr
+      aria-rowindex={index + 2}
       data-tag-id={tag.id}
       data-health={health.status}
       data-pinned={tag.at !== null}

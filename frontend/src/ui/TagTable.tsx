@@ -1,4 +1,13 @@
-import { memo, type CSSProperties, type JSX, type ReactNode, type SyntheticEvent } from 'react';
+import {
+  memo,
+  useMemo,
+  useRef,
+  useState,
+  type CSSProperties,
+  type JSX,
+  type ReactNode,
+  type SyntheticEvent,
+} from 'react';
 
 import { rgbText, sensorColour } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
@@ -10,6 +19,7 @@ import { selectTags } from '../store/moment';
 import { S } from '../strings';
 import { Icon } from './Icon';
 import { TagRow } from './TagRow';
+import { partsOf, SHORT_TABLE, useVisibleRows } from './visibleRows';
 
 /** Every tag, also those without a pin and those whose scan failed. */
 export function TagTable(): JSX.Element {
@@ -21,13 +31,26 @@ export function TagTable(): JSX.Element {
   const rows = useApp(selectRows);
   const hasTags = useApp((state) => selectTags(state).length > 0);
   const columns = 6 + sensors.length;
+  const body = useRef<HTMLTableSectionElement>(null);
+  const sight = useVisibleRows(body, rows.length);
+  // A row that has the focus stays, or the focus would be lost with it.
+  const [focused, setFocused] = useState<string | null>(null);
+  const places = useMemo(() => new Map(rows.map(({ tag }, index) => [tag.id, index])), [rows]);
+  const single = [selected, focused].flatMap((id) => (id === null ? [] : (places.get(id) ?? [])));
   return (
     // Keyboard and screen reader use the button in each row; for the pointer the whole row is
     // its target. One listener here, because a layer per row makes a long table slow.
     // eslint-disable-next-line jsx-a11y/click-events-have-key-events, jsx-a11y/no-noninteractive-element-interactions
     <table
-      className="tags"
+      className={rows.length > SHORT_TABLE ? 'tags long' : 'tags'}
       data-testid="tag-table"
+      aria-rowcount={rows.length + 1}
+      onFocus={(event) => {
+        setFocused(rowTag(event));
+      }}
+      onBlur={() => {
+        setFocused(null);
+      }}
       onClick={onClick}
       onPointerOver={onPointerOver}
       onPointerLeave={onPointerLeave}
@@ -48,7 +71,7 @@ export function TagTable(): JSX.Element {
         <col className="col-flowers optional" />
       </colgroup>
       <thead>
-        <tr>
+        <tr aria-rowindex={1}>
           <ColumnHead id="tag">{S.columns.tag}</ColumnHead>
           <ColumnHead id="health">{S.columns.health}</ColumnHead>
           <ColumnHead id="age" className="number">
@@ -69,19 +92,33 @@ export function TagTable(): JSX.Element {
           </ColumnHead>
         </tr>
       </thead>
-      <tbody>
-        {rows.map((row) => (
-          <TagRow
-            key={row.tag.id}
-            tag={row.tag}
-            health={row.health}
-            sensors={sensors}
-            chosen={chosen}
-            unit={unit}
-            selected={row.tag.id === selected}
-            hovered={row.tag.id === hovered}
-          />
-        ))}
+      <tbody ref={body}>
+        {partsOf(rows.length, sight, single).map((part, place) => {
+          if (part.kind === 'gap') {
+            const height = part.rows * sight.rowHeight;
+            return (
+              <tr key={`gap ${place}`} className="gap" aria-hidden="true" style={{ height }}>
+                <td colSpan={columns} />
+              </tr>
+            );
+          }
+          const row = rows[part.index];
+          return (
+            row && (
+              <TagRow
+                key={`tag ${row.tag.id}`}
+                index={part.index}
+                tag={row.tag}
+                health={row.health}
+                sensors={sensors}
+                chosen={chosen}
+                unit={unit}
+                selected={row.tag.id === selected}
+                hovered={row.tag.id === hovered}
+              />
+            )
+          );
+        })}
         {rows.length === 0 && hasTags && (
           <tr className="no-match">
             <td colSpan={columns}>

@@ -11,6 +11,7 @@ import { HealthSummary } from './HealthSummary';
 import { Icon } from './Icon';
 import { EmptyTable } from './Notices';
 import { TagTable } from './TagTable';
+import { LONGEST_ON_PAPER } from './visibleRows';
 
 export const FILTER_ID = 'tag-filter';
 
@@ -27,12 +28,20 @@ export function TagsPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
           {/* eslint-disable-next-line jsx-a11y/no-noninteractive-tabindex */}
           <div className="table-scroll" role="region" aria-label={S.tableCaption} tabIndex={0}>
             <TagTable />
+            <PaperRest />
             <EmptyTable />
           </div>
         </>
       )}
     </section>
   );
+}
+
+/** Where paper ends, the table does not. */
+function PaperRest(): JSX.Element | null {
+  const count = useApp((state) => selectRows(state).length);
+  if (count <= LONGEST_ON_PAPER) return null;
+  return <p className="paper-rest">{S.paperRest(LONGEST_ON_PAPER, count)}</p>;
 }
 
 function FilterBar(): JSX.Element {

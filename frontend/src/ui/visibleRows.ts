@@ -1,0 +1,119 @@
+/** Which rows of a long table are in the page: those in sight, some around them, and some more. */
+import { useEffect, useState, type RefObject } from 'react';
+import { flushSync } from 'react-dom';
+
+/** Up to so many rows all of them are in the page. */
+export const SHORT_TABLE = 100;
+/** Rows beyond each edge of the window, for the Tab key and for a quick hand. */
+const SPARE = 12;
+/** Rows come and go by so many at once. */
+const STEP = 8;
+/** More rows than this take a browser minutes to lay out for paper. */
+export const LONGEST_ON_PAPER = 1_000;
+/** Until one has been measured, pixels. */
+const USUAL_HEIGHT = 45;
+
+export interface Range {
+  readonly from: number;
+  /** Exclusive. */
+  readonly to: number;
+}
+
+/** A row by its index, or the height of rows that are not in the page. */
+export type Part =
+  | { readonly kind: 'row'; readonly index: number }
+  | { readonly kind: 'gap'; readonly rows: number };
+
+/** The rows of a range, and single ones outside of it, with what is left out between them. */
+export function partsOf(count: number, range: Range, single: readonly number[]): Part[] {
+  const from = Math.min(Math.max(0, range.from), count);
+  const to = Math.min(Math.max(from, range.to), count);
+  const outside = [...new Set(single)].filter(
+    (index) => index >= 0 && index < count && (index < from || index >= to),
+  );
+  const inside = Array.from({ length: to - from }, (_, i) => from + i);
+  const parts: Part[] = [];
+  let next = 0;
+  for (const index of [...outside, ...inside].sort((a, b) => a - b)) {
+    if (index > next) parts.push({ kind: 'gap', rows: index - next });
+    parts.push({ kind: 'row', index });
+    next = index + 1;
+  }
+  if (count > next) parts.push({ kind: 'gap', rows: count - next });
+  return parts;
+}
+
+/** The rows in sight of a table whose first row begins at `top` in a window of that height. */
+export function rangeInSight(top: number, rowHeight: number, windowHeight: number): Range {
+  const down = (row: number): number => Math.floor(row / STEP) * STEP;
+  return {
+    from: Math.max(0, down(-top / rowHeight - SPARE)),
+    to: Math.max(0, down((windowHeight - top) / rowHeight + SPARE) + STEP),
+  };
+}
+
+export interface Visible extends Range {
+  /** Pixels. */
+  readonly rowHeight: number;
+}
+
+/** Follows whatever scrolls, and paper, which has as many rows as it can take. */
+export function useVisibleRows(
+  body: RefObject<HTMLTableSectionElement | null>,
+  count: number,
+): Visible {
+  const [sight, setSight] = useState<Visible>(() => ({
+    ...rangeInSight(0, USUAL_HEIGHT, window.innerHeight),
+    rowHeight: USUAL_HEIGHT,
+  }));
+  const [isPaper, setPaper] = useState(false);
+  const isLong = count > SHORT_TABLE;
+
+  useEffect(() => {
+    const rows = body.current;
+    if (!isLong || !rows) return undefined;
+    const look = (): void => {
+      const { top } = rows.getBoundingClientRect();
+      const row = rows.querySelector('tr[data-tag-id]');
+      // None in a half of the page that is not shown.
+      const measured = row?.getBoundingClientRect().height ?? 0;
+      const rowHeight = measured > 0 ? measured : USUAL_HEIGHT;
+      const { from, to } = rangeInSight(top, rowHeight, window.innerHeight);
+      setSight((last) =>
+        last.from === from && last.to === to && Math.abs(last.rowHeight - rowHeight) < 0.5
+          ? last
+          : { from, to, rowHeight },
+      );
+    };
+    // Told at once, and whenever a filter, the window or the font changes the table's size.
+    const size = new ResizeObserver(look);
+    size.observe(rows);
+    const frame = rows.closest('.table-scroll');
+    if (frame) size.observe(frame);
+    // Which element scrolls depends on the window's size; its event does not bubble.
+    document.addEventListener('scroll', look, { capture: true, passive: true });
+    return () => {
+      size.disconnect();
+      document.removeEventListener('scroll', look, { capture: true });
+    };
+  }, [body, isLong]);
+
+  useEffect(() => {
+    const onPrint = ({ type }: Event): void => {
+      // Not with the next frame: a page on its way to the printer gets none.
+      flushSync(() => {
+        setPaper(type === 'beforeprint');
+      });
+    };
+    window.addEventListener('beforeprint', onPrint);
+    window.addEventListener('afterprint', onPrint);
+    return () => {
+      window.removeEventListener('beforeprint', onPrint);
+      window.removeEventListener('afterprint', onPrint);
+    };
+  }, []);
+
+  if (!isLong) return { from: 0, to: count, rowHeight: 0 };
+  if (isPaper) return { from: 0, to: LONGEST_ON_PAPER, rowHeight: 0 };
+  return sight;
+}

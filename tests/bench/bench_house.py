@@ -1,0 +1,115 @@
+"""The page with a large house: what it costs the main thread when nothing, or little, happens.
+
+Thread time of all tasks of the page, so what else runs on the machine does not count.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from playwright.sync_api import Browser, CDPSession, Page, sync_playwright
+
+from tests.bench.bench_page import page_of
+from tests.bench.house_double import house_of
+from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
+from tests.support.web import bridge
+
+SIZES = (1_000, 10_000)
+BEATS = 8
+MOVES = 60
+
+FIRST_ROW = """
+new MutationObserver((_, observer) => {
+  if (!document.querySelector('tr[data-tag-id]')) return;
+  observer.disconnect();
+  requestAnimationFrame(() => setTimeout(() => { window.firstRow = performance.now(); }));
+}).observe(document, { childList: true, subtree: true });
+"""
+SETTLED = "() => new Promise((r) => requestAnimationFrame(() => setTimeout(r, 50)))"
+
+
+def main() -> None:
+    """Measure both sizes and print them."""
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(
+            executable_path=CHROMIUM, args=list(CHROMIUM_ARGS), headless=True
+        )
+        with chromium:
+            print_large_houses(chromium)
+
+
+def print_large_houses(browser: Browser) -> None:
+    """Heartbeat, small change, mouse, sort, filter and first paint, each for both sizes."""
+    with bridge() as running:
+        for count in SIZES:
+            with page_of(browser) as page:
+                page.add_init_script(FIRST_ROW)
+                page.add_init_script(house_of(count))
+                page.goto(running.url)
+                page.wait_for_function("() => window.firstRow")
+                page.evaluate(SETTLED)
+                session = page.context.new_cdp_session(page)
+                session.send("Performance.enable", {"timeDomain": "threadTicks"})
+                first = page.evaluate("firstRow")
+                rows = page.locator("tr[data-tag-id]").count()
+                print(f"{count:,} tags: first row painted after {first:.0f} ms, {rows} in the page")
+                for what, ms in measure(page, session, count).items():
+                    print(f"{count:,} tags, {what}: {ms:.1f} ms of main thread")
+
+
+def measure(page: Page, session: CDPSession, count: int) -> dict[str, float]:
+    """Main thread time, ms, of each kind of thing that happens."""
+
+    def cost(action: Callable[[], object], times: int) -> float:
+        before = busy_s(session)
+        for _ in range(times):
+            action()
+        page.evaluate(SETTLED)
+        return 1000 * (busy_s(session) - before) / times
+
+    def frame(script: str) -> Callable[[], None]:
+        def send() -> None:
+            page.evaluate(script)
+            time.sleep(1.05)  # a large house is shown once a second: one frame at a time
+
+        return send
+
+    box = page.get_by_test_id("map").bounding_box()
+    assert box is not None
+    steps = iter(range(10_000))
+
+    def move() -> None:
+        step = next(steps)
+        x = box["x"] + 60 + (step * 37) % (box["width"] - 180)
+        page.mouse.move(x, box["y"] + 60 + (step * 23) % (box["height"] - 180))
+
+    def sort() -> None:
+        page.locator("th[data-column=temperature] button").click()
+        page.evaluate(SETTLED)
+
+    def search() -> None:
+        step = next(steps)
+        page.get_by_role("searchbox").fill("tomato" if step % 2 else "basil")
+        page.evaluate(SETTLED)
+
+    cost(frame("house.beat()"), 2)
+    # Ages tick by themselves, and a look at the page costs something too.
+    idle = cost(frame("house.idle()"), BEATS)
+    return {
+        "a heartbeat that changes nothing": cost(frame("house.beat()"), BEATS) - idle,
+        "a delta of 1 %": cost(frame(f"house.change({count // 100})"), BEATS) - idle,
+        "a move of the mouse over the map": cost(move, MOVES),
+        "a sort": cost(sort, 6),
+        "a filter": cost(search, 6),
+    }
+
+
+def busy_s(session: CDPSession) -> float:
+    """Time that the page's main thread has spent in tasks so far, s."""
+    metrics = session.send("Performance.getMetrics")["metrics"]
+    return float(next(each["value"] for each in metrics if each["name"] == "TaskDuration"))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,133 @@
+"""A house of thousands of tags: the page holds what is in sight, and nobody misses the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.bench.house_double import house_of
+from tests.browser.hmi import PHONE, WIDE, Hmi, OpenPage
+from tests.browser.test_accessibility import violations
+from tests.support.web import Bridge
+
+TAGS = 10_000
+# More than the rows of any window with the spare ones; far less than all.
+MOST = 100
+
+OpenHouse = Callable[..., Hmi]
+
+
+@pytest.fixture
+def open_house(house: Bridge, open_page: OpenPage) -> OpenHouse:
+    """`open_house(tags, fragment, **options)`: the page with a house of so many tags."""
+
+    def open_one(tags: int = TAGS, fragment: str = "", **options: object) -> Hmi:
+        hmi = open_page(house.url, go=False, **options)
+        hmi.page.add_init_script(house_of(tags))
+        hmi.go(fragment)
+        expect(hmi.page.locator("tr[data-tag-id]").first).to_be_attached()
+        return hmi
+
+    return open_one
+
+
+def test_the_page_holds_few_rows_and_shows_any(open_house: OpenHouse) -> None:
+    hmi = open_house()
+    expect(hmi.page.get_by_role("table")).to_have_attribute("aria-rowcount", str(TAGS + 1))
+    frame = hmi.page.locator(".table-scroll")
+    for share, tag_id in ((1.0, str(TAGS)), (0.5, str(TAGS // 2 + 5)), (0.0, "1")):
+        frame.evaluate("(e, share) => { e.scrollTop = share * e.scrollHeight; }", share)
+        expect(hmi.row(tag_id)).to_be_in_viewport()
+        assert len(hmi.rows()) < MOST
+        row = hmi.row(tag_id)
+        assert row.get_attribute("aria-rowindex") == str(int(tag_id) + 1)
+        # What is on the screen there is this very row, not a gap.
+        assert row.evaluate(
+            """row => { const { x, y, height } = row.getBoundingClientRect();
+              return document.elementFromPoint(x + 90, y + height / 2).closest('tr') === row; }"""
+        )
+
+
+def test_the_chosen_row_comes_into_view_and_the_focus_is_never_lost(open_house: OpenHouse) -> None:
+    hmi = open_house(fragment=f"tag={TAGS - 3}")
+    expect(hmi.row(str(TAGS - 3))).to_be_in_viewport()
+    hmi.page.keyboard.press("n")
+    expect(hmi.row(str(TAGS - 2))).to_be_in_viewport()
+    expect(hmi.test_id("said-choice")).to_contain_text(f"{TAGS - 2:d} of {TAGS:d}")
+    # With the Tab key from row to row, further than the page held rows when it began.
+    hmi.page.keyboard.press("Escape")
+    hmi.page.locator(".table-scroll").evaluate("e => { e.scrollTop = 0; }")
+    hmi.row("1").get_by_role("button").focus()
+    for _ in range(MOST):
+        hmi.page.keyboard.press("Tab")
+    focused = hmi.page.locator("tr[data-tag-id]:focus-within")
+    expect(focused).to_have_attribute("data-tag-id", str(MOST + 1))
+    expect(focused).to_be_in_viewport()
+    # Scrolled far away it keeps its focus, and goes on from there.
+    hmi.page.locator(".table-scroll").evaluate("e => { e.scrollTop = e.scrollHeight; }")
+    expect(hmi.row(str(TAGS))).to_be_in_viewport()
+    expect(focused).to_have_attribute("data-tag-id", str(MOST + 1))
+    hmi.page.keyboard.press("Shift+Tab")
+    expect(focused).to_be_in_viewport()
+
+
+def test_a_filter_and_an_order_have_their_rows_in_sight(open_house: OpenHouse) -> None:
+    hmi = open_house()
+    hmi.page.locator(".table-scroll").evaluate("e => { e.scrollTop = e.scrollHeight; }")
+    expect(hmi.row(str(TAGS))).to_be_in_viewport()
+    hmi.page.get_by_role("searchbox").fill("pest basil")
+    # Every 50th tag has a pest, and every third of those is basil.
+    expect(hmi.test_id("row-count")).to_contain_text(f"of {TAGS} tags")
+    expect(hmi.page.locator("tr[data-tag-id]").last).to_be_in_viewport()
+    hmi.page.get_by_role("searchbox").fill("")
+    hmi.page.locator("th[data-column=tag] button").click()
+    hmi.page.locator(".table-scroll").evaluate("e => { e.scrollTop = 0; }")
+    expect(hmi.row(str(TAGS))).to_be_in_viewport()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("viewport", [WIDE, PHONE, {"width": 720, "height": 450}])
+def test_axe_and_windows_of_any_size(
+    open_house: OpenHouse, scheme: str, viewport: dict[str, int]
+) -> None:
+    hmi = open_house(1_000, "tag=3", viewport=viewport, color_scheme=scheme, bypass_csp=True)
+    tabs = hmi.page.locator(".pane-tabs")
+    if tabs.is_visible():
+        tabs.get_by_role("button", name="Tags").click()
+    expect(hmi.row("3")).to_be_in_viewport()
+    assert len(hmi.rows()) < MOST
+    assert violations(hmi) == []
+
+
+def test_forced_colours_mark_the_chosen_row(open_house: OpenHouse) -> None:
+    hmi = open_house(1_000, "tag=500", forced_colors="active")
+    expect(hmi.row("500")).to_be_in_viewport()
+    assert hmi.row("500").evaluate("row => getComputedStyle(row).outlineWidth") == "3px"
+
+
+def test_paper_has_all_rows_or_says_so(open_house: OpenHouse) -> None:
+    for tags, printed in ((300, 300), (1_000, 1_000), (1_001, 1_000)):
+        hmi = open_house(tags)
+        rest = hmi.page.locator(".paper-rest")
+        hmi.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+        hmi.page.emulate_media(media="print")
+        assert len(hmi.rows()) == printed
+        assert rest.is_visible() == (printed < tags)
+        if printed < tags:
+            expect(rest).to_contain_text(f"first {printed} of {tags} tags")
+        hmi.page.evaluate("window.dispatchEvent(new Event('afterprint'))")
+        hmi.page.emulate_media(media="screen")
+        assert len(hmi.rows()) < MOST
+
+
+def test_rows_are_equally_high_whatever_they_hold(open_house: OpenHouse) -> None:
+    """Or the table would jump as it scrolls."""
+    hmi = open_house(300)
+    hmi.page.evaluate("house.unpin(3)")
+    expect(hmi.row("3")).to_have_attribute("data-pinned", "false")
+    heights = hmi.page.locator("tr[data-tag-id]").evaluate_all(
+        "rows => rows.map(row => row.getBoundingClientRect().height)"
+    )
+    assert len(set(heights)) == 1

@@ -1,6 +1,6 @@
 """The page with a large house: what it costs the main thread when nothing, or little, happens.
 
-Thread time of all tasks of the page, so what else runs on the machine does not count.
+But for the heartbeat it is thread time of all tasks, so what else runs there does not count.
 """
 
 from __future__ import annotations
@@ -25,6 +25,20 @@ new MutationObserver((_, observer) => {
   observer.disconnect();
   requestAnimationFrame(() => setTimeout(() => { window.firstRow = performance.now(); }));
 }).observe(document, { childList: true, subtree: true });
+"""
+# Until the page has taken the frame, ms, the median.
+HEARTBEAT = """
+async (times) => {
+  const costs = [];
+  for (let i = 0; i < times; i++) {
+    await new Promise((resolve) => setTimeout(resolve, 1050));
+    const start = performance.now();
+    house.beat();
+    await null; // what React does at once it does before that; no frame is asked for
+    costs.push(performance.now() - start);
+  }
+  return costs.sort((a, b) => a - b)[Math.floor(times / 2)];
+}
 """
 SETTLED = "() => new Promise((r) => requestAnimationFrame(() => setTimeout(r, 50)))"
 
@@ -93,11 +107,10 @@ def measure(page: Page, session: CDPSession, count: int) -> dict[str, float]:
         page.get_by_role("searchbox").fill("tomato" if step % 2 else "basil")
         page.evaluate(SETTLED)
 
-    cost(frame("house.beat()"), 2)
     # Ages tick by themselves, and a look at the page costs something too.
     idle = cost(frame("house.idle()"), BEATS)
     return {
-        "a heartbeat that changes nothing": cost(frame("house.beat()"), BEATS) - idle,
+        "a heartbeat that changes nothing": page.evaluate(HEARTBEAT, BEATS),
         "a delta of 1 %": cost(frame(f"house.change({count // 100})"), BEATS) - idle,
         "a move of the mouse over the map": cost(move, MOVES),
         "a sort": cost(sort, 6),

@@ -33,10 +33,13 @@ export function TagTable(): JSX.Element {
   const columns = 6 + sensors.length;
   const body = useRef<HTMLTableSectionElement>(null);
   const sight = useVisibleRows(body, rows.length);
-  // A row that has the focus stays, or the focus would be lost with it.
+  // A row that has the focus stays, or the focus would be lost with it; and the rows beside it,
+  // where the Tab key leads.
   const [focused, setFocused] = useState<string | null>(null);
   const places = useMemo(() => new Map(rows.map(({ tag }, index) => [tag.id, index])), [rows]);
-  const single = [selected, focused].flatMap((id) => (id === null ? [] : (places.get(id) ?? [])));
+  const placeOf = (id: string | null): number => (id === null ? NaN : (places.get(id) ?? NaN));
+  const held = placeOf(focused);
+  const single = [placeOf(selected), held - 1, held, held + 1];
   return (
     // Keyboard and screen reader use the button in each row; for the pointer the whole row is
     // its target. One listener here, because a layer per row makes a long table slow.
@@ -48,8 +51,9 @@ export function TagTable(): JSX.Element {
       onFocus={(event) => {
         setFocused(rowTag(event));
       }}
-      onBlur={() => {
-        setFocused(null);
+      onBlur={({ currentTarget, relatedTarget }) => {
+        // On its way to another row, which is to be still there when it arrives.
+        if (!currentTarget.contains(relatedTarget)) setFocused(null);
       }}
       onClick={onClick}
       onPointerOver={onPointerOver}

@@ -34,7 +34,7 @@ describe('parts of a table', () => {
 
   test('single rows stand where they belong, once', () => {
     expect(text(10, { from: 3, to: 5 }, [8, 0, 8, 4])).toBe('0 (2) 3 4 (3) 8 (1)');
-    expect(text(10, { from: 3, to: 5 }, [-1, 10])).toBe('(3) 3 4 (5)');
+    expect(text(10, { from: 3, to: 5 }, [-1, 10, NaN])).toBe('(3) 3 4 (5)');
   });
 });
 
@@ -107,7 +107,8 @@ describe('a long table', () => {
     settle(() => {
       act({ type: 'select', tagId: null });
     });
-    expect(indices().at(-1)).toBe(7778);
+    // With its neighbours, for the Tab key.
+    expect(indices().slice(-3)).toEqual([7777, 7778, 7779]);
     expect(document.activeElement).toBe(button);
     settle(() => button?.blur());
     expect(indices().at(-1)).toBeLessThan(70);

@@ -268,7 +268,7 @@ def test_any_tag_id_is_found_by_its_percent_encoded_name(live: Bridge, tag_id: s
 
 @pytest.mark.parametrize(
     "tag_id",
-    ["%00", "%FF%FE", "%0d%0aSet-Cookie:x=1", "%3Cscript%3E", "x" * 5_000, "%F0%9F%8C%B7", "a%2Fb"],
+    ["%00", "%FF%FE", "%0d%0aSet-Cookie:x=1", "%3Cscript%3E", "x" * 4_000, "%F0%9F%8C%B7", "a%2Fb"],
 )
 def test_a_hostile_tag_id_is_a_plain_404(live: Bridge, tag_id: str) -> None:
     for path in (f"/api/tags/{tag_id}", f"/api/tags/{tag_id}/history"):

@@ -37,6 +37,12 @@ def has_mapped(process: Process, name: str) -> Callable[[], bool]:
     return lambda: name in maps.read_text()
 
 
+def said_beside_its_start(process: Process) -> list[str]:
+    """What a twin has said, without the line with which it begins, should it have got so far."""
+    start = "lupin_twin in ROS domain"
+    return [line for line in process.output.splitlines() if start not in line]
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("moment", MOMENTS)
 def test_a_signal_during_the_start_ends_it_quietly(
@@ -46,7 +52,7 @@ def test_a_signal_during_the_start_ends_it_quietly(
         wait_for(lambda: holds_back(process), "signals to be held back")
         wait_for(has_mapped(process, MOMENTS[moment]), moment)
         assert process.stop(number) == 0
-        assert process.output == ""
+        assert said_beside_its_start(process) == []
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -57,7 +63,7 @@ def test_a_signal_between_many_callbacks_ends_it_quietly(
     with twin_node(domain, *fast) as process, Peer(domain) as peer:
         peer.state(lambda _: True, "a state")
         assert process.stop(number) == 0
-        assert process.output == ""
+        assert said_beside_its_start(process) == []
 
 
 def test_it_goes_on_after_it_was_stopped_for_a_while(domain: int) -> None:

@@ -91,9 +91,12 @@ describe('time of day', () => {
     expect(clock.epochOf(came)).toBe(at);
   });
 
-  test('follows a clock that was set back', () => {
-    const came = clock.now();
-    wall -= HOUR;
+  test('follows a clock that was set back, and no lapse that nobody has looked for', () => {
+    const [came, at] = [clock.now(), wall];
+    wall += HOUR;
+    expect(clock.epochOf(came)).toBe(at);
+    wall -= 3 * HOUR;
+    expect(clock.epochOf(came)).toBe(wall);
     clock.now();
     expect(clock.epochOf(came)).toBe(wall);
   });

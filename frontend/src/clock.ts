@@ -60,7 +60,11 @@ export class PageClock {
   /** Time of day, ms since the epoch, of a moment on the monotonic clock: as it was then. */
   epochOf(moment: number): number {
     const era = this.#eras.findLast(({ from }) => from <= moment) ?? this.#eras[0];
-    return moment + (era?.offset ?? 0);
+    const offset = this.#clocks.wall() - this.#clocks.monotonic();
+    if (!era) return moment + offset;
+    // Of the present stretch the present word, unless time has lapsed and nobody has looked yet.
+    const isPresent = era === this.#eras.at(-1) && offset - era.offset <= LAPSE_MS;
+    return moment + (isPresent ? offset : era.offset);
   }
 
   /** Calls back when time has lapsed; returns the way to stop. */

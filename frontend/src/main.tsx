@@ -11,6 +11,7 @@ import './styles/table.css';
 import './styles/table-sizes.css';
 import './styles/card.css';
 import './styles/hover.css';
+import './styles/ages.css';
 import './styles/bound.css';
 import './styles/paper.css';
 import './styles/kiosk.css';

@@ -44,6 +44,11 @@ export const S = {
       ? 'A message from the bridge could not be read and was dropped.'
       : `${count} messages from the bridge could not be read and were dropped.`,
   unreadLast: (why: string): string => `The last: ${why}`,
+  paused: 'Time is paused.',
+  pausedHint: 'The simulation stands still, and so do all ages.',
+  drops: (count: number): string =>
+    `The twin dropped ${counted(count, 'message', 'messages')} in the last minutes.`,
+  dropsLast: (message: string): string => `The last: ${message}`,
   failedTitle: 'The page has failed',
   failedHint: 'What it shows is not to be relied on. The twin and the bridge are not affected.',
   failedAgain: 'It is loaded anew by itself.',
@@ -149,7 +154,17 @@ export const S = {
   ageUnknown: 'not known',
   ageUnknownLong: 'How old this is nobody knows until the twin tells its time anew.',
   neverObserved: 'never',
-  neverObservedLong: 'Discovered, but not scanned yet.',
+  neverObservedLong: 'No scan has brought a reading yet.',
+  ageUntoldLong: 'This twin does not tell when its readings were made.',
+  tried: {
+    ok: 'OK',
+    unreachable: 'not reachable',
+    undecoded: 'not decoded',
+    skipped: 'skipped',
+    failed: 'failed',
+  },
+  triedAgo: (age: string, outcome: string): string => `tried ${age} ago, ${outcome}`,
+  triedSometime: (outcome: string): string => `tried, ${outcome}`,
   noSensor: '–',
   noSensorLong: 'no such sensor',
   sensorFailed: 'failed',
@@ -166,6 +181,12 @@ export const S = {
   cardHistory: (count: number, from: string, to: string): string =>
     `Last ${count} readings, between ${from} and ${to}`,
   cardBlooms: 'Blooms',
+  cardScanned: 'Last reading',
+  cardLooked: 'Flowers seen',
+  cardTry: 'Last try',
+  cardTries: 'Last tries',
+  cardTryKinds: { scan: 'scan', look: 'look', any: 'try' },
+  cardNoHistory: 'This twin tells no history.',
   cardPosition: 'Position',
 
   menu: 'Menu',

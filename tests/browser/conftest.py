@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import os
+import threading
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import pytest
@@ -14,6 +16,7 @@ from playwright.sync_api import Browser, expect, sync_playwright
 from tests.browser.hmi import Hmi, OpenPage, open_hmi
 from tests.browser.house import TAGS, furnish
 from tests.support.domains import own_domain
+from tests.support.ros import Peer, clock_at
 from tests.support.waiting import PATIENCE_S
 from tests.support.web import Bridge, bridge
 
@@ -63,17 +66,43 @@ def browser() -> Iterator[Browser]:
             yield chromium
 
 
+TICK_S = 0.5
+
+
+@contextmanager
+def ticking(peer: Peer, started_s: float) -> Iterator[None]:
+    """Simulated time that goes on by a millisecond a tick."""
+    has_ended = threading.Event()
+
+    def tick() -> None:
+        for ticks in itertools.count(1):
+            if has_ended.wait(TICK_S):
+                return
+            peer.publish("/clock", clock_at(started_s + ticks / 1000), depth=1)
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    try:
+        yield
+    finally:
+        has_ended.set()
+        thread.join()
+
+
 @pytest.fixture(scope="package")
 def house() -> Iterator[Bridge]:
     """A server with the greenhouse of `house.py`, for tests that change nothing in it.
 
-    Its clock stands still, so that no pin fades between two pictures.
+    Its clock all but stands still, so that no pin fades between two pictures: it goes on by a
+    millisecond a tick, or it would be told as paused.
     """
     simulated = ("--ros-args", "-p", "use_sim_time:=true")
     with own_domain() as domain, bridge(*simulated, domain=domain) as running:
-        running.peer.set_clock(time.time())
-        furnish(running)
-        yield running
+        started_s = time.time()
+        running.peer.set_clock(started_s)
+        with ticking(running.peer, started_s):
+            furnish(running)
+            yield running
 
 
 @pytest.fixture

@@ -29,6 +29,14 @@ def latched(depth: int) -> QoSProfile:
     )
 
 
+def clock_at(seconds: float) -> Clock:
+    """A message for `/clock`."""
+    clock = Clock()
+    clock.clock.sec = int(seconds)
+    clock.clock.nanosec = int((seconds % 1) * 1e9)
+    return clock
+
+
 class Peer:
     """A node that publishes what a robot would and listens to the twin."""
 
@@ -85,9 +93,7 @@ class Peer:
 
     def set_clock(self, seconds: float) -> None:
         """Publish simulated time until a state carries it: `/clock` is not latched."""
-        clock = Clock()
-        clock.clock.sec = int(seconds)
-        clock.clock.nanosec = int((seconds % 1) * 1e9)
+        clock = clock_at(seconds)
 
         def tick() -> Any:
             self.publish("/clock", clock, depth=1)

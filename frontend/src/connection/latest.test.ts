@@ -4,7 +4,16 @@ import type { DeltaFrame } from '../contract/types';
 import { stateFrame, wireTag } from '../testing/tags';
 import { latestAfter } from './latest';
 
-const a = wireTag({ tag_id: 'a', last_observed: { sec: 995, nanosec: 0 } });
+const a = wireTag({
+  tag_id: 'a',
+  last_observed: { sec: 995, nanosec: 0 },
+  readings: [
+    // Flowers were looked at since.
+    { name: 'co2', value: 600, observed_at: { sec: 100, nanosec: 0 }, stale_seconds: 900 },
+    // A twin that does not tell.
+    { name: 'light', value: 9, observed_at: null, stale_seconds: null },
+  ],
+});
 const b = wireTag({ tag_id: 'b', stale_seconds: null, last_observed: { sec: 0, nanosec: 0 } });
 const full = stateFrame([a, b], { seq: 7, sec: 1000 });
 
@@ -34,8 +43,13 @@ describe('the newest state', () => {
 
   test('an unchanged tag grows older by the twin’s clock and shares the rest', () => {
     const after = latestAfter(full, delta());
-    expect(after?.state.tags[0]).toEqual({ ...a, stale_seconds: 7.5 });
-    expect(after?.state.tags[0]?.readings).toBe(a.readings);
+    const [first, second] = a.readings;
+    expect(after?.state.tags[0]).toEqual({
+      ...a,
+      stale_seconds: 7.5,
+      readings: [{ ...first, stale_seconds: 902.5 }, second],
+    });
+    expect(after?.state.tags[0]?.pose).toBe(a.pose);
     expect(after?.state.tags[1]?.stale_seconds).toBeNull();
   });
 

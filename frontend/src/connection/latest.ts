@@ -29,7 +29,13 @@ export function latestAfter(latest: Latest | null, frame: StateFrame | DeltaFram
 /** An unchanged tag at a later moment; everything but its age is the very same. */
 function aged(tag: TwinTagState, stamp: WireTime): TwinTagState {
   if (tag.stale_seconds === null) return tag;
-  const { sec, nanosec } = tag.last_observed;
-  const age = stamp.sec - sec + (stamp.nanosec - nanosec) / 1e9;
-  return { ...tag, stale_seconds: Math.max(0, age) };
+  const readings = tag.readings.map((reading) =>
+    reading.observed_at === null || reading.stale_seconds === null
+      ? reading
+      : { ...reading, stale_seconds: secondsBetween(reading.observed_at, stamp) },
+  );
+  return { ...tag, readings, stale_seconds: secondsBetween(tag.last_observed, stamp) };
 }
+
+const secondsBetween = (from: WireTime, to: WireTime): number =>
+  Math.max(0, to.sec - from.sec + (to.nanosec - from.nanosec) / 1e9);

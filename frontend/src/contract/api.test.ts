@@ -19,7 +19,9 @@ describe('addresses', () => {
     let asked = '';
     vi.stubGlobal('fetch', (url: URL) => {
       asked = url.href;
-      return Promise.resolve(Response.json({ tag_id: 'a/b?c', sensors: [] }));
+      return Promise.resolve(
+        Response.json({ tag_id: 'a/b?c', is_known: true, sensors: [], tries: [] }),
+      );
     });
     await fetchHistory('a/b?c', signal);
     expect(asked).toMatch(/\/api\/tags\/a%2Fb%3Fc\/history$/);
@@ -46,7 +48,12 @@ describe('an answer that is none of the contract is an error that names the fiel
     [fetchMap, { info: { resolution: '0.05' } }, 'map.info.resolution: a number, not "0.05"'],
     [
       (s: AbortSignal) => fetchHistory('1', s),
-      { tag_id: '1', sensors: [{ name: 'co2', values: [{ stamp: 7, value: 1 }] }] },
+      {
+        tag_id: '1',
+        is_known: true,
+        tries: [],
+        sensors: [{ name: 'co2', values: [{ stamp: 7, value: 1 }] }],
+      },
       'history.sensors[0].values[0].stamp: an object, not 7',
     ],
     [(s: AbortSignal) => fetchQuality('co2', s), [], 'quality: an object, not a list of 0'],

@@ -1,5 +1,5 @@
 /** What the routes answer, as far as the page reads it; nothing behind these checks again. */
-import { count, list, number, numberOrNull, object, orNull } from './check';
+import { boolean, count, list, number, numberOrNull, object, orNull } from './check';
 import { MAX_SENSORS, POSE, TEXT, TIME } from './shapes';
 
 /** More scans than any twin keeps of one tag in memory. */
@@ -17,6 +17,11 @@ export const QUALITY = object({
 
 export const HISTORY = object({
   tag_id: TEXT,
+  is_known: boolean,
+  tries: list(
+    object({ stamp: TIME, status: number, status_detail: TEXT, kind: numberOrNull }),
+    MAX_SCANS,
+  ),
   sensors: list(
     object({
       name: TEXT,

@@ -72,7 +72,11 @@ describe('each field is checked', () => {
     ['a truth', true, /\.(anomaly|has_map)$/],
     ['a list', [], /\.(tags|readings|flowers|points|changed|removed|drops)$/],
     ['an object', {}, /^$/],
-    ['a number as text', '21.5', /\.(type|revision|frame_id|tag_id|species|name|reason|message)$/],
+    [
+      'a number as text',
+      '21.5',
+      /\.(type|revision|frame_id|tag_id|species|name|reason|message|last_try_detail)$/,
+    ],
     ['nothing', undefined, /^$/],
   ])('for %s in its place', (_, wrong, mayPass) => {
     for (const frame of [full, { ...delta, changed: full.state.tags, removed: ['x'] }, status]) {
@@ -85,7 +89,7 @@ describe('each field is checked', () => {
 
   test('null is no value but where one may be unknown', () => {
     const nullable =
-      /\.(value|stale_seconds|species_confidence|confidence|height_m|x|y|z|w|state_age_seconds)$/;
+      /\.(value|observed_at|stale_seconds|species_confidence|confidence|height_m|x|y|z|w|state_age_seconds|looked_at|last_try|last_try_status)$/;
     expect(paths(full).some((path) => nullable.test(path))).toBe(true);
     for (const frame of [full, status]) {
       for (const [path, broken] of mutations(frame, null)) {
@@ -151,6 +155,14 @@ describe('what would stop the page is refused, at the limit and one past it', ()
   test('characters', () => {
     expect(whyBad(' '.repeat(MAX_FRAME_CHARS + 1))).toMatch(/the limit is 128000000$/);
   });
+});
+
+test('drops are told, if they are well formed', () => {
+  const drops = [{ reason: 'frame', message: 'frame odom', count: 12 }];
+  expect(parse({ ...status, drops })).toMatchObject({ kind: 'frame', frame: { drops } });
+  expect(whyBad(JSON.stringify({ ...status, drops: [{ ...drops[0], count: -1 }] }))).toBe(
+    'status.drops[0].count: a whole number, not -1',
+  );
 });
 
 test('a tag that is there twice is one too many', () => {

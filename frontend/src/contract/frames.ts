@@ -1,5 +1,15 @@
 /** What comes over the WebSocket, checked to the last field: nothing behind it checks again. */
-import { also, boolean, list, number, numberOrNull, object, oneOf, type Check } from './check';
+import {
+  also,
+  boolean,
+  count,
+  list,
+  number,
+  numberOrNull,
+  object,
+  oneOf,
+  type Check,
+} from './check';
 import { HEADER, MAX_SENSORS, TAG, TEXT } from './shapes';
 import type { Frame, TwinTagState } from './types';
 
@@ -36,7 +46,7 @@ const FRAMES: Readonly<Record<Frame['type'], Check>> = {
     message: TEXT,
     state_age_seconds: numberOrNull,
     has_map: boolean,
-    drops: list(object({ reason: TEXT, message: TEXT, count: number }), MAX_REASONS),
+    drops: list(object({ reason: TEXT, message: TEXT, count }), MAX_REASONS),
   }),
   state: object({ seq: number, revision: TEXT, state: object({ header: HEADER, tags: TAGS }) }),
   delta: object({

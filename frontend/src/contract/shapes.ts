@@ -1,5 +1,5 @@
 /** The messages that frames and answers are made of, field by field. */
-import { boolean, count, integer, list, numberOrNull, object, text } from './check';
+import { boolean, count, integer, list, numberOrNull, object, orNull, text } from './check';
 
 /** Kinds of sensors of one tag, and in one frame: each is a column of the table. */
 export const MAX_SENSORS = 256;
@@ -15,7 +15,15 @@ export const POSE = object({ position: POINT, orientation: QUATERNION });
 export const TAG = object({
   tag_id: TEXT,
   pose: POSE,
-  readings: list(object({ name: TEXT, value: numberOrNull }), MAX_SENSORS),
+  readings: list(
+    object({
+      name: TEXT,
+      value: numberOrNull,
+      observed_at: orNull(TIME),
+      stale_seconds: numberOrNull,
+    }),
+    MAX_SENSORS,
+  ),
   last_observed: TIME,
   stale_seconds: numberOrNull,
   species: TEXT,
@@ -34,4 +42,8 @@ export const TAG = object({
     MAX_BLOOMS_PER_TAG,
   ),
   box_footprint: object({ points: list(POINT, MAX_FOOTPRINT_POINTS) }),
+  looked_at: orNull(TIME),
+  last_try: orNull(TIME),
+  last_try_status: numberOrNull,
+  last_try_detail: TEXT,
 });

@@ -5,11 +5,14 @@ type Schemas = components['schemas'];
 
 export type StateFrame = Schemas['StateFrame'];
 export type StatusFrame = Schemas['StatusFrame'];
+/** What the twin dropped in the last minutes, and why. */
+export type Drop = Schemas['RecentDrop'];
 export type DeltaFrame = Schemas['DeltaFrame'];
 export type Frame = StateFrame | DeltaFrame | StatusFrame;
 export type TwinTagState = Schemas['TwinTagState'];
 export type OccupancyGrid = Schemas['OccupancyGrid'];
 export type FieldQuality = Schemas['FieldQuality'];
+export type PastTry = Schemas['PastTry'];
 export type TagHistory = Schemas['TagHistory'];
 export type WirePoint = Schemas['Point'];
 export type WireTime = Schemas['Time'];

@@ -16,15 +16,24 @@ export type Ageing =
 export const GROWING: Ageing = { kind: 'growing' };
 export const AGES_UNKNOWN: Ageing = { kind: 'unknown' };
 
-/** Seconds since a moment on the monotonic clock; null: there was none, or nobody knows. */
+/** When something was, ms on the monotonic clock. */
+export type When = number | 'never' | 'unknown';
+
+/** Seconds since then; null: it never was, or nobody knows. */
 export function ageSeconds(
-  observedAt: number | null,
+  observedAt: When | null,
   now: number,
   ageing: Ageing = GROWING,
 ): number | null {
-  if (observedAt === null || ageing.kind === 'unknown') return null;
+  if (typeof observedAt !== 'number' || ageing.kind === 'unknown') return null;
   const asOf = ageing.kind === 'as-of' ? ageing.at : now;
   return Math.max(0, asOf - observedAt) / 1000;
+}
+
+/** How old something looks in text, which does not fade as a picture does. */
+export function ageStep(age: number | null): 'fresh' | 'fading' | 'old' {
+  if (age === null || age >= FADE_TO_S) return 'old';
+  return age < FADE_FROM_S ? 'fresh' : 'fading';
 }
 
 /** How strongly to draw something of that age, 0.35 to 1, even in ratios of age; null: faintest. */

@@ -14,7 +14,12 @@ const tags = [
     last_observed: { sec: 100, nanosec: 250_000_000 },
   }),
   tag({ tag_id: '10', readings: readings({ temperature: 35 }), anomaly: true, bug_count: 3 }),
-  tag({ tag_id: '9', readings: readings({ humidity: 60 }), stale_seconds: 80 }),
+  tag({
+    tag_id: '9',
+    // Its flowers were looked at since: that makes no reading younger.
+    stale_seconds: 1,
+    readings: readings({ humidity: 60 }).map((each) => ({ ...each, stale_seconds: 80 })),
+  }),
   tag({
     tag_id: '1',
     stale_seconds: null,

@@ -5,6 +5,7 @@ import { ageSeconds } from './age';
 import { csv, type Cell } from './csv';
 import type { HealthStatus, HouseHealth, TagHealth } from './health';
 import { sensorNamed, type Sensor } from './sensors';
+import { tryKind } from './tries';
 import { compareIds, type Tag } from './twin';
 import { toShown, unitOf, type TemperatureUnit } from './units';
 
@@ -37,7 +38,7 @@ export function sortKey({ tag, health }: Row, column: string): Key {
       return tag.anomaly ? 1 + tag.bugCount : 0;
     case 'age':
       // The age itself grows with the clock; its order does not.
-      return tag.observedAt === null ? null : -tag.observedAt;
+      return typeof tag.scannedAt === 'number' ? -tag.scannedAt : null;
     default:
       return tag.readings.get(column) ?? null;
   }
@@ -103,7 +104,8 @@ function haystackOf({ tag, health }: Row): string {
     S.health[health.status],
     tag.anomaly ? S.pest : '',
     tag.at ? '' : S.notOnMap,
-    tag.observedAt === null ? S.neverObserved : '',
+    tag.scannedAt === 'never' ? S.neverObserved : '',
+    tag.failedTry ? S.tried[tryKind(tag.failedTry.status)] : '',
     ...[...tag.readings.keys()].map((name) => `${name} ${sensorNamed(name).label}`),
   ]
     .join(' ')
@@ -144,7 +146,7 @@ export function tableCsv(
     T.y,
   ];
   const lines = rows.map(({ tag, health }): Cell[] => {
-    const age = ageSeconds(tag.observedAt, now);
+    const age = ageSeconds(tag.scannedAt, now);
     return [
       tag.id,
       S.health[health.status],

@@ -1,7 +1,8 @@
 import { describe, expect, test } from 'vitest';
 
+import type { Latest, TwinTagState } from '../contract/types';
 import { readings, stateFrame, tag, wireTag } from '../testing/tags';
-import { compareIds, snapshotOf } from './twin';
+import { compareIds, snapshotOf, tagOf } from './twin';
 
 const pose = (x: number | null, w: number | null): ReturnType<typeof wireTag>['pose'] => ({
   position: { x, y: 2, z: 0 },
@@ -121,5 +122,65 @@ describe('snapshot', () => {
     const other = [wireTag({ tag_id: '11' }), ...wires.slice(0, 2)];
     const swapped = snapshotOf(stateFrame(other, { sec: 5 }), 1_400, beat);
     expect(swapped.tags.map(({ id }) => id)).toEqual(['1', '2', '11']);
+  });
+});
+
+describe('times of their own', () => {
+  const at = { sec: 5_000, nanosec: 0 };
+  const reading = (name: string, stale: number | null): TwinTagState['readings'][number] => ({
+    name,
+    value: 1,
+    observed_at: null,
+    stale_seconds: stale,
+  });
+
+  test('each reading has its own, and the newest is that of the scan', () => {
+    const { readAt, scannedAt } = tagOf(
+      wireTag({ stale_seconds: 1, readings: [reading('a', 60), reading('b', 30)] }),
+      { at, takenAt: 100_000 },
+    );
+    expect([...readAt]).toEqual([
+      ['a', 40_000],
+      ['b', 70_000],
+    ]);
+    expect(scannedAt).toBe(70_000);
+  });
+
+  test('what the twin does not tell is not known, and never young', () => {
+    const scanned = (...list: TwinTagState['readings']): unknown =>
+      tagOf(wireTag({ readings: list }), { at, takenAt: 0 }).scannedAt;
+    expect(scanned(reading('a', null))).toBe('unknown');
+    expect(scanned(reading('a', null), reading('b', 3))).toBe(-3_000);
+    expect(scanned()).toBe('never');
+  });
+
+  test('a look and a try by the state’s time; of a success no more is told', () => {
+    const wire = wireTag({
+      looked_at: { sec: 4_990, nanosec: 500_000_000 },
+      last_try: { sec: 4_880, nanosec: 0 },
+      last_try_status: 2,
+      last_try_detail: 'dark',
+    });
+    const tag = tagOf(wire, { at, takenAt: 0 });
+    expect(tag.lookedAt).toBe(-9_500);
+    expect(tag.failedTry).toEqual({ at: -120_000, status: 2, detail: 'dark' });
+    expect(tagOf({ ...wire, last_try_status: 0 }, { at, takenAt: 0 }).failedTry).toBeNull();
+    // Without a clock there is no age.
+    const timeless = tagOf(wire, { at: { sec: 0, nanosec: 0 }, takenAt: 0 });
+    expect([timeless.lookedAt, timeless.failedTry?.at]).toEqual(['unknown', 'unknown']);
+  });
+
+  test('a tag of which nothing but its ages went on is the very same', () => {
+    const house = (stale: number, own: number | null, sec: number): Latest =>
+      stateFrame([wireTag({ stale_seconds: stale, readings: [reading('a', own)] })], { sec });
+    const first = snapshotOf(house(5, 65, 1_000), 0, null);
+    const later = snapshotOf(house(15, 75, 1_010), 10_000, first);
+    expect(later.tags[0]).toBe(first.tags[0]);
+    // A light scan, of which the value is the same by chance.
+    const again = snapshotOf(house(25, 0, 1_020), 20_000, later);
+    expect(again.tags[0]?.readAt.get('a')).toBe(20_000);
+    // A twin that ceases to tell.
+    const silent = snapshotOf(house(35, null, 1_030), 30_000, again);
+    expect(silent.tags[0]?.scannedAt).toBe('unknown');
   });
 });

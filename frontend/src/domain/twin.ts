@@ -1,10 +1,20 @@
 import type { Latest, TwinTagState, WirePoint, WireTime } from '../contract/types';
 import { mapPoint, type MapPoint } from '../geometry/coordinates';
+import type { When } from './age';
 
 export interface Bloom {
   readonly at: MapPoint;
   readonly species: string;
   readonly anomaly: boolean;
+}
+
+/** A try that came to nothing. */
+export interface FailedTry {
+  readonly at: When;
+  /** As in lupin_msgs/Observation; never 0, which is a success. */
+  readonly status: number;
+  /** Why, for a person; may be empty. */
+  readonly detail: string;
 }
 
 /** One tag as the page uses it. Strings are as they came: show them through `domain/text`. */
@@ -14,7 +24,15 @@ export interface Tag {
   readonly at: MapPoint | null;
   /** Latest reading by sensor, in its unit; null: the sensor gave not-a-number. */
   readonly readings: ReadonlyMap<string, number | null>;
-  /** When it was last observed, ms on the browser's monotonic clock; null: never. */
+  /** When each reading was made: a look at the flowers makes none younger. */
+  readonly readAt: ReadonlyMap<string, When>;
+  /** When the newest reading was made. */
+  readonly scannedAt: When;
+  /** When the flowers were last looked at; "never" also where the twin does not tell. */
+  readonly lookedAt: When;
+  /** The last scan or look, if it brought nothing. */
+  readonly failedTry: FailedTry | null;
+  /** When it was last observed in any way, ms on the browser's monotonic clock; null: never. */
   readonly observedAt: number | null;
   /** ROS time of the last observation, as a key to compare; "0.0" when there was none. */
   readonly observation: string;
@@ -38,6 +56,8 @@ export interface Snapshot {
   readonly revision: string;
   /** ROS time of the state, as a key to compare. */
   readonly stamp: string;
+  /** The same as it came. */
+  readonly at: WireTime;
   /** When this state was new, ms on the browser's monotonic clock. */
   readonly takenAt: number;
   /** Tags observed since the snapshot before. */
@@ -55,15 +75,42 @@ function presentPoints(points: readonly WirePoint[]): MapPoint[] {
   return points.map(pointOf).filter((point) => point !== null);
 }
 
-/** Reads a tag of a state that was new at `takenAt`, ms on the monotonic clock. */
-export function tagOf(wire: TwinTagState, takenAt: number): Tag {
+/** The state that a tag is read from. */
+export interface TakenState {
+  /** Its ROS time. */
+  readonly at: WireTime;
+  /** When it was new, ms on the monotonic clock. */
+  readonly takenAt: number;
+}
+
+/** A ROS time on the monotonic clock. A state without a time of its own (0) dates nothing. */
+export function whenOf(time: WireTime, { at, takenAt }: TakenState): When {
+  if (at.sec === 0 && at.nanosec === 0) return 'unknown';
+  const age = at.sec - time.sec + (at.nanosec - time.nanosec) / 1e9;
+  return takenAt - Math.max(0, age) * 1000;
+}
+
+/** Reads a tag of a state. */
+export function tagOf(wire: TwinTagState, state: TakenState): Tag {
+  const { takenAt } = state;
   const { position, orientation } = wire.pose;
+  const readAt = new Map(
+    wire.readings.map((reading): [string, When] => [reading.name, readingAt(reading, takenAt)]),
+  );
+  const { looked_at: looked, last_try: tried, last_try_status: status } = wire;
   return {
     id: wire.tag_id,
     // w is exactly 0 where the twin has no pose; every rotation about z by less than half a
     // turn has another w, and ROS itself defaults it to 1.
     at: orientation.w === 0 || orientation.w === null ? null : pointOf(position),
     readings: new Map(wire.readings.map(({ name, value }) => [name, value])),
+    readAt,
+    scannedAt: newest(readAt.values()),
+    lookedAt: looked === null ? 'never' : whenOf(looked, state),
+    failedTry:
+      tried === null || status === null || status === 0
+        ? null
+        : { at: whenOf(tried, state), status, detail: wire.last_try_detail },
     observedAt: observedAt(wire, takenAt),
     observation: timeKey(wire.last_observed),
     species: wire.species,
@@ -88,6 +135,21 @@ function observedAt({ stale_seconds: stale }: TwinTagState, takenAt: number): nu
   return stale === null ? null : takenAt - stale * 1000;
 }
 
+const readingAt = (
+  { stale_seconds: stale }: TwinTagState['readings'][number],
+  takenAt: number,
+): When => (stale === null ? 'unknown' : takenAt - stale * 1000);
+
+/** The latest of some times; "unknown" where there are only such, "never" without any. */
+function newest(times: Iterable<When>): When {
+  let latest: When = 'never';
+  for (const time of times) {
+    if (typeof time !== 'number') latest = latest === 'never' ? time : latest;
+    else latest = typeof latest === 'number' ? Math.max(latest, time) : time;
+  }
+  return latest;
+}
+
 /** Ages of one observation that differ by less come from the network, not from a new look. */
 const JITTER_MS = 1_500;
 
@@ -95,26 +157,36 @@ const JITTER_MS = 1_500;
  * The tag as it was, if nothing but its age went on: the page renders only what changed. Where
  * the twin's clock runs at another speed (simulation), its ages still win.
  */
-function sharedTag(before: Tag | undefined, wire: TwinTagState, takenAt: number): Tag {
-  if (before && equal({ ...wire, stale_seconds: before.wire.stale_seconds }, before.wire)) {
-    const moment = observedAt(wire, takenAt);
-    const drift = moment === null || before.observedAt === null ? 0 : moment - before.observedAt;
-    if (Math.abs(drift) < JITTER_MS && (moment === null) === (before.observedAt === null)) {
+function sharedTag(before: Tag | undefined, wire: TwinTagState, state: TakenState): Tag {
+  if (before && equal(wire, before.wire)) {
+    const { takenAt } = state;
+    const isSame = (known: When | null, now: When | null): boolean =>
+      typeof known === 'number' && typeof now === 'number'
+        ? Math.abs(now - known) < JITTER_MS
+        : known === now;
+    if (
+      isSame(before.observedAt, observedAt(wire, takenAt)) &&
+      wire.readings.every((reading) =>
+        isSame(before.readAt.get(reading.name) ?? null, readingAt(reading, takenAt)),
+      )
+    ) {
       return before;
     }
   }
-  return tagOf(wire, takenAt);
+  return tagOf(wire, state);
 }
 
-/** Deep equality of plain JSON values. */
+/** Deep equality of plain JSON values, but for ages. */
 function equal(a: unknown, b: unknown): boolean {
   if (a === b) return true;
   if (typeof a !== 'object' || typeof b !== 'object' || a === null || b === null) return false;
   const keys = Object.keys(a);
   return (
     keys.length === Object.keys(b).length &&
-    keys.every((key) =>
-      equal((a as Record<string, unknown>)[key], (b as Record<string, unknown>)[key]),
+    keys.every(
+      (key) =>
+        key === 'stale_seconds' ||
+        equal((a as Record<string, unknown>)[key], (b as Record<string, unknown>)[key]),
     )
   );
 }
@@ -130,9 +202,10 @@ export function snapshotOf(latest: Latest, arrivedAt: number, before: Snapshot |
   const stamp = timeKey(latest.state.header.stamp);
   const repeated = before?.stamp === stamp;
   const takenAt = repeated ? Math.min(before.takenAt, arrivedAt) : arrivedAt;
+  const state = { at: latest.state.header.stamp, takenAt };
   const known = new Map(before?.tags.map((tag) => [tag.id, tag]));
   const tags = inOrder(
-    latest.state.tags.map((wire) => sharedTag(known.get(wire.tag_id), wire, takenAt)),
+    latest.state.tags.map((wire) => sharedTag(known.get(wire.tag_id), wire, state)),
     known,
     before?.tags ?? [],
   );
@@ -140,6 +213,7 @@ export function snapshotOf(latest: Latest, arrivedAt: number, before: Snapshot |
     tags,
     revision: latest.revision,
     stamp,
+    at: state.at,
     takenAt,
     fresh: before && tags !== before.tags ? freshTags(known, tags) : [],
   };

@@ -41,11 +41,20 @@ describe('pins', () => {
   });
 
   test('a pin fades with age', () => {
-    const tags = [tag({ stale_seconds: 1 })];
+    const tags = [tag({ readings: readings({ temperature: 20 }) })];
     const strength = (now: number): number => scene(tags, now).pins[0]?.strength ?? NaN;
     expect(strength(0)).toBe(1);
     expect(strength(600_000)).toBeLessThan(1);
     expect(strength(600_000)).toBeGreaterThan(0);
+  });
+
+  test('by the reading of the sensor in view, not by a later look at the flowers', () => {
+    const old = { name: 'temperature', value: 20, observed_at: null, stale_seconds: 3_600 };
+    const fresh = { ...old, name: 'humidity', stale_seconds: 1 };
+    const [pin] = scene([tag({ stale_seconds: 1, readings: [old, fresh] })]).pins;
+    expect(pin?.strength).toBeLessThan(0.5);
+    const unknown = { ...old, stale_seconds: null };
+    expect(scene([tag({ readings: [unknown] })]).pins[0]?.strength).toBeLessThan(0.5);
   });
 
   test('a pest is marked and its label comes first', () => {

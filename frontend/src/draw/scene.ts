@@ -117,7 +117,7 @@ function pinOf(
   { health, sensor, range, unit, now, ageing }: SceneInput,
 ): Pin {
   const value = tag.readings.get(sensor.name);
-  const strength = freshness(ageSeconds(tag.observedAt, now, ageing));
+  const strength = freshness(ageSeconds(tag.readAt.get(sensor.name) ?? tag.scannedAt, now, ageing));
   const status = health.byTag.get(tag.id)?.status;
   return {
     id: tag.id,

@@ -5,7 +5,7 @@ import { beforeEach, describe, expect, test } from 'vitest';
 
 import { ageSeconds } from '../domain/age';
 import { snapshotOf } from '../domain/twin';
-import { showTags } from '../testing/page';
+import { goLive, showTags, status } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { act, receive, store } from './app';
 import { selectHealth, selectRange, selectRows, selectSensors } from './derived';
@@ -74,6 +74,29 @@ describe('another moment', () => {
     expect(shownAt(twin, 77)).toBe(shownAt(twin, 77));
     expect(shownAt(twin, null)).toBe(now);
     expect(selectShown(store.get())).toBe(now);
+  });
+});
+
+describe('how ages go on', () => {
+  test.each([
+    ['live', 'live', 'growing'],
+    ['live', 'paused', 'as-of'],
+    ['offline', 'stale', 'growing'],
+    ['offline', 'no_clock', 'unknown'],
+    ['offline', 'clock_stopped', 'unknown'],
+  ] as const)('twin %s, %s: %s', (twin, reason, kind) => {
+    goLive(status({ twin, reason }));
+    const shown = selectShown(store.get());
+    expect(shown.ageing.kind).toBe(kind);
+    expect(selectShown(store.get())).toBe(shown);
+  });
+
+  test('in a pause they stand still, whatever the browser’s clock says', () => {
+    goLive(status({ reason: 'paused' }));
+    const { ageing, snapshot } = selectShown(store.get());
+    const when = snapshot?.tags[0]?.scannedAt ?? 'never';
+    const age = ageSeconds(when, performance.now(), ageing);
+    expect(ageSeconds(when, performance.now() + 3_600_000, ageing)).toBe(age);
   });
 });
 

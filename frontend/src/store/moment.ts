@@ -19,23 +19,31 @@ export interface Shown extends House {
 
 /** The same object for the same data and moment. A moment that is not here yet shows nothing. */
 export function shownAt(twin: TwinState, moment: Moment): Shown {
-  if (moment === null) return (twin.isTimeLost ? shownTimeless : shownNow)(twin.latest);
+  if (moment === null) return SHOWN_NOW[clockOf(twin)](twin.latest);
   return shownThen(twin.past?.at === moment ? twin.past.house : NO_HOUSE, moment);
 }
 
-const shownNow = memoOne((house: House): Shown => ({ ...house, moment: null, ageing: GROWING }));
+/** How the time of the newest house goes on, as far as anybody knows. */
+function clockOf({ isTimeLost, connection }: TwinState): keyof typeof SHOWN_NOW {
+  const reason = connection.status?.reason;
+  if (isTimeLost || reason === 'no_clock' || reason === 'clock_stopped') return 'unknown';
+  return reason === 'paused' ? 'paused' : 'running';
+}
 
-const shownTimeless = memoOne((house: House): Shown => ({
-  ...house,
-  moment: null,
-  ageing: AGES_UNKNOWN,
-}));
+const SHOWN_NOW = {
+  running: memoOne((house: House): Shown => ({ ...house, moment: null, ageing: GROWING })),
+  unknown: memoOne((house: House): Shown => ({ ...house, moment: null, ageing: AGES_UNKNOWN })),
+  // The twin's time stands still, and with it every age.
+  paused: memoOne((house: House): Shown => ({ ...house, moment: null, ageing: asTaken(house) })),
+};
+
+const asTaken = ({ snapshot }: House): Ageing => ({ kind: 'as-of', at: snapshot?.takenAt ?? 0 });
 
 const shownThen = memoLast((house: House, moment: number): Shown => ({
   ...house,
   moment,
   // A past moment has one age a reading, however long it is looked at.
-  ageing: { kind: 'as-of', at: house.snapshot?.takenAt ?? 0 },
+  ageing: asTaken(house),
 }));
 
 export const selectShown = ({ twin, view }: AppState): Shown => shownAt(twin, view.moment);

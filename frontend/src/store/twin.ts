@@ -1,5 +1,5 @@
 /** What came from the server: the connection, the greenhouse, and what is fetched about it. */
-import type { Field, FieldQuality, Latest, StatusFrame } from '../contract/types';
+import type { Drop, Field, FieldQuality, Latest, StatusFrame } from '../contract/types';
 import { INITIAL, phaseOf, type Connection, type Phase } from '../connection/machine';
 import { snapshotOf, type Snapshot } from '../domain/twin';
 import type { MapPicture } from './picture';
@@ -117,4 +117,12 @@ const sameStatus = (a: StatusFrame | null, b: StatusFrame | null): boolean =>
   a?.twin === b?.twin &&
   a?.reason === b?.reason &&
   a?.message === b?.message &&
-  a?.has_map === b?.has_map;
+  a?.has_map === b?.has_map &&
+  sameDrops(a?.drops ?? [], b?.drops ?? []);
+
+const sameDrops = (a: readonly Drop[], b: readonly Drop[]): boolean =>
+  a.length === b.length &&
+  a.every(
+    ({ reason, message, count }, index) =>
+      b[index]?.reason === reason && b[index].message === message && b[index].count === count,
+  );

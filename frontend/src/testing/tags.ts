@@ -24,7 +24,8 @@ export function wireTag(over: Partial<TwinTagState> = {}): TwinTagState {
   };
 }
 
-export const tag = (over: Partial<TwinTagState> = {}): Tag => tagOf(wireTag(over), 0);
+export const tag = (over: Partial<TwinTagState> = {}): Tag =>
+  tagOf(wireTag(over), { at: { sec: 105, nanosec: 0 }, takenAt: 0 });
 
 export const readings = (values: Record<string, number | null>): TwinTagState['readings'] =>
   Object.entries(values).map(([name, value]) => ({
@@ -50,6 +51,7 @@ export const snapshot = (tags: readonly Tag[]): Snapshot => ({
   tags,
   revision: 'r1',
   stamp: '1000.0',
+  at: { sec: 1000, nanosec: 0 },
   takenAt: 0,
   fresh: [],
 });

@@ -8,8 +8,9 @@ import { useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
 import { selectTags } from '../store/moment';
 import { S } from '../strings';
+import { Age } from './Age';
 import { HealthMark } from './HealthMark';
-import { Age, PestMark } from './TagRow';
+import { PestMark } from './TagRow';
 
 const LONGEST = 14;
 
@@ -51,7 +52,9 @@ export function AttentionList(): JSX.Element {
                 {tag.anomaly && <PestMark count={tag.bugCount} />}
               </span>
               <span className="faint">
-                <Age observedAt={tag.observedAt} />
+                <Age
+                  when={(own.sensor === null ? null : tag.readAt.get(own.sensor)) ?? tag.scannedAt}
+                />
               </span>
             </li>
           );

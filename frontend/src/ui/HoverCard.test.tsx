@@ -44,7 +44,9 @@ describe('card of the pin under the mouse', () => {
     const text = card()?.textContent;
     expect(text).toContain('Tag 7Critical');
     expect(text).toContain('Pest2 bugs');
-    expect(text).toMatch(/Temperature40\.0\u00a0°CHumidity60\.0\u00a0%CO₂failedAge\d\u00a0s/);
+    expect(text).toMatch(
+      /Temperature40\.0\u00a0°C \d\u00a0sHumidity60\.0\u00a0% \d\u00a0sCO₂failed \d\u00a0s/,
+    );
     expect(text).toContain('lupin');
     point(null);
     expect(card()).toBeNull();

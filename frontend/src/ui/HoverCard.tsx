@@ -1,6 +1,6 @@
 import { useLayoutEffect, useRef, type JSX } from 'react';
 
-import { readingText } from '../domain/format';
+import { readingText, shortAgeText } from '../domain/format';
 import { sensorNamed } from '../domain/sensors';
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';
@@ -11,8 +11,9 @@ import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';
 import { selectTag } from '../store/moment';
 import { S } from '../strings';
+import { Age, AgeFact, Tried } from './Age';
 import { HealthMark } from './HealthMark';
-import { AgeFact, PestMark } from './TagRow';
+import { PestMark } from './TagRow';
 
 /** A tag may carry any number of sensors; the card that opens with a click has them all. */
 const MOST_READINGS = 8;
@@ -69,13 +70,23 @@ function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
           return (
             <div key={name} data-sensor={name} data-chosen={name === chosen}>
               <dt>{shown(sensor.label, 20)}</dt>
-              <dd>{value == null ? S.sensorFailed : readingText(sensor, value, unit)}</dd>
+              <dd>
+                {value == null ? S.sensorFailed : readingText(sensor, value, unit)}{' '}
+                <span className="faint">
+                  <Age when={tag.readAt.get(name) ?? 'never'} format={shortAgeText} />
+                </span>
+              </dd>
             </div>
           );
         })}
-        <AgeFact observedAt={tag.observedAt} />
+        {names.length === 0 && <AgeFact label={S.columns.age} when={tag.scannedAt} />}
       </dl>
       {hidden > 0 && <p className="faint">{S.cardMore(hidden)}</p>}
+      {tag.failedTry && (
+        <p className="faint">
+          <Tried failed={tag.failedTry} />
+        </p>
+      )}
       {names.length === 0 && <p className="faint">{S.cardNoReadings}</p>}
       <p className="faint">{tag.species ? <bdi>{shown(tag.species, 28)}</bdi> : S.unclassified}</p>
     </div>

@@ -1,9 +1,9 @@
 import { fireEvent, render, screen } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
-import { act, store } from '../store/app';
+import { act, receive, store } from '../store/app';
 import { showTags } from '../testing/page';
-import { readings, wireTag } from '../testing/tags';
+import { readings, stateFrame, wireTag } from '../testing/tags';
 import { TagCard } from './TagCard';
 
 beforeEach(() => {
@@ -51,6 +51,11 @@ describe('card', () => {
       Promise.resolve(
         Response.json({
           tag_id: '7',
+          is_known: true,
+          tries: [
+            { stamp: stamp(1), status: 0, status_detail: '', kind: 0 },
+            { stamp: stamp(2), status: 2, status_detail: 'blurred', kind: null },
+          ],
           sensors: [
             {
               name: 'temperature',
@@ -66,5 +71,64 @@ describe('card', () => {
     render(<TagCard tagId="7" />);
     const line = await screen.findByRole('img', { name: /Last 2 readings, between 9\.0/ });
     expect(line.querySelector('polyline')).not.toBeNull();
+    const tries = screen.getByRole('region', { name: 'Last tries' });
+    const told = [...tries.querySelectorAll('li')].map((each) => each.textContent);
+    expect(told).toHaveLength(2);
+    expect(told[0]).toMatch(/trynot decoded blurred$/);
+    expect(told[1]).toMatch(/scanOK$/);
+  });
+
+  test('a twin that tells no history says so', async () => {
+    const none = { tag_id: '7', is_known: false, sensors: [], tries: [] };
+    vi.stubGlobal('fetch', () => Promise.resolve(Response.json(none)));
+    render(<TagCard tagId="7" />);
+    expect(await screen.findByText('This twin tells no history.')).toBeTruthy();
+  });
+
+  test('each reading is as old as it is itself, and the look at the flowers apart', () => {
+    const reading = (name: string, stale: number | null): unknown => ({
+      name,
+      value: 20,
+      observed_at: null,
+      stale_seconds: stale,
+    });
+    showTags([
+      wireTag({
+        tag_id: '7',
+        stale_seconds: 2,
+        looked_at: { sec: 0, nanosec: 0 },
+        readings: [reading('temperature', 7_200), reading('co2', null)] as never,
+      }),
+    ]);
+    render(<TagCard tagId="7" />);
+    const own = (sensor: string): HTMLElement | null =>
+      screen.getByTestId('tag-card').querySelector(`[data-sensor=${sensor}]`);
+    expect(own('temperature')?.textContent).toContain('2\u00a0h 0\u00a0min');
+    expect(own('temperature')?.dataset['age']).toBe('old');
+    expect(own('co2')?.textContent).toContain('not known');
+    expect(screen.getByTestId('tag-card').textContent).toContain('Flowers seen');
+  });
+
+  test('a try that came to nothing is told with its reason', () => {
+    const now = { sec: 5_000, nanosec: 0 };
+    const failing = wireTag({
+      tag_id: '7',
+      last_try: { sec: 4_820, nanosec: 0 },
+      last_try_status: 2,
+      last_try_detail: 'no tag in the picture',
+    });
+    showTags([]);
+    receive({
+      type: 'state',
+      latest: {
+        ...stateFrame([failing]),
+        state: { header: { stamp: now, frame_id: '' }, tags: [failing] },
+      },
+      now: performance.now(),
+    });
+    render(<TagCard tagId="7" />);
+    const { textContent } = screen.getByTestId('tag-card');
+    expect(textContent).toContain('tried 3\u00a0min ago, not decoded');
+    expect(textContent).toContain('no tag in the picture');
   });
 });

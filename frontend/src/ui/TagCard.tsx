@@ -1,5 +1,6 @@
 import { useEffect, useRef, type JSX } from 'react';
 
+import type { When } from '../domain/age';
 import { metresText, percentText, readingText, valueText } from '../domain/format';
 import { deviation, sideOf, statusOf } from '../domain/health';
 import { sensorNamed } from '../domain/sensors';
@@ -12,10 +13,12 @@ import { act, useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
 import { selectTag } from '../store/moment';
 import { S } from '../strings';
+import { Age, AgeFact, Tried, useAgeStep } from './Age';
 import { HealthMark } from './HealthMark';
 import { Icon } from './Icon';
 import { Sparkline } from './Sparkline';
-import { AgeFact, PestMark } from './TagRow';
+import { PestMark } from './TagRow';
+import { Tries } from './Tries';
 import { useHistory } from './useHistory';
 
 /** Everything about one tag, over the map. */
@@ -91,13 +94,26 @@ function CardBody({
             key={name}
             name={name}
             value={value}
+            when={tag.readAt.get(name) ?? 'never'}
             unit={unit}
             values={history?.sensors.find((each) => each.name === name)?.values ?? []}
           />
         ))}
       </ul>
       <dl className="card-facts">
-        <AgeFact observedAt={tag.observedAt} />
+        <AgeFact label={S.cardScanned} when={tag.scannedAt} />
+        {tag.lookedAt !== 'never' && <AgeFact label={S.cardLooked} when={tag.lookedAt} />}
+        {tag.failedTry && (
+          <div className="card-try">
+            <dt>{S.cardTry}</dt>
+            <dd>
+              <Tried failed={tag.failedTry} />
+              {tag.failedTry.detail && (
+                <span className="faint"> {shown(tag.failedTry.detail, 160)}</span>
+              )}
+            </dd>
+          </div>
+        )}
         <div>
           <dt>{S.columns.species}</dt>
           <dd>
@@ -132,6 +148,8 @@ function CardBody({
           </dd>
         </div>
       </dl>
+      {history && !history.is_known && <p className="faint">{S.cardNoHistory}</p>}
+      {history && <Tries tries={history.tries} />}
     </div>
   );
 }
@@ -139,22 +157,28 @@ function CardBody({
 function CardReading({
   name,
   value,
+  when,
   unit,
   values,
 }: {
   name: string;
   value: number | null;
+  when: When;
   unit: TemperatureUnit;
   values: TagHistory['sensors'][number]['values'];
 }): JSX.Element {
   const sensor = sensorNamed(name);
   const side = value === null ? null : sideOf(sensor.ideal, value);
+  const step = useAgeStep(when);
   return (
-    <li data-sensor={name}>
+    <li data-sensor={name} data-age={step}>
       <span className="card-label">{shown(sensor.label, 32)}</span>
       <strong className="card-value">
         {value === null ? S.sensorFailed : readingText(sensor, value, unit)}
       </strong>
+      <span className="card-age faint">
+        <Age when={when} />
+      </span>
       <span className="card-spark">
         <Sparkline sensor={sensor} values={values} unit={unit} />
       </span>

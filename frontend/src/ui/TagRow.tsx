@@ -1,18 +1,16 @@
 import { memo, type JSX } from 'react';
 
-import { ageSeconds } from '../domain/age';
-import { ageText, percentText, valueText, shortAgeText } from '../domain/format';
+import type { When } from '../domain/age';
+import { percentText, shortAgeText, valueText } from '../domain/format';
 import { deviation, sideOf, statusOf, type TagHealth } from '../domain/health';
 import type { Sensor } from '../domain/sensors';
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';
 import type { TemperatureUnit } from '../domain/units';
-import { useApp } from '../store/app';
-import { selectShown } from '../store/moment';
 import { S } from '../strings';
+import { Age, Tried, useAgeStep } from './Age';
 import { HealthMark } from './HealthMark';
 import { Icon } from './Icon';
-import { useTicking } from './useNow';
 
 interface Props {
   /** Its place among all rows, from 0. */
@@ -61,7 +59,7 @@ export const TagRow = memo(function TagRow({
         <HealthMark status={health.status} />
       </td>
       <td className="number cell-age">
-        <Age observedAt={tag.observedAt} format={shortAgeText} />
+        <Age when={tag.scannedAt} format={shortAgeText} />
       </td>
       {sensors.map((sensor) => (
         <td
@@ -69,7 +67,7 @@ export const TagRow = memo(function TagRow({
           className={sensor.name === chosen ? 'number chosen' : 'number other'}
           data-sensor={sensor.name}
         >
-          <Reading sensor={sensor} value={tag.readings.get(sensor.name)} unit={unit} />
+          <TableReading sensor={sensor} tag={tag} unit={unit} />
         </td>
       ))}
       <td className="cell-pest">{tag.anomaly && <PestMark count={tag.bugCount} />}</td>
@@ -85,6 +83,11 @@ export const TagRow = memo(function TagRow({
           </>
         ) : (
           <span className="faint">{S.noSensor}</span>
+        )}
+        {tag.failedTry && (
+          <span className="tried">
+            <Tried failed={tag.failedTry} />
+          </span>
         )}
       </td>
       <td className="number optional">{tag.flowerCount > 0 ? tag.flowerCount : ''}</td>
@@ -105,34 +108,37 @@ export function PestMark({ count }: { count: number }): JSX.Element {
   );
 }
 
-/** Seconds tick here alone, so that a table of hundreds is not rendered anew each second. */
-export function Age({
-  observedAt,
-  format = ageText,
+/** A value that looks as old as it is; one that is older than its row's age says its own. */
+function TableReading({
+  sensor,
+  tag,
+  unit,
 }: {
-  observedAt: number | null;
-  format?: (seconds: number) => string;
+  sensor: Sensor;
+  tag: Tag;
+  unit: TemperatureUnit;
 }): JSX.Element {
-  const ageing = useApp((state) => selectShown(state).ageing);
-  const text = useTicking((now) => {
-    const age = ageSeconds(observedAt, now, ageing);
-    return age === null ? null : format(age);
-  });
-  if (ageing.kind === 'unknown' && observedAt !== null) {
-    return (
-      <span className="age faint" title={S.ageUnknownLong}>
-        {S.ageUnknown}
-      </span>
-    );
-  }
-  return text === null ? (
-    <span className="age faint" title={S.neverObservedLong}>
-      {S.neverObserved}
+  const when = tag.readAt.get(sensor.name) ?? 'never';
+  const step = useAgeStep(when);
+  return (
+    <span className="reading" data-age={when === 'never' ? undefined : step}>
+      <Reading sensor={sensor} value={tag.readings.get(sensor.name)} unit={unit} />
+      {isOlder(when, tag.scannedAt) && (
+        <span className="own-age">
+          {' '}
+          <Age when={when} format={shortAgeText} />
+        </span>
+      )}
     </span>
-  ) : (
-    <span className="age">{text}</span>
   );
 }
+
+/** Readings of one scan come together; more than this apart they are of two, ms. */
+const ONE_SCAN_MS = 60_000;
+
+const isOlder = (when: When, row: When): boolean =>
+  when !== 'never' &&
+  (typeof when === 'number' && typeof row === 'number' ? row - when > ONE_SCAN_MS : when !== row);
 
 function Reading({
   sensor,
@@ -173,17 +179,5 @@ function Reading({
       ) : null}
       {valueText(sensor, value, unit)}
     </>
-  );
-}
-
-/** The age as one entry of a `dl`. */
-export function AgeFact({ observedAt }: { observedAt: number | null }): JSX.Element {
-  return (
-    <div>
-      <dt>{S.columns.age}</dt>
-      <dd>
-        <Age observedAt={observedAt} />
-      </dd>
-    </div>
   );
 }

@@ -2,7 +2,7 @@ import { act as flush, render, screen } from '@testing-library/react';
 import { beforeEach, expect, test } from 'vitest';
 
 import { receive } from '../store/app';
-import { showTags } from '../testing/page';
+import { goLive, showTags, status } from '../testing/page';
 import { Troubles } from './Troubles';
 
 beforeEach(() => {
@@ -29,4 +29,18 @@ test('messages that could not be read are counted, and the last is named', () =>
     receive({ type: 'unread', why: null });
   });
   expect(lines()).toEqual([]);
+});
+
+test('what the twin dropped is told with its count, and a pause as one', () => {
+  goLive(
+    status({
+      reason: 'paused',
+      drops: [{ reason: 'frame', message: 'frame odom, expected map', count: 12 }],
+    }),
+  );
+  render(<Troubles />);
+  expect(lines()).toEqual([
+    'Time is paused. The simulation stands still, and so do all ages.',
+    'The twin dropped 12 messages in the last minutes. The last: frame odom, expected map',
+  ]);
 });

@@ -12,13 +12,24 @@ export interface Trouble {
   readonly detail?: string;
 }
 
-export function troublesOf({ unread }: TwinState): readonly Trouble[] {
+export function troublesOf({ unread, phase, connection }: TwinState): readonly Trouble[] {
   const troubles: Trouble[] = [];
   if (unread) {
     troubles.push({
       id: 'unread',
       title: S.unread(unread.count),
       detail: S.unreadLast(shown(unread.why, 160)),
+    });
+  }
+  const { status } = connection;
+  if (phase === 'live' && status?.reason === 'paused') {
+    troubles.push({ id: 'paused', title: S.paused, detail: S.pausedHint });
+  }
+  for (const { reason, message, count } of status?.drops ?? []) {
+    troubles.push({
+      id: `drop ${reason}`,
+      title: S.drops(count),
+      detail: S.dropsLast(shown(message, 160)),
     });
   }
   return troubles;

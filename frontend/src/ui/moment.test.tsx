@@ -17,7 +17,7 @@ import { TagTable } from './TagTable';
 const tagWith = (temperature: number, stale: number, x: number): ReturnType<typeof wireTag> =>
   wireTag({
     tag_id: 'a',
-    readings: readings({ temperature }),
+    readings: readings({ temperature }).map((each) => ({ ...each, stale_seconds: stale })),
     stale_seconds: stale,
     pose: { position: { x, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } },
   });

@@ -1,0 +1,67 @@
+import type { JSX } from 'react';
+
+import { ageSeconds, ageStep, type When } from '../domain/age';
+import { ageText } from '../domain/format';
+import { shown } from '../domain/text';
+import { tryKind } from '../domain/tries';
+import type { FailedTry } from '../domain/twin';
+import { useApp } from '../store/app';
+import { selectShown } from '../store/moment';
+import { S } from '../strings';
+import { useTicking } from './useNow';
+
+type Format = (seconds: number) => string;
+
+/** An age that goes on as the moment that is shown says; null: there is none to tell. */
+function useAgeText(when: When, format: Format): string | null {
+  const ageing = useApp((state) => selectShown(state).ageing);
+  return useTicking((now) => {
+    const age = ageSeconds(when, now, ageing);
+    return age === null ? null : format(age);
+  });
+}
+
+/** How old something looks. */
+export function useAgeStep(when: When): ReturnType<typeof ageStep> {
+  const ageing = useApp((state) => selectShown(state).ageing);
+  return useTicking((now) => ageStep(ageSeconds(when, now, ageing)));
+}
+
+/** Seconds tick here alone, so that a table of hundreds is not rendered anew each second. */
+export function Age({ when, format = ageText }: { when: When; format?: Format }): JSX.Element {
+  const text = useAgeText(when, format);
+  if (when === 'never') {
+    return (
+      <span className="age faint" title={S.neverObservedLong}>
+        {S.neverObserved}
+      </span>
+    );
+  }
+  if (text !== null) return <span className="age">{text}</span>;
+  return (
+    <span className="age faint" title={when === 'unknown' ? S.ageUntoldLong : S.ageUnknownLong}>
+      {S.ageUnknown}
+    </span>
+  );
+}
+
+/** One entry of a `dl`. */
+export function AgeFact({ label, when }: { label: string; when: When }): JSX.Element {
+  return (
+    <div>
+      <dt>{label}</dt>
+      <dd>
+        <Age when={when} />
+      </dd>
+    </div>
+  );
+}
+
+/** A try that came to nothing: when, and why. */
+export function Tried({ failed }: { failed: FailedTry }): JSX.Element {
+  const age = useAgeText(failed.at, ageText);
+  const outcome = S.tried[tryKind(failed.status)];
+  const text = age === null ? S.triedSometime(outcome) : S.triedAgo(age, outcome);
+  const detail = failed.detail === '' ? '' : `: ${shown(failed.detail, 160)}`;
+  return <span title={text + detail}>{text}</span>;
+}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Iterator
 
 import pytest
@@ -103,10 +104,36 @@ def test_a_failed_scan_is_listed_and_says_so_until_it_succeeds(
     row = hmi.row("tried")
     expect(row).to_have_attribute("data-pinned", "false")
     expect(row).to_have_attribute("data-health", "no-data")
-    expect(row.locator(".cell-age")).to_contain_text(re.compile(r"\d+\ss"))
+    expect(row.locator(".cell-age")).to_have_text("never")
+    tried = row.locator(".tried")
+    expect(tried).to_have_text(re.compile(r"^tried \d+\ss ago, not decoded$"))
     shared.peer.observe(scan("tried", {"temperature": 21.0}, at=(2, 2)))
     expect(row).to_have_attribute("data-pinned", "true")
     expect(hmi.cell("tried", "temperature")).to_have_text("21.0")
+    expect(tried).to_have_count(0)
+    # A later failure leaves the reading as it is, and is told beside it.
+    shared.peer.observe(scan("tried", status=failed))
+    expect(tried).to_contain_text("not decoded")
+    expect(hmi.cell("tried", "temperature")).to_have_text("21.0")
+
+
+def test_a_look_at_the_flowers_makes_no_reading_young(shared: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(shared.url, "tag=looked")
+    now_s = time.time()
+    shared.peer.observe(
+        scan("looked", {"temperature": 20.0, "co2": 600.0}, at=(1, 4), stamp_s=now_s - 7_300),
+        scan("looked", {"co2": 610.0}, stamp_s=now_s - 600),
+        look("looked", "rose", stamp_s=now_s),
+    )
+    row, card = hmi.row("looked"), hmi.card("looked")
+    expect(row.locator(".cell-age")).to_have_text(re.compile(r"^10\smin$"))
+    # Older than the row's newest reading: it says its own age.
+    expect(hmi.cell("looked", "temperature")).to_have_text(re.compile(r"^20\.0 2\sh$"))
+    expect(hmi.cell("looked", "co2")).to_have_text("610")
+    expect(card.locator("[data-sensor=temperature] .age")).to_have_text(re.compile(r"^2\sh 1\smin"))
+    expect(card.locator("[data-sensor=co2] .age")).to_have_text(re.compile(r"^10\smin$"))
+    expect(card).to_contain_text(re.compile(r"Flowers seen\s?\d+\ss"))
+    expect(card.get_by_role("region", name="Last tries").locator("li")).to_have_count(3)
 
 
 def test_a_discovered_tag_has_a_pin_and_was_never_observed(

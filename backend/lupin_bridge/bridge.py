@@ -23,7 +23,7 @@ from lupin_bridge.stream.hub import Client, Hub
 from lupin_bridge.stream.status import Liveness, Status
 from lupin_bridge.twin.shared import Shared
 from lupin_bridge.twin.source import Told, TwinSource
-from lupin_twin.counts import LATE, LOST, Counts
+from lupin_twin.counts import LATE, LOST
 from lupin_twin.drops import Reason
 from lupin_twin.state import NANOSECONDS_PER_SECOND
 
@@ -145,11 +145,15 @@ class Bridge:
     def _count(self) -> Iterator[tuple[str, Mapping[str, int]]]:
         yield "lupin_admission_refused", self.admission.refused
         yield "lupin_http_answers", self.http_answers
-        counts = Counts() if self._latest is None else self._latest.counts
-        yield (
-            "lupin_dropped",
-            {str(why): counts.dropped.get(why, 0) for why in (*Reason, LOST, LATE)},
-        )
+        if self._latest is None:
+            return
+        # A twin that does not say has no zeros: nobody knows.
+        for name, counts in (
+            ("lupin_dropped", self._latest.counts),
+            ("lupin_web_dropped", self._latest.own_counts),
+        ):
+            if counts is not None:
+                yield name, {str(why): counts.dropped.get(why, 0) for why in (*Reason, LOST, LATE)}
 
     def _measure(self) -> Iterator[Sample]:
         hub, source, status = self.hub, self.source, self.status
@@ -196,7 +200,7 @@ class Bridge:
         self._liveness.twin_count = state.twin_count
         self._liveness.has_map = state.occupancy_map is not None
         self._liveness.clock = state.snapshot.clock
-        self._liveness.drops = state.counts.recent
+        self._liveness.drops = state.drops
         if self._push_timer is not None:
             return  # it will take this state along
         if self._is_old_news(state, now_s):

@@ -47,7 +47,8 @@ COUNTERS: Final = {
 # The same, each with a label of its own.
 LABELLED: Final = {
     "lupin_admission_refused": ("reason", "computed answers refused, by the limit they met"),
-    "lupin_dropped": ("reason", "messages and entries that the ROS node dropped or lost"),
+    "lupin_dropped": ("reason", "messages and entries that the twin dropped or lost"),
+    "lupin_web_dropped": ("reason", "messages that `web` itself dropped or lost"),
     "lupin_http_answers": ("status", "HTTP answers of the routes, by status"),
 }
 HISTOGRAMS: Final = {

@@ -30,7 +30,16 @@ ROS = frozenset(
 )
 # The modules that know ROS; all others have to run, and be tested, without it.
 KNOW_ROS = {
-    "lupin_twin": {"cli", "convert", "habits", "node", "ros_parameters", "shapes", "spinning"},
+    "lupin_twin": {
+        "cli",
+        "convert",
+        "diagnostic_messages",
+        "habits",
+        "node",
+        "ros_parameters",
+        "shapes",
+        "spinning",
+    },
     "lupin_patrol": {"cli", "messages", "node"},
     "lupin_bridge": {"twin.ros_logs", "twin.ros_thread", "twin.web_node"},
 }
@@ -100,7 +109,8 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
         "gaps": set(),
         "counts": {"drops"},
         "clock_watch": {"state"},
-        "diagnostics": {"counts", "journal.condition", "state"},
+        "diagnostics": {"counts", "drops", "journal.condition", "state"},
+        "diagnostic_messages": {"convert", "diagnostics"},
         "leaving": set(),
         "deferred": set(),
         "field_desk": {"field_cache", "fields", "grid", "workers"},
@@ -112,7 +122,7 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
         "history": {"state"},
         "lateness": set(),
         "ingest": {"drops", "history", "state"},
-        "convert": {"diagnostics", "state", "grid", "explored", "fields", "history", "ingest"},
+        "convert": {"state", "grid", "explored", "fields", "history", "ingest"},
         "journal": set(),
         "journal.rows": {"state"},
         "journal.packing": {"state"},
@@ -176,6 +186,7 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
             "memory",
             "convert",
             "deferred",
+            "diagnostic_messages",
             "diagnostics",
             "explored",
             "drops",

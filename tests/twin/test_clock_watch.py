@@ -1,6 +1,12 @@
 from __future__ import annotations
 
-from lupin_twin.clock_watch import LISTEN_AFTER_S, STANDS_AFTER_S, ClockWatch, StampWatch
+from lupin_twin.clock_watch import (
+    LISTEN_AFTER_S,
+    REPORT_LAG_S,
+    STANDS_AFTER_S,
+    ClockWatch,
+    StampWatch,
+)
 from lupin_twin.state import ClockState
 
 S = 1_000_000_000
@@ -70,7 +76,7 @@ def test_a_clock_that_goes_back_runs() -> None:
     assert look(watch, 1, 14.5) == "running"
 
 
-def test_by_its_states_alone_a_clock_runs_stands_or_was_never_set() -> None:
+def test_by_its_states_alone_a_clock_runs_has_stopped_or_was_never_set() -> None:
     def look(stamp: int, now_s: float, known: bool = True) -> ClockState:
         return watch.look(stamp * S, now_s, ages_are_known=known)
 
@@ -79,6 +85,24 @@ def test_by_its_states_alone_a_clock_runs_stands_or_was_never_set() -> None:
     assert look(0, 10.0, known=False) == "none"
     assert look(5, 11.0) == "running"
     assert look(5, 11.0 + STANDS_AFTER_S - BIT) == "running"
-    assert look(5, 11.0 + STANDS_AFTER_S) == "paused"
-    assert look(5, 15.0, known=False) == "stopped"
+    assert look(5, 11.0 + STANDS_AFTER_S) == "stopped", "nobody said that it is only paused"
     assert look(6, 16.0) == "running"
+    assert look(6, 16.1, known=False) == "stopped"
+
+
+def test_a_twin_that_says_how_its_clock_does_is_believed_as_long_as_its_states_allow_it() -> None:
+    def look(
+        stamp: int, now_s: float, reported: ClockState | None, known: bool = True
+    ) -> ClockState:
+        return watch.look(stamp * S, now_s, ages_are_known=known, reported=reported)
+
+    watch = StampWatch()
+    assert look(5, 10.0, "paused") == "paused", "who comes late need not wait for three seconds"
+    assert look(6, 11.0, "paused") == "running", "the state is newer than what was said"
+    assert look(6, 11.0 + STANDS_AFTER_S, "paused") == "paused"
+    assert look(6, 11.0 + STANDS_AFTER_S, "stopped") == "stopped"
+    late_s = 11.0 + STANDS_AFTER_S + REPORT_LAG_S
+    assert look(6, late_s - BIT, "running") == "running", "it was said before it stood so long"
+    assert look(6, late_s, "running") == "stopped"
+    assert look(6, late_s, "paused", known=False) == "stopped"
+    assert look(0, late_s, "paused") == "none"

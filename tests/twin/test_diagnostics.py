@@ -6,8 +6,20 @@ from typing import Any
 import pytest
 
 from lupin_twin.counts import Counts, Recent
-from lupin_twin.diagnostics import ERROR, OK, STALE, WARN, Finding, Health, findings
+from lupin_twin.diagnostics import (
+    ERROR,
+    MAX_SHOWN,
+    OK,
+    STALE,
+    WARN,
+    Finding,
+    Health,
+    SelfReport,
+    findings,
+    self_report,
+)
 from lupin_twin.journal.condition import Condition, JournalState
+from lupin_twin.state import ClockState
 
 WELL = Health(
     clock="running",
@@ -53,7 +65,7 @@ def test_a_twin_that_is_well_is_ok_in_all() -> None:
             "5 messages",
         ),
         ("queues", {"counts": Counts({"lost": 5})}, OK, "nothing lost"),
-        ("stamps", {"late": {"robot": 9}}, WARN, "behind"),
+        ("stamps", {"late": {"robot": 9}}, WARN, "behind their own earlier ones from robot"),
         ("twins", {"twins": 2}, ERROR, "2 twins"),
     ],
 )
@@ -70,6 +82,7 @@ def test_the_numbers_are_there() -> None:
     values = {
         "frame": "40",
         "lately: frame": "12",
+        "last: frame": "its frame is 'odom'",
         "callback errors": "0",
     }
     assert found("drops", counts=counts).values == values
@@ -85,3 +98,33 @@ def test_a_journal_that_cannot_be_written_is_an_error_and_one_that_is_off_is_non
     assert told.values["lost"] == "3"
     [told] = [f for f in findings(WELL) if f.name == "journal"]
     assert (told.level, told.message) == (OK, "no journal is kept")
+
+
+@pytest.mark.parametrize("clock", ["running", "paused", "stopped", "none"])
+def test_what_is_said_is_read_again(clock: ClockState) -> None:
+    recent = (FRAME, Recent("lost", "lost messages", 2), Recent("late_stamp", "late", 1))
+    counts = Counts({"frame": 40, "lost": 5, "late_stamp": 1}, 3, recent)
+    assert self_report(findings(replace(WELL, clock=clock, counts=counts))) == SelfReport(
+        clock, counts
+    )
+
+
+def test_who_says_nothing_is_not_said_to_have_dropped_nothing() -> None:
+    assert self_report(()) == SelfReport(None, None)
+    assert self_report([Finding("clock", OK, "", {"state": "well"})]) == SelfReport(None, None)
+
+
+@pytest.mark.parametrize("text", ["", "-1", "1.5", "many", "²", "9" * 16])
+def test_a_number_that_is_none_counts_nothing(text: str) -> None:
+    values = {"frame": text, "lately: frame": text, "callback errors": text, "spoons": "7"}
+    assert self_report([Finding("drops", OK, "", values)]).counts == Counts()
+
+
+def test_a_long_word_is_told_up_to_a_limit() -> None:
+    for length in (MAX_SHOWN, MAX_SHOWN + 1):
+        word = "x" * length
+        said = found("drops", counts=Counts({"frame": 1}, 0, (Recent("frame", word, 1),)))
+        shown = said.values["last: frame"]
+        assert (len(shown), shown == word) == (MAX_SHOWN, length == MAX_SHOWN)
+        [source] = found("stamps", late={word: 1}).values
+        assert source == shown

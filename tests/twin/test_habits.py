@@ -128,3 +128,28 @@ def test_an_error_of_a_callback_is_counted_and_told_with_its_trace(
     [line] = logged.lines
     assert line.startswith("error number 1, in the test:\n")
     assert "ValueError: broken" in line
+
+
+def test_of_a_shared_topic_only_what_is_wanted_is_read_and_nothing_else_counted(
+    habits: Habits,
+) -> None:
+    taken: list[str] = []
+    habits.subscribe(
+        "a_topic",
+        "shared",
+        SHAPE,
+        depth=5,
+        group=None,
+        callback=lambda msg: taken.append(msg.tag_reading.tag_id),
+        is_wanted=lambda data: b"ours" in data,
+    )
+    (subscription,) = [s for s in habits._node.subscriptions if s.topic_name == "/shared"]
+    assert subscription.qos_profile.durability == DurabilityPolicy.VOLATILE
+    for number, tag_id in ((1, "ours"), (9, "theirs"), (20, "ours")):
+        info = {**INFO, "publication_sequence_number": number}
+        subscription.callback(serialize_message(scan(tag_id)), info)
+    subscription.callback(bytes(SHAPE.max_bytes + 1), INFO)
+    assert taken == ["ours", "ours"]
+    assert habits.counts().dropped == {}
+    subscription.callback(b"ours" + bytes(SHAPE.max_bytes), INFO)
+    assert habits.counts().dropped == {"size": 1}

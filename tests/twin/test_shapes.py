@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point32
 from lupin_msgs.msg import (
     DiscoveredTag,
@@ -63,6 +64,12 @@ def corners(count: int) -> Any:
         ),
         (shapes.STATE, lambda count: TwinState(tags=[TwinTagState()] * count), MAX_TAGS, "tags"),
         (shapes.TIMES, lambda count: TwinTimes(tags=[TagTimes()] * count), MAX_TAGS, "tags"),
+        (
+            shapes.DIAGNOSTICS,
+            lambda count: DiagnosticArray(status=[DiagnosticStatus()] * count),
+            shapes.MAX_STATUSES,
+            "status",
+        ),
     ],
 )
 def test_as_many_as_can_be_kept_are_taken_and_not_one_more(
@@ -84,3 +91,14 @@ def test_a_state_holds_as_many_items_as_a_twin_keeps_and_not_one_more() -> None:
         else:
             with pytest.raises(TooManyError, match=r"^tags.box_footprint.points: more elements"):
                 shapes.STATE.check(data)
+
+
+def test_statuses_have_so_many_values_together_and_not_one_more() -> None:
+    def values(count: int) -> bytes:
+        status = DiagnosticStatus(values=[KeyValue()] * count)
+        return bytes(serialize_message(DiagnosticArray(status=[status])))
+
+    most = shapes.MAX_STATUSES + shapes.MAX_STATUS_VALUES - 1
+    assert shapes.DIAGNOSTICS.check(values(most))
+    with pytest.raises(TooManyError, match=r"^status.values: more elements"):
+        shapes.DIAGNOSTICS.check(values(most + 1))

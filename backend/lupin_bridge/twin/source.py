@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final, Protocol
 
-from lupin_twin.counts import Counts
+from lupin_twin.counts import Counts, Recent
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRequest, FieldRules
 from lupin_twin.grid import FieldGrid
@@ -33,15 +33,24 @@ class Told:
     """All that the ROS thread tells the loop, as of one moment; immutable.
 
     `revision` is the snapshot's, `twin_count` how many nodes publish the state, `made_s` when it
-    was told (monotonic clock).
+    was told (monotonic clock). `counts` is what the twin dropped, lost and met; None: it does not
+    say. `own_counts` is the same of a node of ours that is not the twin.
     """
 
     snapshot: Snapshot
     revision: str
     twin_count: int = 1
     occupancy_map: OccupancyMap | None = None
-    counts: Counts = field(default_factory=Counts)
+    counts: Counts | None = None
+    own_counts: Counts | None = None
     made_s: float = field(default_factory=time.monotonic, compare=False)
+
+    @property
+    def drops(self) -> tuple[Recent, ...]:
+        """What was dropped or lost lately, by the twin and then by a node of ours."""
+        theirs = () if self.counts is None else self.counts.recent
+        ours = () if self.own_counts is None else self.own_counts.recent
+        return theirs + tuple(replace(drop, message=f"web: {drop.message}") for drop in ours)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from hashlib import blake2b
 from operator import is_
@@ -16,8 +16,11 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from lupin_bridge.twin.pairing import Pairing
-from lupin_twin import convert, ingest, shapes
+from lupin_twin import convert, diagnostics, ingest, shapes
 from lupin_twin.clock_watch import StampWatch
+from lupin_twin.counts import Counts
+from lupin_twin.diagnostic_messages import findings_of
+from lupin_twin.diagnostics import SelfReport, self_report
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRequest
@@ -35,6 +38,9 @@ NEW_TWIN_S: Final = 2.0
 # How long a state waits for the times that a twin publishes right behind it. Without them it is
 # shown all the same, and when what was observed is not known.
 TIMES_PATIENCE_S: Final = 0.5
+
+# What a twin said of itself, once a second, stands for so long, s.
+REPORT_HOLDS_S: Final = 5.0
 
 # The twin's parameters that a consumer has to know too. They are not on the wire: where the twin's
 # are not the defaults, give both the same parameter file.
@@ -67,8 +73,17 @@ def _are_the_very_same(before: Sequence[TagState], after: Sequence[TagState]) ->
     return len(before) == len(after) and all(map(is_, before, after))
 
 
+def _digest_of_publishers(publishers: Iterable[Any]) -> str:
+    """The same in all replicas: DDS gives a publisher one id for all who see it."""
+    ids = sorted(bytes(info.endpoint_gid) for info in publishers)
+    return blake2b(b"".join(ids), digest_size=6).hexdigest()
+
+
 class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
     """Follows `/twin/state` with its `/twin/times`, and `/map`, and asks `/twin/get_field`.
+
+    Of `/diagnostics`, which all nodes of a domain share, it takes what the node says of itself that
+    publishes this state, and nothing else.
 
     `on_state(snapshot)` is called for each state, once its times are there. Its tags are the very
     same values as in the one before where nothing has changed.
@@ -96,6 +111,10 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._newest: Snapshot | None = None
         self._pairing = Pairing()
         self._stamp_watch = StampWatch()
+        self._twin_names: frozenset[str] = frozenset()
+        self._reporter = ""
+        self._report = SelfReport()
+        self._reported_s = -math.inf
         self._digests: dict[str, tuple[TagState, bytes]] = {}
         self._topics: dict[str, str] = {}
         group = MutuallyExclusiveCallbackGroup()
@@ -115,6 +134,15 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 callback=callback,
                 on_number=on_number,
             )
+        self.habits.subscribe(
+            "diagnostics",
+            diagnostics.TOPIC,
+            shapes.DIAGNOSTICS,
+            depth=50,
+            group=group,
+            callback=self._take_diagnostics,
+            is_wanted=lambda data: any(name.encode() in data for name in self._twin_names),
+        )
         with naming("field_service_name", p.field_service_name):
             self.field_client = self.create_client(
                 GetField, p.field_service_name, callback_group=group
@@ -155,6 +183,11 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         """Whether a twin has come so lately that its service may not have been found yet."""
         return time.monotonic() - self._publishers_since_s < NEW_TWIN_S
 
+    @property
+    def twin_counts(self) -> Counts | None:
+        """What the twin says that it dropped, lost and met; None: it says nothing."""
+        return self._self_report(time.monotonic()).counts
+
     def request_field(self, request: FieldRequest) -> Any:
         """Ask the twin; returns the rclpy Future of its response."""
         return self.field_client.call_async(convert.field_request_message(request))
@@ -192,12 +225,15 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _show(self, msg: Any, times: Any) -> None:
         self._patience.cancel()
+        self._look_at_publishers()
         before = self._newest
         snapshot = convert.snapshot_of(msg, before, times)
+        now_s = time.monotonic()
         clock = self._stamp_watch.look(
             snapshot.stamp_ns,
-            time.monotonic(),
+            now_s,
             ages_are_known=not any(math.isnan(tag.stale_seconds) for tag in msg.tags),
+            reported=self._self_report(now_s).clock,
         )
         snapshot = replace(snapshot, clock=clock)
         if snapshot.has_times:
@@ -212,12 +248,15 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self.epoch += 1
         if len(self._digests) > len(snapshot.tags):
             self._forget_all_but(snapshot.tags)
-        self._look_at_publishers()
         self._on_state(snapshot)
 
     def _look_at_publishers(self) -> None:
         topic = self._topics["state_topic"]
-        publishers_digest = self._digest_of_publishers(topic)
+        publishers = self.get_publishers_info_by_topic(topic)
+        self._twin_names = frozenset(
+            f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in publishers
+        )
+        publishers_digest = _digest_of_publishers(publishers)
         if publishers_digest != self.publishers_digest:
             self.publishers_digest = publishers_digest
             self.epoch += 1
@@ -244,6 +283,14 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self.occupancy_map = replace(new, revision=_digest_of_map(new))
             self.epoch += 1
 
+    def _take_diagnostics(self, msg: Any) -> None:
+        # Told with the next state, like the map: a twin that publishes none is none to show.
+        for name in self._twin_names:
+            said = list(findings_of(msg, name))
+            if said:
+                self._reporter, self._report = name, self_report(said)
+                self._reported_s = time.monotonic()
+
     # --- small parts --------------------------------------------------------------------------
 
     def _forget_all_but(self, tags: Sequence[TagState]) -> None:
@@ -251,10 +298,10 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._history.forget_all_but(ids)
         self._digests = {tag_id: kept for tag_id, kept in self._digests.items() if tag_id in ids}
 
-    def _digest_of_publishers(self, topic: str) -> str:
-        """The same in all replicas: DDS gives a publisher one id for all who see it."""
-        ids = sorted(bytes(info.endpoint_gid) for info in self.get_publishers_info_by_topic(topic))
-        return blake2b(b"".join(ids), digest_size=6).hexdigest()
+    def _self_report(self, now_s: float) -> SelfReport:
+        """What the twin that is followed said of itself lately."""
+        is_recent = now_s - self._reported_s < REPORT_HOLDS_S
+        return self._report if is_recent and self._reporter in self._twin_names else SelfReport()
 
     def _digest_of(self, tags: Sequence[TagState]) -> str:
         total = blake2b(digest_size=12)

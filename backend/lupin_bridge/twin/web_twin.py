@@ -70,6 +70,7 @@ class WebTwin:
                         node.revision,
                         node.twins.value,
                         node.occupancy_map,
+                        node.twin_counts,
                         node.habits.counts(),
                     )
                 )

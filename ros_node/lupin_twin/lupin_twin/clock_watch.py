@@ -12,6 +12,8 @@ from lupin_twin.state import ClockState
 
 # A clock that has not moved for so long, s of steady time, does not run.
 STANDS_AFTER_S: Final = 3.0
+# What a twin says of its clock, once a second, is true of so long ago, s, with room for a slow one.
+REPORT_LAG_S: Final = 2.0
 # From here on it is worth listening whether `/clock` still comes.
 LISTEN_AFTER_S: Final = 1.0
 
@@ -59,21 +61,39 @@ class ClockWatch:
 
 
 class StampWatch:
-    """Tells how a twin's clock does by its states alone, for who hears them from elsewhere."""
+    """Tells how a twin's clock does, for who hears its states from elsewhere.
+
+    A stamp that stands may be that of a clock that is paused, and then only the twin itself knows.
+    Where it does not say so, the clock has stopped: nobody is told that all is well on a guess.
+    """
 
     def __init__(self) -> None:
         self._last_ns: int | None = None
+        self._has_moved = False
         self._moved_s = 0.0
 
-    def look(self, stamp_ns: int, now_s: float, *, ages_are_known: bool) -> ClockState:
+    def look(
+        self,
+        stamp_ns: int,
+        now_s: float,
+        *,
+        ages_are_known: bool,
+        reported: ClockState | None = None,
+    ) -> ClockState:
         """Note a state's stamp; `ages_are_known`: the twin gave no age as NaN.
 
-        One whose stamp stands and that still gives ages knows why it stands.
+        `reported` is what the twin said of its clock just now, up to `REPORT_LAG_S` behind what its
+        states say; None: nothing.
         """
         if stamp_ns != self._last_ns:
+            self._has_moved = self._last_ns is not None
             self._last_ns, self._moved_s = stamp_ns, now_s
         if stamp_ns <= 0:
             return "none"
         if not ages_are_known:
             return "stopped"
-        return "running" if now_s - self._moved_s < STANDS_AFTER_S else "paused"
+        standing_s = now_s - self._moved_s
+        if reported == "paused" and (standing_s >= STANDS_AFTER_S or not self._has_moved):
+            return "paused"
+        lag_s = REPORT_LAG_S if reported == "running" else 0.0
+        return "running" if standing_s < STANDS_AFTER_S + lag_s else "stopped"

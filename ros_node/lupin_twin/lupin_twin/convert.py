@@ -18,7 +18,6 @@ from typing import Any, Final
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, Point32, Polygon, Quaternion
 from geometry_msgs.msg import Pose as PoseMsg
 from lupin_msgs.msg import (
@@ -33,7 +32,6 @@ from lupin_msgs.srv import GetField
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Header
 
-from lupin_twin.diagnostics import Finding
 from lupin_twin.explored import OccupancyMap, occupancy_map
 from lupin_twin.fields import FieldRequest
 from lupin_twin.grid import FieldGrid
@@ -425,23 +423,6 @@ def field_request_message(request: FieldRequest) -> Any:
         bbox_min_y=float(request.bbox_min_y),
         bbox_max_x=float(request.bbox_max_x),
         bbox_max_y=float(request.bbox_max_y),
-    )
-
-
-def diagnostics(findings: Iterable[Finding], node: str, now_ns: int) -> Any:
-    """Findings as diagnostic_msgs/DiagnosticArray; `node` is the node's full name."""
-    return DiagnosticArray(
-        header=Header(stamp=time_msg(now_ns)),
-        status=[
-            DiagnosticStatus(
-                level=bytes([finding.level]),
-                name=f"{node}: {finding.name}",
-                message=finding.message,
-                hardware_id=node,
-                values=[KeyValue(key=key, value=value) for key, value in finding.values.items()],
-            )
-            for finding in findings
-        ],
     )
 
 

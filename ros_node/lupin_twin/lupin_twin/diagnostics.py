@@ -1,18 +1,31 @@
 """What a twin says of itself on `/diagnostics`: how it is, what it heard, lost and dropped. Pure.
 
-Times are seconds.
+Also what a consumer reads of it again. Times are seconds.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Final
 
-from lupin_twin.counts import LOST, Counts
+from lupin_twin.counts import LATE, LOST, Counts, Recent
+from lupin_twin.drops import Reason
 from lupin_twin.journal.condition import OFF as NO_JOURNAL
 from lupin_twin.journal.condition import Condition
 from lupin_twin.state import ClockState
+
+# The topic of all nodes of a robot, and of all robots in one domain.
+TOPIC: Final = "/diagnostics"
+# What a source calls itself is its own affair, and so is how long that is.
+MAX_SHOWN: Final = 500
+
+_REASONS: Final = (*(reason.value for reason in Reason), LOST, LATE)
+_LATELY: Final = "lately: "
+_LAST: Final = "last: "
+_ERRORS: Final = "callback errors"
+_MAX_DIGITS: Final = 15
 
 # diagnostic_msgs/DiagnosticStatus
 OK: Final = 0
@@ -68,11 +81,12 @@ def findings(health: Health) -> Iterator[Finding]:
     yield Finding(
         "drops",
         WARN if recent or counts.callback_errors else OK,
-        "; ".join(f"{drop.count} lately: {drop.message}" for drop in recent) or "nothing lately",
+        "; ".join(f"{drop.count} lately: {_shown(drop.message)}" for drop in recent)
+        or "nothing lately",
         {
             **{str(why): str(count) for why, count in counts.dropped.items() if why != LOST},
-            **{f"lately: {drop.reason}": str(drop.count) for drop in recent},
-            "callback errors": str(counts.callback_errors),
+            **_lately(recent),
+            _ERRORS: str(counts.callback_errors),
         },
     )
     lost = [drop for drop in counts.recent if drop.reason == LOST]
@@ -80,13 +94,16 @@ def findings(health: Health) -> Iterator[Finding]:
         "queues",
         WARN if lost else OK,
         f"{lost[0].count} messages lost lately" if lost else "nothing lost lately",
-        {"lost": str(counts.dropped.get(LOST, 0))},
+        {LOST: str(counts.dropped.get(LOST, 0)), **_lately(lost)},
     )
+    late = {_shown(source): str(count) for source, count in health.late.items()}
     yield Finding(
         "stamps",
-        WARN if health.late else OK,
-        "stamps behind their own earlier ones" if health.late else "no stamps too late",
-        {source: str(count) for source, count in health.late.items()},
+        WARN if late else OK,
+        f"stamps behind their own earlier ones from {_shown(', '.join(late))}"
+        if late
+        else "no stamps too late",
+        late,
     )
     yield Finding(
         "fields",
@@ -129,3 +146,55 @@ def _inputs(health: Health) -> Finding:
     if silent:
         return Finding("inputs", WARN, f"nobody publishes {', '.join(silent)}", values)
     return Finding("inputs", OK, "all inputs are there", values)
+
+
+def _lately(recent: Iterable[Recent]) -> dict[str, str]:
+    values = {}
+    for drop in recent:
+        values[_LATELY + drop.reason] = str(drop.count)
+        values[_LAST + drop.reason] = _shown(drop.message)
+    return values
+
+
+def _shown(text: str) -> str:
+    return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 1] + "…"
+
+
+# --- read again -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class SelfReport:
+    """How a twin's clock does, and what it dropped, lost and met; None: it does not say."""
+
+    clock: ClockState | None = None
+    counts: Counts | None = None
+
+
+def self_report(said: Iterable[Finding]) -> SelfReport:
+    """What `findings` said, as far as it can be read; reasons that are not ours are nobody's."""
+    values = {finding.name: finding.values for finding in said}
+    clock = next((state for state in _CLOCK if state == values.get("clock", {}).get("state")), None)
+    if "drops" not in values:
+        return SelfReport(clock)
+    both = {**values["drops"], **values.get("queues", {})}
+    dropped = {reason: _number(both, reason) for reason in _REASONS}
+    recent = tuple(
+        Recent(reason, _shown(both.get(_LAST + reason, "")), count)
+        for reason in _REASONS
+        if (count := _number(both, _LATELY + reason))
+    )
+    return SelfReport(
+        clock,
+        Counts(
+            MappingProxyType({reason: count for reason, count in dropped.items() if count}),
+            _number(both, _ERRORS),
+            recent,
+        ),
+    )
+
+
+def _number(values: Mapping[str, str], key: str) -> int:
+    text = values.get(key, "")
+    # No count has more digits; and of some texts that are digits int() makes nothing.
+    return int(text) if text.isascii() and text.isdigit() and len(text) <= _MAX_DIGITS else 0

@@ -74,8 +74,12 @@ class Habits:
         group: Any,
         callback: Callable[[Any], None],
         on_number: Callable[[int], None] | None = None,
+        is_wanted: Callable[[bytes], bool] | None = None,
     ) -> str:
         """Have `callback(message)` called, guarded, for each message on a latched topic.
+
+        With `is_wanted` the topic is one that is not latched and that many share: what is not
+        wanted, serialised as it is, or is lost of it, is nothing to be counted.
 
         `parameter` is what gave the name. Returns the topic as ROS has resolved and remapped it:
         that is the name in its graph, and in warnings. `on_number` hears the number that each
@@ -87,15 +91,18 @@ class Habits:
 
         """
         gaps = Gaps()
+        qos = latched(depth) if is_wanted is None else QoSProfile(depth=depth)
 
         def take(data: bytes, info: dict[str, Any]) -> None:
+            if is_wanted is not None and not is_wanted(data):
+                return
             name = str(subscription.topic_name)
             self.published_ago_s = (info["received_timestamp"] - info["source_timestamp"]) / 1e9
             number = info["publication_sequence_number"]
             if on_number is not None and number is not None:
                 on_number(number)
             # Of depth 1, the newest is wanted and nothing else.
-            if depth > 1 and number is not None:
+            if depth > 1 and number is not None and is_wanted is None:
                 lost = gaps.see(number, lambda: int(self._node.count_publishers(name)))
                 if lost:
                     self.lose(lost, name)
@@ -107,7 +114,7 @@ class Habits:
 
         with naming(parameter, topic):
             subscription = self._node.create_subscription(
-                shape.message_type, topic, take, latched(depth), callback_group=group, raw=True
+                shape.message_type, topic, take, qos, callback_group=group, raw=True
             )
         return str(subscription.topic_name)
 

@@ -24,7 +24,8 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from lupin_twin import convert, ingest, shapes
 from lupin_twin.clock_watch import ClockWatch
 from lupin_twin.deferred import Later, allow_later
-from lupin_twin.diagnostics import Health, findings
+from lupin_twin.diagnostic_messages import diagnostics
+from lupin_twin.diagnostics import TOPIC, Health, findings
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.field_cache import FieldCache
@@ -180,7 +181,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 GetField, p.field_service_name, self._on_get_field, callback_group=group
             )
         allow_later(service)
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._diagnostics = self.create_publisher(DiagnosticArray, TOPIC, 10)
         self._every(DIAGNOSTICS_PERIOD_S, "diagnostics timer", self._publish_diagnostics)
         self._every(CLOCK_LOOK_S, "clock timer", self._look_at_clock)
         self._every(1.0 / p.state_publish_rate_hz, "state timer", self._publish_state)
@@ -307,7 +308,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
             slowest_field_s=self._desk.slowest_s,
         )
         self._diagnostics.publish(
-            convert.diagnostics(findings(health), self.get_fully_qualified_name(), self._now_ns())
+            diagnostics(findings(health), self.get_fully_qualified_name(), self._now_ns())
         )
 
     def _publish_state(self) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Final
 
 from builtin_interfaces import msg as builtin
+from diagnostic_msgs import msg as diagnostic
 from geometry_msgs import msg as geometry
 from lupin_msgs import msg as lupin
 from nav_msgs import msg as nav
@@ -22,8 +23,12 @@ from lupin_twin.state import (
     MAX_TAGS,
 )
 
+MAX_STATUSES: Final = 1_000
+MAX_STATUS_VALUES: Final = 10_000
+
 _PACKAGES: Final = {
     "builtin_interfaces": builtin,
+    "diagnostic_msgs": diagnostic,
     "geometry_msgs": geometry,
     "lupin_msgs": lupin,
     "nav_msgs": nav,
@@ -63,4 +68,13 @@ TIMES: Final = MessageShape(
     max_bytes=64_000_000,
     limits={"tags": MAX_TAGS},
     max_elements=MAX_TAGS + 2 * MAX_ITEMS,
+)
+# A twin says seven things of itself, with a few dozen values, in some kB. Whoever collects those of
+# a whole robot has more; it is told on a topic that all nodes share.
+DIAGNOSTICS: Final = MessageShape(
+    diagnostic.DiagnosticArray,
+    _PACKAGES,
+    max_bytes=1_000_000,
+    limits={"status": MAX_STATUSES},
+    max_elements=MAX_STATUSES + MAX_STATUS_VALUES,
 )

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from lupin_msgs.msg import SensorReading, TwinState, TwinTagState, TwinTimes
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -16,6 +17,9 @@ from rclpy.serialization import deserialize_message
 from lupin_bridge.twin import ros_logs
 from lupin_bridge.twin.web_node import WebNode
 from lupin_twin import convert
+from lupin_twin.counts import Counts, Recent
+from lupin_twin.diagnostic_messages import diagnostics
+from lupin_twin.diagnostics import Finding
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.history import TagHistory
 from lupin_twin.parameters import ParameterError
@@ -329,6 +333,42 @@ def test_a_map_that_is_told_again_changes_nothing(
     peer.publish_map(occupancy_grid([[100, 0]], stamp_s=6))
     stage.until(lambda: stage.node.occupancy_map is not first, "another map")
     assert stage.node.revision != revision
+
+
+# --- what the twin says of itself ---------------------------------------------------------------
+
+
+def test_only_the_twin_that_is_followed_is_heard_on_diagnostics(stage: Stage, peer: Peer) -> None:
+    drops = Finding("drops", 0, "", {"frame": "7", "lately: frame": "2", "last: frame": "odom"})
+    paused = Finding("clock", 0, "", {"state": "paused"})
+    publish = peer.node.create_publisher(DiagnosticArray, "/diagnostics", 10).publish
+
+    def say(node: str, *said: Finding) -> Counts | None:
+        publish(diagnostics(said, node, 0))
+        return stage.node.twin_counts
+
+    first = stage.take(peer, tag("1"))
+    assert first.clock == "running"
+    assert stage.node.twin_counts is None, "a twin that says nothing has not dropped nothing"
+    other = Finding("drops", 0, "", {"kind": "100"})
+    # Another greenhouse's is in the same message, before it and behind it.
+    mixed = diagnostics([paused, drops], "/peer", 0)
+    theirs = diagnostics([other], "/gh2/peer", 0)
+    mixed.status = [*theirs.status, *mixed.status, *theirs.status]
+
+    def heard() -> Counts | None:
+        publish(mixed)
+        return say("/gh2/peer", other)
+
+    counts = stage.until(heard, "what the twin says")
+    assert counts == Counts({"frame": 7}, 0, (Recent("frame", "odom", 2),))
+    stage.stamp_s -= 1
+    again = len(stage.told)
+    stage.take(peer, tag("1"))
+    stage.until(lambda: len(stage.told) > again, "the same state again")
+    assert stage.told[-1].clock == "paused"
+    assert stage.take(peer, tag("1")).clock == "running"
+    assert stage.node.habits.counts().dropped == {}
 
 
 # --- the rest -----------------------------------------------------------------------------------

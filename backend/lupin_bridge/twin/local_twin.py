@@ -34,6 +34,11 @@ class LocalTwin:
         # A restarted server must never match an ETag of its predecessor, whose counts it repeats.
         self._identity = uuid.uuid4().hex[:12]
         self._thread: RosThread[TwinNode, Told]
+        self._told: Told
+        self._cache = CacheCounts()
+        # The same for as long as the node lives.
+        self._rules: FieldRules
+        self._names: TwinNames
         self.workers = Workers("work")
         self._computing: Shared[FieldGrid] = Shared()
 
@@ -51,16 +56,31 @@ class LocalTwin:
                         node.twins.value,
                         node.occupancy_map,
                         node.habits.counts(),
+                        cache=_cache_counts(node),
                     )
                 )
 
             node.add_listener(tell, HEARTBEAT_S)
             return node
 
+        def on_told(told: Told) -> None:
+            self._told = told
+            self._note_cache(told.cache)
+            on_state(told)
+
         self._thread = RosThread(
-            make_node, ros_args=self._ros_args, on_event=on_state, on_death=on_death
+            make_node, ros_args=self._ros_args, on_event=on_told, on_death=on_death
         )
         await self._thread.start()
+        self._rules, self._names = await self._thread.call(
+            lambda node: (
+                node.fields.rules,
+                TwinNames(
+                    node.resolve_topic_name(node.parameters.state_topic),
+                    node.resolve_service_name(node.parameters.field_service_name),
+                ),
+            )
+        )
 
     async def stop(self) -> None:
         """Stop the ROS thread and the workers."""
@@ -89,29 +109,27 @@ class LocalTwin:
 
     @property
     def callback_errors(self) -> int:
-        """Errors met by the node's callbacks so far."""
+        """Errors met by the node's callbacks, as of the last heartbeat."""
         return self._thread.callback_errors
 
     def revision(self) -> str:
-        """The process's identity, the observation count and the map's revision."""
-        return self._thread.peek(self._revision_of)
+        """The process's identity, the observation count and the map's revision, as told last.
+
+        What a call brings from the ROS thread is never newer: what has changed is told at once.
+        """
+        return self._told.revision
 
     def field_revision(self, request: FieldRequest) -> str | None:  # noqa: ARG002  # all alike
         """The revision now: here every field is made of the store as it stands."""
-        return self.revision()
+        return self._told.revision
 
     def rules(self) -> FieldRules:
         """The node's parameters for fields."""
-        return self._thread.peek(lambda node: node.fields.rules)
+        return self._rules
 
     def names(self) -> TwinNames:
         """The parameters `state_topic` and `field_service_name` as ROS resolves them."""
-        return self._thread.peek(
-            lambda node: TwinNames(
-                node.resolve_topic_name(node.parameters.state_topic),
-                node.resolve_service_name(node.parameters.field_service_name),
-            )
-        )
+        return self._names
 
     def journal(self) -> Condition:
         """The node's journal."""
@@ -119,12 +137,11 @@ class LocalTwin:
 
     def cache_counts(self) -> CacheCounts:
         """The node's cache of fields."""
-        cache = self._thread.peek(lambda node: node.fields.cache)
-        return CacheCounts(cache.hits, cache.misses, len(cache), cache.bytes)
+        return self._cache
 
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map that the node accepted."""
-        return self._thread.peek(lambda node: node.occupancy_map)
+        return self._told.occupancy_map
 
     async def field(self, request: FieldRequest) -> RevisedGrid:
         """A hit from the node's cache, or the field computed on a worker and handed back to it."""
@@ -135,11 +152,12 @@ class LocalTwin:
         return await self._in_time(self._thread.call(lambda node: node.history_of(tag_id)))
 
     async def _field(self, request: FieldRequest) -> RevisedGrid:
-        def look_up(node: TwinNode) -> tuple[FieldGrid | FieldJob, str]:
+        def look_up(node: TwinNode) -> tuple[FieldGrid | FieldJob, str, CacheCounts]:
             answer = node.fields.lookup(request, node.store, node.occupancy_map)
-            return answer, self._revision_of(node)
+            return answer, self._revision_of(node), _cache_counts(node)
 
-        answer, revision = await self._thread.call(look_up)
+        answer, revision, cache = await self._thread.call(look_up)
+        self._note_cache(cache)
         if isinstance(answer, FieldJob):
             job = answer
             answer = await self._computing.get(job.key, lambda: self._compute(job))
@@ -147,8 +165,18 @@ class LocalTwin:
 
     async def _compute(self, job: FieldJob) -> FieldGrid:
         grid = await asyncio.wrap_future(self.workers.submit(job.compute, job.cost_s))
-        await self._thread.call(lambda node: node.fields.keep(job, grid))
+
+        def keep(node: TwinNode) -> CacheCounts:
+            node.fields.keep(job, grid)
+            return _cache_counts(node)
+
+        self._note_cache(await self._thread.call(keep))
         return grid
+
+    def _note_cache(self, cache: CacheCounts) -> None:
+        # A call's may come behind newer ones that were told; a counter never falls.
+        if cache.hits + cache.misses >= self._cache.hits + self._cache.misses:
+            self._cache = cache
 
     async def _in_time(self, answer: Coroutine[Any, Any, ResultT]) -> ResultT:
         try:
@@ -162,3 +190,8 @@ class LocalTwin:
     def _revision_of(self, node: TwinNode) -> str:
         observation_count, map_revision = node.revision
         return f"{self._identity}-{observation_count}-{map_revision}"
+
+
+def _cache_counts(node: TwinNode) -> CacheCounts:
+    cache = node.fields.cache
+    return CacheCounts(cache.hits, cache.misses, len(cache), cache.bytes)

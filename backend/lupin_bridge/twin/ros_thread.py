@@ -79,6 +79,7 @@ class RosThread(Generic[NodeT, EventT]):
         self._node: NodeT | None = None
         self._newest: EventT | None = None
         self._calls_waiting = 0
+        self._callback_errors = 0
         self._beating: asyncio.Task[None] | None = None
         # When the heartbeat was sent that has not come back yet; loop's clock.
         self._beat_sent_s: float | None = None
@@ -130,17 +131,8 @@ class RosThread(Generic[NodeT, EventT]):
 
     @property
     def callback_errors(self) -> int:
-        """Errors met by the node's callbacks so far."""
-        return 0 if self._node is None else self._node.callback_errors
-
-    def peek(self, read: Callable[[NodeT], ResultT]) -> ResultT:
-        """Read one immutable value off the node without asking its thread.
-
-        Raises:
-            TwinUnavailableError: there is no node.
-
-        """
-        return read(self._require_node())
+        """Errors met by the node's callbacks, as of the last heartbeat."""
+        return self._callback_errors
 
     async def call(self, work: Callable[[NodeT], ResultT]) -> ResultT:
         """Run `work(node)` in the ROS thread, between two callbacks, and return its result.
@@ -214,10 +206,10 @@ class RosThread(Generic[NodeT, EventT]):
 
     async def _beat(self) -> None:
         while self._executor is not None:
-            back = self._loop.create_future()
+            back: asyncio.Future[int] = self._loop.create_future()
             self._beat_sent_s = self._loop.time()
-            self._executor.create_task(self._to_loop, _settle, back, None, None)
-            await back
+            self._executor.create_task(self._bring_back, back)
+            self._callback_errors = await back
             self._beat_sent_s = None
             await asyncio.sleep(BEAT_PERIOD_S)
 
@@ -244,6 +236,9 @@ class RosThread(Generic[NodeT, EventT]):
             error = caught
         finally:
             self._end(error)
+
+    def _bring_back(self, beat: asyncio.Future[int]) -> None:
+        self._to_loop(_settle, beat, self._require_node().callback_errors, None)
 
     def _report(self, what: str, error: Exception) -> None:
         self._require_node().report(what, error)

@@ -29,12 +29,23 @@ class TwinTimeoutError(TwinUnavailableError):
 
 
 @dataclass(frozen=True, slots=True)
+class CacheCounts:
+    """How the cache of fields does."""
+
+    hits: int = 0
+    misses: int = 0
+    entries: int = 0
+    bytes: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class Told:
     """All that the ROS thread tells the loop, as of one moment; immutable.
 
     `revision` is the snapshot's, `twin_count` how many nodes publish the state, `made_s` when it
     was told (monotonic clock). `counts` is what the twin dropped, lost and met; None: it does not
-    say. `own_counts` is the same of a node of ours that is not the twin.
+    say. `own_counts` is the same of a node of ours that is not the twin; `cache` is that of a twin
+    in this process.
     """
 
     snapshot: Snapshot
@@ -43,6 +54,7 @@ class Told:
     occupancy_map: OccupancyMap | None = None
     counts: Counts | None = None
     own_counts: Counts | None = None
+    cache: CacheCounts = field(default_factory=CacheCounts)
     made_s: float = field(default_factory=time.monotonic, compare=False)
 
     @property
@@ -51,16 +63,6 @@ class Told:
         theirs = () if self.counts is None else self.counts.recent
         ours = () if self.own_counts is None else self.own_counts.recent
         return theirs + tuple(replace(drop, message=f"web: {drop.message}") for drop in ours)
-
-
-@dataclass(frozen=True, slots=True)
-class CacheCounts:
-    """How the cache of fields does."""
-
-    hits: int = 0
-    misses: int = 0
-    entries: int = 0
-    bytes: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +113,7 @@ class TwinSource(Protocol):
 
     @property
     def callback_errors(self) -> int:
-        """Errors met by ROS callbacks so far."""
+        """Errors met by ROS callbacks so far, as of the last heartbeat through the thread."""
 
     def revision(self) -> str:
         """The revision now: opaque, changes exactly when a field could."""

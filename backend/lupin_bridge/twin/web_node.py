@@ -86,14 +86,21 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
     publishes this state, and nothing else.
 
     `on_state(snapshot)` is called for each state, once its times are there. Its tags are the very
-    same values as in the one before where nothing has changed.
+    same values as in the one before where nothing has changed. `on_map()` is called for each map
+    that is another.
 
     Raises:
         lupin_twin.parameters.ParameterError: a parameter out of its range.
 
     """
 
-    def __init__(self, on_state: Callable[[Snapshot], None], *, context: Any = None) -> None:
+    def __init__(
+        self,
+        on_state: Callable[[Snapshot], None],
+        on_map: Callable[[], None] = lambda: None,
+        *,
+        context: Any = None,
+    ) -> None:
         with naming_own_parameters():
             super().__init__(NODE_NAME, context=context)
         self.habits = Habits(self)
@@ -108,6 +115,7 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.epoch = 0
         self._publishers_since_s = -math.inf
         self._on_state = on_state
+        self._on_map = on_map
         self._newest: Snapshot | None = None
         self._pairing = Pairing()
         self._stamp_watch = StampWatch()
@@ -172,11 +180,6 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         """
         map_revision = 0 if self.occupancy_map is None else self.occupancy_map.revision
         return f"{self.publishers_digest}-{self.digest}-{map_revision:x}"
-
-    @property
-    def tag_count(self) -> int:
-        """Tags that the newest state has."""
-        return 0 if self._newest is None else len(self._newest.tags)
 
     @property
     def has_new_twin(self) -> bool:
@@ -282,6 +285,7 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         if self.occupancy_map is None or not new.shows_the_same_as(self.occupancy_map):
             self.occupancy_map = replace(new, revision=_digest_of_map(new))
             self.epoch += 1
+            self._on_map()
 
     def _take_diagnostics(self, msg: Any) -> None:
         # Told with the next state, like the map: a twin that publishes none is none to show.

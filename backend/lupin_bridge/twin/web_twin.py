@@ -51,7 +51,11 @@ class WebTwin:
     def __init__(self, *, ros_args: Sequence[str], timeout_s: float) -> None:
         self._ros_args = ros_args
         self._timeout_s = timeout_s
-        self._thread: RosThread[WebNode, Told]
+        self._thread: RosThread[WebNode, _Heard]
+        self._heard = _Heard()
+        # The same for as long as the node lives.
+        self._rules: FieldRules
+        self._names: TwinNames
         self.workers = Workers("work")
         self._asking: Shared[RevisedGrid] = Shared()
         self._trusted: OrderedDict[FieldRequest, _Trusted] = OrderedDict()
@@ -62,26 +66,46 @@ class WebTwin:
     async def start(self, on_state: Callable[[Told], None], on_death: Callable[[], None]) -> None:
         """Start the ROS thread with its node; see `TwinSource.start`."""
 
-        def make_node(context: Any, post: Callable[[Told], None]) -> WebNode:
-            def pass_on(snapshot: Snapshot) -> None:
-                post(
-                    Told(
-                        snapshot,
-                        node.revision,
-                        node.twins.value,
-                        node.occupancy_map,
-                        node.twin_counts,
-                        node.habits.counts(),
-                    )
-                )
+        def make_node(context: Any, post: Callable[[_Heard], None]) -> WebNode:
+            told: Told | None = None
 
-            node = WebNode(pass_on, context=context)
+            def pass_on(snapshot: Snapshot) -> None:
+                nonlocal told
+                told = Told(
+                    snapshot,
+                    node.revision,
+                    node.twins.value,
+                    node.occupancy_map,
+                    node.twin_counts,
+                    node.habits.counts(),
+                )
+                post_all()
+
+            def post_all() -> None:
+                post(_Heard(told, node.epoch, node.revision, node.occupancy_map))
+
+            node = WebNode(pass_on, post_all, context=context)
             return node
 
+        def on_heard(heard: _Heard) -> None:
+            before, self._heard = self._heard.told, heard
+            # A map alone is no sign of life of the twin.
+            if heard.told is not None and heard.told is not before:
+                on_state(heard.told)
+
         self._thread = RosThread(
-            make_node, ros_args=self._ros_args, on_event=on_state, on_death=on_death
+            make_node, ros_args=self._ros_args, on_event=on_heard, on_death=on_death
         )
         await self._thread.start()
+        self._rules, self._names = await self._thread.call(
+            lambda node: (
+                node.rules,
+                TwinNames(
+                    node.resolve_topic_name(node.parameters.state_topic),
+                    node.resolve_service_name(node.parameters.field_service_name),
+                ),
+            )
+        )
 
     async def stop(self) -> None:
         """Stop the ROS thread and the workers."""
@@ -110,25 +134,20 @@ class WebTwin:
 
     @property
     def callback_errors(self) -> int:
-        """Errors met by the node's callbacks so far."""
+        """Errors met by the node's callbacks, as of the last heartbeat."""
         return self._thread.callback_errors
 
     def revision(self) -> str:
         """A digest of poses and readings, and the map's revision."""
-        return self._thread.peek(lambda node: node.revision)
+        return self._heard.revision
 
     def rules(self) -> FieldRules:
         """The twin's parameters for fields, as far as this process was given the same."""
-        return self._thread.peek(lambda node: node.rules)
+        return self._rules
 
     def names(self) -> TwinNames:
         """The parameters `state_topic` and `field_service_name` as ROS resolves them."""
-        return self._thread.peek(
-            lambda node: TwinNames(
-                node.resolve_topic_name(node.parameters.state_topic),
-                node.resolve_service_name(node.parameters.field_service_name),
-            )
-        )
+        return self._names
 
     def journal(self) -> Condition:
         """Off: the journal is the twin's, elsewhere."""
@@ -140,7 +159,7 @@ class WebTwin:
 
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map."""
-        return self._thread.peek(lambda node: node.occupancy_map)
+        return self._heard.occupancy_map
 
     async def history(self, tag_id: str) -> TagHistory | None:
         """The last scans and tries of a tag, as far as they were seen from here."""
@@ -156,7 +175,7 @@ class WebTwin:
         trusted = self._trusted.get(request)
         if trusted is None:
             return None
-        if trusted.epoch != self._epoch() or time.monotonic() > trusted.until_s:
+        if trusted.epoch != self._heard.epoch or time.monotonic() > trusted.until_s:
             del self._trusted[request]
             return None
         return trusted.revision
@@ -167,14 +186,11 @@ class WebTwin:
         Identical is what was asked with no change heard of in between: who has heard of one must
         not get the field from before.
         """
-        epoch = self._epoch()
+        epoch = self._heard.epoch
         return await self._asking.get((epoch, request), lambda: self._ask_once(epoch, request))
 
-    def _epoch(self) -> int:
-        return self._thread.peek(lambda node: node.epoch)
-
     def _trust(self, request: FieldRequest, epoch: int, revision: str) -> None:
-        if epoch != self._epoch():
+        if epoch != self._heard.epoch:
             return  # it was asked for before a change, and nobody knows how long before
         self._trusted[request] = _Trusted(epoch, revision, time.monotonic() + TRUST_S)
         self._trusted.move_to_end(request)
@@ -182,15 +198,17 @@ class WebTwin:
             self._trusted.popitem(last=False)
 
     def _lane(self, request: FieldRequest) -> AbstractAsyncContextManager[Any]:
-        tags = self._thread.peek(lambda node: node.tag_count)
-        is_large = cost_s(request, tags, self.rules()) > SMALL_S
+        told = self._heard.told
+        tags = 0 if told is None else len(told.snapshot.tags)
+        is_large = cost_s(request, tags, self._rules) > SMALL_S
         return self._large_slots if is_large else nullcontext()
 
     async def _find_service(self) -> None:
         while not await self._thread.call(lambda node: node.field_client.service_is_ready()):
-            if not self._thread.peek(lambda node: node.has_new_twin):
-                service = self.names().field_service
-                raise TwinUnavailableError(f"no twin offers {service}: is it running?")
+            if not await self._thread.call(lambda node: node.has_new_twin):
+                raise TwinUnavailableError(
+                    f"no twin offers {self._names.field_service}: is it running?"
+                )
             await asyncio.sleep(SERVICE_LOOK_S)
 
     async def _ask_once(self, epoch: int, request: FieldRequest) -> RevisedGrid:
@@ -214,6 +232,19 @@ class WebTwin:
         )
         self._trust(request, epoch, result.revision)
         return result
+
+
+@dataclass(frozen=True, slots=True)
+class _Heard:
+    """All that crosses to the loop: the newest state as it was told, and what stands now.
+
+    `epoch`, `revision` and the map are newer than `told` where a map has come since.
+    """
+
+    told: Told | None = None
+    epoch: int = 0
+    revision: str = ""
+    occupancy_map: OccupancyMap | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from lupin_bridge.twin.local_twin import LocalTwin
 from lupin_bridge.twin.source import Told, TwinTimeoutError
 from lupin_twin.fields import FieldJob, FieldRefused, FieldRequest
 from lupin_twin.grid import FieldGrid
+from lupin_twin.node import TwinNode
 from lupin_twin.parameters import ParameterError
 from lupin_twin.state import Pose, Reading, Scan
 from lupin_twin.workers import ShouldStop
@@ -46,7 +47,12 @@ class Stage:
             (Reading("co2", value),),
             Pose(1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0),
         )
-        await self.twin._thread.call(lambda node: node.store.record(scan))
+
+        def take(node: TwinNode) -> None:
+            node.store.record(scan)
+            node._tell_listeners()
+
+        await self.twin._thread.call(take)
 
     async def waiting(self, *requests: FieldRequest) -> list[asyncio.Task[Any]]:
         """Ask for fields that wait at the gate; returns when all of them do."""

@@ -88,13 +88,13 @@ async def started(timeout_s: float = 20.0) -> AsyncIterator[tuple[WebTwin, list[
 
 async def found(twin: WebTwin) -> None:
     """Wait until the service is there to be asked."""
-    client = twin._thread.peek(lambda node: node.field_client)
+    client = await twin._thread.call(lambda node: node.field_client)
     await until(client.service_is_ready, "the service")
 
 
 def pending(twin: WebTwin) -> int:
     """Requests that the ROS client still keeps."""
-    return twin._thread.peek(lambda node: len(node.field_client._pending_requests))
+    return len(twin._thread._require_node().field_client._pending_requests)
 
 
 def test_without_a_twin_a_field_is_refused_at_once_by_the_services_name(domain: int) -> None:
@@ -300,7 +300,7 @@ def test_two_fields_of_a_real_twin_never_have_one_revision(domain: int) -> None:
             for value in range(1, 8):
                 peer.observe(scan("1", {"co2": float(value)}, at=(1.0, 1.0)))
                 while True:
-                    epochs.add(twin._epoch())
+                    epochs.add(twin._heard.epoch)
                     answer = await twin.field(request)
                     assert known.setdefault(answer.revision, answer.grid.value_max) == (
                         answer.grid.value_max

@@ -57,6 +57,7 @@ class LocalTwin:
                         node.occupancy_map,
                         node.habits.counts(),
                         cache=_cache_counts(node),
+                        journal=node.memory.condition,
                     )
                 )
 
@@ -133,7 +134,7 @@ class LocalTwin:
 
     def journal(self) -> Condition:
         """The node's journal."""
-        return self._thread.peek(lambda node: node.memory.condition)
+        return self._told.journal
 
     def cache_counts(self) -> CacheCounts:
         """The node's cache of fields."""

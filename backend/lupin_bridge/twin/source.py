@@ -12,7 +12,7 @@ from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRequest, FieldRules
 from lupin_twin.grid import FieldGrid
 from lupin_twin.history import TagHistory
-from lupin_twin.journal.condition import Condition
+from lupin_twin.journal.condition import OFF, Condition
 from lupin_twin.state import Snapshot
 from lupin_twin.workers import Workers
 
@@ -44,8 +44,8 @@ class Told:
 
     `revision` is the snapshot's, `twin_count` how many nodes publish the state, `made_s` when it
     was told (monotonic clock). `counts` is what the twin dropped, lost and met; None: it does not
-    say. `own_counts` is the same of a node of ours that is not the twin; `cache` is that of a twin
-    in this process.
+    say. `own_counts` is the same of a node of ours that is not the twin; `cache` and
+    `journal` are those of a twin in this process.
     """
 
     snapshot: Snapshot
@@ -55,6 +55,7 @@ class Told:
     counts: Counts | None = None
     own_counts: Counts | None = None
     cache: CacheCounts = field(default_factory=CacheCounts)
+    journal: Condition = OFF
     made_s: float = field(default_factory=time.monotonic, compare=False)
 
     @property

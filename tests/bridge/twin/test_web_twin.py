@@ -23,7 +23,7 @@ from lupin_bridge.twin.web_twin import MAX_REQUESTS, TRUST_S, WebTwin
 from lupin_twin.fields import FieldRefused, FieldRequest
 from tests.support.inprocess import run
 from tests.support.live import attached, wait_until_ready
-from tests.support.messages import scan
+from tests.support.messages import occupancy_grid, scan
 from tests.support.processes import lupin_twin, twin_node
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, until, wait_for
@@ -226,6 +226,25 @@ def test_an_answer_stands_for_the_field_until_something_else_is_heard(
                 now_s = time.monotonic()
                 monkeypatch.setattr(time, "monotonic", lambda: now_s + TRUST_S + 1.0)
                 assert twin.field_revision(REQUEST) is None
+
+    run(domain, test())
+
+
+def test_a_map_alone_ends_what_stood_and_is_no_sign_of_life(domain: int) -> None:
+    async def test() -> None:
+        with service_in(domain) as service:
+            async with started() as (twin, told), service.answering():
+                await found(twin)
+                service.peer.publish("/twin/state", state_of(1.0), depth=1)
+                await until(lambda: told and twin.revision() == told[-1].revision, "a state")
+                await twin.field(REQUEST)
+                assert twin.field_revision(REQUEST) is not None
+                before = len(told)
+                service.peer.publish_map(occupancy_grid([[0, 100]]))
+                await until(lambda: twin.occupancy_map() is not None, "the map")
+                assert twin.field_revision(REQUEST) is None
+                assert twin.revision() != told[-1].revision
+                assert len(told) == before
 
     run(domain, test())
 

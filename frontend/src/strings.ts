@@ -202,6 +202,8 @@ export const S = {
   print: 'Print',
   kiosk: 'Kiosk mode',
   help: 'Keyboard shortcuts',
+  signOut: 'Sign out',
+  signOutFailed: (reason: string): string => `You are still signed in: ${reason}`,
   exportFailed: (reason: string): string => `Nothing was saved: ${reason}`,
 
   emptyConnecting: 'Connecting to the bridge',

@@ -136,3 +136,14 @@ def test_a_page_whose_session_has_ended_leaves_for_the_sign_in(page: Page) -> No
     with served("--port", port, LUPIN_TOKEN=TOKEN) as second:
         assert second.url == first.url
         expect(page).to_have_url(second.url + "/signin")
+
+
+def test_a_person_signs_out(closed: Served, page: Page) -> None:
+    page.goto(closed.url)
+    sign_in(page, TOKEN)
+    expect_live(page)
+    page.get_by_role("button", name="Menu").click()
+    page.get_by_role("button", name="Sign out").click()
+    expect(page).to_have_url(closed.url + "/signin")
+    page.goto(closed.url)
+    expect(page).to_have_url(closed.url + "/signin")

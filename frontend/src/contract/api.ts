@@ -1,5 +1,5 @@
 /** The bridge's routes. Addresses are relative to the page, so any path prefix works. */
-import { HISTORY, MAP, QUALITY } from './bodies';
+import { HISTORY, MAP, QUALITY, SESSION } from './bodies';
 import type { Check } from './check';
 import { parseNpy } from './npy';
 import type { Field, FieldQuality, OccupancyGrid, TagHistory } from './types';
@@ -105,4 +105,15 @@ export async function fetchMapPicture(signal: AbortSignal): Promise<Blob> {
 export async function fetchHistory(tagId: string, signal: AbortSignal): Promise<TagHistory> {
   const response = await get(`api/tags/${encodeURIComponent(tagId)}/history`, signal);
   return read<TagHistory>('history', HISTORY, response);
+}
+
+/** Whether there is a session to sign out of: not where no token is asked for. */
+export async function canSignOut(signal: AbortSignal): Promise<boolean> {
+  const response = await get('api/session', signal);
+  return (await read<{ can_sign_out: boolean }>('session', SESSION, response)).can_sign_out;
+}
+
+/** Ends the session, and with it the sockets that it has open. */
+export async function signOut(): Promise<void> {
+  await get('api/signout', new AbortController().signal);
 }

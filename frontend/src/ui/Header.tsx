@@ -10,6 +10,7 @@ import { Disclosure, useClose } from './Disclosure';
 import { openHelp } from './HelpDialog';
 import { Icon } from './Icon';
 import { Segmented } from './Segmented';
+import { SignOut } from './SignOut';
 import { say } from './toast';
 
 export function Header({ kiosk }: { kiosk: boolean }): JSX.Element {
@@ -97,6 +98,7 @@ function Menu(): JSX.Element {
             {S.help} <kbd>?</kbd>
           </button>
         </li>
+        <SignOut close={close} />
       </ul>
     </>
   );

@@ -1,0 +1,59 @@
+import { fireEvent, render, screen, waitFor } from '@testing-library/react';
+import { expect, test, vi } from 'vitest';
+
+import { useSelected } from '../store/create';
+import { SignOut } from './SignOut';
+import { toast } from './toast';
+
+const server = (session: unknown, status = 204): string[] => {
+  const asked: string[] = [];
+  vi.stubGlobal('fetch', (url: URL) => {
+    asked.push(url.pathname);
+    return Promise.resolve(
+      url.pathname === '/api/session'
+        ? Response.json(session)
+        : new Response(null, { status, statusText: 'No' }),
+    );
+  });
+  return asked;
+};
+
+const Toast = (): string => useSelected(toast, (text) => text);
+
+test('a session can be ended, and the page leaves', async () => {
+  const asked = server({ can_sign_out: true, seconds_left: 60 });
+  const [close, leave] = [vi.fn(), vi.fn<(url: URL) => void>()];
+  render(<SignOut close={close} leave={leave} />);
+  fireEvent.click(await screen.findByRole('button', { name: 'Sign out' }));
+  await waitFor(() => {
+    expect(leave.mock.lastCall?.[0].pathname).toBe('/signin');
+  });
+  expect(asked).toEqual(['/api/session', '/api/signout']);
+  expect(close).toHaveBeenCalledOnce();
+});
+
+test('one that cannot be ended is said to go on', async () => {
+  server({ can_sign_out: true, seconds_left: 60 }, 403);
+  const leave = vi.fn();
+  render(
+    <>
+      <SignOut close={() => undefined} leave={leave} />
+      <Toast />
+    </>,
+  );
+  fireEvent.click(await screen.findByRole('button', { name: 'Sign out' }));
+  expect(await screen.findByText(/You are still signed in: 403/)).toBeTruthy();
+  expect(leave).not.toHaveBeenCalled();
+});
+
+test.each([[{ can_sign_out: false, seconds_left: null }], [{}], [null]])(
+  'without a session there is nothing to offer: %j',
+  async (session) => {
+    const asked = server(session);
+    render(<SignOut close={() => undefined} />);
+    await waitFor(() => {
+      expect(asked).toHaveLength(1);
+    });
+    expect(screen.queryByRole('button')).toBeNull();
+  },
+);

@@ -35,9 +35,12 @@ export function ScaleBar(): JSX.Element {
   const bar = scaleBar(scale, LONGEST_BAR_PX);
   const length = lengthText(bar.metres);
   return (
-    <div className="scale-bar" data-over-map role="img" aria-label={S.scaleBar(length)}>
-      <span className="bar" style={{ width: `${bar.pixels}px` }} />
-      <span>{length}</span>
+    // The view that is fitted keeps clear of the place, which must not depend on that view.
+    <div className="scale-place" data-over-map>
+      <div className="scale-bar" role="img" aria-label={S.scaleBar(length)}>
+        <span className="bar" style={{ width: `${bar.pixels}px` }} />
+        <span>{length}</span>
+      </div>
     </div>
   );
 }

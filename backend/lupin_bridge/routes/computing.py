@@ -24,7 +24,7 @@ from lupin_bridge.routes.tools import NEVER_KEEP, REVALIDATE, bridge_of, error_r
 from lupin_bridge.serving.admission import AdmissionError, BusyError
 from lupin_bridge.serving.kept import Answer
 from lupin_bridge.twin.source import TwinTimeoutError, TwinUnavailableError
-from lupin_twin.fields import FieldRequest, cost_s
+from lupin_twin.fields import FieldRequest, check_request, cost_s
 from lupin_twin.workers import SMALL_S, ShouldStop
 
 ResultT = TypeVar("ResultT")
@@ -173,15 +173,23 @@ async def or_refusal(answer: Awaitable[Response]) -> Response:
 # --- fields -------------------------------------------------------------------------------------
 
 
-def is_large(bridge: Bridge, asked: FieldRequest) -> bool:
+def is_large(bridge: Bridge, asked: FieldRequest, scale: int = 1) -> bool:
     """Whether a field may take long: as if every tag had a reading and none was computed before.
+
+    Writing it counts too: of few tags, that takes longer than the field.
 
     Raises:
         lupin_twin.fields.FieldRefused: a bad request.
 
     """
     tags = 0 if bridge.latest is None else len(bridge.latest.snapshot.tags)
-    return cost_s(asked, tags, bridge.source.rules()) > SMALL_S
+    rules = bridge.source.rules()
+    width, height = check_request(asked, rules.max_grid_cells)
+    return cost_s(asked, tags, rules) + _write_s(width, height, scale) > SMALL_S
+
+
+def _write_s(width: int, height: int, scale: int) -> float:
+    return width * height * scale**2 * _WRITE_CELL_S
 
 
 async def field_answer(
@@ -196,7 +204,7 @@ async def field_answer(
 
     """
     with (
-        bridge.admission.computing(is_large=is_large(bridge, asked)),
+        bridge.admission.computing(is_large=is_large(bridge, asked, scale)),
         bridge.metrics.field_seconds.time(),
     ):
         result = await bridge.source.field(asked)
@@ -206,7 +214,7 @@ async def field_answer(
         body = await on_worker(
             bridge,
             lambda _: field_formats.write(grid, field_format, asked.sensor_type, scale),
-            grid.width * grid.height * scale**2 * _WRITE_CELL_S,
+            _write_s(grid.width, grid.height, scale),
         )
     headers = field_query.headers(
         field_formats.metadata(grid, asked.sensor_type),

@@ -14,16 +14,17 @@ import numpy as np
 import pytest
 
 from lupin_bridge.routes import map as routes_map
+from lupin_bridge.routes.computing import is_large
 from lupin_bridge.routes.state import AGES_HOLD_S
 from lupin_bridge.serving.http_protocol import PIECE_BYTES
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.state_json import StateJson
 from lupin_twin.explored import OccupancyMap, occupancy_map
-from lupin_twin.fields import FieldJob
+from lupin_twin.fields import FieldJob, FieldRequest, cost_s
 from lupin_twin.grid import FieldGrid
 from lupin_twin.node import TwinNode
 from lupin_twin.state import Pose, Reading, Scan
-from lupin_twin.workers import LARGE_THREADS, ShouldStop
+from lupin_twin.workers import LARGE_THREADS, SMALL_S, ShouldStop
 from tests.support.inprocess import Running, run, running
 from tests.support.waiting import PATIENCE_S, until
 from tests.support.web import deaf_client
@@ -115,6 +116,21 @@ def test_a_flood_of_the_dearest_fields_does_not_hold_up_a_tiny_one(domain: int, 
                 assert "24 large answers are being computed" in answer.json()["detail"]
             held.gate.set()
             assert sorted([(await task).status_code for task in flood]) == [200] * 24 + [503] * 16
+
+    run(domain, test())
+
+
+@pytest.mark.parametrize(
+    ("cells", "scale", "large"), [(300, 1, False), (500, 1, True), (300, 3, True)]
+)
+def test_what_is_written_counts_for_what_is_large(
+    domain: int, cells: int, scale: int, large: bool
+) -> None:
+    async def test() -> None:
+        async with house() as it:
+            asked = FieldRequest("co2", 4.0 / cells, 0.0, 0.0, 4.0, 4.0)
+            assert cost_s(asked, 20, it.bridge.source.rules()) < SMALL_S, "the field alone is not"
+            assert is_large(it.bridge, asked, scale) is large
 
     run(domain, test())
 

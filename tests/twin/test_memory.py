@@ -11,8 +11,9 @@ from lupin_twin.history import History
 from lupin_twin.ingest import Pin
 from lupin_twin.journal.condition import JournalState
 from lupin_twin.journal.runs import Clock
-from lupin_twin.memory import Memory, journal_path, open_journal, state_folder
+from lupin_twin.memory import MAX_NEW_RUNS, Memory, journal_path, open_journal, state_folder
 from lupin_twin.state import Flower, Look, Pose, Reading, Scan, TwinStore
+from tests.support.journal import select
 from tests.support.waiting import wait_for
 
 S = 1_000_000_000
@@ -133,6 +134,25 @@ def test_a_clock_that_goes_back_begins_a_run_that_knows_what_the_twin_knew(tmp_p
         before = store.snapshot(50 * S, "map")
     with twin(path, sim(300, 110)) as (_, store, _):
         assert store.snapshot(50 * S, "map").tags == before.tags
+
+
+def test_a_clock_that_goes_back_all_the_time_begins_few_runs(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    with twin(path, sim(9000, 0)) as (memory, _, _):
+        for number in range(1000):
+            memory.follow(sim(1000, number / 100))
+            memory.follow(sim(9000, number / 100))
+    assert select(path, "SELECT count(*) FROM run") == [(1 + MAX_NEW_RUNS,)]
+
+
+@pytest.mark.parametrize(("last_s", "more"), [(199.9, 0), (200, 1)])
+def test_and_another_after_some_time(tmp_path: Path, last_s: float, more: int) -> None:
+    path = tmp_path / "j.sqlite"
+    with twin(path, sim(9000, 0)) as (memory, _, _):
+        for number in range(MAX_NEW_RUNS):
+            memory.follow(sim(1000 - number, 100 + number))
+        memory.follow(sim(500, last_s))
+    assert select(path, "SELECT count(*) FROM run") == [(1 + MAX_NEW_RUNS + more,)]
 
 
 def test_what_is_refused_is_not_written(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ belongs to, and takes microseconds, but for the start: that waits for what was k
 from __future__ import annotations
 
 import re
+from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
@@ -27,6 +28,11 @@ NO_JOURNAL: Final = "off"
 
 # So long a start waits for what was known before; what comes later is taken in as it comes.
 _START_WAIT_S: Final = 10.0
+
+# Two simulations on one /clock make it go back dozens of times a second, and each run stays in the
+# file: so many may begin within such a time, by the wall's clock.
+MAX_NEW_RUNS: Final = 10
+NEW_RUNS_NS: Final = 100 * 1_000_000_000
 
 
 def journal_path(
@@ -75,22 +81,28 @@ class Memory:
         self._journal = journal
         self._buffer_len = buffer_len
         self._clock: Clock | None = None
+        self._begun_ns: deque[int] = deque(maxlen=MAX_NEW_RUNS)
 
     def follow(self, now: Clock) -> None:
         """Keep to a clock: the first moment of it restores, one that goes back begins a new run.
 
         0 is a simulated clock that has not started: nothing is known then of when anything was.
+        One that goes back time and again stays in a run, as at its latest, until it may begin
+        another (`MAX_NEW_RUNS`).
         """
         if self._journal is None or now.stamp_ns <= 0:
             return
         before = self._clock
-        self._clock = now
         if before is None:
+            self._clock = now
             self._journal.begin(now, self._buffer_len)
             self._take(self._journal.take_restored(_START_WAIT_S), now)
             return
-        if before.is_simulated != now.is_simulated or is_new_run(before, now):
-            self._journal.begin(now)
+        is_new = before.is_simulated != now.is_simulated or is_new_run(before, now)
+        if not is_new or self._may_begin(now.arrival_ns):
+            self._clock = now
+            if is_new:
+                self._journal.begin(now)
         self._take(self._journal.take_restored(), now)
 
     def apply(self, write: ingest.Write, arrival_ns: int, mission: str = "") -> Drop | None:
@@ -115,6 +127,13 @@ class Memory:
         """Write what is waiting."""
         if self._journal is not None:
             self._journal.close()
+
+    def _may_begin(self, arrival_ns: int) -> bool:
+        begun = self._begun_ns
+        if len(begun) == MAX_NEW_RUNS and abs(arrival_ns - begun[0]) < NEW_RUNS_NS:
+            return False
+        begun.append(arrival_ns)
+        return True
 
     def _take(self, restored: Restored | None, now: Clock) -> None:
         if restored is None:

@@ -55,6 +55,14 @@ def test_todays_simulation_is_another_than_yesterdays_though_its_clock_is_furthe
     assert not goes_on(ending, sim(3700, 86_400))
 
 
+@pytest.mark.parametrize(("back_s", "is_same"), [(60, True), (60.001, False)])
+def test_a_wall_clock_that_was_set_back_does_not_make_yesterdays_simulation_todays(
+    back_s: float, is_same: bool
+) -> None:
+    ending = ended(sim(0, 0), sim(3600, 3600))
+    assert goes_on(ending, sim(3605, 3600 - back_s)) is is_same
+
+
 def test_a_simulation_that_has_started_over_is_another() -> None:
     ending = ended(sim(0, 0), sim(3600, 3600))
     assert not goes_on(ending, sim(3599.9, 3601))

@@ -60,17 +60,19 @@ def goes_on(ending: Ending, now: Clock) -> bool:
     """Whether a twin that starts `now` is still in that run.
 
     A simulation is the same if its clock is further on than one could be that began after the last
-    word of the old one: at twice the pace that the old one had, or the wall's.
+    word of the old one: at twice the pace that the old one had, or the wall's. Where the wall's
+    clock was set back meanwhile, how long that was is not known, and it is another.
     """
     passed = now.stamp_ns - ending.last.stamp_ns
     if not now.is_simulated:
         return passed >= -CORRECTION_NS
+    waited_ns = now.arrival_ns - ending.last.arrival_ns
+    if waited_ns < -CORRECTION_NS:
+        return False
     begun = ending.run.begun
     lasted_ns = max(1, ending.last.arrival_ns - begun.arrival_ns)
     pace = max(1.0, (ending.last.stamp_ns - begun.stamp_ns) / lasted_ns)
-    return passed >= 0 and now.stamp_ns > _FASTER * pace * max(
-        0, now.arrival_ns - ending.last.arrival_ns
-    )
+    return passed >= 0 and now.stamp_ns > _FASTER * pace * max(0, waited_ns)
 
 
 def carried_at_start(now: Clock) -> Carries:

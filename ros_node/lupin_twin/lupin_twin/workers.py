@@ -17,8 +17,8 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Final, Generic, TypeVar
 
-# Estimates are seconds of one core. A small job costs what nobody notices, also as one of as many as
-# the bridge admits from a few clients at their full rate: those do not keep the threads busy.
+# Estimates are seconds of one core. A small job costs what nobody notices: those of a few clients
+# that ask at the rate they may do not keep the threads busy.
 SMALL_S: Final = 0.02
 PATIENCE: Final = 2.0
 # Threads that take any job; two, so that one heavy job does not hold up all other large ones.

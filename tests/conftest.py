@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,10 +13,10 @@ from hypothesis import HealthCheck, settings
 from tests.support.domains import own_domain
 from tests.support.needs import is_quick, let_nothing_in
 from tests.support.shared_memory import remove_what_the_dead_left
+from tests.support.state_home import use_own
 
 # What twins keep in a user's folder, the tests' keep in one of their own, in every process.
-STATE = tempfile.mkdtemp(prefix="lupin-twin-test-state-")
-os.environ["XDG_STATE_HOME"] = STATE
+STATE = use_own()
 
 # Before anything imports rclpy: ROS would swallow a field of the wrong type, and leave the machine.
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
@@ -46,7 +45,6 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """Leave the machine's memory as it was: many tests kill processes."""
-    shutil.rmtree(STATE, ignore_errors=True)
     if not hasattr(session.config, "workerinput"):  # once, not by each worker
         remove_what_the_dead_left()
 

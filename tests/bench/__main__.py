@@ -5,12 +5,15 @@ from __future__ import annotations
 import importlib
 import sys
 
+from tests.support.state_home import use_own
+
 # In the order of the way through the system: field, truth, tick, bridge, page, large houses.
 BENCHES = ("bench_field", "bench_truth", "bench_tick", "bench_bridge", "bench_page", "bench_house")
 
 
 def main() -> int:
     """Run the benchmarks named on the command line, or all."""
+    use_own()
     for name in sys.argv[1:] or BENCHES:
         print(f"\n=== {name}", flush=True)
         importlib.import_module(f"tests.bench.{name}").main()

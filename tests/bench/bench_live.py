@@ -35,6 +35,7 @@ from tests.bench.live_outages import measure_outages
 from tests.support.domains import own_domain, ros_env
 from tests.support.proc_stat import cpu_s, resident_mb, tcp_buffers_mb
 from tests.support.processes import Process, lupin_twin, url_of
+from tests.support.state_home import use_own
 
 CLIENTS_A_PROCESS = 1_250
 # Python starts and imports; then all clients connect at once.
@@ -275,6 +276,7 @@ def as_row(cells: Sequence[str]) -> str:
 
 
 def main() -> None:
+    use_own()
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--quick", action="store_true", help="a minute instead of five")
     parser.add_argument("--only", type=int, metavar="N", help="row N of the table alone, from 0")

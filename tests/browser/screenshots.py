@@ -18,6 +18,7 @@ from playwright.sync_api import Browser, Page, ViewportSize, expect, sync_playwr
 from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
 from tests.support.domains import own_domain, ros_env
 from tests.support.processes import Process, lupin_twin, url_of
+from tests.support.state_home import use_own
 
 SIZES = ((360, 740), (820, 1180), (1440, 900), (1920, 1080))
 BLINDNESS = ("protanopia", "deuteranopia", "tritanopia", "achromatopsia")
@@ -35,6 +36,7 @@ def main() -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--readme", action="store_true", help="also write those of the README")
     options = parser.parse_args()
+    use_own()
     options.folder.mkdir(parents=True, exist_ok=True)
     expect.set_options(timeout=PATIENCE_MS)
     patrol = [sys.executable, "-m", "lupin_patrol", "--speed", str(PATROL_SPEED)]

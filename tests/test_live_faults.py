@@ -257,7 +257,9 @@ def test_the_shadow_of_a_killed_twin_is_no_second_one(domain: int) -> None:
         with twin_node(domain) as second:
             robot.observe(scan("a", {"co2": 1.0}))
             client.until_tag("a")
-            assert robot.node.count_publishers("/twin/state") == 2, "the shadow is there"
+            robot.until(
+                lambda: robot.node.count_publishers("/twin/state") == 2, "the twin and the shadow"
+            )
             for _ in range(5):
                 client.until("state")
             assert "nodes publish" not in process.output + second.output

@@ -253,6 +253,7 @@ def test_the_shadow_of_a_killed_twin_is_no_second_one(domain: int) -> None:
     ):
         with twin_node(domain) as first:
             reason(client, "live")
+            robot.until(lambda: robot.node.count_publishers("/twin/state") == 1, "the twin")
             first.kill()
         with twin_node(domain) as second:
             robot.observe(scan("a", {"co2": 1.0}))

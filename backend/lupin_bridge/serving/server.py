@@ -34,6 +34,9 @@ SPARE_FILES = 512
 # connection, uvicorn cancels it.
 GOODBYE_S = 0.5
 GRACEFUL_SHUTDOWN_S = 1
+# Who comes while the loop is busy waits in the kernel; whom that has no place for tries again a
+# second later. All clients come at once when a bridge is started anew.
+BACKLOG = 2_048
 # uvicorn's main loop.
 TICKS_PER_S = 10
 
@@ -148,7 +151,7 @@ def listen(host: str, port: int) -> socket.socket:
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((host, port))
-        listener.listen()
+        listener.listen(BACKLOG)
     except OSError:
         listener.close()
         raise

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import resource
+import select
 import signal
 import socket
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import httpx
@@ -59,6 +60,18 @@ def test_who_connects_before_the_server_serves_has_only_to_wait() -> None:
         with socket.create_connection(listener.getsockname()) as client:
             assert client.getpeername() == listener.getsockname()
         assert address_of(listener) == f"http://127.0.0.1:{listener.getsockname()[1]}"
+
+
+def test_hundreds_who_connect_at_once_need_no_second_try() -> None:
+    with listen("127.0.0.1", 0) as listener, ExitStack() as stack:
+        clients = [stack.enter_context(socket.socket()) for _ in range(400)]
+        poll = select.poll()
+        for client in clients:
+            client.setblocking(False)
+            client.connect_ex(listener.getsockname())
+            poll.register(client, select.POLLOUT)
+        # On loopback the kernel has let them in by now, or has no place for them.
+        assert len(poll.poll(500)) == len(clients)
 
 
 def test_ipv6_has_brackets_in_its_address() -> None:

@@ -17,15 +17,16 @@ SHELL := /bin/bash
 # pip must neither look at a user's site-packages nor at the modules of a sourced ROS.
 export PYTHONNOUSERSITE := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
-# A checked run: ROS serialises a field of the wrong type as garbage unless this is set.
-TEST_ENV := ROS_PYTHON_CHECK_FIELDS=1 ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST \
-            ROS_LOG_DIR=$(CURDIR)/$(DONE)/ros_log
+# A checked run: ROS serialises a field of the wrong type as garbage unless this is set. Bytecode is
+# kept, whatever the machine's habit: the tests start hundreds of processes with the same modules.
+TEST_ENV := PYTHONDONTWRITEBYTECODE= ROS_PYTHON_CHECK_FIELDS=1 \
+            ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_LOG_DIR=$(CURDIR)/$(DONE)/ros_log
 # Measured as it runs in a greenhouse: without the checks.
 BENCH_ENV := ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_LOG_DIR=$(CURDIR)/$(DONE)/ros_log
 
 say = @printf '\033[1m==> %s\033[0m\n'
 
-.PHONY: help setup run check quick test lint types unit hmi-test bench bench-live clean
+.PHONY: help setup run check quick test lint types collect unit hmi-test bench bench-live soak clean
 
 help: ## what there is
 	@grep -E '^[a-z-]+:.*## ' Makefile | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -86,7 +87,9 @@ quick: setup ## Python tests that need neither ROS nor a browser
 	$(say) 'Python tests without ROS and browser'
 	@$(TEST_ENV) $(BIN)/pytest -q -n 2 --dist worksteal --quick tests
 
-test: setup $(DONE)/tools lint types hmi-test unit ## every check: lint, types, unit, real ROS, browser
+test: setup $(DONE)/tools ## every check: lint, types, unit, real ROS, browser
+	@$(MAKE) --no-print-directory -j 2 --output-sync=target lint types hmi-test collect
+	@$(MAKE) --no-print-directory unit
 	$(say) 'all checks passed'
 
 lint: setup ## ruff, ESLint, Prettier
@@ -102,19 +105,32 @@ types: setup ## mypy and tsc, both strict; the browser's types against the serve
 	@npm run --silent typecheck
 	@npm run --silent types:check
 
-hmi-test: setup ## the HMI's unit tests
-	$(say) 'front-end unit tests'
+hmi-test: setup ## the HMI's unit tests, and whether its build is as small as it has to be
+	$(say) 'front-end unit tests, size of the build'
 	@npm run --silent test
+	@npm run --silent size >/dev/null
+
+# In a fresh checkout each of pytest's workers would rewrite the assertions of all test files.
+collect: setup
+	$(say) 'collecting the Python tests'
+	@$(TEST_ENV) $(BIN)/pytest -qq --collect-only tests >$(DONE)/collected || { cat $(DONE)/collected; exit 1; }
 
 unit: setup $(DONE)/tools ## Python tests, real ROS and real browser included
 	$(say) 'Python tests: units, ROS over DDS, browser'
 	@$(TEST_ENV) $(BIN)/pytest -q -n 4 --dist worksteal tests
 
-bench: setup $(DONE)/tools ## measure: ratios side by side, nothing asserted
+$(DONE)/bench: pyproject.toml $(DONE)/python
+	@env -u PYTHONPATH $(BIN)/pip install --quiet -e '.[bench]'
+	@touch $@
+
+bench: setup $(DONE)/tools $(DONE)/bench ## measure: ratios side by side, nothing asserted
 	@$(BENCH_ENV) $(BIN)/python -m tests.bench $(ARGS)
 
 bench-live: setup ## the live bridge with up to 5,000 clients, in five minutes
 	@$(BENCH_ENV) $(BIN)/python -m tests.bench.bench_live $(ARGS)
+
+soak: setup ## 50 kills under load, and eight hours of writing in a few minutes: what must hold for long
+	@$(TEST_ENV) $(BIN)/python -m tests.soak $(ARGS)
 
 clean: ## remove everything that set-up and builds have made
 	rm -rf $(VENV) $(DONE) node_modules backend/lupin_bridge/static

@@ -7,13 +7,30 @@ const here = (path: string): string => fileURLToPath(new URL(path, import.meta.u
 
 const BRIDGE = process.env['LUPIN_BRIDGE'] ?? 'http://127.0.0.1:8000';
 
+interface Modules {
+  getModuleInfo: (id: string) => { isEntry: boolean; importers: readonly string[] } | null;
+}
+
+/** Whether the page needs a module before it shows anything: the entry imports it, however far off. */
+function isFirst(id: string, modules: Modules, seen = new Set<string>()): boolean {
+  if (seen.has(id)) return false;
+  seen.add(id);
+  const info = modules.getModuleInfo(id);
+  return info !== null && (info.isEntry || info.importers.some((by) => isFirst(by, modules, seen)));
+}
+
 const RULES = [
   'src/clock.test.ts',
   'src/structure.test.ts',
   'src/{domain,geometry}/**/*.test.ts',
+  'src/charts/{looks,model,zoom}.test.ts',
   'src/connection/{backoff,latest,machine}.test.ts',
   'src/contract/{check,frames,npy}.test.ts',
-  'src/store/{create,memo,permalink,twin,view}.test.ts',
+  'src/draw/palette.test.ts',
+  'src/store/{create,memo,permalink,refresher,seeker,twin,view}.test.ts',
+  'src/timebar/{axis,columns,ownTimes}.test.ts',
+  'src/ui/{fitting,later}.test.ts',
+  'src/words/languages.test.ts',
 ];
 
 export default defineConfig({
@@ -21,6 +38,13 @@ export default defineConfig({
   // Relative, so that the bridge may stand behind any path prefix.
   base: './',
   plugins: [react()],
+  // Nothing in the map is animated by d3-zoom: it gets what it needs, and nothing more.
+  resolve: {
+    alias: {
+      'd3-transition': here('src/map/instantly.ts'),
+      'd3-interpolate': here('src/map/instantly.ts'),
+    },
+  },
   build: {
     outDir: here('../backend/lupin_bridge/static'),
     emptyOutDir: true,
@@ -29,6 +53,14 @@ export default defineConfig({
     // The polyfill is an inline script in some outputs; every browser of the last years preloads.
     modulePreload: { polyfill: false },
     target: 'es2022',
+    rolldownOptions: {
+      output: {
+        // In one piece: what later parts share with it would else be a file each, and more in all.
+        codeSplitting: {
+          groups: [{ name: (id, modules) => (isFirst(id, modules) ? 'first' : null) }],
+        },
+      },
+    },
   },
   server: {
     host: '127.0.0.1',
@@ -41,6 +73,8 @@ export default defineConfig({
   },
   test: {
     restoreMocks: true,
+    // Else it is loaded as it is, and not with what stands in for its parts.
+    server: { deps: { inline: ['d3-zoom'] } },
     // A machine that builds and tests at once is slow; a test that hangs still fails.
     testTimeout: 30_000,
     unstubGlobals: true,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import tempfile
 from collections.abc import Iterator
@@ -18,8 +19,12 @@ from tests.support.state_home import use_own
 # What twins keep in a user's folder, the tests' keep in one of their own, in every process.
 STATE = use_own()
 
+# Whatever the hour is: of servers that measure no light, by their clock.
+os.environ["LUPIN_DAY_HOURS"] = "00:00-23:59"
 # Before anything imports rclpy: ROS would swallow a field of the wrong type, and leave the machine.
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
+# Before numpy: threads of its own that wait for a busy core take ten times the time.
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 # How long an example takes is the machine's business.
@@ -41,6 +46,11 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     """Under --quick, not even imported; None: for others to decide."""
     return True if config.getoption("--quick") and not is_quick(collection_path) else None
+
+
+def pytest_collection_finish() -> None:
+    """What thousands of tests were collected into stays: no `gc.collect()` has to look at it."""
+    gc.freeze()
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

@@ -74,6 +74,28 @@ const scenarios = {
     };
   },
 
+  /** Draws the map and follows the inputs, in JSON, in CBOR, and raw. */
+  async inputs() {
+    const heard = async (options) => {
+      const next = (name, messageType) => subscribe({ name, messageType, ...options }).next();
+      const [map, observation, tags, state] = await Promise.all([
+        next('/map', 'nav_msgs/msg/OccupancyGrid'),
+        next('/floranova/observations', 'lupin_msgs/msg/Observation'),
+        next('/perception/discovered_tags', 'lupin_msgs/msg/DiscoveredTags'),
+        next(STATE.name, STATE.messageType),
+      ]);
+      return { map, observation, tags, state, kind: map.data.constructor.name };
+    };
+    const json = await heard({});
+    const cbor = await heard({ compression: 'cbor' });
+    const raw = await subscribe({
+      name: '/map',
+      messageType: 'nav_msgs/msg/OccupancyGrid',
+      compression: 'cbor-raw',
+    }).next();
+    return { json, cbor, raw: raw.bytes.length };
+  },
+
   /** Tries whatever would change something. */
   async write() {
     const topic = new Topic({ ros, name: '/cmd_vel', messageType: 'geometry_msgs/msg/Twist' });

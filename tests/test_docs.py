@@ -12,7 +12,11 @@ from lupin_bridge.app import create_app
 from lupin_bridge.cli import ROLES
 from lupin_bridge.settings import option, table
 from lupin_patrol import cli as patrol_cli
+from lupin_twin.estimates import ESTIMATE_SERVICE
+from lupin_twin.layers import LAYERS_BELOW
+from lupin_twin.marks import PLANTERS_TOPIC, TAGS_TOPIC
 from lupin_twin.parameters import TwinParameters, describe
+from lupin_twin.past import HISTORY_SERVICE, STATE_AT_SERVICE
 from tests.support.structure import PACKAGES, ROOMS
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -33,7 +37,7 @@ def test_every_parameter_is_named_with_its_default() -> None:
     assert {name: cells[0].strip("`") for name, cells in documented.items()} == {
         spec.name: str(spec.default).lower()
         if isinstance(spec.default, bool)
-        else str(spec.default)
+        else str(spec.default or "")
         for spec in fields(TwinParameters)
     }
 
@@ -42,12 +46,13 @@ def test_every_parameter_is_given_with_its_range() -> None:
     documented = rows("Parameters of the twin")
     documented.pop("use_sim_time")
     for name, cells in documented.items():
-        assert cells[1] == describe(name)[1], name
+        assert cells[1] == describe(name).range, name
 
 
 def test_every_setting_is_named_with_its_default() -> None:
     documented = {name: cells[0] for name, cells in rows("Settings of the bridge").items()}
-    assert documented.pop("LUPIN_TOKEN") == documented.pop("--config") == ""
+    for name in ("LUPIN_TOKEN", "LUPIN_MQTT_PASSWORD", "LUPIN_WEBHOOK_SECRET", "--config"):
+        assert documented.pop(name) == ""
     expected = {
         option(spec.name): "" if spec.default in ((), "") else str(spec.default) for spec in table()
     }
@@ -60,6 +65,7 @@ def test_every_route_is_named_and_none_that_is_not_there() -> None:
         "/",
         "/ws/state",
         "/rosbridge",
+        "/foxglove",
         "/signin",
         "/api/signin",
         "/api/signout",
@@ -81,7 +87,15 @@ def test_every_topic_is_named_with_its_qos() -> None:
     ):
         assert f"reliable, transient local, depth {depth}" in str(rows_by_name(f"/{topic}"))
     assert "with the same stamp" in str(rows_by_name(f"/{parameters.times_topic}"))
-    assert parameters.field_service_name in README
+    for topic in (f"{LAYERS_BELOW}<sensor>", TAGS_TOPIC, PLANTERS_TOPIC):
+        assert "depth 1: while somebody subscribes" in str(rows_by_name(f"/{topic}"))
+    for service in (
+        parameters.field_service_name,
+        ESTIMATE_SERVICE,
+        STATE_AT_SERVICE,
+        HISTORY_SERVICE,
+    ):
+        assert "services' default" in str(rows_by_name(f"/{service}"))
     assert documented == {}  # topics stand in the second column
 
 

@@ -1,4 +1,4 @@
-"""100,000 WebSocket frames that nobody asked for, half to `/ws/state` and half to `/rosbridge`.
+"""105,000 WebSocket frames that nobody asked for, to `/ws/state`, `/rosbridge` and `/foxglove`.
 
 Two kinds: frames as they should be, with anything in them, which are ignored or answered with a
 refusal; and frames that break the protocol, each of which ends its connection. Meanwhile a healthy
@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from lupin_bridge.rosbridge.session import MAX_BURST
+from lupin_bridge.serving.client_pace import MAX_BURST
 from lupin_bridge.serving.ws_protocol import FRAMES_AT_ONCE
 from tests.support.messages import scan
 from tests.support.proc_stat import open_files, peak_mb, reset_peak, resident_mb
@@ -50,7 +50,7 @@ ROSBRIDGE_OPS = (
 
 @pytest.fixture(scope="module")
 def live() -> Iterator[Bridge]:
-    with bridge() as running:
+    with bridge(afresh=True) as running:
         running.peer.observe(scan("1", {"co2": 400.0}, (0, 0)))
         running.tag("1")
         yield running
@@ -121,9 +121,16 @@ def closing_code(frames: list[tuple[int, bytes]]) -> int | None:
 
 
 @pytest.mark.parametrize(
-    ("path", "at_once"), [("/ws/state", FRAMES_AT_ONCE // 2), ("/rosbridge", MAX_BURST // 2)]
+    ("path", "at_once", "frames"),
+    [
+        ("/ws/state", FRAMES_AT_ONCE // 2, FRAMES),
+        ("/rosbridge", MAX_BURST // 2, FRAMES),
+        ("/foxglove", MAX_BURST // 2, FRAMES // 10),  # as fast as /rosbridge, by the same parts
+    ],
 )
-def test_frames_that_nobody_asked_for_change_nothing(live: Bridge, path: str, at_once: int) -> None:
+def test_frames_that_nobody_asked_for_change_nothing(
+    live: Bridge, path: str, at_once: int, frames: int
+) -> None:
     chance = random.Random(path)
     pid = live.process.pid
     with live.listen() as healthy:
@@ -132,7 +139,7 @@ def test_frames_that_nobody_asked_for_change_nothing(live: Bridge, path: str, at
             client.say(masked(CLOSE, b"\x03\xe8"))
         memory, files = resident_mb(pid), open_files(pid)
         reset_peak(pid)
-        for _ in range(FRAMES // at_once):
+        for _ in range(frames // at_once):
             with RawClient(live.url, path) as client:
                 said = b"".join(anything(chance) for _ in range(at_once))
                 heard = client.say(said + masked(CLOSE, struct.pack("!H", NORMAL)))

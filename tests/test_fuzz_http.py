@@ -17,6 +17,7 @@ import schemathesis
 from hypothesis import HealthCheck, settings
 from schemathesis.specs.openapi.checks import positive_data_acceptance
 
+from lupin_bridge.access.middleware import MAX_TARGET_BYTES
 from lupin_bridge.openapi import document
 from tests.support.messages import look, occupancy_grid, scan
 from tests.support.proc_stat import open_files, peak_mb, reset_peak, resident_mb
@@ -30,7 +31,7 @@ MEMORY_MB = 5.0
 
 @pytest.fixture(scope="module")
 def live() -> Iterator[Bridge]:
-    with bridge(*NO_LIMITS) as running:
+    with bridge(*NO_LIMITS, afresh=True) as running:
         running.peer.observe(
             scan("1", {"co2": 400.0, "temperature": 20.0}, (0, 0)),
             look("1", blooms=[(0.1, 0.1)], footprint=[(0, 0), (1, 0), (1, 1)]),
@@ -49,9 +50,13 @@ schema = schemathesis.openapi.from_dict(json.loads(document()))
 
 
 @schema.parametrize()
-@settings(max_examples=60, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=30, derandomize=True, suppress_health_check=list(HealthCheck))
 def test_every_answer_is_one_that_the_document_describes(case: Any, live: Bridge) -> None:
-    case.call_and_validate(base_url=live.url, excluded_checks=[positive_data_acceptance])
+    answer = case.call(base_url=live.url)
+    if answer.status_code == 414:  # the door's answer, whatever the route
+        assert len(answer.request.url) - len(live.url) > MAX_TARGET_BYTES
+        return
+    case.validate_response(answer, excluded_checks=[positive_data_acceptance])
 
 
 def test_the_document_names_every_route() -> None:
@@ -121,4 +126,5 @@ def test_bytes_that_are_no_http_are_refused_and_leave_nothing_behind(live: Bridg
         assert not answer.startswith(b"HTTP/1.1 5")
     assert peak_mb(pid) - before_mb < MEMORY_MB
     wait_for(lambda: open_files(pid) <= files, "the end of all connections")
-    assert answer_to(address, GOOD).startswith(b"HTTP/1.1 200 ")
+    # Not by `answer_to`: who ends its half of the connection is taken to have gone (nginx's habit).
+    assert live.get("/api/state").status_code == 200

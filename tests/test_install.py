@@ -80,5 +80,7 @@ def test_with_the_page_it_is_in_the_package(clone: Path, domain: int, tmp_path: 
         page = httpx.get(f"{url}/", trust_env=False, timeout=PATIENCE_S)
         assert (page.status_code, "Lupin twin" in page.text) == (200, True)
         for name in (part.split('"')[0] for part in page.text.split('="./')[1:]):
-            assert httpx.get(f"{url}/{name}", trust_env=False).status_code == 200, name
+            assert (
+                httpx.get(f"{url}/{name}", trust_env=False, timeout=PATIENCE_S).status_code == 200
+            ), name
         assert "was not built" not in process.output

@@ -81,8 +81,33 @@ def test_the_clock_never_starts_runs_is_paused_stops_and_runs_again(
 
     for live in both:
         until(lambda live=live: runs(live), "a clock that runs again")  # type: ignore[misc]
+    for live in both:
+        goes_back_while_the_past_is_asked(twin, live, seconds - 100 * (1 + both.index(live)))
     assert "nothing comes on /clock" in twin.process.output
     assert twin.json("/healthz")["callback_errors"] == 0
+
+
+def goes_back_while_the_past_is_asked(twin: Bridge, live: Bridge, seconds: int) -> None:
+    """No answer of either time is an error, and who listens hears of the time that is now."""
+    asked = ("/api/state?at=1000", "/api/history?tag_id=1&sensor_type=co2", "/api/timeline")
+    statuses: set[int] = set()
+
+    def gone_back() -> bool:
+        tick(twin, seconds)
+        statuses.update(live.get(path).status_code for path in asked)
+        return bool(live.json("/api/state")["header"]["stamp"]["sec"] == seconds)
+
+    with live.listen() as listening:
+        twin.peer.until(gone_back, "the clock's new time")
+        listening.until("state", lambda frame: frame["state"]["header"]["stamp"]["sec"] == seconds)
+    assert statuses == {200}
+    later = live.get("/api/state", at=seconds + 90)
+    assert (later.status_code, "later than now" in later.text) == (400, True)
+    for path in asked[1:]:
+        assert live.json(path)["to"]["sec"] == seconds
+    # What it knew it knows still.
+    [tag] = live.json("/api/state", at=seconds)["tags"]
+    assert [reading["value"] for reading in tag["readings"]] == [2.0]
 
 
 def drops(live: Bridge) -> dict[str, tuple[str, int]]:

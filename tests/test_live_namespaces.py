@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import base64
+
 import httpx
 
+from tests.bridge.routes.test_foxglove import play
+from tests.support.foxglove import reader_of
 from tests.support.messages import look, occupancy_grid, scan
 from tests.support.processes import Process, lupin_twin, twin_node, url_of
 from tests.support.ros import Peer
-from tests.support.waiting import wait_for
+from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import listener, tag_ids
 
 FIELD = {"sensor_type": "co2", "resolution": "0.5"}
@@ -26,7 +30,10 @@ def fill(robot: Peer, namespace: str, tag_id: str, co2: float) -> None:
 
 def answers(process: Process, tag_id: str) -> tuple[list[str], dict[str, object]]:
     """The tags and the field of a bridge, once it has this tag and finds the twin's service."""
-    with listener(url_of(process)) as client, httpx.Client(base_url=url_of(process)) as http:
+    with (
+        listener(url_of(process)) as client,
+        httpx.Client(base_url=url_of(process), timeout=PATIENCE_S) as http,
+    ):
         client.until_tag(tag_id)
         field = wait_for(
             lambda: (
@@ -40,6 +47,18 @@ def answers(process: Process, tag_id: str) -> tuple[list[str], dict[str, object]
         assert field is not None
         wait_for(lambda: http.get("/api/map").status_code == 200, "the map")
         return tag_ids(http.get("/api/state").json()), field.json()
+
+
+def viewed(process: Process, namespace: str) -> tuple[str, list[int]]:
+    """What Foxglove's own client sees of a house: the tag last observed, and the map."""
+    topics = [f"{namespace}/{name}" for name in ("floranova/observations", "map", "twin/state")]
+    told = play(url_of(process), "look", *topics)
+    channels = {channel["topic"]: channel for channel in told["channels"]}
+    observation, grid, _state = (
+        reader_of(channels[topic])(base64.b64decode(told["first"][topic]["data"]))
+        for topic in topics
+    )
+    return observation.tag_reading.tag_id or observation.flower.tag_id, list(grid.data)
 
 
 def test_two_houses_in_one_domain_do_not_mix(domain: int) -> None:
@@ -56,6 +75,7 @@ def test_two_houses_in_one_domain_do_not_mix(domain: int) -> None:
         assert (ours, field["value_max"]) == (["one"], 400.0)
         theirs, field = answers(second, "two")
         assert (theirs, field["value_max"]) == (["two"], 900.0)
+        assert viewed(web, "/gh1") == ("one", [0, 0, 0, 0])
         # What it hears and tells is the first that a twin says.
         first.wait_for_output("/gh1/lupin_twin in ROS domain")
         for name in ("/gh1/floranova/observations", "/gh1/perception/discovered_tags", "/gh1/map"):
@@ -69,7 +89,8 @@ def test_two_houses_in_one_domain_do_not_mix(domain: int) -> None:
 
 def test_the_demo_below_a_namespace_takes_its_patrol_along(domain: int) -> None:
     with (
-        lupin_twin(domain, "demo", "--speed", "20", *below("/gh1")) as demo,
+        # Without the past that it begins with: what is shown comes from the patrol.
+        lupin_twin(domain, "demo", "--speed", "20", *below("/gh1"), "-p", "journal:=off") as demo,
         listener(url_of(demo)) as screen,
     ):
         screen.until("state", lambda frame: len(tag_ids(frame["state"])) > 3)

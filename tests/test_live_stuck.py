@@ -19,7 +19,7 @@ from websockets.exceptions import ConnectionClosed
 
 from lupin_bridge.serving.server import MAX_INBOUND_BYTES
 from lupin_bridge.serving.ws_protocol import FRAMES_AT_ONCE, FRAMES_PER_S, MAX_PIECES
-from tests.bench.bench_live import Server, serving
+from tests.bench.live_parts import Server, serving
 from tests.support import raw_http
 from tests.support.proc_stat import open_files, peak_mb, reset_peak, resident_mb
 from tests.support.raw_ws import CLOSE, CONT, TEXT, RawClient, masked
@@ -28,8 +28,10 @@ from tests.support.web import Listener, bridge, deaf_client, listener
 
 CLIENTS = 20
 TIMEOUT_S = 2
-# For all of them together; a state of the robot's 30 tags has 23 kB, 1.1 MB a second for each.
-MEMORY_MB = 10.0
+SELDOM_HZ = 10.0
+# For all of them together; a state of the robot's 30 tags has 23 kB, 1.1 MB a second for each. What
+# the twin itself does meanwhile, fitting models, takes some 15 MB of it.
+MEMORY_MB = 25.0
 
 PING = b"\x89\x80abcd"
 EMPTY_TEXT = b"\x81\x80abcd"
@@ -43,7 +45,8 @@ def server() -> Iterator[Server]:
 
 @pytest.fixture
 def healthy(server: Server) -> Iterator[Listener]:
-    with listener(url(server)) as client:
+    """On a busy machine, whoever wants all of it may be as slow as those that are to go."""
+    with listener(url(server), max_rate_hz=SELDOM_HZ) as client:
         client.until("state")
         yield client
         assert "Traceback" not in server.process.output
@@ -108,7 +111,7 @@ def gone_in_the_end(server: Server, healthy: Listener) -> Iterator[ExitStack]:
     reset_peak(server.process.pid)
     with ExitStack() as stack:
         yield stack
-        wait_reading(healthy, lambda: metric(server, "lupin_clients") == clients, "the others' end")
+        wait_reading(healthy, lambda: metric(server, "lupin_clients") <= clients, "the others' end")
         wait_reading(
             healthy, lambda: open_files(server.process.pid) <= files, "the end of their sockets"
         )
@@ -207,13 +210,14 @@ def wait_for_the_answer(client: socket.socket) -> None:
 def test_a_flood_ends_its_sender_alone(server: Server, healthy: Listener, frame: bytes) -> None:
     with (
         gone_in_the_end(server, healthy) as stack,
-        listener(url(server)) as reads,
+        listener(url(server), max_rate_hz=SELDOM_HZ) as reads,
     ):
         reads.until("state")
         deaf = stack.enter_context(deaf_client(url(server)))
         wait_for_the_answer(deaf)
         for sender in (reads.connection.socket, deaf):
-            sender.sendall(frame * (FRAMES_AT_ONCE + FRAMES_PER_S))
+            # As many as it is for a server that needs seconds for them.
+            sender.sendall(frame * (FRAMES_AT_ONCE + 5 * FRAMES_PER_S))
         with pytest.raises(ConnectionClosed) as closed:
             reads.until("never", lambda _: False)
         assert closed.value.rcvd is not None
@@ -223,7 +227,10 @@ def test_a_flood_ends_its_sender_alone(server: Server, healthy: Listener, frame:
 
 
 def test_a_message_past_the_limit_is_one_in_pieces_too(server: Server, healthy: Listener) -> None:
-    with gone_in_the_end(server, healthy), listener(url(server)) as loud:
+    with (
+        gone_in_the_end(server, healthy),
+        listener(url(server), max_rate_hz=SELDOM_HZ) as loud,
+    ):
         pieces = MAX_INBOUND_BYTES // 10_000 + 1
         with suppress(ConnectionClosed):  # it may hear the answer before it has said all
             loud.connection.send("x" * 10_000 for _ in range(pieces))
@@ -233,7 +240,7 @@ def test_a_message_past_the_limit_is_one_in_pieces_too(server: Server, healthy: 
         assert closed.value.rcvd.code == 1009
 
 
-@pytest.mark.parametrize("path", ["/ws/state", "/rosbridge"])
+@pytest.mark.parametrize("path", ["/ws/state", "/rosbridge", "/foxglove"])
 def test_a_message_has_a_limit_of_pieces_however_small(server: Server, path: str) -> None:
     piece = masked(CONT, b"", fin=False)
     begin = masked(TEXT, b"", fin=False) + piece * (MAX_PIECES - 2)
@@ -269,9 +276,10 @@ def test_one_client_too_many_is_told_so_and_may_come_when_another_has_gone() -> 
             client.until("state")
 
 
-@pytest.mark.parametrize("path", [b"/ws/state", b"/rosbridge"])
+@pytest.mark.parametrize("path", [b"/ws/state", b"/foxglove"])
 def test_one_address_does_not_keep_the_places_from_the_others(path: bytes) -> None:
-    hello = b"GET %b HTTP/1.1\r\n%b\r\n" % (path, raw_http.UPGRADE)
+    spoken = b"Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n"
+    hello = b"GET %b HTTP/1.1\r\n%b%b\r\n" % (path, raw_http.UPGRADE, spoken)
     with bridge("--max-clients", "4") as live, ExitStack() as stack:
         greedy = [stack.enter_context(live.listen()) for _ in range(4)]
         for client in greedy:

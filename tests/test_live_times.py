@@ -86,7 +86,12 @@ def test_both_roles_tell_the_same_states_and_the_same_histories() -> None:
         for tag_id in "abcd":
             ours = served.json(f"/api/tags/{tag_id}/history")
             assert ours["is_known"] is True
-            assert known_of(followed.json(f"/api/tags/{tag_id}/history")) == late_try_apart(ours)
+
+            def is_known(path: str = f"/api/tags/{tag_id}/history", own: Any = ours) -> bool:
+                return known_of(followed.json(path)) == late_try_apart(own)
+
+            # A state's times come behind it.
+            wait_for(is_known, f"the history of {tag_id} at both")
         assert sensors_of(followed, "a") == {
             "co2": [(10, 400.0), (5000, 401.0), (7600, 402.0)],
             "light": [(10, 1.0), (7210, 2.0), (7600, 3.0)],

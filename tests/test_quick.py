@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -56,6 +57,7 @@ def test_a_good_part_is_quick_and_none_of_it_is_lost() -> None:
     result = subprocess.run(
         [sys.executable, "-m", "pytest", "--quick", "--collect-only", "-qq", TESTS],
         capture_output=True, text=True, check=False, cwd=TESTS.parent,
+        env={name: value for name, value in os.environ.items() if name != "PYTEST_ADDOPTS"},
     )  # fmt: skip
     assert result.returncode == 0, result.stdout
     collected = {line.partition(":")[0] for line in result.stdout.splitlines() if ": " in line}

@@ -88,11 +88,37 @@ def test_a_field_that_is_refused_and_a_call_that_fails_are_two_things(house: Bri
 
 def test_roslibs_questions_about_names_are_answered(house: Bridge) -> None:
     told = play(house.url, "names")
-    assert told["topics"] == {"topics": ["/twin/state"], "types": ["lupin_msgs/msg/TwinState"]}
+    assert dict(zip(*told["topics"].values(), strict=True)) == {
+        "/twin/state": "lupin_msgs/msg/TwinState",
+        "/floranova/observations": "lupin_msgs/msg/Observation",
+        "/perception/discovered_tags": "lupin_msgs/msg/DiscoveredTags",
+        "/map": "nav_msgs/msg/OccupancyGrid",
+        "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+    }
     assert told["topicType"] == "lupin_msgs/msg/TwinState"
     assert "/twin/get_field" in told["services"]
     assert told["serviceType"] == "lupin_msgs/srv/GetField"
     assert told["nodes"]["failed"].startswith("service 'rosapi/nodes' is not served")
+
+
+def test_map_and_inputs_come_as_they_were_published(house: Bridge) -> None:
+    house.peer.publish_map(messages.occupancy_grid([[0, 100], [-1, 50]]))
+    house.peer.discover(messages.discovered({"1": messages.pose(1.0, 2.0)}))
+    told = play(house.url, "inputs")
+    for grid in (told["json"]["map"], told["cbor"]["map"]):
+        assert (grid["info"]["width"], grid["header"]["frame_id"]) == (2, "map")
+    assert told["json"]["map"]["data"] == [0, 100, -1, 50]
+    assert told["json"]["observation"]["tag_reading"]["tag_id"] == "1"
+    assert told["json"]["tags"]["tags"][0]["tag_id"] == "1"
+    # A typed array, of which JSON makes an object.
+    assert (told["cbor"]["kind"], list(told["cbor"]["map"]["data"].values())) == (
+        "Int8Array",
+        [0, 100, -1, 50],
+    )
+    assert told["cbor"]["observation"] == told["json"]["observation"]
+    # Off the wire of ROS, where it is published once a second.
+    assert told["cbor"]["state"]["header"]["frame_id"] == "map"
+    assert told["raw"] > 20
 
 
 def test_what_writes_is_refused(house: Bridge) -> None:
@@ -114,8 +140,7 @@ def test_what_writes_is_refused(house: Bridge) -> None:
 def test_two_components_of_a_page_share_a_topic(house: Bridge) -> None:
     told = play(house.url, "two")
     assert told["warnings"] == [
-        "compression 'cbor' is not served: messages are plain JSON",
-        "queue_length 10 is served as 1: the newest state only",
+        "queue_length 10 is served as 1: the newest only",
     ]
     assert told["heardAfterUnsubscribe"] == 0
     assert told["afterTheEnd"] == 0

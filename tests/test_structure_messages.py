@@ -54,11 +54,46 @@ WIRE_FORMAT = {
         "uint8 last_try_status · string last_try_detail"
     ),
     "msg/TwinTimes.msg": "std_msgs/Header header · TagTimes[] tags",
+    "srv/GetEstimate.srv": (
+        "string sensor_type · float32 resolution · float32 bbox_min_x · float32 bbox_min_y · "
+        "float32 bbox_max_x · float32 bbox_max_y · builtin_interfaces/Time at · --- · bool ok · "
+        "string error_message · float32[] mean · float32[] sd · uint32 width · uint32 height · "
+        "float32 origin_x · float32 origin_y · float32 resolution_used · float32 sd_known · "
+        "uint32 sample_count · uint32 reading_count"
+    ),
+    "srv/GetEstimateReport.srv": (
+        "string sensor_type · uint32 max_places · --- · bool ok · string error_message · "
+        "builtin_interfaces/Time at · builtin_interfaces/Time fitted_at · string fit_problem · "
+        "builtin_interfaces/Time graded_since · uint32 day_scans · uint32 day_inside · "
+        "uint32 week_scans · uint32 week_inside · string[] tag_ids · float64[] measured · "
+        "builtin_interfaces/Time[] observed_at · float64[] expected · float64[] expected_sd · "
+        "float64[] z · float64[] offset · bool[] left_out · "
+        "builtin_interfaces/Time[] changed_since · float64[] place_x · float64[] place_y · "
+        "float64[] error_ratio"
+    ),
     "srv/GetField.srv": (
         "string sensor_type · float32 resolution · float32 bbox_min_x · float32 bbox_min_y · "
         "float32 bbox_max_x · float32 bbox_max_y · --- · bool ok · string error_message · "
         "float32[] values · uint32 width · uint32 height · float32 origin_x · float32 origin_y · "
         "float32 resolution_used · float32 value_min · float32 value_max · uint32 sample_count"
+    ),
+    "srv/GetStateAt.srv": (
+        "builtin_interfaces/Time at · --- · bool ok · string error_message · "
+        "TwinState state · TwinTimes times"
+    ),
+    "srv/GetHistory.srv": (
+        "string tag_id · string sensor_type · builtin_interfaces/Time start · "
+        "builtin_interfaces/Time end · uint32 max_points · --- · bool ok · string error_message · "
+        "bool is_bucketed · builtin_interfaces/Time[] stamps · uint32[] counts · "
+        "float64[] means · float64[] minima · float64[] maxima"
+    ),
+    "srv/GetWrites.srv": (
+        "uint64 after · float64 reach_s · uint64 reach_count · uint32 max_count · --- · "
+        "bool ok · string error_message · string journal · uint64 last · bool is_all · "
+        "uint32[] span_runs · int64[] span_starts_ns · int64[] span_ends_ns · string[] texts · "
+        "uint64[] numbers · uint32[] runs · uint32[] tags · int64[] stamps_ns · uint8[] kinds · "
+        "uint8[] statuses · uint32[] reading_counts · bool[] has_seen · uint32[] species · "
+        "bool[] anomalies · uint16[] bug_counts · uint32[] sensors · float64[] values"
     ),
 }
 

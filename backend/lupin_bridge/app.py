@@ -5,17 +5,25 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from fastapi import FastAPI, Request, Response
+from fastapi import FastAPI, Response, WebSocket
+from starlette.requests import HTTPConnection
 from starlette.staticfiles import StaticFiles
 
 from lupin_bridge.access.entrance import ComesIn, Entrance
 from lupin_bridge.access.middleware import Access, AccessControl
 from lupin_bridge.access.security import ReadOnly
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.routes import alarms as routes_alarms
 from lupin_bridge.routes import docs_page, no_page
+from lupin_bridge.routes import estimate as routes_estimate
+from lupin_bridge.routes import estimate_report as routes_estimate_report
+from lupin_bridge.routes import export as routes_export
 from lupin_bridge.routes import field as routes_field
+from lupin_bridge.routes import foxglove as routes_foxglove
 from lupin_bridge.routes import health as routes_health
+from lupin_bridge.routes import judge as routes_judge
 from lupin_bridge.routes import map as routes_map
+from lupin_bridge.routes import past as routes_past
 from lupin_bridge.routes import rosbridge as routes_rosbridge
 from lupin_bridge.routes import signin as routes_signin
 from lupin_bridge.routes import state as routes_state
@@ -59,8 +67,15 @@ def create_app(
     for module in (
         routes_state,
         routes_rosbridge,
+        routes_foxglove,
         routes_field,
+        routes_estimate,
+        routes_estimate_report,
+        routes_past,
+        routes_export,
         routes_map,
+        routes_judge,
+        routes_alarms,
         routes_health,
         routes_signin,
         docs_page,
@@ -76,6 +91,7 @@ def create_app(
     if bridge is not None:
         app.add_middleware(Metered, note=bridge.note_answer)
     app.add_exception_handler(404, _not_found)
+    app.add_api_websocket_route("/{path:path}", _no_websocket)
     if has_page(static_folder):
         app.mount("/", StaticFiles(directory=static_folder, html=True), name="hmi")
     else:
@@ -87,15 +103,28 @@ def create_app(
 _DESCRIPTION = """
 Read-only: every route answers GET and HEAD alone. Positions are metres in the map frame, values
 are in the sensor's unit, what is not known is null. `/ws/state` is a WebSocket that sends
-`StateFrame` and `StatusFrame` as JSON text: the current ones at once, then every change. A bridge
-with a token (`LUPIN_TOKEN`) wants it as `Authorization: Bearer` with every request, `/healthz`
-excepted; a browser signs in at `/signin`.
+`StateFrame`, `StatusFrame` and `AlarmsFrame` as JSON text: the current ones at once, then every
+change. A bridge with a token (`LUPIN_TOKEN`) wants it as `Authorization: Bearer` with every
+request, `/healthz` excepted; a browser signs in at `/signin`.
 """
 
 
-async def _not_found(request: Request, _error: Exception) -> Response:
+async def _not_found(request: HTTPConnection, _error: Exception | None = None) -> Response:
     prefix = request.scope.get("root_path", "")
     return error_response(f"there is nothing at {request.url.path[:128]!r}; see {prefix}/docs", 404)
+
+
+async def _no_websocket(websocket: WebSocket) -> None:
+    await websocket.send_denial_response(await _not_found(websocket))
+
+
+_FRAMES = (
+    schema.StateFrame,
+    schema.DeltaFrame,
+    schema.StatusFrame,
+    schema.AlarmsFrame,
+    schema.Alarms,
+)
 
 
 def _describe_frames(app: FastAPI) -> None:
@@ -106,7 +135,7 @@ def _describe_frames(app: FastAPI) -> None:
     def with_frames() -> dict[str, object]:
         document = plain()
         schemas = document.setdefault("components", {}).setdefault("schemas", {})
-        for model in (schema.StateFrame, schema.DeltaFrame, schema.StatusFrame):
+        for model in _FRAMES:
             described = model.model_json_schema(ref_template="#/components/schemas/{model}")
             schemas.update(described.pop("$defs", {}))
             schemas[model.__name__] = described

@@ -11,19 +11,33 @@ from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from typing import Final
 
+from lupin_bridge.alarms.board import AlarmBoard, Board
+from lupin_bridge.alarms.feed import AlarmFeed
+from lupin_bridge.alarms.ledger import Change
+from lupin_bridge.estimates.following import EstimateFollower
+from lupin_bridge.estimates.reports import Reports
+from lupin_bridge.foxglove.offer import Offer
+from lupin_bridge.judge.choosing import Criteria
+from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced
 from lupin_bridge.metrics import Metrics, Sample
+from lupin_bridge.outward.channels import Channels
+from lupin_bridge.outward.payloads import Seen
+from lupin_bridge.past.asked import Answered
+from lupin_bridge.past.rhythms import learn_rhythms
 from lupin_bridge.serving.admission import Admission
 from lupin_bridge.serving.goodbye import Goodbye
 from lupin_bridge.serving.kept import Answer, Kept
 from lupin_bridge.serving.metering import route_class
 from lupin_bridge.serving.rate_limit import RateLimit
 from lupin_bridge.settings import Settings
-from lupin_bridge.stream.frames import FrameWriter
+from lupin_bridge.stream.alarms_json import alarms_frame, told_of
+from lupin_bridge.stream.frames import CBOR, JSON, FrameWriter, encoded
 from lupin_bridge.stream.hub import Client, Hub
 from lupin_bridge.stream.status import Liveness, Status
 from lupin_bridge.twin.shared import Shared
 from lupin_bridge.twin.source import Told, TwinSource
 from lupin_twin.counts import LATE, LOST
+from lupin_twin.diagnostics import Origin
 from lupin_twin.drops import Reason
 from lupin_twin.state import NANOSECONDS_PER_SECOND
 
@@ -43,6 +57,9 @@ HEARTBEAT_SPARED_S = 0.8
 # after it would wait for its slot.
 PACE_BURST: Final = 2.0
 _EVERYBODY: Final = ""
+# What a frame of alarms takes to write, at worst; and how fast such frames follow each other.
+ALARMS_S: Final = 0.03
+ALARM_BYTES_PER_S: Final = 500_000
 
 
 class Bridge:
@@ -52,7 +69,12 @@ class Bridge:
     """
 
     def __init__(
-        self, source: TwinSource, settings: Settings, clock: Callable[[], float] = time.monotonic
+        self,
+        source: TwinSource,
+        settings: Settings,
+        clock: Callable[[], float] = time.monotonic,
+        criteria: Criteria | None = None,
+        outward: Channels | None = None,
     ) -> None:
         self._clock = clock
         self.source = source
@@ -64,10 +86,29 @@ class Bridge:
         )
         self.kept = Kept()
         self.answering: Shared[Answer] = Shared()
+        self.looking_back: Shared[Answered] = Shared()
         self.goodbye = Goodbye()
         self.frames = FrameWriter()
+        self.offer = Offer(source)
+        self.criteria = criteria or Criteria.of(settings)
+        self._judge = Judge(self.criteria.sensors, self.criteria.recent_s)
+        self._judged = NOTHING_JUDGED
+        self.reports = Reports(source)
+        self._estimates = EstimateFollower(
+            source,
+            self.reports,
+            lambda: None if self._latest is None else self._latest.snapshot,
+            self._judge.note_changed,
+        )
+        self.alarms = AlarmBoard()
+        self.alarms.subscribe(self._on_alarms)
+        self._alarm_feed = AlarmFeed(
+            source, self.criteria, self.alarms, lambda: self.ros_time_ns, settings.alarm_days
+        )
+        self.outward = outward or Channels()
         self.http_answers: Counter[str] = Counter()
         self.metrics = Metrics(self._measure, self._count)
+        self.alarms_raised = 0
         self.kept_state: Hashable = None
         self.state_number = 0
         self._latest: Told | None = None
@@ -77,6 +118,9 @@ class Bridge:
         self._pace = RateLimit(settings.max_rate_hz, PACE_BURST)
         self._push_timer: asyncio.TimerHandle | None = None
         self._watch: asyncio.Task[None] | None = None
+        self._learning: asyncio.Task[None] | None = None
+        self._has_alarms = asyncio.Event()
+        self._telling_alarms: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
         """Start the source and the watch.
@@ -88,16 +132,23 @@ class Bridge:
         await self.source.start(self._on_state, self._on_death)
         self._tell_status()
         self._watch = asyncio.create_task(self._keep_watch(), name="watch")
+        self._telling_alarms = asyncio.create_task(self._tell_alarms(), name="alarm frames")
+        self.outward.start(self, self.criteria.sensors)
+        self._alarm_feed.start()
+        self._estimates.start()
 
     async def stop(self) -> None:
-        """Stop both; the clients were told by `say_goodbye`."""
-        if self._watch is not None:
-            self._watch.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._watch
+        """Stop them, and what tells others; the clients were told by `say_goodbye`."""
+        for task in (self._watch, self._learning, self._telling_alarms):
+            if task is not None:
+                task.cancel()
+                with contextlib.suppress(asyncio.CancelledError):
+                    await task
+        await self._alarm_feed.stop()
+        await self._estimates.stop()
         if self._push_timer is not None:
             self._push_timer.cancel()
-        await self.source.stop()
+        await asyncio.gather(self.outward.stop(), self.source.stop())
 
     def say_goodbye(self) -> None:
         """Tell every client that the bridge is about to go, those who wait for an answer too."""
@@ -118,6 +169,11 @@ class Bridge:
         return self._liveness.status(self._clock())
 
     @property
+    def origin(self) -> Origin:
+        """Where observations come from, as the twin says."""
+        return self._liveness.origin
+
+    @property
     def ros_time_ns(self) -> int | None:
         """ROS time now: the newest state's, and the time since it came; None: it is not known."""
         if self._latest is None or self._liveness.last_state_s is None:
@@ -127,6 +183,30 @@ class Bridge:
             return snapshot.now_ns
         since_s = self._clock() - self._liveness.last_state_s
         return self._latest.snapshot.stamp_ns + int(since_s * NANOSECONDS_PER_SECOND)
+
+    @property
+    def judged(self) -> Judged:
+        """What was said with the last frame; of a house whose twin is silent, that it is."""
+        return self._judged if self.status.is_live else silenced(self._judged)
+
+    def readings_hold_ns(self) -> dict[str, int]:
+        """For how long those of each tag do, by the rhythm of now."""
+        return self._judge.holds_ns()
+
+    def seen(self) -> Seen:
+        """How the house is now, for who tells others of it."""
+        latest, status = self._latest, self.status
+        return Seen(
+            snapshot=None if latest is None else latest.snapshot,
+            judged=self.judged,
+            board=self.alarms.now,
+            holds_ns=self.readings_hold_ns(),
+            now_ns=self.ros_time_ns,
+            is_live=status.is_live,
+            twin=status.reason,
+            message=status.message,
+            origin=status.origin,
+        )
 
     def join(self, client: Client) -> None:
         """Add a listener; it has the status and the current state when this returns."""
@@ -145,6 +225,16 @@ class Bridge:
     def _count(self) -> Iterator[tuple[str, Mapping[str, int]]]:
         yield "lupin_admission_refused", self.admission.refused
         yield "lupin_http_answers", self.http_answers
+        yield from self.outward.counts()
+        known = self._estimates.known
+        yield (
+            "lupin_estimate_trusted",
+            {name: report.record.is_trusted for name, report in known.items()},
+        )
+        yield (
+            "lupin_estimate_fit_failing",
+            {name: bool(report.fit_problem) for name, report in known.items()},
+        )
         if self._latest is None:
             return
         # A twin that does not say has no zeros: nobody knows.
@@ -166,6 +256,9 @@ class Bridge:
         yield "lupin_frames_sent", hub.frames_sent
         yield "lupin_frames_skipped", hub.frames_skipped
         yield "lupin_bytes_sent", hub.bytes_sent
+        yield "lupin_topics_relayed", len(source.relay)
+        yield "lupin_messages_sent", self.offer.counts.sent
+        yield "lupin_messages_skipped", self.offer.counts.skipped + source.relay.skipped
         yield "lupin_ros_thread_alive", source.is_alive
         yield "lupin_ros_calls_waiting", source.calls_waiting
         yield "lupin_ros_callback_errors", source.callback_errors
@@ -177,12 +270,19 @@ class Bridge:
         )
         yield "lupin_tags", len(tags)
         yield "lupin_tags_pinned", sum(tag.pose is not None for tag in tags)
+        yield "lupin_alarms_known", self.alarms.now.source != "starting"
+        yield "lupin_alarms_active", len(self.alarms.now.active)
+        yield "lupin_alarms_missed", self._alarm_feed.missed
+        yield "lupin_alarms_raised", self.alarms_raised
         yield "lupin_fields_computing", self.admission.being_computed
+        yield "lupin_exports_running", self.admission.exporting
         yield "lupin_work_abandoned", source.workers.abandoned
         yield "lupin_field_cache_hits", cache.hits
         yield "lupin_field_cache_misses", cache.misses
         yield "lupin_field_cache_entries", cache.entries
         yield "lupin_field_cache_bytes", cache.bytes
+        if journal.state == "unknown":  # nobody knows: no zeros
+            return
         yield "lupin_journal_recording", journal.state == "recording"
         yield "lupin_journal_rows", journal.written
         yield "lupin_journal_rows_lost", journal.lost
@@ -201,6 +301,9 @@ class Bridge:
         self._liveness.has_map = state.occupancy_map is not None
         self._liveness.clock = state.snapshot.clock
         self._liveness.drops = state.drops
+        self._liveness.journal = state.journal
+        self._liveness.origin = state.origin
+        self._alarm_feed.on_state(state)
         if self._push_timer is not None:
             return  # it will take this state along
         if self._is_old_news(state, now_s):
@@ -236,8 +339,39 @@ class Bridge:
         now_s = self._clock()
         self._pushed, self._pushed_s = state, now_s
         self._tell_status()
-        self.hub.publish(self.frames.state(state.snapshot, state.revision), now_s)
+        # A source answers once it has started, which it may not have as it tells its first state.
+        if self._watch is not None and self._learning is None and state.snapshot.tags:
+            work = learn_rhythms(self.source, self._judge, state.snapshot)
+            self._learning = asyncio.create_task(work, name="rhythms")
+        judge_day = self.criteria.judge_day(state.snapshot.stamp_ns)
+        self._judged = self._judge.see(state.snapshot, judge_day)
+        self.hub.publish(self.frames.state(state.snapshot, state.revision, self._judged), now_s)
         self.metrics.push_seconds.observe(time.monotonic() - state.made_s)
+
+    def _on_alarms(self, change: Change) -> None:
+        if not change.is_past:
+            self.alarms_raised += sum(alarm.is_active for alarm in change.changed)
+        self._has_alarms.set()
+
+    async def _tell_alarms(self) -> None:
+        """The newest alarms, again and again; a frame of a thousand is written by a worker."""
+        while True:
+            await self._has_alarms.wait()
+            self._has_alarms.clear()
+            now, now_ns = self.alarms.now, self.ros_time_ns
+
+            def write(_: object, now: Board = now, now_ns: int | None = now_ns) -> dict[str, bytes]:
+                text = alarms_frame(told_of(now.page, now_ns), now.source, now.since_ns)
+                return {encoding: encoded(text, encoding) for encoding in (JSON, CBOR)}
+
+            try:
+                wires = await asyncio.wrap_future(self.source.workers.submit(write, ALARMS_S))
+                self.hub.tell_alarms(wires, self._clock())
+            except Exception:  # nobody waits for this task: the next alarms are told
+                log.exception("the newest alarms were told to nobody")
+                continue
+            # Of many alarms that change all the time, no more is sent than a browser can take.
+            await asyncio.sleep(len(wires[JSON]) / ALARM_BYTES_PER_S)
 
     def _on_death(self) -> None:
         self._liveness.thread_dead = True
@@ -246,6 +380,7 @@ class Bridge:
     # --- the watch ----------------------------------------------------------------------------
 
     def _tell_status(self) -> None:
+        self._liveness.outward = self.outward.status()
         status = self.status
         if not status.is_news_after(self._told):
             return
@@ -254,6 +389,12 @@ class Bridge:
         if (first and not is_good) or (self._told and status.says_more_than(self._told)):
             log.log(logging.INFO if is_good else logging.WARNING, "%s", status.message)
         self._told = status
+        if status.reason not in ("never_seen", "shutting_down"):
+            last = self._latest
+            self._alarm_feed.on_silence(
+                is_silent=not status.is_live,
+                last_ns=None if last is None else last.snapshot.now_ns,
+            )
         self.hub.announce(self._clock())
 
     async def _keep_watch(self) -> None:
@@ -262,9 +403,11 @@ class Bridge:
             try:
                 self._tell_status()
                 now_s = self._clock()
+                if not self.status.is_live:
+                    self.hub.remind(now_s)
                 self.hub.serve_all(now_s)  # who asked for a low rate may be due by now
                 stuck = self.hub.dismiss_stuck(now_s)
-            except Exception:
+            except Exception:  # nobody waits for this task, and who takes no frame must go
                 log.exception("the watch met an error and goes on")
                 continue
             if stuck:

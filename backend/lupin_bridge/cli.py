@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import math
 import os
 import signal
 import sys
@@ -12,15 +13,17 @@ from collections.abc import Sequence
 from dataclasses import Field
 from typing import Any, NoReturn
 
-from lupin_bridge import logs
+from lupin_bridge import journal_command, logs
+from lupin_bridge.bags import mcap_command, record_command, replay_command
 from lupin_bridge.configuration import (
     CONFIG_VARIABLE,
     settings_from,
     strange_variables,
-    take_token,
+    take_secrets,
 )
 from lupin_bridge.settings import SettingError, Settings, one_of, option, table
-from lupin_twin.leaving import leave
+from lupin_twin.leaving import leave_after
+from lupin_twin.one_core import use_one_core
 
 log = logging.getLogger(__name__)
 
@@ -29,8 +32,24 @@ USAGE_ERROR = 2
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a role; returns the process's exit code."""
+    use_one_core()
     own, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
     options = _parser().parse_args(own)
+    if options.role == "journal":
+        if ros_args:
+            _fail("journal takes no arguments of ROS: name its file with --journal or --namespace")
+        return journal_command.run(options, os.environ)
+    if options.role == "record":
+        _prepare_process()
+        return record_command.run(options, ros_args)
+    if options.role == "mcap":
+        if ros_args:
+            _fail("mcap takes no arguments of ROS: it works on files")
+        return mcap_command.run(options)
+    if options.role == "replay":
+        _prepare_process()
+        return replay_command.run(options, ros_args)
+    replay_args = _replay_args(options)
     try:
         settings = _settings_from(options)
         # Before anything slow is imported, and before the first thread: Ctrl-C and SIGTERM wait
@@ -42,8 +61,15 @@ def main(argv: Sequence[str] | None = None) -> int:
             log.warning("%s", warning)
         from lupin_bridge.roles import run  # noqa: PLC0415  # see above
 
-        token = take_token(settings, os.environ)
-        run(options.role, settings, token, ros_args, _patrol_args(options))
+        secrets = take_secrets(settings, os.environ)
+        run(
+            options.role,
+            settings,
+            secrets,
+            ros_args,
+            _patrol_args(options),
+            replay_args=replay_args,
+        )
     except SettingError as error:
         _fail(str(error))
     return 0
@@ -51,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def command() -> NoReturn:
     """`main` as a process of its own."""
-    leave(main())
+    leave_after(main)
 
 
 def split_ros_args(argv: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -79,7 +105,10 @@ ROLES = {
 
 # Handed on to the patrol, which checks their ranges; what is no number is refused here already.
 PATROL_OPTIONS: dict[str, tuple[type[int | float], str]] = {
-    "speed": (float, "how fast the patrol goes, patrol seconds a second (default: 1)"),
+    "speed": (
+        float,
+        "how fast the patrol goes, or the recording, its seconds a second (default: 1)",
+    ),
     "seed": (int, "another seed, another patrol (default: 0)"),
 }
 
@@ -87,6 +116,25 @@ PATROL_OPTIONS: dict[str, tuple[type[int | float], str]] = {
 def _patrol_args(options: argparse.Namespace) -> list[str]:
     given = {name: getattr(options, name, None) for name in PATROL_OPTIONS}
     return [f"--{name}={value}" for name, value in given.items() if value is not None]
+
+
+def _replay_args(options: argparse.Namespace) -> list[str]:
+    """What `demo --from` hands on to `replay`, which has to take it; nothing without."""
+    if options.role != "demo":
+        return []
+    asked = [f"--start={options.start}"] if options.start is not None else []
+    asked += ["--loop"] if options.loop else []
+    asked += [f"--skip-gaps={options.skip_gaps}"] if options.skip_gaps < math.inf else []
+    if options.recording is None:
+        if asked:
+            _fail(f"{asked[0].partition('=')[0]} is for --from FILE.mcap")
+        return []
+    if options.seed is not None:
+        _fail("--seed is the patrol's, which --from FILE.mcap does without")
+    asked += [f"--speed={options.speed:.15g}"] if options.speed is not None else []
+    words = [*options.recording, *asked]
+    _parser().parse_args(["replay", *words])
+    return words
 
 
 def _settings_from(options: argparse.Namespace) -> Settings:
@@ -133,12 +181,26 @@ def _parser() -> argparse.ArgumentParser:
         if role == "demo":
             for name, (kind, help_text) in PATROL_OPTIONS.items():
                 own.add_argument(f"--{name}", type=kind, metavar=name.upper(), help=help_text)
+            own.add_argument(
+                "--from",
+                dest="recording",
+                metavar="FILE.mcap",
+                nargs="+",
+                help="show this recording and not the patrol: a file, or all of its files, or the "
+                "folder that they are in. It goes to a twin of its own, with the time of the "
+                "recording and a journal that ends with it",
+            )
+            replay_command.add_options(own)
+    journal_command.add_parser(roles)
+    record_command.add_parser(roles)
+    mcap_command.add_parser(roles)
+    replay_command.add_parser(roles)
     return parser
 
 
 def _described(spec: Field[Any]) -> str:
     low, high, choices = (spec.metadata[name] for name in ("low", "high", "choices"))
-    limits = f", from {low:g} to {high:g}" if low is not None else ""
+    limits = f", from {low:.15g} to {high:.15g}" if low is not None else ""
     return f"{spec.metadata['help']}{limits}{f': {one_of(choices)}' if choices else ''}"
 
 

@@ -13,17 +13,26 @@ import re
 import stat
 import tomllib
 from collections.abc import Iterable, Mapping, MutableMapping
-from dataclasses import Field
+from dataclasses import Field, fields
 from pathlib import Path
 from typing import Any, Final
 
-from lupin_bridge.settings import ENV_PREFIX, SettingError, Settings, check, table, variable
+from lupin_bridge.settings import (
+    ENV_PREFIX,
+    Secrets,
+    SettingError,
+    Settings,
+    check,
+    table,
+    variable,
+)
 
 log = logging.getLogger(__name__)
 
 CONFIG_VARIABLE: Final = variable("config")
-TOKEN_VARIABLE: Final = variable("token")
-_NOT_IN_THE_TABLE: Final = (CONFIG_VARIABLE, TOKEN_VARIABLE)
+# Each by a variable of its name, or in a file that a setting names.
+SECRETS: Final = tuple(spec.name for spec in fields(Secrets))
+_NOT_IN_THE_TABLE: Final = (CONFIG_VARIABLE, *map(variable, SECRETS))
 _BARE: Final = re.compile(r"[A-Za-z0-9_-]{1,64}")
 # Nobody writes this much; a device or a disk image given by mistake is not read to its end.
 MAX_FILE_BYTES: Final = 65_536
@@ -68,29 +77,37 @@ def settings_from(
     return Settings(**values, given_as=given_as)
 
 
-def take_token(settings: Settings, environment: MutableMapping[str, str]) -> str | None:
-    """The token that readers have to know, if there is one, with the environment rid of it.
+def take_secrets(settings: Settings, environment: MutableMapping[str, str]) -> Secrets:
+    """What the operator keeps from others, with the environment rid of it.
 
     The processes that the bridge starts have no use for it.
 
     Raises:
-        SettingError: it is given twice, or its file cannot be read.
+        SettingError: one is given twice, or its file cannot be read.
 
     """
-    token = environment.pop(TOKEN_VARIABLE, None)
-    if not settings.token_file:
-        return token
-    called = settings.called("token_file")
-    if token is not None:
-        raise SettingError(f"{TOKEN_VARIABLE} and {called} are both given, expected one of them")
-    text = read_text(settings.token_file, called).strip()
-    mode = Path(settings.token_file).stat().st_mode
+    return Secrets(**{name: _take_secret(name, settings, environment) for name in SECRETS})
+
+
+def _take_secret(
+    name: str, settings: Settings, environment: MutableMapping[str, str]
+) -> str | None:
+    secret = environment.pop(variable(name), None)
+    file = getattr(settings, f"{name}_file")
+    if not file:
+        return secret
+    called = settings.called(f"{name}_file")
+    if secret is not None:
+        raise SettingError(f"{variable(name)} and {called} are both given, expected one of them")
+    text = read_text(file, called).strip()
+    mode = Path(file).stat().st_mode
     if mode & stat.S_IROTH:
         log.warning(
-            "%s %s has mode %o: anyone on this machine can read the token, make it 600",
+            "%s %s has mode %o: anyone on this machine can read the %s, make it 600",
             called,
-            settings.token_file,
+            file,
             stat.S_IMODE(mode),
+            name.rpartition("_")[2],
         )
     return text
 
@@ -117,10 +134,10 @@ def _take_file(path: str, called: str, values: dict[str, Any], given_as: dict[st
     specs = {spec.name: spec for spec in table()}
     for key, value in content.items():
         place = f"{path}{_line_of(key, text)}: {key if _BARE.fullmatch(key) else repr(key[:64])}"
-        if key == "token":
+        if key in SECRETS:
             raise SettingError(
-                f"{place} is no setting: put the token into a file of its own, and name that with "
-                "token_file"
+                f"{place} is no setting: put the {key.rpartition('_')[2]} into a file of its own, "
+                f"and name that with {key}_file"
             )
         if key not in specs:
             raise SettingError(f"{place} is no setting of the bridge{_meant(key, specs)}")

@@ -16,6 +16,7 @@ Sample = tuple[str, float]
 GAUGES: Final = {
     "lupin_clients": "WebSocket clients that follow the state",
     "lupin_clients_blocked": "clients whose socket takes nothing just now",
+    "lupin_topics_relayed": "ROS topics that are listened to for viewers",
     "lupin_ros_thread_alive": "1 while the ROS thread runs",
     "lupin_ros_calls_waiting": "calls that wait for the ROS thread",
     "lupin_twin_live": "1 while the twin is live",
@@ -23,7 +24,10 @@ GAUGES: Final = {
     "lupin_state_age_seconds": "seconds since the last state came; infinite: none has",
     "lupin_tags": "tags that the twin knows",
     "lupin_tags_pinned": "tags that have a pose",
+    "lupin_alarms_known": "1 once the past has been gone through for alarms",
+    "lupin_alarms_active": "alarms that are active",
     "lupin_fields_computing": "field requests being computed now",
+    "lupin_exports_running": "exports being sent now",
     "lupin_field_cache_entries": "fields in the cache",
     "lupin_field_cache_bytes": "memory of the fields in the cache",
     "lupin_journal_recording": "1 while the journal keeps what is observed, as promised",
@@ -31,12 +35,23 @@ GAUGES: Final = {
     "lupin_journal_behind_seconds": "for how long the oldest of those has been waiting",
     "lupin_journal_file_bytes": "size of the journal on the disk",
 }
+# The same, each with a label of its own.
+LABELLED_GAUGES: Final = {
+    "lupin_outward_connected": ("channel", "1 while MQTT's broker, the webhook's receiver takes"),
+    "lupin_estimate_trusted": ("sensor", "1 while its estimates are as often right as they say"),
+    "lupin_estimate_fit_failing": ("sensor", "1 while a fit fails, is slow, or denies the day"),
+    "lupin_outward_waiting": ("channel", "tags and the house, or changes of alarms, not told yet"),
+}
 # Written with `_total` behind the name, as Prometheus wants it.
 COUNTERS: Final = {
     "lupin_clients_dismissed": "clients closed because they took no frame for too long",
     "lupin_frames_sent": "state frames written to clients",
     "lupin_frames_skipped": "state frames that a client did not get, being slow or wanting fewer",
     "lupin_bytes_sent": "bytes of frames written to clients",
+    "lupin_messages_sent": "ROS messages written to viewers as they are",
+    "lupin_messages_skipped": "ROS messages that a viewer did not get, being slow, or too large",
+    "lupin_alarms_missed": "observations that were heard too late for the alarms they belong to",
+    "lupin_alarms_raised": "alarms raised since the start; those of the past are not counted",
     "lupin_ros_callback_errors": "errors met by ROS callbacks",
     "lupin_field_cache_hits": "fields served from the cache",
     "lupin_field_cache_misses": "fields that had to be computed",
@@ -50,12 +65,19 @@ LABELLED: Final = {
     "lupin_dropped": ("reason", "messages and entries that the twin dropped or lost"),
     "lupin_web_dropped": ("reason", "messages that `web` itself dropped or lost"),
     "lupin_http_answers": ("status", "HTTP answers of the routes, by status"),
+    "lupin_outward_sent": ("channel", "messages that a broker or a receiver has taken"),
+    "lupin_outward_failed": ("channel", "connections and posts that failed"),
+    "lupin_outward_dropped": (
+        "channel",
+        "of MQTT, states of tags that gave way to newer ones; of the webhook, changes given up",
+    ),
 }
 HISTOGRAMS: Final = {
     "lupin_push_seconds": (
         "from a change in the ROS thread until every ready client has been written its frame"
     ),
     "lupin_field_seconds": "until a field is there: from the cache, computed, or asked for",
+    "lupin_estimate_seconds": "until an estimate is there and written",
 }
 
 # From a millisecond to the time-out of a field.
@@ -77,10 +99,18 @@ class Metrics(Collector):
         ProcessCollector(registry=self._registry)
         self.push_seconds = self._histogram("lupin_push_seconds")
         self.field_seconds = self._histogram("lupin_field_seconds")
+        self.estimate_seconds = self._histogram("lupin_estimate_seconds")
         self.http_seconds = Histogram(
             "lupin_http_seconds",
             "from a request until its answer began",
             ["route"],
+            buckets=_SECONDS,
+            registry=self._registry,
+        )
+        self.past_seconds = Histogram(
+            "lupin_past_seconds",
+            "until a question of the past is answered, by its kind",
+            ["question"],
             buckets=_SECONDS,
             registry=self._registry,
         )
@@ -97,8 +127,13 @@ class Metrics(Collector):
             else:
                 yield CounterMetricFamily(name, COUNTERS[name], value)
         for name, counts in self._read_labelled():
-            label, documentation = LABELLED[name]
-            family = CounterMetricFamily(name, documentation, labels=[label])
+            family: GaugeMetricFamily | CounterMetricFamily
+            if name in LABELLED_GAUGES:
+                label, documentation = LABELLED_GAUGES[name]
+                family = GaugeMetricFamily(name, documentation, labels=[label])
+            else:
+                label, documentation = LABELLED[name]
+                family = CounterMetricFamily(name, documentation, labels=[label])
             for name_of, count in counts.items():
                 family.add_metric([name_of], count)
             yield family

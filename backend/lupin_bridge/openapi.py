@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import sys
+from functools import cache
 
 import orjson
 
 from lupin_bridge.app import create_app
 
 
+@cache
 def document() -> bytes:
     """The document as indented JSON with a newline at its end."""
     options = orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE

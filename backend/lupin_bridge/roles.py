@@ -4,64 +4,93 @@ from __future__ import annotations
 
 import asyncio
 import gc
-import json
 import logging
 import os
 import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
+from pathlib import Path
 
+from lupin_bridge import demo
 from lupin_bridge.access.entrance import Entrance
 from lupin_bridge.access.middleware import Access
 from lupin_bridge.access.policy import exposure
 from lupin_bridge.access.tls import Certificates, check_pair
 from lupin_bridge.app import create_app, has_page
+from lupin_bridge.bags.recording import RecordingError
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.judge.choosing import Criteria
+from lupin_bridge.outward.channels import Channels
+from lupin_bridge.outward.choosing import Targets
+from lupin_bridge.past.asked import Answering
 from lupin_bridge.routes import no_page
 from lupin_bridge.serving.server import BridgeServer, address_of, allow_connections, listen
-from lupin_bridge.settings import SettingError, Settings
+from lupin_bridge.settings import Secrets, SettingError, Settings
 from lupin_bridge.supervisor import Supervisor
 from lupin_bridge.twin.local_twin import LocalTwin
 from lupin_bridge.twin.ros_thread import RosStartError
 from lupin_bridge.twin.source import ailment
 from lupin_bridge.twin.web_twin import WebTwin
-from lupin_twin.memory import state_folder
 from lupin_twin.parameters import ParameterError
 
 log = logging.getLogger("lupin_bridge")
 
-PATROL_STOP_S = 0.9
+FEEDER_STOP_S = 0.9
 
 
 def run(
     role: str,
     settings: Settings,
-    token: str | None,
+    secrets: Secrets,
     ros_args: Sequence[str],
     patrol_args: Sequence[str] = (),
+    *,
+    replay_args: Sequence[str] = (),
 ) -> None:
-    """Run a role until a signal ends it; `token` is what clients have to know, if anything.
+    """Run a role until a signal ends it.
 
     `patrol_args` are the options of the patrol, in the role `demo`; it gets `ros_args` too, so that
-    a namespace or a remapping holds for both.
+    a namespace or a remapping holds for both. With `replay_args`, the options of `lupin-twin
+    replay` and its files in front, a recording takes the patrol's place.
 
     Raises:
         SettingError: a setting, a parameter or an argument of ROS with which it cannot run.
 
     """
-    access = Access.of(settings, token)
+    access = Access.of(settings, secrets.token)
     entrance = Entrance.of(settings)
+    criteria = Criteria.of(settings)
+    targets = Targets.of(settings, secrets)
     if settings.tls_cert:
         check_pair(settings.tls_cert, settings.tls_key)
-    try:
-        asyncio.run(
-            _run(role, settings, access, entrance, ros_args=ros_args, patrol_args=patrol_args)
-        )
-    except (ParameterError, RosStartError) as error:
-        raise SettingError(str(error)) from error
+    with ExitStack() as ending:
+        try:
+            feed = None
+            if replay_args:
+                folder = ending.enter_context(tempfile.TemporaryDirectory(prefix="lupin-twin-"))
+                feed = demo.replayed(replay_args, ros_args, Path(folder))
+            elif role == "demo":
+                feed = demo.patrolled(os.environ, patrol_args, ros_args)
+            asyncio.run(
+                _run(
+                    role,
+                    settings,
+                    access,
+                    entrance,
+                    criteria,
+                    targets=targets,
+                    ros_args=ros_args,
+                    feed=feed,
+                    patrol_args=patrol_args,
+                )
+            )
+        except (ParameterError, RosStartError, RecordingError) as error:
+            raise SettingError(str(error)) from error
 
 
 async def _run(
@@ -69,8 +98,11 @@ async def _run(
     settings: Settings,
     access: Access,
     entrance: Entrance,
+    criteria: Criteria,
     *,
+    targets: Targets,
     ros_args: Sequence[str],
+    feed: demo.Feed | None,
     patrol_args: Sequence[str],
 ) -> None:
     try:
@@ -85,11 +117,18 @@ async def _run(
     settings = replace(settings, max_clients=allow_connections(settings.max_clients))
     # Before a process is started that would inherit its variables.
     supervisor = Supervisor(os.environ)
-    # The twin's alone: the patrol keeps nothing.
-    own_args = demo_journal(os.environ, patrol_args) if role == "demo" else []
-    make_source = WebTwin if role == "web" else LocalTwin
-    source = make_source(ros_args=[*own_args, *ros_args], timeout_s=settings.field_timeout_s)
-    bridge = Bridge(source, settings)
+    # The twin's alone: who feeds it keeps nothing.
+    own_args = [] if feed is None else feed.twin_args
+    if feed is not None and feed.journal is not None:
+        feed = await asyncio.to_thread(demo.with_past, feed, feed.journal, patrol_args)
+    source: LocalTwin | WebTwin
+    timeout_s = settings.field_timeout_s
+    if role == "web":
+        source = WebTwin(ros_args=ros_args, timeout_s=timeout_s)
+    else:
+        all_args = [*own_args, *ros_args]
+        source = LocalTwin(ros_args=all_args, timeout_s=timeout_s, expects=Answering)
+    bridge = Bridge(source, settings, criteria=criteria, outward=Channels(targets))
     app = create_app(bridge, access=access, entrance=entrance)
 
     def say_goodbye() -> None:
@@ -102,7 +141,7 @@ async def _run(
     # them, 30 to 50 ms during which nobody is served.
     gc.collect()
     gc.freeze()
-    patrol = Patrol([*patrol_args, *ros_args]) if role == "demo" else None
+    feeder = None if feed is None else Feeder(feed, lambda: server.should_exit)
     url = address_of(listener, "https" if access.secure else "http")
     print(f"lupin-twin: {url}", flush=True)  # noqa: T201  # for people and scripts
     supervisor.ready(f"serving {url}")
@@ -114,23 +153,9 @@ async def _run(
         living.cancel()
         if renewal is not None:
             renewal.cancel()
-        if patrol is not None:
-            patrol.terminate()
-        await asyncio.gather(bridge.stop(), *([] if patrol is None else [patrol.wait()]))
-
-
-def demo_journal(environ: Mapping[str, str], patrol_args: Sequence[str]) -> list[str]:
-    """ROS arguments that keep a demo's journal apart from a real twin's, and seeds from each other.
-
-    Whatever is given after them counts instead.
-    """
-    seeds = [word for word in patrol_args if word.startswith("--seed=")]
-    seed = seeds[-1].partition("=")[2] if seeds else "0"
-    try:
-        path = state_folder(environ) / f"demo-seed-{seed}.sqlite"
-    except RuntimeError:
-        return []
-    return ["--ros-args", "-p", f"journal:={json.dumps(str(path))}", "--"]
+        if feeder is not None:
+            feeder.terminate()
+        await asyncio.gather(bridge.stop(), *([] if feeder is None else [feeder.wait()]))
 
 
 def _follow_certificates(settings: Settings, server: BridgeServer) -> asyncio.Task[None] | None:
@@ -152,31 +177,34 @@ def _warn_of_exposure(listener: socket.socket, access: Access) -> None:
         log.warning("%s", warning)
 
 
-class Patrol:
-    """The simulated robot, in a process of its own so that its data crosses DDS."""
+class Feeder:
+    """The patrol, or a replay, in a process of its own so that its data crosses DDS."""
 
-    def __init__(self, options: Sequence[str]) -> None:
+    def __init__(self, feed: demo.Feed, is_stopping: Callable[[], bool]) -> None:
+        self._what = feed.what
+        self._is_stopping = is_stopping
         # The environment goes along whole: the ROS wheels' own variables only work together.
         self._process = subprocess.Popen(  # noqa: S603  # the operator's own words, no shell
-            [sys.executable, "-m", "lupin_patrol", "--end-with-parent", *options]
+            [sys.executable, "-m", *feed.command]
         )
-        self._is_stopping = False
-        self._watch = asyncio.create_task(asyncio.to_thread(self._tell_the_end))
+        self._watch = asyncio.create_task(self._tell_the_end())
 
     def terminate(self) -> None:
         """Ask it to end."""
-        self._is_stopping = True
         self._process.terminate()
 
     async def wait(self) -> None:
         """Wait for its end; kill it if that does not come."""
         try:
-            await asyncio.wait_for(asyncio.shield(self._watch), PATROL_STOP_S)
+            await asyncio.wait_for(asyncio.shield(self._watch), FEEDER_STOP_S)
         except TimeoutError:
             self._process.kill()
             await self._watch
 
-    def _tell_the_end(self) -> None:
-        code = self._process.wait()
-        if not self._is_stopping:
-            log.error("the patrol has ended with code %d; the twin goes on without it", code)
+    async def _tell_the_end(self) -> None:
+        code = await asyncio.to_thread(self._process.wait)
+        # At Ctrl-C a terminal signals both: on the loop, ours is known by now.
+        if not self._is_stopping():
+            log.error(
+                "the %s has ended with code %d; the twin goes on without it", self._what, code
+            )

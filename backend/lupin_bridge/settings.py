@@ -45,10 +45,12 @@ class Settings:
     field_timeout_s: float = _setting(
         10.0, "a computed answer that takes longer ends in 504, and its work with it", 0.1, 600.0
     )
+    # A page that is dragged through the past asks for ten moments a second, each for a state and a
+    # field or two; and behind one address there may be two such pages.
     field_rate_hz: float = _setting(
-        20.0,
+        50.0,
         "fields and other answers computed a second and client; two seconds' worth at once",
-        0.1,
+        0.01,
         10_000.0,
     )
     field_concurrency: int = _setting(
@@ -77,6 +79,34 @@ class Settings:
     tls_cert: str = _setting("", "PEM file with the certificate chain: serve https and wss")
     tls_key: str = _setting("", "PEM file with the certificate's private key, not encrypted")
     token_file: str = _setting("", "file with the token that readers have to know, a line of text")
+    sensors: str = _setting(
+        "", "JSON file with every sensor's label, unit, colour and ranges, instead of our own"
+    )
+    recent_s: float = _setting(
+        0.0, "how long a reading holds; 0: three times the tag's own usual interval", 0.0, 604_800.0
+    )
+    time_zone: str = _setting(
+        "", "such as Europe/Amsterdam: for the hours of the day; empty: this machine's"
+    )
+    day_hours: str = _setting(
+        "06:00-20:00", "from when to when it is day where no light is measured"
+    )
+    alarm_days: float = _setting(7.0, "how far back alarms are worked out, in days", 0.01, 3_652.0)
+    mqtt_url: str = _setting(
+        "",
+        "MQTT broker, such as mqtt://broker.lan or mqtts://broker.lan:8883: readings, verdicts and "
+        "alarms go there",
+    )
+    mqtt_user: str = _setting("", "who the bridge is to the broker")
+    mqtt_password_file: str = _setting("", "file with that user's password, a line of text")
+    mqtt_ca: str = _setting("", "PEM file with who signs the broker's certificate")
+    mqtt_prefix: str = _setting("lupin-twin", "what the topics begin with, such as farm/gh1")
+    mqtt_discovery_prefix: str = _setting(
+        "homeassistant", "where Home Assistant looks for devices; empty: they are not announced"
+    )
+    webhook_url: str = _setting("", "http or https address that changes of alarms are posted to")
+    webhook_secret_file: str = _setting("", "file with the secret that signs them, a line of text")
+    webhook_ca: str = _setting("", "PEM file with who signs the receiver's certificate")
     log_format: str = _setting(TEXT, "lines for people, or JSON for a collector", choices=FORMATS)
     log_level: str = _setting("info", "the least that is logged", choices=LEVELS)
     # What the operator called a setting, where it is not the option: a variable, a file's line.
@@ -98,6 +128,19 @@ class Settings:
         return self.given_as.get(name, option(name))
 
 
+@dataclass(frozen=True, slots=True, repr=False)
+class Secrets:
+    """What must not stand on a command line, for others can read it; None: not given.
+
+    `token` is what readers have to know, `mqtt_password` what the broker asks for, `webhook_secret`
+    signs what is posted.
+    """
+
+    token: str | None = None
+    mqtt_password: str | None = None
+    webhook_secret: str | None = None
+
+
 def table() -> tuple[Field[Any], ...]:
     """The settings themselves."""
     return tuple(spec for spec in fields(Settings) if spec.metadata)
@@ -112,7 +155,7 @@ def check(spec: Field[Any], value: Any, called: str) -> None:
     """
     low, high, choices = (spec.metadata[name] for name in ("low", "high", "choices"))
     if low is not None and not low <= value <= high:
-        raise SettingError(f"{called} is {value}, must be from {low:g} to {high:g}")
+        raise SettingError(f"{called} is {value}, must be from {low:.15g} to {high:.15g}")
     if choices and value not in choices:
         raise SettingError(f"{called} is {value!r}, must be {one_of(choices)}")
     if spec.name == "host" and not value:

@@ -1,23 +1,32 @@
 /**
- * Prints the gzip size of the built script and style as JSON, and fails above the budget.
- * The page must arrive quickly over a greenhouse's weak Wi-Fi.
+ * Prints the gzip size of the built script and style as JSON, and fails above the budget. The page
+ * must arrive quickly over a greenhouse's weak Wi-Fi: what it needs before it shows anything,
+ * English among it, has the budget; what comes right behind the first view (cards, lists, the time bar),
+ * what is loaded when asked for (charts) and the one other language that a reader waits for have
+ * budgets of their own.
  */
 import { readdir, readFile } from 'node:fs/promises';
 import { gzipSync } from 'node:zlib';
 
-const BUDGET_BYTES = 150_000;
-const ASSETS = new URL('../../backend/lupin_bridge/static/assets/', import.meta.url);
+const BUDGET_BYTES = { first: 150_000, behind: 25_000, language: 10_000, later: 50_000 };
+const STATIC = new URL('../../backend/lupin_bridge/static/', import.meta.url);
 
+const page = await readFile(new URL('index.html', STATIC), 'utf8');
 /** @type {Record<string, number>} */
 const sizes = {};
-for (const name of await readdir(ASSETS)) {
-  if (/\.(js|css)$/.test(name)) {
-    sizes[name] = gzipSync(await readFile(new URL(name, ASSETS))).length;
-  }
+const total = { first: 0, behind: 0, language: 0, later: 0 };
+for (const name of await readdir(new URL('assets/', STATIC))) {
+  if (!/\.(js|css)$/.test(name)) continue;
+  const size = gzipSync(await readFile(new URL(`assets/${name}`, STATIC))).length;
+  sizes[name] = size;
+  if (/^(de|nl|es)-/.test(name)) total.language = Math.max(total.language, size);
+  else if (name.startsWith('behind-')) total.behind += size;
+  else total[page.includes(name) ? 'first' : 'later'] += size;
 }
-const total = Object.values(sizes).reduce((sum, size) => sum + size, 0);
-console.log(JSON.stringify({ total_gzip_bytes: total, budget_bytes: BUDGET_BYTES, files: sizes }));
-if (total === 0 || total > BUDGET_BYTES) {
-  console.error(`script and style: ${total} bytes gzip, allowed 1 to ${BUDGET_BYTES}`);
+console.log(JSON.stringify({ gzip_bytes: total, budget_bytes: BUDGET_BYTES, files: sizes }));
+for (const [part, size] of Object.entries(total)) {
+  const allowed = BUDGET_BYTES[/** @type {keyof typeof total} */ (part)];
+  if (size > 0 && size <= allowed) continue;
+  console.error(`script and style (${part}): ${size} bytes gzip, allowed 1 to ${allowed}`);
   process.exitCode = 1;
 }

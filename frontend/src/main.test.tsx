@@ -30,6 +30,8 @@ test.each([
 ])('with “%s” the key T leaves it %s', async (query, theme, buttons) => {
   history.replaceState(null, '', `/${query}`);
   await flush(() => import('./main'));
+  const { loadParts } = await import('./ui/later');
+  await flush(() => loadParts());
   const { store } = await import('./store/app');
   fireEvent.keyDown(document.body, { key: 't' });
   expect(document.documentElement.dataset['theme']).toBe(theme);

@@ -9,25 +9,32 @@ import './styles/legend.css';
 import './styles/health.css';
 import './styles/table.css';
 import './styles/table-sizes.css';
-import './styles/card.css';
-import './styles/hover.css';
+import './styles/alarms.css';
 import './styles/ages.css';
 import './styles/bound.css';
 import './styles/paper.css';
 import './styles/kiosk.css';
 import './styles/frozen.css';
 import './styles/troubles.css';
+import './styles/past.css';
 import './styles/forced.css';
 import './styles/print.css';
+import { startAlarmsAndTelling } from './alarms/start';
 import { startAddress } from './store/address';
 import { prefer, store } from './store/app';
+import { askedCycle, startCycle } from './store/cycle';
+import { startHourAgo } from './store/hourAgo';
 import { startLive } from './store/live';
 import { startLoaders } from './store/loaders';
+import { startPast } from './store/past';
+import { startSensors } from './store/sensors';
 import { keepSettings, openStorage, readSettings } from './store/settings';
 import { startTheme } from './store/theme';
+import { LANGUAGE, S } from './strings';
 import { App } from './ui/App';
 import { ErrorBoundary } from './ui/ErrorBoundary';
-import { startShortcuts } from './ui/shortcuts';
+import { startKeys } from './ui/keys';
+import { loadParts } from './ui/later';
 
 const storage = openStorage();
 prefer(readSettings(storage));
@@ -39,19 +46,43 @@ store.subscribe(() => {
 });
 
 const kiosk = new URLSearchParams(window.location.search).get('kiosk') === '1';
+const cycle = askedCycle();
 
+document.documentElement.lang = LANGUAGE;
+document.title = S.product;
 startTheme();
-startAddress(kiosk);
+startAddress(kiosk, cycle.seconds !== null);
+startSensors();
 startLoaders();
+startAlarmsAndTelling(storage);
 startLive();
-if (!kiosk) startShortcuts();
+if (kiosk) {
+  startCycle(cycle);
+} else {
+  startPast();
+  startHourAgo();
+  startKeys();
+}
+
+void loadParts().then((parts) => {
+  parts.startDifference();
+  parts.startBadge();
+  parts.startSound();
+  parts.startNotify();
+  if (kiosk) {
+    parts.startLeaving();
+  } else {
+    parts.startRemembered();
+    parts.startOpening();
+  }
+});
 
 const root = document.getElementById('root');
 if (!root) throw new Error('index.html has no #root');
 createRoot(root).render(
   <StrictMode>
     <ErrorBoundary kiosk={kiosk}>
-      <App kiosk={kiosk} />
+      <App kiosk={kiosk} cycle={cycle} />
     </ErrorBoundary>
   </StrictMode>,
 );

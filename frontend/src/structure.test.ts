@@ -11,12 +11,12 @@ import { fileGraph, partOf, ringIn, wrongImports, type Table } from './testing/i
  * and from nothing else. A part is a folder, with all folders in it, or a file beside this one.
  */
 const TABLE: Table = {
-  strings: [],
+  words: [],
+  strings: ['words'],
   clock: [],
   contract: [],
   geometry: ['contract'],
-  // The numbers of the sensors stand once, in the bridge's sensors.json.
-  domain: ['contract', 'geometry', 'strings', '../../backend/lupin_bridge/sensors.json'],
+  domain: ['contract', 'geometry', 'strings'],
   connection: ['contract', 'clock'],
   draw: ['contract', 'geometry', 'domain'],
   store: ['clock', 'contract', 'geometry', 'domain', 'connection', 'npm:react'],
@@ -24,15 +24,41 @@ const TABLE: Table = {
     ...['strings', 'clock', 'contract', 'geometry', 'domain', 'draw', 'store'],
     ...['npm:react', 'npm:d3-selection', 'npm:d3-zoom'],
   ],
+  // What goes on about alarms beside the components, which are in `ui/alarms`.
+  alarms: ['strings', 'clock', 'contract', 'domain', 'store', 'map'],
+  widgets: ['clock', 'npm:react'],
+  timebar: [...['strings', 'clock', 'domain', 'draw', 'store', 'widgets'], ...['npm:react']],
   export: ['strings', 'clock', 'domain', 'draw', 'store', 'map'],
+  charts: [
+    ...['strings', 'clock', 'contract', 'geometry', 'domain', 'store', 'widgets', 'export'],
+    ...['styles', 'npm:react', 'npm:uplot'],
+  ],
+  estimate: [
+    ...['words', 'strings', 'contract', 'geometry', 'domain', 'store', 'widgets', 'styles'],
+    ...['npm:react'],
+  ],
   ui: [
-    ...['strings', 'clock', 'contract', 'geometry', 'domain', 'draw', 'store', 'map', 'export'],
+    ...[
+      'strings',
+      'words',
+      'clock',
+      'contract',
+      'geometry',
+      'domain',
+      'draw',
+      'store',
+      'map',
+      'export',
+    ],
+    ...['styles', 'widgets', 'alarms', 'timebar', 'charts', 'estimate'],
     ...['npm:react', 'npm:react-dom'],
   ],
-  main: ['styles', 'store', 'ui', 'npm:react', 'npm:react-dom'],
+  main: ['styles', 'strings', 'store', 'alarms', 'ui', 'npm:react', 'npm:react-dom'],
   // For tests alone: no part above names it.
   testing: [
     ...['contract', 'domain', 'connection', 'store'],
+    // The file that comes with the bridge: the page itself has no copy of it.
+    '../../backend/lupin_bridge/sensors.json',
     ...['npm:vitest', 'npm:@testing-library/react', 'npm:typescript', 'npm:node:path'],
   ],
 };

@@ -8,11 +8,12 @@ setup(
     description="A simulated robot on patrol in a greenhouse, as a ROS 2 node.",
     license="Apache-2.0",
     python_requires=">=3.10",
-    packages=find_packages(),
+    packages=find_packages(exclude=["test"]),
     package_data={"lupin_patrol": ["py.typed"]},
     # The messages come from lupin_msgs, rclpy from ROS (apt) or the ROS wheels (PyPI): naming
     # them here would make pip look for what colcon has already built.
     install_requires=["mdp-greenhouse>=1.0.8,<1.1", "numpy>=1.26,<3"],
+    extras_require={"test": ["pytest"]},  # by which colcon knows how to test it
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/lupin_patrol"]),
         ("share/lupin_patrol", ["package.xml"]),

@@ -7,8 +7,26 @@ import sys
 
 from tests.support.state_home import use_own
 
-# In the order of the way through the system: field, truth, tick, bridge, page, large houses.
-BENCHES = ("bench_field", "bench_truth", "bench_tick", "bench_bridge", "bench_page", "bench_house")
+# In the order of the way through the system: field, truth, tick, journal, past, bridge, page.
+BENCHES = (
+    "bench_field",
+    "bench_truth",
+    "bench_estimate",
+    "bench_estimate_changes",
+    "bench_estimate_many",
+    "bench_estimate_speed",
+    "bench_estimate_first",
+    "bench_tick",
+    "bench_store",
+    "bench_asof",
+    "bench_alarms",
+    "bench_outward",
+    "bench_bridge",
+    "bench_past",
+    "bench_page",
+    "bench_past_page",
+    "bench_house",
+)
 
 
 def main() -> int:

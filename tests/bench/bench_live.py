@@ -20,34 +20,20 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import json
-import subprocess
-import sys
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Self
-from urllib.parse import urlsplit
 
+from tests.bench.live_estimates import measure_estimates
 from tests.bench.live_outages import measure_outages
-from tests.support.domains import own_domain, ros_env
+from tests.bench.live_parts import HEAD_START_S, Clients, Seen, Server, serving
+from tests.bench.live_past import measure_past
 from tests.support.proc_stat import cpu_s, resident_mb, tcp_buffers_mb
-from tests.support.processes import Process, lupin_twin, url_of
 from tests.support.state_home import use_own
 
-CLIENTS_A_PROCESS = 1_250
-# Python starts and imports; then all clients connect at once.
-HEAD_START_S = 1.5
+# Between joining, which is not measured, and what is: the load goes on meanwhile.
 SETTLE_S = 1.0
-# 20,000 messages, one batch after the other.
-FILL_PATIENCE_S = 300.0
-# The bridge may send a little more often than the robot causes it to: at exactly the robot's rate,
-# a change would wait up to a period for its turn, and that is what one would measure.
-HEADROOM = 1.2
-# The tests let ROS check every field of every message, which costs time; nobody else does.
-AS_IN_USE = {"ROS_PYTHON_CHECK_FIELDS": "0"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,134 +52,12 @@ class Load:
         return self.tags, self.rate_hz
 
 
-@dataclass(slots=True)
-class Seen:
-    """What the clients saw in one measurement; `delays_s` is sorted."""
-
-    delays_s: list[float]
-    received: Counter[int]
-    frame_bytes: float
-
-    def delivered(self, clients: int) -> float:
-        """The share of all frames made, times clients, that arrived."""
-        made = max(self.received) - min(self.received) + 1
-        return self.received.total() / (made * clients)
-
-    def delay_ms(self, share: float) -> float:
-        """A quantile of the delays, ms."""
-        return 1e3 * self.delays_s[min(len(self.delays_s) - 1, int(share * len(self.delays_s)))]
-
-    def delays(self) -> str:
-        """The delays, for a person."""
-        return f"median {self.delay_ms(0.5):.1f} ms, p99 {self.delay_ms(0.99):.1f} ms"
-
-
-class Clients:
-    """The client processes of one load."""
-
-    def __init__(self, port: int, count: int, path: str = "/ws/state", *, deaf: bool = False):
-        self.count = count
-        self._processes = []
-        number = -(-count // CLIENTS_A_PROCESS)
-        connect_at = time.monotonic() + HEAD_START_S
-        for index in range(number):
-            share = count // number + (index < count % number)
-            arguments = [
-                *("--port", port, "--path", path),
-                *("--clients", share, "--connect-at", connect_at),
-                *(["--deaf"] if deaf else []),
-            ]
-            self._processes.append(
-                subprocess.Popen(
-                    [sys.executable, "-m", "tests.bench.live_clients", *map(str, arguments)],
-                    stdin=subprocess.PIPE,
-                    stdout=subprocess.PIPE,
-                    text=True,
-                )
-            )
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for process in self._processes:
-            process.kill()
-            process.communicate()
-
-    def joined_s(self) -> float:
-        """Wait for every client's first state; the time that the last one took, s."""
-        return max(max(map(float, told["joined_s"])) for told in self._told())
-
-    def measure(self, start_s: float, end_s: float) -> Seen:
-        """Measure changes published in a stretch of the monotonic clock."""
-        self._command(f"measure {start_s} {end_s}")
-        seen = Seen([], Counter(), 0.0)
-        for told in self._told():
-            seen.delays_s += told["delays_s"]
-            seen.received.update({int(seq): n for seq, n in told["received"].items()})
-            seen.frame_bytes = max(seen.frame_bytes, told["frame_bytes"])
-        seen.delays_s.sort()
-        return seen
-
-    def closed_s(self) -> list[float]:
-        """When the server closed clients, s after they connected."""
-        self._command("closed")
-        return sorted(at for told in self._told() for at in told["closed_s"])
-
-    def _command(self, text: str) -> None:
-        for process in self._processes:
-            assert process.stdin is not None
-            process.stdin.write(text + "\n")
-            process.stdin.flush()
-
-    def _told(self) -> Iterator[dict[str, Any]]:
-        for process in self._processes:
-            assert process.stdout is not None
-            line = process.stdout.readline()
-            if not line:
-                raise RuntimeError(f"a client process ended with {process.wait()}")
-            yield json.loads(line)
-
-
-@dataclass(slots=True)
-class Server:
-    """A `lupin-twin serve` with a robot that keeps it changing."""
-
-    process: Process
-    port: int
-
-    def cores_since(self, start_s: float, cpu_before_s: float) -> float:
-        """Processor time per time since a moment, in cores."""
-        return (cpu_s(self.process.pid) - cpu_before_s) / (time.monotonic() - start_s)
-
-
-@contextmanager
-def serving(tags: int, rate_hz: float, *options: str) -> Iterator[Server]:
-    """A server and its robot, once the twin has all tags."""
-    with ExitStack() as stack:
-        domain = stack.enter_context(own_domain())
-        pace = ("--max-rate-hz", str(rate_hz * HEADROOM))
-        server = stack.enter_context(lupin_twin(domain, "serve", *pace, *options, **AS_IN_USE))
-        url = url_of(server)
-        port = urlsplit(url).port
-        assert port is not None
-        arguments = ("--domain", domain, "--url", url, "--tags", tags, "--rate-hz", rate_hz)
-        robot = stack.enter_context(
-            Process(
-                [sys.executable, "-m", "tests.bench.live_robot", *map(str, arguments)],
-                ros_env(domain, **AS_IN_USE),
-            )
-        )
-        robot.wait_for_output("filled", timeout_s=FILL_PATIENCE_S)
-        yield Server(server, port)
-
-
 def measure_load(server: Server, load: Load) -> list[str]:
     """One row of the table."""
     with Clients(server.port, load.clients, load.path) as clients:
         joined_s = clients.joined_s()
         start_s = time.monotonic() + SETTLE_S
-        time.sleep(SETTLE_S)
+        time.sleep(SETTLE_S)  # for every load as long: joining is not measured
         before_s = cpu_s(server.process.pid)
         # The clients answer when it is over and drained; the processor time ends with them.
         seen = clients.measure(start_s, start_s + load.measure_s)
@@ -281,7 +145,15 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="a minute instead of five")
     parser.add_argument("--only", type=int, metavar="N", help="row N of the table alone, from 0")
     parser.add_argument("--stuck", action="store_true", help="the stuck clients alone")
+    parser.add_argument("--past", action="store_true", help="those who ask for the past alone")
+    parser.add_argument("--estimates", action="store_true", help="those who ask for estimates")
     options = parser.parse_args()
+    if options.estimates:
+        print(measure_estimates(10.0 if options.quick else 30.0))
+        return
+    if options.past:
+        print(measure_past(10.0 if options.quick else 30.0, is_quick=options.quick))
+        return
     loads = QUICK_LOADS if options.quick else LOADS
     if options.only is not None:
         loads = loads[options.only : options.only + 1]
@@ -295,9 +167,10 @@ def main() -> None:
     if options.only is None:
         print()
         if options.quick:
-            print(measure_stuck(20, 10.0, 3.0))
+            parts = [measure_stuck(20, 10.0, 3.0), measure_past(10.0, is_quick=True)]
         else:
-            print(measure_stuck(20, 60.0, 30.0), measure_outages(), sep="\n\n")
+            parts = [measure_stuck(20, 60.0, 30.0), measure_outages(), measure_past(30.0)]
+        print(*parts, measure_estimates(10.0 if options.quick else 30.0), sep="\n\n")
 
 
 if __name__ == "__main__":

@@ -37,7 +37,9 @@ window.house = {};
   };
   const tags = Array.from({ length: COUNT }, (_, index) => tag(index, 18 + index % 12));
   const status = { type: 'status', twin: 'live', reason: 'live', message: '',
-                   state_age_seconds: 0, has_map: false, drops: [] };
+                   state_age_seconds: 0, has_map: false, origin: 'robot', drops: [],
+                   journal: { state: "recording", detail: "", set_aside: "", simulated: null },
+                   outward: [] };
   let socket;
   const say = (frame) => socket.onmessage?.({ data: JSON.stringify(frame) });
   const delta = (changed) => {
@@ -69,12 +71,19 @@ window.house = {};
         this.onopen?.();
         say(status);
         say({ type: 'state', seq: ++seq, revision: `r${revision}`,
-              state: { header: header(), tags } });
+              state: { header: header(), tags },
+              health: { house: { verdict: 'healthy', reasons: [],
+                                 day: { is_day: true, source: 'assumed' },
+                                 patrol: { interval_s: null, last_scan: null, overdue: 0 } },
+                        tags: {} } });
       }, 1);
     }
     close() {}
   };
-  window.fetch = async () => Response.json({ detail: 'not in this double' }, { status: 404 });
+  const real = window.fetch.bind(window);
+  window.fetch = async (url, options) => new URL(url).pathname.endsWith('/api/sensors')
+    ? real(url, options)
+    : Response.json({ detail: 'not in this double' }, { status: 404 });
 })();
 """
 

@@ -168,6 +168,9 @@ class Clients:
                 break
             if data[start] == 0x81:  # a text frame, whole
                 self._frame(stream, data, start + header, start + header + length)
+            elif data[start] == 0x89:  # a ping: who does not answer is taken for gone after 40 s
+                payload = data[start + header : start + header + length]
+                stream.socket.send(bytes((0x8A, 0x80 | length, 0, 0, 0, 0)) + payload)
             start += header + length
         if start < end:
             stream.parts.append(data[start:])
@@ -214,6 +217,7 @@ def main() -> None:
     hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
     resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
     clients = Clients(options.path, options.port, options.deaf)
+    # All processes have one moment: who waited for the others would come after them.
     time.sleep(max(0.0, options.connect_at - time.monotonic()))
     clients.connect(options.clients)
     clients.run(options.clients)

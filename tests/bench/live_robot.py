@@ -70,7 +70,7 @@ def beat(peer: Peer, period_s: float) -> None:
     due_s = time.monotonic()
     while True:
         due_s += period_s
-        time.sleep(max(0.0, due_s - time.monotonic()))
+        time.sleep(max(0.0, due_s - time.monotonic()))  # a load at a rate
         peer.observe(scan(BEAT, {BEAT: time.monotonic()}))
 
 

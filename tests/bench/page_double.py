@@ -30,8 +30,10 @@ window.network = { frames: 0, fetches: 0 };
       tag_id: String(index + 1),
       pose: { position: { x, y, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } },
       readings: [
-        { name: 'temperature', value: n % 97 === 0 ? null : 20 + 8 * Math.sin(n / 50 + index) },
-        { name: 'humidity', value: 60 + 10 * Math.cos(n / 70 + index) },
+        { name: 'temperature', value: n % 97 === 0 ? null : 20 + 8 * Math.sin(n / 50 + index),
+          observed_at: time(), stale_seconds: 0 },
+        { name: 'humidity', value: 60 + 10 * Math.cos(n / 70 + index),
+          observed_at: time(), stale_seconds: 0 },
       ],
       last_observed: time(),
       stale_seconds: 0,
@@ -46,8 +48,30 @@ window.network = { frames: 0, fetches: 0 };
       })),
       box_footprint: { points: [[0, 0], [0.4, 0], [0.4, 0.2], [0, 0.2]].map(
         ([dx, dy]) => ({ x: x + dx, y: y + dy, z: 0 })) },
+      looked_at: time(), last_try: time(), last_try_status: 0, last_try_detail: '',
     };
   };
+  const reason = (tag) => ({
+    kind: 'pest', verdict: 'critical', sensor: '', value: tag.bug_count, limit: null, since: null,
+  });
+  // As the bridge judges: what changed, and the house.
+  const health = (of) => ({
+    house: {
+      verdict: tags.some((tag) => tag.anomaly) ? 'critical' : 'healthy', reasons: [],
+      day: { is_day: true, source: 'clock' },
+      patrol: { interval_s: 29, last_scan: time(), overdue: 0 },
+    },
+    tags: Object.fromEntries(of.map((tag) => [tag.tag_id, {
+      verdict: tag.anomaly ? 'critical' : 'healthy', reasons: tag.anomaly ? [reason(tag)] : [],
+    }])),
+  });
+  const alarms = () => ({
+    type: 'alarms', source: 'journal', since: { sec: start, nanosec: 0 },
+    alarms: tags.filter((tag) => tag.anomaly).map((tag) => ({
+      id: `${tag.tag_id} pest`, reason: reason(tag), tag_id: tag.tag_id,
+      raised_at: tag.looked_at, cleared_at: null, worst: null,
+    })),
+  });
   const tags = Array.from({ length: 29 }, (_, index) => tag(index));
   const revision = () => `r${observations}`;
 
@@ -57,9 +81,13 @@ window.network = { frames: 0, fetches: 0 };
       setTimeout(() => {
         this.onopen?.();
         this.say({ type: 'status', twin: 'live', reason: 'live', message: '',
-                   state_age_seconds: 0, has_map: true });
+                   state_age_seconds: 0, has_map: true, origin: 'robot',
+                   drops: [], outward: [],
+                   journal: { state: 'recording', detail: 'recording', set_aside: '',
+                              simulated: null } });
         this.say({ type: 'state', seq: ++seq, revision: revision(),
-                   state: { header: header(), tags } });
+                   state: { header: header(), tags }, health: health(tags) });
+        this.say(alarms());
         this.timer = setInterval(() => this.beat(), 100);
       }, 1);
     }
@@ -81,7 +109,8 @@ window.network = { frames: 0, fetches: 0 };
       }
       const base = seq++;
       this.say({ type: 'delta', seq, base, revision: revision(), header: header(),
-                 changed, removed: [] });
+                 changed, removed: [], health: health(changed) });
+      if (changed.length > 0) this.say(alarms());
     }
     close() {
       clearInterval(this.timer);
@@ -118,9 +147,11 @@ window.network = { frames: 0, fetches: 0 };
     context.fillRect(10, 10, 140, 120);
     canvas.toBlob(resolve);
   });
-  window.fetch = async (url) => {
+  const real = window.fetch.bind(window);
+  window.fetch = async (url, options) => {
     network.fetches += 1;
     const { pathname } = new URL(url);
+    if (pathname.endsWith('/api/sensors')) return real(url, options);
     if (pathname.endsWith('field.npy')) return new Response(npy(), { headers: fieldHeaders });
     if (pathname.endsWith('map.png')) return new Response(await mapPicture());
     if (pathname.endsWith('/api/map')) return Response.json({

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
@@ -103,6 +104,31 @@ def test_what_is_not_there_is_said_in_json(static: Path, path: str, built: bool)
     message = schema.ErrorMessage.model_validate_json(answer.content)
     assert message.detail == f"there is nothing at {path!r}; see /docs"
     assert answer.headers["cache-control"] == "no-store"
+
+
+@pytest.mark.parametrize("built", [True, False])
+def test_a_websocket_that_is_not_there_is_refused_in_json(static: Path, built: bool) -> None:
+    sent: list[dict[str, Any]] = []
+
+    async def receive() -> dict[str, str]:
+        return {"type": "websocket.connect"}
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    scope = {
+        "type": "websocket",
+        "scheme": "ws",
+        "path": "/ws/nope",
+        "query_string": b"",
+        "headers": [(b"host", b"localhost")],
+        "extensions": {"websocket.http.response": {}},
+    }
+    asyncio.run(create_app(None, static if built else static / "none")(scope, receive, send))
+    start, body = sent
+    assert start["status"] == 404
+    message = schema.ErrorMessage.model_validate_json(body["body"])
+    assert message.detail == "there is nothing at '/ws/nope'; see /docs"
 
 
 def test_a_long_path_is_cut_in_the_answer(tmp_path: Path) -> None:

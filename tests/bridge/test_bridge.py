@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -22,17 +22,20 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.field import formats as field_formats
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.hub import Client
-from lupin_bridge.twin.source import CacheCounts, Told
+from lupin_bridge.twin.relay import Relay
+from lupin_bridge.twin.source import CacheCounts, Told, TwinUnavailableError
 from lupin_twin.fields import FieldJob
 from lupin_twin.grid import FieldGrid
 from lupin_twin.journal.condition import OFF, Condition
+from lupin_twin.past import NotRemembered, SeriesPast, SeriesRequest
+from lupin_twin.past_writes import PastWrites, WritesRequest
 from lupin_twin.state import Snapshot, TagState
-from lupin_twin.workers import ShouldStop
+from lupin_twin.workers import ShouldStop, Workers
 from tests.bridge.stream.test_frames import received
 from tests.support.inprocess import Running, run, running
 from tests.support.messages import scan
 from tests.support.ros import Peer
-from tests.support.waiting import until, wait_for
+from tests.support.waiting import PATIENCE_S, until, wait_for
 from tests.support.web import ws_url
 
 
@@ -44,12 +47,21 @@ class Script:
         self.die: Callable[[], None]
         self.is_alive = True
         self.calls_waiting = self.callback_errors = 0
+        self.workers = Workers("script")
+        self.relay = Relay(lambda: cast("Any", self), cast("Any", self))  # listened to by nobody
 
     async def start(self, on_state: Callable[[Told], None], on_death: Callable[[], None]) -> None:
         self.tell, self.die = on_state, on_death
 
     async def stop(self) -> None:
         self.is_alive = False
+        self.workers.close()
+
+    async def series(self, request: SeriesRequest) -> SeriesPast:
+        raise NotRemembered(f"nothing of {request.tag_id}", is_lasting=True)
+
+    async def writes(self, request: WritesRequest) -> PastWrites:
+        raise NotRemembered(f"nothing after {request.after}", is_lasting=False)
 
     def journal(self) -> Condition:
         return OFF
@@ -222,11 +234,13 @@ def test_a_heartbeat_right_after_a_frame_tells_nobody_anything_and_is_spared() -
 
 def test_a_status_goes_out_when_it_changes_and_only_then() -> None:
     async def test() -> None:
-        async with Stage() as stage:
+        now_s = 100.0
+        async with Stage(lambda: now_s) as stage:
             stage.bridge._liveness.stale_after_s = 0.3
             assert stage.ear.reasons == ["never_seen"]
             stage.script.tell(state(1))
             assert stage.ear.reasons == ["never_seen", "live"]
+            now_s += 0.5
             await until(lambda: len(stage.ear.reasons) == 3, "the silence to be noticed")
             stage.script.tell(state(2))
             await until(lambda: len(stage.ear.reasons) == 4, "the twin to be back")
@@ -241,6 +255,35 @@ def test_a_status_goes_out_when_it_changes_and_only_then() -> None:
             "thread_dead",
             "shutting_down",
         ]
+
+    asyncio.run(test())
+
+
+def test_a_memory_that_is_busy_at_the_start_is_asked_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("lupin_bridge.past.rhythms.ASK_AGAIN_S", 0.01)
+    hour_ns = 3_600 * 10**9
+
+    async def test() -> None:
+        async with Stage() as stage:
+            answers = iter([NotRemembered("busy", is_lasting=False), TwinUnavailableError("gone")])
+
+            async def series(_: SeriesRequest) -> SeriesPast:
+                for error in answers:
+                    raise error
+                stamps = tuple(hour_ns * n for n in range(1, 5))
+                return SeriesPast(0, 5 * hour_ns, None, stamps, (1,) * 4, (), (), ())
+
+            monkeypatch.setattr(stage.script, "series", series)
+            stage.script.tell(state(4 * hour_ns))
+            tag_id = f"t{4 * hour_ns}"
+
+            def is_learnt() -> bool:
+                stage.script.tell(state(4 * hour_ns))  # judged anew with the next frame
+                return stage.bridge.readings_hold_ns().get(tag_id) == 3 * hour_ns
+
+            await until(is_learnt, "the rhythm")
 
     asyncio.run(test())
 
@@ -314,7 +357,7 @@ def test_while_a_field_is_made_states_are_answered_and_frames_keep_coming(
 
     def hold() -> None:
         reached.set()
-        gate.wait(20.0)
+        gate.wait(PATIENCE_S)
 
     compute, write = FieldJob.compute, field_formats.write
 
@@ -334,7 +377,9 @@ def test_while_a_field_is_made_states_are_answered_and_frames_keep_coming(
     async def test(served: Running, peer: Peer) -> None:
         heavy = asyncio.create_task(served.http.get(MILLION_CELLS))
         await until(reached.is_set, "the heavy request to be at work")
-        async with connect(ws_url(served.url), proxy=None, max_size=None) as listener:
+        async with connect(
+            ws_url(served.url), proxy=None, max_size=None, open_timeout=PATIENCE_S
+        ) as listener:
             for number in range(3):
                 peer.observe(scan(f"meanwhile {number}", {"co2": 1.0}))
                 while f"meanwhile {number}" not in str(await listener.recv()):
@@ -347,7 +392,7 @@ def test_while_a_field_is_made_states_are_answered_and_frames_keep_coming(
         assert (answer.status_code, answer.headers["x-field-width"]) == (200, "1000")
 
     async def with_twin() -> None:
-        async with running() as served:
+        async with running(Settings(field_timeout_s=PATIENCE_S)) as served:
             with Peer(domain) as peer:
                 try:
                     await test(served, peer)
@@ -371,13 +416,20 @@ def test_no_thread_and_no_descriptor_is_left_behind(domain: int) -> None:
     async def once() -> None:
         async with (
             running() as served,
-            connect(ws_url(served.url), proxy=None, max_size=None) as listener,
+            connect(
+                ws_url(served.url), proxy=None, max_size=None, open_timeout=PATIENCE_S
+            ) as listener,
         ):
             await listener.recv()
             assert (await served.http.get("/api/field.png?sensor_type=co2")).status_code == 200
 
     run(domain, once())  # what is made once for a process stays
-    before = left()
+    threads, files = left()  # some of which may be about to end
     for _ in range(3):
         run(domain, once())
-    wait_for(lambda: left() == before, "no more threads and descriptors than before")
+
+    def are_gone() -> bool:
+        threads_now, files_now = left()
+        return threads_now <= threads and files_now <= files
+
+    wait_for(are_gone, "no more threads and descriptors than before")

@@ -96,7 +96,7 @@ def test_without_a_home_directory_it_serves_all_the_same(tmp_path: Path) -> None
 
 
 def test_a_signal_before_it_serves_is_kept_for_then(domain: int) -> None:
-    with lupin_twin(domain, "serve") as process:
+    with lupin_twin(domain, "serve", afresh=True) as process:
         # The command holds both back from before its first slow import; see /proc/[pid]/status.
         held_back = 1 << (signal.SIGINT - 1) | 1 << (signal.SIGTERM - 1)
         wait_for(lambda: blocked_signals(process.pid) & held_back == held_back, "them held back")

@@ -12,9 +12,9 @@ from lupin_bridge.configuration import (
     MAX_FILE_BYTES,
     settings_from,
     strange_variables,
-    take_token,
+    take_secrets,
 )
-from lupin_bridge.settings import SettingError, Settings, table, variable
+from lupin_bridge.settings import Secrets, SettingError, Settings, table, variable
 from tests.support.access import TOKEN, refused_start, served
 
 
@@ -131,6 +131,7 @@ def test_a_mistake_in_a_variable_is_named(name: str, value: str, named: str) -> 
         ('"a\\nb" = 1', ": 'a\\nb' is no setting of the bridge"),
         ("config = 'x'", " line 1: config is no setting of the bridge"),
         ("token = 'x'", " line 1: token is no setting: put the token into a file of its own"),
+        ("mqtt_password = 'x'", " line 1: mqtt_password is no setting: put the password into a f"),
         ("port = ", " is not TOML: Invalid value (at end of document)"),
         ("port = 1\nport = 2\n", " is not TOML: Cannot overwrite a value (at line 2, column 9)"),
     ],
@@ -165,9 +166,9 @@ def test_a_strange_variable_is_warned_of_and_others_are_nobodys_business() -> No
 
 def test_the_token_leaves_the_environment() -> None:
     environment = {"LUPIN_TOKEN": TOKEN, "HOME": "/"}
-    assert take_token(Settings(), environment) == TOKEN
+    assert take_secrets(Settings(), environment).token == TOKEN
     assert environment == {"HOME": "/"}
-    assert take_token(Settings(), environment) is None
+    assert take_secrets(Settings(), environment).token is None
 
 
 def test_a_token_file_is_its_line(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -178,7 +179,7 @@ def test_a_token_file_is_its_line(tmp_path: Path, caplog: pytest.LogCaptureFixtu
         file.chmod(mode)
         caplog.clear()
         with caplog.at_level(logging.WARNING):
-            assert take_token(settings, {}) == TOKEN
+            assert take_secrets(settings, {}).token == TOKEN
         assert bool(caplog.messages) == warned
     assert "mode 644: anyone on this machine can read the token" in caplog.text
 
@@ -186,9 +187,24 @@ def test_a_token_file_is_its_line(tmp_path: Path, caplog: pytest.LogCaptureFixtu
 def test_two_tokens_are_one_too_many(tmp_path: Path) -> None:
     settings = Settings(token_file=str(tmp_path / "token"))
     with pytest.raises(SettingError, match="LUPIN_TOKEN and --token-file are both given"):
-        take_token(settings, {"LUPIN_TOKEN": TOKEN})
+        take_secrets(settings, {"LUPIN_TOKEN": TOKEN})
     with pytest.raises(SettingError, match=r"--token-file .*/token: No such file"):
-        take_token(settings, {})
+        take_secrets(settings, {})
+
+
+@pytest.mark.parametrize("name", ["mqtt_password", "webhook_secret"])
+def test_the_other_secrets_go_by_a_variable_or_a_file_too(name: str, tmp_path: Path) -> None:
+    file = tmp_path / "secret"
+    file.write_text("of the file\n", encoding="utf-8")
+    environment = {variable(name): "of the environment"}
+    assert getattr(take_secrets(Settings(), environment), name) == "of the environment"
+    assert environment == {}
+    settings = Settings(**{f"{name}_file": str(file)})  # type: ignore[arg-type]
+    assert getattr(take_secrets(settings, {}), name) == "of the file"
+    with pytest.raises(SettingError, match=f"{variable(name)} and --.*-file are both given"):
+        take_secrets(settings, {variable(name): "x"})
+    assert strange_variables([variable(name)]) == []
+    assert "hunter2" not in repr(Secrets("hunter2", "hunter2", "hunter2"))
 
 
 # --- the process ----------------------------------------------------------------------------------

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import httpx
 from prometheus_client.parser import text_string_to_metric_families
 from websockets.sync.client import connect
 
+from lupin_bridge.bridge import Bridge
 from lupin_bridge.metrics import CONTENT_TYPE, COUNTERS, GAUGES, HISTOGRAMS, Metrics
+from lupin_bridge.settings import Settings
+from lupin_twin.estimate_report import Report
+from lupin_twin.grading import Record, Tally
+from tests.bridge.test_bridge import Script
 from tests.support.messages import scan
 from tests.support.processes import lupin_twin, url_of
 from tests.support.ros import Peer
@@ -35,7 +42,7 @@ def test_every_metric_is_there_and_follows_what_happens(domain: int) -> None:
         assert names <= set(before)
         assert (before["lupin_clients"], before["lupin_tags"]) == (0.0, 0.0)
         peer.wait_for_twin()
-        with connect(url.replace("http", "ws") + "/ws/state") as client:
+        with connect(url.replace("http", "ws") + "/ws/state", open_timeout=PATIENCE_S) as client:
             client.recv()
             peer.observe(scan("1", frame_id="odom"), scan("1", frame_id="odom"))
             peer.observe(scan("1", {"co2": 500.0}, at=(1, 1)), scan("2", {"co2": 500.0}))
@@ -60,6 +67,30 @@ def test_every_metric_is_there_and_follows_what_happens(domain: int) -> None:
         assert (after["lupin_ros_thread_alive"], after["lupin_twin_live"]) == (1.0, 1.0)
         assert after["lupin_state_age_seconds"] < 3.0
         assert after["lupin_ros_callback_errors_total"] == 0.0
+
+
+def test_what_is_counted_by_a_name_has_it_as_a_label_gauges_too() -> None:
+    labelled = [("lupin_outward_waiting", {"mqtt": 3}), ("lupin_outward_sent", {"webhook": 2})]
+    text = Metrics(tuple, lambda: labelled).text().decode()
+    assert '\nlupin_outward_waiting{channel="mqtt"} 3.0\n' in text
+    assert "# TYPE lupin_outward_waiting gauge" in text
+    assert '\nlupin_outward_sent_total{channel="webhook"} 2.0\n' in text
+
+
+def test_estimates_that_are_wrong_are_told_by_sensor() -> None:
+    source: Any = Script()
+    bridge = Bridge(source, Settings())
+    right, wrong = (Record(1, tally, tally) for tally in (Tally(90, 81), Tally(90, 10)))
+    for name, record, problem in (("co2", right, "singular"), ("light", wrong, "")):
+        bridge._estimates.known[name] = Report(1, 1, problem, record)
+    text = bridge.metrics.text().decode()
+    for name, sensor, value in (
+        ("trusted", "co2", 1.0),
+        ("trusted", "light", 0.0),
+        ("fit_failing", "co2", 1.0),
+        ("fit_failing", "light", 0.0),
+    ):
+        assert f'\nlupin_estimate_{name}{{sensor="{sensor}"}} {value}\n' in text
 
 
 def test_samples_are_read_at_the_scrape_and_not_before() -> None:

@@ -40,6 +40,7 @@ def test_every_parameter_is_described() -> None:
         "bbox_max_x",
         "bbox_max_y",
         "scale",
+        "at",
     ]
     assert all(parameter["description"] for parameter in field)
 

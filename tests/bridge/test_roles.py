@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import socket
 from pathlib import Path
 
 import pytest
 
-from lupin_bridge.roles import demo_journal
 from lupin_bridge.serving.server import listen
+from tests.support.journal import select
 from tests.support.messages import scan
-from tests.support.processes import Process, lupin_twin, url_of
+from tests.support.processes import Process, children_of, lupin_twin, patrols_of, url_of
+from tests.support.recordings import Sent, write_bag
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
 from tests.support.web import bridge, listener, tag_ids
 
 ROLES = ["serve", "demo", "web"]
 ALL_TAGS = 29
+# Of a demo: no past is filled in either.
+NO_JOURNAL = ("--ros-args", "-p", "journal:=off")
 
 
 # --- what is wrong is said in one line ------------------------------------------------------------
@@ -93,16 +97,6 @@ def test_the_web_role_ends_at_once_and_quietly(domain: int, number: signal.Signa
         assert "Traceback" not in process.output
 
 
-def children_of(pid: int) -> list[int]:
-    """The processes that a process has started."""
-    tasks = Path(f"/proc/{pid}/task")
-    return [
-        int(child)
-        for task in tasks.iterdir()
-        for child in (task / "children").read_text(encoding="ascii").split()
-    ]
-
-
 def is_running(pid: int) -> bool:
     """Whether a process is there, and no zombie."""
     try:
@@ -114,10 +108,12 @@ def is_running(pid: int) -> bool:
 
 def test_the_demo_shows_the_whole_greenhouse_and_ends_with_its_patrol(domain: int) -> None:
     with (
-        lupin_twin(domain, "demo", "--speed", "10", "--seed", "3") as demo,
+        lupin_twin(
+            domain, "demo", "--speed", "10", "--seed", "3", *NO_JOURNAL, afresh=True
+        ) as demo,
         listener(url_of(demo)) as screen,
     ):
-        (patrol,) = wait_for(lambda: children_of(demo.pid), "the patrol")
+        (patrol,) = wait_for(lambda: patrols_of(demo.pid), "the patrol")
         ids: set[str] = set()
 
         def look() -> bool:
@@ -128,15 +124,60 @@ def test_the_demo_shows_the_whole_greenhouse_and_ends_with_its_patrol(domain: in
 
         wait_for(look, f"all {ALL_TAGS} tags", meanwhile=lambda: None)
         assert is_running(patrol)
-        assert demo.stop(signal.SIGINT) == 0
+        os.killpg(demo.pid, signal.SIGINT)  # as a terminal does at Ctrl-C
+        assert demo.wait() == 0
         assert not is_running(patrol)
+        assert "has ended" not in demo.output
+        assert "Traceback" not in demo.output
+
+
+def test_a_demo_of_a_recording_shows_its_tags_at_their_time_and_leaves_nothing(
+    domain: int, tmp_path: Path
+) -> None:
+    """By the recorded name of the topic; and at the end the time stands."""
+    sent = [
+        Sent(
+            "/gh1/seen", 5_000.0 + at_s, scan(f"tag {at_s}", {"co2": 1.0}, (1, 2), stamp_s=5_000.0)
+        )
+        for at_s in (0, 20, 40)
+    ]
+    paths = [
+        str(write_bag(tmp_path / "run_1.mcap", sent[2:])),
+        str(write_bag(tmp_path / "run.mcap", sent[:2])),
+    ]
+    with (
+        lupin_twin(
+            domain, "demo", "--from", *paths, "--speed", "100", TMPDIR=str(tmp_path)
+        ) as demo,
+        listener(url_of(demo)) as screen,
+    ):
+        # The clock goes ahead of what was observed by then.
+        shown = screen.until(
+            "state",
+            lambda frame: (
+                frame["state"]["header"]["stamp"]["sec"] == 5040
+                and len(tag_ids(frame["state"])) == 3
+            ),
+        )
+        assert set(tag_ids(shown["state"])) == {"tag 0", "tag 20", "tag 40"}
+        (tag, *_) = shown["state"]["tags"]
+        assert tag["stale_seconds"] == 40.0
+        status = screen.until(
+            "status", lambda frame: bool(frame["journal"]["state"] == "recording")
+        )
+        assert status["origin"] == "recorded"
+        (replay,) = children_of(demo.pid, b"replay")
+        assert len(list(tmp_path.glob("lupin-twin-*/journal.sqlite"))) == 1
+        assert demo.stop(signal.SIGINT) == 0
+        assert not is_running(replay)
+        assert list(tmp_path.glob("lupin-twin-*")) == []
         assert "Traceback" not in demo.output
 
 
 def test_the_patrol_ends_although_the_demo_is_killed(domain: int) -> None:
-    with lupin_twin(domain, "demo") as demo:
+    with lupin_twin(domain, "demo", *NO_JOURNAL) as demo:
         url_of(demo)
-        (patrol,) = wait_for(lambda: children_of(demo.pid), "the patrol")
+        (patrol,) = wait_for(lambda: patrols_of(demo.pid), "the patrol")
         demo.wait_for_output("patrol starts")
         demo.send(signal.SIGKILL)
         demo.wait()
@@ -154,19 +195,27 @@ def test_ipv6_is_served_too(domain: int) -> None:
 
 
 def test_a_patrol_that_ends_by_itself_is_told(domain: int) -> None:
-    with lupin_twin(domain, "demo", "--speed", "0") as demo:
+    with lupin_twin(domain, "demo", "--speed", "0", *NO_JOURNAL) as demo:
         url_of(demo)
         demo.wait_for_output("the patrol has ended with code 2")
         assert "argument --speed" in demo.output
         assert demo.stop() == 0
 
 
-def test_a_demo_keeps_a_journal_of_its_own_by_seed() -> None:
-    env = {"XDG_STATE_HOME": "/state"}
-    for patrol_args, name in (([], "demo-seed-0"), (["--seed=3"], "demo-seed-3")):
-        assert demo_journal(env, patrol_args) == [
-            "--ros-args",
-            "-p",
-            f'journal:="/state/lupin-twin/{name}.sqlite"',
-            "--",
-        ]
+def test_a_demo_has_a_past_from_its_first_moment_on(domain: int, tmp_path: Path) -> None:
+    """Filled in once, and told to be simulated; the patrol goes on where it ends."""
+    state = str(tmp_path)
+    for _ in range(2):
+        with (
+            lupin_twin(domain, "demo", XDG_STATE_HOME=state) as demo,
+            listener(url_of(demo)) as screen,
+        ):
+            assert len(tag_ids(screen.until("state")["state"])) == ALL_TAGS
+            assert demo.stop(signal.SIGINT) == 0
+    path = tmp_path / "lupin-twin" / "demo-seed-0.sqlite"
+    (filled,) = select(path, "SELECT value FROM meta WHERE key = 'simulated_until_ns'")
+    past = select(path, "SELECT max(stamp_ns), count(*) FROM scans WHERE source LIKE '%past)'")
+    assert past[0][0] < filled[0]  # type: ignore[operator]
+    assert past[0][1] > 2500  # type: ignore[operator]
+    (after,) = select(path, "SELECT min(stamp_ns) FROM scans WHERE source = 'lupin_patrol'")
+    assert after[0] is None or after[0] > filled[0]  # type: ignore[operator]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -21,6 +22,10 @@ Pixel = tuple[int, int, int]
 
 WIDE: Final = {"width": 1440, "height": 900}
 PHONE: Final = {"width": 360, "height": 740}
+# What the console says of a server that has ended, wherever it was in an answer.
+SERVER_GONE: Final = (
+    r"net::ERR_(CONNECTION_|EMPTY_RESPONSE|INCOMPLETE_CHUNKED|CONTENT_LENGTH_MISMATCH)|WebSocket"
+)
 AXE: Final = Path(__file__).parents[2] / "node_modules/axe-core/axe.min.js"
 
 
@@ -125,7 +130,8 @@ class Hmi:
         return self.page.locator(f"tr[data-tag-id={json.dumps(tag_id)}]")
 
     def cell(self, tag_id: str, sensor: str) -> Locator:
-        return self.row(tag_id).locator(f"td[data-sensor={json.dumps(sensor)}]")
+        """A reading, without its trend."""
+        return self.row(tag_id).locator(f"td[data-sensor={json.dumps(sensor)}] .reading")
 
     def card(self, tag_id: str) -> Locator:
         return self.page.locator(f"[data-testid=tag-card][data-tag-id={json.dumps(tag_id)}]")
@@ -153,6 +159,10 @@ class Hmi:
 
     def choose_sensor(self, label: str) -> None:
         self.page.locator(".sensors label", has_text=label).click()
+
+    def colour_by_value(self) -> None:
+        """The page opens in the colours that tell what is ideal."""
+        self.page.get_by_role("radio", name="Value").check()
 
     # --- the map, pixel by pixel ------------------------------------------------------------
 
@@ -182,20 +192,23 @@ class Hmi:
         return picture if width is None else picture.crop((0, 0, width, picture.height))
 
     def settled_picture(self, width: int | None = None) -> Image.Image:
-        """The map view once it has the SLAM map and stays the same.
+        """The map view of a live page once it has the SLAM map and stays the same.
 
         The heat map may come later still: see `expect_samples`.
         """
         self.expect_map()
+        # What comes behind the first view takes room from the map.
+        expect(self.page.locator("#help-dialog")).to_be_attached()
         self.view()  # with its font
-        pictures = [self.picture(width)]
+        looks: list[tuple[Image.Image, str | None]] = []
 
         def look() -> bool:
-            pictures.append(self.picture(width))
-            return len(pictures) > 3 and all(p == pictures[-1] for p in pictures[-3:])
+            # While nothing comes from a busy server, what is shown is dimmed.
+            looks.append((self.picture(width), self.app.get_attribute("data-connection-state")))
+            return len(looks) > 3 and all(each == (looks[-1][0], "live") for each in looks[-3:])
 
         wait_for(look, "a picture that stays the same")
-        return pictures[-1]
+        return looks[-1][0]
 
     def expect_change(self, before: Image.Image) -> None:
         """Wait until the map view looks otherwise, if only on its way to something."""
@@ -284,6 +297,18 @@ def _rgb(picture: Image.Image, x: int, y: int) -> Pixel:
     return int(pixel[0]), int(pixel[1]), int(pixel[2])
 
 
+LATE_ANSWERS: Final = """const ask = fetch; fetch = async (...question) => {
+  const answer = await ask(...question);
+  await new Promise((go) => setTimeout(go, 300 + 1200 * Math.random()));
+  return answer; };"""
+
+
+def slow_down(page: Page, times: float) -> None:
+    """Let the page's scripts take so many times as long, and its answers come late."""
+    page.context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": times})
+    page.add_init_script(LATE_ANSWERS)
+
+
 @contextmanager
 def open_hmi(
     browser: Browser,
@@ -302,6 +327,8 @@ def open_hmi(
     with browser.new_context(**options) as own:
         page = own.new_page()
         page.set_default_timeout(PATIENCE_S * 1000)
+        if times := os.environ.get("SLOW_PAGES"):
+            slow_down(page, float(times))
         hmi = Hmi(page, url)
         if go:
             hmi.go(fragment, query)

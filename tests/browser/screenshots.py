@@ -2,23 +2,29 @@
 
 One for each size, light and dark, and the wide one as people with the common kinds of colour
 blindness see it. To be looked at; those for the README are written to `frontend/docs` with
-`--readme`.
+`--readme`. With `--states` instead: the page in every state of a house that the tests know.
 """
 
 from __future__ import annotations
 
 import argparse
 import io
+import json
 import sys
+import time
 from pathlib import Path
+from urllib.request import urlopen
 
 from PIL import Image
 from playwright.sync_api import Browser, Page, ViewportSize, expect, sync_playwright
 
+from tests.browser import estimate_pictures
 from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
-from tests.support.domains import own_domain, ros_env
-from tests.support.processes import Process, lupin_twin, url_of
+from tests.browser.states import shoot_states
+from tests.support.domains import own_domain
+from tests.support.processes import lupin_twin, url_of
 from tests.support.state_home import use_own
+from tests.support.waiting import wait_for
 
 SIZES = ((360, 740), (820, 1180), (1440, 900), (1920, 1080))
 BLINDNESS = ("protanopia", "deuteranopia", "tritanopia", "achromatopsia")
@@ -35,15 +41,23 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--readme", action="store_true", help="also write those of the README")
+    parser.add_argument("--states", action="store_true", help="every state of states.json alone")
     options = parser.parse_args()
     use_own()
     options.folder.mkdir(parents=True, exist_ok=True)
     expect.set_options(timeout=PATIENCE_MS)
-    patrol = [sys.executable, "-m", "lupin_patrol", "--speed", str(PATROL_SPEED)]
+    if options.states:
+        with (
+            sync_playwright() as playwright,
+            playwright.chromium.launch(
+                executable_path=CHROMIUM, args=list(CHROMIUM_ARGS), headless=True
+            ) as browser,
+        ):
+            shoot_states(browser, options.folder)
+        return 0
     with (
         own_domain() as domain,
-        lupin_twin(domain, "serve") as server,
-        Process(patrol, ros_env(domain)),
+        lupin_twin(domain, "demo", "--speed", str(PATROL_SPEED)) as server,
         sync_playwright() as playwright,
         playwright.chromium.launch(
             executable_path=CHROMIUM, args=list(CHROMIUM_ARGS), headless=True
@@ -57,11 +71,20 @@ def main() -> int:
         blindness(browser, url, options.folder)
         if options.readme:
             readme(browser, url)
+            estimate_pictures.taken(browser, README)
     return 0
 
 
 def wait_for_second_pass(browser: Browser, url: str) -> None:
-    """Wait until every tag is known and a pest is to be seen."""
+    """Wait until the robot has been everywhere, which it maps thereby, and a pest is to be seen."""
+    began_s = time.monotonic()
+
+    def has_been_everywhere() -> bool:
+        with urlopen(f"{url}/api/state") as answer:
+            ages_s = [tag["stale_seconds"] for tag in json.load(answer)["tags"]]
+        return len(ages_s) == 29 and max(ages_s) < time.monotonic() - began_s
+
+    wait_for(has_been_everywhere, "a scan of every tag", PATIENCE_MS / 1000)
     page = opened(browser, url, (1440, 900), "light")
     expect(page.locator("tbody tr[data-pinned=true]")).to_have_count(29)
     expect(page.locator("tbody .cell-species bdi")).to_have_count(29)
@@ -106,6 +129,7 @@ def views(browser: Browser, url: str, folder: Path, size: tuple[int, int], schem
     page.context.close()
     if width == 1440:
         page = opened(browser, url, size, scheme)
+        page.get_by_role("radio", name="Value").check()
         page.get_by_role("radio", name="Fixed").check()
         page.get_by_role("button", name="Layers").click()
         page.screenshot(path=folder / f"{name}-layers.png")
@@ -137,15 +161,28 @@ def blindness(browser: Browser, url: str, folder: Path) -> None:
         page.context.close()
 
 
+def past(url: str) -> str:
+    """A link to the first day that the demo remembers, with a tag's chart."""
+    with urlopen(f"{url}/api/timeline") as answer:
+        reach = json.load(answer)["reach"]
+    begun_s, ended_s = reach["from"]["sec"], reach["to"]["sec"]
+    at_s = begun_s + (ended_s - begun_s) // 2
+    return f"/#at={at_s}&period=all&chart.tag=5&tag=5"
+
+
 def readme(browser: Browser, url: str) -> None:
     """The README's pictures: all their colours, and still under 250 kB each."""
     README.mkdir(exist_ok=True)
     for name, size, scheme, path in (
         ("wide-light", (1280, 800), "light", "/"),
         ("wide-dark", (1280, 800), "dark", CARD),
+        ("past", (1280, 800), "dark", past(url)),
         ("phone", (360, 740), "light", "/"),
     ):
         page = opened(browser, url, size, scheme, path)
+        if "tag=" in path:
+            expect(page.get_by_test_id("plot").last.locator("canvas")).to_be_visible()
+            page.wait_for_load_state("networkidle")
         picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
         page.context.close()
         picture.save(README / f"{name}.png", optimize=True)

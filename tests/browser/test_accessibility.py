@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.hmi import AXE, PHONE, WIDE, Hmi, OpenPage
+from tests.browser.hmi import AXE, PHONE, SERVER_GONE, WIDE, Hmi, OpenPage
 from tests.browser.house import TAGS
 from tests.support.messages import scan
 from tests.support.web import Bridge, bridge
@@ -60,6 +60,7 @@ def test_what_opens_on_demand(house: Bridge, open_page: OpenPage, scheme: str) -
     hmi.page.get_by_role("button", name="Menu").click()
     assert violations(hmi) == []
     hmi.page.keyboard.press("Escape")
+    hmi.colour_by_value()
     hmi.page.get_by_role("radio", name="Fixed").check()
     hmi.page.get_by_label("Lowest").fill("99")
     expect(hmi.page.locator(".bound").get_by_role("alert")).to_be_visible()
@@ -73,15 +74,36 @@ def test_what_opens_on_demand(house: Bridge, open_page: OpenPage, scheme: str) -
     assert violations(hmi) == []
 
 
+@pytest.mark.parametrize("colouring", ["ideal", "value"])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_table_alarms_and_charts_in_both_colourings(
+    house: Bridge, open_page: OpenPage, scheme: str, colouring: str
+) -> None:
+    link = f"colour={colouring}&chart.tag=10&tag=10"
+    hmi = open_page(house.url, link, color_scheme=scheme, bypass_csp=True)
+    hmi.expect_rows(*TAGS)
+    hmi.page.get_by_role("button", name="Show as table").first.click()
+    expect(hmi.test_id("series-table").first).to_be_visible()
+    assert violations(hmi) == []
+    hmi.page.keyboard.press("a")
+    expect(hmi.page.locator("[data-group=active] li").first).to_be_visible()
+    assert violations(hmi) == []
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_an_empty_house_and_a_frozen_one(domain: int, open_page: OpenPage, scheme: str) -> None:
     with bridge(domain=domain) as running:
         hmi = open_page(running.url, color_scheme=scheme, bypass_csp=True)
         expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-tags")
+        hmi.page.keyboard.press("a")
+        expect(hmi.page.locator("[data-note=none]")).to_be_visible()
         assert violations(hmi) == []
-        running.peer.observe(scan("a", {"temperature": 99.0}, at=(1, 1)))
-        hmi.expect_rows("a")
-        hmi.allow_noise("ERR_CONNECTION_REFUSED|ERR_EMPTY_RESPONSE|ERR_CONNECTION_RESET|WebSocket")
+        running.peer.observe(*[scan("a", {"temperature": 99.0}, at=(1, 1))] * 2)
+        hmi.page.get_by_role("button", name="Put aside: Tag a").click()
+        hmi.page.get_by_role("button", name="Tell me of alarms").click()
+        assert violations(hmi) == []
+        hmi.page.keyboard.press("Escape")
+        hmi.allow_noise(SERVER_GONE)
         running.process.kill()
         hmi.expect_phase("reconnecting")
         assert violations(hmi) == []

@@ -103,7 +103,7 @@ def test_a_failed_scan_is_listed_and_says_so_until_it_succeeds(
     shared.peer.observe(scan("tried", at=(2, 2), status=failed))
     row = hmi.row("tried")
     expect(row).to_have_attribute("data-pinned", "false")
-    expect(row).to_have_attribute("data-health", "no-data")
+    expect(row).to_have_attribute("data-health", "stressed")
     expect(row.locator(".cell-age")).to_have_text("never")
     tried = row.locator(".tried")
     expect(tried).to_have_text(re.compile(r"^tried \d+\ss ago, not decoded$"))
@@ -121,7 +121,7 @@ def test_a_look_at_the_flowers_makes_no_reading_young(shared: Bridge, open_page:
     hmi = open_page(shared.url, "tag=looked")
     now_s = time.time()
     shared.peer.observe(
-        scan("looked", {"temperature": 20.0, "co2": 600.0}, at=(1, 4), stamp_s=now_s - 7_300),
+        scan("looked", {"temperature": 20.0, "co2": 600.0}, at=(1, 4), stamp_s=now_s - 7_262),
         scan("looked", {"co2": 610.0}, stamp_s=now_s - 600),
         look("looked", "rose", stamp_s=now_s),
     )
@@ -160,7 +160,6 @@ def test_a_pest_appears_on_map_and_table_and_a_clean_look_clears_it(
     shared.peer.observe(scan("crop", {"temperature": 20.0}, at=(6, 6)))
     hmi = open_page(shared.url, "view=6,6,4&layers=pins")
     expect(hmi.row("crop")).to_have_attribute("data-pest", "false")
-    # The pins have the colours of the field's range.
     hmi.expect_samples()
     before = hmi.settled_picture()
 
@@ -179,3 +178,18 @@ def test_a_pest_appears_on_map_and_table_and_a_clean_look_clears_it(
     expect(hmi.row("crop")).to_have_attribute("data-pest", "false")
     expect(hmi.row("crop").locator(".cell-pest")).to_have_text("")
     hmi.expect_picture(before)
+
+
+def test_what_comes_behind_the_first_view_is_asked_for_until_it_is_there(
+    shared: Bridge, open_page: OpenPage
+) -> None:
+    hmi = open_page(shared.url)
+    hmi.allow_noise("behind-.*js")
+    hmi.page.route("**/assets/behind-*.js", lambda route: route.abort())
+    hmi.go()
+    expect(hmi.row("first")).to_be_attached()
+    trouble = hmi.page.locator("[data-trouble=parts]")
+    expect(trouble).to_contain_text("Part of the page has not arrived.")
+    hmi.page.unroute("**/assets/behind-*.js")
+    expect(hmi.test_id("timebar")).to_be_visible()
+    expect(trouble).to_have_count(0)

@@ -12,15 +12,17 @@ import pytest
 from geometry_msgs.msg import Point, Pose, Quaternion
 from playwright.sync_api import expect
 
-from lupin_bridge.field import sensors
+import lupin_bridge
 from tests.browser.hmi import OpenPage, Pixel
 from tests.support.messages import look, occupancy_grid, scan
 from tests.support.web import Bridge, bridge
 
-SENSORS: Any = json.loads((Path(sensors.__file__).parents[1] / "sensors.json").read_text())
+SENSORS: Any = json.loads((Path(lupin_bridge.__file__).parent / "sensors.json").read_text())
 
 
-# What the light theme makes of occupied, free and unknown cells.
+# The bodies of pins in the light theme.
+HEALTHY, CRITICAL = (31, 122, 69), (196, 33, 26)
+# What it makes of occupied, free and unknown cells.
 WALL, FLOOR, GROUND = (84, 94, 88), (253, 253, 252), (232, 235, 231)
 
 
@@ -72,7 +74,7 @@ def test_the_heat_map_is_the_right_way_up(domain: int, open_page: OpenPage) -> N
     with bridge(domain=domain) as running:
         hot_corner(running)
         running.tag("hot")
-        hmi = open_page(running.url, f"{VIEW}&layers=map,field")
+        hmi = open_page(running.url, f"{VIEW}&colour=value&layers=map,field")
         hmi.expect_samples(4)
         hmi.settled_picture()
         beside_hot = (HOT[0] + 0.5, HOT[1] + 0.5)
@@ -95,7 +97,7 @@ def test_a_cell_that_is_not_known_shows_the_map_below_it(domain: int, open_page:
         running.tag("hot")
         # The range begins far below every value, so that even the minimum has a colour, and so
         # would a zero in a cell's place.
-        hmi = open_page(running.url, f"{VIEW}&layers=map,field&range=-30,30")
+        hmi = open_page(running.url, f"{VIEW}&colour=value&layers=map,field&range=-30,30")
         hmi.expect_samples(4)
         wall, free, corner = (2.5, 1.5), (2.5, 0.5), (-1.4, -1.4)
         known = [(0.5, 0.5), (4.5, 3.5), (0.5, 3.5), (4.5, 0.5)]
@@ -105,7 +107,7 @@ def test_a_cell_that_is_not_known_shows_the_map_below_it(domain: int, open_page:
         hmi.expect_pixels(lambda pixel: pixel != hmi.pixel(2.5, 0.5), known[1], what="a field")
         with_field = hmi.settled_picture()
         view = hmi.view()
-        hmi.go(f"{VIEW}&layers=map&range=-30,30")
+        hmi.go(f"{VIEW}&colour=value&layers=map&range=-30,30")
         expect(hmi.row("hot")).to_be_visible()
         hmi.expect_pixels(lambda pixel: close(pixel, WALL), wall, what="the wall")
         bare = hmi.settled_picture()
@@ -156,7 +158,7 @@ def test_a_pin_sits_on_its_pose_and_in_its_cell(domain: int, open_page: OpenPage
     with bridge(domain=domain) as running:
         running.peer.publish_map(floor(6, 6))
         at = (3.125, 2.375)
-        running.peer.observe(scan("a", {"co2": 900.0}, at=at))
+        running.peer.observe(scan("a", {"co2": 600.0}, at=at))
         running.tag("a")
         hmi = open_page(running.url, go=False)
         for camera in ("view=3,3,6", "view=3.1,2.4,0.4"):
@@ -168,13 +170,19 @@ def test_a_pin_sits_on_its_pose_and_in_its_cell(domain: int, open_page: OpenPage
             x, y = hmi.view().pixel(*at)
             assert abs((pin.left + pin.right - 1) / 2 - x) <= 1
             assert abs((pin.top + pin.bottom - 1) / 2 - y) <= 1
-            # The only value is the maximum: the body has the full colour, at its very middle.
-            assert close(hmi.pixel(*at), colour_of("co2"))
+            # Its body has the colour of its verdict, here above the sign.
+            assert close(hmi.pixel(at[0], at[1] + 6 / hmi.view().scale), HEALTHY)
         # Zoomed in this far a cell is as large as the pin, and the pin's is the known one whose
         # centre is nearest: the field's value there is the tag's own.
         hmi.page.keyboard.press("Escape")
         hmi.point_at(*at)
-        expect(hmi.test_id("readout")).to_have_text("900 ppmx 3.12 m, y 2.38 m")
+        expect(hmi.test_id("readout")).to_have_text("600 ppmidealx 3.12 m, y 2.38 m")
+        hmi.page.mouse.move(1, 1)
+        running.peer.observe(scan("a", {"co2": 9000.0}, at=at))
+        # Above its sign, and in the corner that a square has and no disc.
+        metre = hmi.view().scale
+        above, corner = (at[0], at[1] + 7 / metre), (at[0] + 9 / metre, at[1] + 9 / metre)
+        hmi.expect_pixels(lambda pixel: close(pixel, CRITICAL), above, corner, what="a red square")
 
 
 def test_a_planter_box_and_its_blooms_lie_where_they_were_seen(

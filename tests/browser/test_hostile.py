@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import expect
 
+from lupin_bridge.judge.choosing import own_sensors
 from tests.browser.hmi import PHONE, Hmi, OpenPage
 from tests.support.domains import own_domain
 from tests.support.messages import look, occupancy_grid, scan
@@ -104,10 +105,11 @@ def test_every_such_sensor_can_be_looked_at(hostile: Bridge, open_page: OpenPage
     hmi = open_page(hostile.url)
     hmi.expect(lambda: len(hmi.rows()) == len(HOSTILE_IDS), "every tag")
     sensors = hmi.page.locator(".sensors input")
-    expect(sensors).to_have_count(5 + len(HOSTILE_SENSORS))
+    declared = len(own_sensors().by_name)
+    expect(sensors).to_have_count(declared + len(HOSTILE_SENSORS))
     for index, name in enumerate(sorted(HOSTILE_SENSORS)):
-        sensors.nth(5 + index).check(force=True)
-        expect(sensors.nth(5 + index)).to_have_value(name)
+        sensors.nth(declared + index).check(force=True)
+        expect(sensors.nth(declared + index)).to_have_value(name)
         hmi.expect_samples(len(HOSTILE_IDS))
     assert nothing_sticks_out(hmi)
 

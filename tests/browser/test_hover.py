@@ -22,11 +22,11 @@ def test_the_mouse_on_a_pin_shows_its_card_in_short(hmi: Hmi) -> None:
     hmi.point_at(1, 3)
     card = hover_card(hmi)
     expect(card).to_have_attribute("data-tag-id", "10")
-    for text in ("Tag 10", "Stressed", "31.0\u00a0°C", "40.0\u00a0%", "lupin", "3 bugs"):
+    for text in ("Tag 10", "Critical", "31.0\u00a0°C", "40.0\u00a0%", "lupin", "3 pests seen"):
         expect(card).to_contain_text(text)
     # Each reading has an age of its own.
     expect(card.locator("dd .age")).to_have_text([re.compile(r"^\d+\ss$")] * 2)
-    assert card.locator("[data-health=stressed] svg").count() == 1
+    assert card.locator("header [data-health=critical] svg").count() == 1
     # Table and card carry the same for those who do not see it.
     expect(card).to_have_attribute("aria-hidden", "true")
     hmi.point_at(2, 2.4)

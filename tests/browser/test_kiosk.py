@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from playwright.sync_api import expect
 
 from tests.browser.hmi import OpenPage
@@ -38,3 +40,35 @@ def test_a_wall_screen_that_is_brushed_stays_as_its_link_says(
     assert wall.map.evaluate("map => getComputedStyle(map).cursor") == "default"
     # To assistive technology it is a picture, not something to operate.
     expect(wall.map).to_have_attribute("role", "img")
+
+
+def test_a_wall_screen_goes_round_and_is_left_by_the_key_that_it_names(
+    house: Bridge, open_page: OpenPage
+) -> None:
+    wall = open_page(house.url, "sensor=temperature", "?kiosk=1&cycle=5")
+    note, legend = wall.test_id("kiosk-note"), wall.test_id("legend")
+    expect(note).to_contain_text(re.compile(r"Temperature next: Humidity in [1-5]\u00a0s"))
+    # Too low for the whole list: it says how many are left, and cuts none in two.
+    wall.page.set_viewport_size({"width": 1100, "height": 500})
+    listed = wall.page.locator("li[data-fits=true]")
+    all_of_it = wall.page.locator("li[data-fits]")
+
+    def says_how_many_are_left() -> bool:
+        left = all_of_it.count() - listed.count()
+        more = wall.page.locator(".attention-more")
+        return left > 0 and more.all_inner_texts() == [f"+ {left} more"]
+
+    wall.expect(says_how_many_are_left, "how many are left")
+    bottom = wall.page.locator(".attention").evaluate("e => e.getBoundingClientRect().bottom")
+    for row in listed.all():
+        box = row.bounding_box()
+        assert box is not None
+        assert box["y"] + box["height"] <= bottom
+    expect(legend).to_contain_text("Humidity %")
+    wall.page.keyboard.press("Escape")
+    expect(wall.test_id("tag-table")).to_be_visible()
+    # What the link names, not what was shown just now.
+    expect(wall.page).not_to_have_url(re.compile("kiosk"))
+    expect(legend).to_contain_text("Temperature °C")
+    wall.page.go_back()
+    expect(note).to_be_visible()

@@ -93,6 +93,7 @@ def test_a_narrow_screen_shows_one_half_at_a_time_and_nothing_sticks_out(phone: 
 
 
 def test_what_a_finger_has_to_hit_is_large_enough(phone: Hmi) -> None:
+    phone.colour_by_value()
     phone.page.get_by_role("radio", name="Fixed").check()
     for pane in ("Map", "Tags"):
         phone.page.get_by_role("navigation").get_by_role("button", name=pane).tap()

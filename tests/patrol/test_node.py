@@ -82,10 +82,14 @@ def test_one_pass_shows_the_whole_greenhouse_and_ends(domain: int) -> None:
         heard = Heard().listen(peer)
         with patrol(domain, "--once", "--speed", "10") as process:
             peer.until(heard.map_is_complete, "a complete map")
-            peer.until(lambda: len(heard.discovered_tags[-1].tags) == 29, "29 discovered tags")
+            peer.until(
+                lambda: heard.discovered_tags and len(heard.discovered_tags[-1].tags) == 29,
+                "29 discovered tags",
+            )
             peer.until(lambda: heard.read_tags == set(tags), "a reading of every tag")
             peer.until(lambda: heard.seen_tags == set(tags), "a look at every tag")
             peer.until(lambda: process.exit_code is not None, "the end of the process")
+            peer.until(lambda: len(heard.observations) >= 2 * 29 + 2, "what came last")
             assert process.exit_code == 0
             assert "Traceback" not in process.output
 
@@ -111,10 +115,10 @@ def test_it_does_not_begin_before_somebody_listens(
 
     def events() -> Iterator[PassCompleted]:
         has_begun.set()
-        yield PassCompleted(0.0, 0, ())
+        yield PassCompleted(1_000.0, 0, ())
 
     patrol_thread = Thread(
-        target=partial(node.play, events(), speed=1.0, once=True, ros_arguments=[])
+        target=partial(node.play, events(), begin_s=1_000.0, speed=1.0, once=True, ros_arguments=[])
     )
     with Peer(domain) as peer:
         patrol_thread.start()

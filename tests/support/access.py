@@ -10,11 +10,11 @@ from typing import Any
 
 import httpx
 from websockets.exceptions import InvalidStatus
-from websockets.sync.client import connect
 
 from tests.support.domains import own_domain
 from tests.support.processes import Process, lupin_twin, url_of
 from tests.support.waiting import PATIENCE_S
+from tests.support.wss import wss
 
 TOKEN = "a-good-token/of.32~characters+==="
 BEARER = {"Authorization": f"Bearer {TOKEN}"}
@@ -47,23 +47,35 @@ class Served:
         url = self.url.replace("http", "ws", 1) + path
         context = self.trust if isinstance(self.trust, ssl.SSLContext) else None
         try:
-            with connect(url, additional_headers=headers, proxy=None, ssl=context) as connection:
-                connection.recv(timeout=PATIENCE_S)
+            with wss(url, context, headers) as connection:
+                connection.recv()
                 return 101
         except InvalidStatus as refused:
             return refused.response.status_code
 
 
 @contextmanager
-def served(*options: str, trust: ssl.SSLContext | bool = True, **env: str) -> Iterator[Served]:
-    """`lupin-twin serve` with these options and environment, in a ROS domain of its own."""
-    with own_domain() as domain, lupin_twin(domain, "serve", *options, **env) as process:
+def served(
+    *options: str, trust: ssl.SSLContext | bool = True, afresh: bool = False, **env: str
+) -> Iterator[Served]:
+    """`lupin-twin serve` with these options and environment, in a ROS domain of its own.
+
+    It keeps no journal, and so needs no process that looks back.
+    """
+    options = (*options, "--ros-args", "-p", "journal:=off")
+    with (
+        own_domain() as domain,
+        lupin_twin(domain, "serve", *options, afresh=afresh, **env) as process,
+    ):
         yield Served(process, url_of(process), trust)
 
 
 def refused_start(*options: str, **env: str) -> str:
     """The one line with which `lupin-twin serve` ends instead of starting."""
-    with own_domain() as domain, lupin_twin(domain, "serve", *options, **env) as process:
+    with (
+        own_domain() as domain,
+        lupin_twin(domain, "serve", *options, afresh=False, **env) as process,
+    ):
         assert process.wait() == 2
         (line,) = process.output.splitlines()
         return line

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from tests.support.shared_memory import SHARED_MEMORY
+
 # 0 is everybody's default; above 101 the ports of DDS run into those of outgoing connections.
 DOMAINS = range(1, 102)
 
@@ -27,9 +29,18 @@ def own_domain() -> Iterator[int]:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 continue
+            _remove_ports_of(domain)
             yield domain
             return
     raise RuntimeError("all ROS domains are in use by other tests")
+
+
+def _remove_ports_of(domain: int, folder: Path = SHARED_MEMORY) -> None:
+    """Remove what killed processes left of a domain's ports: half-made, they stop whoever comes."""
+    for port in range(7400 + 250 * domain, 7400 + 250 * (domain + 1)):
+        for name in (f"fastrtps_port{port}", f"fastrtps_port{port}_el"):
+            (folder / name).unlink(missing_ok=True)
+        (folder / f"sem.fastrtps_port{port}_mutex").unlink(missing_ok=True)
 
 
 _leases = 0

@@ -14,7 +14,7 @@ from lupin_twin.journal.restoring import Restored
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rows import LookRow, PinRow, Row, ScanRow
 from lupin_twin.journal.runs import Clock, Run
-from lupin_twin.journal.schema import open_reader
+from lupin_twin.journal.schema import Empty, open_reader
 from lupin_twin.journal.writer import Journal
 from lupin_twin.state import Bloom, Flower, Pose, Reading
 from tests.support.waiting import wait_for
@@ -96,8 +96,13 @@ def known(path: Path, now: Clock | None = None) -> set[Row]:
 
 
 def select(path: Path, sql: str) -> list[tuple[object, ...]]:
-    """What a reader sees."""
-    connection = open_reader(path)
+    """What a reader sees; nothing while the file is still to be made."""
+    if not path.exists():
+        return []
+    try:
+        connection = open_reader(path)
+    except Empty:
+        return []
     try:
         return connection.execute(sql).fetchall()
     finally:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.support.messages import scan
+from tests.support.proc_stat import waited_s
 from tests.support.processes import OFTEN, twin_node
 from tests.support.ros import Peer
 
@@ -27,7 +28,7 @@ def kill_and_look(domain: int, journal: Path, chance: random.Random, first: int)
     """
     ros_args = (*OFTEN, "-p", f"journal:={journal}")
     number = first
-    shown: list[tuple[float, dict[str, float]]] = []
+    shown: list[tuple[float, float, dict[str, float]]] = []
     with twin_node(domain, *ros_args) as twin, Peer(domain, "robot") as robot:
         robot.listen()
         robot.wait_for_twin()
@@ -46,13 +47,15 @@ def kill_and_look(domain: int, journal: Path, chance: random.Random, first: int)
                 )
             robot.spin_briefly()
             if robot.states:
-                shown.append((time.monotonic(), counts(robot.states[-1])))
-        killed = time.monotonic()
+                newest = counts(robot.states[-1])
+                shown.append((time.monotonic(), waited_s(twin.pid), newest))
+        killed, waited = time.monotonic(), waited_s(twin.pid)
         twin.send(signal.SIGKILL)
     # Nobody is there who would tell it again.
     safe: dict[str, float] = {}
-    for at, state in shown:
-        if at <= killed - SAFE_S:
+    for at, waited_by_then, state in shown:
+        # The time in which its threads waited for a core is the machine's.
+        if killed - at - (waited - waited_by_then) >= SAFE_S:
             safe = state
     with twin_node(domain, *ros_args), Peer(domain, "client") as client:
         client.listen()

@@ -67,15 +67,16 @@ def _names(body: Sequence[ast.stmt]) -> Iterator[str]:
             yield from _names([it for it in ast.iter_child_nodes(node) if isinstance(it, ast.stmt)])
 
 
-def _files_of(name: str) -> list[Path]:
+@cache
+def _files_of(name: str) -> tuple[Path, ...]:
     """A module of ours, and the packages that it is in; none where it is not ours."""
     top, *parts = name.split(".")
     folder = TESTS if top == "tests" else PACKAGES.get(top)
     if folder is None:
-        return []
+        return ()
     module = folder.joinpath(*parts)
     packages = [it / "__init__.py" for it in (module, *module.parents) if it.is_relative_to(folder)]
-    return [file for file in (*packages, module.with_suffix(".py")) if file.is_file()]
+    return tuple(file for file in (*packages, module.with_suffix(".py")) if file.is_file())
 
 
 class _NothingFromOutside(importlib.abc.MetaPathFinder):

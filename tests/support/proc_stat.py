@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
@@ -16,6 +17,15 @@ def cpu_s(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / _TICKS_PER_S
 
 
+def waited_s(pid: int) -> float:
+    """How long its threads that are there have waited for a core so far, s (schedstats, Linux)."""
+    waited_ns = 0
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        with suppress(FileNotFoundError, ProcessLookupError):  # it has just ended
+            waited_ns += int((task / "schedstat").read_text(encoding="ascii").split()[1])
+    return waited_ns / 1e9
+
+
 def resident_mb(pid: int) -> float:
     """Resident memory, MB (10^6 bytes)."""
     pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
@@ -23,8 +33,21 @@ def resident_mb(pid: int) -> float:
 
 
 def open_files(pid: int) -> int:
-    """How many descriptors it has open."""
-    return len(list(Path(f"/proc/{pid}/fd").iterdir()))
+    """How many descriptors it has open, without its end of a socket to a process of its own.
+
+    That one is there from the first question about the past on, or from some seconds on.
+    """
+    own = {line.split()[6] for line in Path("/proc/net/unix").read_text("ascii").splitlines()[1:]}
+    files = (_target(path) for path in Path(f"/proc/{pid}/fd").iterdir())
+    return sum(file.removeprefix("socket:[").rstrip("]") not in own for file in files)
+
+
+def _target(descriptor: Path) -> str:
+    """What it stands for (proc_pid_fd(5)); nothing in particular once it is closed."""
+    try:
+        return str(descriptor.readlink())
+    except FileNotFoundError:
+        return ""
 
 
 def tcp_buffers_mb() -> float:

@@ -10,26 +10,45 @@ import sys
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from tests.support.domains import ros_env
+from tests.support.template import Forked, Template
 from tests.support.waiting import PATIENCE_S, wait_for
 
 # ROS arguments, last on a command line: a state so often that none has to be waited for, and that
 # a busy machine makes no silence.
 OFTEN = ("--ros-args", "-p", "state_publish_rate_hz:=20.0")
 
+# A shell that runs the tests in its background has them ignore SIGINT, and with them all that they
+# start, until that asks for it: a signal before would be lost.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
 
 class Process:
-    """A process with its output in a file; killed with all its children at the end of `with`."""
+    """A process with its output in a file; killed with all its children at the end of `with`.
 
-    def __init__(self, command: Sequence[str], env: Mapping[str, str]) -> None:
+    Within pytest, and unless it is to be started `afresh`, one of our programs is forked from a
+    process that has imported it already (`Template`). What a test measures of a process (memory,
+    the time of its start, a signal amid it) is that of one afresh.
+    """
+
+    def __init__(
+        self, command: Sequence[str], env: Mapping[str, str], *, afresh: bool = False
+    ) -> None:
         self._output = tempfile.NamedTemporaryFile("w+", suffix=".log", delete=False)  # noqa: SIM115
+        env = {**env, **_state_of_its_own(env)}
+        self._process: subprocess.Popen[bytes] | Forked
+        if not afresh and "PYTEST_VERSION" in os.environ and _template().can_be(command, env):
+            self._process = _template().start(command, env, self._output)
+            return
         self._process = subprocess.Popen(
             command,
-            env={**env, **_state_of_its_own(env)},
+            env=env,
             stdin=subprocess.DEVNULL,
             stdout=self._output,
             stderr=subprocess.STDOUT,
@@ -118,21 +137,50 @@ class Process:
         self._process.wait()
 
 
-def twin_node(domain: int, *ros_args: str) -> Process:
+def twin_node(domain: int, *ros_args: str, afresh: bool = False) -> Process:
     """The twin alone, as the executable `twin_node`."""
     command = [sys.executable, "-m", "lupin_twin.cli", *ros_args]
-    return Process(command, ros_env(domain))
+    return Process(command, ros_env(domain), afresh=afresh)
 
 
-def lupin_twin(domain: int, role: str, *args: str, **env: str) -> Process:
+def lupin_twin(domain: int, role: str, *args: str, afresh: bool = False, **env: str) -> Process:
     """`lupin-twin ROLE` on a free port; ask `url_of` for its address."""
     command = [sys.executable, "-m", "lupin_bridge.cli", role, "--port", "0", *args]
-    return Process(command, ros_env(domain, **env))
+    return Process(command, ros_env(domain, **env), afresh=afresh)
+
+
+def patrols_of(pid: int) -> list[int]:
+    """The patrol that a demo has started; what looks back is a process of its own too."""
+    return children_of(pid, b"lupin_patrol")
+
+
+def children_of(pid: int, word: bytes) -> list[int]:
+    """Those processes that a process has started with this word on their command line."""
+    tasks = Path(f"/proc/{pid}/task")
+    children = [
+        int(child)
+        for task in tasks.iterdir()
+        for child in (task / "children").read_text(encoding="ascii").split()
+    ]
+    return [child for child in children if word in _command(child)]
 
 
 def url_of(process: Process) -> str:
     """The address that a `lupin-twin` process announces once it serves."""
     return process.wait_for_output("lupin-twin: http").partition(": ")[2].strip()
+
+
+@cache
+def _template() -> Template:
+    return Template()
+
+
+def _command(pid: int) -> bytes:
+    """What it was started with (proc_pid_cmdline(5)); nothing once it is gone."""
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_bytes()
+    except (FileNotFoundError, ProcessLookupError):
+        return b""
 
 
 def _state_of_its_own(env: Mapping[str, str]) -> dict[str, str]:

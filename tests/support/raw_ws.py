@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import random
 import socket
 import struct
@@ -43,6 +44,15 @@ def frames_of(data: bytes) -> Iterator[tuple[int, bytes]]:
         start = end
 
 
+def handshake_request(host: str, path: str) -> bytes:
+    return (
+        f"GET {path} HTTP/1.1\r\nHost: {host}\r\nUpgrade: websocket\r\n"
+        "Connection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+        "Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n"  # which other routes pass over
+        "Sec-WebSocket-Version: 13\r\n\r\n"
+    ).encode()
+
+
 class RawClient:
     """A connection after its handshake."""
 
@@ -50,11 +60,7 @@ class RawClient:
         address = urlsplit(url)
         assert address.hostname is not None
         self.socket = socket.create_connection((address.hostname, address.port), PATIENCE_S)
-        self.socket.sendall(
-            f"GET {path} HTTP/1.1\r\nHost: {address.netloc}\r\nUpgrade: websocket\r\n"
-            "Connection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
-            "Sec-WebSocket-Version: 13\r\n\r\n".encode()
-        )
+        self.socket.sendall(handshake_request(address.netloc, path))
         self.received = b""
         while b"\r\n\r\n" not in self.received:
             self.received += self.socket.recv(65_536)
@@ -83,6 +89,20 @@ class RawClient:
             while block := self.socket.recv(1 << 18):
                 blocks.append(block)
         return list(frames_of(b"".join(blocks)))
+
+
+async def deaf(url: str, path: str) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+    """A client that reads nothing but the answer to its handshake."""
+    address = urlsplit(url)
+    raw = socket.socket()
+    raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    raw.setblocking(False)
+    loop = asyncio.get_running_loop()
+    await loop.sock_connect(raw, (address.hostname, address.port))
+    reader, writer = await asyncio.open_connection(sock=raw, limit=1024)
+    writer.write(handshake_request(address.netloc, path))
+    assert b" 101 " in await reader.readuntil(b"\r\n\r\n")
+    return reader, writer
 
 
 def random_payload(chance: random.Random, longest: int) -> bytes:

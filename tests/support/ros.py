@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
@@ -142,12 +142,21 @@ class Peer:
 
     def get_field(self, **request: Any) -> Any:
         """Call `/twin/get_field` and return the response."""
-        client = self.node.create_client(GetField, "/twin/get_field")
-        self.until(client.service_is_ready, "the service /twin/get_field")
-        future = client.call_async(GetField.Request(**request))
-        self.until(future.done, "an answer of /twin/get_field")
+        return self.ask(GetField, "/twin/get_field", **request)
+
+    def ask(self, kind: Any, service: str, **request: Any) -> Any:
+        """Call a service and return the response."""
+        [answer] = self.ask_all(kind, service, [kind.Request(**request)])
+        return answer
+
+    def ask_all(self, kind: Any, service: str, requests: Sequence[Any]) -> list[Any]:
+        """Call a service with all of these at once, and return the responses in their order."""
+        client = self.node.create_client(kind, service)
+        self.until(client.service_is_ready, f"the service {service}")
+        futures = [client.call_async(request) for request in requests]
+        self.until(lambda: all(future.done() for future in futures), f"answers of {service}")
         self.node.destroy_client(client)
-        return future.result()
+        return [future.result() for future in futures]
 
 
 __all__ = ["DiscoveredTags", "Observation", "OccupancyGrid", "Peer", "latched"]

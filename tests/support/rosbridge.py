@@ -1,19 +1,17 @@
-"""A rosbridge client that hides nothing, and one that does not read."""
+"""A rosbridge client that hides nothing."""
 
 from __future__ import annotations
 
-import asyncio
 import json
-import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
-from urllib.parse import urlsplit
 
 from websockets.frames import Frame, Opcode
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import ClientConnection
 
 from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.ws_client import open_websocket
 
 TOPIC = "/twin/state"
 FIELD = "/twin/get_field"
@@ -94,29 +92,10 @@ def tags(message: Message) -> list[str]:
 @contextmanager
 def ros_at(url: str) -> Iterator[Ros]:
     address = f"{url.replace('http', 'ws', 1)}/rosbridge"
-    # No pings of its own: a test that is busy elsewhere reads no answers to them.
-    with connect(address, proxy=None, max_size=None, ping_interval=None) as opened:
+    with open_websocket(address) as opened:
         yield Ros(opened)
 
 
 def masked(message: Message) -> bytes:
     """A message as a client's WebSocket frame."""
     return Frame(Opcode.TEXT, json.dumps(message).encode()).serialize(mask=True)
-
-
-async def deaf(url: str) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
-    """A rosbridge client that reads no message."""
-    address = urlsplit(url)
-    raw = socket.socket()
-    raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-    raw.setblocking(False)
-    loop = asyncio.get_running_loop()
-    await loop.sock_connect(raw, (address.hostname, address.port))
-    reader, writer = await asyncio.open_connection(sock=raw, limit=1024)
-    writer.write(
-        f"GET /rosbridge HTTP/1.1\r\nHost: {address.netloc}\r\nConnection: Upgrade\r\n"
-        "Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
-        "Sec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==\r\n\r\n".encode()
-    )
-    assert b" 101 " in await reader.readuntil(b"\r\n\r\n")
-    return reader, writer

@@ -1,12 +1,12 @@
-"""The table of who may import what, and the imports as they are, read off the modules' text."""
+"""The table of who may import what."""
 
 from __future__ import annotations
 
-import ast
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+
+from tests.support.structure_estimate import ESTIMATE
+from tests.support.structure_journal import JOURNAL
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = {
@@ -25,7 +25,9 @@ ROS = frozenset(
         "diagnostic_msgs",
         "rcl_interfaces",
         "rosgraph_msgs",
+        "sensor_msgs",
         "std_msgs",
+        "visualization_msgs",
     }
 )
 # The modules that know ROS; all others have to run, and be tested, without it.
@@ -33,54 +35,142 @@ KNOW_ROS = {
     "lupin_twin": {
         "cli",
         "convert",
+        "convert_estimate",
+        "convert_field",
+        "convert_layers",
+        "convert_past",
+        "convert_writes",
         "diagnostic_messages",
+        "estimate_service",
         "habits",
+        "layer_service",
         "node",
+        "other_twins",
+        "past_service",
         "ros_parameters",
         "shapes",
         "spinning",
     },
     "lupin_patrol": {"cli", "messages", "node"},
-    "lupin_bridge": {"twin.ros_logs", "twin.ros_thread", "twin.web_node"},
+    "lupin_bridge": {
+        "bags.journal_messages",
+        "bags.record_command",
+        "bags.record_node",
+        "bags.replay_node",
+        "bags.replaying",
+        "twin.relay_ros",
+        "twin.ros_logs",
+        "twin.ros_thread",
+        "twin.web_node",
+    },
 }
 # What the patrol may use of the twin: how a node behaves, and nothing of what a twin knows.
-SHARED_WITH_PATROL = {"lupin_twin.habits", "lupin_twin.spinning", "lupin_twin.stop_signals"}
+SHARED_WITH_PATROL = {
+    "lupin_twin.habits",
+    "lupin_twin.half_made",
+    "lupin_twin.spinning",
+    "lupin_twin.stop_signals",
+}
 # Those of the twin that know the disk, threads and clocks, and still no ROS.
 KNOW_THE_DISK = {
     f"lupin_twin.journal.{module}"
     for module in (
         "appending",
+        "asof",
+        "carving",
+        "changes",
+        "checking",
+        "columns",
+        "events",
+        "export",
         "file",
+        "flowers",
+        "happenings",
+        "heard",
+        "hours",
+        "lately",
         "lock",
+        "fixed",
+        "newest",
+        "overview",
         "pending",
+        "prefilling",
         "reading",
         "restoring",
         "retention",
         "rollups",
         "salvage",
         "schema",
+        "series",
+        "silences",
+        "spans",
         "syncing",
+        "tallies",
+        "tallying",
+        "vacuuming",
         "writer",
+        "writes",
     )
-} | {"lupin_twin.memory"}
+} | {"lupin_twin.half_made", "lupin_twin.memory", "lupin_twin.recall"}
 # What else a package may use, and in which modules: None is all of them. The bridge may use what
 # its own dependencies list.
 LIBRARIES: Mapping[str, Mapping[str, set[str] | None]] = {
     "lupin_twin": {
-        "numpy": {"grid", "idw", "explored", "field_quality", "fields", "convert"},
+        "numpy": {
+            "grid",
+            "idw",
+            "explored",
+            "field_quality",
+            "fields",
+            "convert",
+            "convert_estimate",
+            "convert_field",
+            "journal.columns",
+            "journal.fixed",
+            "journal.flowers",
+            "journal.heard",
+            "journal.hours",
+            "journal.newest",
+            "estimate.advice",
+            "estimate.cells",
+            "estimate.changed",
+            "estimate.course",
+            "estimate.day_length",
+            "estimate.fitting",
+            "estimate.kernel",
+            "estimate.lattice",
+            "estimate.member",
+            "estimate.model",
+            "estimate.nearby",
+            "estimate.nowcast",
+            "estimate.posterior",
+            "estimate.readings",
+            "estimate.screening",
+            "estimate.tiled",
+            "estimate.tiles",
+            "estimate.triangle",
+            "estimates",
+            "estimate_rounds",
+            "estimate_service",
+            "free_places",
+            "layers",
+        },
     },
     "lupin_patrol": {
         "numpy": {"exploration", "geometry", "perception", "route"},
-        "greenhouse_sim": {"climate", "cli"},
+        "greenhouse_sim": {"climate", "cli", "past"},
         "lupin_twin": {"cli", "node"},
     },
     "lupin_bridge": dict.fromkeys(
         (
             "PIL",
+            "aiomqtt",
             "cbor2",
             "fastapi",
             "h11",
             "lupin_twin",
+            "lz4",
+            "mcap",
             "numpy",
             "orjson",
             "prometheus_client",
@@ -88,6 +178,7 @@ LIBRARIES: Mapping[str, Mapping[str, set[str] | None]] = {
             "starlette",
             "uvicorn",
             "websockets",
+            "zstandard",
         )
     ),
 }
@@ -95,7 +186,8 @@ LIBRARIES: Mapping[str, Mapping[str, set[str] | None]] = {
 # module: the modules of its own package that it may import.
 ARROWS: Mapping[str, Mapping[str, set[str]]] = {
     "lupin_twin": {
-        "state": set(),
+        "bounds": set(),
+        "state": {"bounds"},
         "drops": set(),
         "grid": set(),
         "stop_signals": set(),
@@ -111,101 +203,131 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
         "clock_watch": {"state"},
         "diagnostics": {"counts", "drops", "journal.condition", "state"},
         "diagnostic_messages": {"convert", "diagnostics"},
+        "half_made": set(),
+        "launching": set(),
         "leaving": set(),
         "deferred": set(),
-        "field_desk": {"field_cache", "fields", "grid", "workers"},
-        "shapes": {"cdr", "state"},
+        "field_desk": {"field_cache", "fields", "grid", "refusals", "workers"},
+        "shapes": {"bounds", "cdr"},
         "explored": {"grid"},
         "field_cache": {"grid"},
         "field_quality": {"state", "grid", "idw"},
-        "fields": {"state", "grid", "idw", "explored", "field_cache"},
+        "fields": {"bounds", "explored", "field_cache", "grid", "idw", "state"},
         "history": {"state"},
+        "past": {"bounds", "refusals", "state"},
+        "making": set(),
+        "recall": {"journal.condition", "journal.schema", "past", "workers"},
+        "past_desk": {"past", "workers"},
+        "past_service": {
+            "convert",
+            "convert_past",
+            "convert_writes",
+            "past_writes",
+            "journal.writes",
+            "deferred",
+            "habits",
+            "history",
+            "journal.asof",
+            "journal.series",
+            "past",
+            "past_desk",
+            "recall",
+            "recent",
+            "state",
+            "workers",
+        },
+        "recent": {"history", "past", "state"},
+        "refusals": set(),
         "lateness": set(),
-        "ingest": {"drops", "history", "state"},
-        "convert": {"state", "grid", "explored", "fields", "history", "ingest"},
-        "journal": set(),
-        "journal.rows": {"state"},
-        "journal.packing": {"state"},
-        "journal.condition": set(),
-        "journal.runs": set(),
-        "journal.pending": {"journal.rows"},
-        "journal.lock": set(),
-        "journal.schema": set(),
-        "journal.syncing": {"journal.schema"},
-        "journal.appending": {"journal.packing", "journal.rows", "journal.runs"},
-        "journal.reading": {"journal.packing", "journal.rows", "journal.runs", "state"},
-        "journal.restoring": {"journal.packing", "journal.reading", "journal.rows", "journal.runs"},
-        "journal.rollups": {"journal.packing", "journal.reading"},
-        "journal.retention": {"journal.rollups"},
-        "journal.salvage": {
-            "journal.packing",
-            "journal.reading",
-            "journal.rollups",
-            "journal.schema",
-        },
-        "journal.file": {
-            "journal.appending",
-            "journal.reading",
-            "journal.restoring",
-            "journal.retention",
-            "journal.rollups",
-            "journal.rows",
-            "journal.runs",
-            "journal.salvage",
-            "journal.schema",
-            "journal.syncing",
-        },
-        "journal.writer": {
-            "journal.condition",
-            "journal.file",
-            "journal.lock",
-            "journal.pending",
-            "journal.restoring",
-            "journal.retention",
-            "journal.rows",
-            "journal.runs",
-            "journal.schema",
-        },
+        "ingest": {"bounds", "drops", "history", "state"},
+        "convert": {"state", "explored", "history", "ingest"},
+        "convert_field": {"convert", "fields", "grid"},
+        "convert_past": {"bounds", "convert", "past", "state", "workers"},
+        "past_writes": {"past"},
+        "convert_writes": {"bounds", "convert_past", "past", "past_writes"},
+        **JOURNAL,
+        **ESTIMATE,
+        "other_twins": {"habits", "twin_count"},
         "ros_parameters": {"parameters"},
+        "field_rules": {"fields", "parameters"},
+        "layers": {"estimate", "fields", "grid", "parameters"},
+        "marks": {"state"},
+        "convert_layers": {"convert", "layers", "marks", "workers"},
+        "layer_service": {
+            "convert_layers",
+            "diagnostics",
+            "estimate_service",
+            "estimates",
+            "explored",
+            "fields",
+            "grid",
+            "habits",
+            "idw",
+            "layers",
+            "marks",
+            "past_desk",
+            "ros_parameters",
+            "state",
+            "workers",
+        },
         "habits": {"cdr", "counts", "drops", "gaps", "lateness", "ros_parameters", "throttle"},
         "memory": {
+            "bounds",
             "drops",
             "history",
             "ingest",
-            "state",
             "journal.condition",
             "journal.restoring",
             "journal.retention",
             "journal.rows",
             "journal.runs",
             "journal.writer",
+            "recall",
+            "state",
         },
         "node": {
             "clock_watch",
+            "journal.condition",
             "journal.runs",
             "memory",
             "convert",
+            "convert_field",
             "deferred",
             "diagnostic_messages",
             "diagnostics",
+            "estimate_service",
             "explored",
             "drops",
             "field_cache",
             "field_desk",
+            "field_rules",
             "fields",
             "grid",
             "habits",
             "history",
             "lateness",
+            "layer_service",
             "ingest",
+            "other_twins",
             "parameters",
+            "past_desk",
+            "past_service",
             "ros_parameters",
             "shapes",
             "state",
             "twin_count",
             "workers",
         },
-        "cli": {"leaving", "node", "parameters", "spinning", "stop_signals"},
+        "one_core": set(),
+        "cli": {
+            "half_made",
+            "leaving",
+            "node",
+            "one_core",
+            "parameters",
+            "spinning",
+            "stop_signals",
+        },
     },
     "lupin_patrol": {
         "chance": set(),
@@ -216,7 +338,7 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
         "route": {"geometry", "house"},
         "plants": {"chance", "geometry", "house"},
         "perception": {"chance", "geometry", "house", "plants"},
-        "events": {"exploration", "geometry", "perception", "plants"},
+        "events": {"exploration", "geometry", "house", "perception", "plants"},
         "mission": {
             "chance",
             "climate",
@@ -228,9 +350,10 @@ ARROWS: Mapping[str, Mapping[str, set[str]]] = {
             "plants",
             "route",
         },
-        "messages": {"events", "house", "perception", "plants"},
+        "messages": {"events", "perception", "plants"},
         "node": {"events", "messages"},
         "cli": {"mission", "node"},
+        "past": {"cli", "climate", "events", "mission"},
         "__main__": {"cli"},
     },
 }
@@ -241,161 +364,71 @@ ROOMS: Mapping[str, set[str]] = {
     "logs": set(),
     "metrics": set(),
     "supervisor": set(),
+    "message_schemas": set(),
+    "bags": {"message_schemas"},
     "settings": {"logs"},
     "configuration": {"settings"},
+    "query_string": set(),
     "serving": {"settings"},
     "twin": set(),
-    "field": {"serving"},
-    "stream": {"field"},
+    "field": {"judge", "query_string", "serving"},
+    "stream": {"field", "judge"},
+    "past": {"field", "judge", "query_string", "stream", "twin"},
     "access": {"serving", "settings"},
     "rosbridge": {"field", "serving", "stream", "twin"},
-    "bridge": {"field", "metrics", "serving", "settings", "stream", "twin"},
+    "foxglove": {"message_schemas", "serving", "twin"},
+    "judge": {"settings"},
+    "alarms": {"judge", "twin"},
+    "estimates": {"twin"},
+    "outward": {"alarms", "judge", "past", "settings", "stream"},
+    "bridge": {
+        "alarms",
+        "estimates",
+        "field",
+        "foxglove",
+        "judge",
+        "metrics",
+        "outward",
+        "past",
+        "serving",
+        "settings",
+        "stream",
+        "twin",
+    },
     "routes": {
         "access",
         "bridge",
+        "estimates",
         "field",
+        "foxglove",
+        "judge",
         "metrics",
+        "past",
+        "query_string",
         "rosbridge",
         "serving",
         "settings",
         "stream",
         "twin",
     },
+    "demo": {"bags"},
     "app": {"access", "bridge", "routes", "serving", "stream"},
-    "roles": {"access", "app", "bridge", "routes", "serving", "settings", "supervisor", "twin"},
-    "cli": {"configuration", "logs", "roles", "settings"},
-    "openapi": {"app"},
-}
-
-# What a pure module may use of the standard library. Whatever is not named here (files, sockets,
-# threads, clocks, databases) is the outside world.
-PURE_STANDARD = frozenset(
-    {
-        "__future__",
-        "array",
-        "collections",
-        "colorsys",
-        "contextlib",
-        "dataclasses",
-        "enum",
-        "fractions",
-        "functools",
-        "hashlib",
-        "heapq",
-        "hmac",
-        "html",
-        "io",
-        "ipaddress",
-        "itertools",
-        "json",
-        "math",
-        "re",
-        "string",
-        "struct",
-        "types",
-        "typing",
-        "urllib.parse",
-        "zlib",
-    }
-)
-# And of libraries: what computes, and nothing that serves.
-PURE_LIBRARIES = frozenset({"PIL", "cbor2", "numpy", "orjson", "pydantic", "websockets.frames"})
-# A pure module that needs one thing more.
-PURE_EXCEPT: Mapping[str, set[str]] = {
-    "lupin_twin.idw": {"sys"},  # float_info
-    # It has no ROS and does no input or output, but it is threads and order in time.
-    "lupin_twin.workers": {"concurrent.futures", "threading", "time"},
-    "lupin_twin.field_desk": {
-        "concurrent.futures",
-        "queue",
-        "time",
-    },  # where the workers' results come back
-    "lupin_twin.leaving": {"logging", "os", "sys", "threading", "time"},  # the end of a process
-    "lupin_twin.stop_signals": {"signal"},  # which is what it is about
-    # Values and errors of modules that do more than that.
-    "lupin_bridge.access.credentials": {"lupin_bridge.settings.SettingError"},
-    "lupin_bridge.field.formats": {
-        "lupin_bridge.field.sensors.max_alpha",
-        "lupin_bridge.field.sensors.sensor",
+    "roles": {
+        "access",
+        "app",
+        "bags",
+        "bridge",
+        "demo",
+        "judge",
+        "outward",
+        "past",
+        "routes",
+        "serving",
+        "settings",
+        "supervisor",
+        "twin",
     },
-    "lupin_bridge.rosbridge.services": {"lupin_bridge.twin.source.TwinNames"},
-    "lupin_bridge.rosbridge.session": {"lupin_bridge.twin.source.TwinNames"},
-}
-CLAIMS_PURITY = re.compile(r"\bPure\b|No input or output")
-
-
-class Arrow(NamedTuple):
-    """One import: the module (`package.module`), what it imports, and in which line."""
-
-    source: str
-    target: str
-    line: int
-
-    @property
-    def package(self) -> str:
-        return self.source.partition(".")[0]
-
-    @property
-    def module(self) -> str:
-        return self.source.partition(".")[2]
-
-    @property
-    def top(self) -> str:
-        """The package that is imported from."""
-        return self.target.partition(".")[0]
-
-    def __str__(self) -> str:
-        return f"{self.source} -> {self.target} (line {self.line})"
-
-
-def arrows_in(source: str, text: str) -> Iterator[Arrow]:
-    """Every import in a module's text, those in functions and for type checkers included."""
-    package = source.rpartition(".")[0]
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield Arrow(source, alias.name, node.lineno)
-        elif isinstance(node, ast.ImportFrom):
-            module = node.module or ""
-            if node.level:
-                module = ".".join(filter(None, [package, module]))
-            for alias in node.names:
-                # `from package import module` and `from package.module import name` alike.
-                yield Arrow(source, f"{module}.{alias.name}", node.lineno)
-
-
-def modules(package: str) -> dict[str, str]:
-    """The text of a package's modules, by `package.folder.module`; a folder's own is its name."""
-    found = {}
-    for file in sorted(PACKAGES[package].rglob("*.py")):
-        parts = file.relative_to(PACKAGES[package]).with_suffix("").parts
-        if parts != ("__init__",):
-            name = ".".join((package, *(part for part in parts if part != "__init__")))
-            found[name] = file.read_text(encoding="utf-8")
-    return found
-
-
-MODULES = {name: text for package in PACKAGES for name, text in modules(package).items()}
-
-
-def project_module(target: str) -> str | None:
-    """The project's module that an import names, None where it is of no module of ours."""
-    parts = target.split(".")
-    names = (".".join(parts[:length]) for length in range(len(parts), 1, -1))
-    return next((name for name in names if name in MODULES), None)
-
-
-def room(name: str) -> str:
-    """The room of the bridge that a module (`lupin_bridge.room.module`) stands in."""
-    return name.split(".")[1]
-
-
-ALL_ARROWS = [arrow for name, text in MODULES.items() for arrow in arrows_in(name, text)]
-TO_OURS = {
-    name: {
-        found: arrow
-        for arrow in ALL_ARROWS
-        if arrow.source == name and (found := project_module(arrow.target))
-    }
-    for name in MODULES
+    "journal_command": {"bags", "judge", "past"},
+    "cli": {"bags", "configuration", "journal_command", "logs", "roles", "settings"},
+    "openapi": {"app"},
 }

@@ -16,6 +16,7 @@ class Certificate:
     cert: Path
     key: Path
     trust: ssl.SSLContext
+    authority: trustme.CA
 
     @property
     def options(self) -> tuple[str, ...]:
@@ -33,4 +34,4 @@ def certificate(folder: Path, name: str = "server") -> Certificate:
         blob.write_to_path(str(cert), append=True)
     trust = ssl.create_default_context()
     authority.configure_trust(trust)
-    return Certificate(cert, key, trust)
+    return Certificate(cert, key, trust, authority)

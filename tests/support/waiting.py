@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import TypeVar
 
 T = TypeVar("T")
 
 # Discovery takes up to 3 s on an idle machine; a busy one takes far longer over everything.
 PATIENCE_S = 60.0
-_PAUSE_S = 0.01
+# 40 looks a second: fewer than the computed answers that one address may ask a bridge for.
+_PAUSE_S = 0.025
 
 
 def wait_for(
@@ -44,6 +45,25 @@ async def until(look: Callable[[], T], what: str, timeout_s: float = PATIENCE_S)
         _hold_to(deadline, f"waited {timeout_s:g} s in vain for {what}; last: {found!r}")
         await asyncio.sleep(_PAUSE_S)
     return found
+
+
+async def until_answered(
+    ask: Callable[[], Awaitable[T]],
+    what: str,
+    is_it: Callable[[T], object] = bool,
+    timeout_s: float = PATIENCE_S,
+) -> T:
+    """`until` where the answer has to be awaited: asked again until `is_it` says so."""
+    last: object = None
+    try:
+        async with asyncio.timeout(timeout_s):
+            while not is_it(found := await ask()):
+                last = found
+                await asyncio.sleep(_PAUSE_S)
+            return found
+    except TimeoutError as error:
+        complaint = f"waited {timeout_s:g} s in vain for {what}; last: {last!r}"
+        raise AssertionError(complaint) from error
 
 
 def _hold_to(deadline_s: float, complaint: str) -> None:

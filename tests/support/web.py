@@ -11,14 +11,14 @@ from urllib.parse import urlencode
 
 import cbor2
 import httpx
-from websockets.sync.client import ClientConnection, connect
-from websockets.typing import Subprotocol
+from websockets.sync.client import ClientConnection
 
 from tests.support.domains import own_domain
 from tests.support.messages import look
 from tests.support.processes import Process, lupin_twin, url_of
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.ws_client import open_websocket
 
 Frame = dict[str, Any]
 
@@ -32,6 +32,19 @@ ROUTES = {
     "/api/field.png": True,
     "/api/field.npy": True,
     "/api/field/quality": True,
+    "/api/estimate": True,
+    "/api/estimate.json": True,
+    "/api/estimate.png": True,
+    "/api/estimate.npy": True,
+    "/api/estimate/quality": True,
+    "/api/estimate/tags": True,
+    "/api/estimate/advice": True,
+    "/api/history": True,
+    "/api/timeline": True,
+    "/api/export.csv": True,
+    "/api/health": True,
+    "/api/alarms": True,
+    "/api/sensors": True,
     "/api/map": True,
     "/api/map.png": True,
     "/healthz": True,
@@ -108,19 +121,9 @@ def without_ages(state: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 @contextmanager
-def listener(
-    url: str, subprotocols: Sequence[str] | None = None, **query: Any
-) -> Iterator[Listener]:
+def listener(url: str, subprotocols: Sequence[str] = (), **query: Any) -> Iterator[Listener]:
     """A WebSocket client of the bridge at `url`; keyword arguments are the query."""
-    offered = None if subprotocols is None else [Subprotocol(name) for name in subprotocols]
-    # No pings of its own: a test that is busy elsewhere reads no answers to them.
-    with connect(
-        ws_url(url, **query),
-        proxy=None,
-        max_size=None,
-        subprotocols=offered,
-        ping_interval=None,
-    ) as connection:
+    with open_websocket(ws_url(url, **query), subprotocols) as connection:
         yield Listener(connection)
 
 
@@ -155,14 +158,16 @@ class Bridge:
 
 
 @contextmanager
-def bridge(*options: str, domain: int | None = None, **env: str) -> Iterator[Bridge]:
+def bridge(
+    *options: str, domain: int | None = None, afresh: bool = False, **env: str
+) -> Iterator[Bridge]:
     """`lupin-twin serve` with these options, in a ROS domain of its own unless one is given."""
     if domain is None:
-        with own_domain() as leased, bridge(*options, domain=leased, **env) as running:
+        with own_domain() as own, bridge(*options, domain=own, afresh=afresh, **env) as running:
             yield running
         return
     with (
-        lupin_twin(domain, "serve", *options, **env) as process,
+        lupin_twin(domain, "serve", *options, afresh=afresh, **env) as process,
         Peer(domain) as peer,
         httpx.Client(base_url=url_of(process), timeout=PATIENCE_S, trust_env=False) as http,
     ):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from array import array
 from dataclasses import replace
 from typing import Any
 
@@ -14,12 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lupin_msgs.msg import Observation as ObservationMsg
 from lupin_msgs.msg import TwinTimes
-from lupin_msgs.srv import GetField
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Header
 
 from lupin_twin import convert, history, ingest
-from lupin_twin.grid import FieldGrid
 from lupin_twin.ingest import HeardLook, HeardReading
 from lupin_twin.state import (
     NANOSECONDS_PER_SECOND,
@@ -238,32 +235,3 @@ def test_a_malformed_map_is_refused() -> None:
             setattr(msg.info, name, value)
         with pytest.raises(ValueError, match="map"):
             convert.map_of(msg, 1)
-
-
-def test_a_response_is_filled_from_a_grid_and_shares_nothing_with_it() -> None:
-    values = np.array([1.0, np.nan, 3.0, 4.0], dtype=np.float32)
-    grid = FieldGrid(2, 2, 0.5, -1.5, 0.25, values, 1.0, 4.0, 9)
-    response: Any = convert.fill_field_response(GetField.Response(), grid)
-    values[0] = 99.0
-    assert isinstance(response.values, array)
-    assert response.ok
-    assert np.array_equal(response.values, [1.0, np.nan, 3.0, 4.0], equal_nan=True)
-    assert (response.width, response.height, response.sample_count) == (2, 2, 9)
-    assert (response.origin_x, response.origin_y, response.resolution_used) == (0.5, -1.5, 0.25)
-    assert (response.value_min, response.value_max) == (1.0, 4.0)
-
-
-def test_a_field_request_is_read_field_by_field() -> None:
-    request = convert.field_request(
-        GetField.Request(
-            sensor_type="co2",
-            resolution=0.5,
-            bbox_min_x=1.0,
-            bbox_min_y=2.0,
-            bbox_max_x=3.0,
-            bbox_max_y=4.0,
-        )
-    )
-    assert (request.sensor_type, request.resolution) == ("co2", 0.5)
-    assert (request.bbox_min_x, request.bbox_min_y) == (1.0, 2.0)
-    assert (request.bbox_max_x, request.bbox_max_y) == (3.0, 4.0)

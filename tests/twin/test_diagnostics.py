@@ -12,13 +12,16 @@ from lupin_twin.diagnostics import (
     OK,
     STALE,
     WARN,
+    Estimates,
     Finding,
     Health,
+    Layers,
+    Origin,
     SelfReport,
     findings,
     self_report,
 )
-from lupin_twin.journal.condition import Condition, JournalState
+from lupin_twin.journal.condition import OFF, UNKNOWN, Condition, JournalState
 from lupin_twin.state import ClockState
 
 WELL = Health(
@@ -40,10 +43,32 @@ def found(name: str, **changes: Any) -> Finding:
     return finding
 
 
+def test_layers_say_what_is_published_and_what_cannot_be() -> None:
+    published = {"/twin/field/co2": 3, "/twin/tags": 0}
+    said = found("layers", layers=Layers(published, 1))
+    assert (said.level, said.message) == (OK, "1 of 2 topics have subscribers")
+    assert said.values == {"/twin/field/co2": "3", "/twin/tags": "0"}
+    said = found("layers", layers=Layers(published, 1, {"/twin/field/co2": "too far"}))
+    assert (said.level, said.message) == (WARN, "/twin/field/co2: too far")
+
+
 def test_a_twin_that_is_well_is_ok_in_all() -> None:
     levels = {finding.name: finding.level for finding in findings(WELL)}
     assert levels == dict.fromkeys(
-        ("clock", "inputs", "drops", "queues", "stamps", "fields", "journal", "twins"), OK
+        (
+            "clock",
+            "origin",
+            "inputs",
+            "drops",
+            "queues",
+            "stamps",
+            "fields",
+            "estimates",
+            "layers",
+            "journal",
+            "twins",
+        ),
+        OK,
     )
 
 
@@ -66,6 +91,12 @@ def test_a_twin_that_is_well_is_ok_in_all() -> None:
         ),
         ("queues", {"counts": Counts({"lost": 5})}, OK, "nothing lost"),
         ("stamps", {"late": {"robot": 9}}, WARN, "behind their own earlier ones from robot"),
+        (
+            "journal",
+            {"journal": Condition(JournalState.FAILING, "no room")},
+            ERROR,
+            "no room",
+        ),
         ("twins", {"twins": 2}, ERROR, "2 twins"),
     ],
 )
@@ -105,8 +136,36 @@ def test_what_is_said_is_read_again(clock: ClockState) -> None:
     recent = (FRAME, Recent("lost", "lost messages", 2), Recent("late_stamp", "late", 1))
     counts = Counts({"frame": 40, "lost": 5, "late_stamp": 1}, 3, recent)
     assert self_report(findings(replace(WELL, clock=clock, counts=counts))) == SelfReport(
-        clock, counts
+        clock, counts, OFF, "robot"
     )
+
+
+@pytest.mark.parametrize("origin", ["unknown", "robot", "simulated", "recorded", "sim_time"])
+def test_where_observations_come_from_is_read_again(origin: Origin) -> None:
+    assert self_report(findings(replace(WELL, origin=origin))).origin == origin
+    assert self_report([found("origin", origin=origin)]).origin == origin
+    assert self_report([Finding("origin", OK, "", {"origin": "elsewhere"})]).origin == "unknown"
+
+
+def test_what_is_said_of_the_journal_is_read_again() -> None:
+    told = Condition(
+        JournalState.FAILING,
+        "the disk is full",
+        "/j.sqlite",
+        written=7,
+        waiting=2,
+        lost=3,
+        refused=1,
+        set_aside="/j.sqlite.damaged",
+        simulated_ns=(1_763_440_800_000_000_001, 1_763_700_000_000_000_000),
+    )
+    for journal in (told, replace(told, simulated_ns=None)):
+        assert self_report(findings(replace(WELL, journal=journal))).journal == journal
+    for values in ({}, {"state": "constructor"}):
+        assert self_report([Finding("journal", OK, "", values)]).journal == UNKNOWN
+    for stretch in ("1", "1 x", "x 1", " ", "1 " + 20 * "9"):
+        values = {"state": "recording", "simulated": stretch}
+        assert self_report([Finding("journal", OK, "", values)]).journal.simulated_ns is None
 
 
 def test_who_says_nothing_is_not_said_to_have_dropped_nothing() -> None:
@@ -128,3 +187,11 @@ def test_a_long_word_is_told_up_to_a_limit() -> None:
         assert (len(shown), shown == word) == (MAX_SHOWN, length == MAX_SHOWN)
         [source] = found("stamps", late={word: 1}).values
         assert source == shown
+
+
+def test_estimates_that_are_wrong_are_named() -> None:
+    assert found("estimates").message == "nothing is wrong"
+    wrong = found("estimates", estimates=Estimates({"co2": "singular"}, ("light",), 3, 7))
+    assert wrong.level == WARN
+    assert wrong.message.startswith("co2: singular; light: the model is wrong")
+    assert wrong.values == {"fits failed": "3", "scans not graded": "7"}

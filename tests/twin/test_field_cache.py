@@ -22,6 +22,7 @@ def key(number: int, sensor_type: str = "temperature") -> FieldKey:
         bbox_max_x=number + 5.0,
         bbox_max_y=5.0,
         map_revision=None,
+        rules=None,
     )
 
 

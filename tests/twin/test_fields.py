@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lupin_twin import idw
+from lupin_twin.bounds import MAX_TEXT_LENGTH
 from lupin_twin.explored import OccupancyMap, occupancy_map
 from lupin_twin.field_cache import FieldCache
 from lupin_twin.fields import (
@@ -28,7 +29,7 @@ from lupin_twin.fields import (
 )
 from lupin_twin.grid import FieldGrid
 from lupin_twin.idw import Abandoned
-from lupin_twin.state import MAX_TEXT_LENGTH, Pose, Reading, Scan, TwinStore
+from lupin_twin.state import Pose, Reading, Scan, TwinStore
 
 MAX_CELLS = 1_000_000
 

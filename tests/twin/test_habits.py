@@ -9,14 +9,28 @@ import pytest
 import rclpy
 from lupin_msgs.msg import Observation
 from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 
 from lupin_twin.cdr import MessageShape
+from lupin_twin.counts import LOST
 from lupin_twin.drops import Drop, Reason
-from lupin_twin.habits import WARNING_PERIOD_S, Habits, latched, read_message
+from lupin_twin.habits import (
+    BEHIND_S,
+    BELIEVED_S,
+    DRAIN_S,
+    WARNING_PERIOD_S,
+    Habits,
+    latched,
+    read_message,
+    waker,
+)
 from tests.support.hostile import PACKAGES, lies
 from tests.support.messages import INFO, scan
+from tests.support.ros import Peer
+from tests.support.waiting import PATIENCE_S, wait_for
 
 SHAPE = MessageShape(Observation, PACKAGES, max_bytes=1_000)
 
@@ -104,6 +118,15 @@ def test_a_subscription_hands_on_messages_and_tells_of_the_others(
     ]
 
 
+def test_who_wakes_a_node_that_is_gone_wakes_nobody(habits: Habits) -> None:
+    node = habits._node
+    condition = node.create_guard_condition(lambda: None)
+    wake = waker(condition)
+    wake()
+    condition.destroy()
+    wake()
+
+
 def test_warnings_are_throttled_by_their_key_and_counted(habits: Habits, logged: Logged) -> None:
     for _ in range(3):
         habits.drop(Drop(Reason.FRAME, "no"), "/t")
@@ -153,3 +176,93 @@ def test_of_a_shared_topic_only_what_is_wanted_is_read_and_nothing_else_counted(
     assert habits.counts().dropped == {}
     subscription.callback(b"ours" + bytes(SHAPE.max_bytes), INFO)
     assert habits.counts().dropped == {"size": 1}
+
+
+def test_messages_that_wait_are_taken_one_right_behind_the_other(
+    habits: Habits, domain: int
+) -> None:
+    """In one round of the executor, whatever else is due in it; and before what takes its time."""
+    heard: list[float] = []
+    large = MessageShape(Observation, PACKAGES, max_bytes=10_000)
+    group = habits._node.default_callback_group
+    habits.subscribe(
+        "topic",
+        "many",
+        large,
+        depth=50,
+        group=group,
+        callback=lambda message: heard.append(message.tag_reading.readings[0].value),
+    )
+    executor = SingleThreadedExecutor(context=habits._node.context)
+    executor.add_node(habits._node)
+    with Peer(domain) as peer:
+        publisher = peer.publisher("/many", Observation)
+        peer.until(lambda: habits._node.count_publishers("/many"), "the publisher")
+
+        def publish(values: range) -> None:
+            for value in values:
+                publisher.publish(scan("1", {"co2": float(value)}))
+            # The reader's queue has them then.
+            assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE_S))
+
+        publish(range(1))
+        wait_for(lambda: heard, "the first", meanwhile=lambda: executor.spin_once(0.05))
+        publish(range(1, 40))
+        executor.spin_once(PATIENCE_S)
+        assert heard == list(map(float, range(40)))
+        publish(range(40, 90))
+        habits.drain()
+        assert heard == list(map(float, range(90)))
+        assert habits.counts().dropped.get(LOST, 0) == 0
+    executor.shutdown()
+
+
+def test_those_that_wait_keep_nobody_waiting_for_long(
+    habits: Habits, logged: Logged, domain: int
+) -> None:
+    heard: list[Any] = []
+
+    def hear(message: Any) -> None:
+        heard.append(message)
+        logged.now_s += DRAIN_S / 2 + 0.001
+
+    group = habits._node.default_callback_group
+    habits.subscribe("topic", "many", SHAPE, depth=5, group=group, callback=hear)
+    (subscription,) = [s for s in habits._node.subscriptions if s.topic_name == "/many"]
+    with Peer(domain) as peer:
+        publisher = peer.publisher("/many", Observation)
+        peer.until(publisher.get_subscription_count, "the subscription")
+
+        def publish() -> None:
+            for _ in range(5):
+                publisher.publish(scan("1"))
+            assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE_S))
+
+        publish()
+        one = serialize_message(scan("1"))
+        for count in (3, 6):  # one that the executor brings, and two behind it
+            subscription.callback(one, INFO)
+            assert len(heard) == count
+        publish()
+        # Before what keeps the thread for longer, all that there is room for.
+        habits.drain()
+        assert len(heard) == 11
+
+
+def test_a_message_that_waited_long_tells_that_the_thread_is_behind_for_a_while(
+    habits: Habits, logged: Logged, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    group = habits._node.default_callback_group
+    habits.subscribe("topic", "many", SHAPE, depth=5, group=group, callback=lambda _: None)
+    (subscription,) = [s for s in habits._node.subscriptions if s.topic_name == "/many"]
+    monkeypatch.setattr("lupin_twin.habits.time.time_ns", lambda: 10**18)
+    one = serialize_message(scan("1"))
+    for waited_s, is_behind in ((0.0, False), (BEHIND_S, False), (BEHIND_S + 0.001, True)):
+        received_ns = 10**18 - int(waited_s * 1e9)
+        subscription.callback(one, {**INFO, "received_timestamp": received_ns})
+        assert habits.is_behind == is_behind
+    logged.now_s += BELIEVED_S - 0.001
+    subscription.callback(one, {**INFO, "received_timestamp": 10**18})
+    assert habits.is_behind
+    logged.now_s += 0.002
+    assert not habits.is_behind

@@ -303,3 +303,14 @@ def test_both_histories_are_the_same_where_every_state_is_seen(
     assert [past.what for past in twin.followed.of("1").tries] == [
         past.what for past in twin.own.of("1").tries
     ]
+
+
+def test_all_that_is_kept_can_be_looked_at_later_as_it_was() -> None:
+    history = History()
+    history.add(scan("1", 10.0, co2=400.0))
+    history.add(scan("2", 20.0, succeeded=False))
+    before = {tag_id: history.of(tag_id) for tag_id in "12"}
+    later = history.all_later()
+    history.add(scan("1", 30.0, co2=500.0))
+    history.hold_to(5 * S)
+    assert later() == before

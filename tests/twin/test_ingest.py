@@ -8,11 +8,12 @@ from dataclasses import replace
 import pytest
 
 from lupin_twin import ingest
+from lupin_twin.bounds import MAX_TEXT_LENGTH
 from lupin_twin.convert import pose_message, pose_of
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.history import History, TagHistory
 from lupin_twin.ingest import Heard, HeardLook, HeardReading, HeardTags, Pin
-from lupin_twin.state import MAX_TEXT_LENGTH, Flower, Look, Pose, Reading, Scan, TwinStore
+from lupin_twin.state import Flower, Look, Pose, Reading, Scan, TwinStore
 from tests.support.store import S, at
 
 NOW_NS = 100 * S

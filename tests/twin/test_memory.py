@@ -1,19 +1,24 @@
 from __future__ import annotations
 
-from collections.abc import Iterator
+import sqlite3
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
+from lupin_twin import ingest
 from lupin_twin.history import History
 from lupin_twin.ingest import Pin
 from lupin_twin.journal.condition import JournalState
 from lupin_twin.journal.runs import Clock
 from lupin_twin.memory import MAX_NEW_RUNS, Memory, journal_path, open_journal, state_folder
+from lupin_twin.past import NotRemembered
 from lupin_twin.state import Flower, Look, Pose, Reading, Scan, TwinStore
-from tests.support.journal import select
+from lupin_twin.workers import ShouldStop
+from tests.support.journal import is_whole, kept, scan, select
 from tests.support.waiting import wait_for
 
 S = 1_000_000_000
@@ -42,6 +47,71 @@ def twin(path: Path | None, clock: Clock) -> Iterator[tuple[Memory, TwinStore, H
         memory.close()
 
 
+def test_damage_that_somebody_meets_has_the_file_set_aside_while_the_twin_records(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "j.sqlite"
+    count = 5_000
+    kept(path, [scan(str(n % 30), NOW - (count - n) * S, t=n) for n in range(count)])
+
+    def how_many(memory: Memory) -> int:
+        def ask(connection: sqlite3.Connection, _: ShouldStop) -> int:
+            return len(connection.execute("SELECT readings FROM scan").fetchall())
+
+        return memory.recall.ask(ask).result(30.0)
+
+    with twin(path, wall(5)) as (memory, _, _):
+        # What is met before is for the check at the start.
+        wait_for(lambda: memory.condition.state is JournalState.RECORDING, "the journal")
+        # Not through the memory: what that has read it keeps, and would not see the damage.
+        assert select(path, "SELECT count(readings) FROM scan") == [(count,)]
+        with path.open("r+b") as file:
+            file.seek(path.stat().st_size // 2)
+            file.write(b"\xff" * 4096)
+        with pytest.raises(NotRemembered, match="the twin sets it aside and keeps what"):
+            how_many(memory)
+        memory.apply(SCAN, NOW)
+        wait_for(lambda: memory.condition.set_aside, "the damaged file to be set aside")
+        wait_for(lambda: memory.condition.written == 2, "what came meanwhile, and its place")
+        assert Path(memory.condition.set_aside).exists()
+        # A few pages are lost, and what can be read is being read.
+        wait_for(lambda: count * 0.9 < how_many(memory) <= count, "what can be read")
+        # Were it somebody's error and no damage, the disk would be filled with copies.
+        before = memory.condition.set_aside
+        memory.heal("again, the same day")
+        memory.apply(replace(SCAN, stamp_ns=NOW + 9, own_stamp_ns=NOW + 9), NOW)
+        wait_for(lambda: memory.condition.written == 3, "what came after it")
+        assert memory.condition.set_aside == before
+        assert len(list(tmp_path.glob("*.damaged-*Z"))) == 1
+    assert is_whole(path)
+
+
+def test_what_is_known_again_is_told_in_one_line(tmp_path: Path) -> None:
+    def told(path: Path, *clocks: Clock, writes: Sequence[ingest.Write] = ()) -> list[str | None]:
+        memory = Memory(TwinStore(), History(8), open_journal(path, "/twin", 1e4, 1e4), 8)
+        said = [memory.follow(clock) for clock in clocks]
+        for write in writes:
+            assert memory.apply(write, NOW) is None
+        memory.close()
+        return said
+
+    path = tmp_path / "j.sqlite"
+    nothing = f"journal {path}: nothing was known before"
+    assert told(path, wall(5), wall(6), writes=WRITES) == [nothing, None]
+    [line] = told(path, wall(9))
+    oldest = f"{datetime.fromtimestamp(PART.stamp_ns / S, UTC):%Y-%m-%dT%H:%M:%SZ}"
+    assert line == (
+        f"journal {path}: 3 tags are known again, of 3 places, 4 scans and tries, 1 looks;"
+        f" the oldest is of {oldest}"
+    )
+    path = tmp_path / "simulated.sqlite"
+    told(path, sim(5, 5), writes=[at(SCAN, 4 * S)])
+    waiting = Clock(0, NOW, is_simulated=True)
+    before, after = told(path, waiting, sim(6, 6))
+    assert before is None
+    assert str(after).endswith("; the oldest is of second 4.000")
+
+
 def at(write: Scan | Look, stamp_ns: int) -> Scan | Look:
     return replace(write, stamp_ns=stamp_ns, own_stamp_ns=stamp_ns)
 
@@ -68,6 +138,17 @@ def test_a_twin_that_starts_again_knows_all_that_it_knew(tmp_path: Path) -> None
             assert replace(restored, readings=tag.readings) == tag
             assert again.of(tag.tag_id) == past.of(tag.tag_id)
         assert after.observation_count >= before.observation_count
+
+
+def test_a_place_is_as_old_as_the_scan_that_brought_it_and_a_discovery_is_of_now(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "j.sqlite"
+    with twin(path, wall(5)) as (memory, _, _):
+        memory.apply(SCAN, NOW)
+        memory.apply(Pin("9", HERE), NOW)
+    stamps = select(path, "SELECT stamp_ns FROM pin ORDER BY id")
+    assert stamps == [(NOW,), (NOW + 5 * S,)]
 
 
 def test_what_is_heard_again_changes_nothing_and_is_not_written(tmp_path: Path) -> None:

@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import re
+from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 import rclpy
+import yaml
 from lupin_msgs.msg import TwinState
+from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
 
-from lupin_twin.fields import FieldRules
+from lupin_twin.fields import FieldJob, FieldRequest, FieldRules
+from lupin_twin.grid import FieldGrid
 from lupin_twin.node import TwinNode
 from tests.support.messages import INFO, discovered, look, occupancy_grid, pose, scan
 from tests.support.ros import Peer
+from tests.support.waiting import PATIENCE_S
 
 SOURCES = [file for folder in ("ros_node", "backend") for file in Path(folder).rglob("*.py")]
 DEPTHS = {"/floranova/observations": 50, "/perception/discovered_tags": 50, "/map": 1}
@@ -99,6 +107,79 @@ def test_the_parameters_are_the_rules_of_its_fields(domain: int) -> None:
         assert stage.node.fields.cache.max_bytes == 1_500_000
 
 
+def test_a_rule_that_is_changed_takes_effect_at_once(stage: Stage) -> None:
+    node = stage.node
+    told: list[Any] = []
+    node.add_listener(told.append, heartbeat_s=60.0)
+    before, revision = node.fields.rules, node.revision
+    request = FieldRequest("co2", 0.5, -1.0, -1.0, 1.0, 1.0)
+    job = node.fields.lookup(request, node.store, None)
+    assert isinstance(job, FieldJob)
+    node.fields.keep(job, job.compute())
+    [result] = node.set_parameters([Parameter("idw_power", value=3.5)])
+    assert (result.successful, result.reason) == (True, "")
+    assert node.fields.rules == replace(before, idw_power=3.5)
+    assert node.revision != revision
+    assert len(told) == 2
+    other = node.fields.lookup(request, node.store, None)
+    assert isinstance(other, FieldJob)
+    assert other.rules.idw_power == 3.5
+    # What was computed by the old rules is theirs, and back with them.
+    node.set_parameters([Parameter("idw_power", value=2.0)])
+    assert isinstance(node.fields.lookup(request, node.store, None), FieldGrid)
+    node.set_parameters([Parameter("layer_rate_hz", value=0.5)])
+    assert node.layers.shown.rate_hz() == 0.5
+
+
+def test_the_state_is_published_at_the_new_rate(stage: Stage) -> None:
+    node = stage.node
+    timers = len(list(node.timers))
+    assert node._state_timer.timer_period_ns == 1e9
+    for rate_hz in (100.0, 0.01, 0.01):
+        assert node.set_parameters([Parameter("state_publish_rate_hz", value=rate_hz)])[
+            0
+        ].successful
+        assert node._state_timer.timer_period_ns == 1e9 / rate_hz
+    assert len(list(node.timers)) == timers
+
+
+def dumped(stage: Stage) -> str:
+    """What `ros2 param dump` writes: its two services are asked, as that asks them."""
+    executor = SingleThreadedExecutor(context=stage.node.context)
+    asker = rclpy.create_node("asker", context=stage.node.context)
+    executor.add_node(stage.node)
+    executor.add_node(asker)
+
+    def ask(kind: Any, name: str, **arguments: Any) -> Any:
+        client = asker.create_client(kind, f"/lupin_twin/{name}")
+        assert client.wait_for_service(timeout_sec=PATIENCE_S)
+        future = client.call_async(kind.Request(**arguments))
+        executor.spin_until_future_complete(future, timeout_sec=PATIENCE_S)
+        return future.result()
+
+    names = sorted(ask(ListParameters, "list_parameters").result.names)
+    values = ask(GetParameters, "get_parameters", names=names).values
+    executor.shutdown()
+    asker.destroy_node()
+    read = [parameter_value_to_python(value) for value in values]
+    plain = [list(value) if isinstance(value, array) else value for value in read]
+    told = {"/lupin_twin": {"ros__parameters": dict(zip(names, plain, strict=True))}}
+    return yaml.dump(told, default_flow_style=False)
+
+
+def test_a_dump_of_its_parameters_starts_a_twin_like_it(domain: int, tmp_path: Path) -> None:
+    changed = ("journal:=off", "layers:=[co2, light]", "idw_power:=3", "buffer_len:=7")
+    file = tmp_path / "dump.yaml"
+    with stage_in(domain, *(word for one in changed for word in ("-p", one))) as stage:
+        stage.node.set_parameters([Parameter("idw_falloff_radius_m", value=4.5)])
+        parameters = stage.node.parameters
+        file.write_text(dumped(stage), encoding="utf-8")
+    assert (parameters.layers, parameters.idw_falloff_radius_m) == (("co2", "light"), 4.5)
+    with stage_in(domain, "--params-file", str(file)) as again:
+        assert again.node.parameters == parameters
+        assert again.warnings == []
+
+
 # --- one thread ---------------------------------------------------------------------------------
 
 
@@ -115,7 +196,7 @@ def test_one_callback_group_keeps_all_callbacks_apart(stage: Stage) -> None:
         ),
         *node.timers,
     ]
-    assert len(ours) == 3 + 1 + 4
+    assert len(ours) == 3 + 1 + 6
     assert isinstance(node._group, MutuallyExclusiveCallbackGroup)
     assert {id(each.callback_group) for each in ours} == {id(node._group)}
 

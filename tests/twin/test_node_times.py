@@ -7,7 +7,7 @@ from typing import Any
 
 from lupin_msgs.msg import Observation, TwinTimes
 
-from lupin_twin.node import LATCHED_AFTER_S
+from lupin_twin.lateness import LATCHED_AFTER_S
 from tests.support.messages import look, scan
 from tests.support.processes import OFTEN, twin_node
 from tests.support.ros import Peer, latched

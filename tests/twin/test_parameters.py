@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import yaml
 
-from lupin_twin.parameters import ParameterError, TwinParameters, describe
+from lupin_twin.parameters import MAX_NAMES, ParameterError, TwinParameters, changed, describe
 
 # DESIGN's table, and field_cache_mb.
 DEFAULTS = {
@@ -29,6 +29,10 @@ DEFAULTS = {
     "clip_to_explored": False,
     "max_grid_cells": 1_000_000,
     "field_cache_mb": 64.0,
+    "day_length_s": 86_400.0,
+    "origin": "robot",
+    "layers": (),
+    "layer_rate_hz": 1.0,
     "journal": "",
     "journal_days": 90.0,
     "journal_max_mb": 4000.0,
@@ -46,8 +50,9 @@ def test_names_and_defaults() -> None:
 def test_the_shipped_file_holds_every_parameter_at_its_default() -> None:
     file = Path("ros_node/lupin_twin/config/twin.yaml")
     # For every node: a twin of another name or namespace, and `web`, read it too.
+    # Of an empty list, ROS does not know what it is one of.
     assert yaml.safe_load(file.read_text()) == {
-        "/**": {"ros__parameters": {**DEFAULTS, "use_sim_time": False}}
+        "/**": {"ros__parameters": {**DEFAULTS, "layers": [""], "use_sim_time": False}}
     }
 
 
@@ -72,6 +77,10 @@ def test_the_shipped_file_holds_every_parameter_at_its_default() -> None:
         ("frame_id", 7),
         ("map_topic", ""),
         ("observations_topic", None),
+        ("layers", ["co2", 7]),
+        ("layers", 7),
+        ("origin", "gazebo"),
+        ("origin", ""),
     ],
 )
 def test_a_bad_value_is_refused_by_name_with_the_value(name: str, value: Any) -> None:
@@ -95,6 +104,21 @@ def test_the_ends_of_a_range_are_in_it_and_what_lies_beyond_is_not(name: str) ->
             parameters(name, beyond)
 
 
+@pytest.mark.parametrize(
+    ("given", "names"),
+    [([], ()), (None, ()), ([""], ()), ("co2", ("co2",)), (["co2", "", "light"], ("co2", "light"))],
+)
+def test_of_a_list_empty_names_do_not_count(given: Any, names: tuple[str, ...]) -> None:
+    assert parameters("layers", given).layers == names
+
+
+def test_a_list_has_so_many_names_and_no_more() -> None:
+    names = [f"sensor{number}" for number in range(MAX_NAMES)]
+    assert parameters("layers", names).layers == tuple(names)
+    with pytest.raises(ParameterError, match="parameter layers is 17 names, expected 16 at most"):
+        parameters("layers", [*names, "more"])
+
+
 def test_a_whole_number_is_a_number() -> None:
     power = parameters("idw_power", 3).idw_power
     assert (power, type(power)) == (3.0, float)
@@ -102,9 +126,37 @@ def test_a_whole_number_is_a_number() -> None:
 
 def test_every_parameter_is_described() -> None:
     for spec in fields(TwinParameters):
-        description, limits = describe(spec.name)
-        assert description
-        assert bool(limits) == (type(spec.default) in (int, float))
+        told = describe(spec.name)
+        assert told.description
+        assert bool(told.range) == (type(spec.default) in (int, float) or spec.name == "origin")
+    assert describe("origin").range == "robot, simulated or recorded"
+
+
+CHANGEABLE = {
+    "state_publish_rate_hz": 5,
+    "idw_power": 3.0,
+    "idw_falloff_radius_m": 2.0,
+    "idw_max_distance_m": 2.0,
+    "clip_to_explored": True,
+    "layer_rate_hz": 0.5,
+}
+
+
+def test_what_may_change_while_the_twin_runs_changes_and_the_rest_stays() -> None:
+    before = TwinParameters(buffer_len=5)
+    after = changed(before, CHANGEABLE)
+    assert asdict(after) == asdict(before) | CHANGEABLE
+    assert type(after.state_publish_rate_hz) is float
+
+
+@pytest.mark.parametrize("name", sorted(set(DEFAULTS) - set(CHANGEABLE)))
+def test_what_is_fixed_cannot_and_says_why(name: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        changed(TwinParameters(), {"idw_power": 3.0, name: "other"})
+    text = str(caught.value)
+    assert text.startswith(f"parameter {name} is ")
+    assert f"cannot become 'other' while the twin runs: {describe(name).fixed}" in text
+    assert len(describe(name).fixed) > 20
 
 
 def test_a_plain_off_which_yaml_reads_as_false_is_the_journals_off() -> None:

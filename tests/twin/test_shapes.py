@@ -22,14 +22,14 @@ from lupin_msgs.msg import (
 from rclpy.serialization import serialize_message
 
 from lupin_twin import shapes
-from lupin_twin.cdr import MessageShape, TooManyError
-from lupin_twin.state import (
+from lupin_twin.bounds import (
     MAX_BLOOMS_PER_TAG,
     MAX_FOOTPRINT_POINTS,
     MAX_ITEMS,
     MAX_SENSORS_PER_TAG,
     MAX_TAGS,
 )
+from lupin_twin.cdr import MessageShape, TooManyError
 
 
 def readings(count: int) -> Any:

@@ -8,18 +8,9 @@ from collections.abc import Callable
 
 import pytest
 
-from lupin_twin import state
-from lupin_twin.state import (
-    Bloom,
-    Flower,
-    Look,
-    Reading,
-    Rejected,
-    Scan,
-    Try,
-    TwinStore,
-    age_seconds,
-)
+from lupin_twin import bounds, state
+from lupin_twin.bounds import Rejected
+from lupin_twin.state import Bloom, Flower, Look, Reading, Scan, Try, TwinStore, age_seconds
 from tests.support.store import S, at, failed_look, look, scan
 
 
@@ -199,23 +190,23 @@ BLOOM = Bloom(0.0, 0.0, 0.0, 0.1, "rose", 0.9, anomaly=False)
 BOUNDED: dict[str, tuple[Callable[[int], Scan | Look], int]] = {
     "readings": (
         lambda n: Scan("1", S, tuple(Reading(f"s{i}", 0.0) for i in range(n))),
-        state.MAX_SENSORS_PER_TAG,
+        bounds.MAX_SENSORS_PER_TAG,
     ),
-    "blooms": (lambda n: look("1", blooms=(BLOOM,) * n), state.MAX_BLOOMS_PER_TAG),
+    "blooms": (lambda n: look("1", blooms=(BLOOM,) * n), bounds.MAX_BLOOMS_PER_TAG),
     "footprint": (
         lambda n: look("1", footprint=((0.0, 0.0, 0.0),) * n),
-        state.MAX_FOOTPRINT_POINTS,
+        bounds.MAX_FOOTPRINT_POINTS,
     ),
-    "the tag_id of a scan": (lambda n: Scan("t" * n, S), state.MAX_TEXT_LENGTH),
+    "the tag_id of a scan": (lambda n: Scan("t" * n, S), bounds.MAX_TEXT_LENGTH),
     "a sensor's name": (
         lambda n: Scan("1", S, (Reading("s" * n, 0.0),)),
-        state.MAX_TEXT_LENGTH,
+        bounds.MAX_TEXT_LENGTH,
     ),
-    "the tag_id of a look": (lambda n: look("t" * n), state.MAX_TEXT_LENGTH),
-    "species": (lambda n: look("1", species="r" * n), state.MAX_TEXT_LENGTH),
+    "the tag_id of a look": (lambda n: look("t" * n), bounds.MAX_TEXT_LENGTH),
+    "species": (lambda n: look("1", species="r" * n), bounds.MAX_TEXT_LENGTH),
     "a bloom's species": (
         lambda n: look("1", blooms=(dataclasses.replace(BLOOM, species="r" * n),)),
-        state.MAX_TEXT_LENGTH,
+        bounds.MAX_TEXT_LENGTH,
     ),
 }
 
@@ -236,9 +227,9 @@ def test_a_bound_belongs_to_what_is_allowed_and_one_more_is_refused_by_both_numb
 
 def test_a_pinned_tags_id_is_bounded_like_a_scanned_ones() -> None:
     store = TwinStore()
-    store.pin("t" * state.MAX_TEXT_LENGTH, at(1.0))
+    store.pin("t" * bounds.MAX_TEXT_LENGTH, at(1.0))
     with pytest.raises(Rejected, match="limit is"):
-        store.pin("t" * (state.MAX_TEXT_LENGTH + 1), at(1.0))
+        store.pin("t" * (bounds.MAX_TEXT_LENGTH + 1), at(1.0))
 
 
 def test_one_tag_too_many_is_refused_and_the_known_ones_go_on(
@@ -296,3 +287,12 @@ def test_a_snapshot_stays_as_it_was() -> None:
 def test_one_number_that_is_not_finite_makes_a_pose_not_finite(field: str, broken: float) -> None:
     assert at(1.0).is_finite
     assert not dataclasses.replace(at(1.0), **{field: broken}).is_finite
+
+
+def test_the_size_is_that_of_what_is_kept() -> None:
+    store = TwinStore()
+    assert store.size == (0, 0)
+    store.record(scan("1", co2=1.0, light=2.0))
+    store.record(scan("1", co2=3.0))
+    store.pin("2", at(1.0))
+    assert store.size == (2, 2)

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lupin_twin import state
-from lupin_twin.state import Flower, Look, Reading, Rejected, Scan, TagState, Try, TwinStore
+from lupin_twin.bounds import Rejected
+from lupin_twin.state import Flower, Look, Reading, Scan, TagState, Try, TwinStore
 from tests.support.store import SCAN_FAILED, S, at, look, scan
 
 

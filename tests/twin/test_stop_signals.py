@@ -9,6 +9,8 @@ import sys
 
 import pytest
 
+from tests.support.waiting import PATIENCE_S
+
 SCRIPT = """
 from lupin_twin import stop_signals
 stop_signals.block()
@@ -31,4 +33,42 @@ def test_a_signal_waits_until_it_is_asked_for(stop: signal.Signals) -> None:
         process.stdin.write("\n")
         process.stdin.flush()
         assert process.stdout.readline() == "asked\n"
-        assert process.wait(20) == 0
+        assert process.wait(PATIENCE_S) == 0
+
+
+# Each holds on to the interpreter, or comes after it, as a call of the middleware may.
+HANGS = {
+    "a call that keeps the interpreter": "ctypes.PyDLL(None).sleep(60)",
+    "what runs after Python": "ctypes.CDLL(None).on_exit(ctypes.CDLL(None).pause, None)",
+}
+HANG = """
+import ctypes
+from lupin_twin import stop_signals
+stop_signals.block()
+print("blocked", flush=True)
+stop_signals.wait(1)
+"""
+
+
+def test_whatever_hangs_at_the_end_the_process_ends() -> None:
+    processes = {
+        what: subprocess.Popen(
+            [sys.executable, "-c", HANG + call],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for what, call in HANGS.items()
+    }
+    for process in processes.values():
+        assert process.stdout is not None
+        assert process.stdout.readline() == "blocked\n"
+        process.send_signal(signal.SIGINT)
+    codes, said = {}, {}
+    for what, process in processes.items():
+        with process:
+            _, said[what] = process.communicate(timeout=PATIENCE_S)
+            codes[what] = process.returncode
+    assert codes == dict(zip(HANGS, (1, -signal.SIGALRM), strict=True))
+    # Where it hung is told while there is an interpreter that knows.
+    assert "Timeout (0:00:01)!" in said["a call that keeps the interpreter"]

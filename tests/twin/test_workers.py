@@ -16,7 +16,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lupin_twin.idw import Abandoned
-from lupin_twin.workers import LARGE_THREADS, PATIENCE, SMALL_S, SMALL_THREADS, ShouldStop, Workers
+from lupin_twin.workers import (
+    LARGE_THREADS,
+    PATIENCE,
+    SMALL_S,
+    SMALL_THREADS,
+    TURN_S,
+    ShouldStop,
+    Workers,
+    in_turns,
+)
 from tests.support.waiting import PATIENCE_S, wait_for
 
 LARGE_S = 10.0
@@ -204,3 +213,13 @@ def test_what_a_job_was_made_of_and_its_result_are_not_kept() -> None:
         wait_for(lambda: gc.collect() is not None and seen() is None, "the end of the input")
         del future
         wait_for(lambda: gc.collect() is not None and result_seen() is None, "the result's end")
+
+
+def test_who_makes_many_things_rests_after_each_turn() -> None:
+    clock, made = Clock(), list[int]()
+    rests = list[tuple[int, float]]()
+    for item in in_turns(range(10), clock, lambda seconds: rests.append((len(made), seconds))):
+        made.append(item)
+        clock.now_s += 0.4 * TURN_S
+    assert made == list(range(10))
+    assert rests == [(3, TURN_S), (6, TURN_S), (9, TURN_S)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
+import re
 import time
 from dataclasses import dataclass, field
 from typing import Final, Self
@@ -30,6 +31,8 @@ log = logging.getLogger(__name__)
 
 # What a browser needs to sign in, and what a supervisor needs to see that the process lives.
 OPEN_PATHS: Final = frozenset({"/signin", "/signin.js", "/signin.css", "/healthz"})
+# `?lang=`, which the sign-in page goes by too.
+_LANGUAGE: Final = re.compile(r"[A-Za-z]{2,3}(?:-[A-Za-z0-9]{1,8}){0,2}")
 
 # In a request's state: the session that it was let in by, where it was one.
 SESSION_KEY: Final = "session"
@@ -160,6 +163,9 @@ class AccessControl:
         if _wants_page(request):
             # Relative, for a bridge behind a path prefix.
             location = "../" * (path.count("/") - 1) + "signin"
+            language = request.query_params.get("lang", "")
+            if _LANGUAGE.fullmatch(language):
+                location += f"?lang={language}"
             return _Refusal(303, "sign in first", {"location": location})
         return _unauthorized(
             "a token is needed: send it as Authorization: Bearer, or sign in at /signin"

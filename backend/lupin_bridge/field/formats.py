@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,7 +13,9 @@ import orjson
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from lupin_bridge.field.sensors import max_alpha, sensor
+from lupin_bridge.field.colour import rgb
+from lupin_bridge.judge.ranges import Sensor, Sensors
+from lupin_twin.estimate import EstimateGrid
 from lupin_twin.field_quality import leave_one_out, painted_share
 from lupin_twin.fields import FieldRules
 from lupin_twin.grid import FieldGrid
@@ -22,6 +24,8 @@ from lupin_twin.state import TagState
 
 # Palette index 0 is "not known"; the ramp has the other 255.
 _RAMP_STEPS: Final = 255
+# Numbers that are written at once: for this millisecond, no other thread of this process runs.
+_AT_ONCE: Final = 16_384
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,36 +42,42 @@ NPY: Final = FieldFormat("npy", "application/x-npy")
 FORMATS: Final = (JSON, PNG, NPY)
 
 
-def metadata(grid: FieldGrid, sensor_type: str) -> dict[str, str]:
-    """What a picture or a bare array cannot say of itself: extent, range, unit, sensor."""
+def extent(grid: FieldGrid | EstimateGrid, sensor: Sensor) -> dict[str, str]:
+    """Of which sensor the cells are, how many, and where they lie."""
     return {
-        "Sensor": sensor_type,
-        "Unit": sensor(sensor_type).unit,
+        "Sensor": sensor.name,
+        "Unit": sensor.unit,
         "Width": str(grid.width),
         "Height": str(grid.height),
         "Origin-X": str(np.float32(grid.origin_x)),
         "Origin-Y": str(np.float32(grid.origin_y)),
         "Resolution": str(np.float32(grid.resolution)),
+    }
+
+
+def metadata(grid: FieldGrid, sensor: Sensor) -> dict[str, str]:
+    """What a picture or a bare array cannot say of itself: extent, range, unit, sensor."""
+    return {
+        **extent(grid, sensor),
         "Value-Min": str(np.float32(grid.value_min)),
         "Value-Max": str(np.float32(grid.value_max)),
         "Sample-Count": str(grid.sample_count),
     }
 
 
-def write(grid: FieldGrid, field_format: FieldFormat, sensor_type: str, scale: int = 1) -> bytes:
+def write(
+    grid: FieldGrid, field_format: FieldFormat, sensor_type: str, sensors: Sensors, scale: int = 1
+) -> bytes:
     """The field in a format. `scale` (PNG only) is the side of a cell in pixels."""
-    if field_format is PNG:
-        return write_png(grid, sensor_type, scale)
-    return write_npy(grid) if field_format is NPY else write_json(grid)
+    if field_format == PNG:
+        return write_png(grid, sensor_type, sensors, scale)
+    return write_npy(grid) if field_format == NPY else write_json(grid)
 
 
 def write_json(grid: FieldGrid) -> bytes:
     """`schema.GetFieldResponse`: `values` flat and row-major, NaN as null."""
-    return orjson.dumps(
+    rest = orjson.dumps(
         {
-            "ok": True,
-            "error_message": "",
-            "values": grid.values,
             "width": grid.width,
             "height": grid.height,
             # GetField's float32, and so the shortest decimals that are the same float32: 0.1.
@@ -80,12 +90,26 @@ def write_json(grid: FieldGrid) -> bytes:
         },
         option=orjson.OPT_SERIALIZE_NUMPY,
     )
+    # Put together once: to copy thirty megabytes takes a while too.
+    return b"".join(
+        (b'{"ok":true,"error_message":"","values":[', *numbers(grid.values), b"],", rest[1:])
+    )
+
+
+def numbers(cells: npt.NDArray[np.float32]) -> Iterator[bytes]:
+    """The numbers of an array as JSON, row-major, without the brackets, in parts; NaN as null."""
+    flat = np.ascontiguousarray(cells).ravel()
+    for start in range(0, flat.size, _AT_ONCE):
+        part = flat[start : start + _AT_ONCE]
+        if start:
+            yield b","
+        yield orjson.dumps(part, option=orjson.OPT_SERIALIZE_NUMPY)[1:-1]
 
 
 def write_quality(
     grid: FieldGrid,
     tags: Sequence[TagState],
-    sensor_type: str,
+    sensor: Sensor,
     rules: FieldRules,
     should_stop: Callable[[], bool] = never,
 ) -> bytes:
@@ -97,7 +121,7 @@ def write_quality(
     """
     quality = leave_one_out(
         tags,
-        sensor_type,
+        sensor.name,
         falloff_radius_m=rules.falloff_radius_m,
         max_distance_m=rules.max_distance_m,
         power=rules.idw_power,
@@ -105,8 +129,8 @@ def write_quality(
     )
     return orjson.dumps(
         {
-            "sensor_type": sensor_type,
-            "unit": sensor(sensor_type).unit,
+            "sensor_type": sensor.name,
+            "unit": sensor.unit,
             "sample_count": quality.judged + quality.unjudged,
             "judged_count": quality.judged,
             "rmse": quality.rmse,
@@ -142,7 +166,7 @@ def write_npy(grid: FieldGrid) -> bytes:
     return buffer.getvalue()
 
 
-def write_png(grid: FieldGrid, sensor_type: str, scale: int = 1) -> bytes:
+def write_png(grid: FieldGrid, sensor_type: str, sensors: Sensors, scale: int = 1) -> bytes:
     """A picture of `scale` pixels a cell, its top row at `bbox_max_y`; NaN is transparent.
 
     One hue, alpha rising from 0 at `value_min` to `max_alpha` at `value_max`: a palette and its
@@ -152,10 +176,12 @@ def write_png(grid: FieldGrid, sensor_type: str, scale: int = 1) -> bytes:
     if scale > 1:
         indices = indices.repeat(scale, axis=0).repeat(scale, axis=1)
     image = Image.fromarray(np.ascontiguousarray(indices), mode="P")
-    image.putpalette(list(sensor(sensor_type).rgb) * (_RAMP_STEPS + 1))
-    alphas = np.rint(np.linspace(0.0, max_alpha() * 255, _RAMP_STEPS)).astype(np.uint8)
+    sensor = sensors.named(sensor_type)
+    colour = rgb(sensor.hue, sensors.saturation, sensor.lightness)
+    image.putpalette(list(colour) * (_RAMP_STEPS + 1))
+    alphas = np.rint(np.linspace(0.0, sensors.max_alpha * 255, _RAMP_STEPS)).astype(np.uint8)
     text = PngInfo()
-    for name, value in metadata(grid, sensor_type).items():
+    for name, value in metadata(grid, sensor).items():
         text.add_itxt(name, value)
     buffer = io.BytesIO()
     image.save(

@@ -15,11 +15,15 @@ from typing import Final
 from urllib.parse import quote
 
 from lupin_bridge.field.formats import FORMATS, JSON, PNG, FieldFormat
+from lupin_bridge.query_string import values_of
 from lupin_twin.fields import FieldRefused, FieldRequest
 
 DEFAULT_RESOLUTION_M: Final = 0.1
 BOX_NAMES: Final = ("bbox_min_x", "bbox_min_y", "bbox_max_x", "bbox_max_y")
-NAMES: Final = ("sensor_type", "resolution", *BOX_NAMES, "scale")
+NAMES: Final = ("sensor_type", "resolution", *BOX_NAMES, "scale", "at")
+# An estimate is two numbers a cell, a picture shows one of them.
+LAYERS: Final = ("mean", "sd")
+ESTIMATE_NAMES: Final = (*NAMES, "layer")
 _PLAIN: Final = re.compile(r"[0-9A-Za-z+.-]+")
 
 Box = tuple[float, float, float, float]
@@ -27,32 +31,32 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class FieldQuery:
-    """What a query string asks for; `box` is None where it is left to the server."""
+    """What a query string asks for; `box` is None where it is left to the server.
+
+    `at` is a moment as it was sent, None for now; `layer`, of an estimate's picture, one of
+    `LAYERS`.
+    """
 
     sensor_type: str
     resolution: float
     box: Box | None
     scale: int
+    at: str | None = None
+    layer: str = LAYERS[0]
 
     def request(self, default_box: Box) -> FieldRequest:
         """The query as GetField's request."""
         return FieldRequest(self.sensor_type, self.resolution, *(self.box or default_box))
 
 
-def parse(parameters: Sequence[tuple[str, str]]) -> FieldQuery:
-    """Read a query string's (name, value) pairs.
+def parse(parameters: Sequence[tuple[str, str]], names: Sequence[str] = NAMES) -> FieldQuery:
+    """Read a query string's (name, value) pairs; `names` are those that it may have.
 
     Raises:
-        FieldRefused: an unknown or repeated parameter, an incomplete box, or not a number.
+        FieldRefused: an unknown or repeated parameter, an incomplete box, not a number, no layer.
 
     """
-    values: dict[str, str] = {}
-    for name, value in parameters:
-        if name not in NAMES:
-            raise FieldRefused(f"parameter {name[:64]!r} is unknown, expected {', '.join(NAMES)}")
-        if name in values:
-            raise FieldRefused(f"{name} is given more than once, expected one value")
-        values[name] = value
+    values = values_of(parameters, names, FieldRefused)
     given = [name for name in BOX_NAMES if name in values]
     box: Box | None = None
     if given:
@@ -66,6 +70,8 @@ def parse(parameters: Sequence[tuple[str, str]]) -> FieldQuery:
         resolution=_number("resolution", values.get("resolution", str(DEFAULT_RESOLUTION_M))),
         box=box,
         scale=_scale(values.get("scale", "1")),
+        at=values.get("at"),
+        layer=_layer(values.get("layer", LAYERS[0])),
     )
 
 
@@ -94,6 +100,12 @@ def _scale(text: str) -> int:
     return int(text)
 
 
+def _layer(text: str) -> str:
+    if text not in LAYERS:
+        raise FieldRefused(f"layer is {text[:64]!r}, expected one of {', '.join(LAYERS)}")
+    return text
+
+
 def check_scale(query: FieldQuery, field_format: FieldFormat, cells: int, max_cells: int) -> None:
     """Refuse a scale for anything but a picture, and a picture past the cell limit.
 
@@ -103,7 +115,7 @@ def check_scale(query: FieldQuery, field_format: FieldFormat, cells: int, max_ce
     """
     if query.scale == 1:
         return
-    if field_format is not PNG:
+    if field_format != PNG:
         raise FieldRefused(f"scale is {query.scale}, but only a PNG can be scaled")
     pixels = cells * query.scale**2
     if pixels > max_cells:
@@ -169,16 +181,23 @@ def matches(if_none_match: str | None, tag: str) -> bool:
     return "*" in candidates or tag in [part.removeprefix("W/") for part in candidates]
 
 
-def headers(metadata: Mapping[str, str], file_name: str) -> dict[str, str]:
+def headers(metadata: Mapping[str, str], file_name: str, kind: str = "Field") -> dict[str, str]:
     """A field's metadata as `X-Field-…` headers, and a name for who saves it.
 
-    Header values are ASCII; what is not is percent-encoded as UTF-8. In the file's name, anything
-    that a file system or a shell could take amiss becomes an underscore.
+    Header values are ASCII and neither begin nor end with a space; what is not so is
+    percent-encoded as UTF-8. In the file's name, anything that a file system or a shell could take
+    amiss becomes an underscore.
     """
-    result = {f"X-Field-{name}": quote(value, safe=_SAFE) for name, value in metadata.items()}
+    result = {f"X-{kind}-{name}": _header_value(value) for name, value in metadata.items()}
     result["Content-Disposition"] = f'inline; filename="{_UNSAFE_IN_NAME.sub("_", file_name)}"'
     return result
 
 
+def _header_value(text: str) -> str:
+    value = quote(text, safe=_SAFE)
+    return _OUTER_SPACES.sub(lambda spaces: "%20" * len(spaces[0]), value)
+
+
+_OUTER_SPACES: Final = re.compile(r"^ +| +$")
 _SAFE: Final = " !#$&'()*+,-./:;<=>?@[]^_`{|}~"
 _UNSAFE_IN_NAME: Final = re.compile(r"[^A-Za-z0-9._-]")

@@ -1,17 +1,18 @@
 """The read-only part of the rosbridge v2 protocol, as values: what came in, what goes out.
 
-Pure. Served at `/rosbridge` are `subscribe` and `unsubscribe` (the twin's state), `call_service`
+Pure. Served at `/rosbridge` are `subscribe` and `unsubscribe` (the twin's topics), `call_service`
 (GetField and a little of rosapi) and `set_level`. Whatever else rosbridge knows is refused with a
 `status` message that names the operation, and changes nothing.
 
-How the options meet our policy, which keeps the newest state for a client and queues nothing:
+How the options meet our policy, which keeps the newest for a client and queues no more:
 
 - `throttle_rate` (ms) is honoured; of several subscriptions the smallest counts. When it has
   passed, the newest state follows by itself (rosbridge would wait for the next message).
-- `queue_length` 0 or 1 is what every client gets: the newest state. A longer queue is accepted as
-  1, with a warning.
-- `compression` `png` or `cbor`, and `fragment_size`: a warning, and whole messages as plain JSON,
-  which every client reads. `cbor-raw` would change the message itself and is refused.
+- `queue_length` 0 or 1 is what every client gets: the newest, and of observations and discovered
+  tags the newest 50. A longer queue is accepted as 1, with a warning.
+- `compression` `cbor` gives messages in CBOR, `cbor-raw` as they came off the wire of ROS; of
+  several subscriptions to a topic the last one's counts. `png`, and `fragment_size`: a warning, and
+  whole messages as plain JSON, which every client reads. Responses are always JSON.
 - `id` is a string or an integer. null counts as not given, everywhere. Members that are not named
   here are passed over, as rosbridge does.
 
@@ -27,16 +28,17 @@ from typing import Any, Final, Literal
 
 import orjson
 
-# The longest message that makes sense, a GetField call with every argument, has some 500 bytes.
-MAX_MESSAGE_LENGTH: Final = 16_384
-# orjson reads nested values by recursion and has no limit of its own: 60,000 levels end the
-# process. What we serve has two.
-MAX_BRACKETS: Final = 1_000
+from lupin_bridge.serving.client_json import members_of, shown
+
 MAX_NAME_LENGTH: Final = 256
 MAX_THROTTLE_RATE_MS: Final = 3_600_000.0
 
 Level = Literal["none", "error", "warning", "info"]
 LEVELS: Final[tuple[Level, ...]] = ("none", "error", "warning", "info")
+
+# How the messages of a topic are sent; none is JSON.
+Compression = Literal["none", "cbor", "cbor-raw"]
+COMPRESSIONS: Final[tuple[Compression, ...]] = ("none", "cbor", "cbor-raw")
 
 Id = str | int | None
 
@@ -85,6 +87,7 @@ class Subscribe:
     topic: str
     type: str
     throttle_rate_ms: float
+    compression: Compression
     warnings: tuple[str, ...]
 
 
@@ -128,39 +131,15 @@ def parse(message: str | bytes) -> Request:
         Refused: not JSON text, not an operation that is served, or a member of the wrong kind.
 
     """
-    members = _members(message)
+    try:
+        members = members_of(message)
+    except ValueError as error:
+        raise Refused(str(error)) from None
     message_id = _id(members)
     try:
         return _request(members, message_id)
     except Refused as error:
         raise Refused(str(error), message_id, error.service) from None
-
-
-def shown(value: object) -> str:
-    """A value as a refusal quotes it: short, and never its inside."""
-    if isinstance(value, dict | list):
-        return "an object" if isinstance(value, dict) else "an array"
-    text = repr(value)
-    return text if len(text) <= 64 else text[:63] + "…"
-
-
-def _members(message: str | bytes) -> dict[str, Any]:
-    if isinstance(message, bytes):
-        raise Refused("a binary frame is refused, expected JSON text")
-    if len(message) > MAX_MESSAGE_LENGTH:
-        raise Refused(
-            f"the message has {len(message)} characters, the limit is {MAX_MESSAGE_LENGTH}"
-        )
-    brackets = message.count("[") + message.count("{")
-    if brackets > MAX_BRACKETS:
-        raise Refused(f"the message opens {brackets} brackets, the limit is {MAX_BRACKETS}")
-    try:
-        members = orjson.loads(message)
-    except ValueError as error:
-        raise Refused(f"the message is not JSON: {error}") from None
-    if not isinstance(members, dict):
-        raise Refused(f"the message is {shown(members)}, expected an object")
-    return members
 
 
 def _id(members: Mapping[str, Any]) -> Id:
@@ -190,20 +169,22 @@ def _request(members: Mapping[str, Any], message_id: Id) -> Request:
 
 
 def _subscribe(members: Mapping[str, Any], message_id: Id) -> Subscribe:
-    warnings = _transport_warnings(members)
+    compression, warnings = _transport(members)
     queue_length = _number(members, "queue_length", 0.0)
     if queue_length > 1:
-        warnings.append(f"queue_length {queue_length:g} is served as 1: the newest state only")
+        warnings.append(f"queue_length {queue_length:.15g} is served as 1: the newest only")
     throttle_rate_ms = _number(members, "throttle_rate", 0.0)
     if throttle_rate_ms > MAX_THROTTLE_RATE_MS:
         raise Refused(
-            f"throttle_rate is {throttle_rate_ms:g}, expected 0 to {MAX_THROTTLE_RATE_MS:g} ms"
+            f"throttle_rate is {members['throttle_rate']}, expected 0 to "
+            f"{MAX_THROTTLE_RATE_MS:.15g} ms"
         )
     return Subscribe(
         id=message_id,
         topic=_text(members, "topic"),
         type=_text(members, "type", default=""),
         throttle_rate_ms=throttle_rate_ms,
+        compression=compression,
         warnings=tuple(warnings),
     )
 
@@ -211,6 +192,9 @@ def _subscribe(members: Mapping[str, Any], message_id: Id) -> Subscribe:
 def _call_service(members: Mapping[str, Any], message_id: Id) -> CallService:
     service = _text(members, "service")
     try:
+        compression, warnings = _transport(members)
+        if compression != "none":
+            warnings.append(f"compression {shown(compression)} is of messages: responses are JSON")
         timeout_s = _number(members, "timeout", 0.0, low=-math.inf)
         return CallService(
             id=message_id,
@@ -218,7 +202,7 @@ def _call_service(members: Mapping[str, Any], message_id: Id) -> CallService:
             type=_text(members, "type", default=""),
             args=_args(members),
             timeout_s=timeout_s if timeout_s > 0.0 else None,
-            warnings=tuple(_transport_warnings(members)),
+            warnings=tuple(warnings),
         )
     except Refused as error:
         raise Refused(str(error), service=service) from None
@@ -240,17 +224,19 @@ def _set_level(members: Mapping[str, Any]) -> SetLevel:
     return SetLevel(level)
 
 
-def _transport_warnings(members: Mapping[str, Any]) -> list[str]:
+def _transport(members: Mapping[str, Any]) -> tuple[Compression, list[str]]:
     warnings = []
-    compression = _text(members, "compression", default="none")
-    if compression in ("png", "cbor"):
-        warnings.append(f"compression {shown(compression)} is not served: messages are plain JSON")
-    elif compression != "none":
-        raise Refused(f"compression is {shown(compression)}, expected 'none'")
+    given = _text(members, "compression", default="none")
+    compression = next((known for known in COMPRESSIONS if known == given), None)
+    if given == "png":
+        warnings.append(f"compression {shown(given)} is not served: messages are plain JSON")
+        compression = "none"
+    if compression is None:
+        raise Refused(f"compression is {shown(given)}, expected {', '.join(COMPRESSIONS)} or png")
     if members.get("fragment_size") is not None:
         size = _number(members, "fragment_size", 0.0)
-        warnings.append(f"fragment_size {size:g} is not served: messages are whole")
-    return warnings
+        warnings.append(f"fragment_size {size:.15g} is not served: messages are whole")
+    return compression, warnings
 
 
 def _text(members: Mapping[str, Any], name: str, *, default: str | None = None) -> str:
@@ -273,7 +259,7 @@ def _number(members: Mapping[str, Any], name: str, default: float, low: float = 
     if type(value) not in (int, float):
         raise Refused(f"{name} is {shown(value)}, expected a number")
     if value < low:
-        raise Refused(f"{name} is {value}, must not be less than {low:g}")
+        raise Refused(f"{name} is {value}, must not be less than {low:.15g}")
     return float(value)
 
 

@@ -15,11 +15,11 @@ from typing import Any, Final
 import orjson
 
 from lupin_bridge.field.query import BOX_NAMES
-from lupin_bridge.rosbridge.protocol import CallService, Refused, shown
-from lupin_bridge.twin.source import TwinNames
+from lupin_bridge.rosbridge.protocol import CallService, Refused
+from lupin_bridge.serving.client_json import shown
+from lupin_bridge.twin.names import TwinNames, topics_of
 from lupin_twin.fields import FieldRequest
 
-STATE_TYPE: Final = "lupin_msgs/msg/TwinState"
 FIELD_TYPE: Final = "lupin_msgs/srv/GetField"
 
 # A request's members in their order, at ROS's defaults for what a call leaves out.
@@ -118,7 +118,7 @@ def _listed(defaults: Mapping[str, object]) -> str:
 
 def _rosapi(service: str, args: Mapping[str, Any], names: TwinNames) -> dict[str, Any]:
     """What rosapi says of names and types it does not know: nothing, and that is no error."""
-    topics = {names.state_topic: STATE_TYPE}
+    topics = {topic.name: topic.type_name for topic in topics_of(names)}
     services = {names.field_service: FIELD_TYPE}
     services |= {name: f"rosapi_msgs/srv/{kind}" for name, (kind, _) in _ROSAPI.items()}
     match service:

@@ -14,6 +14,7 @@ from lupin_bridge.rosbridge import services as rosbridge_services
 from lupin_bridge.rosbridge.protocol import (
     LEVELS,
     CallService,
+    Compression,
     Id,
     Level,
     Refused,
@@ -21,29 +22,35 @@ from lupin_bridge.rosbridge.protocol import (
     Subscribe,
     Unsubscribe,
 )
-from lupin_bridge.rosbridge.services import STATE_TYPE, FieldCall
-from lupin_bridge.serving.rate_limit import RateLimit
+from lupin_bridge.rosbridge.services import FieldCall
+from lupin_bridge.serving.client_json import shown
+from lupin_bridge.serving.client_pace import ClientPace
 from lupin_bridge.stream.frames import JSON, StateFrame
-from lupin_bridge.twin.source import TwinNames
+from lupin_bridge.twin.names import Topic, TwinNames, topics_of
 
 MAX_SUBSCRIPTIONS: Final = 32
 
-# A page subscribes a few times and then calls a service now and again; more fields than
-# `field_rate_hz` (20 a second) it does not get anyway.
-MAX_MESSAGES_PER_S: Final = 100
-MAX_BURST: Final = 500
 
+@dataclass(frozen=True, slots=True)
+class Feed:
+    """What a client wants of a topic that it spells `name`, and how."""
 
-class TooManyMessages(ValueError):
-    """A client that sends faster than any use of it could need."""
+    topic: Topic
+    name: str
+    compression: Compression
+    min_interval_s: float
 
 
 @dataclass(frozen=True, slots=True)
 class Reaction:
-    """What a message leads to: replies to send now, a state that is due now, a field to compute."""
+    """What a message leads to: replies to send now, a state that is due now, a field to compute.
+
+    `subscribed` is the topic, as the client spells it, whose newest messages it is owed.
+    """
 
     replies: tuple[bytes, ...] = ()
     state_is_due: bool = False
+    subscribed: str | None = None
     field_call: FieldCall | None = None
 
 
@@ -53,19 +60,49 @@ class Session:
     def __init__(self, names: TwinNames) -> None:
         self._names = names
         self._level: Level = "warning"
-        self._pace = RateLimit(MAX_MESSAGES_PER_S, MAX_BURST)
-        # (topic as the client spells it, subscription's id) to the least interval in ms.
-        self._subscriptions: dict[tuple[str, Id], float] = {}
+        self._pace = ClientPace()
+        self._topics = {topic.name: topic for topic in topics_of(names)}
+        # By (topic as the client spells it, subscription's id); the last made is the last.
+        self._subscriptions: dict[tuple[str, Id], Subscribe] = {}
 
     @property
     def is_subscribed(self) -> bool:
-        """Whether the client wants the state at all."""
-        return bool(self._subscriptions)
+        """Whether the client wants the state in JSON, which is written for everybody at once."""
+        return bool(self._states())
 
     @property
     def min_interval_s(self) -> float:
         """The least time between two states: that of the subscription in the greatest hurry."""
-        return min(self._subscriptions.values(), default=0.0) / 1000.0
+        wanted = self._states()
+        return min((self._interval_s(name) for name in wanted), default=0.0)
+
+    @property
+    def feeds(self) -> dict[str, Feed]:
+        """Whatever else it wants, by the topic as it spells it: to be heard off the wire of ROS."""
+        spelled = {name: one.compression for (name, _), one in self._subscriptions.items()}
+        return {
+            name: Feed(self._topic(name), name, compression, self._interval_s(name))
+            for name, compression in spelled.items()
+            if name not in self._states()
+        }
+
+    def _topic(self, name: str) -> Topic:
+        return self._topics[rosbridge_services.absolute(name)]
+
+    def _interval_s(self, name: str) -> float:
+        rates = [
+            one.throttle_rate_ms for (topic, _), one in self._subscriptions.items() if topic == name
+        ]
+        return min(rates) / 1000.0
+
+    def _states(self) -> dict[str, None]:
+        """The spellings of the state's topic under which it is wanted in JSON."""
+        spelled = {name: one.compression for (name, _), one in self._subscriptions.items()}
+        return {
+            name: None
+            for name, compression in spelled.items()
+            if compression == "none" and self._topic(name).name == self._names.state_topic
+        }
 
     def receive(self, message: str | bytes, now_s: float) -> Reaction:
         """Take one frame from the client.
@@ -74,10 +111,7 @@ class Session:
             TooManyMessages: the client has to go.
 
         """
-        if self._pace.take("", now_s) > 0.0:
-            raise TooManyMessages(
-                f"more than {MAX_MESSAGES_PER_S} messages a second after {MAX_BURST} at once"
-            )
+        self._pace.take(now_s)
         try:
             request = rosbridge.parse(message)
             match request:
@@ -98,30 +132,34 @@ class Session:
 
         Written once for all clients that spell it alike.
         """
-        spellings = dict.fromkeys(topic for topic, _ in self._subscriptions)
+        spellings = self._states()
         return b"".join(
             frame.wire(f"rosbridge {topic}", JSON, partial(_published, topic, frame))
             for topic in spellings
         )
 
     def _subscribe(self, request: Subscribe) -> Reaction:
-        if rosbridge_services.absolute(request.topic) != self._names.state_topic:
+        topic = self._topics.get(rosbridge_services.absolute(request.topic))
+        if topic is None:
             raise Refused(
-                f"topic {rosbridge.shown(request.topic)} is not served, "
-                f"expected {self._names.state_topic}",
+                f"topic {shown(request.topic)} is not served, "
+                f"expected one of {', '.join(self._topics)}",
                 request.id,
             )
-        if request.type and not rosbridge_services.is_type(request.type, STATE_TYPE):
-            raise Refused(
-                f"type is {rosbridge.shown(request.type)}, expected {STATE_TYPE}", request.id
-            )
+        if request.type and not rosbridge_services.is_type(request.type, topic.type_name):
+            raise Refused(f"type is {shown(request.type)}, expected {topic.type_name}", request.id)
         key = (request.topic, request.id)
         if key not in self._subscriptions and len(self._subscriptions) >= MAX_SUBSCRIPTIONS:
             raise Refused(
                 f"{len(self._subscriptions)} subscriptions are open, the limit", request.id
             )
-        self._subscriptions[key] = request.throttle_rate_ms
-        return Reaction(self._warn(request.warnings, request.id), state_is_due=True)
+        self._subscriptions.pop(key, None)
+        self._subscriptions[key] = request
+        return Reaction(
+            self._warn(request.warnings, request.id),
+            state_is_due=request.topic in self._states(),
+            subscribed=request.topic,
+        )
 
     def _unsubscribe(self, request: Unsubscribe) -> Reaction:
         ended = [
@@ -133,7 +171,7 @@ class Session:
             del self._subscriptions[key]
         if ended:
             return Reaction()
-        text = f"there is no such subscription to topic {rosbridge.shown(request.topic)}"
+        text = f"there is no such subscription to topic {shown(request.topic)}"
         return Reaction(self._warn((text,), request.id))
 
     def _call_service(self, request: CallService) -> Reaction:

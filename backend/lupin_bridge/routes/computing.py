@@ -20,11 +20,18 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.field import formats as field_formats
 from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import FieldFormat
-from lupin_bridge.routes.tools import NEVER_KEEP, REVALIDATE, bridge_of, error_response
+from lupin_bridge.routes.tools import (
+    NEVER_KEEP,
+    REVALIDATE,
+    bridge_of,
+    error_response,
+    list_header,
+)
 from lupin_bridge.serving.admission import AdmissionError, BusyError
 from lupin_bridge.serving.kept import Answer
 from lupin_bridge.twin.source import TwinTimeoutError, TwinUnavailableError
-from lupin_twin.fields import FieldRequest, check_request, cost_s
+from lupin_twin.fields import FieldRequest, check_request, cost_s, default_box
+from lupin_twin.past import NotRemembered, PastRefused
 from lupin_twin.workers import SMALL_S, ShouldStop
 
 ResultT = TypeVar("ResultT")
@@ -76,14 +83,60 @@ async def computed_response(
 
     """
     bridge = bridge_of(request)
+    return await admitted_response(request, lambda: bridge.answering.get(key, compute))
+
+
+async def admitted_response(
+    request: Request, work: Callable[[], Awaitable[Answer | Response]]
+) -> Response:
+    """What `work` gives, which counts as one request of the client until it has taken it.
+
+    Raises:
+        AdmissionError: past a limit of the client.
+        Exception: whatever `work` raised.
+
+    """
+    bridge = bridge_of(request)
     with ExitStack() as held:
         held.enter_context(bridge.admission.request(client_of(request), time.monotonic()))
-        answer = await while_client_waits(
-            request, within_time(bridge, bridge.answering.get(key, compute))
-        )
+        answer = await while_client_waits(request, within_time(bridge, work()))
         if answer is None:
             return Response(status_code=CLIENT_GONE)
+        if isinstance(answer, Response):
+            return answer
         return _response(answer, held.pop_all().close)
+
+
+async def unless_known(
+    request: Request,
+    tag: str | None,
+    key: Hashable,
+    compute: Callable[[], Coroutine[Any, Any, Answer]],
+) -> Response:
+    """304 for who has the answer, which `tag` names where that is known without computing."""
+    if tag is not None:
+        if has_already(request, tag):
+            return not_modified(tag)
+        kept = kept_response(bridge_of(request), tag)
+        if kept is not None:
+            return kept
+    response = await computed_response(request, key, compute)
+    made = response.headers.get("etag")
+    if made is not None and has_already(request, made):
+        if isinstance(response, LentResponse) and response.give_back is not None:
+            response.give_back()
+        return not_modified(made)
+    return response
+
+
+def has_already(request: Request, tag: str) -> bool:
+    """Whether the client says that it has the answer of this ETag."""
+    return field_query.matches(list_header(request, "if-none-match"), tag)
+
+
+def not_modified(tag: str) -> Response:
+    """The answer for who has it already."""
+    return Response(status_code=304, headers={"ETag": tag, **REVALIDATE})
 
 
 def _response(answer: Answer, give_back: Callable[[], None]) -> LentResponse:
@@ -114,16 +167,22 @@ async def while_client_waits(
 ) -> ResultT | None:
     """What `work` gives; None: the client has left, and the work was cancelled."""
     working = asyncio.create_task(work)
-    leaving = asyncio.create_task(_client_left(request))
+    leaving = asyncio.create_task(client_left(request))
     try:
         await asyncio.wait((working, leaving), return_when=asyncio.FIRST_COMPLETED)
         return await working if working.done() else None
     finally:
-        working.cancel()
         leaving.cancel()
+        if not working.done():
+            working.cancel()
+            # What it works on is free when this returns.
+            await asyncio.wait((working,))
+            if not working.cancelled():
+                working.exception()
 
 
-async def _client_left(request: Request) -> None:
+async def client_left(request: Request) -> None:
+    """Return when the client has left."""
     while (await request.receive())["type"] != "http.disconnect":
         pass
 
@@ -164,6 +223,11 @@ async def or_refusal(answer: Awaitable[Response]) -> Response:
     except AdmissionError as error:
         status = 503 if isinstance(error, BusyError) else 429
         return error_response(str(error), status, error.headers)
+    except PastRefused as error:
+        return error_response(str(error), 400)
+    except NotRemembered as error:
+        if_passing = None if error.is_lasting else {"Retry-After": "3"}
+        return error_response(str(error), 404 if error.is_lasting else 503, if_passing)
     except TwinTimeoutError as error:
         return error_response(str(error), 504)
     except TwinUnavailableError as error:
@@ -185,11 +249,12 @@ def is_large(bridge: Bridge, asked: FieldRequest, scale: int = 1) -> bool:
     tags = 0 if bridge.latest is None else len(bridge.latest.snapshot.tags)
     rules = bridge.source.rules()
     width, height = check_request(asked, rules.max_grid_cells)
-    return cost_s(asked, tags, rules) + _write_s(width, height, scale) > SMALL_S
+    return cost_s(asked, tags, rules) + write_s(width * height, scale) > SMALL_S
 
 
-def _write_s(width: int, height: int, scale: int) -> float:
-    return width * height * scale**2 * _WRITE_CELL_S
+def write_s(cells: int, scale: int) -> float:
+    """About what writing cells takes, s of one core."""
+    return cells * scale**2 * _WRITE_CELL_S
 
 
 async def field_answer(
@@ -210,16 +275,26 @@ async def field_answer(
         result = await bridge.source.field(asked)
         # The revision that the field was made from, which may be newer than the one asked at.
         tag = field_query.etag(result.revision, asked, field_format.name, scale)
-        grid = result.grid
+        grid, sensors = result.grid, bridge.criteria.sensors
         body = await on_worker(
             bridge,
-            lambda _: field_formats.write(grid, field_format, asked.sensor_type, scale),
-            _write_s(grid.width, grid.height, scale),
+            lambda _: field_formats.write(grid, field_format, asked.sensor_type, sensors, scale),
+            write_s(grid.width * grid.height, scale),
         )
     headers = field_query.headers(
-        field_formats.metadata(grid, asked.sensor_type),
+        field_formats.metadata(grid, sensors.named(asked.sensor_type)),
         f"{asked.sensor_type}.{field_format.name}",
     )
     answer = Answer(body, field_format.media_type, {**headers, "ETag": tag, **REVALIDATE})
     bridge.kept.put(tag, answer)
     return answer
+
+
+def box_of_all_tags(bridge: Bridge) -> field_query.Box:
+    """The box of who asks for none: all pinned tags, and their reach."""
+    latest = bridge.latest
+    tags = () if latest is None else latest.snapshot.tags
+    return default_box(
+        [(tag.pose.x, tag.pose.y) for tag in tags if tag.pose is not None],
+        bridge.source.rules().max_distance_m,
+    )

@@ -14,7 +14,7 @@ import asyncio
 import logging
 import time
 from contextlib import ExitStack
-from typing import Final
+from typing import Any, Final
 
 from fastapi import APIRouter, WebSocket
 
@@ -23,14 +23,17 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.field import formats as field_formats
 from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import JSON
+from lupin_bridge.rosbridge.feeds import Feeding, Writer
 from lupin_bridge.rosbridge.protocol import service_failure, service_response
 from lupin_bridge.rosbridge.services import FieldCall
-from lupin_bridge.rosbridge.session import Session, TooManyMessages
+from lupin_bridge.rosbridge.session import Session
+from lupin_bridge.routes.clients import dismiss, has_place, next_message, write_when_free
 from lupin_bridge.routes.computing import field_answer
 from lupin_bridge.serving.admission import AdmissionError
+from lupin_bridge.serving.client_pace import TooManyMessages
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.stream.frames import text_frame
-from lupin_bridge.stream.hub import CLOSE_POLICY, CLOSE_TRY_AGAIN_LATER, Client
+from lupin_bridge.stream.hub import Client
 from lupin_bridge.twin.source import TwinUnavailableError
 from lupin_twin.fields import FieldRefused, FieldRequest
 
@@ -46,11 +49,17 @@ async def rosbridge(websocket: WebSocket) -> None:
     """The read-only part of the rosbridge v2 protocol."""
     bridge: Bridge = websocket.app.state.bridge
     await websocket.accept()
-    if not bridge.hub.make_place(client_of(websocket)):
-        limit = bridge.hub.max_clients
-        await websocket.close(CLOSE_TRY_AGAIN_LATER, f"{limit} clients are connected, the limit")
+    if not await has_place(websocket, bridge.hub):
         return
     await _Conversation(websocket, bridge).run()
+
+
+def writer_of(state: Any, bridge: Bridge) -> Writer:
+    """The one writer of an application."""
+    if not hasattr(state, "rosbridge_writer"):
+        state.rosbridge_writer = Writer(bridge.source.relay, bridge.source.workers)
+    writer: Writer = state.rosbridge_writer
+    return writer
 
 
 class _Conversation:
@@ -67,9 +76,11 @@ class _Conversation:
             address=self._address,
             strict_interval=True,
             wants_status=False,
+            wants_alarms=False,
             wants_state=False,
             wire=lambda _client, frame: self._session.wire(frame),
         )
+        self._feeding = Feeding(writer_of(websocket.app.state, bridge), self._write)
         self._calls: set[asyncio.Task[None]] = set()
         self._running = asyncio.Semaphore(MAX_RUNNING_CALLS)
 
@@ -78,16 +89,14 @@ class _Conversation:
         self._connection.on_writable = self._go_on
         self._bridge.join(self._client)
         try:
-            while (event := await self._websocket.receive())["type"] != "websocket.disconnect":
-                text: str | None = event.get("text")
-                await self._take(event["bytes"] if text is None else text)
+            while (message := await next_message(self._websocket)) is not None:
+                await self._take(message)
         except TooManyMessages as error:
-            self._connection.dismiss(CLOSE_POLICY, str(error))
-            while (await self._websocket.receive())["type"] != "websocket.disconnect":
-                await asyncio.sleep(0)
+            await dismiss(self._websocket, self._connection, error)
         finally:
             self._connection.on_writable = None
             self._bridge.hub.leave(self._client)
+            self._feeding.close()
             for call in self._calls:
                 call.cancel()
 
@@ -98,6 +107,7 @@ class _Conversation:
         if reaction.field_call is not None:
             await self._open(reaction.field_call)
         self._follow_subscriptions(reaction.state_is_due)
+        self._feeding.follow(self._session.feeds, reaction.subscribed)
         # What one client has sent at once must not hold up the others.
         await asyncio.sleep(0)
 
@@ -113,13 +123,14 @@ class _Conversation:
     def _go_on(self) -> None:
         # Here and not in the hub, which looks only when a state is due: a reply may have filled
         # the socket.
-        self._client.blocked_since_s = None
+        self._bridge.hub.is_free(self._client)
         self._bridge.serve(self._client)
 
     async def _send(self, message: bytes) -> None:
-        if not self._connection.can_take and self._client.blocked_since_s is None:
-            self._client.blocked_since_s = time.monotonic()
-        await self._connection.write_when_free(text_frame(message))
+        await self._write(text_frame(message))
+
+    async def _write(self, frame: bytes) -> None:
+        await write_when_free(self._bridge.hub, self._client, self._connection, frame)
 
     # --- calls of GetField --------------------------------------------------------------------
 
@@ -138,27 +149,33 @@ class _Conversation:
 
     async def _answer(self, field_call: FieldCall, limit_s: float) -> None:
         deadline_s = asyncio.get_running_loop().time() + limit_s
-        call = field_call.call
         async with self._running:
             with ExitStack() as held:
-                try:
-                    async with asyncio.timeout_at(deadline_s):
-                        values = await self._values(field_call.request, held)
-                    response = service_response(call.id, call.service, values, result=True)
-                except TimeoutError:
-                    text = f"{call.service} did not answer within {limit_s:g} s"
-                    response = service_failure(call.id, call.service, text)
-                except FieldRefused as error:
-                    # The service has answered, and the answer is no: as over ROS, `ok` says so.
-                    values = field_formats.refusal_json(str(error))
-                    response = service_response(call.id, call.service, values, result=True)
-                except (AdmissionError, TwinUnavailableError) as error:
-                    response = service_failure(call.id, call.service, str(error))
-                except Exception:
-                    log.exception("a call of %s met an error", call.service)
-                    text = "the bridge met an error of its own, see its log"
-                    response = service_failure(call.id, call.service, text)
-                await self._send(response)
+                # Nothing but the frame: of what it was made of, each as large, none waits along.
+                await self._write(await self._reply(field_call, limit_s, deadline_s, held))
+
+    async def _reply(
+        self, field_call: FieldCall, limit_s: float, deadline_s: float, held: ExitStack
+    ) -> bytes:
+        call = field_call.call
+        try:
+            async with asyncio.timeout_at(deadline_s):
+                values = await self._values(field_call.request, held)
+            response = service_response(call.id, call.service, values, result=True)
+        except TimeoutError:
+            text = f"{call.service} did not answer within {limit_s:g} s"
+            response = service_failure(call.id, call.service, text)
+        except FieldRefused as error:
+            # The service has answered, and the answer is no: as over ROS, `ok` says so.
+            values = field_formats.refusal_json(str(error))
+            response = service_response(call.id, call.service, values, result=True)
+        except (AdmissionError, TwinUnavailableError) as error:
+            response = service_failure(call.id, call.service, str(error))
+        except Exception:  # nobody waits for this task: its caller is told, as over HTTP
+            log.exception("a call of %s met an error", call.service)
+            text = "the bridge met an error of its own, see its log"
+            response = service_failure(call.id, call.service, text)
+        return text_frame(response)
 
     async def _values(self, request: FieldRequest, held: ExitStack) -> bytes:
         bridge = self._bridge
@@ -168,8 +185,8 @@ class _Conversation:
         if tag and (lent := bridge.kept.lend(tag)) is not None:
             answer, give_back = lent
             give_back()  # the reply holds a copy of its own
-            return answer.body
+            return bytes(answer.body)
         held.enter_context(bridge.admission.request(self._address, time.monotonic()))
         key = (bridge.source.revision(), request, JSON.name, 1)
         answer = await bridge.answering.get(key, lambda: field_answer(bridge, request, JSON))
-        return answer.body
+        return bytes(answer.body)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 import time
 from functools import cache
+from html import escape
 from pathlib import Path
 from typing import Final, Literal, TypedDict
 
@@ -13,11 +14,13 @@ from fastapi import APIRouter, Request, Response
 
 from lupin_bridge.access.credentials import SESSION_S, BrowserSession
 from lupin_bridge.access.middleware import SESSION_KEY, Access
+from lupin_bridge.routes.speaking import language_of
 from lupin_bridge.routes.tools import (
     NEVER_KEEP,
     REVALIDATE,
     error_response,
     json_response,
+    list_header,
     read_route,
 )
 from lupin_bridge.stream import schema
@@ -92,7 +95,11 @@ async def page(request: Request) -> Response:
     """The page; where no token is asked for, on to the HMI."""
     if _access_of(request).credentials is None:
         return Response(status_code=303, headers={"Location": "./", **NEVER_KEEP})
-    return _file("signin.html", "text/html; charset=utf-8")
+    language = language_of(
+        request.query_params.get("lang"), list_header(request, "accept-language"), _words()
+    )
+    headers = {**REVALIDATE, "Content-Language": language, "Vary": "Accept-Language"}
+    return Response(_page_in(language), headers=headers, media_type="text/html; charset=utf-8")
 
 
 @read_route(router, "/signin.css", include_in_schema=False)
@@ -136,6 +143,18 @@ def _access_of(request: Request) -> Access:
 
 def _file(name: str, media_type: str) -> Response:
     return Response(_read(name), headers=REVALIDATE, media_type=media_type)
+
+
+@cache
+def _words() -> dict[str, dict[str, str]]:
+    words: dict[str, dict[str, str]] = orjson.loads(_read("words.json"))
+    return words
+
+
+@cache
+def _page_in(language: str) -> str:
+    words = {key: escape(text) for key, text in _words()[language].items()}
+    return _read("signin.html").decode().format(lang=language, **words)
 
 
 @cache

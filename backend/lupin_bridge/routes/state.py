@@ -10,12 +10,17 @@ from fastapi import APIRouter, Request, Response, WebSocket
 
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.past import query as past_query
+from lupin_bridge.past.asked import NoSuchTag, OneTag, WholeState
+from lupin_bridge.routes.as_of import response_as_of
+from lupin_bridge.routes.clients import has_place, next_message
 from lupin_bridge.routes.computing import (
     computed_response,
     kept_or_computed,
     on_worker,
     or_refusal,
 )
+from lupin_bridge.routes.documented import AT, NOT_REMEMBERED
 from lupin_bridge.routes.tools import (
     JSON_TYPE,
     NEVER_KEEP,
@@ -28,7 +33,7 @@ from lupin_bridge.serving.kept import Answer
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.stream import listen_query, schema, state_json
 from lupin_bridge.stream.frames import ENCODINGS
-from lupin_bridge.stream.hub import CLOSE_POLICY, CLOSE_TRY_AGAIN_LATER, Client
+from lupin_bridge.stream.hub import CLOSE_POLICY, Client
 from lupin_bridge.stream.listen_query import ListenRefused
 
 router = APIRouter()
@@ -62,9 +67,7 @@ async def ws_state(websocket: WebSocket) -> None:
     # What is selected is what is sent: a query may ask for JSON although CBOR was offered.
     chosen = query.encoding if query.encoding in offered else None
     await websocket.accept(subprotocol=chosen)
-    if not bridge.hub.make_place(client_of(websocket)):
-        limit = bridge.hub.max_clients
-        await websocket.close(CLOSE_TRY_AGAIN_LATER, f"{limit} clients are connected, the limit")
+    if not await has_place(websocket, bridge.hub):
         return
     connection: Connection = getattr(websocket.state, CONNECTION_KEY)
     client = Client(
@@ -77,7 +80,7 @@ async def ws_state(websocket: WebSocket) -> None:
     connection.on_writable = lambda: bridge.serve(client)
     bridge.join(client)
     try:
-        while (await websocket.receive())["type"] != "websocket.disconnect":
+        while await next_message(websocket) is not None:
             pass
     finally:
         connection.on_writable = None
@@ -88,11 +91,22 @@ async def ws_state(websocket: WebSocket) -> None:
     router,
     "/api/state",
     summary="The current state of every tag",
-    responses={200: {"model": schema.TwinState}, **_TOO_MUCH, **_UNAVAILABLE},
+    responses={200: {"model": schema.TwinState}, **NOT_REMEMBERED},
+    openapi_extra={"parameters": [AT]},
 )
 async def state(request: Request) -> Response:
-    """The newest TwinState with the message's own field names, and ages as of this answer."""
+    """TwinState with the message's own field names; the newest, with ages as of this answer.
+
+    As of a moment that has passed, `header.stamp` is that moment, and ages are those of then.
+    """
+    return await or_refusal(_state(request))
+
+
+async def _state(request: Request) -> Response:
     bridge = bridge_of(request)
+    at_ns = past_query.at(request.query_params.multi_items(), bridge.ros_time_ns)
+    if at_ns is not None:
+        return await response_as_of(request, at_ns, WholeState())
     latest = bridge.latest
     if latest is None:
         return error_response(_NO_TWIN, 503)
@@ -108,7 +122,7 @@ async def state(request: Request) -> Response:
         bridge.kept_state = key
         return answer
 
-    return await or_refusal(kept_or_computed(request, key, compute))
+    return await kept_or_computed(request, key, compute)
 
 
 # An id may hold a slash, which is decoded before the routes are tried: hence :path, and the longer
@@ -149,11 +163,19 @@ async def history(request: Request, tag_id: str) -> Response:
     router,
     "/api/tags/{tag_id:path}",
     summary="One tag",
-    responses={200: {"model": schema.TwinTagState}, **_NO_TAG, **_UNAVAILABLE},
+    responses={200: {"model": schema.TwinTagState}, **NOT_REMEMBERED, **_NO_TAG},
+    openapi_extra={"parameters": [AT]},
 )
 async def tag(request: Request, tag_id: str) -> Response:
-    """Everything that the twin knows about one tag."""
+    """Everything that the twin knows about one tag, or knew at a moment."""
+    return await or_refusal(_tag(request, tag_id))
+
+
+async def _tag(request: Request, tag_id: str) -> Response:
     bridge = bridge_of(request)
+    at_ns = past_query.at(request.query_params.multi_items(), bridge.ros_time_ns)
+    if at_ns is not None:
+        return await _tag_as_of(request, tag_id, at_ns)
     latest = bridge.latest
     if latest is None:
         return error_response(_NO_TWIN, 503)
@@ -161,6 +183,13 @@ async def tag(request: Request, tag_id: str) -> Response:
         if candidate.tag_id == tag_id:
             return json_response(bridge.frames.json.tag(candidate, bridge.ros_time_ns))
     return _no_such_tag(tag_id, len(latest.snapshot.tags))
+
+
+async def _tag_as_of(request: Request, tag_id: str, at_ns: int) -> Response:
+    try:
+        return await response_as_of(request, at_ns, OneTag(tag_id))
+    except NoSuchTag as error:
+        return _no_such_tag(tag_id, error.known)
 
 
 class _NoSuchTagError(KeyError):

@@ -12,6 +12,7 @@ import logging
 import resource
 import socket
 import ssl
+from asyncio.sslproto import SSLProtocol
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import dataclass
@@ -32,6 +33,9 @@ MIN_CONNECTIONS: Final = 8
 AT_ONCE: Final = 64
 # Of a full house, so much is turned out at once: who is to go costs a look at everybody.
 TURNED_OUT: Final = 1 / 16
+# What asyncio sets aside for each connection over TLS, from its first moment on: 256 kB if nothing
+# is said of it, which a stranger could have thousands of times. A record of TLS has 16 kB at most.
+TLS_BUFFER_BYTES: Final = 32 * 1024
 RETRY_S: Final = 0.25
 COMPLAINT_PERIOD_S: Final = 30.0
 
@@ -84,6 +88,7 @@ class Acceptor:
         self._room = room
         self._options: dict[str, Any] = {}
         if tls is not None:
+            SSLProtocol.max_size = TLS_BUFFER_BYTES
             self._options = {
                 "ssl": tls,
                 "ssl_handshake_timeout": timeout_s,

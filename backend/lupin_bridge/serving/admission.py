@@ -19,13 +19,18 @@ from lupin_bridge.serving.rate_limit import RateLimit
 
 # A page that opens asks for several fields at once; seconds' worth of field_rate_hz.
 BURST_S: Final = 2.0
+# An export goes on for as long as its reader takes: one a client, and few that share the disk.
+EXPORTS_A_CLIENT: Final = 1
+EXPORTS: Final = 4
 
 # Why something was refused, as it is counted.
 IN_FLIGHT: Final = "client_in_flight"
 RATE: Final = "client_rate"
 LARGE: Final = "large_in_flight"
 TOTAL: Final = "total_in_flight"
-REASONS: Final = (IN_FLIGHT, RATE, LARGE, TOTAL)
+CLIENT_EXPORTS: Final = "client_exports"
+ALL_EXPORTS: Final = "total_exports"
+REASONS: Final = (IN_FLIGHT, RATE, LARGE, TOTAL, CLIENT_EXPORTS, ALL_EXPORTS)
 
 
 class AdmissionError(RuntimeError):
@@ -60,6 +65,7 @@ class Admission:
         self._large_concurrency = total_concurrency - total_concurrency // 4
         self._rate = RateLimit(rate_hz, rate_hz * BURST_S)
         self._in_flight: Counter[str] = Counter()
+        self._exporting: Counter[str] = Counter()
         self._computing = 0
         self._large = 0
 
@@ -98,6 +104,36 @@ class Admission:
             self._in_flight[client] -= 1
             if not self._in_flight[client]:
                 del self._in_flight[client]
+
+    @property
+    def exporting(self) -> int:
+        """How many exports are being sent now."""
+        return self._exporting.total()
+
+    @contextmanager
+    def export(self, client: str) -> Iterator[None]:
+        """A client's export, from its first row to its last.
+
+        Raises:
+            ClientLimitError: one more than the client may have at once.
+            BusyError: one more than there may be at once.
+
+        """
+        if self._exporting[client] >= EXPORTS_A_CLIENT:
+            self.refused[CLIENT_EXPORTS] += 1
+            raise ClientLimitError(
+                f"{client} has {EXPORTS_A_CLIENT} export under way, the limit", 5.0
+            )
+        if self.exporting >= EXPORTS:
+            self.refused[ALL_EXPORTS] += 1
+            raise BusyError(f"{EXPORTS} exports are under way, the limit", 5.0)
+        self._exporting[client] += 1
+        try:
+            yield
+        finally:
+            self._exporting[client] -= 1
+            if not self._exporting[client]:
+                del self._exporting[client]
 
     @contextmanager
     def computing(self, *, is_large: bool = False) -> Iterator[None]:

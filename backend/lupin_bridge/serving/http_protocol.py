@@ -21,7 +21,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
 
 from lupin_bridge.serving.rate_limit import client_key
 from lupin_bridge.serving.refusal import refusal
-from lupin_bridge.serving.transports import CLOSE_GRACE_S, bound_unsent, tear_down
+from lupin_bridge.serving.transports import CLOSE_GRACE_S, bound_unsent, reset, tear_down
 
 log = logging.getLogger(__name__)
 
@@ -32,6 +32,8 @@ PIECE_BYTES: Final = 64 * 1024
 MAX_HEAD_BYTES: Final = 32 * 1024
 # From here on the next piece has to wait. asyncio's own value, but over TLS, where it is 512 kB.
 HIGH_WATER_BYTES: Final = 64 * 1024
+# Where a request's scope has its connection, among the state.
+CONNECTION_KEY: Final = "http_connection"
 
 
 class HttpConnection(H11Protocol):
@@ -48,7 +50,7 @@ class HttpConnection(H11Protocol):
         app_state: dict[str, Any],
         _loop: asyncio.AbstractEventLoop | None = None,
     ) -> None:
-        super().__init__(config, server_state, app_state, _loop)
+        super().__init__(config, server_state, {**app_state, CONNECTION_KEY: self}, _loop)
         self.address = ""
         self._deadline: asyncio.TimerHandle | None = None
         self._reader_deadline: asyncio.TimerHandle | None = None
@@ -125,6 +127,13 @@ class HttpConnection(H11Protocol):
     def abort(self) -> None:
         """Tear the connection down and forget what was still to be sent."""
         tear_down(self.transport)
+
+    def break_off(self) -> None:
+        """End an answer in its middle: whoever gets it must not take what has come for all of it.
+
+        Of HTTP/1.0, where an answer ends with its connection, that goes for nothing but a reset.
+        """
+        reset(self.transport)
 
     def _should_upgrade(self) -> bool:
         # RFC 9110, section 7.8: an upgrade asked for in HTTP/1.0 is to be passed over.

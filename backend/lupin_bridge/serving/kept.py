@@ -9,18 +9,21 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import Final
 
 MAX_BYTES: Final = 64_000_000
 # What an entry takes beside its body, roughly: the least that it counts.
 ENTRY_BYTES: Final = 1_000
+# So many entries are looked through for the newest.
+MAX_NEWEST: Final = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
     """The body of an answer, and its headers."""
 
-    body: bytes
+    body: bytes | memoryview
     media_type: str
     headers: Mapping[str, str] = field(default_factory=dict)
 
@@ -78,6 +81,11 @@ class Kept:
             entry.readers -= 1
 
         return entry.answer, give_back
+
+    def newest_tags(self) -> list[str]:
+        """The ETags that were put or lent last, of those that are keys."""
+        newest = islice(reversed(self._entries), MAX_NEWEST)
+        return [key for key in newest if isinstance(key, str)]
 
     def _drop(self, key: Hashable) -> None:
         self.bytes -= self._entries.pop(key).bytes

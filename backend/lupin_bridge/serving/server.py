@@ -10,6 +10,7 @@ import signal
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import FrameType
 from typing import Any
 
 import uvicorn
@@ -21,6 +22,7 @@ from lupin_bridge.serving.http_protocol import MAX_HEAD_BYTES, HttpConnection
 from lupin_bridge.serving.transports import tear_down
 from lupin_bridge.serving.ws_protocol import Connection
 from lupin_bridge.settings import Settings
+from lupin_twin import stop_signals
 
 log = logging.getLogger(__name__)
 
@@ -122,6 +124,11 @@ class BridgeServer(uvicorn.Server):
             finally:
                 signal.pthread_sigmask(signal.SIG_SETMASK, held_back)
                 self._captured_signals.clear()
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """A stop signal has come: end, soon, and whatever hangs, a stuck loop included."""
+        stop_signals.must_end()
+        super().handle_exit(sig, frame)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Tell the clients, then close."""

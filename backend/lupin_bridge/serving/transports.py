@@ -27,8 +27,27 @@ def tear_down(transport: asyncio.WriteTransport) -> None:
 
     Closed, its socket would go on offering what nobody reads for another four minutes.
     """
+    if _has_let_go(transport):
+        return
     if transport.get_write_buffer_size() > 0:
-        no_lingering = struct.pack("ii", 1, 0)
-        connection: socket.socket = transport.get_extra_info("socket")
-        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, no_lingering)
+        reset(transport)
+    else:
+        transport.abort()
+
+
+def reset(transport: asyncio.WriteTransport) -> None:
+    """End a connection now, and so that its other side takes it for no proper end."""
+    if _has_let_go(transport):
+        return
+    no_lingering = struct.pack("ii", 1, 0)
+    connection: socket.socket = transport.get_extra_info("socket")
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, no_lingering)
     transport.abort()
+
+
+def _has_let_go(transport: asyncio.WriteTransport) -> bool:
+    """Whether it is one of asyncio's for TLS that was closed when its connection had ended.
+
+    All that it can be asked then, even how much is unsent, is an AttributeError.
+    """
+    return getattr(transport, "_ssl_protocol", transport) is None

@@ -7,6 +7,7 @@ wait: it asks, and keeps the newest frame for the moment at which the client is 
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -14,6 +15,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.frames import CloseCode, Frame
 from websockets.protocol import State
 
+from lupin_bridge.serving.pieces import Piece, pieces
 from lupin_bridge.serving.rate_limit import client_key
 from lupin_bridge.serving.refusal import refusal
 from lupin_bridge.serving.transports import CLOSE_GRACE_S, tear_down
@@ -52,6 +54,9 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         self._handshake_deadline: asyncio.TimerHandle | None = None
         # When all frames heard would be through at the allowed rate (ITU-T I.371).
         self._frames_through_s = 0.0
+        # What is left of large messages, for as long as the socket does not take it.
+        self._pieces: deque[Piece] = deque()
+        self._is_full = False
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Stop at the first bytes that the socket does not take: what is queued is one frame.
@@ -61,12 +66,15 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         super().connection_made(transport)
         if self.client is not None:
             self.address = client_key(self.client[0])
+        # uvicorn does so later. Over TLS something may be unsent when the limits are set: HTTP's
+        # protocol would be told, wait for a reader who is not its own, and cut the client off.
+        self.transport.set_protocol(self)
         # Not 0: asyncio's TLS transport stops at the limit, not past it, and would stop on nothing.
         self.transport.set_write_buffer_limits(high=1, low=0)
-        # What the client has asked for before, over HTTP, may still fill the socket. The transport
-        # has told so, or does now, to the protocol that it had then.
+        # What the client has asked for before, over HTTP, may still fill the socket. It is HTTP's
+        # protocol then that was told.
         if self.transport.get_write_buffer_size() > 0:
-            self.writable.clear()
+            self.pause_writing()
         self._handshake_deadline = self.loop.call_later(
             self.config.timeout_keep_alive, self._look_for_handshake
         )
@@ -74,6 +82,7 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the connection."""
         self._end_handshake()
+        self._pieces.clear()
         super().connection_lost(exc)
 
     @property
@@ -116,8 +125,17 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
                 f"sent more than {FRAMES_PER_S} frames a second after {FRAMES_AT_ONCE} at once",
             )
 
+    def pause_writing(self) -> None:
+        """The socket takes no more."""
+        self._is_full = True
+        super().pause_writing()
+
     def resume_writing(self) -> None:
-        """The socket has taken everything: time for the newest frame."""
+        """The socket has taken everything: time for the next piece, or the newest frame."""
+        self._is_full = False
+        self._write_pieces()
+        if self._is_full:
+            return
         super().resume_writing()
         if self.on_writable is not None:
             self.on_writable()
@@ -168,14 +186,25 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         """Write a whole frame; never waits. The caller has asked `can_take`."""
         self.transport.write(wire)
 
+    def write_shared(self, frame: bytes, rest: bytes = b"") -> None:
+        """Write a message that others get too, without a copy of it; see `pieces`. Never waits."""
+        self._pieces.extend(pieces(frame, rest))
+        self._write_pieces()
+
     async def write_when_free(self, wire: bytes) -> None:
         """Write as soon as all before has gone out; at most one frame slips in between.
 
         Nothing is written to a connection that is closing.
         """
         await self.writable.wait()
-        if not self.close_sent and not self.transport.is_closing():
-            self.transport.write(wire)
+        self.write_shared(wire)
+
+    def _write_pieces(self) -> None:
+        while self._pieces and not self._is_full:
+            if self.close_sent or self.transport.is_closing():
+                self._pieces.clear()
+            else:
+                self.transport.writelines(self._pieces.popleft())
 
     def dismiss(self, code: int, reason: str) -> None:
         """Send a close frame with the reason, and tear the socket down if nobody reads it."""
@@ -196,6 +225,7 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
 
     def _say_last_words(self) -> None:
         """Write the close frame that the protocol has ready, and end after the grace."""
+        self._pieces.clear()
         self.transport.write(b"".join(self.conn.data_to_send()))
         self.close_sent = True
         # uvicorn's own: with it, the end of the application is not yet that of the connection.

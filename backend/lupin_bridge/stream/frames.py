@@ -5,6 +5,7 @@ Pure. A frame is written in an encoding when the first client asks for it, and k
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
@@ -13,6 +14,8 @@ import cbor2
 import orjson
 from websockets.frames import Frame, Opcode
 
+from lupin_bridge.judge.judging import NOTHING_JUDGED, Judged
+from lupin_bridge.stream.health_json import HealthJson
 from lupin_bridge.stream.state_cbor import StateCbor, array, mapping
 from lupin_bridge.stream.state_json import StateJson, header
 from lupin_bridge.stream.status import Status
@@ -32,17 +35,28 @@ def binary_frame(payload: bytes) -> bytes:
     return Frame(Opcode.BINARY, payload).serialize(mask=False)
 
 
+def binary_head(length: int) -> bytes:
+    """What stands before so many bytes of a binary frame: they need not be copied for it."""
+    frame = Frame(Opcode.BINARY, b"").serialize(mask=False)[:1]
+    if length < 126:
+        return frame + bytes((length,))
+    if length < 1 << 16:
+        return frame + struct.pack("!BH", 126, length)
+    return frame + struct.pack("!BQ", 127, length)
+
+
 _FRAMES: Final[Mapping[str, Callable[[bytes], bytes]]] = {JSON: text_frame, CBOR: binary_frame}
 ENCODINGS: Final = tuple(_FRAMES)
 
 
 def status_frame(status: Status, encoding: str = JSON) -> bytes:
     """A status as a WebSocket frame."""
-    payload = orjson.dumps(status.frame())
-    if encoding == CBOR:
-        # By way of the JSON: what the two encodings say is the same to the last field.
-        payload = cbor2.dumps(orjson.loads(payload))
-    return _FRAMES[encoding](payload)
+    return encoded(orjson.dumps(status.frame()), encoding)
+
+
+def encoded(payload: bytes, encoding: str) -> bytes:
+    """JSON as a WebSocket frame in an encoding."""
+    return _FRAMES[encoding](_as_cbor(payload) if encoding == CBOR else payload)
 
 
 @dataclass(slots=True, eq=False)
@@ -55,6 +69,7 @@ class StateFrame:
     seq: int
     revision: str
     snapshot: Snapshot
+    judged: Judged
     base: StateFrame | None
     _writer: FrameWriter
     _json: bytes | None = None
@@ -98,10 +113,11 @@ class StateFrame:
         return self._wires[key]
 
     def _full(self) -> bytes:
-        return b'{"type":"state","seq":%d,"revision":%b,"state":%b}' % (
+        return b'{"type":"state","seq":%d,"revision":%b,"state":%b,"health":%b}' % (
             self.seq,
             orjson.dumps(self.revision),
             self.json,
+            self._writer.health.whole(self.judged),
         )
 
     def _delta(self) -> bytes:
@@ -110,7 +126,7 @@ class StateFrame:
         stamp_ns = self.snapshot.stamp_ns
         return (
             b'{"type":"delta","seq":%d,"base":%d,"revision":%b,"header":%b,'
-            b'"changed":[%b],"removed":%b}'
+            b'"changed":[%b],"removed":%b,"health":%b}'
         ) % (
             self.seq,
             self.base.seq,
@@ -118,6 +134,7 @@ class StateFrame:
             orjson.dumps(header(stamp_ns, self.snapshot.frame_id)),
             b",".join([self._writer.json.tag(tag, self.snapshot.now_ns) for tag in changed]),
             orjson.dumps(removed),
+            self._writer.health.delta(self.base.judged, self.judged),
         )
 
     def _full_cbor(self) -> bytes:
@@ -127,6 +144,7 @@ class StateFrame:
                 ("seq", cbor2.dumps(self.seq)),
                 ("revision", cbor2.dumps(self.revision)),
                 ("state", self._writer.cbor.state(self.snapshot)),
+                ("health", self._writer.health_cbor(self.judged)),
             ]
         )
 
@@ -146,6 +164,10 @@ class StateFrame:
                     array([self._writer.cbor.tag(tag, self.snapshot.now_ns) for tag in changed]),
                 ),
                 ("removed", cbor2.dumps(removed)),
+                (
+                    "health",
+                    _as_cbor(self._writer.health.delta(self.base.judged, self.judged)),
+                ),
             ]
         )
 
@@ -173,10 +195,14 @@ class FrameWriter:
         self.json = StateJson()
         self.cbor = StateCbor()
         self.message_json = StateJson(has_times=False)
+        self.health = HealthJson()
+        self._health_cbor: tuple[Judged, bytes] | None = None
         self._newest: StateFrame | None = None
 
-    def state(self, snapshot: Snapshot, revision: str) -> StateFrame:
-        """The next state frame."""
+    def state(
+        self, snapshot: Snapshot, revision: str, judged: Judged = NOTHING_JUDGED
+    ) -> StateFrame:
+        """The next state frame, and what is to be said of that state."""
         base = self._newest
         if base is not None:
             base.let_go()
@@ -184,6 +210,7 @@ class FrameWriter:
             seq=1 if base is None else base.seq + 1,
             revision=revision,
             snapshot=snapshot,
+            judged=judged,
             base=base,
             _writer=self,
         )
@@ -192,3 +219,14 @@ class FrameWriter:
         self.cbor.keep_only(snapshot)
         self.message_json.keep_only(snapshot)
         return frame
+
+    def health_cbor(self, judged: Judged) -> bytes:
+        """All that was judged as CBOR; it is kept until something else is."""
+        if self._health_cbor is None or self._health_cbor[0] is not judged:
+            self._health_cbor = judged, _as_cbor(self.health.whole(judged))
+        return self._health_cbor[1]
+
+
+def _as_cbor(json: bytes) -> bytes:
+    """By way of the JSON: what the two encodings say is the same to the last field."""
+    return cbor2.dumps(orjson.loads(json))

@@ -12,17 +12,25 @@ are arguments.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final, Protocol
 
 from lupin_bridge.stream.frames import JSON, StateFrame, status_frame
 from lupin_bridge.stream.status import Status
+from lupin_bridge.stream.unsent import Unsent
 
 # RFC 6455, section 7.4.1, and the IANA registry: 1008 policy violation, 1013 try again later.
 CLOSE_POLICY: Final = 1008
 CLOSE_TRY_AGAIN_LATER: Final = 1013
 
+
+# What is smaller is not worth counting, of what waits for sockets.
+LARGE_BYTES: Final = 131_072
+
+# A client that has been told nothing for so long is told the status again: of a twin that is silent
+# come no states, and who hears nothing for seconds takes the connection for dead.
+REMINDED_AFTER_S: Final = 1.0
 
 # Frames come a little early or late; so much of an interval is forgiven.
 BEAT_SLACK: Final = 0.1
@@ -66,7 +74,7 @@ class Client:
 
     `min_interval_s` is the time between two frames: now and then a tenth less, on average right;
     never less where `strict_interval`. `wire` writes a frame as this client reads it. `address` is
-    the one whose share of the places it takes.
+    the one whose share of the places it takes. `told_s` is when the last frame was written to it.
     """
 
     connection: Writable
@@ -77,10 +85,13 @@ class Client:
     strict_interval: bool = False
     wants_status: bool = True
     wants_state: bool = True
+    wants_alarms: bool = True
     wire: Callable[[Client, StateFrame], bytes] = plain_wire
     sent_seq: int = 0
     next_due_s: float = 0.0
     status_due: bool = True
+    alarms_due: bool = True
+    told_s: float = 0.0
     blocked_since_s: float | None = None
 
 
@@ -98,8 +109,10 @@ class Hub:
         self._client_timeout_s = client_timeout_s
         # In the order in which they came.
         self._clients: dict[Client, None] = {}
+        self.unsent: Unsent[Client] = Unsent()
         self._parties: Counter[str] = Counter()
         self._frame: StateFrame | None = None
+        self._alarms: Mapping[str, bytes] | None = None
         self._status_at = status_at
         self._status_wires: dict[str, bytes] = {}
         self._status_wires_s = 0.0
@@ -119,13 +132,16 @@ class Hub:
         if size < self._parties[address] + 2:
             return False
         newest = next(client for client in reversed(self._clients) if client.address == largest)
-        self.leave(newest)
-        self.clients_dismissed += 1
-        newest.connection.dismiss(
-            CLOSE_TRY_AGAIN_LATER,
-            f"{self.max_clients} clients are connected, the limit, {size} of them from here",
+        self.turn_out(
+            newest, f"{self.max_clients} clients are connected, the limit, {size} of them from here"
         )
         return True
+
+    def turn_out(self, client: Client, reason: str) -> None:
+        """Close a client for what others need; it may try again."""
+        self.leave(client)
+        self.clients_dismissed += 1
+        client.connection.dismiss(CLOSE_TRY_AGAIN_LATER, reason)
 
     @property
     def blocked(self) -> int:
@@ -140,11 +156,26 @@ class Hub:
 
     def leave(self, client: Client) -> None:
         """Forget a client; harmless if it has left already."""
+        self.unsent.let_go(client)
         if client in self._clients:
             del self._clients[client]
             self._parties[client.address] -= 1
             if not self._parties[client.address]:
                 del self._parties[client.address]
+
+    def hold(self, client: Client, message: bytes) -> None:
+        """A large message of another kind waits for a client's socket, until that is free again.
+
+        If all that wait are too much, who has waited longest gives way.
+        """
+        if len(message) >= LARGE_BYTES and client in self._clients:
+            for slowest in self.unsent.hold(client, message):
+                self.turn_out(slowest, "slow to take what it asked for, and others need the memory")
+
+    def is_free(self, client: Client) -> None:
+        """A client's socket has taken everything."""
+        client.blocked_since_s = None
+        self.unsent.let_go(client)
 
     def publish(self, frame: StateFrame, now_s: float) -> None:
         """Make this the newest frame and give it to everyone who can take it."""
@@ -156,6 +187,23 @@ class Hub:
         self._status_wires.clear()
         for client in self._clients:
             client.status_due = True
+        self.serve_all(now_s)
+
+    def remind(self, now_s: float) -> None:
+        """Who was told nothing for a second, and can take it, is told the status when next served.
+
+        Who asked for fewer frames is told as seldom as that.
+        """
+        for client in self._clients:
+            silence_s = max(REMINDED_AFTER_S, client.min_interval_s)
+            if client.blocked_since_s is None and now_s >= client.told_s + silence_s:
+                client.status_due = True
+
+    def tell_alarms(self, wires: Mapping[str, bytes], now_s: float) -> None:
+        """The alarms are others: give these frames, by encoding, to everyone who can take them."""
+        self._alarms = wires
+        for client in self._clients:
+            client.alarms_due = True
         self.serve_all(now_s)
 
     def serve_all(self, now_s: float) -> None:
@@ -173,6 +221,14 @@ class Hub:
             if not client.connection.can_take:
                 self._mark_blocked(client, now_s)
             return
+        self._serve_state(client, now_s)
+        # Behind a state: alarms are of tags that a listener knows then.
+        if not (client.wants_alarms and client.alarms_due and client.sent_seq):
+            return
+        if self._alarms is not None:
+            client.alarms_due = not self._write(client, self._alarms[client.encoding], now_s)
+
+    def _serve_state(self, client: Client, now_s: float) -> None:
         frame = self._frame
         if frame is None or frame.seq == client.sent_seq or now_s < client.next_due_s:
             return
@@ -220,6 +276,7 @@ class Hub:
             self._mark_blocked(client, now_s)
             return False
         client.blocked_since_s = None
+        client.told_s = now_s
         client.connection.write(wire)
         self.bytes_sent += len(wire)
         return True

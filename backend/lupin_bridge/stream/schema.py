@@ -125,6 +125,104 @@ class TwinState(Contract):
     tags: list[TwinTagState]
 
 
+class HealthReason(Contract):
+    """Why a tag, or the house, has its verdict.
+
+    The last two are the house's alone. `silent`: nothing is heard of the twin, or its clock does
+    not run. `stopped`: no tag was scanned for longer than the patrol's own rhythm allows.
+    """
+
+    kind: Literal[
+        "range", "reading_failed", "scan_failed", "pest", "old", "changed", "silent", "stopped"
+    ]
+    verdict: Literal["critical", "stressed", "unknown", "healthy"]
+    sensor: str = Field(description="empty: all of the tag's, or none")
+    value: float | None = Field(
+        description="sensor's unit; of a pest how many were counted, of scan_failed the status"
+    )
+    limit: float | None = Field(
+        description="the bound that was passed, sensor's unit; of old how long readings hold, s"
+    )
+    since: Time | None = Field(
+        description="ROS time of the observation that began it, of old the last one; null: none"
+    )
+
+
+class TagHealth(Contract):
+    """The verdict of a tag: that of its worst reason; healthy: something recent was judged."""
+
+    verdict: Literal["critical", "stressed", "unknown", "healthy"]
+    reasons: list[HealthReason] = Field(description="worst first")
+
+
+class Day(Contract):
+    """Whether the ranges of the day hold or those of the night, and what says so."""
+
+    is_day: bool
+    source: Literal["light", "clock", "assumed"]
+
+
+class Patrol(Contract):
+    """What the house is doing; nothing of it is a verdict."""
+
+    interval_s: float | None = Field(
+        description="median of the last intervals between scans, whatever tag they were of; "
+        "null: fewer than two are known"
+    )
+    last_scan: Time | None = Field(description="ROS time; null: none is known")
+    overdue: int = Field(description="tags none of whose readings holds any more, or without any")
+
+
+class HouseHealth(TagHealth):
+    """The house is its worst tag; unknown where more than half of its tags are."""
+
+    day: Day
+    patrol: Patrol
+
+
+class Judgement(Contract):
+    """`/api/health`, and `health` in frames: in a delta only the tags whose health has changed."""
+
+    house: HouseHealth
+    tags: dict[str, TagHealth]
+
+
+class Alarm(Contract):
+    """One episode: what was wrong, where, from when to when, and how bad at worst.
+
+    It follows from what was observed and from the ranges: the same in every replica and after
+    every restart.
+    """
+
+    id: str = Field(description="opaque; made of what, where and since when")
+    reason: HealthReason = Field(description="as it was when the alarm was raised")
+    tag_id: str = Field(description="empty: the house")
+    raised_at: Time = Field(description="ROS time")
+    cleared_at: Time | None = Field(description="ROS time; null: it is active")
+    worst: float | None = Field(
+        description="the value farthest beyond its limit, sensor's unit; of a pest the most that "
+        "were counted; null: there is no such value"
+    )
+
+
+class Alarms(Contract):
+    """`/api/alarms`: what the past and now give.
+
+    `starting`: the past has not been gone through yet; `heard`: no journal is kept, and only what
+    this process heard since its start is in it.
+    """
+
+    alarms: list[Alarm] = Field(description="newest first")
+    source: Literal["starting", "journal", "heard"]
+    since: Time | None = Field(description="ROS time from which on alarms are known; null: not yet")
+
+
+class AlarmsFrame(Alarms):
+    """WebSocket frame: the active alarms and those raised or cleared within 24 h, on any change."""
+
+    type: Literal["alarms"]
+
+
 class StateFrame(Contract):
     """WebSocket frame: the state. `seq` grows by one a frame; a gap tells what was skipped."""
 
@@ -132,6 +230,7 @@ class StateFrame(Contract):
     seq: int
     revision: str = Field(description="opaque; changes exactly when a field could")
     state: TwinState
+    health: Judgement
 
 
 class DeltaFrame(Contract):
@@ -150,6 +249,7 @@ class DeltaFrame(Contract):
     header: Header
     changed: list[TwinTagState]
     removed: list[str] = Field(description="tag_ids; a restarted twin knows fewer tags")
+    health: Judgement = Field(description="the house, and the tags of whom it is another")
 
 
 class RecentDrop(Contract):
@@ -158,6 +258,34 @@ class RecentDrop(Contract):
     reason: str
     message: str = Field(description="the last of them, for a person to read")
     count: int
+
+
+class Stretch(Contract):
+    """From one moment of ROS time to another."""
+
+    start: Time
+    end: Time
+
+
+class Journal(Contract):
+    """How the twin's journal does. Only while it is `recording` is everything kept."""
+
+    state: Literal[
+        "unknown", "off", "starting", "recording", "slow", "failing", "in_use", "foreign"
+    ] = Field(description="unknown: the twin does not say")
+    detail: str = Field(description="for a person to read")
+    set_aside: str = Field(description="the last damaged file, by its new name; empty: none")
+    simulated: Stretch | None = Field(
+        description="what no robot observed: the past that a demo's journal begins with"
+    )
+
+
+class Outward(Contract):
+    """How a channel does by which others are told: MQTT, the webhook."""
+
+    channel: Literal["mqtt", "webhook"]
+    is_failing: bool
+    detail: str = Field(description="what is wrong, for a person to read; empty: nothing")
 
 
 class StatusFrame(Contract):
@@ -183,20 +311,13 @@ class StatusFrame(Contract):
         description="s since the bridge got its last state, by its own clock; null: never"
     )
     has_map: bool = Field(description="false: /api/map answers 404, no map has come yet")
+    origin: Literal["unknown", "robot", "simulated", "recorded", "sim_time"] = Field(
+        description="where what was observed comes from, as the twin says; sim_time: it goes by "
+        "/clock, so from a simulation, or a recording that is played"
+    )
     drops: list[RecentDrop] = Field(description="what the twin did not take in lately, by reason")
-
-
-class Journal(Contract):
-    """How the twin's journal does."""
-
-    state: Literal["off", "starting", "recording", "slow", "failing", "in_use", "foreign"]
-    detail: str = Field(description="for a person to read")
-
-
-class Readiness(StatusFrame):
-    """The status, and what a replica with a twin of its own can tell beside it."""
-
     journal: Journal
+    outward: list[Outward] = Field(description="those that the operator has set up")
 
 
 class GetFieldResponse(Contract):

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from lupin_twin.counts import Recent
-from lupin_twin.state import ClockState
+from lupin_twin.diagnostics import Origin
+from lupin_twin.journal.condition import UNKNOWN, Condition, JournalState
+from lupin_twin.state import NANOSECONDS_PER_SECOND, ClockState
 
 # The twin publishes at least once a second (parameter state_publish_rate_hz, default 1); three
 # missed publications are no accident.
@@ -47,11 +49,21 @@ _MESSAGES: dict[Reason, str] = {
 
 
 @dataclass(frozen=True, slots=True)
+class Outward:
+    """How a channel does that tells others by itself; `detail` is what is wrong, in a line."""
+
+    channel: str
+    is_failing: bool
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
 class Status:
     """`reason` says why the twin counts as live or offline; `state_age_s` is None: never.
 
     `twin_count` is how many nodes publish the state topic; more than one is a mistake. `has_map`
-    spares a browser requests whose 404 it would show as an error.
+    spares a browser requests whose 404 it would show as an error. `origin` is where what the twin
+    observed comes from, as far as it says.
     """
 
     reason: Reason
@@ -59,6 +71,9 @@ class Status:
     twin_count: int = 1
     has_map: bool = False
     drops: tuple[Recent, ...] = ()
+    journal: Condition = UNKNOWN
+    outward: tuple[Outward, ...] = ()
+    origin: Origin = "unknown"
 
     @property
     def is_live(self) -> bool:
@@ -82,6 +97,9 @@ class Status:
             or self.says_more_than(before)
             or before.has_map is not self.has_map
             or _about(before.drops) != _about(self.drops)
+            or _news_of(before.journal) != _news_of(self.journal)
+            or before.outward != self.outward
+            or before.origin != self.origin
         )
 
     def says_more_than(self, before: Status) -> bool:
@@ -97,9 +115,15 @@ class Status:
             "message": self.message,
             "state_age_seconds": None if self.state_age_s is None else round(self.state_age_s, 3),
             "has_map": self.has_map,
+            "origin": self.origin,
             "drops": [
                 {"reason": drop.reason, "message": drop.message, "count": drop.count}
                 for drop in self.drops
+            ],
+            "journal": _journal(self.journal),
+            "outward": [
+                {"channel": it.channel, "is_failing": it.is_failing, "detail": it.detail}
+                for it in self.outward
             ],
         }
 
@@ -107,6 +131,27 @@ class Status:
 def _about(drops: tuple[Recent, ...]) -> dict[str, int]:
     """How often each, roughly: a stream of drops is no stream of statuses."""
     return {drop.reason: drop.count.bit_length() for drop in drops}
+
+
+def _news_of(journal: Condition) -> tuple[object, ...]:
+    """What is told of a journal at once: how far behind it is changes all the time."""
+    detail = "" if journal.state == JournalState.SLOW else journal.detail
+    return journal.state, detail, journal.set_aside, journal.simulated_ns
+
+
+def _journal(journal: Condition) -> dict[str, Any]:
+    simulated = journal.simulated_ns
+    return {
+        "state": journal.state.value,
+        "detail": journal.detail,
+        "set_aside": journal.set_aside,
+        "simulated": simulated and {"start": _time(simulated[0]), "end": _time(simulated[1])},
+    }
+
+
+def _time(stamp_ns: int) -> dict[str, int]:
+    sec, nanosec = divmod(stamp_ns, NANOSECONDS_PER_SECOND)
+    return {"sec": sec, "nanosec": nanosec}
 
 
 @dataclass(slots=True)
@@ -119,13 +164,25 @@ class Liveness:
     has_map: bool = False
     clock: ClockState = "running"
     drops: tuple[Recent, ...] = ()
+    journal: Condition = UNKNOWN
+    outward: tuple[Outward, ...] = ()
+    origin: Origin = "unknown"
     thread_dead: bool = False
     shutting_down: bool = False
 
     def status(self, now_s: float) -> Status:
         """The status at `now_s`."""
         age = None if self.last_state_s is None else max(0.0, now_s - self.last_state_s)
-        return Status(self._reason(age), age, self.twin_count, self.has_map, self.drops)
+        return Status(
+            self._reason(age),
+            age,
+            self.twin_count,
+            self.has_map,
+            self.drops,
+            self.journal,
+            self.outward,
+            self.origin,
+        )
 
     def _reason(self, age_s: float | None) -> Reason:
         if self.shutting_down:

@@ -1,34 +1,55 @@
-"""The source of `serve`: a twin in this process, in a thread of its own."""
+"""The source of `serve`: a twin in this process, in a thread of its own; its past in another."""
 
 from __future__ import annotations
 
 import asyncio
+import time
 import uuid
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from concurrent.futures import Future
+from contextlib import aclosing, nullcontext
 from typing import Any, TypeVar
 
+from lupin_bridge.twin.looking import Itself, Question, look_up
+from lupin_bridge.twin.names import TwinNames
+from lupin_bridge.twin.past_child import Now
+from lupin_bridge.twin.past_process import PastProcess
+from lupin_bridge.twin.relay import Relay
+from lupin_bridge.twin.relay_ros import RelayRos, names_of
 from lupin_bridge.twin.ros_thread import RosThread
 from lupin_bridge.twin.shared import Shared
-from lupin_bridge.twin.source import CacheCounts, RevisedGrid, Told, TwinNames, TwinTimeoutError
+from lupin_bridge.twin.source import CacheCounts, RevisedGrid, Told, TwinTimeoutError
+from lupin_bridge.twin.trust import RevisedEstimate, Trust, revised
+from lupin_twin import recent
+from lupin_twin.estimate_report import ADVICE_S, Report, ReportRequest
+from lupin_twin.estimate_service import Task
+from lupin_twin.estimates import EstimateRequest, TagPast
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldJob, FieldRequest, FieldRules
 from lupin_twin.grid import FieldGrid
 from lupin_twin.history import TagHistory
-from lupin_twin.journal.condition import Condition
+from lupin_twin.journal.condition import Condition, JournalState
+from lupin_twin.journal.series import SERIES_S
+from lupin_twin.journal.writes import WRITES_S
 from lupin_twin.node import TwinNode
-from lupin_twin.state import Snapshot
-from lupin_twin.workers import Workers
+from lupin_twin.past import NotRemembered, PastRow, SeriesPast, SeriesRequest
+from lupin_twin.past_writes import PastWrites, WritesRequest
+from lupin_twin.state import NANOSECONDS_PER_SECOND, Snapshot
+from lupin_twin.workers import SMALL_S, Workers
 
 # A third of what counts as silence (`status.STALE_AFTER_S`).
 HEARTBEAT_S = 1.0
-
+# What looking through the history in memory takes, about, s of one core for each tag.
+RECENT_S_PER_TAG = 50e-6
 ResultT = TypeVar("ResultT")
 
 
 class LocalTwin:
-    """`TwinSource` over a `TwinNode` of this process."""
+    """`TwinSource` over a `TwinNode` of this process; see `PastProcess` for what it `expects`."""
 
-    def __init__(self, *, ros_args: Sequence[str], timeout_s: float) -> None:
+    def __init__(
+        self, *, ros_args: Sequence[str], timeout_s: float, expects: type | None = None
+    ) -> None:
         self._ros_args = ros_args
         self._timeout_s = timeout_s
         # A restarted server must never match an ETag of its predecessor, whose counts it repeats.
@@ -36,11 +57,18 @@ class LocalTwin:
         self._thread: RosThread[TwinNode, Told]
         self._told: Told
         self._cache = CacheCounts()
-        # The same for as long as the node lives.
         self._rules: FieldRules
+        # The same for as long as the node lives.
         self._names: TwinNames
+        self.past = PastProcess(expects, lambda: self._now() if self._told_number else None)
+        self._told_number = 0
         self.workers = Workers("work")
+        self.relay = Relay(lambda: self._thread, RelayRos())
         self._computing: Shared[FieldGrid] = Shared()
+        self._estimating: Shared[RevisedEstimate] = Shared()
+        self._trust = Trust()
+        # One at a time: fields have the other workers, and frames the other cores.
+        self._large_estimate = asyncio.Semaphore(1)
 
     async def start(self, on_state: Callable[[Told], None], on_death: Callable[[], None]) -> None:
         """Start the ROS thread with its node; see `TwinSource.start`."""
@@ -58,6 +86,8 @@ class LocalTwin:
                         node.habits.counts(),
                         cache=_cache_counts(node),
                         journal=node.memory.condition,
+                        rules=node.fields.rules,
+                        origin=node.origin,
                     )
                 )
 
@@ -66,27 +96,30 @@ class LocalTwin:
 
         def on_told(told: Told) -> None:
             self._told = told
+            self._told_number += 1
             self._note_cache(told.cache)
+            if told.rules is not None:
+                self._rules = told.rules
             on_state(told)
 
         self._thread = RosThread(
             make_node, ros_args=self._ros_args, on_event=on_told, on_death=on_death
         )
         await self._thread.start()
-        self._rules, self._names = await self._thread.call(
+        self._rules, self._names, keeps_none = await self._thread.call(
             lambda node: (
                 node.fields.rules,
-                TwinNames(
-                    node.resolve_topic_name(node.parameters.state_topic),
-                    node.resolve_service_name(node.parameters.field_service_name),
-                ),
+                names_of(node),
+                node.memory.condition.state is JournalState.OFF,
             )
         )
+        if not keeps_none:
+            self.past.start()
 
     async def stop(self) -> None:
-        """Stop the ROS thread and the workers."""
+        """Stop the ROS thread, the workers and the process that looks back."""
         self.workers.close()
-        await self._thread.stop()
+        await asyncio.gather(self.past.stop(), self._thread.stop())
 
     @property
     def identity(self) -> str:
@@ -129,7 +162,7 @@ class LocalTwin:
         return self._rules
 
     def names(self) -> TwinNames:
-        """The parameters `state_topic` and `field_service_name` as ROS resolves them."""
+        """The twin's, as ROS resolves and remaps them."""
         return self._names
 
     def journal(self) -> Condition:
@@ -148,9 +181,105 @@ class LocalTwin:
         """A hit from the node's cache, or the field computed on a worker and handed back to it."""
         return await self._in_time(self._field(request))
 
+    def estimate_revision(self, request: EstimateRequest) -> str | None:
+        """That of the last answer, as long as nothing was told that could have changed it."""
+        return self._trust.revision(request, self._told.revision)
+
+    async def estimate(self, request: EstimateRequest) -> RevisedEstimate:
+        """The node says of what, and by which model; it is computed on a worker."""
+        key = (self._told.revision, request)
+        return await self._in_time(self._estimating.get(key, lambda: self._estimate(request)))
+
+    async def estimate_report(self, request: ReportRequest) -> Report:
+        """What the node knows; where another tag helps is worked out on a worker."""
+        return await self._in_time(self._report(request))
+
     async def history(self, tag_id: str) -> TagHistory | None:
         """The last `buffer_len` scans, and as many tries, of a tag."""
         return await self._in_time(self._thread.call(lambda node: node.history_of(tag_id)))
+
+    async def ask(self, question: Question[ResultT], cost_s: float) -> ResultT:
+        """Answered in a process of its own; without a journal here, of what memory holds.
+
+        What is observed within the journal's 100 ms may be missing.
+        """
+        if self._has_journal:
+            return await self._in_time(self.past.ask(question, self._now(), cost_s))
+        return await self._in_time(look_up(question, self, self.workers))
+
+    async def state_at(self, at_ns: int) -> Snapshot:
+        """The journal's answer.
+
+        Raises:
+            NotRemembered: there is none.
+
+        """
+        if not self._has_journal:
+            raise NotRemembered(recent.NO_JOURNAL, is_lasting=True)
+        return await self.ask(Itself(at_ns), 0.0)
+
+    async def series(self, request: SeriesRequest) -> SeriesPast:
+        """The journal's answer, as of now; without a journal, what memory holds."""
+        if not self._has_journal:
+            return await self._in_time(self._recent(request, self._now_ns))
+        return await self.ask(Itself(request), SERIES_S)
+
+    async def writes(self, request: WritesRequest) -> PastWrites:
+        """The journal's rows; what was heard within its 100 ms may be missing.
+
+        Raises:
+            NotRemembered: there is none.
+
+        """
+        if not self._has_journal:
+            raise NotRemembered(recent.NO_JOURNAL, is_lasting=True)
+        return await self.ask(Itself(request), WRITES_S)
+
+    async def rows(
+        self,
+        start_ns: int,
+        end_ns: int,
+        tag_id: str | None,
+        sensor_type: str | None,
+        write: Callable[[Sequence[PastRow]], ResultT],
+    ) -> AsyncIterator[ResultT]:
+        """Read a stretch when the last one was taken; what nobody takes is not read."""
+        if not self._has_journal:
+            raise NotRemembered(recent.NO_JOURNAL, is_lasting=True)
+        query = start_ns, end_ns, tag_id, sensor_type
+        async with aclosing(self.past.rows(query, write, self._now)) as lots:
+            while True:
+                try:
+                    lot = await self._in_time(anext(lots))
+                except StopAsyncIteration:
+                    return
+                yield lot
+
+    async def _recent(self, request: SeriesRequest, now_ns: int) -> SeriesPast:
+        recent.check_known(request)
+        histories = await self._thread.call(lambda node: node.history.all_later())
+        return await asyncio.wrap_future(
+            self.workers.submit(
+                lambda _: recent.series(request, histories(), now_ns),
+                len(self._told.snapshot.tags) * RECENT_S_PER_TAG,
+            )
+        )
+
+    @property
+    def _now_ns(self) -> int:
+        """ROS time now: what was told last may be a heartbeat old."""
+        now = self._told.snapshot
+        if now.clock != "running":
+            return now.stamp_ns
+        return now.stamp_ns + int((time.monotonic() - self._told.made_s) * NANOSECONDS_PER_SECOND)
+
+    @property
+    def _has_journal(self) -> bool:
+        return self._told.journal.state is not JournalState.OFF
+
+    def _now(self) -> Now:
+        told = self._told
+        return Now(self._now_ns, told.snapshot.frame_id, told.journal, self._told_number)
 
     async def _field(self, request: FieldRequest) -> RevisedGrid:
         def look_up(node: TwinNode) -> tuple[FieldGrid | FieldJob, str, CacheCounts]:
@@ -174,12 +303,34 @@ class LocalTwin:
         self._note_cache(await self._thread.call(keep))
         return grid
 
+    async def _estimate(self, request: EstimateRequest) -> RevisedEstimate:
+        def begin(node: TwinNode) -> tuple[Task, Future[Sequence[TagPast]]]:
+            task = node.estimates.prepare(request)
+            return task, task.look_up()
+
+        epoch = self._told.revision
+        task, looking_up = await self._thread.call(begin)
+        found = await asyncio.wrap_future(looking_up)
+        async with self._large_estimate if task.cost_s > SMALL_S else nullcontext():
+            result = await asyncio.wrap_future(
+                self.workers.submit(
+                    lambda should_stop: revised(task.make(found, should_stop)), task.cost_s
+                )
+            )
+        if epoch == self._told.revision:
+            self._trust.put(request, epoch, result.revision)
+        return result
+
+    async def _report(self, request: ReportRequest) -> Report:
+        work = await self._thread.call(lambda node: node.estimates.report(request))
+        return await asyncio.wrap_future(self.workers.submit(lambda _: work(), ADVICE_S))
+
     def _note_cache(self, cache: CacheCounts) -> None:
         # A call's may come behind newer ones that were told; a counter never falls.
         if cache.hits + cache.misses >= self._cache.hits + self._cache.misses:
             self._cache = cache
 
-    async def _in_time(self, answer: Coroutine[Any, Any, ResultT]) -> ResultT:
+    async def _in_time(self, answer: Awaitable[ResultT]) -> ResultT:
         try:
             async with asyncio.timeout(self._timeout_s):
                 return await answer
@@ -187,10 +338,14 @@ class LocalTwin:
             raise TwinTimeoutError(
                 f"the twin did not answer within {self._timeout_s:g} s (field_timeout_s)"
             ) from None
+        except NotRemembered as error:
+            damage = error.damage
+            if damage:
+                await self._thread.call(lambda node: node.memory.heal(damage))
+            raise
 
     def _revision_of(self, node: TwinNode) -> str:
-        observation_count, map_revision = node.revision
-        return f"{self._identity}-{observation_count}-{map_revision}"
+        return "-".join((self._identity, *map(str, node.revision)))
 
 
 def _cache_counts(node: TwinNode) -> CacheCounts:

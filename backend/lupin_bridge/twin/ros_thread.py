@@ -19,6 +19,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from lupin_bridge.twin import ros_logs
 from lupin_bridge.twin.source import TwinUnavailableError
+from lupin_twin.half_made import remove_half_made
 from lupin_twin.spinning import end_spinning, spin_until_shutdown
 
 log = logging.getLogger(__name__)
@@ -150,9 +151,9 @@ class RosThread(Generic[NodeT, EventT]):
             try:
                 value = work(self._require_node())
             except Exception as error:  # noqa: BLE001  # handed to the caller
-                self._to_loop(_settle, result, None, error)
+                self.to_loop(_settle, result, None, error)
             else:
-                self._to_loop(_settle, result, value, None)
+                self.to_loop(_settle, result, value, None)
 
         self._executor.create_task(run)
         self._calls_waiting += 1
@@ -185,7 +186,7 @@ class RosThread(Generic[NodeT, EventT]):
                 return
             future = start(node)
             future.add_done_callback(
-                lambda done: self._to_loop(
+                lambda done: self.to_loop(
                     _settle, result, None if done.exception() else done.result(), done.exception()
                 )
             )
@@ -230,7 +231,7 @@ class RosThread(Generic[NodeT, EventT]):
             executor = SingleThreadedExecutor(context=self._context)
             executor.add_node(self._node)
             self._executor = executor
-            self._to_loop(_settle, self._started, None, None)
+            self.to_loop(_settle, self._started, None, None)
             spin_until_shutdown(executor, self._report)
         except BaseException as caught:  # noqa: BLE001  # no thread dies unseen
             error = caught
@@ -238,7 +239,7 @@ class RosThread(Generic[NodeT, EventT]):
             self._end(error)
 
     def _bring_back(self, beat: asyncio.Future[int]) -> None:
-        self._to_loop(_settle, beat, self._require_node().callback_errors, None)
+        self.to_loop(_settle, beat, self._require_node().callback_errors, None)
 
     def _report(self, what: str, error: Exception) -> None:
         self._require_node().report(what, error)
@@ -254,6 +255,7 @@ class RosThread(Generic[NodeT, EventT]):
             )
         except Exception as error:  # rclpy raises several kinds
             raise RosStartError(" ".join(str(error).split())) from error
+        remove_half_made(self._context.get_domain_id())
 
     def _end(self, error: BaseException | None) -> None:
         if self._node is not None:
@@ -262,10 +264,18 @@ class RosThread(Generic[NodeT, EventT]):
             rclpy.try_shutdown(context=self._context)
         if self._executor is None:
             failure = error if isinstance(error, Exception) else TwinUnavailableError(repr(error))
-            self._to_loop(_settle, self._started, None, failure)
+            self.to_loop(_settle, self._started, None, failure)
         elif not self._is_stopping:
             log.critical("the ROS thread has ended", exc_info=error)
-            self._to_loop(self._on_death)
+            self.to_loop(self._on_death)
+
+    def to_loop(self, callback: Callable[..., None], *args: Any) -> None:
+        """Have a callback run on the event loop, which is woken at once; from this thread."""
+        try:
+            self._loop.call_soon_threadsafe(callback, *args)
+        except RuntimeError:
+            # The loop is closed: nobody is left to be told.
+            log.debug("event loop closed, dropped %r", callback)
 
     def _post(self, event: EventT) -> None:
         self._newest = event
@@ -273,14 +283,7 @@ class RosThread(Generic[NodeT, EventT]):
         # there is a node to look at.
         if self._node is not None and not self._is_waking:
             self._is_waking = True
-            self._to_loop(self._drain)
-
-    def _to_loop(self, callback: Callable[..., None], *args: Any) -> None:
-        try:
-            self._loop.call_soon_threadsafe(callback, *args)
-        except RuntimeError:
-            # The loop is closed: nobody is left to be told.
-            log.debug("event loop closed, dropped %r", callback)
+            self.to_loop(self._drain)
 
     # --- on the event loop again --------------------------------------------------------------
 

@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final, Protocol
+from typing import Final, Protocol, TypeVar
 
+from lupin_bridge.twin.looking import Question
+from lupin_bridge.twin.names import TwinNames
+from lupin_bridge.twin.relay import Relay
+from lupin_bridge.twin.trust import RevisedEstimate
 from lupin_twin.counts import Counts, Recent
+from lupin_twin.diagnostics import Origin
+from lupin_twin.estimate_report import Report, ReportRequest
+from lupin_twin.estimates import EstimateRequest
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRequest, FieldRules
 from lupin_twin.grid import FieldGrid
 from lupin_twin.history import TagHistory
-from lupin_twin.journal.condition import OFF, Condition
+from lupin_twin.journal.condition import UNKNOWN, Condition
+from lupin_twin.past import PastRow, SeriesPast, SeriesRequest
+from lupin_twin.past_writes import PastWrites, WritesRequest
 from lupin_twin.state import Snapshot
 from lupin_twin.workers import Workers
+
+ResultT = TypeVar("ResultT")
 
 # What a callback may take at worst, on a slow machine: the largest state there is takes a second.
 STUCK_AFTER_S: Final = 10.0
@@ -44,8 +55,9 @@ class Told:
 
     `revision` is the snapshot's, `twin_count` how many nodes publish the state, `made_s` when it
     was told (monotonic clock). `counts` is what the twin dropped, lost and met; None: it does not
-    say. `own_counts` is the same of a node of ours that is not the twin; `cache` and
-    `journal` are those of a twin in this process.
+    say. `own_counts` is the same of a node of ours that is not the twin; `cache` is that of a twin
+    in this process, and `rules` are its own; `journal` is the twin's, wherever it is, as far as
+    that tells, and so is `origin`, where its observations come from.
     """
 
     snapshot: Snapshot
@@ -55,7 +67,9 @@ class Told:
     counts: Counts | None = None
     own_counts: Counts | None = None
     cache: CacheCounts = field(default_factory=CacheCounts)
-    journal: Condition = OFF
+    journal: Condition = UNKNOWN
+    rules: FieldRules | None = None
+    origin: Origin = "unknown"
     made_s: float = field(default_factory=time.monotonic, compare=False)
 
     @property
@@ -74,21 +88,15 @@ class RevisedGrid:
     revision: str
 
 
-@dataclass(frozen=True, slots=True)
-class TwinNames:
-    """What the twin's topic and service are called in ROS, from the root on and after remapping."""
-
-    state_topic: str
-    field_service: str
-
-
 class TwinSource(Protocol):
     """A twin in this process, or one elsewhere. Everything here is called on the event loop.
 
-    `workers` is where this process does what takes longer than a tick; `stop` closes it.
+    `workers` is where this process does what takes longer than a tick; `stop` closes it. `relay`
+    is where ROS topics are listened to as they are on the wire.
     """
 
     workers: Workers
+    relay: Relay
 
     async def start(self, on_state: Callable[[Told], None], on_death: Callable[[], None]) -> None:
         """Start; `on_state` gets every change (the newest, where they come fast)."""
@@ -129,13 +137,13 @@ class TwinSource(Protocol):
         """The rules by which fields are made, and their limit."""
 
     def names(self) -> TwinNames:
-        """What the twin's topic and service are called."""
+        """What the twin's topics and service are called."""
 
     def cache_counts(self) -> CacheCounts:
         """How the cache of fields does; all 0 where it is not in this process."""
 
     def journal(self) -> Condition:
-        """How the journal does; off where it is not in this process."""
+        """How the twin's journal does, as far as it tells."""
 
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map, if any has come."""
@@ -149,8 +157,54 @@ class TwinSource(Protocol):
 
         """
 
+    def estimate_revision(self, request: EstimateRequest) -> str | None:
+        """The revision of the estimate asked for now; None: only the answer will tell."""
+
+    async def estimate(self, request: EstimateRequest) -> RevisedEstimate:
+        """Estimate a sensor over a box.
+
+        Raises:
+            lupin_twin.fields.FieldRefused: a bad request, or nothing to make an estimate of.
+            lupin_twin.past.NotRemembered: there is no journal, or it cannot be read now.
+            TwinUnavailableError: nobody there to compute it.
+
+        """
+
+    async def estimate_report(self, request: ReportRequest) -> Report:
+        """What a sensor's estimates are worth.
+
+        Raises:
+            TwinUnavailableError: nobody there to say.
+
+        """
+
     async def history(self, tag_id: str) -> TagHistory | None:
         """The last scans and tries of a tag; None: no such tag."""
+
+    # --- the past; each may raise `PastRefused`, `NotRemembered` or `TwinUnavailableError` --------
+
+    async def ask(self, question: Question[ResultT], cost_s: float) -> ResultT:
+        """The answer to a question; `cost_s` estimates what looking it up takes, s of one core."""
+
+    async def series(self, request: SeriesRequest) -> SeriesPast:
+        """Readings of one sensor of one tag, or events, as they were or in buckets."""
+
+    async def writes(self, request: WritesRequest) -> PastWrites:
+        """What was heard, scan by scan and look by look, in the order of hearing."""
+
+    def rows(
+        self,
+        start_ns: int,
+        end_ns: int,
+        tag_id: str | None,
+        sensor_type: str | None,
+        write: Callable[[Sequence[PastRow]], ResultT],
+    ) -> AsyncIterator[ResultT]:
+        """Every reading and failed try of a period, at the pace of whoever takes them.
+
+        They come in lots, each through `write`, which may be called in another process. None: all
+        tags, all sensors.
+        """
 
 
 def ailment(source: TwinSource) -> str | None:

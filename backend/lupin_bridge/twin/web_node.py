@@ -1,4 +1,4 @@
-"""The ROS side of `lupin-twin web`: a consumer of a twin elsewhere, over its two ROS contracts."""
+"""The ROS side of `lupin-twin web`: a consumer of a twin elsewhere, over its ROS contracts."""
 
 from __future__ import annotations
 
@@ -6,32 +6,62 @@ import math
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from enum import Enum
 from hashlib import blake2b
 from operator import is_
 from typing import Any, Final
 
-from lupin_msgs.srv import GetField
+from lupin_msgs.srv import (
+    GetEstimate,
+    GetEstimateReport,
+    GetField,
+    GetHistory,
+    GetStateAt,
+    GetWrites,
+)
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 
 from lupin_bridge.twin.pairing import Pairing
 from lupin_twin import convert, diagnostics, ingest, shapes
 from lupin_twin.clock_watch import StampWatch
 from lupin_twin.counts import Counts
 from lupin_twin.diagnostic_messages import findings_of
-from lupin_twin.diagnostics import SelfReport, self_report
+from lupin_twin.diagnostics import Origin, SelfReport, self_report
 from lupin_twin.drops import Drop, Reason
+from lupin_twin.estimate_report import REPORT_SERVICE
+from lupin_twin.estimates import ESTIMATE_SERVICE
 from lupin_twin.explored import OccupancyMap
-from lupin_twin.fields import FieldRequest
+from lupin_twin.field_rules import field_rules
 from lupin_twin.habits import Habits
 from lupin_twin.history import History, TagHistory
-from lupin_twin.node import field_rules
-from lupin_twin.ros_parameters import declare, naming, naming_own_parameters
+from lupin_twin.journal.condition import Condition
+from lupin_twin.parameters import TwinParameters
+from lupin_twin.past import HISTORY_SERVICE, STATE_AT_SERVICE
+from lupin_twin.past_writes import WRITES_SERVICE
+from lupin_twin.ros_parameters import (
+    AdjustableNode,
+    declare,
+    naming,
+    naming_own_parameters,
+)
 from lupin_twin.state import Snapshot, TagState
 from lupin_twin.twin_count import TwinCount
 
 NODE_NAME: Final = "lupin_web"
+
+
+class Service(Enum):
+    """What a twin is asked for."""
+
+    FIELD = GetField
+    STATE_AT = GetStateAt
+    HISTORY = GetHistory
+    WRITES = GetWrites
+    ESTIMATE = GetEstimate
+    REPORT = GetEstimateReport
+
+
 # DDS finds a twin's publisher and its service each on its own, one at times a little later.
 NEW_TWIN_S: Final = 2.0
 
@@ -48,6 +78,8 @@ SHARED_PARAMETERS: Final = (
     "state_topic",
     "times_topic",
     "field_service_name",
+    "observations_topic",
+    "discovered_tags_topic",
     "map_topic",
     "frame_id",
     "buffer_len",
@@ -79,8 +111,8 @@ def _digest_of_publishers(publishers: Iterable[Any]) -> str:
     return blake2b(b"".join(ids), digest_size=6).hexdigest()
 
 
-class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
-    """Follows `/twin/state` with its `/twin/times`, and `/map`, and asks `/twin/get_field`.
+class WebNode(AdjustableNode):
+    """Follows `/twin/state` with its `/twin/times`, and `/map`, and asks the twin's services.
 
     Of `/diagnostics`, which all nodes of a domain share, it takes what the node says of itself that
     publishes this state, and nothing else.
@@ -107,12 +139,14 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.report = self.habits.report
         self.parameters = declare(self, SHARED_PARAMETERS)
         self.rules = field_rules(self.parameters)
+        self.adjust_by(self._adjust)
         self.twins = TwinCount()
         self.occupancy_map: OccupancyMap | None = None
         self.digest = ""
         self.publishers_digest = ""
         # Counts the changes heard of that a field may depend on.
         self.epoch = 0
+        self._changes = 0
         self._publishers_since_s = -math.inf
         self._on_state = on_state
         self._on_map = on_map
@@ -152,10 +186,17 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
             is_wanted=lambda data: any(name.encode() in data for name in self._twin_names),
         )
         with naming("field_service_name", p.field_service_name):
-            self.field_client = self.create_client(
-                GetField, p.field_service_name, callback_group=group
-            )
-
+            self.clients_of_twin = {
+                service: self.create_client(service.value, name, callback_group=group)
+                for service, name in (
+                    (Service.FIELD, p.field_service_name),
+                    (Service.STATE_AT, STATE_AT_SERVICE),
+                    (Service.HISTORY, HISTORY_SERVICE),
+                    (Service.WRITES, WRITES_SERVICE),
+                    (Service.ESTIMATE, ESTIMATE_SERVICE),
+                    (Service.REPORT, REPORT_SERVICE),
+                )
+            }
         self._patience = self.create_timer(
             TIMES_PATIENCE_S,
             self.habits.guarded("the wait for times", self._show_without_times),
@@ -176,10 +217,11 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         """Digests of who publishes the state, of poses and readings, and of the map.
 
         The twin's count is not on the wire, nor are its parameters: but one that was started with
-        others is another publisher.
+        others is another publisher. Of this node's own they are part, once they are changed.
         """
         map_revision = 0 if self.occupancy_map is None else self.occupancy_map.revision
-        return f"{self.publishers_digest}-{self.digest}-{map_revision:x}"
+        known = f"{self.publishers_digest}-{self.digest}-{map_revision:x}"
+        return f"{known}-{self._changes}" if self._changes else known
 
     @property
     def has_new_twin(self) -> bool:
@@ -191,13 +233,31 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
         """What the twin says that it dropped, lost and met; None: it says nothing."""
         return self._self_report(time.monotonic()).counts
 
-    def request_field(self, request: FieldRequest) -> Any:
-        """Ask the twin; returns the rclpy Future of its response."""
-        return self.field_client.call_async(convert.field_request_message(request))
+    @property
+    def journal(self) -> Condition:
+        """What the twin says of its journal."""
+        return self._self_report(time.monotonic()).journal
 
-    def forget_request(self, future: Any) -> None:
+    @property
+    def origin(self) -> Origin:
+        """Where the twin says that its observations come from."""
+        return self._self_report(time.monotonic()).origin
+
+    def offers(self, service: Service) -> bool:
+        """Whether a twin offers it now."""
+        return bool(self.clients_of_twin[service].service_is_ready())
+
+    def name_of(self, service: Service) -> str:
+        """What it is called, from the root on and after remapping."""
+        return str(self.clients_of_twin[service].service_name)
+
+    def ask(self, service: Service, request: Any) -> Any:
+        """Ask the twin; returns the rclpy Future of its response."""
+        return self.clients_of_twin[service].call_async(request)
+
+    def forget(self, service: Service, future: Any) -> None:
         """Drop a request that nobody waits for any more, or it would be kept for ever."""
-        self.field_client.remove_pending_request(future)
+        self.clients_of_twin[service].remove_pending_request(future)
 
     def history_of(self, tag_id: str) -> TagHistory | None:
         """The last scans and tries of a tag that were seen from here; None: no such tag."""
@@ -294,6 +354,13 @@ class WebNode(Node):  # type: ignore[misc]  # rclpy is not typed
             if said:
                 self._reporter, self._report = name, self_report(said)
                 self._reported_s = time.monotonic()
+
+    def _adjust(self, now: TwinParameters) -> None:
+        # A twin's own are not on the wire: they are set here as there.
+        self.rules = field_rules(now)
+        self._changes += 1
+        self.epoch += 1
+        self._on_map()
 
     # --- small parts --------------------------------------------------------------------------
 

@@ -4,31 +4,45 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections import OrderedDict
-from collections.abc import Callable, Sequence
-from contextlib import AbstractAsyncContextManager, nullcontext
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from hashlib import blake2b
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
+from lupin_bridge.twin.looking import WRITE_ROW_S, Question, look_up
+from lupin_bridge.twin.names import TwinNames
+from lupin_bridge.twin.relay import Relay
+from lupin_bridge.twin.relay_ros import RelayRos, names_of
 from lupin_bridge.twin.ros_thread import RosThread
 from lupin_bridge.twin.shared import Shared
 from lupin_bridge.twin.source import (
     CacheCounts,
     RevisedGrid,
     Told,
-    TwinNames,
     TwinTimeoutError,
     TwinUnavailableError,
 )
-from lupin_bridge.twin.web_node import WebNode
-from lupin_twin import convert
+from lupin_bridge.twin.trust import RevisedEstimate, Trust, revised
+from lupin_bridge.twin.web_node import Service, WebNode
+from lupin_bridge.twin.web_past import WebPast
+from lupin_bridge.twin.web_rows import rows
+from lupin_twin import convert_estimate, convert_field
+from lupin_twin.convert_past import TAG_S, NotAnAnswerError
+from lupin_twin.estimate_report import ADVICE_S, Report, ReportRequest
+from lupin_twin.estimates import EstimateRequest
+from lupin_twin.estimates import cost_s as estimate_cost_s
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRefused, FieldRequest, FieldRules, cost_s
 from lupin_twin.history import TagHistory
-from lupin_twin.journal.condition import OFF, Condition
-from lupin_twin.state import Snapshot
+from lupin_twin.journal.condition import UNKNOWN, Condition
+from lupin_twin.past import NotRemembered, PastRow, SeriesPast, SeriesRequest
+from lupin_twin.past_writes import PastWrites, WritesRequest
+from lupin_twin.refusals import lasts, may_pass
+from lupin_twin.state import NANOSECONDS_PER_SECOND, Snapshot
 from lupin_twin.workers import SMALL_S, Workers
+
+ResultT = TypeVar("ResultT")
 
 # Requests on their way to the twin at once. It answers one after the other anyway; more would
 # only wait in DDS, where they cannot be taken back.
@@ -36,13 +50,9 @@ MAX_REQUESTS = 4
 
 SERVICE_LOOK_S = 0.02
 
-# How long an answer stands for the twin's field while nothing is heard of a change. There are some
-# that no state tells: a map that reached the twin later than this process.
-TRUST_S: Final = 5.0
-# A page asks for a few fields; so many may be told without asking the twin.
-MAX_TRUSTED: Final = 256
 # What reading a cell of an answer takes, roughly and at worst.
 _READ_CELL_S: Final = 10e-9
+_READ_TAG_S: Final = 20e-6
 
 
 class WebTwin:
@@ -53,12 +63,22 @@ class WebTwin:
         self._timeout_s = timeout_s
         self._thread: RosThread[WebNode, _Heard]
         self._heard = _Heard()
-        # The same for as long as the node lives.
         self._rules: FieldRules
+        # The same for as long as the node lives.
         self._names: TwinNames
         self.workers = Workers("work")
+        self.relay = Relay(lambda: self._thread, RelayRos())
         self._asking: Shared[RevisedGrid] = Shared()
-        self._trusted: OrderedDict[FieldRequest, _Trusted] = OrderedDict()
+        self._past = WebPast(
+            lambda request: self._ask(Service.STATE_AT, request, self._tags * TAG_S),
+            lambda request: self._ask(Service.HISTORY, request, 0.0),
+            lambda request: self._ask(Service.WRITES, request, 0.0),
+            self.workers,
+            now_ns=self._now_ns,
+            tags=lambda: self._tags,
+        )
+        self._estimating: Shared[RevisedEstimate] = Shared()
+        self._trust = Trust()
         self._slots = asyncio.Semaphore(MAX_REQUESTS)
         # One way is left to the small, which would wait behind the large otherwise.
         self._large_slots = asyncio.Semaphore(MAX_REQUESTS - 1)
@@ -78,17 +98,21 @@ class WebTwin:
                     node.occupancy_map,
                     node.twin_counts,
                     node.habits.counts(),
+                    journal=node.journal,
+                    origin=node.origin,
                 )
                 post_all()
 
             def post_all() -> None:
-                post(_Heard(told, node.epoch, node.revision, node.occupancy_map))
+                post(_Heard(told, node.epoch, node.revision, node.occupancy_map, node.rules))
 
             node = WebNode(pass_on, post_all, context=context)
             return node
 
         def on_heard(heard: _Heard) -> None:
             before, self._heard = self._heard.told, heard
+            if heard.rules is not None:
+                self._rules = heard.rules
             # A map alone is no sign of life of the twin.
             if heard.told is not None and heard.told is not before:
                 on_state(heard.told)
@@ -100,10 +124,7 @@ class WebTwin:
         self._rules, self._names = await self._thread.call(
             lambda node: (
                 node.rules,
-                TwinNames(
-                    node.resolve_topic_name(node.parameters.state_topic),
-                    node.resolve_service_name(node.parameters.field_service_name),
-                ),
+                names_of(node),
             )
         )
 
@@ -146,12 +167,13 @@ class WebTwin:
         return self._rules
 
     def names(self) -> TwinNames:
-        """The parameters `state_topic` and `field_service_name` as ROS resolves them."""
+        """The twin's, as ROS resolves and remaps them."""
         return self._names
 
     def journal(self) -> Condition:
-        """Off: the journal is the twin's, elsewhere."""
-        return OFF
+        """The twin's, elsewhere: what it says of it on `/diagnostics`."""
+        told = self._heard.told
+        return UNKNOWN if told is None else told.journal
 
     def cache_counts(self) -> CacheCounts:
         """Nothing: the cache is the twin's."""
@@ -165,20 +187,41 @@ class WebTwin:
         """The last scans and tries of a tag, as far as they were seen from here."""
         return await self._thread.call(lambda node: node.history_of(tag_id))
 
+    async def ask(self, question: Question[ResultT], cost_s: float) -> ResultT:  # noqa: ARG002  # the twin's
+        """Answered here, of the answers of the twin's services; the same are asked once."""
+        return await look_up(question, self._past, self.workers)
+
+    async def series(self, request: SeriesRequest) -> SeriesPast:
+        """The answer of the twin's `get_history`; identical questions in flight are asked once."""
+        return await self._past.series(request)
+
+    async def writes(self, request: WritesRequest) -> PastWrites:
+        """The answer of the twin's `get_writes`."""
+        return await self._past.writes(request)
+
+    async def rows(
+        self,
+        start_ns: int,
+        end_ns: int,
+        tag_id: str | None,
+        sensor_type: str | None,
+        write: Callable[[Sequence[PastRow]], ResultT],
+    ) -> AsyncIterator[ResultT]:
+        """Put together of many answers, see `web_rows`."""
+        async for lot in rows(self._past, start_ns, end_ns, tag_id, sensor_type):
+            cost_s = len(lot) * WRITE_ROW_S
+            yield await asyncio.wrap_future(
+                self.workers.submit(lambda _, lot=lot: write(lot), cost_s)  # type: ignore[misc]
+            )
+
     def field_revision(self, request: FieldRequest) -> str | None:
         """That of the last answer, as long as nothing was heard that could have changed it.
 
         An answer may hold what no state has told yet, so it is known by its content. It is at least
         as new as the state at which it was asked for, and stands for the field until the next
-        change, or for `TRUST_S`.
+        change, or for `trust.TRUST_S`.
         """
-        trusted = self._trusted.get(request)
-        if trusted is None:
-            return None
-        if trusted.epoch != self._heard.epoch or time.monotonic() > trusted.until_s:
-            del self._trusted[request]
-            return None
-        return trusted.revision
+        return self._trust.revision(request, self._heard.epoch)
 
     async def field(self, request: FieldRequest) -> RevisedGrid:
         """The field from the twin's service; identical requests in flight are asked once.
@@ -189,76 +232,141 @@ class WebTwin:
         epoch = self._heard.epoch
         return await self._asking.get((epoch, request), lambda: self._ask_once(epoch, request))
 
-    def _trust(self, request: FieldRequest, epoch: int, revision: str) -> None:
-        if epoch != self._heard.epoch:
-            return  # it was asked for before a change, and nobody knows how long before
-        self._trusted[request] = _Trusted(epoch, revision, time.monotonic() + TRUST_S)
-        self._trusted.move_to_end(request)
-        if len(self._trusted) > MAX_TRUSTED:
-            self._trusted.popitem(last=False)
+    def estimate_revision(self, request: EstimateRequest) -> str | None:
+        """As a field's: that of the last answer."""
+        return self._trust.revision(request, self._heard.epoch)
 
-    def _lane(self, request: FieldRequest) -> AbstractAsyncContextManager[Any]:
+    async def estimate(self, request: EstimateRequest) -> RevisedEstimate:
+        """The estimate from the twin's service; identical requests in flight are asked once."""
+        epoch = self._heard.epoch
+        return await self._estimating.get(
+            (epoch, request), lambda: self._ask_estimate(epoch, request)
+        )
+
+    async def estimate_report(self, request: ReportRequest) -> Report:
+        """What the twin's service says."""
+        response = await self._ask(
+            Service.REPORT, convert_estimate.report_request_message(request), ADVICE_S
+        )
+        _check_ok(response)
+        cost_s = len(response.tag_ids) * _READ_TAG_S
+        return await self._read(lambda: convert_estimate.report_of(response), cost_s)
+
+    @property
+    def _tags(self) -> int:
         told = self._heard.told
-        tags = 0 if told is None else len(told.snapshot.tags)
-        is_large = cost_s(request, tags, self._rules) > SMALL_S
-        return self._large_slots if is_large else nullcontext()
+        return 0 if told is None else len(told.snapshot.tags)
 
-    async def _find_service(self) -> None:
-        while not await self._thread.call(lambda node: node.field_client.service_is_ready()):
+    def _now_ns(self) -> int:
+        told = self._heard.told
+        if told is None:
+            raise TwinUnavailableError(f"nothing was heard yet on {self._names.state_topic}")
+        snapshot = told.snapshot
+        if snapshot.clock != "running":
+            return snapshot.stamp_ns
+        since_s = time.monotonic() - told.made_s
+        return snapshot.stamp_ns + int(since_s * NANOSECONDS_PER_SECOND)
+
+    async def _find(self, service: Service) -> None:
+        while not await self._thread.call(lambda node: node.offers(service)):
             if not await self._thread.call(lambda node: node.has_new_twin):
-                raise TwinUnavailableError(
-                    f"no twin offers {self._names.field_service}: is it running?"
+                name, has_twin = await self._thread.call(
+                    lambda node: (node.name_of(service), node.offers(Service.FIELD))
                 )
+                what = "is it an older one?" if has_twin else "is it running?"
+                raise TwinUnavailableError(f"no twin offers {name}: {what}")
             await asyncio.sleep(SERVICE_LOOK_S)
 
-    async def _ask_once(self, epoch: int, request: FieldRequest) -> RevisedGrid:
+    async def _ask(self, service: Service, request: Any, cost_s: float) -> Any:
+        """The twin's response; `cost_s` estimates what it takes there, s of one core.
+
+        Raises:
+            TwinUnavailableError: nobody there to answer, or not in time.
+
+        """
+        lane = self._large_slots if cost_s > SMALL_S else nullcontext()
         try:
-            async with asyncio.timeout(self._timeout_s), self._lane(request), self._slots:
-                await self._find_service()
-                response = await self._thread.ask(
-                    lambda node: node.request_field(request),
-                    lambda node, future: node.forget_request(future),
+            async with asyncio.timeout(self._timeout_s), lane, self._slots:
+                await self._find(service)
+                return await self._thread.ask(
+                    lambda node: node.ask(service, request),
+                    lambda node, future: node.forget(service, future),
                 )
         except TimeoutError:
             raise TwinTimeoutError(
                 f"the twin did not answer within {self._timeout_s:g} s (field_timeout_s)"
             ) from None
-        if not response.ok:
-            raise FieldRefused(response.error_message)
+
+    async def _ask_once(self, epoch: int, request: FieldRequest) -> RevisedGrid:
+        response = await self._ask(
+            Service.FIELD,
+            convert_field.request_message(request),
+            cost_s(request, self._tags, self._rules),
+        )
+        _check_ok(response)
         result = await asyncio.wrap_future(
             self.workers.submit(
                 lambda _: _revised(response), response.width * response.height * _READ_CELL_S
             )
         )
-        self._trust(request, epoch, result.revision)
+        self._stands(request, epoch, result.revision)
         return result
+
+    async def _ask_estimate(self, epoch: int, request: EstimateRequest) -> RevisedEstimate:
+        response = await self._ask(
+            Service.ESTIMATE,
+            convert_estimate.request_message(request),
+            estimate_cost_s(request, self._tags, self._rules.max_grid_cells),
+        )
+        _check_ok(response)
+        result = await self._read(
+            lambda: revised(convert_estimate.estimate_of(response)),
+            2 * response.width * response.height * _READ_CELL_S,
+        )
+        self._stands(request, epoch, result.revision)
+        return result
+
+    async def _read(self, read: Callable[[], ResultT], cost_s: float) -> ResultT:
+        try:
+            return await asyncio.wrap_future(self.workers.submit(lambda _: read(), cost_s))
+        except NotAnAnswerError as error:
+            raise TwinUnavailableError(f"the twin's answer cannot be used: {error}") from error
+
+    def _stands(self, request: FieldRequest | EstimateRequest, epoch: int, revision: str) -> None:
+        # Else it was asked for before a change, and nobody knows how long before.
+        if epoch == self._heard.epoch:
+            self._trust.put(request, epoch, revision)
 
 
 @dataclass(frozen=True, slots=True)
 class _Heard:
     """All that crosses to the loop: the newest state as it was told, and what stands now.
 
-    `epoch`, `revision` and the map are newer than `told` where a map has come since.
+    `epoch`, `revision`, the map and the rules are newer than `told` where a map has come since.
     """
 
     told: Told | None = None
     epoch: int = 0
     revision: str = ""
     occupancy_map: OccupancyMap | None = None
+    rules: FieldRules | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class _Trusted:
-    """The revision of an answer that was asked for in `epoch`, and until when it stands, s."""
-
-    epoch: int
-    revision: str
-    until_s: float
+def _check_ok(response: Any) -> None:
+    """Raise what a service's refusal says."""
+    if response.ok:
+        return
+    if may_pass(response.error_message):
+        raise TwinUnavailableError(response.error_message)
+    why = lasts(response.error_message)
+    if why is not None:
+        raise NotRemembered(why, is_lasting=True)
+    raise FieldRefused(response.error_message)
 
 
 def _revised(response: Any) -> RevisedGrid:
     """The grid of an answer, and a digest of it: the same in all replicas."""
-    grid = convert.grid_of(response)
+    grid = convert_field.grid_of(response)
     values = grid.values
     about = (grid.width, grid.height, grid.origin_x, grid.origin_y, grid.resolution)
     digest = blake2b(repr((about, grid.sample_count)).encode(), digest_size=12)

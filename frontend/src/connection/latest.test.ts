@@ -1,6 +1,7 @@
 import { describe, expect, test } from 'vitest';
 
 import type { DeltaFrame } from '../contract/types';
+import { NOBODY } from '../testing/health';
 import { stateFrame, wireTag } from '../testing/tags';
 import { latestAfter } from './latest';
 
@@ -25,6 +26,7 @@ const delta = (over: Partial<DeltaFrame> = {}): DeltaFrame => ({
   header: { stamp: { sec: 1002, nanosec: 500_000_000 }, frame_id: 'map' },
   changed: [],
   removed: [],
+  health: NOBODY,
   ...over,
 });
 
@@ -62,4 +64,18 @@ describe('the newest state', () => {
     expect(latestAfter(full, delta({ base: 6 }))).toBeNull();
     expect(latestAfter(null, delta())).toBeNull();
   });
+});
+
+test('the health of who has changed is another, and of who is gone none', () => {
+  const critical = { verdict: 'critical', reasons: [] } as const;
+  const healthy = { verdict: 'healthy', reasons: [] } as const;
+  const known = { ...full, health: { ...NOBODY, tags: { a: healthy, b: critical } } };
+  const same = latestAfter(known, delta());
+  expect(same?.health.tags).toBe(known.health.tags);
+  const house = { ...NOBODY.house, verdict: 'critical' } as const;
+  const then = latestAfter(
+    known,
+    delta({ removed: ['b'], health: { house, tags: { a: critical } } }),
+  );
+  expect(then?.health).toEqual({ house, tags: { a: critical } });
 });

@@ -23,7 +23,18 @@ export function latestAfter(latest: Latest | null, frame: StateFrame | DeltaFram
     seq: frame.seq,
     revision: frame.revision,
     state: { header: frame.header, tags: [...tags, ...changed.values()] },
+    health: { house: frame.health.house, tags: healthsAfter(latest, frame) },
   };
+}
+
+/** The very same where nobody's health is another. */
+function healthsAfter({ health }: Latest, frame: DeltaFrame): Latest['health']['tags'] {
+  const isSame = frame.removed.length === 0 && Object.keys(frame.health.tags).length === 0;
+  if (isSame) return health.tags;
+  const tags = new Map(Object.entries(health.tags));
+  for (const tagId of frame.removed) tags.delete(tagId);
+  for (const [tagId, now] of Object.entries(frame.health.tags)) tags.set(tagId, now);
+  return Object.fromEntries(tags);
 }
 
 /** An unchanged tag at a later moment; everything but its age is the very same. */

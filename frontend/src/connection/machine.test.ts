@@ -21,7 +21,10 @@ const status = (twin: StatusFrame['twin']): StatusFrame => ({
   message: '',
   state_age_seconds: 0,
   has_map: true,
+  origin: 'robot',
   drops: [],
+  journal: { state: 'recording', detail: '', set_aside: '', simulated: null },
+  outward: [],
 });
 
 /** Runs events one after another. */
@@ -50,6 +53,17 @@ const closed = (now: number, code: number | null = 1006): ConnectionEvent => ({
 });
 
 describe('phases', () => {
+  test('alarms are a sign of life, and no state', () => {
+    const waiting = run(...started.slice(0, 3), { type: 'heard', now: 30 }).connection;
+    expect(phaseOf(waiting, 30)).toBe('connecting');
+    const heard = step(live, { type: 'heard', now: 25 + SILENCE_MS - 1 }).connection;
+    expect(phaseOf(heard, 25 + SILENCE_MS)).toBe('live');
+    expect(phaseOf(live, 25 + SILENCE_MS)).toBe('stale');
+    // It has waited for a page that stood still, as any other frame.
+    expect(step(live, { type: 'heard', now: 25 + DEAD_MS }).command).toBe('reopen');
+    expect(step(INITIAL, { type: 'heard', now: 1 }).connection).toBe(INITIAL);
+  });
+
   test('connecting until the first frame, then live', () => {
     expect(phaseOf(INITIAL, 0)).toBe('connecting');
     expect(phaseOf(run(...started.slice(0, 1)).connection, 10)).toBe('connecting');

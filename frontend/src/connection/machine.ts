@@ -45,6 +45,8 @@ export type ConnectionEvent =
   | { readonly type: 'opened'; readonly now: number }
   /** A status frame brings its status, a state frame none. */
   | { readonly type: 'frame'; readonly now: number; readonly status: StatusFrame | null }
+  /** What came is neither: a sign of life alone. */
+  | { readonly type: 'heard'; readonly now: number }
   | {
       readonly type: 'closed';
       readonly now: number;
@@ -104,6 +106,10 @@ export function step(connection: Connection, event: ConnectionEvent): Step {
           hasState: socket.hasState || event.status === null,
         },
       });
+    case 'heard':
+      if (socket.kind !== 'open') return stay(connection);
+      if (silence(socket, now) >= DEAD_MS) return open(connection, now);
+      return stay({ ...connection, socket: { ...socket, lastFrameAt: now } });
     case 'closed':
       if (socket.kind === 'closed') return stay(connection);
       return { connection: fail(connection, now, event.code, event.random), command: null };

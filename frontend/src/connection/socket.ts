@@ -85,7 +85,8 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
         return;
       }
       const { frame } = parsed;
-      send({ type: 'frame', now: at, status: frame.type === 'status' ? frame : null });
+      if (frame.type === 'alarms') send({ type: 'heard', now: at });
+      else send({ type: 'frame', now: at, status: frame.type === 'status' ? frame : null });
       if (look() === null) return;
       handlers.onFrame(frame, connection);
     };

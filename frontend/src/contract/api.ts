@@ -1,17 +1,20 @@
 /** The bridge's routes. Addresses are relative to the page, so any path prefix works. */
-import { HISTORY, MAP, QUALITY, SESSION } from './bodies';
+import { HISTORY, MAP, QUALITY, SENSORS, SESSION } from './bodies';
 import type { Check } from './check';
 import { parseNpy } from './npy';
-import type { Field, FieldQuality, OccupancyGrid, TagHistory } from './types';
+import type { Field, FieldQuality, OccupancyGrid, SensorsFile, TagHistory } from './types';
 
 /** A refusal by the server, with its reason. */
 export class Refusal extends Error {
   readonly status: number;
+  /** How long the server wants to be left alone, seconds; null: it does not say. */
+  readonly retryAfterS: number | null;
 
-  constructor(status: number, message: string) {
+  constructor(status: number, message: string, retryAfterS: number | null = null) {
     super(message);
     this.name = 'Refusal';
     this.status = status;
+    this.retryAfterS = retryAfterS;
   }
 }
 
@@ -26,19 +29,28 @@ export function stateSocketUrl(): string {
   return url.href;
 }
 
-async function get(path: string, signal: AbortSignal, headers?: HeadersInit): Promise<Response> {
+/** An answer of the bridge; a refusal is thrown with its reason. */
+export async function get(
+  path: string,
+  signal: AbortSignal,
+  headers?: HeadersInit,
+): Promise<Response> {
   // "no-cache": the browser asks with its ETag each time, and a 304 costs no body.
   const response = await fetch(route(path), {
     signal,
     cache: 'no-cache',
     ...(headers ? { headers } : {}),
   });
-  if (!response.ok) throw new Refusal(response.status, await reasonOf(response));
+  if (!response.ok) {
+    const wait = Number(response.headers.get('Retry-After') ?? NaN);
+    const reason = await reasonOf(response);
+    throw new Refusal(response.status, reason, Number.isFinite(wait) ? wait : null);
+  }
   return response;
 }
 
 /** A body that has been checked: `T` is what the check makes of it. */
-async function read<T>(name: string, check: Check, response: Response): Promise<T> {
+export async function read<T>(name: string, check: Check, response: Response): Promise<T> {
   const body: unknown = await response.json();
   const fault = check(body);
   if (fault !== null) throw new Error(name + fault);
@@ -57,21 +69,52 @@ async function reasonOf(response: Response): Promise<string> {
   return `${response.status} ${response.statusText}`.trim();
 }
 
-export async function fetchField(
-  query: { readonly sensor: string; readonly resolution: number },
-  signal: AbortSignal,
-): Promise<Field> {
+const BOX_NAMES = {
+  minX: 'bbox_min_x',
+  minY: 'bbox_min_y',
+  maxX: 'bbox_max_x',
+  maxY: 'bbox_max_y',
+} as const;
+
+/** A box in the map frame, metres. */
+type Box = Readonly<Record<keyof typeof BOX_NAMES, number>>;
+
+export interface FieldQuery {
+  readonly sensor: string;
+  readonly resolution: number;
+  /** ROS seconds; none: now. */
+  readonly at?: number;
+  /** Metres; none: around all tags. */
+  readonly box?: Box;
+}
+
+export function fieldParameters(query: FieldQuery): string {
   const parts = new URLSearchParams({
     sensor_type: query.sensor,
     resolution: String(query.resolution),
   });
-  const response = await get(`api/field.npy?${parts.toString()}`, signal);
-  const grid = parseNpy(await response.arrayBuffer());
-  const header = (name: string): number => {
-    const value = Number(response.headers.get(name) ?? NaN);
+  if (query.at !== undefined) parts.set('at', query.at.toFixed(3));
+  if (query.box) {
+    for (const [edge, name] of Object.entries(BOX_NAMES) as [keyof Box, string][]) {
+      parts.set(name, String(query.box[edge]));
+    }
+  }
+  return parts.toString();
+}
+
+/** Reads numbers out of an answer's headers. */
+export const numberIn =
+  ({ headers }: Response) =>
+  (name: string): number => {
+    const value = Number(headers.get(name) ?? NaN);
     if (!Number.isFinite(value)) throw new Error(`field: header ${name} is missing or no number`);
     return value;
   };
+
+export async function fetchField(query: FieldQuery, signal: AbortSignal): Promise<Field> {
+  const response = await get(`api/field.npy?${fieldParameters(query)}`, signal);
+  const grid = parseNpy(await response.arrayBuffer());
+  const header = numberIn(response);
   return {
     sensor: query.sensor,
     width: grid.width,
@@ -86,8 +129,14 @@ export async function fetchField(
   };
 }
 
-export async function fetchQuality(sensor: string, signal: AbortSignal): Promise<FieldQuality> {
+/** `at`: ROS seconds; none: now. */
+export async function fetchQuality(
+  sensor: string,
+  signal: AbortSignal,
+  at?: number,
+): Promise<FieldQuality> {
   const parts = new URLSearchParams({ sensor_type: sensor });
+  if (at !== undefined) parts.set('at', at.toFixed(3));
   const response = await get(`api/field/quality?${parts.toString()}`, signal);
   return read<FieldQuality>('quality', QUALITY, response);
 }
@@ -100,6 +149,12 @@ export async function fetchMap(signal: AbortSignal): Promise<OccupancyGrid> {
 export async function fetchMapPicture(signal: AbortSignal): Promise<Blob> {
   const response = await get('api/map.png', signal);
   return response.blob();
+}
+
+/** The file of sensors that is in force. */
+export async function fetchSensors(signal: AbortSignal): Promise<SensorsFile> {
+  const response = await get('api/sensors', signal);
+  return read<SensorsFile>('sensors', SENSORS, response);
 }
 
 export async function fetchHistory(tagId: string, signal: AbortSignal): Promise<TagHistory> {

@@ -1,5 +1,17 @@
 /** What the routes answer, as far as the page reads it; nothing behind these checks again. */
-import { boolean, count, list, number, numberOrNull, object, orNull } from './check';
+import {
+  also,
+  boolean,
+  count,
+  list,
+  number,
+  numberOrNull,
+  object,
+  optional,
+  orNull,
+  record,
+  type Check,
+} from './check';
 import { MAX_SENSORS, POSE, TEXT, TIME } from './shapes';
 
 /** More scans than any twin keeps of one tag in memory. */
@@ -31,4 +43,29 @@ export const HISTORY = object({
     }),
     MAX_SENSORS,
   ),
+});
+
+/** Low and high, or null where nothing is out of it. */
+const SPAN: Check = orNull(
+  also(list(number, 2), (value) =>
+    (value as readonly number[]).length === 2 ? null : ': is no pair of low and high',
+  ),
+);
+const BOUNDS = { ideal: SPAN, critical: optional(SPAN) };
+const RANGES = { ...BOUNDS, night: optional(object(BOUNDS)) };
+const SENSOR = object({
+  ...RANGES,
+  label: TEXT,
+  labels: optional(record(TEXT, MAX_SENSORS)),
+  unit: TEXT,
+  hue: number,
+  lightness: number,
+  derived: optional(boolean),
+  species: optional(record(object(RANGES), MAX_SENSORS)),
+});
+
+export const SENSORS = object({
+  ramp: object({ saturation: number, max_alpha: number }),
+  fallback: SENSOR,
+  sensors: record(SENSOR, MAX_SENSORS),
 });

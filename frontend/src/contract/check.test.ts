@@ -10,6 +10,7 @@ import {
   numberOrNull,
   object,
   oneOf,
+  optional,
   orNull,
   text,
 } from './check';
@@ -29,6 +30,7 @@ describe('what passes, and what is said of the rest', () => {
     [text(3), '', ['a'], ': text, not a list of 1'],
     [oneOf('a', 'b'), 'b', 'c', ': one of a, b, not "c"'],
     [orNull(text(3)), null, 7, ': text, not 7'],
+    [optional(text(3)), undefined, null, ': text, not null'],
     [list(number, 2), [1, 2], [1, 2, 3], ': 3 entries, the limit is 2'],
     [list(number, 2), [], { length: 0 }, ': a list, not an object'],
     [list(number, 2), [1], [1, null], '[1]: a number, not null'],

@@ -54,6 +54,12 @@ export const oneOf =
       ? null
       : wrong(`one of ${allowed.join(', ')}`, value);
 
+/** What may be missing. */
+export const optional =
+  (check: Check): Check =>
+  (value) =>
+    value === undefined ? null : check(value);
+
 export const orNull =
   (check: Check): Check =>
   (value) =>
@@ -84,6 +90,21 @@ export const list =
     for (let index = 0; index < items.length; index++) {
       const fault = check(items[index]);
       if (fault !== null) return `[${index}]${fault}`;
+    }
+    return null;
+  };
+
+/** An object of any names, at most so many. */
+export const record =
+  (check: Check, most: number): Check =>
+  (value) => {
+    const fault = object({})(value);
+    if (fault !== null) return fault;
+    const entries = Object.entries(value as object) as [string, unknown][];
+    if (entries.length > most) return `: ${entries.length} entries, the limit is ${most}`;
+    for (const [name, item] of entries) {
+      const why = check(item);
+      if (why !== null) return `[${JSON.stringify(name).slice(0, SHOWN)}]${why}`;
     }
     return null;
   };

@@ -1,7 +1,9 @@
 import { describe, expect, test } from 'vitest';
 
+import { alarm } from '../testing/alarms';
+import { NOBODY } from '../testing/health';
 import { readings, stateFrame, wireTag } from '../testing/tags';
-import { MAX_FRAME_CHARS, MAX_TAGS, parseFrame } from './frames';
+import { MAX_ALARMS, MAX_FRAME_CHARS, MAX_TAGS, parseFrame } from './frames';
 import { MAX_SENSORS } from './shapes';
 import type { Frame } from './types';
 
@@ -12,10 +14,36 @@ const status = {
   message: '',
   state_age_seconds: 4,
   has_map: false,
+  origin: 'robot',
   drops: [{ reason: 'frame', message: 'dropped a message', count: 3 }],
+  journal: {
+    state: 'failing',
+    detail: 'no room',
+    set_aside: '',
+    simulated: { start: { sec: 1, nanosec: 0 }, end: { sec: 2, nanosec: 0 } },
+  },
+  outward: [{ channel: 'mqtt', is_failing: true, detail: 'refused' }],
 };
 const header = { stamp: { sec: 1, nanosec: 0 }, frame_id: 'map' };
-const delta = { type: 'delta', seq: 2, base: 1, revision: 'r', header, changed: [], removed: [] };
+const reason = {
+  kind: 'range',
+  verdict: 'critical',
+  sensor: 'temperature',
+  value: 6.6,
+  limit: 10,
+  since: { sec: 1, nanosec: 0 },
+};
+const health = { ...NOBODY, tags: { a: { verdict: 'critical', reasons: [reason] } } } as const;
+const delta = {
+  type: 'delta',
+  seq: 2,
+  base: 1,
+  revision: 'r',
+  header,
+  changed: [],
+  removed: [],
+  health,
+};
 const bloom = {
   position: { x: 1, y: null, z: 0 },
   height_m: 0.2,
@@ -23,9 +51,12 @@ const bloom = {
   confidence: null,
   anomaly: false,
 };
-const full = stateFrame([
-  wireTag({ readings: readings({ temperature: 20, co2: null }), flowers: [bloom] }),
-]);
+const full = {
+  ...stateFrame([
+    wireTag({ readings: readings({ temperature: 20, co2: null }), flowers: [bloom] }),
+  ]),
+  health,
+};
 
 const parse = (message: unknown): ReturnType<typeof parseFrame> =>
   parseFrame(JSON.stringify(message));
@@ -69,15 +100,19 @@ const paths = (frame: unknown): string[] => mutations(frame, undefined).map(([pa
 
 describe('each field is checked', () => {
   test.each([
-    ['a truth', true, /\.(anomaly|has_map)$/],
-    ['a list', [], /\.(tags|readings|flowers|points|changed|removed|drops)$/],
-    ['an object', {}, /^$/],
+    ['a truth', true, /\.(anomaly|has_map|is_day|is_failing)$/],
+    [
+      'a list',
+      [],
+      /\.(state\.tags|readings|flowers|points|changed|removed|drops|reasons|outward)$/,
+    ],
+    ['an object', {}, /\.health\.tags$/],
     [
       'a number as text',
       '21.5',
-      /\.(type|revision|frame_id|tag_id|species|name|reason|message|last_try_detail)$/,
+      /\.(type|revision|frame_id|tag_id|species|name|reason|message|last_try_detail|kind|sensor|source|state|detail|set_aside|channel|origin)$/,
     ],
-    ['nothing', undefined, /^$/],
+    ['nothing', undefined, /\.health\.tags\.a$/],
   ])('for %s in its place', (_, wrong, mayPass) => {
     for (const frame of [full, { ...delta, changed: full.state.tags, removed: ['x'] }, status]) {
       for (const [path, broken] of mutations(frame, wrong)) {
@@ -89,7 +124,7 @@ describe('each field is checked', () => {
 
   test('null is no value but where one may be unknown', () => {
     const nullable =
-      /\.(value|observed_at|stale_seconds|species_confidence|confidence|height_m|x|y|z|w|state_age_seconds|looked_at|last_try|last_try_status)$/;
+      /\.(value|observed_at|stale_seconds|species_confidence|confidence|height_m|x|y|z|w|state_age_seconds|looked_at|last_try|last_try_status|limit|since|simulated|interval_s|last_scan)$/;
     expect(paths(full).some((path) => nullable.test(path))).toBe(true);
     for (const frame of [full, status]) {
       for (const [path, broken] of mutations(frame, null)) {
@@ -169,4 +204,40 @@ test('a tag that is there twice is one too many', () => {
   expect(whyBad(JSON.stringify(stateFrame([wireTag(), wireTag()])))).toBe(
     'state.state.tags[1].tag_id: "1" a second time',
   );
+});
+
+describe('alarms', () => {
+  const frame = (over: object = {}): object => ({
+    type: 'alarms',
+    alarms: [alarm('a'), alarm('b', { cleared: 950, worst: 2 })],
+    source: 'journal',
+    since: { sec: 1, nanosec: 0 },
+    ...over,
+  });
+
+  test('are read, of a later server too', () => {
+    expect(parse(frame())).toEqual({ kind: 'frame', frame: frame() });
+    const later = frame({ source: 'archive', since: null, more: 1 });
+    expect(parse(later)).toEqual({ kind: 'frame', frame: later });
+  });
+
+  test.each([
+    [{ alarms: null }, /^alarms\.alarms: a list/],
+    [{ alarms: [{ ...alarm('a'), id: 7 }] }, /^alarms\.alarms\[0\]\.id: text/],
+    [{ alarms: [{ ...alarm('a'), reason: null }] }, /\[0\]\.reason: an object/],
+    [{ alarms: [{ ...alarm('a'), tag_id: null }] }, /\[0\]\.tag_id: text/],
+    [{ alarms: [{ ...alarm('a'), raised_at: null }] }, /\[0\]\.raised_at: an object/],
+    [{ alarms: [{ ...alarm('a'), cleared_at: 7 }] }, /\[0\]\.cleared_at: an object/],
+    [{ alarms: [{ ...alarm('a'), worst: '7' }] }, /\[0\]\.worst: a number or null/],
+    [{ alarms: [alarm('a'), alarm('a')] }, /\[1\]\.id: "a" a second time/],
+    [{ since: 'ever' }, /^alarms\.since: an object/],
+  ])('%j is refused', (over, why) => {
+    expect(whyBad(JSON.stringify(frame(over)))).toMatch(why);
+  });
+
+  test('no more than the limit', () => {
+    const many = Array.from({ length: MAX_ALARMS + 1 }, (_, at) => alarm(String(at)));
+    expect(parse(frame({ alarms: many.slice(1) })).kind).toBe('frame');
+    expect(whyBad(JSON.stringify(frame({ alarms: many })))).toMatch(/the limit is 20000$/);
+  });
 });

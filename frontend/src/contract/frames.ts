@@ -8,15 +8,20 @@ import {
   numberOrNull,
   object,
   oneOf,
+  record,
   type Check,
+  orNull,
 } from './check';
-import { HEADER, MAX_SENSORS, TAG, TEXT } from './shapes';
-import type { Frame, TwinTagState } from './types';
+import { ALARM, HEADER, HOUSE_HEALTH, MAX_SENSORS, TAG, TAG_HEALTH, TEXT, TIME } from './shapes';
+import type { Alarm, Frame, TwinTagState } from './types';
 
 /** Most characters of a frame: the largest house that a twin keeps is a bit smaller. */
 export const MAX_FRAME_CHARS = 128_000_000;
 /** More than a twin keeps; beyond it a page would stand still. */
 export const MAX_TAGS = 50_000;
+
+/** More than a house can have in a day without something else being wrong. */
+export const MAX_ALARMS = 20_000;
 
 /** Why messages may have been dropped; there are a dozen. */
 const MAX_REASONS = 100;
@@ -36,7 +41,21 @@ const apart: Check = (value) => {
   }
   return null;
 };
-const TAGS = also(list(TAG, MAX_TAGS), apart);
+/** All tags of a state. */
+export const TAGS = also(list(TAG, MAX_TAGS), apart);
+
+/** No alarm twice. */
+const ALARMS = also(list(ALARM, MAX_ALARMS), (value) => {
+  const ids = new Set<string>();
+  for (const [index, { id }] of (value as readonly Alarm[]).entries()) {
+    if (ids.has(id)) return `[${index}].id: ${JSON.stringify(id).slice(0, 40)} a second time`;
+    ids.add(id);
+  }
+  return null;
+});
+
+/** What is said of the house and of each tag. */
+export const HEALTH = object({ house: HOUSE_HEALTH, tags: record(TAG_HEALTH, MAX_TAGS) });
 
 const FRAMES: Readonly<Record<Frame['type'], Check>> = {
   status: object({
@@ -46,9 +65,24 @@ const FRAMES: Readonly<Record<Frame['type'], Check>> = {
     message: TEXT,
     state_age_seconds: numberOrNull,
     has_map: boolean,
+    // A word of a later server that is not known here is not told.
+    origin: TEXT,
     drops: list(object({ reason: TEXT, message: TEXT, count }), MAX_REASONS),
+    journal: object({
+      // Nor this: a state that is not known here is not told, and no reason to stop.
+      state: TEXT,
+      detail: TEXT,
+      set_aside: TEXT,
+      simulated: orNull(object({ start: TIME, end: TIME })),
+    }),
+    outward: list(object({ channel: TEXT, is_failing: boolean, detail: TEXT }), MAX_REASONS),
   }),
-  state: object({ seq: number, revision: TEXT, state: object({ header: HEADER, tags: TAGS }) }),
+  state: object({
+    seq: number,
+    revision: TEXT,
+    state: object({ header: HEADER, tags: TAGS }),
+    health: HEALTH,
+  }),
   delta: object({
     seq: number,
     base: number,
@@ -56,6 +90,13 @@ const FRAMES: Readonly<Record<Frame['type'], Check>> = {
     header: HEADER,
     changed: TAGS,
     removed: list(TEXT, MAX_TAGS),
+    health: HEALTH,
+  }),
+  alarms: object({
+    alarms: ALARMS,
+    // Not one of those of today: a later server may have them from elsewhere.
+    source: TEXT,
+    since: orNull(TIME),
   }),
 };
 

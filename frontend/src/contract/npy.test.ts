@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 
-import { parseNpy } from './npy';
+import { npyOf, parseNpy } from './npy';
 
 function npy(header: string, values: readonly number[], version = 1): ArrayBuffer {
   const prefix = version === 1 ? 10 : 12;
@@ -26,11 +26,17 @@ describe('npy', () => {
     expect([...grid.values]).toEqual([1, 2, 3, NaN, 5, 6.5]);
   });
 
+  test('as many dimensions as are asked for', () => {
+    const three = npy(HEADER.replace('(2, 3)', '(2, 1, 3)'), [1, 2, 3, NaN, 5, 6.5]);
+    expect(npyOf(three, 3).shape).toEqual([2, 1, 3]);
+    expect(() => npyOf(three, 2)).toThrow('expected 2 dimensions');
+  });
+
   test.each([
     ['magic', npy(HEADER, [1, 2, 3, 4, 5, 6]).slice(1), /magic/],
     ['type', npy(HEADER.replace('<f4', '<f8'), [1, 2, 3, 4, 5, 6]), /<f8/],
     ['order', npy(HEADER.replace('False', 'True'), [1, 2, 3, 4, 5, 6]), /order/],
-    ['dimensions', npy(HEADER.replace('(2, 3)', '(6,)'), [1, 2, 3, 4, 5, 6]), /two dimensions/],
+    ['dimensions', npy(HEADER.replace('(2, 3)', '(6,)'), [1, 2, 3, 4, 5, 6]), /2 dimensions/],
     ['length', npy(HEADER, [1, 2, 3]), /12 bytes .* 2 x 3/],
     ['stump', new Uint8Array([0x93, 0x4e, 0x55, 0x4d, 0x50, 0x59, 1, 0]).buffer, /8 bytes/],
   ])('refuses a wrong %s', (_, buffer, message) => {

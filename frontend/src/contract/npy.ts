@@ -1,6 +1,5 @@
 /**
- * Reader for the one NPY flavour that the bridge sends: little-endian float32, C order, two
- * dimensions. Format: https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html
+ * Reader for the one NPY flavour that the bridge sends: little-endian float32, C order. Format: https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html
  */
 export interface NpyGrid {
   /** Rows. */
@@ -13,7 +12,22 @@ export interface NpyGrid {
 
 const MAGIC = '\x93NUMPY';
 
+/** One grid: two dimensions. */
 export function parseNpy(buffer: ArrayBuffer): NpyGrid {
+  const { shape, values } = npyOf(buffer, 2);
+  const [height = 0, width = 0] = shape;
+  return { height, width, values };
+}
+
+/**
+ * Numbers in so many dimensions.
+ *
+ * @throws Error where the body is anything else.
+ */
+export function npyOf(
+  buffer: ArrayBuffer,
+  dimensions: number,
+): { readonly shape: readonly number[]; readonly values: Float32Array } {
   const bytes = new Uint8Array(buffer);
   const magic = String.fromCharCode(...bytes.subarray(0, MAGIC.length));
   if (magic !== MAGIC) throw new Error(`npy: magic is ${JSON.stringify(magic)}`);
@@ -30,14 +44,13 @@ export function parseNpy(buffer: ArrayBuffer): NpyGrid {
   const type = /'descr':\s*'([^']+)'/.exec(header)?.[1];
   if (type !== '<f4') throw new Error(`npy: type is ${String(type)}, expected <f4`);
   if (!/'fortran_order':\s*False/.test(header)) throw new Error('npy: not in C order');
-  const shape = /'shape':\s*\((\d+),\s*(\d+),?\)/.exec(header);
-  if (!shape) throw new Error(`npy: header is ${JSON.stringify(header)}, expected two dimensions`);
-
-  const height = Number(shape[1]);
-  const width = Number(shape[2]);
-  const body = buffer.slice(start + length);
-  if (body.byteLength !== height * width * 4) {
-    throw new Error(`npy: ${body.byteLength} bytes of data, expected ${height} x ${width} x 4`);
+  const shape = /'shape':\s*\(([\d,\s]+)\)/.exec(header)?.[1]?.match(/\d+/g)?.map(Number) ?? [];
+  if (shape.length !== dimensions) {
+    throw new Error(`npy: header is ${JSON.stringify(header)}, expected ${dimensions} dimensions`);
   }
-  return { height, width, values: new Float32Array(body) };
+  const body = buffer.slice(start + length);
+  if (body.byteLength !== shape.reduce((size, each) => size * each, 4)) {
+    throw new Error(`npy: ${body.byteLength} bytes of data, expected ${shape.join(' x ')} x 4`);
+  }
+  return { shape, values: new Float32Array(body) };
 }

@@ -10,7 +10,9 @@ export interface paths {
         };
         /**
          * The current state of every tag
-         * @description The newest TwinState with the message's own field names, and ages as of this answer.
+         * @description TwinState with the message's own field names; the newest, with ages as of this answer.
+         *
+         *     As of a moment that has passed, `header.stamp` is that moment, and ages are those of then.
          */
         readonly get: operations["state_api_state_get"];
         readonly put?: never;
@@ -50,7 +52,7 @@ export interface paths {
         };
         /**
          * One tag
-         * @description Everything that the twin knows about one tag.
+         * @description Everything that the twin knows about one tag, or knew at a moment.
          */
         readonly get: operations["tag_api_tags__tag_id__get"];
         readonly put?: never;
@@ -71,6 +73,9 @@ export interface paths {
         /**
          * The field of one sensor, in the format that Accept asks for
          * @description Inverse-distance-weighted from the pinned tags; not known where no tag is near.
+         *
+         *     As of a moment that has passed: of the tags as they were then, by the rules and on the map of
+         *     now.
          */
         readonly get: operations["field_api_field_get"];
         readonly put?: never;
@@ -152,6 +157,206 @@ export interface paths {
         readonly patch?: never;
         readonly trace?: never;
     };
+    readonly "/api/estimate": {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        /**
+         * The estimate of one sensor, in the format that Accept asks for
+         * @description From all readings of a day, in space and time, with its error.
+         *
+         *     That of now is made for the newest reading or the last whole minute of the day, whichever is
+         *     later: until then its ETag holds, unless something is heard, or a model fitted anew. Of a moment
+         *     that has passed it is made by the model of now.
+         */
+        readonly get: operations["estimate_api_estimate_get"];
+        readonly put?: never;
+        readonly post?: never;
+        readonly delete?: never;
+        readonly options?: never;
+        readonly head?: never;
+        readonly patch?: never;
+        readonly trace?: never;
+    };
+    readonly "/api/estimate.json": {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        /** The estimate of one sensor as JSON */
+        readonly get: operations["estimate_json_api_estimate_json_get"];
+        readonly put?: never;
+        readonly post?: never;
+        readonly delete?: never;
+        readonly options?: never;
+        readonly head?: never;
+        readonly patch?: never;
+        readonly trace?: never;
+    };
+    readonly "/api/estimate.png": {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        /** The estimate of one sensor as PNG */
+        readonly get: operations["estimate_png_api_estimate_png_get"];
+        readonly put?: never;
+        readonly post?: never;
+        readonly delete?: never;
+        readonly options?: never;
+        readonly head?: never;
+        readonly patch?: never;
+        readonly trace?: never;
+    };
+    readonly "/api/estimate.npy": {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        /** The estimate of one sensor as NPY */
+        readonly get: operations["estimate_npy_api_estimate_npy_get"];
+        readonly put?: never;
+        readonly post?: never;
+        readonly delete?: never;
+        readonly options?: never;
+        readonly head?: never;
+        readonly patch?: never;
+        readonly trace?: never;
+    };
+    readonly "/api/estimate/quality": {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        /**
+         * How often the estimates of each sensor were right
+         * @description Each new scan is held against what was foretold for it before it was heard.
+         *
+         *     9 of 10 are to lie inside. Counts are by the hour, over the last day and week, since the twin
+         *     was started.
+         */
+        readonly get: operations["quality_api_estimate_quality_get"];
+        readonly put?: never;
+        readonly post?: never;
+        readonly delete?: never;
+        readonly options?: never;
+        readonly head?: never;
+        readonly patch?: never;
+        readonly trace?: never;
+    };
+    readonly "/api/estimate/tags": {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        /**
+         * What was expected of each tag's newest reading, and which tags have changed
+         * @description By all other tags, and by the tag's own readings but for its last ones.
+         */
+        readonly get: operations["tags_api_estimate_tags_get"];
+        readonly put?: never;
+        readonly post?: never;
+        readonly delete?: never;
+        readonly options?: never;
+        readonly head?: never;
+        readonly patch?: never;
+        readonly trace?: never;
+    };
+    readonly "/api/estimate/advice": {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        /**
+         * Where another tag helps the estimate most
+         * @description Of the free floor on the map, or about the tags without one; the best place first.
+         */
+        readonly get: operations["advice_api_estimate_advice_get"];
+        readonly put?: never;
+        readonly post?: never;
+        readonly delete?: never;
+        readonly options?: never;
+        readonly head?: never;
+        readonly patch?: never;
+        readonly trace?: never;
+    };
+    readonly "/api/history": {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        /**
+         * The readings of one sensor of one tag over a period
+         * @description Readings, or buckets of equal length where there are more than `points`; gaps are told.
+         */
+        readonly get: operations["history_route_api_history_get"];
+        readonly put?: never;
+        readonly post?: never;
+        readonly delete?: never;
+        readonly options?: never;
+        readonly head?: never;
+        readonly patch?: never;
+        readonly trace?: never;
+    };
+    readonly "/api/timeline": {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        /**
+         * What happened when: scans, failures, looks, pests, silences, runs of the clock
+         * @description Events counted in buckets of equal length, and how far back anything is remembered.
+         */
+        readonly get: operations["timeline_route_api_timeline_get"];
+        readonly put?: never;
+        readonly post?: never;
+        readonly delete?: never;
+        readonly options?: never;
+        readonly head?: never;
+        readonly patch?: never;
+        readonly trace?: never;
+    };
+    readonly "/api/export.csv": {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        /**
+         * Every reading and failed try of a period, as CSV
+         * @description A row for each reading, and one without a sensor for each try that brought none.
+         *
+         *     It is streamed: one that does not end as HTTP says it must (the last chunk) is not whole.
+         */
+        readonly get: operations["export_route_api_export_csv_get"];
+        readonly put?: never;
+        readonly post?: never;
+        readonly delete?: never;
+        readonly options?: never;
+        readonly head?: never;
+        readonly patch?: never;
+        readonly trace?: never;
+    };
     readonly "/api/map": {
         readonly parameters: {
             readonly query?: never;
@@ -184,6 +389,71 @@ export interface paths {
          * @description One pixel a cell, the grid's last row on top, unknown cells transparent.
          */
         readonly get: operations["map_picture_api_map_png_get"];
+        readonly put?: never;
+        readonly post?: never;
+        readonly delete?: never;
+        readonly options?: never;
+        readonly head?: never;
+        readonly patch?: never;
+        readonly trace?: never;
+    };
+    readonly "/api/health": {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        /**
+         * How the house and each tag are, and why
+         * @description The verdicts that stand in the frames of `/ws/state`, with the reasons for each.
+         *
+         *     As of a moment that has passed, what was known then is judged by the ranges of now, and by how
+         *     long readings hold now; a reason's `since` is the observation of then that says so.
+         */
+        readonly get: operations["health_api_health_get"];
+        readonly put?: never;
+        readonly post?: never;
+        readonly delete?: never;
+        readonly options?: never;
+        readonly head?: never;
+        readonly patch?: never;
+        readonly trace?: never;
+    };
+    readonly "/api/sensors": {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        /**
+         * The file of sensors that is in force: labels, units, colours, ranges
+         * @description `sensors.json`, or the file that the operator gave instead, as it stands.
+         */
+        readonly get: operations["sensors_api_sensors_get"];
+        readonly put?: never;
+        readonly post?: never;
+        readonly delete?: never;
+        readonly options?: never;
+        readonly head?: never;
+        readonly patch?: never;
+        readonly trace?: never;
+    };
+    readonly "/api/alarms": {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        /**
+         * What was wrong, where, from when to when, and how bad at worst
+         * @description Alarms that were active at any time of the period, the newest first and 2,000 at most.
+         *
+         *     They follow from what was observed and the ranges of now, the same in every replica.
+         */
+        readonly get: operations["alarms_route_api_alarms_get"];
         readonly put?: never;
         readonly post?: never;
         readonly delete?: never;
@@ -279,12 +549,209 @@ export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
         /**
+         * Advice
+         * @description `/api/estimate/advice`: where another tag helps most, the best place first.
+         */
+        readonly Advice: {
+            /** Sensor Type */
+            readonly sensor_type: string;
+            /** Places */
+            readonly places: readonly components["schemas"]["AdvisedPlace"][];
+        };
+        /**
+         * AdvisedPlace
+         * @description Where another tag helps; m, map frame.
+         */
+        readonly AdvisedPlace: {
+            /** X */
+            readonly x: number;
+            /** Y */
+            readonly y: number;
+            /**
+             * Error Ratio
+             * @description the error with a tag there, and at the places before it, without: 1
+             */
+            readonly error_ratio: number;
+        };
+        /**
+         * Alarm
+         * @description One episode: what was wrong, where, from when to when, and how bad at worst.
+         *
+         *     It follows from what was observed and from the ranges: the same in every replica and after
+         *     every restart.
+         */
+        readonly Alarm: {
+            /**
+             * Id
+             * @description opaque; made of what, where and since when
+             */
+            readonly id: string;
+            /** @description as it was when the alarm was raised */
+            readonly reason: components["schemas"]["HealthReason"];
+            /**
+             * Tag Id
+             * @description empty: the house
+             */
+            readonly tag_id: string;
+            /** @description ROS time */
+            readonly raised_at: components["schemas"]["Time"];
+            /** @description ROS time; null: it is active */
+            readonly cleared_at: components["schemas"]["Time"] | null;
+            /**
+             * Worst
+             * @description the value farthest beyond its limit, sensor's unit; of a pest the most that were counted; null: there is no such value
+             */
+            readonly worst: number | null;
+        };
+        /**
+         * Alarms
+         * @description `/api/alarms`: what the past and now give.
+         *
+         *     `starting`: the past has not been gone through yet; `heard`: no journal is kept, and only what
+         *     this process heard since its start is in it.
+         */
+        readonly Alarms: {
+            /**
+             * Alarms
+             * @description newest first
+             */
+            readonly alarms: readonly components["schemas"]["Alarm"][];
+            /**
+             * Source
+             * @enum {string}
+             */
+            readonly source: "starting" | "journal" | "heard";
+            /** @description ROS time from which on alarms are known; null: not yet */
+            readonly since: components["schemas"]["Time"] | null;
+        };
+        /**
+         * Bucket
+         * @description The readings of a stretch of `bucket_s`; only finite ones count.
+         */
+        readonly Bucket: {
+            readonly start: components["schemas"]["Time"];
+            /** N */
+            readonly n: number;
+            /** Mean */
+            readonly mean: number;
+            /** Min */
+            readonly min: number;
+            /** Max */
+            readonly max: number;
+        };
+        /**
+         * ClockRun
+         * @description A run of the clock: a simulated one that starts over begins another.
+         */
+        readonly ClockRun: {
+            readonly from: components["schemas"]["Time"];
+            readonly to: components["schemas"]["Time"];
+            /** Is Simulated */
+            readonly is_simulated: boolean;
+        };
+        /**
+         * Day
+         * @description Whether the ranges of the day hold or those of the night, and what says so.
+         */
+        readonly Day: {
+            /** Is Day */
+            readonly is_day: boolean;
+            /**
+             * Source
+             * @enum {string}
+             */
+            readonly source: "light" | "clock" | "assumed";
+        };
+        /**
          * ErrorMessage
          * @description Body of a refusal outside the field routes.
          */
         readonly ErrorMessage: {
             /** Detail */
             readonly detail: string;
+        };
+        /**
+         * EstimateQualities
+         * @description `/api/estimate/quality`: by sensor.
+         */
+        readonly EstimateQualities: {
+            /** Sensors */
+            readonly sensors: {
+                readonly [key: string]: components["schemas"]["EstimateQuality"];
+            };
+        };
+        /**
+         * EstimateQuality
+         * @description How often a sensor's estimates were right; a day is one of the twin's `day_length_s`.
+         */
+        readonly EstimateQuality: {
+            /** @description null: no model was fitted yet */
+            readonly fitted_at: components["schemas"]["Time"] | null;
+            /**
+             * Fit Problem
+             * @description why the last fit came to nothing, or that the readings tell of a longer day than day_length_s; empty: neither
+             */
+            readonly fit_problem: string;
+            /** @description the counts are since then; null: none yet */
+            readonly graded_since: components["schemas"]["Time"] | null;
+            readonly day: components["schemas"]["Graded"];
+            readonly week: components["schemas"]["Graded"];
+            /**
+             * Share Day
+             * @description inside of scans; null: there are none
+             */
+            readonly share_day: number | null;
+            /** Share Week */
+            readonly share_week: number | null;
+            /**
+             * Is Trusted
+             * @description false: chance does not explain how far a share is from 0.9; the model is wrong, a day's length for one
+             */
+            readonly is_trusted: boolean;
+        };
+        /**
+         * ExpectedReading
+         * @description A tag's newest reading beside what all others foretell for it; sensor's unit.
+         */
+        readonly ExpectedReading: {
+            /** Measured */
+            readonly measured: number;
+            readonly observed_at: components["schemas"]["Time"];
+            /** Expected */
+            readonly expected: number;
+            /**
+             * Expected Sd
+             * @description a reading's noise included
+             */
+            readonly expected_sd: number;
+            /**
+             * Z
+             * @description how far its last readings are off together, in sds
+             */
+            readonly z: number;
+            /**
+             * Offset
+             * @description by how much they are off
+             */
+            readonly offset: number;
+            /**
+             * Left Out
+             * @description it has changed: the estimate does without it
+             */
+            readonly left_out: boolean;
+        };
+        /**
+         * ExpectedTags
+         * @description `/api/estimate/tags`: what was expected of each tag with a place, as of a moment.
+         */
+        readonly ExpectedTags: {
+            /** Sensor Type */
+            readonly sensor_type: string;
+            readonly at: components["schemas"]["Time"];
+            /** Tags */
+            readonly tags: {
+                readonly [key: string]: components["schemas"]["ExpectedReading"];
+            };
         };
         /**
          * FieldQuality
@@ -333,6 +800,51 @@ export interface components {
             readonly anomaly: boolean;
         };
         /**
+         * GetEstimateResponse
+         * @description GetEstimate's response. A refusal has `ok` false, the reason, and everything else zero.
+         */
+        readonly GetEstimateResponse: {
+            /** Ok */
+            readonly ok: boolean;
+            /** Error Message */
+            readonly error_message: string;
+            /**
+             * Mean
+             * @description sensor's unit, row-major, row 0 at bbox_min_y
+             */
+            readonly mean: readonly (number | null)[];
+            /**
+             * Sd
+             * @description sensor's unit, as mean: 9 of 10 times the truth is within 1.645 sd
+             */
+            readonly sd: readonly (number | null)[];
+            /** Width */
+            readonly width: number;
+            /** Height */
+            readonly height: number;
+            /** Origin X */
+            readonly origin_x: number;
+            /** Origin Y */
+            readonly origin_y: number;
+            /** Resolution Used */
+            readonly resolution_used: number;
+            /**
+             * Sd Known
+             * @description a cell whose sd is not below this is not known
+             */
+            readonly sd_known: number;
+            /**
+             * Sample Count
+             * @description tags that contribute
+             */
+            readonly sample_count: number;
+            /**
+             * Reading Count
+             * @description readings that contribute
+             */
+            readonly reading_count: number;
+        };
+        /**
          * GetFieldResponse
          * @description GetField's response. A refusal has `ok` false, the reason, and everything else zero.
          */
@@ -363,6 +875,16 @@ export interface components {
             /** Sample Count */
             readonly sample_count: number;
         };
+        /**
+         * Graded
+         * @description New scans that were foretold, and those of them within the interval for 9 of 10.
+         */
+        readonly Graded: {
+            /** Scans */
+            readonly scans: number;
+            /** Inside */
+            readonly inside: number;
+        };
         /** HTTPValidationError */
         readonly HTTPValidationError: {
             /** Detail */
@@ -390,6 +912,78 @@ export interface components {
             readonly callback_errors: number;
         };
         /**
+         * HealthReason
+         * @description Why a tag, or the house, has its verdict.
+         *
+         *     The last two are the house's alone. `silent`: nothing is heard of the twin, or its clock does
+         *     not run. `stopped`: no tag was scanned for longer than the patrol's own rhythm allows.
+         */
+        readonly HealthReason: {
+            /**
+             * Kind
+             * @enum {string}
+             */
+            readonly kind: "range" | "reading_failed" | "scan_failed" | "pest" | "old" | "changed" | "silent" | "stopped";
+            /**
+             * Verdict
+             * @enum {string}
+             */
+            readonly verdict: "critical" | "stressed" | "unknown" | "healthy";
+            /**
+             * Sensor
+             * @description empty: all of the tag's, or none
+             */
+            readonly sensor: string;
+            /**
+             * Value
+             * @description sensor's unit; of a pest how many were counted, of scan_failed the status
+             */
+            readonly value: number | null;
+            /**
+             * Limit
+             * @description the bound that was passed, sensor's unit; of old how long readings hold, s
+             */
+            readonly limit: number | null;
+            /** @description ROS time of the observation that began it, of old the last one; null: none */
+            readonly since: components["schemas"]["Time"] | null;
+        };
+        /**
+         * History
+         * @description One sensor of one tag over a period: `readings`, or `buckets` where they are too many.
+         */
+        readonly History: {
+            readonly from: components["schemas"]["Time"];
+            readonly to: components["schemas"]["Time"];
+            /** Tag Id */
+            readonly tag_id: string;
+            /** Sensor Type */
+            readonly sensor_type: string;
+            /** Unit */
+            readonly unit: string;
+            /** Is Bucketed */
+            readonly is_bucketed: boolean;
+            /**
+             * Bucket S
+             * @description s, length of a bucket; null: these are readings
+             */
+            readonly bucket_s: number | null;
+            /**
+             * Readings
+             * @description oldest first
+             */
+            readonly readings: readonly components["schemas"]["HistoryReading"][];
+            /**
+             * Buckets
+             * @description oldest first; one without a reading is absent
+             */
+            readonly buckets: readonly components["schemas"]["Bucket"][];
+            /**
+             * Gaps
+             * @description no reading for longer than three times what is usual here: draw no line
+             */
+            readonly gaps: readonly components["schemas"]["lupin_bridge__past__schema__Stretch"][];
+        };
+        /**
          * HistoryReading
          * @description One past value of a sensor.
          */
@@ -399,20 +993,57 @@ export interface components {
             readonly value: number | null;
         };
         /**
+         * HouseHealth
+         * @description The house is its worst tag; unknown where more than half of its tags are.
+         */
+        readonly HouseHealth: {
+            /**
+             * Verdict
+             * @enum {string}
+             */
+            readonly verdict: "critical" | "stressed" | "unknown" | "healthy";
+            /**
+             * Reasons
+             * @description worst first
+             */
+            readonly reasons: readonly components["schemas"]["HealthReason"][];
+            readonly day: components["schemas"]["Day"];
+            readonly patrol: components["schemas"]["Patrol"];
+        };
+        /**
          * Journal
-         * @description How the twin's journal does.
+         * @description How the twin's journal does. Only while it is `recording` is everything kept.
          */
         readonly Journal: {
             /**
              * State
+             * @description unknown: the twin does not say
              * @enum {string}
              */
-            readonly state: "off" | "starting" | "recording" | "slow" | "failing" | "in_use" | "foreign";
+            readonly state: "unknown" | "off" | "starting" | "recording" | "slow" | "failing" | "in_use" | "foreign";
             /**
              * Detail
              * @description for a person to read
              */
             readonly detail: string;
+            /**
+             * Set Aside
+             * @description the last damaged file, by its new name; empty: none
+             */
+            readonly set_aside: string;
+            /** @description what no robot observed: the past that a demo's journal begins with */
+            readonly simulated: components["schemas"]["Stretch"] | null;
+        };
+        /**
+         * Judgement
+         * @description `/api/health`, and `health` in frames: in a delta only the tags whose health has changed.
+         */
+        readonly Judgement: {
+            readonly house: components["schemas"]["HouseHealth"];
+            /** Tags */
+            readonly tags: {
+                readonly [key: string]: components["schemas"]["TagHealth"];
+            };
         };
         /**
          * MapMetaData
@@ -437,6 +1068,24 @@ export interface components {
             readonly info: components["schemas"]["MapMetaData"];
         };
         /**
+         * Outward
+         * @description How a channel does by which others are told: MQTT, the webhook.
+         */
+        readonly Outward: {
+            /**
+             * Channel
+             * @enum {string}
+             */
+            readonly channel: "mqtt" | "webhook";
+            /** Is Failing */
+            readonly is_failing: boolean;
+            /**
+             * Detail
+             * @description what is wrong, for a person to read; empty: nothing
+             */
+            readonly detail: string;
+        };
+        /**
          * PastTry
          * @description One scan or look, with success or without.
          */
@@ -457,6 +1106,24 @@ export interface components {
              * @description as in lupin_msgs/Observation: 0 scan, 1 look; null: a twin elsewhere does not tell it of a try that failed
              */
             readonly kind: number | null;
+        };
+        /**
+         * Patrol
+         * @description What the house is doing; nothing of it is a verdict.
+         */
+        readonly Patrol: {
+            /**
+             * Interval S
+             * @description median of the last intervals between scans, whatever tag they were of; null: fewer than two are known
+             */
+            readonly interval_s: number | null;
+            /** @description ROS time; null: none is known */
+            readonly last_scan: components["schemas"]["Time"] | null;
+            /**
+             * Overdue
+             * @description tags none of whose readings holds any more, or without any
+             */
+            readonly overdue: number;
         };
         /**
          * Point
@@ -499,49 +1166,6 @@ export interface components {
             readonly z: number | null;
             /** W */
             readonly w: number | null;
-        };
-        /**
-         * Readiness
-         * @description The status, and what a replica with a twin of its own can tell beside it.
-         */
-        readonly Readiness: {
-            /**
-             * Type
-             * @constant
-             */
-            readonly type: "status";
-            /**
-             * Twin
-             * @enum {string}
-             */
-            readonly twin: "live" | "offline";
-            /**
-             * Reason
-             * @description paused: simulated time stands, and is told to, the twin is live; no_clock, clock_stopped: the twin's time does not run, no age is known, and it counts as offline
-             * @enum {string}
-             */
-            readonly reason: "live" | "paused" | "no_clock" | "clock_stopped" | "never_seen" | "stale" | "thread_dead" | "shutting_down";
-            /**
-             * Message
-             * @description for a person to read
-             */
-            readonly message: string;
-            /**
-             * State Age Seconds
-             * @description s since the bridge got its last state, by its own clock; null: never
-             */
-            readonly state_age_seconds: number | null;
-            /**
-             * Has Map
-             * @description false: /api/map answers 404, no map has come yet
-             */
-            readonly has_map: boolean;
-            /**
-             * Drops
-             * @description what the twin did not take in lately, by reason
-             */
-            readonly drops: readonly components["schemas"]["RecentDrop"][];
-            readonly journal: components["schemas"]["Journal"];
         };
         /**
          * RecentDrop
@@ -596,6 +1220,60 @@ export interface components {
             readonly seconds_left: number | null;
         };
         /**
+         * StatusFrame
+         * @description WebSocket frame, and the body of `/readyz`: whether the twin behind the bridge is alive.
+         */
+        readonly StatusFrame: {
+            /**
+             * Type
+             * @constant
+             */
+            readonly type: "status";
+            /**
+             * Twin
+             * @enum {string}
+             */
+            readonly twin: "live" | "offline";
+            /**
+             * Reason
+             * @description paused: simulated time stands, and is told to, the twin is live; no_clock, clock_stopped: the twin's time does not run, no age is known, and it counts as offline
+             * @enum {string}
+             */
+            readonly reason: "live" | "paused" | "no_clock" | "clock_stopped" | "never_seen" | "stale" | "thread_dead" | "shutting_down";
+            /**
+             * Message
+             * @description for a person to read
+             */
+            readonly message: string;
+            /**
+             * State Age Seconds
+             * @description s since the bridge got its last state, by its own clock; null: never
+             */
+            readonly state_age_seconds: number | null;
+            /**
+             * Has Map
+             * @description false: /api/map answers 404, no map has come yet
+             */
+            readonly has_map: boolean;
+            /**
+             * Origin
+             * @description where what was observed comes from, as the twin says; sim_time: it goes by /clock, so from a simulation, or a recording that is played
+             * @enum {string}
+             */
+            readonly origin: "unknown" | "robot" | "simulated" | "recorded" | "sim_time";
+            /**
+             * Drops
+             * @description what the twin did not take in lately, by reason
+             */
+            readonly drops: readonly components["schemas"]["RecentDrop"][];
+            readonly journal: components["schemas"]["Journal"];
+            /**
+             * Outward
+             * @description those that the operator has set up
+             */
+            readonly outward: readonly components["schemas"]["Outward"][];
+        };
+        /**
          * TagError
          * @description One tag's reading against what the other tags say of its place.
          */
@@ -611,6 +1289,22 @@ export interface components {
              * @description predicted less measured, sensor's unit
              */
             readonly error: number;
+        };
+        /**
+         * TagHealth
+         * @description The verdict of a tag: that of its worst reason; healthy: something recent was judged.
+         */
+        readonly TagHealth: {
+            /**
+             * Verdict
+             * @enum {string}
+             */
+            readonly verdict: "critical" | "stressed" | "unknown" | "healthy";
+            /**
+             * Reasons
+             * @description worst first
+             */
+            readonly reasons: readonly components["schemas"]["HealthReason"][];
         };
         /**
          * TagHistory
@@ -641,6 +1335,68 @@ export interface components {
             readonly sec: number;
             /** Nanosec */
             readonly nanosec: number;
+        };
+        /**
+         * Timeline
+         * @description What happened over a period, and what of the past is remembered at all.
+         */
+        readonly Timeline: {
+            readonly from: components["schemas"]["Time"];
+            readonly to: components["schemas"]["Time"];
+            /**
+             * Bucket S
+             * @description s, length of a bucket
+             */
+            readonly bucket_s: number;
+            /** @description what is remembered at all; null: nothing is */
+            readonly reach: components["schemas"]["lupin_bridge__past__schema__Stretch"] | null;
+            /**
+             * Buckets
+             * @description oldest first; one in which nothing happened is absent
+             */
+            readonly buckets: readonly components["schemas"]["TimelineBucket"][];
+            /**
+             * Silences
+             * @description stretches in which nothing was tried
+             */
+            readonly silences: readonly components["schemas"]["lupin_bridge__past__schema__Stretch"][];
+            /**
+             * Runs
+             * @description the runs of the clock that meet this period
+             */
+            readonly runs: readonly components["schemas"]["ClockRun"][];
+        };
+        /**
+         * TimelineBucket
+         * @description What happened within `bucket_s`.
+         */
+        readonly TimelineBucket: {
+            readonly start: components["schemas"]["Time"];
+            /**
+             * Scans
+             * @description tries at sensors that succeeded
+             */
+            readonly scans: number;
+            /**
+             * Failures
+             * @description tries that failed, looks too
+             */
+            readonly failures: number;
+            /**
+             * Looks
+             * @description looks that saw the flowers
+             */
+            readonly looks: number;
+            /**
+             * Pests Seen
+             * @description looks with an anomaly where the look before had none
+             */
+            readonly pests_seen: number;
+            /**
+             * Pests Cleared
+             * @description looks without one where the look before had one
+             */
+            readonly pests_cleared: number;
         };
         /**
          * TwinState
@@ -711,6 +1467,22 @@ export interface components {
             readonly ctx?: Record<string, never>;
         };
         /**
+         * Stretch
+         * @description A stretch of time, `from` <= t < `to`.
+         */
+        readonly lupin_bridge__past__schema__Stretch: {
+            readonly from: components["schemas"]["Time"];
+            readonly to: components["schemas"]["Time"];
+        };
+        /**
+         * Stretch
+         * @description From one moment of ROS time to another.
+         */
+        readonly lupin_bridge__stream__schema__Stretch: {
+            readonly start: components["schemas"]["Time"];
+            readonly end: components["schemas"]["Time"];
+        };
+        /**
          * StateFrame
          * @description WebSocket frame: the state. `seq` grows by one a frame; a gap tells what was skipped.
          */
@@ -728,6 +1500,7 @@ export interface components {
              */
             readonly revision: string;
             readonly state: components["schemas"]["TwinState"];
+            readonly health: components["schemas"]["Judgement"];
         };
         /**
          * DeltaFrame
@@ -761,48 +1534,39 @@ export interface components {
              * @description tag_ids; a restarted twin knows fewer tags
              */
             readonly removed: readonly string[];
+            /** @description the house, and the tags of whom it is another */
+            readonly health: components["schemas"]["Judgement"];
         };
         /**
-         * StatusFrame
-         * @description WebSocket frame, and the body of `/readyz`: whether the twin behind the bridge is alive.
+         * Stretch
+         * @description From one moment of ROS time to another.
          */
-        readonly StatusFrame: {
+        readonly Stretch: {
+            readonly start: components["schemas"]["Time"];
+            readonly end: components["schemas"]["Time"];
+        };
+        /**
+         * AlarmsFrame
+         * @description WebSocket frame: the active alarms and those raised or cleared within 24 h, on any change.
+         */
+        readonly AlarmsFrame: {
+            /**
+             * Alarms
+             * @description newest first
+             */
+            readonly alarms: readonly components["schemas"]["Alarm"][];
+            /**
+             * Source
+             * @enum {string}
+             */
+            readonly source: "starting" | "journal" | "heard";
+            /** @description ROS time from which on alarms are known; null: not yet */
+            readonly since: components["schemas"]["Time"] | null;
             /**
              * Type
              * @constant
              */
-            readonly type: "status";
-            /**
-             * Twin
-             * @enum {string}
-             */
-            readonly twin: "live" | "offline";
-            /**
-             * Reason
-             * @description paused: simulated time stands, and is told to, the twin is live; no_clock, clock_stopped: the twin's time does not run, no age is known, and it counts as offline
-             * @enum {string}
-             */
-            readonly reason: "live" | "paused" | "no_clock" | "clock_stopped" | "never_seen" | "stale" | "thread_dead" | "shutting_down";
-            /**
-             * Message
-             * @description for a person to read
-             */
-            readonly message: string;
-            /**
-             * State Age Seconds
-             * @description s since the bridge got its last state, by its own clock; null: never
-             */
-            readonly state_age_seconds: number | null;
-            /**
-             * Has Map
-             * @description false: /api/map answers 404, no map has come yet
-             */
-            readonly has_map: boolean;
-            /**
-             * Drops
-             * @description what the twin did not take in lately, by reason
-             */
-            readonly drops: readonly components["schemas"]["RecentDrop"][];
+            readonly type: "alarms";
         };
     };
     responses: never;
@@ -815,7 +1579,10 @@ export type $defs = Record<string, never>;
 export interface operations {
     readonly state_api_state_get: {
         readonly parameters: {
-            readonly query?: never;
+            readonly query?: {
+                /** @description as of this moment: ROS seconds as a decimal number, or ISO 8601 with an offset; default: now */
+                readonly at?: string;
+            };
             readonly header?: never;
             readonly path?: never;
             readonly cookie?: never;
@@ -831,6 +1598,31 @@ export interface operations {
                     readonly "application/json": components["schemas"]["TwinState"];
                 };
             };
+            /** @description the ETag still holds */
+            readonly 304: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description refused; detail says why */
+            readonly 400: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description nothing of the past is kept here */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
             /** @description this client asks for too much */
             readonly 429: {
                 headers: {
@@ -840,8 +1632,17 @@ export interface operations {
                     readonly "application/json": components["schemas"]["ErrorMessage"];
                 };
             };
-            /** @description no twin was heard yet, or it is busy */
+            /** @description it cannot be read now, or too much is */
             readonly 503: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description it took too long */
+            readonly 504: {
                 headers: {
                     readonly [name: string]: unknown;
                 };
@@ -911,7 +1712,10 @@ export interface operations {
     };
     readonly tag_api_tags__tag_id__get: {
         readonly parameters: {
-            readonly query?: never;
+            readonly query?: {
+                /** @description as of this moment: ROS seconds as a decimal number, or ISO 8601 with an offset; default: now */
+                readonly at?: string;
+            };
             readonly header?: never;
             readonly path: {
                 readonly tag_id: string;
@@ -927,6 +1731,22 @@ export interface operations {
                 };
                 content: {
                     readonly "application/json": components["schemas"]["TwinTagState"];
+                };
+            };
+            /** @description the ETag still holds */
+            readonly 304: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description refused; detail says why */
+            readonly 400: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
                 };
             };
             /** @description no such tag */
@@ -947,8 +1767,26 @@ export interface operations {
                     readonly "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
-            /** @description no twin was heard yet, or it is busy */
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description it cannot be read now, or too much is */
             readonly 503: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description it took too long */
+            readonly 504: {
                 headers: {
                     readonly [name: string]: unknown;
                 };
@@ -975,6 +1813,8 @@ export interface operations {
                 readonly bbox_max_y?: number;
                 /** @description PNG only: pixels a cell along each side */
                 readonly scale?: number;
+                /** @description as of this moment: ROS seconds as a decimal number, or ISO 8601 with an offset; default: now */
+                readonly at?: string;
             };
             readonly header?: never;
             readonly path?: never;
@@ -1007,6 +1847,15 @@ export interface operations {
                 };
                 content: {
                     readonly "application/json": components["schemas"]["GetFieldResponse"];
+                };
+            };
+            /** @description nothing of the past is kept here */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
                 };
             };
             /** @description no format that Accept allows */
@@ -1064,6 +1913,8 @@ export interface operations {
                 readonly bbox_max_y?: number;
                 /** @description PNG only: pixels a cell along each side */
                 readonly scale?: number;
+                /** @description as of this moment: ROS seconds as a decimal number, or ISO 8601 with an offset; default: now */
+                readonly at?: string;
             };
             readonly header?: never;
             readonly path?: never;
@@ -1094,6 +1945,15 @@ export interface operations {
                 };
                 content: {
                     readonly "application/json": components["schemas"]["GetFieldResponse"];
+                };
+            };
+            /** @description nothing of the past is kept here */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
                 };
             };
             /** @description this client asks for too much */
@@ -1142,6 +2002,8 @@ export interface operations {
                 readonly bbox_max_y?: number;
                 /** @description PNG only: pixels a cell along each side */
                 readonly scale?: number;
+                /** @description as of this moment: ROS seconds as a decimal number, or ISO 8601 with an offset; default: now */
+                readonly at?: string;
             };
             readonly header?: never;
             readonly path?: never;
@@ -1172,6 +2034,15 @@ export interface operations {
                 };
                 content: {
                     readonly "application/json": components["schemas"]["GetFieldResponse"];
+                };
+            };
+            /** @description nothing of the past is kept here */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
                 };
             };
             /** @description this client asks for too much */
@@ -1220,6 +2091,8 @@ export interface operations {
                 readonly bbox_max_y?: number;
                 /** @description PNG only: pixels a cell along each side */
                 readonly scale?: number;
+                /** @description as of this moment: ROS seconds as a decimal number, or ISO 8601 with an offset; default: now */
+                readonly at?: string;
             };
             readonly header?: never;
             readonly path?: never;
@@ -1250,6 +2123,15 @@ export interface operations {
                 };
                 content: {
                     readonly "application/json": components["schemas"]["GetFieldResponse"];
+                };
+            };
+            /** @description nothing of the past is kept here */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
                 };
             };
             /** @description this client asks for too much */
@@ -1296,6 +2178,8 @@ export interface operations {
                 readonly bbox_max_x?: number;
                 /** @description m, map frame; without a box: all pinned tags and their reach */
                 readonly bbox_max_y?: number;
+                /** @description as of this moment: ROS seconds as a decimal number, or ISO 8601 with an offset; default: now */
+                readonly at?: string;
             };
             readonly header?: never;
             readonly path?: never;
@@ -1328,6 +2212,15 @@ export interface operations {
                     readonly "application/json": components["schemas"]["GetFieldResponse"];
                 };
             };
+            /** @description nothing of the past is kept here */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
             /** @description this client asks for too much */
             readonly 429: {
                 headers: {
@@ -1347,6 +2240,846 @@ export interface operations {
                 };
             };
             /** @description the twin did not answer in time */
+            readonly 504: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+        };
+    };
+    readonly estimate_api_estimate_get: {
+        readonly parameters: {
+            readonly query: {
+                /** @description name of a sensor, as in a reading */
+                readonly sensor_type: string;
+                /** @description m, side of a square cell */
+                readonly resolution?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_min_x?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_min_y?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_max_x?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_max_y?: number;
+                /** @description PNG only: pixels a cell along each side */
+                readonly scale?: number;
+                /** @description as of this moment: ROS seconds as a decimal number, or ISO 8601 with an offset; default: now */
+                readonly at?: string;
+                /** @description PNG only: which of the two numbers; transparent where the estimate is not known */
+                readonly layer?: "mean" | "sd";
+            };
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        readonly requestBody?: never;
+        readonly responses: {
+            /** @description Successful Response */
+            readonly 200: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "image/png": string;
+                    readonly "application/x-npy": string;
+                    readonly "application/json": components["schemas"]["GetEstimateResponse"];
+                };
+            };
+            /** @description the ETag still holds */
+            readonly 304: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description refused; error_message says why */
+            readonly 400: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["GetEstimateResponse"];
+                };
+            };
+            /** @description nothing of the past is kept here */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description no format that Accept allows */
+            readonly 406: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["GetEstimateResponse"];
+                };
+            };
+            /** @description the twin is not there, or busy */
+            readonly 503: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description the twin did not answer in time */
+            readonly 504: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+        };
+    };
+    readonly estimate_json_api_estimate_json_get: {
+        readonly parameters: {
+            readonly query: {
+                /** @description name of a sensor, as in a reading */
+                readonly sensor_type: string;
+                /** @description m, side of a square cell */
+                readonly resolution?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_min_x?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_min_y?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_max_x?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_max_y?: number;
+                /** @description PNG only: pixels a cell along each side */
+                readonly scale?: number;
+                /** @description as of this moment: ROS seconds as a decimal number, or ISO 8601 with an offset; default: now */
+                readonly at?: string;
+                /** @description PNG only: which of the two numbers; transparent where the estimate is not known */
+                readonly layer?: "mean" | "sd";
+            };
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        readonly requestBody?: never;
+        readonly responses: {
+            /** @description Successful Response */
+            readonly 200: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["GetEstimateResponse"];
+                };
+            };
+            /** @description the ETag still holds */
+            readonly 304: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description refused; error_message says why */
+            readonly 400: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["GetEstimateResponse"];
+                };
+            };
+            /** @description nothing of the past is kept here */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["GetEstimateResponse"];
+                };
+            };
+            /** @description the twin is not there, or busy */
+            readonly 503: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description the twin did not answer in time */
+            readonly 504: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+        };
+    };
+    readonly estimate_png_api_estimate_png_get: {
+        readonly parameters: {
+            readonly query: {
+                /** @description name of a sensor, as in a reading */
+                readonly sensor_type: string;
+                /** @description m, side of a square cell */
+                readonly resolution?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_min_x?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_min_y?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_max_x?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_max_y?: number;
+                /** @description PNG only: pixels a cell along each side */
+                readonly scale?: number;
+                /** @description as of this moment: ROS seconds as a decimal number, or ISO 8601 with an offset; default: now */
+                readonly at?: string;
+                /** @description PNG only: which of the two numbers; transparent where the estimate is not known */
+                readonly layer?: "mean" | "sd";
+            };
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        readonly requestBody?: never;
+        readonly responses: {
+            /** @description Successful Response */
+            readonly 200: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "image/png": string;
+                };
+            };
+            /** @description the ETag still holds */
+            readonly 304: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description refused; error_message says why */
+            readonly 400: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["GetEstimateResponse"];
+                };
+            };
+            /** @description nothing of the past is kept here */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["GetEstimateResponse"];
+                };
+            };
+            /** @description the twin is not there, or busy */
+            readonly 503: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description the twin did not answer in time */
+            readonly 504: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+        };
+    };
+    readonly estimate_npy_api_estimate_npy_get: {
+        readonly parameters: {
+            readonly query: {
+                /** @description name of a sensor, as in a reading */
+                readonly sensor_type: string;
+                /** @description m, side of a square cell */
+                readonly resolution?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_min_x?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_min_y?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_max_x?: number;
+                /** @description m, map frame; without a box: all pinned tags and their reach */
+                readonly bbox_max_y?: number;
+                /** @description PNG only: pixels a cell along each side */
+                readonly scale?: number;
+                /** @description as of this moment: ROS seconds as a decimal number, or ISO 8601 with an offset; default: now */
+                readonly at?: string;
+                /** @description PNG only: which of the two numbers; transparent where the estimate is not known */
+                readonly layer?: "mean" | "sd";
+            };
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        readonly requestBody?: never;
+        readonly responses: {
+            /** @description Successful Response */
+            readonly 200: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/x-npy": string;
+                };
+            };
+            /** @description the ETag still holds */
+            readonly 304: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description refused; error_message says why */
+            readonly 400: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["GetEstimateResponse"];
+                };
+            };
+            /** @description nothing of the past is kept here */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["GetEstimateResponse"];
+                };
+            };
+            /** @description the twin is not there, or busy */
+            readonly 503: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description the twin did not answer in time */
+            readonly 504: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+        };
+    };
+    readonly quality_api_estimate_quality_get: {
+        readonly parameters: {
+            readonly query?: {
+                /** @description of this sensor alone; default: of every one */
+                readonly sensor_type?: string;
+            };
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        readonly requestBody?: never;
+        readonly responses: {
+            /** @description Successful Response */
+            readonly 200: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["EstimateQualities"];
+                };
+            };
+            /** @description the ETag still holds */
+            readonly 304: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description refused; detail says why */
+            readonly 400: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description nothing of the past is kept here */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description it cannot be read now, or too much is */
+            readonly 503: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description it took too long */
+            readonly 504: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+        };
+    };
+    readonly tags_api_estimate_tags_get: {
+        readonly parameters: {
+            readonly query: {
+                /** @description name of a sensor, as in a reading */
+                readonly sensor_type: string;
+            };
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        readonly requestBody?: never;
+        readonly responses: {
+            /** @description Successful Response */
+            readonly 200: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ExpectedTags"];
+                };
+            };
+            /** @description the ETag still holds */
+            readonly 304: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description refused; detail says why */
+            readonly 400: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description nothing of the past is kept here */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description it cannot be read now, or too much is */
+            readonly 503: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description it took too long */
+            readonly 504: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+        };
+    };
+    readonly advice_api_estimate_advice_get: {
+        readonly parameters: {
+            readonly query: {
+                /** @description name of a sensor, as in a reading */
+                readonly sensor_type: string;
+                /** @description at most so many places */
+                readonly places?: number;
+            };
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        readonly requestBody?: never;
+        readonly responses: {
+            /** @description Successful Response */
+            readonly 200: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["Advice"];
+                };
+            };
+            /** @description the ETag still holds */
+            readonly 304: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description refused; detail says why */
+            readonly 400: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description nothing of the past is kept here */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description it cannot be read now, or too much is */
+            readonly 503: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description it took too long */
+            readonly 504: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+        };
+    };
+    readonly history_route_api_history_get: {
+        readonly parameters: {
+            readonly query: {
+                /** @description one tag; for events, `*` is the whole house */
+                readonly tag_id: string;
+                /** @description name of a sensor, as in a reading; or an event: ~scans, ~failures, ~looks, ~pests_seen, ~pests_cleared, ~silences, ~runs */
+                readonly sensor_type: string;
+                /** @description ROS seconds as a decimal number, or ISO 8601 with an offset; default: the oldest that is kept */
+                readonly from?: string;
+                /** @description as `from`; this moment itself is not in the period; default: now */
+                readonly to?: string;
+                /** @description at most so many readings or buckets */
+                readonly points?: number;
+            };
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        readonly requestBody?: never;
+        readonly responses: {
+            /** @description Successful Response */
+            readonly 200: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["History"];
+                };
+            };
+            /** @description the ETag still holds */
+            readonly 304: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description refused; detail says why */
+            readonly 400: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description nothing of the past is kept here */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description it cannot be read now, or too much is */
+            readonly 503: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description it took too long */
+            readonly 504: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+        };
+    };
+    readonly timeline_route_api_timeline_get: {
+        readonly parameters: {
+            readonly query?: {
+                /** @description ROS seconds as a decimal number, or ISO 8601 with an offset; default: the oldest that is kept */
+                readonly from?: string;
+                /** @description as `from`; this moment itself is not in the period; default: now */
+                readonly to?: string;
+                /** @description at most so many readings or buckets */
+                readonly points?: number;
+                /** @description one tag alone; default: all */
+                readonly tag_id?: string;
+            };
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        readonly requestBody?: never;
+        readonly responses: {
+            /** @description Successful Response */
+            readonly 200: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["Timeline"];
+                };
+            };
+            /** @description the ETag still holds */
+            readonly 304: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description refused; detail says why */
+            readonly 400: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description nothing of the past is kept here */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description it cannot be read now, or too much is */
+            readonly 503: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description it took too long */
+            readonly 504: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+        };
+    };
+    readonly export_route_api_export_csv_get: {
+        readonly parameters: {
+            readonly query?: {
+                /** @description ROS seconds as a decimal number, or ISO 8601 with an offset; default: the oldest that is kept */
+                readonly from?: string;
+                /** @description as `from`; this moment itself is not in the period; default: now */
+                readonly to?: string;
+                /** @description one tag alone; default: all */
+                readonly tag_id?: string;
+                /** @description one sensor alone; default: all */
+                readonly sensor_type?: string;
+            };
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        readonly requestBody?: never;
+        readonly responses: {
+            /** @description Successful Response */
+            readonly 200: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "text/csv": string;
+                };
+            };
+            /** @description refused; detail says why */
+            readonly 400: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description nothing of the past is kept here */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description it cannot be read now, or too much is */
+            readonly 503: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description it took too long */
             readonly 504: {
                 headers: {
                     readonly [name: string]: unknown;
@@ -1465,6 +3198,180 @@ export interface operations {
             };
         };
     };
+    readonly health_api_health_get: {
+        readonly parameters: {
+            readonly query?: {
+                /** @description as of this moment: ROS seconds as a decimal number, or ISO 8601 with an offset; default: now */
+                readonly at?: string;
+            };
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        readonly requestBody?: never;
+        readonly responses: {
+            /** @description Successful Response */
+            readonly 200: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["Judgement"];
+                };
+            };
+            /** @description the ETag still holds */
+            readonly 304: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description refused; detail says why */
+            readonly 400: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description nothing of the past is kept here */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description no twin was heard yet, or it is busy */
+            readonly 503: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description it took too long */
+            readonly 504: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+        };
+    };
+    readonly sensors_api_sensors_get: {
+        readonly parameters: {
+            readonly query?: never;
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        readonly requestBody?: never;
+        readonly responses: {
+            /** @description Successful Response */
+            readonly 200: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": Record<string, never>;
+                };
+            };
+        };
+    };
+    readonly alarms_route_api_alarms_get: {
+        readonly parameters: {
+            readonly query?: {
+                /** @description ROS seconds as a decimal number, or ISO 8601 with an offset; default: the oldest that is kept */
+                readonly from?: string;
+                /** @description as `from`; this moment itself is not in the period; default: now */
+                readonly to?: string;
+                /** @description 1: only those that have not been cleared, 0: only the others; default: all */
+                readonly active?: "0" | "1";
+            };
+            readonly header?: never;
+            readonly path?: never;
+            readonly cookie?: never;
+        };
+        readonly requestBody?: never;
+        readonly responses: {
+            /** @description Successful Response */
+            readonly 200: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["Alarms"];
+                };
+            };
+            /** @description the ETag still holds */
+            readonly 304: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description refused; detail says why */
+            readonly 400: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description nothing of the past is kept here */
+            readonly 404: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description this client asks for too much */
+            readonly 429: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description it cannot be read now, or too much is */
+            readonly 503: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+            /** @description it took too long */
+            readonly 504: {
+                headers: {
+                    readonly [name: string]: unknown;
+                };
+                content: {
+                    readonly "application/json": components["schemas"]["ErrorMessage"];
+                };
+            };
+        };
+    };
     readonly healthz_healthz_get: {
         readonly parameters: {
             readonly query?: never;
@@ -1529,7 +3436,7 @@ export interface operations {
                     readonly [name: string]: unknown;
                 };
                 content: {
-                    readonly "application/json": components["schemas"]["Readiness"];
+                    readonly "application/json": components["schemas"]["StatusFrame"];
                 };
             };
             /** @description never seen, silent, or dead */
@@ -1538,7 +3445,7 @@ export interface operations {
                     readonly [name: string]: unknown;
                 };
                 content: {
-                    readonly "application/json": components["schemas"]["Readiness"];
+                    readonly "application/json": components["schemas"]["StatusFrame"];
                 };
             };
         };

@@ -1,5 +1,5 @@
 /** The messages that frames and answers are made of, field by field. */
-import { boolean, count, integer, list, numberOrNull, object, orNull, text } from './check';
+import { boolean, count, integer, list, numberOrNull, object, oneOf, orNull, text } from './check';
 
 /** Kinds of sensors of one tag, and in one frame: each is a column of the table. */
 export const MAX_SENSORS = 256;
@@ -46,4 +46,32 @@ export const TAG = object({
   last_try: orNull(TIME),
   last_try_status: numberOrNull,
   last_try_detail: TEXT,
+});
+
+const MAX_REASONS_PER_TAG = 1_000;
+const VERDICT = oneOf('critical', 'stressed', 'unknown', 'healthy');
+const REASON = object({
+  // Not one of those of today: a later server may know more reasons.
+  kind: TEXT,
+  verdict: VERDICT,
+  sensor: TEXT,
+  value: numberOrNull,
+  limit: numberOrNull,
+  since: orNull(TIME),
+});
+const HEALTH = { verdict: VERDICT, reasons: list(REASON, MAX_REASONS_PER_TAG) };
+export const TAG_HEALTH = object(HEALTH);
+export const HOUSE_HEALTH = object({
+  ...HEALTH,
+  day: object({ is_day: boolean, source: TEXT }),
+  patrol: object({ interval_s: numberOrNull, last_scan: orNull(TIME), overdue: count }),
+});
+
+export const ALARM = object({
+  id: TEXT,
+  reason: REASON,
+  tag_id: TEXT,
+  raised_at: TIME,
+  cleared_at: orNull(TIME),
+  worst: numberOrNull,
 });

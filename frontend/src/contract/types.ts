@@ -7,18 +7,90 @@ export type StateFrame = Schemas['StateFrame'];
 export type StatusFrame = Schemas['StatusFrame'];
 /** What the twin dropped in the last minutes, and why. */
 export type Drop = Schemas['RecentDrop'];
+/** Whether what happens is kept, and what of it no robot observed. */
+export type Journal = Schemas['Journal'];
+/** How a channel does by which others are told: MQTT, the webhook. */
+export type Outward = Schemas['Outward'];
 export type DeltaFrame = Schemas['DeltaFrame'];
-export type Frame = StateFrame | DeltaFrame | StatusFrame;
+export type Frame = StateFrame | DeltaFrame | StatusFrame | AlarmsFrame;
+export type TwinState = Schemas['TwinState'];
 export type TwinTagState = Schemas['TwinTagState'];
 export type OccupancyGrid = Schemas['OccupancyGrid'];
 export type FieldQuality = Schemas['FieldQuality'];
 export type PastTry = Schemas['PastTry'];
 export type TagHistory = Schemas['TagHistory'];
+export type History = Schemas['History'];
+export type Timeline = Schemas['Timeline'];
+/** One episode of something wrong at a tag, or in the house. */
+export type Alarm = Schemas['Alarm'];
+export type AlarmsFrame = Schemas['AlarmsFrame'];
+export type Alarms = Schemas['Alarms'];
+/** What the bridge's judge says of the house and of each tag. */
+export type Judgement = Schemas['Judgement'];
+export type TagHealth = Schemas['TagHealth'];
+export type HealthReason = Schemas['HealthReason'];
+export type Verdict = TagHealth['verdict'];
+/** How well the estimates have foretold, by sensor. */
+export type Grades = Schemas['EstimateQualities'];
+export type Grade = Schemas['EstimateQuality'];
+/** What was measured at the tags against what all else foretells. */
+export type ExpectedTags = Schemas['ExpectedTags'];
+export type Expected = Schemas['ExpectedReading'];
+/** Where another tag helps. */
+export type Advice = Schemas['Advice'];
+export type Place = Schemas['AdvisedPlace'];
 export type WirePoint = Schemas['Point'];
 export type WireTime = Schemas['Time'];
 
+/** What should be read: ideal, and critical outside of the wider `critical`. */
+interface Bounds {
+  readonly ideal: readonly number[] | null;
+  readonly critical?: readonly number[] | null;
+}
+
+/** By day, and by night where that has its own. */
+export interface SensorRanges extends Bounds {
+  readonly night?: Bounds;
+}
+
+/** What the file of sensors says of one. */
+export interface SensorEntry extends SensorRanges {
+  readonly label: string;
+  /** In other languages, some or all. */
+  readonly labels?: Readonly<Record<string, string>>;
+  readonly unit: string;
+  /** Degrees and percent (HSL). */
+  readonly hue: number;
+  readonly lightness: number;
+  readonly derived?: boolean;
+  readonly species?: Readonly<Record<string, SensorRanges>>;
+}
+
+/** `/api/sensors`: the file that is in force, as it stands. */
+export interface SensorsFile {
+  readonly ramp: { readonly saturation: number; readonly max_alpha: number };
+  readonly fallback: SensorEntry;
+  readonly sensors: Readonly<Record<string, SensorEntry>>;
+}
+
 /** The newest state, put together from full frames and deltas. */
 export type Latest = Omit<StateFrame, 'type'>;
+
+/** How sure each cell of a field is; the nearest readings alone do not tell. */
+export interface Sureness {
+  /** Standard deviation, cell by cell as the values, the sensor's unit; not-a-number: not asked. */
+  readonly sd: Float32Array;
+  /** Below this a cell counts as known. */
+  readonly sdKnown: number;
+  readonly readingCount: number;
+}
+
+/** Why a field is not the estimate that was asked for. */
+export interface NoEstimate {
+  /** Of the refusal. */
+  readonly status: number;
+  readonly message: string;
+}
 
 /** A reconstructed field of one sensor. */
 export interface Field {
@@ -38,4 +110,8 @@ export interface Field {
   readonly sampleCount: number;
   /** Row-major, row 0 at the bottom (lowest y); not-a-number: not known. */
   readonly values: Float32Array;
+  /** Of an estimate. */
+  readonly sureness?: Sureness;
+  /** Of the nearest readings in place of an estimate. */
+  readonly noEstimate?: NoEstimate;
 }

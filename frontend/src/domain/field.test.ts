@@ -2,6 +2,7 @@ import { describe, expect, test } from 'vitest';
 
 import type { Field } from '../contract/types';
 import { mapPoint } from '../geometry/coordinates';
+import { fieldShade } from './ramp';
 import {
   fieldCorners,
   fieldPixels,
@@ -10,22 +11,13 @@ import {
   smoothDetail,
   valueAt,
 } from './field';
+import { fieldWith } from '../testing/field';
+import { sensorNamed } from '../testing/sensors';
 
-function field(rows: readonly (readonly number[])[]): Field {
-  const width = rows[0]?.length ?? 0;
-  return {
-    sensor: 'temperature',
-    width,
-    height: rows.length,
-    originX: 10,
-    originY: -2,
-    resolution: 0.5,
-    valueMin: 0,
-    valueMax: 10,
-    sampleCount: 3,
-    values: Float32Array.from(rows.flat()),
-  };
-}
+const red = sensorNamed('temperature');
+
+const field = (rows: readonly (readonly number[])[]): Field =>
+  fieldWith(rows, { originX: 10, originY: -2, resolution: 0.5 });
 
 /** Row 0, the lowest y, is written first. */
 const small = field([
@@ -52,14 +44,14 @@ describe('value under a point', () => {
 
 describe('picture', () => {
   test('has row 0 at the bottom', () => {
-    const { data, width, height } = fieldPixels(small, [200, 10, 20], range, 1);
+    const { data, width, height } = fieldPixels(small, fieldShade(red, range), 1);
     expect([width, height]).toEqual([3, 2]);
     expect(alpha(data, 5)).toBe(Math.round(255 * 0.6));
-    expect([...data.slice(5 * 4, 5 * 4 + 3)]).toEqual([200, 10, 20]);
+    expect([...data.slice(5 * 4, 5 * 4 + 3)]).toEqual([219, 60, 36]);
   });
 
   test('is transparent at the minimum and where nothing is known', () => {
-    const { data } = fieldPixels(small, [200, 10, 20], range, 1);
+    const { data } = fieldPixels(small, fieldShade(red, range), 1);
     expect(alpha(data, 0)).toBe(0);
     expect(alpha(data, 3)).toBe(0);
   });
@@ -71,7 +63,7 @@ describe('picture', () => {
       [8, 8, 8],
     ]);
     const detail = 4;
-    const { data, width } = fieldPixels(grid, [1, 2, 3], range, detail);
+    const { data, width } = fieldPixels(grid, fieldShade(red, range), detail);
     for (let y = 0; y < 3 * detail; y++) {
       for (let x = 0; x < 3 * detail; x++) {
         const isHole = Math.floor(x / detail) === 1 && Math.floor(y / detail) === 1;

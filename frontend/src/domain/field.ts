@@ -1,13 +1,19 @@
 import type { Field } from '../contract/types';
 import { mapPoint, type Bounds, type MapPoint } from '../geometry/coordinates';
-import { fieldAlpha, type Range, type Rgb } from './ramp';
+import type { Shade } from './ramp';
 
-/** The value of the cell that holds the point; null outside the grid and where it is not known. */
-export function valueAt(field: Field, point: MapPoint): number | null {
+/** The cell that holds the point; null outside the grid. */
+export function cellAt(field: Field, point: MapPoint): number | null {
   const column = Math.floor((point.x - field.originX) / field.resolution);
   const row = Math.floor((point.y - field.originY) / field.resolution);
   if (column < 0 || column >= field.width || row < 0 || row >= field.height) return null;
-  const value = field.values[row * field.width + column];
+  return row * field.width + column;
+}
+
+/** The value of the cell that holds the point; null outside the grid and where it is not known. */
+export function valueAt(field: Field, point: MapPoint): number | null {
+  const cell = cellAt(field, point);
+  const value = cell === null ? undefined : field.values[cell];
   return value === undefined || Number.isNaN(value) ? null : value;
 }
 
@@ -34,23 +40,21 @@ export interface Pixels {
  * interpolated between cell centres, in values and not in colours: a picture scaled by the
  * browser would let colour bleed into cells that are not known.
  */
-export function fieldPixels(field: Field, colour: Rgb, range: Range, detail: number): Pixels {
+export function fieldPixels(field: Field, shade: Shade, detail: number): Pixels {
   const width = field.width * detail;
   const height = field.height * detail;
   const data = new Uint8ClampedArray(width * height * 4);
   let at = 0;
   for (let top = 0; top < height; top++) {
     const y = height - 1 - top;
+    const row = Math.floor(y / detail) * field.width;
     for (let x = 0; x < width; x++, at += 4) {
       const value =
         detail === 1
           ? (field.values[y * field.width + x] ?? NaN)
           : interpolate(field, (x + 0.5) / detail - 0.5, (y + 0.5) / detail - 0.5);
       if (Number.isNaN(value)) continue;
-      data[at] = colour[0];
-      data[at + 1] = colour[1];
-      data[at + 2] = colour[2];
-      data[at + 3] = 255 * fieldAlpha(range, value);
+      shade(data, at, value, row + Math.floor(x / detail));
     }
   }
   return { width, height, data };

@@ -10,7 +10,7 @@ import {
   readingText,
   shortAgeText,
 } from './format';
-import { sensorNamed } from './sensors';
+import { sensorNamed } from '../testing/sensors';
 
 test.each([
   [0, '0.0'],

@@ -1,13 +1,22 @@
 import type { Range } from './ramp';
+import { LOCALE } from '../strings';
 import type { Sensor } from './sensors';
 import { toShown, unitOf, type TemperatureUnit } from './units';
 
-/** A number at the precision that a climate sensor deserves, with a true minus sign. */
+/** What stands between the whole and the tenths where the reader lives. */
+const POINT =
+  new Intl.NumberFormat(LOCALE).formatToParts(0.5).find(({ type }) => type === 'decimal')?.value ??
+  '.';
+
+/** A number's text as the reader writes it: their decimal point, and a true minus sign. */
+export const written = (text: string): string => text.replace('.', POINT).replace('-', '\u2212');
+
+/** A number at the precision that a climate sensor deserves. */
 export function numberText(value: number): string {
   const size = Math.abs(value);
   const digits = size >= 1e6 ? null : size >= 100 ? 0 : size >= 1 || value === 0 ? 1 : 2;
   const text = digits === null ? value.toExponential(2) : value.toFixed(digits);
-  return (/^-0(\.0+)?$/.test(text) ? text.slice(1) : text).replace('-', '\u2212');
+  return written(/^-0(\.0+)?$/.test(text) ? text.slice(1) : text);
 }
 
 /** A reading without its unit. */
@@ -39,15 +48,24 @@ export function ageText(seconds: number): string {
   return `${Math.floor(hours / 24)}\u00a0d ${hours % 24}\u00a0h`;
 }
 
+/** A time between two things that come again and again: exact where it is short. */
+export function intervalText(seconds: number): string {
+  if (seconds < 10) return `${written(seconds.toFixed(1))}\u00a0s`;
+  const s = Math.round(seconds);
+  if (s >= 60 && s < 600 && s % 60 > 0) return `${Math.floor(s / 60)}\u00a0min ${s % 60}\u00a0s`;
+  return ageText(s).replace(/\u00a0(h|d) 0\u00a0\w+$/, '\u00a0$1');
+}
+
 /** An age in its largest unit alone, for a narrow column. */
 export function shortAgeText(seconds: number): string {
   return ageText(seconds).replace(/^(\d+\u00a0\w+) .*$/, '$1');
 }
 
-const clock = new Intl.DateTimeFormat('en-GB', {
+const clock = new Intl.DateTimeFormat(LOCALE, {
   hour: '2-digit',
   minute: '2-digit',
   second: '2-digit',
+  hourCycle: 'h23',
 });
 
 /** Time of day on the operator's own clock. */
@@ -55,9 +73,9 @@ export function clockText(epochMs: number): string {
   return clock.format(epochMs);
 }
 
-/** Date and time of day on the operator's own clock: 2026-05-01 14:03:22. */
+/** Date and time of day on the operator's own clock, for files' names: 2026-05-01 14:03:22. */
 export function momentText(epochMs: number): string {
-  return `${new Date(epochMs).toLocaleDateString('en-CA')} ${clockText(epochMs)}`;
+  return new Date(epochMs).toLocaleString('sv-SE');
 }
 
 export function percentText(share: number): string {
@@ -65,5 +83,5 @@ export function percentText(share: number): string {
 }
 
 export function metresText(value: number): string {
-  return value.toFixed(2).replace('-', '\u2212');
+  return written(value.toFixed(2));
 }

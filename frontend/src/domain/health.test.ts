@@ -1,110 +1,95 @@
 import { describe, expect, test } from 'vitest';
 
-import { readings, tag } from '../testing/tags';
-import { deviation, houseHealth, newlyCritical, sideOf, statusOf, tagHealth } from './health';
-import { sensorNamed } from './sensors';
+import { judgement, NOBODY, reason } from '../testing/health';
+import { tag } from '../testing/tags';
+import {
+  houseHealth,
+  rangeReason,
+  severity,
+  sharedJudgement,
+  sideOf,
+  type HouseHealth,
+} from './health';
 
-const ideal = sensorNamed('temperature').ideal ?? [NaN, NaN];
-const [low, high] = ideal;
-const width = high - low;
-
-describe('deviation', () => {
-  test('is 0 inside the range, its ends included', () => {
-    expect(deviation(ideal, low)).toBe(0);
-    expect(deviation(ideal, (low + high) / 2)).toBe(0);
-    expect(deviation(ideal, high)).toBe(0);
-  });
-
-  test('is the distance to the nearest bound over the width', () => {
-    expect(deviation(ideal, low - width / 4)).toBeCloseTo(0.25);
-    expect(deviation(ideal, high + width)).toBeCloseTo(1);
-  });
-
-  test('is clamped to 2', () => {
-    expect(deviation(ideal, high + 50 * width)).toBe(2);
-  });
-});
-
-test.each([
-  [0, 'healthy'],
-  [0.299, 'healthy'],
-  [0.3, 'stressed'],
-  [0.699, 'stressed'],
-  [0.7, 'critical'],
-  [2, 'critical'],
-  [null, 'no-data'],
-] as const)('a deviation of %s is %s', (value, status) => {
-  expect(statusOf(value)).toBe(status);
-});
-
-test('which side of the ideal range', () => {
-  expect(sideOf(ideal, low - 1)).toBe('below');
-  expect(sideOf(ideal, low)).toBe('within');
-  expect(sideOf(ideal, high + 1)).toBe('above');
-  expect(sideOf(null, 1)).toBeNull();
-});
-
-describe('tag', () => {
-  test('is as healthy as its worst sensor, which is named', () => {
-    const sick = tag({ readings: readings({ humidity: 60, temperature: high + width / 2 }) });
-    expect(tagHealth(sick)).toMatchObject({ status: 'stressed', sensor: 'temperature' });
-  });
-
-  test('without a reading that can be judged it has no data', () => {
-    for (const values of [{}, { temperature: null }, { ph: 7 }]) {
-      expect(tagHealth(tag({ readings: readings(values) })).status).toBe('no-data');
-    }
-  });
-});
+const house = (said: Parameters<typeof judgement>[0], isHeard = true): HouseHealth =>
+  houseHealth(
+    Object.keys(said).map((tag_id) => tag({ tag_id })),
+    judgement(said),
+    isHeard,
+  );
 
 describe('house', () => {
-  const fine = tag({ tag_id: '1', readings: readings({ temperature: low }) });
-  const sick = tag({ tag_id: '2', readings: readings({ temperature: high + width }) });
-  const unknown = tag({ tag_id: '3' });
+  const mixed = {
+    1: 'healthy',
+    2: [reason({ verdict: 'critical' })],
+    3: [reason(), reason({ sensor: 'humidity' })],
+    4: 'unknown',
+  } as const;
 
-  test('is as healthy as its worst tag, which is named; all are counted', () => {
-    const house = houseHealth([fine, sick, unknown]);
-    expect(house.status).toBe('critical');
-    expect(house.worst).toMatchObject({ tagId: '2', sensor: 'temperature', value: high + width });
-    expect(house.counts).toEqual({ healthy: 1, stressed: 0, critical: 1, 'no-data': 1 });
-    expect(house.byTag.get('3')?.status).toBe('no-data');
+  test('is what the bridge says, tag by tag and as a whole', () => {
+    const { verdict, worst, counts, byTag } = house(mixed);
+    expect(verdict).toBe('critical');
+    expect(worst?.tagId).toBe('3');
+    expect(counts).toEqual({ critical: 2, stressed: 0, unknown: 1, healthy: 1 });
+    expect(byTag.get('4')).toEqual({ verdict: 'unknown', reasons: [] });
   });
 
-  test('of equals the first drives it', () => {
-    expect(
-      houseHealth([
-        fine,
-        tag({ tag_id: '4', readings: fine.readings.size ? readings({ temperature: low }) : [] }),
-      ]).worst?.tagId,
-    ).toBe('1');
+  test('nothing that is read makes a verdict: only what is said does', () => {
+    const lethal = tag({ readings: [{ name: 'temperature', value: -40 }] as never });
+    expect(houseHealth([lethal], judgement({ 1: 'healthy' }), true).verdict).toBe('healthy');
+    expect(houseHealth([lethal], null, true).verdict).toBe('unknown');
   });
 
-  test('an empty one has no data and no driver', () => {
-    expect(houseHealth([])).toMatchObject({ status: 'no-data', worst: null });
+  test('that is not heard of is unknown and says why; of its tags stands what was said', () => {
+    const silent = house(mixed, false);
+    expect(silent).toMatchObject({ verdict: 'unknown', worst: null });
+    expect(silent.reasons.map(({ kind }) => kind)).toEqual(['silent']);
+    expect(silent.counts.critical).toBe(2);
+  });
+
+  test('a tag that was not judged yet is unknown', () => {
+    expect(houseHealth([tag()], NOBODY, true).byTag.get('1')?.verdict).toBe('unknown');
+  });
+
+  test('of equals the first makes it what it is; of one that is well nobody does', () => {
+    expect(house({ 1: [reason()], 2: [reason()] }).worst?.tagId).toBe('1');
+    expect(house({ 1: 'healthy' }).worst).toBeNull();
   });
 });
 
-test('of a tag’s equally bad sensors the first reported drives it', () => {
-  // Both are at the clamp.
-  for (const names of [
-    ['temperature', 'humidity'],
-    ['humidity', 'temperature'],
-  ]) {
-    const values = Object.fromEntries(names.map((name) => [name, 1e6]));
-    expect(tagHealth(tag({ readings: readings(values) })).sensor).toBe(names[0]);
-  }
+test('the worst verdict is the most severe, and of one verdict who has most reasons for it', () => {
+  const order = [
+    { verdict: 'critical', reasons: Array.from({ length: 50 }, () => reason()) },
+    { verdict: 'critical', reasons: [reason(), reason()] },
+    { verdict: 'critical', reasons: [reason(), reason({ verdict: 'stressed' })] },
+    { verdict: 'stressed', reasons: [reason({ verdict: 'stressed' })] },
+    { verdict: 'unknown', reasons: [] },
+    { verdict: 'healthy', reasons: [] },
+  ] as const;
+  const severities = order.map(severity);
+  expect(severities).toEqual([...severities].sort((a, b) => b - a));
+  expect(new Set(severities).size).toBe(order.length);
 });
 
-test('newly critical is who was not critical before, or not there', () => {
-  const house = (temperatures: Record<string, number>): ReturnType<typeof houseHealth> =>
-    houseHealth(
-      Object.entries(temperatures).map(([tag_id, temperature]) =>
-        tag({ tag_id, readings: readings({ temperature }) }),
-      ),
-    );
-  const before = house({ 1: high + width, 2: low });
-  const now = house({ 1: high + width, 2: high + width, 3: high + width, 4: low });
-  expect(newlyCritical(before, now).map(({ tagId }) => tagId)).toEqual(['2', '3']);
-  expect(newlyCritical(now, before)).toEqual([]);
-  expect(newlyCritical(now, now)).toEqual([]);
+test('a value is out of its range where a reason says so', () => {
+  const health = { verdict: 'critical', reasons: [reason(), reason({ kind: 'old' })] } as const;
+  const found = rangeReason(health, 'temperature');
+  expect(found && sideOf(found)).toBe('below');
+  expect(sideOf({ value: 11, limit: 10 })).toBe('above');
+  expect(rangeReason(health, 'humidity')).toBeNull();
+  expect(rangeReason(undefined, 'temperature')).toBeNull();
+});
+
+test('what is said again is the very same', () => {
+  const before = judgement({ 1: 'healthy' });
+  expect(sharedJudgement(before, { ...before, house: { ...before.house } })).toBe(before);
+  const night = { is_day: false, source: 'light' } as const;
+  const now = { ...before, house: { ...before.house, day: night } };
+  expect(sharedJudgement(before, now)).toBe(now);
+  expect(sharedJudgement(null, now)).toBe(now);
+});
+
+test('what was not judged is unknown, and that is no silence of the twin', () => {
+  expect(houseHealth([], null, true)).toMatchObject({ verdict: 'unknown', reasons: [] });
+  expect(houseHealth([], null, false).reasons.map(({ kind }) => kind)).toEqual(['silent']);
 });

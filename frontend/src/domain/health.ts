@@ -1,108 +1,117 @@
-import { sensorNamed } from './sensors';
+/** What the bridge's verdicts come to for the page. Nothing is judged here: no rule, no range. */
+import type { HealthReason, Judgement, TagHealth, Verdict } from '../contract/types';
 import type { Tag } from './twin';
 
-/** From the worst to the best, and last what cannot be judged. */
-export const HEALTH_STATUSES = ['critical', 'stressed', 'healthy', 'no-data'] as const;
-export type HealthStatus = (typeof HEALTH_STATUSES)[number];
+/** From the worst to the best; of who is unknown, nobody knows that he is well. */
+export const VERDICTS = [
+  'critical',
+  'stressed',
+  'unknown',
+  'healthy',
+] as const satisfies readonly Verdict[];
 
-/** Distance beyond which more makes no difference, in widths of the ideal range. */
-const MAX_DEVIATION = 2;
-const STRESSED_FROM = 0.3;
-const CRITICAL_FROM = 0.7;
+/** Who was not judged, or not yet. */
+const NOT_JUDGED: TagHealth = { verdict: 'unknown', reasons: [] };
+
+/** A tag and what is said of it. */
+export interface JudgedTag {
+  readonly tagId: string;
+  readonly health: TagHealth;
+}
+
+export interface HouseHealth {
+  readonly verdict: Verdict;
+  readonly reasons: readonly HealthReason[];
+  /** Whose ranges hold, and what says so; null: nobody was asked. */
+  readonly day: Judgement['house']['day'] | null;
+  /** What it is doing; null: nobody was asked. */
+  readonly patrol: Judgement['house']['patrol'] | null;
+  /** The tag that the house has its verdict from; null: it has it from none alone. */
+  readonly worst: JudgedTag | null;
+  readonly counts: Readonly<Record<Verdict, number>>;
+  readonly byTag: ReadonlyMap<string, TagHealth>;
+}
+
+const SILENT: HealthReason = {
+  kind: 'silent',
+  verdict: 'unknown',
+  sensor: '',
+  value: null,
+  limit: null,
+  since: null,
+};
 
 /**
- * How far a value lies outside its ideal range: 0 inside, else the distance to the nearest bound
- * over the range's width, at most 2.
+ * The house as it was judged. `isHeard`: false, and nothing is known of it as a whole, whatever
+ * was said last; of its tags that stands, with the age of their readings beside it.
  */
-export function deviation([low, high]: readonly [number, number], value: number): number {
-  if (value >= low && value <= high) return 0;
-  const distance = value < low ? low - value : value - high;
-  return Math.min(MAX_DEVIATION, distance / (high - low));
-}
-
-/** Which side of the ideal range a value lies on. */
-export function sideOf(
-  ideal: readonly [number, number] | null,
-  value: number,
-): 'below' | 'within' | 'above' | null {
-  if (!ideal) return null;
-  return value < ideal[0] ? 'below' : value > ideal[1] ? 'above' : 'within';
-}
-
-export function statusOf(deviation: number | null): HealthStatus {
-  if (deviation === null) return 'no-data';
-  if (deviation < STRESSED_FROM) return 'healthy';
-  return deviation < CRITICAL_FROM ? 'stressed' : 'critical';
-}
-
-export interface TagHealth {
-  readonly tagId: string;
-  readonly status: HealthStatus;
-  /** Of the worst sensor; null without a judged reading. */
-  readonly deviation: number | null;
-  /** The sensor that drives it, and its value. */
-  readonly sensor: string | null;
-  readonly value: number | null;
-}
-
-/** Tags are shared from one snapshot to the next; so is what follows from them. */
-const judged = new WeakMap<Tag, TagHealth>();
-
-/** A tag is as healthy as its worst sensor; of equals, the first reported. */
-export function tagHealth(tag: Tag): TagHealth {
-  const known = judged.get(tag);
-  if (known) return known;
-  const health = judge(tag);
-  judged.set(tag, health);
-  return health;
-}
-
-function judge(tag: Tag): TagHealth {
-  let worst: TagHealth = {
-    tagId: tag.id,
-    status: 'no-data',
-    deviation: null,
-    sensor: null,
-    value: null,
+export function houseHealth(
+  tags: readonly Tag[],
+  judgement: Judgement | null,
+  isHeard: boolean,
+): HouseHealth {
+  const counts = { critical: 0, stressed: 0, unknown: 0, healthy: 0 };
+  const byTag = new Map<string, TagHealth>();
+  for (const { id } of tags) {
+    const health = judgement?.tags[id] ?? NOT_JUDGED;
+    byTag.set(id, health);
+    counts[health.verdict] += 1;
+  }
+  const { verdict, reasons } = isHeard ? (judgement?.house ?? NOT_JUDGED) : UNHEARD;
+  return {
+    verdict,
+    reasons,
+    day: judgement?.house.day ?? null,
+    patrol: judgement?.house.patrol ?? null,
+    worst: worstOf(byTag, verdict),
+    counts,
+    byTag,
   };
-  for (const [name, value] of tag.readings) {
-    const { ideal } = sensorNamed(name);
-    if (!ideal || value === null) continue;
-    const far = deviation(ideal, value);
-    if (worst.deviation === null || far > worst.deviation) {
-      worst = { tagId: tag.id, status: statusOf(far), deviation: far, sensor: name, value };
-    }
+}
+
+const UNHEARD: TagHealth = { verdict: 'unknown', reasons: [SILENT] };
+
+/** Of the tags with the house's verdict, who has most reasons for it; of equals the first. */
+function worstOf(byTag: ReadonlyMap<string, TagHealth>, verdict: Verdict): JudgedTag | null {
+  if (verdict !== 'critical' && verdict !== 'stressed') return null;
+  let worst: JudgedTag | null = null;
+  for (const [tagId, health] of byTag) {
+    if (health.verdict !== verdict) continue;
+    if (!worst || severity(health) > severity(worst.health)) worst = { tagId, health };
   }
   return worst;
 }
 
-export interface HouseHealth {
-  readonly status: HealthStatus;
-  /** The tag that drives it; null without a judged reading. */
-  readonly worst: TagHealth | null;
-  readonly counts: Readonly<Record<HealthStatus, number>>;
-  readonly byTag: ReadonlyMap<string, TagHealth>;
+/** More is worse: by verdict, then by how many reasons there are for it. */
+export function severity({ verdict, reasons }: TagHealth): number {
+  const many = reasons.filter((reason) => reason.verdict === verdict).length;
+  return VERDICTS.length - VERDICTS.indexOf(verdict) + many / (many + 1);
 }
 
-/** The house is as healthy as its worst tag; of equals, the first in the order of ids. */
-export function houseHealth(tags: readonly Tag[]): HouseHealth {
-  const counts = { healthy: 0, stressed: 0, critical: 0, 'no-data': 0 };
-  const byTag = new Map<string, TagHealth>();
-  let worst: TagHealth | null = null;
-  for (const tag of tags) {
-    const health = tagHealth(tag);
-    byTag.set(tag.id, health);
-    counts[health.status] += 1;
-    if (health.deviation === null) continue;
-    if (worst?.deviation == null || health.deviation > worst.deviation) worst = health;
-  }
-  return { status: worst?.status ?? 'no-data', worst, counts, byTag };
-}
+/** Why a sensor's value counts as out of its range; null: it does not. */
+export const rangeReason = (
+  health: TagHealth | undefined,
+  sensor: string,
+): (HealthReason & { readonly value: number; readonly limit: number }) | null =>
+  health?.reasons.filter(isOfRange).find((reason) => reason.sensor === sensor) ?? null;
 
-/** Tags that are critical now and were not before; those of a tag that is new too. */
-export function newlyCritical(before: HouseHealth, now: HouseHealth): TagHealth[] {
-  if (now === before || now.counts.critical === 0) return [];
-  return [...now.byTag.values()].filter(
-    ({ tagId, status }) => status === 'critical' && before.byTag.get(tagId)?.status !== 'critical',
-  );
+export const isOfRange = (
+  reason: HealthReason,
+): reason is HealthReason & { readonly value: number; readonly limit: number } =>
+  reason.kind === 'range' && reason.value !== null && reason.limit !== null;
+
+/** On which side of its range a value is that lies outside. */
+export const sideOf = ({
+  value,
+  limit,
+}: {
+  readonly value: number;
+  readonly limit: number;
+}): 'below' | 'above' => (value < limit ? 'below' : 'above');
+
+/** The very same as before where nothing else is said: what follows from it is kept then. */
+export function sharedJudgement(before: Judgement | null, now: Judgement): Judgement {
+  const isSame =
+    before?.tags === now.tags && JSON.stringify(before.house) === JSON.stringify(now.house);
+  return isSame ? before : now;
 }

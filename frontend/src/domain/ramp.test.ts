@@ -1,7 +1,7 @@
 import { describe, expect, test } from 'vitest';
 
 import { fieldAlpha, fraction, hslToRgb, mix, rangeOf, rgbText, sensorColour } from './ramp';
-import { sensorNamed } from './sensors';
+import { sensorNamed } from '../testing/sensors';
 
 test.each([
   [0, 100, 50, [255, 0, 0]],
@@ -23,14 +23,14 @@ describe('alpha of the heat map', () => {
   const range = { low: 10, high: 20 };
 
   test('is 0 at the minimum, 60 % at the maximum, linear between', () => {
-    expect(fieldAlpha(range, 10)).toBe(0);
-    expect(fieldAlpha(range, 15)).toBeCloseTo(0.3);
-    expect(fieldAlpha(range, 20)).toBeCloseTo(0.6);
+    expect(fieldAlpha(sensorNamed('temperature'), range, 10)).toBe(0);
+    expect(fieldAlpha(sensorNamed('temperature'), range, 15)).toBeCloseTo(0.3);
+    expect(fieldAlpha(sensorNamed('temperature'), range, 20)).toBeCloseTo(0.6);
   });
 
   test('is clamped outside a fixed range', () => {
-    expect(fieldAlpha(range, -5)).toBe(0);
-    expect(fieldAlpha(range, 99)).toBeCloseTo(0.6);
+    expect(fieldAlpha(sensorNamed('temperature'), range, -5)).toBe(0);
+    expect(fieldAlpha(sensorNamed('temperature'), range, 99)).toBeCloseTo(0.6);
   });
 
   test('a range of no width shows its value', () => {

@@ -1,4 +1,4 @@
-import { RAMP, type Sensor } from './sensors';
+import type { Sensor } from './sensors';
 
 /** Red, green, blue from 0 to 255. */
 export type Rgb = readonly [number, number, number];
@@ -22,7 +22,7 @@ export function hslToRgb(hue: number, saturation: number, lightness: number): Rg
 
 /** The one colour of a sensor; values differ by how much of it there is. */
 export function sensorColour(sensor: Sensor): Rgb {
-  return hslToRgb(sensor.hue, RAMP.saturation, sensor.lightness);
+  return hslToRgb(sensor.hue, sensor.saturation, sensor.lightness);
 }
 
 /**
@@ -35,9 +35,23 @@ export function fraction(range: Range, value: number): number {
   return Math.min(1, Math.max(0, (value - range.low) / width));
 }
 
-/** Alpha of the heat map, 0 to 1: transparent at the minimum, `max_alpha` at the maximum. */
-export function fieldAlpha(range: Range, value: number): number {
-  return RAMP.maxAlpha * fraction(range, value);
+/** Alpha of the heat map, 0 to 1: transparent at the minimum, `maxAlpha` at the maximum. */
+export function fieldAlpha({ maxAlpha }: Sensor, range: Range, value: number): number {
+  return maxAlpha * fraction(range, value);
+}
+
+/** Colours one pixel, RGBA from `at` on, by the value that it stands for and the cell it lies in. */
+export type Shade = (data: Uint8ClampedArray, at: number, value: number, cell: number) => void;
+
+/** One colour, and the more of it the higher the value. */
+export function fieldShade(sensor: Sensor, range: Range): Shade {
+  const [red, green, blue] = sensorColour(sensor);
+  return (data, at, value) => {
+    data[at] = red;
+    data[at + 1] = green;
+    data[at + 2] = blue;
+    data[at + 3] = 255 * fieldAlpha(sensor, range, value);
+  };
 }
 
 export function mix(from: Rgb, to: Rgb, share: number): Rgb {

@@ -1,20 +1,78 @@
-import { expect, test } from 'vitest';
+import { describe, expect, test } from 'vitest';
 
-import declared from '../../../backend/lupin_bridge/sensors.json';
-import { KNOWN_SENSORS, RAMP, sensorNamed, sensorsIn } from './sensors';
+import { CATALOGUE, CATALOGUES, FILE, sensorNamed } from '../testing/sensors';
+import { cataloguesOf, isMeasured, NO_CATALOGUES, rangesFor } from './sensors';
 
-test('every number comes from sensors.json', () => {
-  for (const [name, sensor] of Object.entries(declared.sensors)) {
-    expect(sensorNamed(name)).toEqual({ name, ...sensor });
+test('every look comes from the file, in its order', () => {
+  expect(CATALOGUE.all.map(({ name }) => name)).toEqual(Object.keys(FILE.sensors));
+  for (const [name, { label, unit, hue, lightness }] of Object.entries(FILE.sensors)) {
+    expect(sensorNamed(name)).toMatchObject({ name, label, unit, hue, lightness });
   }
-  expect(RAMP).toEqual({ saturation: declared.ramp.saturation, maxAlpha: declared.ramp.max_alpha });
+  const { saturation, max_alpha: maxAlpha } = FILE.ramp;
+  expect(sensorNamed('co2')).toMatchObject({ saturation, maxAlpha });
 });
 
-test('an undeclared sensor shows its own name and is never judged', () => {
+test('an undeclared sensor shows its own name, is never judged, and stays the same', () => {
   expect(sensorNamed('ph')).toMatchObject({ name: 'ph', label: 'ph', unit: '', ideal: null });
+  expect(sensorNamed('ph')).toBe(sensorNamed('ph'));
 });
 
 test('declared sensors first, then the others by name, each once', () => {
-  const names = sensorsIn(['zinc', 'humidity', 'ph', 'zinc']).map(({ name }) => name);
-  expect(names).toEqual([...KNOWN_SENSORS.map(({ name }) => name), 'ph', 'zinc']);
+  const names = CATALOGUE.with(['zinc', 'humidity', 'ph', 'zinc']).map(({ name }) => name);
+  expect(names).toEqual([...CATALOGUE.all.map(({ name }) => name), 'ph', 'zinc']);
+  expect(CATALOGUE.with(['humidity'])).toBe(CATALOGUE.all);
+});
+
+test('a sensor is called what the file calls it in that language, else its label, else its name', () => {
+  const { day: german } = cataloguesOf(FILE, 'de');
+  expect(german.named('humidity')).toMatchObject({ label: 'Luftfeuchte', dataLabel: 'Humidity' });
+  expect(german.named('co2')).toMatchObject({ label: 'CO₂', dataLabel: 'CO₂' });
+  expect(german.named('ph')).toMatchObject({ label: 'ph', dataLabel: 'ph' });
+  expect(cataloguesOf(FILE, 'fr').day.named('humidity').label).toBe('Humidity');
+});
+
+test('the file says what is derived', () => {
+  const derived = CATALOGUE.all.filter((sensor) => !isMeasured(sensor));
+  expect(derived.map(({ name }) => name)).toEqual(['vpd', 'dew_point']);
+});
+
+describe('ranges', () => {
+  const file = {
+    ...FILE,
+    sensors: {
+      heat: {
+        ...FILE.fallback,
+        ideal: [18, 26],
+        critical: [10, 35],
+        night: { ideal: [15, 24] },
+        species: { Orchid: { ideal: [20, 28], night: { ideal: null } }, moss: { ideal: null } },
+      },
+      damp: { ...FILE.fallback, ideal: [40, 60] },
+    },
+  };
+  const { day, night } = cataloguesOf(file);
+
+  test('are those of the day or of the night; of a night that says nothing, the day\u2019s', () => {
+    expect(day.named('heat')).toMatchObject({ ideal: [18, 26], critical: [10, 35] });
+    expect(night.named('heat')).toMatchObject({ ideal: [15, 24], critical: null });
+    expect(night.named('damp')).toMatchObject({ ideal: [40, 60] });
+    expect([day, night].map((each) => each.named('heat').part)).toEqual(['day', 'night']);
+    expect([day, night].map((each) => each.named('damp').part)).toEqual([null, null]);
+  });
+
+  test('a species has its own, or none, or those of all', () => {
+    expect(rangesFor(day.named('heat'), 'ORCHID').ideal).toEqual([20, 28]);
+    expect(rangesFor(night.named('heat'), 'orchid').ideal).toBeNull();
+    expect(rangesFor(day.named('heat'), 'moss').ideal).toBeNull();
+    expect(rangesFor(day.named('heat'), 'rose').ideal).toEqual([18, 26]);
+  });
+
+  test('before the bridge has told, nothing is judged', () => {
+    expect(NO_CATALOGUES.day.all).toEqual([]);
+    expect(NO_CATALOGUES.day.named('temperature')).toMatchObject({
+      label: 'temperature',
+      ideal: null,
+    });
+    expect(CATALOGUES.night.named('light').ideal).toBeNull();
+  });
 });

@@ -1,58 +1,130 @@
-import declared from '../../../backend/lupin_bridge/sensors.json';
+/** What the page knows about kinds of sensors: the file that is in force, as the bridge tells it. */
+import type { SensorEntry, SensorRanges, SensorsFile } from '../contract/types';
+import { LANGUAGE } from '../strings';
 
-/** What the page knows about a kind of sensor. The numbers stand once, in `sensors.json`. */
-export interface Sensor {
+/** From low to high, both included, in the sensor's unit. */
+export type Span = readonly [low: number, high: number];
+
+export interface Ranges {
+  /** Outside of it a reading is out of its range; null: it is never judged. */
+  readonly ideal: Span | null;
+  /** Outside of it, it is critical; null: nothing is. */
+  readonly critical: Span | null;
+}
+
+/** A kind of sensor, with the ranges of the day or of the night, whichever it is. */
+export interface Sensor extends Ranges {
   /** Name on the wire. */
   readonly name: string;
+  /** In the page's language; where the file has none, as in every language. */
   readonly label: string;
+  /** The same in every language, for files that programs read. */
+  readonly dataLabel: string;
   /** Unit of its readings; empty when unknown. */
   readonly unit: string;
-  /** Degrees and percent of the ramp's colour. */
+  /** Degrees and percents of the ramp's colour, and the heat map's alpha at the maximum. */
   readonly hue: number;
+  readonly saturation: number;
   readonly lightness: number;
-  /** Lowest and highest healthy value, in `unit`; null: readings are never judged. */
-  readonly ideal: readonly [low: number, high: number] | null;
+  readonly maxAlpha: number;
+  /** Computed of what was measured: there are fields of it, and no readings. */
+  readonly isDerived: boolean;
+  /** Whose its ranges are; null: by day and by night they are the same. */
+  readonly part: 'day' | 'night' | null;
+  /** Species with ranges of their own, by their name in lower case. */
+  readonly species: ReadonlyMap<string, Ranges>;
 }
 
-interface Declaration {
-  readonly label: string;
-  readonly unit: string;
-  readonly hue: number;
-  readonly lightness: number;
-  readonly ideal: readonly number[] | null;
+/** Whether tags can have readings of it: what is derived is told where it is a reason. */
+export const isMeasured = ({ isDerived }: Sensor): boolean => !isDerived;
+
+/** What holds for plants of a species; of one that is not known, what holds for all. */
+export const rangesFor = (sensor: Sensor, species: string): Ranges =>
+  sensor.species.get(species.toLowerCase()) ?? sensor;
+
+/** So many names that the file does not have are remembered; tags may make up any number. */
+const MOST_OTHERS = 1_000;
+
+/** The sensors of a file, by day or by night. */
+export class Catalogue {
+  /** Those of the file, in its order. */
+  readonly all: readonly Sensor[];
+  readonly #known: ReadonlyMap<string, Sensor>;
+  readonly #others = new Map<string, Sensor>();
+  readonly #other: (name: string) => Sensor;
+
+  constructor(all: readonly Sensor[], other: (name: string) => Sensor) {
+    this.all = all;
+    this.#known = new Map(all.map((sensor) => [sensor.name, sensor]));
+    this.#other = other;
+  }
+
+  /** A sensor by its name on the wire; one that nobody declared gets the fallback's look. */
+  named(name: string): Sensor {
+    const found = this.#known.get(name) ?? this.#others.get(name);
+    if (found) return found;
+    const other = this.#other(name);
+    if (this.#others.size >= MOST_OTHERS) this.#others.clear();
+    this.#others.set(name, other);
+    return other;
+  }
+
+  /** All sensors to offer: the declared ones, then others that some tag reports, by name. */
+  with(reported: Iterable<string>): readonly Sensor[] {
+    const others = [...new Set(reported)].filter((name) => !this.#known.has(name)).sort();
+    return others.length === 0
+      ? this.all
+      : [...this.all, ...others.map((name) => this.named(name))];
+  }
 }
 
-/** Saturation of every ramp (percent) and the heat map's alpha at the maximum. */
-export const RAMP = { saturation: declared.ramp.saturation, maxAlpha: declared.ramp.max_alpha };
+/** One file: what holds by day, and what by night. */
+export interface Catalogues {
+  readonly day: Catalogue;
+  readonly night: Catalogue;
+}
 
-const declarations = declared.sensors as Readonly<Record<string, Declaration>>;
-
-function toSensor(name: string, { label, unit, hue, lightness, ideal }: Declaration): Sensor {
-  const [low, high] = ideal ?? [];
-  return {
-    name,
-    label: label || name,
-    unit,
-    hue,
-    lightness,
-    ideal: low !== undefined && high !== undefined ? [low, high] : null,
+export function cataloguesOf(file: SensorsFile, language: string = LANGUAGE): Catalogues {
+  const by = (isDay: boolean): Catalogue => {
+    const made = (name: string, entry: SensorEntry): Sensor => ({
+      name,
+      label: entry.labels?.[language] ?? (entry.label || name),
+      dataLabel: entry.label || name,
+      unit: entry.unit,
+      hue: entry.hue,
+      lightness: entry.lightness,
+      saturation: file.ramp.saturation,
+      maxAlpha: file.ramp.max_alpha,
+      isDerived: entry.derived ?? false,
+      part: entry.night ? (isDay ? 'day' : 'night') : null,
+      ...rangesOf(entry, isDay),
+      species: new Map(
+        Object.entries(entry.species ?? {}).map(([species, ranges]) => [
+          species.toLowerCase(),
+          rangesOf(ranges, isDay),
+        ]),
+      ),
+    });
+    const all = Object.entries(file.sensors).map(([name, entry]) => made(name, entry));
+    return new Catalogue(all, (name) => made(name, file.fallback));
   };
+  return { day: by(true), night: by(false) };
 }
 
-/** The sensors of `sensors.json`, in its order. */
-export const KNOWN_SENSORS: readonly Sensor[] = Object.entries(declarations).map(
-  ([name, declaration]) => toSensor(name, declaration),
-);
-
-const known = new Map(KNOWN_SENSORS.map((sensor) => [sensor.name, sensor]));
-
-/** A sensor by its name on the wire; one that nobody declared gets the fallback's look. */
-export function sensorNamed(name: string): Sensor {
-  return known.get(name) ?? toSensor(name, declared.fallback);
+/** Of a night that says nothing, what holds by day. */
+function rangesOf(entry: SensorRanges, isDay: boolean): Ranges {
+  const { ideal, critical } = isDay ? entry : (entry.night ?? entry);
+  return { ideal: spanOf(ideal), critical: spanOf(critical) };
 }
 
-/** All sensors to offer: the declared ones, then others that some tag reports, by name. */
-export function sensorsIn(reported: Iterable<string>): readonly Sensor[] {
-  const others = [...new Set(reported)].filter((name) => !known.has(name)).sort();
-  return others.length === 0 ? KNOWN_SENSORS : [...KNOWN_SENSORS, ...others.map(sensorNamed)];
+function spanOf(bounds: readonly number[] | null | undefined): Span | null {
+  const [low, high] = bounds ?? [];
+  return low !== undefined && high !== undefined ? [low, high] : null;
 }
+
+/** Before the bridge has told: no sensor has more than its name, and none is judged. */
+export const NO_CATALOGUES: Catalogues = cataloguesOf({
+  ramp: { saturation: 0, max_alpha: 0 },
+  fallback: { label: '', unit: '', hue: 0, lightness: 50, ideal: null },
+  sensors: {},
+});

@@ -1,10 +1,11 @@
 import { describe, expect, test } from 'vitest';
 
+import { judgement, NOBODY, reason } from '../testing/health';
 import { readings, tag } from '../testing/tags';
 import { houseHealth } from './health';
-import { sensorNamed } from './sensors';
 import { filterRows, rowsOf, sortRows, tableCsv, type Row } from './table';
 import { compareIds } from './twin';
+import { CATALOGUE, sensorNamed } from '../testing/sensors';
 
 const tags = [
   tag({
@@ -27,7 +28,16 @@ const tags = [
     pose: { position: { x: 0, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 0 } },
   }),
 ];
-const rows = rowsOf(tags, houseHealth(tags));
+const said = judgement({
+  1: 'unknown',
+  2: 'healthy',
+  9: 'healthy',
+  10: [
+    reason({ value: 35, limit: 30 }),
+    reason({ kind: 'pest', sensor: '', value: 3, limit: null }),
+  ],
+});
+const rows = rowsOf(tags, houseHealth(tags, said, true));
 /** As `sortRows` wants them. */
 const byId = [...rows].sort((a, b) => compareIds(a.tag.id, b.tag.id));
 const ids = (list: readonly Row[]): string[] => list.map((row) => row.tag.id);
@@ -67,7 +77,7 @@ describe('sorting', () => {
 
   test('texts are sorted as a person would', () => {
     const named = ['b10', 'b9', 'a'].map((species, i) => tag({ tag_id: String(i), species }));
-    const some = rowsOf(named, houseHealth(named));
+    const some = rowsOf(named, houseHealth(named, NOBODY, true));
     expect(ids(sortRows(some, { column: 'species', descending: false }))).toEqual(['2', '1', '0']);
   });
 });
@@ -82,21 +92,23 @@ describe('filter', () => {
     ['critical temp', ['10']],
     ['rose pest', []],
   ])('%j', (text, expected) => {
-    expect(ids(filterRows(rows, text, null))).toEqual(expected);
+    expect(ids(filterRows(rows, text, null, CATALOGUE))).toEqual(expected);
   });
 
   test('by health', () => {
-    expect(ids(filterRows(rows, '', 'no-data'))).toEqual(['1']);
+    expect(ids(filterRows(rows, '', 'unknown', CATALOGUE))).toEqual(['1']);
   });
 });
 
 test('the file has every tag, values in the shown unit, and ages of its time', () => {
   const sensors = [sensorNamed('temperature'), sensorNamed('humidity')];
-  const text = tableCsv(rows, sensors, 'F', 10_000);
+  const text = tableCsv(rows, CATALOGUE, sensors, 'F', 10_000);
   const lines = text.split('\r\n');
   expect(lines[0]).toContain('Temperature [°F],Humidity [%]');
   expect(lines).toHaveLength(1 + tags.length + 1);
-  expect(lines[1]).toBe('2,Healthy,Temperature,68,,rose,,0,0,no,15,1970-01-01T00:01:40.250Z,1,2');
-  expect(lines[2]).toBe('10,Critical,Temperature,95,,,,0,3,yes,15,1970-01-01T00:01:40.000Z,1,2');
-  expect(lines[4]).toBe('1,No data,,,,,,0,0,no,,,,');
+  expect(lines[1]).toBe('2,Healthy,,68,,rose,,0,0,no,15,1970-01-01T00:01:40.250Z,1,2');
+  expect(lines[2]).toBe(
+    '10,Critical,"Temperature 95.0\u00a0°F, above 86.0 (critical); 3 pests seen",95,,,,0,3,yes,15,1970-01-01T00:01:40.000Z,1,2',
+  );
+  expect(lines[4]).toBe('1,Unknown,,,,,,0,0,no,,,,');
 });

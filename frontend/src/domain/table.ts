@@ -1,10 +1,11 @@
 /** Rows of the table: what is in a column, how it sorts, what a filter finds. */
-import type { WireTime } from '../contract/types';
+import type { TagHealth, Verdict, WireTime } from '../contract/types';
 import { S } from '../strings';
 import { ageSeconds } from './age';
 import { csv, type Cell } from './csv';
-import type { HealthStatus, HouseHealth, TagHealth } from './health';
-import { sensorNamed, type Sensor } from './sensors';
+import { severity, type HouseHealth } from './health';
+import { reasonsText } from './reasons';
+import type { Catalogue, Sensor } from './sensors';
 import { tryKind } from './tries';
 import { compareIds, type Tag } from './twin';
 import { toShown, unitOf, type TemperatureUnit } from './units';
@@ -27,7 +28,7 @@ type Key = number | string | null;
 export function sortKey({ tag, health }: Row, column: string): Key {
   switch (column) {
     case 'health':
-      return health.deviation;
+      return severity(health);
     case 'tag':
       return tag.id;
     case 'species':
@@ -75,38 +76,39 @@ function textRanks(keys: readonly Key[]): ReadonlyMap<string, number> {
 export function filterRows(
   rows: readonly Row[],
   text: string,
-  health: HealthStatus | null,
+  health: Verdict | null,
+  sensors: Catalogue,
 ): readonly Row[] {
   const words = text.toLowerCase().split(/\s+/).filter(Boolean);
   if (words.length === 0 && health === null) return rows;
   return rows.filter(
     (row) =>
-      (health === null || row.health.status === health) &&
-      words.every((word) => haystack(row).includes(word)),
+      (health === null || row.health.verdict === health) &&
+      words.every((word) => haystack(row, sensors).includes(word)),
   );
 }
 
-/** A tag is searched with each letter that is typed, and its health follows from it. */
-const haystacks = new WeakMap<Tag, string>();
+/** A tag is searched with each letter that is typed. */
+const haystacks = new WeakMap<Tag, Row & { readonly sensors: Catalogue; readonly text: string }>();
 
-function haystack(row: Row): string {
+function haystack(row: Row, sensors: Catalogue): string {
   const known = haystacks.get(row.tag);
-  if (known !== undefined) return known;
-  const text = haystackOf(row);
-  haystacks.set(row.tag, text);
+  if (known?.health === row.health && known.sensors === sensors) return known.text;
+  const text = haystackOf(row, sensors);
+  haystacks.set(row.tag, { ...row, sensors, text });
   return text;
 }
 
-function haystackOf({ tag, health }: Row): string {
+function haystackOf({ tag, health }: Row, sensors: Catalogue): string {
   return [
     tag.id,
     tag.species || S.unclassified,
-    S.health[health.status],
+    S.health[health.verdict],
     tag.anomaly ? S.pest : '',
     tag.at ? '' : S.notOnMap,
     tag.scannedAt === 'never' ? S.neverObserved : '',
     tag.failedTry ? S.tried[tryKind(tag.failedTry.status)] : '',
-    ...[...tag.readings.keys()].map((name) => `${name} ${sensorNamed(name).label}`),
+    ...[...tag.readings.keys()].map((name) => `${name} ${sensors.named(name).label}`),
   ]
     .join(' ')
     .toLowerCase();
@@ -118,39 +120,33 @@ function observedText({ sec, nanosec }: WireTime): string | null {
   return new Date(sec * 1000 + Math.floor(nanosec / 1e6)).toISOString();
 }
 
-/** The table as a file: raw values at full precision, in the units that the page shows. */
+/**
+ * The table as a file: raw values at full precision, in the units that the page shows. Programs read
+ * it, so its columns are named, and its numbers written, the same in every language.
+ */
 export function tableCsv(
   rows: readonly Row[],
+  catalogue: Catalogue,
   sensors: readonly Sensor[],
   unit: TemperatureUnit,
   /** When the state was taken, ms on the monotonic clock: ages are those of that moment. */
   now: number,
 ): string {
-  const T = S.csv;
   const header: Cell[] = [
-    T.tag,
-    T.health,
-    T.driver,
+    ...['tag', 'health', 'reasons'],
     ...sensors.map((sensor) => {
       const suffix = unitOf(sensor, unit);
-      return suffix ? `${sensor.label} [${suffix}]` : sensor.label;
+      return suffix ? `${sensor.dataLabel} [${suffix}]` : sensor.dataLabel;
     }),
-    T.species,
-    T.confidence,
-    T.flowers,
-    T.bugs,
-    T.pest,
-    T.age,
-    T.observed,
-    T.x,
-    T.y,
+    ...['species', 'species confidence', 'blooms', 'bugs', 'pest', 'age [s]'],
+    ...['last observed [UTC]', 'x [m]', 'y [m]'],
   ];
   const lines = rows.map(({ tag, health }): Cell[] => {
     const age = ageSeconds(tag.scannedAt, now);
     return [
       tag.id,
-      S.health[health.status],
-      health.sensor === null ? null : sensorNamed(health.sensor).label,
+      S.health[health.verdict],
+      reasonsText(catalogue, health.reasons, unit) || null,
       ...sensors.map((sensor): Cell => {
         const value = tag.readings.get(sensor.name);
         return value == null ? null : round(toShown(sensor, value, unit));
@@ -159,7 +155,7 @@ export function tableCsv(
       tag.speciesConfidence === null ? null : round(tag.speciesConfidence),
       tag.flowerCount,
       tag.bugCount,
-      tag.anomaly ? T.yes : T.no,
+      tag.anomaly ? 'yes' : 'no',
       age === null ? null : Math.round(age),
       observedText(tag.wire.last_observed),
       tag.at && round(tag.at.x),

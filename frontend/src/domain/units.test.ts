@@ -1,7 +1,7 @@
 import { expect, test } from 'vitest';
 
-import { sensorNamed } from './sensors';
 import { differenceToShown, fromShown, toShown, unitOf } from './units';
+import { sensorNamed } from '../testing/sensors';
 
 const temperature = sensorNamed('temperature');
 const humidity = sensorNamed('humidity');

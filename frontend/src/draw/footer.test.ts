@@ -8,6 +8,7 @@ const footer: Footer = {
   title: 'Temperature',
   time: '2026-05-01 14:03:22',
   ends: ['20.0', '31.0\u00a0°C'],
+  maxAlpha: 0.6,
   colour: [200, 0, 0],
   scale: 40,
 };

@@ -1,7 +1,7 @@
 /** What stands below the map in a saved picture: what it shows, of when, and how large it is. */
+import { written } from '../domain/format';
 import { rgbText, type Rgb } from '../domain/ramp';
 import { lengthText, scaleBar } from '../geometry/scale';
-import { RAMP } from '../domain/sensors';
 
 export const FOOTER_PX = 56;
 const EDGE_PX = 14;
@@ -17,6 +17,10 @@ export interface Footer {
   /** The ramp's two ends, the upper one with its unit; null: there is no reading. */
   readonly ends: readonly [low: string, high: string] | null;
   readonly colour: Rgb;
+  /** Alpha of the heat map at its maximum. */
+  readonly maxAlpha: number;
+  /** Colours from the lowest to the highest of a difference; none: more and more of the one. */
+  readonly diverging?: readonly string[];
   /** Pixels a metre. */
   readonly scale: number;
 }
@@ -43,7 +47,7 @@ export function drawFooter(
 
   const middle = 40;
   const bar = scaleBar(footer.scale, LONGEST_BAR_PX);
-  const length = lengthText(bar.metres);
+  const length = written(lengthText(bar.metres));
   context.fillText(length, right, middle);
   const end = right - context.measureText(length).width - GAP_PX;
   context.textAlign = 'left';
@@ -59,18 +63,25 @@ export function drawFooter(
   const [low, high] = footer.ends;
   context.fillText(low, EDGE_PX, middle);
   const left = EDGE_PX + context.measureText(low).width + GAP_PX;
-  drawRamp(context, left, middle - RAMP_PX.height / 2, footer.colour);
+  drawRamp(context, left, middle - RAMP_PX.height / 2, footer);
   context.fillStyle = ink;
   context.fillText(high, left + RAMP_PX.width + GAP_PX, middle);
 }
 
 /** The pins' colours above those of the heat map, as in the page's legend. */
-function drawRamp(context: CanvasRenderingContext2D, x: number, y: number, colour: Rgb): void {
+function drawRamp(
+  context: CanvasRenderingContext2D,
+  x: number,
+  y: number,
+  { colour, maxAlpha, diverging }: Footer,
+): void {
   const { width, height } = RAMP_PX;
-  [1, RAMP.maxAlpha].forEach((most, index) => {
+  [1, maxAlpha].forEach((most, index) => {
     const gradient = context.createLinearGradient(x, 0, x + width, 0);
-    gradient.addColorStop(0, rgbText(colour, 0));
-    gradient.addColorStop(1, rgbText(colour, most));
+    const stops = diverging ?? [rgbText(colour, 0), rgbText(colour, most)];
+    stops.forEach((stop, place) => {
+      gradient.addColorStop(place / (stops.length - 1), stop);
+    });
     context.fillStyle = gradient;
     context.fillRect(x, y + (index * height) / 2, width, height / 2);
   });

@@ -4,6 +4,7 @@ import { mapPoint } from '../geometry/coordinates';
 import { FakeContext } from '../testing/canvas';
 import { drawCrosshair, drawMark, drawPulses, PULSE_MS } from './overlay';
 import { LIGHT } from './palette';
+import { pinRadius } from './pins';
 
 const view = { x: 0, y: 100, scale: 50 };
 const set = (): { context: FakeContext; surface: Parameters<typeof drawPulses>[0] } => {
@@ -30,8 +31,10 @@ test('a pulse grows and vanishes', () => {
 test('the mark surrounds its pin', () => {
   const { context, surface } = set();
   drawMark(surface, view, mapPoint(1, 1), true, LIGHT);
-  expect(context.named('moveTo')[0]?.args[0]).toBe(50);
-  expect(context.named('moveTo')[0]?.args[1]).toBeLessThan(50);
+  const [x, y, radius] = (context.named('arc')[0]?.args ?? []) as number[];
+  expect([x, y]).toEqual([50, 50]);
+  // With the ring of a pest in it.
+  expect(radius).toBeGreaterThan(pinRadius(50) + 7);
 });
 
 test('the crosshair is in the middle', () => {

@@ -41,15 +41,11 @@ export function drawMark(
   strong: boolean,
   palette: Palette,
 ): void {
-  const radius = pinRadius(view.scale) + 5;
+  // Outside of the ring that tells a pest.
+  const radius = pinRadius(view.scale) + 9;
   const { x, y } = toCanvas(view, at);
   context.beginPath();
-  context.moveTo(x, y - radius);
-  context.lineTo(x + radius, y);
-  context.lineTo(x, y + radius);
-  context.lineTo(x - radius, y);
-  context.closePath();
-  context.lineJoin = 'round';
+  context.arc(x, y, radius, 0, 2 * Math.PI);
   context.strokeStyle = palette.halo;
   context.lineWidth = strong ? 6 : 4;
   context.stroke();

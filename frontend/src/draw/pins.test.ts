@@ -1,8 +1,10 @@
 import { describe, expect, test } from 'vitest';
 
+import type { Verdict } from '../contract/types';
+import { VERDICTS } from '../domain/health';
 import { mapPoint } from '../geometry/coordinates';
 import { FakeContext } from '../testing/canvas';
-import { LIGHT } from './palette';
+import { forcedPalette, LIGHT, type Palette } from './palette';
 import { bloomRadius, drawBlooms, drawLabels, drawPins, labelRequests, pinRadius } from './pins';
 import type { Pin } from './scene';
 import { Sprites, type Surface } from './surface';
@@ -13,7 +15,7 @@ const pin = (over: Partial<Pin> = {}): Pin => ({
   id: '1',
   at: mapPoint(1, 1),
   kind: 'value',
-  share: 0.5,
+  verdict: 'healthy',
   strength: 1,
   pest: false,
   texts: ['1 · 20', '1'],
@@ -22,7 +24,10 @@ const pin = (over: Partial<Pin> = {}): Pin => ({
 });
 
 /** Draws and returns what was copied to the surface, and what was painted into each sprite. */
-function draw(pins: readonly Pin[]): { copies: FakeContext; sprites: FakeContext[] } {
+function draw(
+  pins: readonly Pin[],
+  palette: Palette = LIGHT,
+): { copies: FakeContext; sprites: FakeContext[] } {
   const copies = new FakeContext();
   const sprites: FakeContext[] = [];
   const surface: Surface = {
@@ -40,7 +45,7 @@ function draw(pins: readonly Pin[]): { copies: FakeContext; sprites: FakeContext
       });
     }
   }
-  drawPins(surface, view, pins, [255, 0, 0], new Spy(1), LIGHT);
+  drawPins(surface, view, pins, new Spy(1), palette);
   return { copies, sprites };
 }
 
@@ -54,7 +59,7 @@ describe('pins', () => {
   test('is copied with its centre on its place', () => {
     const [copy] = draw([pin()]).copies.named('drawImage');
     const [, x, y] = copy?.args as [unknown, number, number];
-    const half = pinRadius(100) + 3;
+    const half = pinRadius(100) + 5;
     expect([x + half, y + half]).toEqual([100, 300]);
   });
 
@@ -64,27 +69,82 @@ describe('pins', () => {
     expect(alphas).toEqual([0.5, 1]);
   });
 
-  test('a value is filled; a lacking sensor is hollow and dashed', () => {
-    const [filled] = draw([pin()]).sprites;
-    expect(filled?.named('fill')).toHaveLength(1);
-    expect(filled?.named('setLineDash')).toHaveLength(0);
-    const [hollow] = draw([pin({ kind: 'lacking' })]).sprites;
-    expect(hollow?.named('fill')).toHaveLength(0);
-    expect(hollow?.named('setLineDash')).toHaveLength(1);
+  const fills = (over: Partial<Pin>): unknown[] =>
+    draw([pin(over)])
+      .sprites[0]?.named('fill')
+      .map(({ state }) => state['fillStyle']) ?? [];
+  const strokes = (over: Partial<Pin>): FakeContext['calls'] =>
+    draw([pin(over)]).sprites[0]?.named('stroke') ?? [];
+
+  test.each(VERDICTS)('one that is %s has the body of its verdict', (verdict) => {
+    expect(fills({ verdict })).toEqual([LIGHT.verdicts[verdict].body]);
   });
 
-  test('a failed sensor is hollow, and struck through instead of dashed', () => {
-    const [failed] = draw([pin({ kind: 'failed' })]).sprites;
-    expect(failed?.named('fill')).toHaveLength(0);
-    expect(failed?.named('setLineDash')).toHaveLength(0);
-    expect(failed?.named('stroke')).toHaveLength(2);
+  test('silhouettes differ: three of lines, the others told by what fills them', () => {
+    const outline = (verdict: Verdict): string => {
+      const [sprite] = draw([pin({ verdict })]).sprites;
+      const end = sprite?.calls.findIndex(({ name }) => name === 'stroke') ?? 0;
+      const names = sprite?.calls.slice(0, end).map(({ name }) => name) ?? [];
+      return names.filter((name) => name === 'lineTo' || name === 'arc').join();
+    };
+    expect(outline('critical')).toBe('lineTo,lineTo,lineTo');
+    expect(outline('stressed')).toBe('lineTo,lineTo');
+    expect(outline('healthy')).toBe('arc');
+    expect(outline('unknown')).toBe('arc');
+    expect(fills({ verdict: 'unknown' })).not.toEqual(fills({ verdict: 'healthy' }));
   });
 
-  test('the pest’s ring is dashed and carries a sign', () => {
+  test('without a reading of the sensor in view a body is empty, its line in the verdict’s colour', () => {
+    const empty = [LIGHT.verdicts.unknown.body];
+    const red = LIGHT.verdicts.critical.line;
+    for (const kind of ['lacking', 'failed'] as const) {
+      expect(fills({ verdict: 'critical', kind })).toEqual(empty);
+      expect(strokes({ verdict: 'critical', kind })[1]?.state['strokeStyle']).toBe(red);
+    }
+    const dashes = (kind: Pin['kind']): unknown[] =>
+      draw([pin({ kind })])
+        .sprites[0]?.named('setLineDash')
+        .map(({ args }) => args[0]) ?? [];
+    expect(dashes('lacking')).toContainEqual([3, 3]);
+    expect(dashes('failed')).toEqual([[]]);
+    // A stroke through it in place of the sign: halo, outline, and that.
+    expect(strokes({ kind: 'failed' })).toHaveLength(3);
+    expect(strokes({ verdict: 'critical', kind: 'value' })).toHaveLength(4);
+  });
+
+  test('with forced colours no line is drawn in the colour that it encloses', () => {
+    const forced = forcedPalette((name) => (name === 'Canvas' ? [255, 255, 255] : [0, 0, 0]));
+    for (const verdict of VERDICTS) {
+      for (const kind of ['value', 'lacking', 'failed'] as const) {
+        const [sprite] = draw([pin({ verdict, kind })], forced).sprites;
+        const line = sprite?.named('stroke')[1]?.state['strokeStyle'];
+        expect(line, `${verdict} ${kind}`).toBe('rgb(0 0 0)');
+      }
+    }
+  });
+
+  test('who needs somebody lies on top, whatever the order', () => {
+    const order = (...verdicts: Verdict[]): unknown[] =>
+      draw(verdicts.map((verdict, id) => pin({ id: String(id), verdict, strength: 1 - id / 10 })))
+        .copies.named('drawImage')
+        .map(({ state }) => state['globalAlpha']);
+    expect(order('critical', 'healthy', 'unknown', 'stressed')).toEqual([0.9, 0.8, 0.7, 1]);
+  });
+
+  test('five hundred pins are a handful of sprites', () => {
+    const kinds = ['value', 'failed', 'lacking'] as const;
+    const pins = Array.from({ length: 500 }, (_, i) =>
+      pin({ id: String(i), verdict: VERDICTS[i % 4] ?? 'unknown', kind: kinds[i % 3] ?? 'value' }),
+    );
+    const { copies, sprites } = draw(pins);
+    expect(copies.named('drawImage')).toHaveLength(500);
+    expect(sprites.length).toBeLessThanOrEqual(12);
+  });
+
+  test('the pest’s ring is dashed and carries a bug', () => {
     const [, ring] = draw([pin({ pest: true })]).sprites;
     expect(ring?.named('setLineDash')[0]?.args).not.toEqual([[]]);
-    expect(ring?.named('arc')).toHaveLength(1);
-    expect(ring?.named('fillRect').length).toBeGreaterThan(0);
+    expect(ring?.named('ellipse')).toHaveLength(1);
   });
 
   test('what is out of sight is not copied', () => {
@@ -128,7 +188,7 @@ test('labels are as high as their text asks for', () => {
 });
 
 test('pins and blooms shrink with the map, within limits', () => {
-  expect(pinRadius(1)).toBe(5);
+  expect(pinRadius(1)).toBe(6);
   expect(pinRadius(5000)).toBe(11);
   expect(bloomRadius(1)).toBe(1.5);
   expect(bloomRadius(5000)).toBe(6);

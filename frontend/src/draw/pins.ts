@@ -1,5 +1,7 @@
 /** Pins, blooms, pest rings and labels: what the data moves. All from cached sprites. */
-import { mix, rgbText, type Rgb } from '../domain/ramp';
+import { MARKS, type Mark, type Point } from '../domain/marks';
+import { VERDICTS } from '../domain/health';
+import { rgbText } from '../domain/ramp';
 import type { BloomLook } from '../domain/species';
 import { toCanvas, type View } from '../geometry/coordinates';
 import type { LabelRequest, PlacedLabel } from '../geometry/declutter';
@@ -13,9 +15,9 @@ export const labelFont = (text: number): string =>
   `600 ${11.5 * text}px "Inter Variable", system-ui, sans-serif`;
 const LABEL_PADDING = 5;
 
-/** Half the diagonal of a pin in pixels: smaller when far away, so that pins stay apart. */
+/** Half a pin's width in pixels: smaller when far away, so that pins stay apart, and never too small to be told. */
 export function pinRadius(scale: number): number {
-  return Math.round(Math.min(11, Math.max(5, scale * 0.11)));
+  return Math.round(Math.min(11, Math.max(6, scale * 0.11)));
 }
 
 export function bloomRadius(scale: number): number {
@@ -75,27 +77,35 @@ function paintBloom(
   context.stroke();
 }
 
+/** Warnings are larger than the rest. */
+const WARNING_PX = 1;
+
+/** Those who need somebody lie on top of their neighbours. */
+const BY_SEVERITY = [...VERDICTS].reverse();
+
 export function drawPins(
   surface: Surface,
   view: View,
   pins: readonly Pin[],
-  colour: Rgb,
   sprites: Sprites,
   palette: Palette,
 ): void {
   const radius = pinRadius(view.scale);
-  const box = (radius + 3) * 2;
-  for (const pin of pins) {
-    const { x, y } = toCanvas(view, pin.at);
-    if (!inside(surface, x, y, box)) continue;
-    const key = `pin ${radius} ${pin.kind} ${pin.share} ${colour.join()}`;
-    const sprite = sprites.get(key, box, box, (context) => {
-      context.translate(box / 2, box / 2);
-      paintPin(context, radius, pin.kind, mix(palette.pinBody, colour, pin.share), palette);
-    });
-    surface.context.globalAlpha = pin.strength;
-    sprites.draw(surface, sprite, x - box / 2, y - box / 2);
-    surface.context.globalAlpha = 1;
+  const box = (radius + WARNING_PX + 4) * 2;
+  for (const verdict of BY_SEVERITY) {
+    for (const pin of pins) {
+      if (pin.verdict !== verdict) continue;
+      const { x, y } = toCanvas(view, pin.at);
+      if (!inside(surface, x, y, box)) continue;
+      const key = `pin ${radius} ${verdict} ${pin.kind}`;
+      const sprite = sprites.get(key, box, box, (context) => {
+        context.translate(box / 2, box / 2);
+        paintPin(context, radius, pin, palette);
+      });
+      surface.context.globalAlpha = pin.strength;
+      sprites.draw(surface, sprite, x - box / 2, y - box / 2);
+      surface.context.globalAlpha = 1;
+    }
   }
   // Last, so that no neighbour covers a warning; and never faded.
   for (const pin of pins) {
@@ -105,41 +115,72 @@ export function drawPins(
   }
 }
 
-/** A diamond about the origin. Hollow and dashed: the tag lacks the sensor. */
+/**
+ * The mark of a verdict about the origin. Whether the tag has the sensor in view is told by its
+ * body: full with a reading, empty and its line broken without such a sensor, empty and struck through
+ * where the sensor gives no number.
+ */
 function paintPin(
   context: CanvasRenderingContext2D,
-  radius: number,
-  kind: Pin['kind'],
-  fill: Rgb,
+  pinSize: number,
+  { verdict, kind }: Pick<Pin, 'verdict' | 'kind'>,
   palette: Palette,
 ): void {
-  const diamond = (): void => {
-    context.beginPath();
-    context.moveTo(0, -radius);
-    context.lineTo(radius, 0);
-    context.lineTo(0, radius);
-    context.lineTo(-radius, 0);
-    context.closePath();
-  };
-  diamond();
+  const mark = MARKS[verdict];
+  const { body, ink, line: own } = palette.verdicts[verdict];
+  const isWarning = verdict === 'critical' || verdict === 'stressed';
+  const radius = pinSize + (isWarning ? WARNING_PX : 0);
+  const isEmpty = kind !== 'value';
+  const isLine = isEmpty || mark.isHollow;
+  traceOutline(context, mark, radius);
   context.lineJoin = 'round';
+  context.lineCap = 'round';
+  // The halo tells it from whatever colour lies below.
   context.strokeStyle = palette.halo;
-  context.lineWidth = 4;
-  if (kind === 'value') context.stroke();
-  if (kind === 'value') {
-    context.fillStyle = rgbText(fill);
-    context.fill();
-  }
-  context.strokeStyle = palette.pinLine;
-  context.lineWidth = kind === 'value' ? 1.5 : 1.25;
-  if (kind === 'lacking') context.setLineDash([3, 2.5]);
+  context.lineWidth = isLine ? 5 : 4;
   context.stroke();
-  if (kind === 'failed') {
-    // A stroke through it: there is such a sensor, and it gives no number.
-    context.beginPath();
-    context.moveTo(-radius * 0.5, radius * 0.5);
-    context.lineTo(radius * 0.5, -radius * 0.5);
+  context.fillStyle = isEmpty ? palette.verdicts.unknown.body : body;
+  context.fill();
+  context.strokeStyle = isLine ? own : palette.pinLine;
+  context.lineWidth = isLine ? 2 : 1.25;
+  if (kind === 'lacking') context.setLineDash([3, 3]);
+  context.stroke();
+  context.setLineDash([]);
+  context.strokeStyle = isEmpty ? own : ink;
+  context.lineWidth = Math.max(1.5, radius * 0.24);
+  for (const line of kind === 'failed' ? STRUCK : mark.sign) {
+    traceLine(context, line, radius);
     context.stroke();
+  }
+}
+
+/** There is such a sensor, and it gives no number. */
+const STRUCK: Mark['sign'] = [
+  [
+    [-0.45, 0.45],
+    [0.45, -0.45],
+  ],
+];
+
+function traceOutline(context: CanvasRenderingContext2D, { outline }: Mark, radius: number): void {
+  if (outline === 'circle') {
+    context.beginPath();
+    context.arc(0, 0, radius, 0, 2 * Math.PI);
+  } else {
+    traceLine(context, outline, radius);
+    context.closePath();
+  }
+}
+
+function traceLine(
+  context: CanvasRenderingContext2D,
+  line: readonly Point[],
+  radius: number,
+): void {
+  context.beginPath();
+  for (const [index, [x, y]] of line.entries()) {
+    if (index === 0) context.moveTo(x * radius, y * radius);
+    else context.lineTo(x * radius, y * radius);
   }
 }
 
@@ -162,35 +203,36 @@ function drawPest(
     context.arc(0, 0, ring, 0, 2 * Math.PI);
     context.stroke();
     context.setLineDash([]);
-    paintWarning(context, ring * 0.74, -ring * 0.74, palette);
+    context.translate(ring * 0.74, -ring * 0.74);
+    // Small pins stand close together.
+    context.scale(radius < 8 ? 0.8 : 1, radius < 8 ? 0.8 : 1);
+    paintBug(context, palette);
   });
   sprites.draw(surface, sprite, x - box / 2, y - box / 2);
 }
 
-/** A warning triangle with its mark, centred at (x, y). */
-function paintWarning(
-  context: CanvasRenderingContext2D,
-  x: number,
-  y: number,
-  palette: Palette,
-): void {
-  context.save();
-  context.translate(x, y);
+/** A bug on a disc about the origin: no shape of any verdict. */
+function paintBug(context: CanvasRenderingContext2D, palette: Palette): void {
   context.beginPath();
-  context.moveTo(0, -8);
-  context.lineTo(8, 6);
-  context.lineTo(-8, 6);
-  context.closePath();
-  context.lineJoin = 'round';
+  context.arc(0, 0, 7, 0, 2 * Math.PI);
   context.strokeStyle = palette.halo;
   context.lineWidth = 3;
   context.stroke();
   context.fillStyle = palette.pest;
   context.fill();
+  context.strokeStyle = palette.pestInk;
   context.fillStyle = palette.pestInk;
-  context.fillRect(-1, -3.5, 2, 5);
-  context.fillRect(-1, 2.6, 2, 2);
-  context.restore();
+  context.lineWidth = 1;
+  for (const y of [-1.5, 1, 3.2]) {
+    traceLine(context, [[-4.2, y], [4.2, y]], 1); // prettier-ignore
+    context.stroke();
+  }
+  context.beginPath();
+  context.ellipse(0, 1, 2.1, 3.4, 0, 0, 2 * Math.PI);
+  context.fill();
+  context.beginPath();
+  context.arc(0, -3.3, 1.4, 0, 2 * Math.PI);
+  context.fill();
 }
 
 /** What `placeLabels` needs to know, relative to the map's origin. */

@@ -2,18 +2,23 @@ import { describe, expect, test } from 'vitest';
 
 import { GROWING } from '../domain/age';
 import { houseHealth } from '../domain/health';
-import { sensorNamed } from '../domain/sensors';
+import { judgement, NOBODY } from '../testing/health';
 import { readings, tag } from '../testing/tags';
 import type { Tag } from '../domain/twin';
 import { buildScene, type Scene } from './scene';
+import { sensorNamed } from '../testing/sensors';
 
-const scene = (tags: readonly Tag[], now = 0, before: Scene | null = null): Scene =>
+const scene = (
+  tags: readonly Tag[],
+  now = 0,
+  before: Scene | null = null,
+  health = NOBODY,
+): Scene =>
   buildScene(
     {
       tags,
-      health: houseHealth(tags),
+      health: houseHealth(tags, health, true),
       sensor: sensorNamed('temperature'),
-      range: { low: 10, high: 30 },
       unit: 'C',
       now,
       ageing: GROWING,
@@ -34,11 +39,36 @@ describe('pins', () => {
     expect(kinds).toEqual(['value', 'failed', 'lacking']);
   });
 
-  test('the share follows the range', () => {
+  test('has the verdict that was given, unknown where none was', () => {
+    const tags = ['1', '2', '3'].map((tag_id) => tag({ tag_id }));
+    const said = judgement({ '1': 'critical', '2': 'healthy' });
+    const verdicts = scene(tags, 0, null, said).pins.map(({ verdict }) => verdict);
+    expect(verdicts).toEqual(['critical', 'healthy', 'unknown']);
+  });
+
+  test('another verdict makes another pin, and only of that tag', () => {
+    const tags = [tag(), tag({ tag_id: '2' })];
+    const before = scene(tags, 0, null, judgement({ '1': 'healthy', '2': 'healthy' }));
+    const after = scene(tags, 0, before, judgement({ '1': 'stressed', '2': 'healthy' }));
+    expect(after.pins[0]?.verdict).toBe('stressed');
+    expect(after.pins[1]).toBe(before.pins[1]);
+  });
+
+  test('a label tells the value', () => {
     const [pin] = scene([tag({ readings: readings({ temperature: 25 }) })]).pins;
-    expect(pin?.share).toBeCloseTo(0.75);
     expect(pin?.texts).toEqual(['1 · 25.0\u00a0°C', '1']);
   });
+
+  test.each(['critical', 'stressed'] as const)(
+    'one that is %s never fades out of sight',
+    (verdict) => {
+      const tags = [tag({ readings: readings({ temperature: 20 }) })];
+      const [pin] = scene(tags, 86_400_000, null, judgement({ '1': verdict })).pins;
+      expect(pin?.strength).toBeGreaterThan(0.8);
+      const [well] = scene(tags, 86_400_000, null, judgement({ '1': 'healthy' })).pins;
+      expect(well?.strength).toBeLessThan(0.5);
+    },
+  );
 
   test('a pin fades with age', () => {
     const tags = [tag({ readings: readings({ temperature: 20 }) })];

@@ -1,8 +1,8 @@
 /** What to draw, from the data: one list each of pins, blooms and boxes. Pure. */
+import type { Verdict } from '../contract/types';
 import { ageSeconds, freshness, type Ageing } from '../domain/age';
 import { readingText } from '../domain/format';
 import type { HouseHealth } from '../domain/health';
-import { fraction, type Range } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
 import { speciesLooks, UNKNOWN_SPECIES, type BloomLook } from '../domain/species';
 import { shown } from '../domain/text';
@@ -10,9 +10,10 @@ import type { Tag } from '../domain/twin';
 import type { TemperatureUnit } from '../domain/units';
 import type { MapPoint } from '../geometry/coordinates';
 
-/** Steps of colour and of fading; more cannot be told apart and would cost sprites. */
-const COLOUR_STEPS = 32;
+/** Steps of fading; more cannot be told apart. */
 const FADE_STEPS = 6;
+/** A pin that needs somebody stays in sight, however old what it says. */
+const FAINTEST_WARNING = 5 / 6;
 
 export interface Pin {
   readonly id: string;
@@ -23,9 +24,9 @@ export interface Pin {
    * - lacking: it has no such sensor
    */
   readonly kind: 'value' | 'failed' | 'lacking';
-  /** Place of the value in the range, 0 to 1; 0 without a value. */
-  readonly share: number;
-  /** How fresh, 0.35 to 1. */
+  /** As the bridge judged the tag. */
+  readonly verdict: Verdict;
+  /** How fresh, 0.35 to 1; of a warning never faint. */
   readonly strength: number;
   readonly pest: boolean;
   /** Label texts from the most to the least telling. */
@@ -48,7 +49,6 @@ export interface SceneInput {
   readonly tags: readonly Tag[];
   readonly health: HouseHealth;
   readonly sensor: Sensor;
-  readonly range: Range | null;
   readonly unit: TemperatureUnit;
   /** ms on the monotonic clock. */
   readonly now: number;
@@ -104,33 +104,30 @@ const samePin = (a: Pin, b: Pin): boolean =>
   a.at.x === b.at.x &&
   a.at.y === b.at.y &&
   a.kind === b.kind &&
-  a.share === b.share &&
+  a.verdict === b.verdict &&
   a.strength === b.strength &&
   a.pest === b.pest &&
   a.priority === b.priority &&
   a.texts.length === b.texts.length &&
   a.texts.every((text, index) => text === b.texts[index]);
 
-function pinOf(
-  tag: Tag,
-  at: MapPoint,
-  { health, sensor, range, unit, now, ageing }: SceneInput,
-): Pin {
+function pinOf(tag: Tag, at: MapPoint, { health, sensor, unit, now, ageing }: SceneInput): Pin {
   const value = tag.readings.get(sensor.name);
-  const strength = freshness(ageSeconds(tag.readAt.get(sensor.name) ?? tag.scannedAt, now, ageing));
-  const status = health.byTag.get(tag.id)?.status;
+  const fresh = freshness(ageSeconds(tag.readAt.get(sensor.name) ?? tag.scannedAt, now, ageing));
+  const verdict = health.byTag.get(tag.id)?.verdict ?? 'unknown';
+  const isWarning = verdict === 'critical' || verdict === 'stressed';
   return {
     id: tag.id,
     at,
     kind: value === undefined ? 'lacking' : value === null ? 'failed' : 'value',
-    share: value == null || !range ? 0 : quantised(fraction(range, value), COLOUR_STEPS),
-    strength: quantised(strength, FADE_STEPS),
+    verdict,
+    strength: Math.max(quantised(fresh, FADE_STEPS), isWarning ? FAINTEST_WARNING : 0),
     pest: tag.anomaly,
     texts: textsOf(tag, sensor, value, unit),
     priority:
       (tag.anomaly ? 4 : 0) +
       (value == null ? 0 : 2) +
-      (status === 'critical' ? 1 : status === 'stressed' ? 0.5 : 0),
+      (verdict === 'critical' ? 4 : verdict === 'stressed' ? 3 : 0),
   };
 }
 

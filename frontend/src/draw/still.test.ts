@@ -67,6 +67,17 @@ test('the grid’s numbers are round metres at their lines', () => {
   expect(two?.[1]).toBe(50 + 2 * 40 + 4);
 });
 
+test.each([1, 1.5, 2, 3])('the grid’s numbers keep apart at %d times the text', (textScale) => {
+  const context = new FakeContext();
+  drawGridLabels(surface(context), view, LIGHT, textScale);
+  const along = context
+    .named('fillText')
+    .filter(({ args }) => args[2] === 4)
+    .map(({ args }) => args[1] as number);
+  const gaps = along.slice(1).map((at, i) => at - (along[i] ?? 0));
+  expect(Math.min(...gaps)).toBeGreaterThanOrEqual(56 * textScale);
+});
+
 test('text on the map can be read in both themes', () => {
   for (const palette of [LIGHT, DARK]) {
     const ink = Number(/\d+/.exec(palette.labelText)?.[0]);

@@ -1,5 +1,6 @@
 /** What changes only with the data or the view: ground, SLAM map, heat map, grid, boxes. */
 import type { Field } from '../contract/types';
+import { written } from '../domain/format';
 import { mix, rgbText } from '../domain/ramp';
 import { canvasPoint, toCanvas, toMap, type MapPoint, type View } from '../geometry/coordinates';
 import { imageToCanvas, type Placement } from '../geometry/image';
@@ -15,6 +16,8 @@ export function drawGround({ context, size }: Surface, palette: Palette): void {
 /** The greys of /api/map.png between which a cell lies, from occupied to free. */
 const OCCUPIED_GREY = 70;
 const FREE_GREY = 236;
+/** Lighter is floor. */
+export const LEAST_FREE_GREY = (OCCUPIED_GREY + FREE_GREY) / 2;
 
 /** The SLAM map in the theme's colours: its grey becomes the way from wall to floor. */
 export function tintMap(pixels: ImageData, palette: Palette): HTMLCanvasElement {
@@ -71,8 +74,8 @@ interface GridTicks {
 }
 
 /** Round metres within the surface. */
-function gridTicks({ size }: Surface, view: View): GridTicks {
-  const step = gridStep(view.scale, GRID_GAP_PX);
+function gridTicks({ size }: Surface, view: View, textScale: number): GridTicks {
+  const step = gridStep(view.scale, GRID_GAP_PX * textScale);
   const topLeft = toMap(view, canvasPoint(0, 0));
   const bottomRight = toMap(view, canvasPoint(size.width, size.height));
   return {
@@ -81,10 +84,10 @@ function gridTicks({ size }: Surface, view: View): GridTicks {
   };
 }
 
-/** Lines at round metres. */
-export function drawGridLines(surface: Surface, view: View, palette: Palette): void {
+/** Lines at round metres, so far apart that their numbers have room. */
+export function drawGridLines(surface: Surface, view: View, palette: Palette, textScale = 1): void {
   const { context, size } = surface;
-  const { columns, rows } = gridTicks(surface, view);
+  const { columns, rows } = gridTicks(surface, view, textScale);
   const sharp = (value: number): number => Math.round(value) + 0.5;
 
   context.strokeStyle = palette.gridLine;
@@ -111,7 +114,7 @@ export function drawGridLabels(
   textScale = 1,
 ): void {
   const { context, size } = surface;
-  const { columns, rows } = gridTicks(surface, view);
+  const { columns, rows } = gridTicks(surface, view, textScale);
   context.fillStyle = palette.gridText;
   context.font = `500 ${10.5 * textScale}px "Inter Variable", system-ui, sans-serif`;
   context.textBaseline = 'top';
@@ -119,12 +122,12 @@ export function drawGridLabels(
   for (const x of columns) {
     const at = view.x + x * view.scale + 4;
     // The buttons are in the upper right corner, the other axis begins in the left one.
-    if (at > 30 && at < size.width - 96) context.fillText(tick(x), at, 4);
+    if (at > 30 * textScale && at < size.width - 96) context.fillText(tick(x), at, 4);
   }
   context.textBaseline = 'bottom';
   for (const y of rows) {
     const at = view.y - y * view.scale - 2;
-    if (at > 28) context.fillText(tick(y), 4, at);
+    if (at > 28 * textScale) context.fillText(tick(y), 4, at);
   }
 }
 
@@ -136,7 +139,7 @@ function multiples(from: number, to: number, step: number): number[] {
 
 const tick = (metres: number): string =>
   (metres < 0 ? '\u2212' : '') +
-  (Math.abs(metres) < 1e-9 ? '0' : lengthText(Math.abs(metres))).replace('\u00a0', ' ');
+  (Math.abs(metres) < 1e-9 ? '0' : written(lengthText(Math.abs(metres)))).replace('\u00a0', ' ');
 
 /** Outlines of the planter boxes; several tags of one box draw it once. */
 export function drawBoxes(

@@ -1,11 +1,13 @@
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { onMapCommand } from '../map/commands';
-import { act, prefer } from '../store/app';
+import { snapshotOf } from '../domain/twin';
+import { act, prefer, receive } from '../store/app';
+import { NO_HOUSE } from '../store/twin';
 import { FakeContext } from '../testing/canvas';
 import { showTags } from '../testing/page';
-import { readings, wireTag } from '../testing/tags';
-import { copyLink, saveMap, saveTable } from './actions';
+import { readings, stateFrame, wireTag } from '../testing/tags';
+import { saveMap, saveTable } from './actions';
 import { fileName } from './save';
 
 // Half an hour off the full one, and set before any module looks at the clock.
@@ -95,17 +97,24 @@ test('a picture is taken of layers that are as on paper', async () => {
   expect(names).toHaveLength(2);
 });
 
+describe('of another moment', () => {
+  test.each([
+    [Date.UTC(2026, 4, 1, 8, 33, 22) / 1000, 'lupin-twin-tags-past-2026-05-01T14-03-22.csv'],
+    [5_025, 'lupin-twin-tags-past-sim-01-23-45.csv'],
+  ])('the file’s name says the moment, and that it is past: %i', async (at, name) => {
+    const then = wireTag({ tag_id: 'then', readings: readings({ temperature: 12 }) });
+    const snapshot = snapshotOf(stateFrame([then], { sec: at }), at * 1000, null);
+    receive({ type: 'past', past: { at, house: { ...NO_HOUSE, snapshot } } });
+    act({ type: 'moment', moment: at });
+    saveTable();
+    expect(names).toEqual([name]);
+    expect((await saved[0]?.text())?.split('\r\n')[1]).toMatch(/^then,.*,5,/);
+  });
+});
+
 test('a file’s name sorts by time and is legal everywhere', () => {
   // On the clock of who saves it, like the time in the picture.
   expect(fileName('map', 'png', Date.UTC(2026, 4, 1, 8, 33, 22))).toBe(
     'lupin-twin-map-2026-05-01T14-03-22.png',
   );
-});
-
-test('without a clipboard copying says no instead of failing', async () => {
-  expect(await copyLink()).toBe(false);
-  const writeText = vi.fn(() => Promise.resolve());
-  vi.stubGlobal('navigator', { clipboard: { writeText } });
-  expect(await copyLink()).toBe(true);
-  expect(writeText).toHaveBeenCalledWith(window.location.href);
 });

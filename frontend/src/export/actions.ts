@@ -1,28 +1,48 @@
 /** The exports, as buttons and menu call them. */
 import { epochOf } from '../clock';
-import { momentText, readingText, valueText } from '../domain/format';
+import { differenceText, divergingColours, signedText } from '../domain/difference';
+import { readingText, valueText } from '../domain/format';
+import { IDEAL_ALPHA, idealParts } from '../domain/ideal';
 import { sensorColour } from '../domain/ramp';
-import { sensorNamed } from '../domain/sensors';
+import { dateText, rosText, secondsOf } from '../domain/rostime';
 import { tableCsv } from '../domain/table';
 import { shown } from '../domain/text';
 import { drawFooter, FOOTER_PX, type Footer } from '../draw/footer';
 import { contextOf, newCanvas } from '../draw/surface';
 import { commandMap } from '../map/commands';
 import { store } from '../store/app';
-import { selectRange, selectRows, selectSensors } from '../store/derived';
-import { selectSnapshot } from '../store/moment';
-import { fileName, save } from './save';
+import {
+  selectCatalogue,
+  selectColouring,
+  selectColumns,
+  selectHeat,
+  selectRange,
+  selectRows,
+  selectSensor,
+} from '../store/derived';
+import { selectShown } from '../store/moment';
+import { selectHasOwnTime, selectOrigin } from '../store/origin';
+import { S } from '../strings';
+import { fileName, pastFileName, save } from './save';
 
 /** The table as the operator sees it, filtered and sorted; ages are those of the state's time. */
 export function saveTable(): void {
   const state = store.get();
-  const snapshot = selectSnapshot(state);
+  const { snapshot, moment } = selectShown(state);
   if (!snapshot) return;
   const { unit } = state.settings;
-  const text = tableCsv(selectRows(state), selectSensors(state), unit, snapshot.takenAt);
+  const text = tableCsv(
+    selectRows(state),
+    selectCatalogue(state),
+    selectColumns(state),
+    unit,
+    snapshot.takenAt,
+  );
   save(
     new Blob([text], { type: 'text/csv;charset=utf-8' }),
-    fileName('tags', 'csv', epochOf(snapshot.takenAt)),
+    moment === null
+      ? fileName('tags', 'csv', epochOf(snapshot.takenAt))
+      : pastFileName('tags', 'csv', moment),
   );
 }
 
@@ -31,7 +51,7 @@ export async function saveMap(): Promise<void> {
   const layers = [...document.querySelectorAll<HTMLCanvasElement>('canvas[data-layer]')];
   const [first] = layers;
   const state = store.get();
-  const snapshot = selectSnapshot(state);
+  const { snapshot, moment } = selectShown(state);
   if (!first || first.width === 0 || !snapshot) return;
   const ratio = first.width / Math.max(1, first.getBoundingClientRect().width);
   const style = getComputedStyle(document.documentElement);
@@ -44,16 +64,47 @@ export async function saveMap(): Promise<void> {
     },
   });
 
-  const sensor = sensorNamed(state.view.sensor);
+  const sensor = selectSensor(state);
   const range = selectRange(state);
+  const isIdeal = selectColouring(state) === 'ideal';
+  const { ideal } = sensor;
   const takenAt = epochOf(snapshot.takenAt);
   const { unit } = state.settings;
+  const label = shown(sensor.label, 32);
+  const { difference, range: change } = selectHeat(state) ?? {};
+  const origin = selectOrigin(state);
+  // Of a run with a time of its own: that, and not when it came here.
+  const then = moment ?? (selectHasOwnTime(state) ? secondsOf(snapshot.at) : null);
+  const time = then === null ? dateText(takenAt) : S.asOf(rosText(then));
   const footer: Footer = {
-    title: shown(sensor.label, 32),
-    time: momentText(takenAt),
-    ends: range && [valueText(sensor, range.low, unit), readingText(sensor, range.high, unit)],
     colour: sensorColour(sensor),
+    maxAlpha: sensor.maxAlpha,
     scale: state.viewport.view.scale,
+    ...(difference && change
+      ? {
+          title: S.difference(label),
+          time: S.differenceTimes(rosText(difference.at), rosText(difference.against)),
+          ends: [signedText(sensor, change.low, unit), differenceText(sensor, change.high, unit)],
+          diverging: divergingColours(),
+        }
+      : {
+          title: isIdeal ? S.legendAgainst(label) : label,
+          time: origin === null ? time : `${S.origin[origin]}, ${time}`,
+          ...(isIdeal && ideal
+            ? {
+                ends: [
+                  S.legendBelow(valueText(sensor, ideal[0], unit)),
+                  S.legendAbove(readingText(sensor, ideal[1], unit)),
+                ] as const,
+                diverging: Object.values(idealParts(IDEAL_ALPHA)).flat(),
+              }
+            : {
+                ends: range && [
+                  valueText(sensor, range.low, unit),
+                  readingText(sensor, range.high, unit),
+                ],
+              }),
+        }),
   };
   context.setTransform(ratio, 0, 0, ratio, 0, first.height);
   drawFooter(context, first.width / ratio, footer, {
@@ -64,17 +115,9 @@ export async function saveMap(): Promise<void> {
   const blob = await new Promise<Blob | null>((resolve) => {
     canvas.toBlob(resolve, 'image/png');
   });
-  if (blob) save(blob, fileName('map', 'png', takenAt));
-}
-
-/** Copies the address of this view; true when the clipboard took it. */
-export async function copyLink(): Promise<boolean> {
-  // Only secure contexts have a clipboard, and a greenhouse's plain http is none: hence the
-  // look at a property whose type claims that it is always there.
-  const clipboard = navigator.clipboard as Clipboard | undefined;
-  if (!clipboard) return false;
-  return clipboard.writeText(window.location.href).then(
-    () => true,
-    () => false,
-  );
+  if (blob)
+    save(
+      blob,
+      moment === null ? fileName('map', 'png', takenAt) : pastFileName('map', 'png', moment),
+    );
 }

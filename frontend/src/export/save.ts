@@ -1,4 +1,5 @@
 import { momentText } from '../domain/format';
+import { hasDate, rosText } from '../domain/rostime';
 import { S } from '../strings';
 
 /** Hands a file to the browser's download. */
@@ -15,6 +16,16 @@ export function save(blob: Blob, name: string): void {
 
 /** A name that sorts by time and is legal everywhere, local time: 2026-05-01T14-03-22. */
 export function fileName(kind: string, extension: string, epochMs: number): string {
-  const stamp = momentText(epochMs).replace(' ', 'T').replaceAll(':', '-');
+  return named(kind, extension, momentText(epochMs));
+}
+
+/** The same for what was at a moment in the past, ROS seconds; the name says so. */
+export function pastFileName(kind: string, extension: string, moment: number): string {
+  const time = hasDate(moment) ? momentText(moment * 1000) : rosText(moment);
+  return named(`${kind}-past`, extension, time);
+}
+
+function named(kind: string, extension: string, time: string): string {
+  const stamp = time.replace(' ', /^\d/.test(time) ? 'T' : '-').replaceAll(':', '-');
   return `${S.fileName(kind, stamp)}.${extension}`;
 }

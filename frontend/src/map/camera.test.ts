@@ -73,6 +73,14 @@ describe('camera', () => {
     expect(onCamera).toHaveBeenLastCalledWith(expect.objectContaining({ span: 4 }));
   });
 
+  test('a double click zooms at once, about where it was', () => {
+    camera.goTo({ x: 2, y: 4, span: 8 }, null);
+    const before = viewport.view.scale;
+    element.dispatchEvent(new MouseEvent('dblclick', { clientX: 300, clientY: 200 }));
+    expect(viewport.view.scale).toBeCloseTo(before * 2);
+    expect(toCanvas(viewport.view, mapPoint(2, 4)).x).toBeCloseTo(300);
+  });
+
   test('panning right and down moves the map left and up', () => {
     camera.goTo({ x: 2, y: 4, span: 8 }, null);
     camera.panBy(0.1, 0.1);

@@ -67,7 +67,9 @@ export class MapCamera {
         [0, 0],
         [this.#viewport().size.width, this.#viewport().size.height],
       ])
-      .clickDistance(6);
+      .clickDistance(6)
+      // At once, by the double click too: nothing here is animated (see `instantly.ts`).
+      .duration(0);
     if (isFixed) this.#zoom.filter(() => false);
     this.#selection.call(this.#zoom);
     // A map that comes back into the page goes on where it was.

@@ -21,3 +21,28 @@ export function onMapCommand(listener: Listener): () => void {
 export function commandMap(command: MapCommand): void {
   for (const listener of [...listeners]) listener(command);
 }
+
+/** What a key stands for on the map; null: nothing. */
+export function keyCommand({ key, shiftKey }: KeyboardEvent): MapCommand | null {
+  const far = shiftKey ? 0.5 : 0.1;
+  switch (key) {
+    case 'ArrowLeft':
+      return { type: 'pan', x: -far, y: 0 };
+    case 'ArrowRight':
+      return { type: 'pan', x: far, y: 0 };
+    case 'ArrowUp':
+      return { type: 'pan', x: 0, y: -far };
+    case 'ArrowDown':
+      return { type: 'pan', x: 0, y: far };
+    case '+':
+    case '=':
+      return { type: 'zoom', factor: 1.25 };
+    case '-':
+      return { type: 'zoom', factor: 0.8 };
+    case '0':
+    case 'Home':
+      return { type: 'fit' };
+    default:
+      return null;
+  }
+}

@@ -5,7 +5,7 @@ import type { Tag } from '../domain/twin';
 import type { Box } from '../geometry/clear';
 import { boundsOf, corners, type Bounds, type MapPoint } from '../geometry/coordinates';
 import { memoOne } from '../store/memo';
-import type { Shown } from '../store/moment';
+import type { House } from '../store/twin';
 
 export interface Content {
   readonly bounds: Bounds;
@@ -25,7 +25,7 @@ const places = memoOne((tags: readonly Tag[]) => {
  * The grid of the heat map is the same for every sensor, so that a switch moves nothing; while
  * the next one is on its way, the last one's stands in for it.
  */
-export function contentOf({ snapshot, map }: Shown, field: Field | null): Content | null {
+export function contentOf({ snapshot, map }: House, field: Field | null): Content | null {
   const { pins, corners: planted } = places(snapshot?.tags ?? NO_TAGS);
   const bounds = boundsOf([
     ...planted,
@@ -34,6 +34,13 @@ export function contentOf({ snapshot, map }: Shown, field: Field | null): Conten
     ...(map.value?.known ?? []),
   ]);
   return bounds && { bounds, pins };
+}
+
+/** Both, as one. */
+export function together(a: Content | null, b: Content | null): Content | null {
+  if (!a || !b) return a ?? b;
+  const bounds = boundsOf([...corners(a.bounds), ...corners(b.bounds)]);
+  return bounds && { bounds, pins: [...a.pins, ...b.pins] };
 }
 
 /** What in the page stands on the map and hides a pin: buttons, scale bar, notices. */

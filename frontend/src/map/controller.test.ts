@@ -4,7 +4,7 @@ import { canvasPoint, mapPoint, toCanvas, type View } from '../geometry/coordina
 import { act, receive, store } from '../store/app';
 import { NOTHING } from '../store/twin';
 import { FakeContext } from '../testing/canvas';
-import { showTags } from '../testing/page';
+import { showField, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { commandMap } from './commands';
 import { runMap } from './controller';
@@ -286,7 +286,7 @@ test('everything is in sight, the heat map too', () => {
     values: new Float32Array(3_000).fill(1),
   };
   start();
-  receive({ type: 'field', field: { state: 'ready', message: '', value: field } });
+  showField(field);
   for (const [x, y] of [place(-2, -4), place(4, 1)]) {
     expect(x >= 0 && x <= SIZE.width && y >= 0 && y <= SIZE.height).toBe(true);
   }

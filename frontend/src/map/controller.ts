@@ -1,6 +1,5 @@
 /** Ties the map's canvases to the store: draws what changed, once a frame, and nothing else. */
 import { now } from '../clock';
-import { DARK, LIGHT } from '../draw/palette';
 import { PULSE_MS, type Pulse } from '../draw/overlay';
 import { pinRadius } from '../draw/pins';
 import type { Pin } from '../draw/scene';
@@ -14,15 +13,23 @@ import {
   type View,
 } from '../geometry/coordinates';
 import { Grid, nearest } from '../geometry/nearest';
-import { act, moveViewport, store } from '../store/app';
-import { selectRange } from '../store/derived';
+import { act, moveViewport, store, type AppState } from '../store/app';
+import { selectHeat, selectRange, selectSensor } from '../store/derived';
 import { memoOne } from '../store/memo';
-import { selectShown, selectTag, type Shown } from '../store/moment';
-import { isDark, isPrinting, onThemeChange } from '../store/theme';
+import { selectNewest, selectShown, selectTag, type Shown } from '../store/moment';
+import { isPrinting } from '../store/theme';
 import { MapCamera } from './camera';
-import { onMapCommand, type MapCommand } from './commands';
-import { contentOf, coveredBelow, coveredBoxes, watchCovered } from './content';
+import { keyCommand, onMapCommand, type MapCommand } from './commands';
+import {
+  contentOf,
+  coveredBelow,
+  coveredBoxes,
+  together,
+  watchCovered,
+  type Content,
+} from './content';
 import { Painter, type Canvases } from './painter';
+import { onPaletteChange, paletteInUse } from './palette';
 import { pinUnderMouse, pointedAt } from './pointer';
 
 /** A finger hits a pin from this far, a mouse from a bit less; CSS pixels. */
@@ -53,7 +60,7 @@ export function runMap(
       onFailure(error);
     }
   };
-  const painter = new Painter(canvases, isDark() ? DARK : LIGHT);
+  const painter = new Painter(canvases, paletteInUse());
   const calm = window.matchMedia('(prefers-reduced-motion: reduce)');
   const dirty = new Set<Part>();
   let frame = 0;
@@ -143,7 +150,8 @@ export function runMap(
     lastField = house.field.value ?? lastField;
     const changedTags = house.snapshot?.tags !== last.snapshot?.tags;
     // What was news at another moment is none.
-    if (changedTags && house.snapshot && house.moment === null && !calm.matches) {
+    const isNews = house.moment === null && last.moment === null;
+    if (changedTags && house.snapshot && isNews && !calm.matches) {
       pulses = [...pulses, ...newPulses(house)];
     }
     const sameMap = house.map === last.map;
@@ -151,13 +159,15 @@ export function runMap(
       !sameMap ||
       house.field !== last.field ||
       view.layers !== before.view.layers ||
-      view.sensor !== before.view.sensor ||
+      selectSensor(state) !== selectSensor(before) ||
       selectRange(state) !== selectRange(before) ||
+      selectHeat(state) !== selectHeat(before) ||
       (changedTags && house.snapshot?.revision !== last.snapshot?.revision);
     if (stillChanged) spoil('still');
     if (
       changedTags ||
       stillChanged ||
+      house.health !== last.health ||
       house.ageing !== last.ageing ||
       state.settings !== before.settings
     )
@@ -174,13 +184,21 @@ export function runMap(
     }
     const sameContent = !changedTags && sameMap && house.field === last.field;
     if (view.camera !== before.view.camera || (!view.camera && !sameContent)) {
-      camera.goTo(view.camera, contentOf(house, lastField), covered);
+      camera.goTo(view.camera, content(state), covered);
     }
+  };
+
+  /** Of the moment that is shown and of now: whoever drags through time keeps the same view. */
+  const content = (state: AppState): Content | null => {
+    const shown = contentOf(selectShown(state), lastField);
+    return selectShown(state).moment === null
+      ? shown
+      : together(contentOf(selectNewest(state), null), shown);
   };
 
   const goToContent = (): void => {
     const state = store.get();
-    camera.goTo(state.view.camera, contentOf(selectShown(state), lastField), covered);
+    camera.goTo(state.view.camera, content(state), covered);
   };
 
   const pinAt = (point: CanvasPoint, reach: number): Pin | null => {
@@ -260,7 +278,7 @@ export function runMap(
     switch (command.type) {
       case 'fit':
         act({ type: 'camera', camera: null });
-        camera.goTo(null, contentOf(selectShown(store.get()), lastField), covered);
+        camera.goTo(null, content(store.get()), covered);
         break;
       case 'zoom':
         camera.zoomBy(command.factor);
@@ -327,8 +345,8 @@ export function runMap(
   const stops = [
     store.subscribe(guarded(update)),
     onMapCommand(run),
-    onThemeChange(() => {
-      painter.setPalette(isDark() ? DARK : LIGHT);
+    onPaletteChange(() => {
+      painter.setPalette(paletteInUse());
       spoil('still', 'pins', 'overlay');
       // Not with the next frame: a page on its way to the printer gets none.
       cancelAnimationFrame(frame);
@@ -364,28 +382,4 @@ function newPulses({ snapshot }: Shown): Pulse[] {
   return (snapshot?.tags ?? []).flatMap((tag) =>
     tag.at && fresh.has(tag.id) ? [{ at: tag.at, since }] : [],
   );
-}
-
-function keyCommand({ key, shiftKey }: KeyboardEvent): MapCommand | null {
-  const far = shiftKey ? 0.5 : 0.1;
-  switch (key) {
-    case 'ArrowLeft':
-      return { type: 'pan', x: -far, y: 0 };
-    case 'ArrowRight':
-      return { type: 'pan', x: far, y: 0 };
-    case 'ArrowUp':
-      return { type: 'pan', x: 0, y: -far };
-    case 'ArrowDown':
-      return { type: 'pan', x: 0, y: far };
-    case '+':
-    case '=':
-      return { type: 'zoom', factor: 1.25 };
-    case '-':
-      return { type: 'zoom', factor: 0.8 };
-    case '0':
-    case 'Home':
-      return { type: 'fit' };
-    default:
-      return null;
-  }
 }

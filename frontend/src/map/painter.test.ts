@@ -4,7 +4,9 @@ import { DARK, LIGHT } from '../draw/palette';
 import { act, receive, store } from '../store/app';
 import type { Layer } from '../store/view';
 import { FakeContext } from '../testing/canvas';
-import { showTags } from '../testing/page';
+import { fieldWith } from '../testing/field';
+import { judgement, reason } from '../testing/health';
+import { showField, showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { Painter, type Canvases } from './painter';
 
@@ -32,25 +34,12 @@ beforeEach(() => {
       pose: { position: { x: 0, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 0 } },
     }),
   ]);
-  receive({
-    type: 'field',
-    field: {
-      state: 'ready',
-      message: '',
-      value: {
-        sensor: 'temperature',
-        width: 2,
-        height: 2,
-        originX: 0,
-        originY: 0,
-        resolution: 1,
-        valueMin: 1,
-        valueMax: 2,
-        sampleCount: 1,
-        values: Float32Array.of(1, 2, NaN, 2),
-      },
-    },
-  });
+  showField(
+    fieldWith([
+      [1, 2],
+      [NaN, 2],
+    ]),
+  );
 });
 
 const show = (...layers: Layer[]): void => {
@@ -87,6 +76,42 @@ describe('painter', () => {
     expect(calls(canvases.still)).toHaveLength(0);
     expect(calls(canvases.pins)).toHaveLength(0);
   });
+
+  test('what is not known is hatched below the field, and outlined above it', () => {
+    show('field', 'unknown');
+    painter.paintStill(store.get(), view, 0, true);
+    const [hatching, field] = named(canvases.still, 'drawImage').map(({ args }) => args[0]);
+    expect(hatching).toMatchObject({ width: 600, height: 800 });
+    expect(field).toMatchObject({ width: 2, height: 2 });
+    expect(calls(canvases.still).at(-1)?.name).toBe('stroke');
+  });
+
+  test.each(['ideal', 'value'] as const)(
+    'what is too old to say is faint and hatched, by %s',
+    (colouring) => {
+      const said = (kind: 'old' | 'range'): ReturnType<typeof judgement> =>
+        judgement({ '1': [reason({ kind, verdict: 'unknown', sensor: '' })] });
+      const paint = (kind: 'old' | 'range'): { pictures: number; alpha: number | undefined } => {
+        const field = store.get().twin.latest.field;
+        showTags([wireTag({ tag_id: '1', readings: readings({ temperature: 20 }) })], said(kind));
+        receive({ type: 'field', field });
+        act({ type: 'colouring', colouring });
+        show('field', 'unknown');
+        calls(canvases.still).length = 0;
+        painter.paintStill(store.get(), view, 0, true);
+        const pictures = named(canvases.still, 'drawImage');
+        const [, coloured] = pictures.map(({ args }) => args[0] as HTMLCanvasElement);
+        const [put] = coloured ? named(coloured, 'putImageData') : [];
+        return { pictures: pictures.length, alpha: (put?.args[0] as ImageData).data[7] };
+      };
+      const known = paint('range');
+      const old = paint('old');
+      // What is not known, the field, and now the hatching over it.
+      expect([known.pictures, old.pictures]).toEqual([2, 3]);
+      expect(old.alpha).toBeGreaterThan(0);
+      expect(old.alpha).toBeLessThan((known.alpha ?? 0) / 2);
+    },
+  );
 
   test('layers that are off are not drawn', () => {
     show();

@@ -1,10 +1,15 @@
 import type { Ageing } from '../domain/age';
 import type { Field } from '../contract/types';
+import { divergingShade } from '../domain/difference';
+import { edgesOf } from '../domain/edges';
 import { fieldPixels, smoothDetail } from '../domain/field';
 import type { HouseHealth } from '../domain/health';
-import { sensorColour, type Range } from '../domain/ramp';
-import { sensorNamed } from '../domain/sensors';
+import { fieldShade } from '../domain/ramp';
+import { cellsWhere, withOld } from '../domain/old';
+import type { Sensor } from '../domain/sensors';
 import type { Tag } from '../domain/twin';
+import { errorShade } from '../domain/sureness';
+import { idealShade } from '../domain/zones';
 import type { TemperatureUnit } from '../domain/units';
 import { drawCrosshair, drawMark, drawPulses, type Pulse } from '../draw/overlay';
 import type { Palette } from '../draw/palette';
@@ -25,6 +30,7 @@ import {
   drawGround,
   drawPicture,
   fieldPlacement,
+  LEAST_FREE_GREY,
   tintMap,
 } from '../draw/still';
 import {
@@ -35,12 +41,13 @@ import {
   Sprites,
   type Surface,
 } from '../draw/surface';
+import { drawEdges, drawUnsure, floorOf, Hatching, knownOf, unsureOf } from '../draw/unknown';
 import type { Size, View } from '../geometry/coordinates';
 import type { Box } from '../geometry/clear';
 import { placeLabels, type Room } from '../geometry/declutter';
 import type { AppState } from '../store/app';
-import { selectHealth, selectRange } from '../store/derived';
-import { memoLast } from '../store/memo';
+import { selectHealth, selectHeat, selectMapped, selectSensor, type Heat } from '../store/derived';
+import { memoLast, memoOne } from '../store/memo';
 import { selectShown, selectTag, selectTags } from '../store/moment';
 import type { MapPicture } from '../store/picture';
 
@@ -52,6 +59,25 @@ export interface Canvases {
 
 /** Fading is worked out anew this often even when nothing else changes, ms. */
 const FADE_TICK_MS = 5_000;
+
+const edges = memoOne(edgesOf);
+const knownPart = memoOne(knownOf);
+const unsureParts = memoOne((field: Field) =>
+  field.sureness ? unsureOf(field, field.sureness) : [],
+);
+const floor = memoOne(({ pixels }: MapPicture) => floorOf(pixels, LEAST_FREE_GREY));
+/** Of what a field tells the part that holds, and the part that is too old to say. */
+const holding = memoLast((field: Field, old: Uint8Array | null) =>
+  old ? cellsWhere(field, (cell) => old[cell] === 0) : field,
+);
+const tooOld = memoLast((field: Field, old: Uint8Array) =>
+  knownOf(cellsWhere(field, (cell) => old[cell] !== 0)),
+);
+const whole = memoOne((field: Field) => {
+  const canvas = newCanvas(field.width, field.height);
+  contextOf(canvas).fillRect(0, 0, field.width, field.height);
+  return canvas;
+});
 
 /**
  * Puts the state on three canvases: the still layers, the pins, and what moves by itself. It
@@ -73,6 +99,7 @@ export class Painter {
   #room: (Room & { readonly scale: number }) | null = null;
   #lastScene: Scene | null = null;
   #paintedScene: Scene | null = null;
+  readonly #hatching = new Hatching();
   readonly #stillBuffer = new PanBuffer();
   readonly #pinBuffer = new PanBuffer();
 
@@ -136,15 +163,40 @@ export class Painter {
     if (picture && layers.has('map')) {
       drawPicture(surface, view, this.#mapPicture(picture, this.#palette), picture.placement);
     }
-    if (layers.has('grid')) drawGridLines(surface, view, this.#palette);
+    const isTold = layers.has('field') && layers.has('unknown');
+    const mapped = isTold ? selectMapped(state) : null;
+    if (mapped) this.#drawUnknown(surface, view, mapped, picture);
+    if (layers.has('grid')) drawGridLines(surface, view, this.#palette, this.#textScale);
     if (layers.has('boxes')) drawBoxes(surface, view, this.scene(state, now).boxes, this.#palette);
-    const field = house.field.value;
-    const range = selectRange(state);
-    if (field && range && field.sampleCount > 0 && layers.has('field')) {
-      const detail = layers.has('smooth') ? smoothDetail(field) : 1;
-      const coloured = this.#fieldPicture(field, range, detail);
-      drawPicture(surface, view, coloured, fieldPlacement(field, coloured));
+    const heat = selectHeat(state);
+    if (heat && layers.has('field')) {
+      const detail = layers.has('smooth') ? smoothDetail(heat.field) : 1;
+      const coloured = this.#heatPicture(heat, selectSensor(state), detail, isTold);
+      drawPicture(surface, view, coloured, fieldPlacement(heat.field, coloured));
+      if (isTold && !heat.isError) {
+        const unsure = unsureParts(heat.field).map(
+          (picture) => picture && { picture, placement: fieldPlacement(heat.field, picture) },
+        );
+        drawUnsure(surface, view, unsure, this.#hatching, this.#palette);
+      }
+      if (isTold && heat.old) {
+        const picture = tooOld(heat.field, heat.old);
+        const inside = { picture, placement: fieldPlacement(heat.field, picture) };
+        this.#hatching.draw(surface, view, inside, null, this.#palette);
+      }
+      const known = holding(heat.field, heat.old);
+      if (isTold) drawEdges(surface, view, edges(known), this.#palette);
     }
+  }
+
+  /** Inside the house is the floor of its map; without one, as far as the field was asked for. */
+  #drawUnknown(surface: Surface, view: View, field: Field, map: MapPicture | null): void {
+    const known = knownPart(field);
+    const placement = fieldPlacement(field, known);
+    const inside = map
+      ? { picture: floor(map), placement: map.placement }
+      : { picture: whole(field), placement };
+    this.#hatching.draw(surface, view, inside, { picture: known, placement }, this.#palette);
   }
 
   /** `covered`: what stands on the map; null while the map moves, and labels with it. */
@@ -172,8 +224,7 @@ export class Painter {
     this.#paintedScene = scene;
     if (layers.has('blooms')) drawBlooms(surface, view, scene.blooms, this.#sprites, this.#palette);
     if (!layers.has('pins')) return;
-    const colour = sensorColour(sensorNamed(state.view.sensor));
-    drawPins(surface, view, scene.pins, colour, this.#sprites, this.#palette);
+    drawPins(surface, view, scene.pins, this.#sprites, this.#palette);
     if (!layers.has('labels')) return;
     const room = this.#room?.scale === view.scale ? this.#room : null;
     const labels = this.#labels(scene, view.scale, state.view.selected, this.#widths, room);
@@ -212,8 +263,7 @@ export class Painter {
       selectTags(state),
       selectShown(state).ageing,
       selectHealth(state),
-      state.view.sensor,
-      selectRange(state),
+      selectSensor(state),
       state.settings.unit,
       Math.floor(now / FADE_TICK_MS),
     );
@@ -224,12 +274,11 @@ export class Painter {
       tags: readonly Tag[],
       ageing: Ageing,
       health: HouseHealth,
-      sensor: string,
-      range: Range | null,
+      sensor: Sensor,
       unit: TemperatureUnit,
       tick: number,
     ) => {
-      const look = { tags, ageing, health, sensor: sensorNamed(sensor), range, unit };
+      const look = { tags, ageing, health, sensor, unit };
       this.#lastScene = buildScene({ ...look, now: tick * FADE_TICK_MS }, this.#lastScene);
       return this.#lastScene;
     },
@@ -288,7 +337,21 @@ export class Painter {
     tintMap(picture.pixels, palette),
   );
 
-  readonly #fieldPicture = memoLast((field: Field, range: Range, detail: number) =>
-    canvasOfPixels(fieldPixels(field, sensorColour(sensorNamed(field.sensor)), range, detail)),
+  readonly #heatPicture = memoLast(
+    (
+      { field, range, zones, difference, isError, old }: Heat,
+      sensor: Sensor,
+      detail: number,
+      isTold: boolean,
+    ) => {
+      const shade = difference
+        ? divergingShade(range)
+        : isError
+          ? errorShade(range)
+          : zones
+            ? idealShade(zones)
+            : fieldShade(sensor, range);
+      return canvasOfPixels(fieldPixels(field, old ? withOld(shade, old, isTold) : shade, detail));
+    },
   );
 }

@@ -36,6 +36,27 @@ test('the address follows the view once it has settled, and keeps the rest', () 
   expect(location.search).toBe('?kiosk=1');
 });
 
+test('a wall screen shows now, whatever moment its link holds', () => {
+  stop();
+  history.replaceState(null, '', '/?kiosk=1#at=77&sensor=co2');
+  stop = startAddress(true);
+  expect(store.get().view).toMatchObject({ sensor: 'co2', moment: null });
+});
+
+test('where a round goes through the sensors only the rest comes back to the link', () => {
+  stop();
+  stop = startAddress(true, true);
+  // No change of the sensor puts the return off.
+  for (const sensor of ['light', 'humidity', 'temperature']) {
+    if (sensor === 'humidity') act({ type: 'layer', layer: 'grid', on: false });
+    act({ type: 'sensor', sensor });
+    vi.advanceTimersByTime(60_000);
+  }
+  expect(store.get().view.layers.has('grid')).toBe(true);
+  expect(store.get().view.sensor).toBe('temperature');
+  expect(vi.getTimerCount()).toBe(0);
+});
+
 test('a wall screen chooses no tag, leaves its address alone, and comes back to it', () => {
   stop();
   stop = startAddress(true);
@@ -111,6 +132,60 @@ describe('a card is a step of the browser’s history', () => {
     expect(location.hash).toBe('#sensor=co2&tag=8');
     await travel(-1);
     expect(store.get().view.selected).toBeNull();
+  });
+
+  test('so is a look back, from which Back leads to now, and Forward there again', async () => {
+    act({ type: 'moment', moment: 500 });
+    expect(location.hash).toBe('#at=500&sensor=co2');
+    act({ type: 'moment', moment: 400 });
+    await vi.waitFor(() => {
+      expect(location.hash).toBe('#at=400&sensor=co2');
+    });
+    // One step for all of it.
+    expect(history.state).toMatchObject({ opened: 'moment', moment: 400 });
+    await travel(-1);
+    expect(store.get().view.moment).toBeNull();
+    expect(location.hash).toBe('#sensor=co2');
+    await travel(1);
+    expect(store.get().view.moment).toBe(400);
+    const back = arrival();
+    act({ type: 'moment', moment: null });
+    await back;
+    expect(location.hash).toBe('#sensor=co2');
+  });
+
+  test('a card that opens while it looks back is closed by Back, and the moment stays', async () => {
+    act({ type: 'moment', moment: 500 });
+    act({ type: 'select', tagId: '7' });
+    act({ type: 'moment', moment: 300 });
+    await travel(-1);
+    expect(store.get().view).toMatchObject({ selected: null, moment: 300 });
+    await travel(-1);
+    expect(store.get().view).toMatchObject({ selected: null, moment: null });
+  });
+
+  test('now beside a card that was opened later is no step back', async () => {
+    act({ type: 'moment', moment: 500 });
+    act({ type: 'select', tagId: '7' });
+    act({ type: 'moment', moment: null });
+    await vi.waitFor(() => {
+      expect(location.hash).toBe('#sensor=co2&tag=7');
+    });
+    expect(history.state).toMatchObject({ opened: 'tag', tag: '7', moment: null });
+    await travel(-1);
+    expect(store.get().view).toMatchObject({ selected: null, moment: 500 });
+  });
+
+  test('a link to a moment is shown as it is; now is no step, for there is none before', async () => {
+    stop();
+    history.replaceState(null, '', '/#at=500');
+    stop = startAddress();
+    const { length } = history;
+    act({ type: 'moment', moment: null });
+    await vi.waitFor(() => {
+      expect(location.hash).toBe('');
+    });
+    expect(history.length).toBe(length);
   });
 
   test('Back to a link before the last one follows it whole', async () => {

@@ -1,5 +1,6 @@
 import { act, store } from './app';
 import { fromFragment, toFragment } from './permalink';
+import type { ViewState } from './view';
 
 /** Browsers refuse more than about a hundred changes of the address in half a minute. */
 const SETTLE_MS = 400;
@@ -12,39 +13,57 @@ interface Entry {
   readonly link: number;
   /** The tag whose card the entry is for; null: no card. */
   readonly tag: string | null;
-  /** The entry before is the same page without a card. */
-  readonly isOverPage: boolean;
+  /** The moment in the past that it is for, ROS seconds; null: now. */
+  readonly moment: number | null;
+  /** What this step opened: the entry before is the same page without. Null: it is no such step. */
+  readonly opened: 'tag' | 'moment' | null;
 }
+
+const placeOf = (view: Pick<ViewState, 'selected' | 'moment'>): Pick<Entry, 'tag' | 'moment'> => ({
+  tag: view.selected,
+  moment: view.moment,
+});
 
 function entryNow(): Entry | null {
   const state: unknown = history.state;
-  return typeof state === 'object' && state !== null && 'link' in state && 'isOverPage' in state
+  return typeof state === 'object' && state !== null && 'link' in state && 'opened' in state
     ? (state as Entry)
     : null;
 }
 
 /**
  * Keeps the address a link to what is on the screen, and follows a link that is opened. A card
- * that opens is a step of the browser's history, so that Back closes it. On a wall screen the
- * address is the law: it is never rewritten, and no tag is chosen.
+ * that opens is a step of the browser's history, so that Back closes it, and so is a look back,
+ * from which Back leads to now. On a wall screen the address is the law: it is never rewritten, no
+ * tag is chosen, and it always shows now. `isRound`: but for the sensor, which changes by itself.
  */
-export function startAddress(kiosk = false): () => void {
-  return kiosk ? keepToLink() : keepLink();
+export function startAddress(kiosk = false, isRound = false): () => void {
+  return kiosk ? keepToLink(isRound) : keepLink();
 }
 
-function keepToLink(): () => void {
+function keepToLink(isRound: boolean): () => void {
   let timer: ReturnType<typeof setTimeout> | undefined;
   let { view } = store.get();
   const follow = (): void => {
-    act({ type: 'look', view: { ...fromFragment(window.location.hash), selected: null } });
+    act({
+      type: 'look',
+      view: { ...fromFragment(window.location.hash), selected: null, moment: null },
+    });
     // What the link says needs no return to it.
     clearTimeout(timer);
   };
-  const onStore = (): void => {
-    if (store.get().view === view) return;
-    ({ view } = store.get());
+  const comeBack = (): void => {
+    const { sensor } = view;
+    follow();
+    if (isRound) act({ type: 'sensor', sensor });
     clearTimeout(timer);
-    timer = setTimeout(follow, RETURN_MS);
+  };
+  const onStore = (): void => {
+    const before = view;
+    ({ view } = store.get());
+    if (view === before || (isRound && view.sensor !== before.sensor)) return;
+    clearTimeout(timer);
+    timer = setTimeout(comeBack, RETURN_MS);
   };
   follow();
   window.addEventListener('hashchange', follow);
@@ -59,7 +78,7 @@ function keepToLink(): () => void {
 function keepLink(): () => void {
   let timer: ReturnType<typeof setTimeout> | undefined;
   let { view } = store.get();
-  let entry: Entry = entryNow() ?? { link: 0, tag: null, isOverPage: false };
+  let entry: Entry = entryNow() ?? { link: 0, tag: null, moment: null, opened: null };
   /** A step back that the page itself asked for, and that the browser takes in its own time. */
   let isGoingBack = false;
 
@@ -75,18 +94,19 @@ function keepLink(): () => void {
     const isSame =
       to === `${pathname}${search}${hash}` &&
       now?.tag === entry.tag &&
+      now.moment === entry.moment &&
       now.link === entry.link &&
-      now.isOverPage === entry.isOverPage;
+      now.opened === entry.opened;
     if (!isSame) history.replaceState(entry, '', to);
   };
   const write = (): void => {
     clearTimeout(timer);
-    entry = { ...entry, tag: store.get().view.selected };
+    entry = { ...entry, ...placeOf(store.get().view) };
     mark(address());
   };
   const follow = (): void => {
     const linked = fromFragment(window.location.hash);
-    entry = { ...entry, tag: linked.selected };
+    entry = { ...entry, ...placeOf(linked) };
     act({ type: 'look', view: linked });
     clearTimeout(timer);
     mark(window.location.href.slice(window.location.origin.length));
@@ -94,7 +114,7 @@ function keepLink(): () => void {
   const onHashChange = (): void => {
     // A step between entries that the page made: `onPopState` has seen to it.
     if (entryNow()) return;
-    entry = { link: entry.link + 1, tag: null, isOverPage: false };
+    entry = { link: entry.link + 1, tag: null, moment: null, opened: null };
     follow();
   };
   const onPopState = (): void => {
@@ -108,28 +128,38 @@ function keepLink(): () => void {
       follow();
       return;
     }
-    const { selected } = store.get().view;
+    const shown = store.get().view;
     if (isOwnStep) {
       // Another card may have been opened meanwhile.
-      if (!step(selected)) write();
+      if (!step(shown)) write();
       return;
     }
-    // The rest of the view stays: what was done since is not to be undone.
-    if (now.tag !== selected) act({ type: 'select', tagId: now.tag });
+    // The rest of the view stays, another moment in the past too: what was done since is not to
+    // be undone.
+    const isOtherTime = (now.moment === null) !== (shown.moment === null);
+    if (isOtherTime || now.tag !== shown.selected) {
+      const moment = isOtherTime ? now.moment : shown.moment;
+      act({ type: 'look', view: { selected: now.tag, moment } });
+    }
     write();
   };
-  /** Enters or leaves the step of an open card; true: there is nothing else to write. */
-  const step = (selected: string | null): boolean => {
+  /** Enters or leaves the step of a card or of a look back; true: there is nothing else to write. */
+  const step = (shown: ViewState): boolean => {
     if (isGoingBack) return true;
-    if (selected !== null && entry.tag === null) {
-      entry = { ...entry, tag: selected, isOverPage: true };
+    const place = placeOf(shown);
+    const changed = (is: (a: unknown, b: unknown) => boolean): Entry['opened'] =>
+      is(entry.tag, place.tag) ? 'tag' : is(entry.moment, place.moment) ? 'moment' : null;
+    const opened = changed((before, now) => before === null && now !== null);
+    if (opened) {
+      entry = { ...entry, ...place, opened };
       history.pushState(entry, '', address());
       return true;
     }
-    if (selected === null && entry.tag !== null) {
-      isGoingBack = entry.isOverPage;
+    const closed = changed((before, now) => before !== null && now === null);
+    if (closed) {
+      isGoingBack = entry.opened === closed;
       if (isGoingBack) history.back();
-      else entry = { ...entry, tag: null };
+      else entry = { ...entry, ...place };
       return isGoingBack;
     }
     return false;
@@ -138,7 +168,7 @@ function keepLink(): () => void {
     if (store.get().view === view) return;
     ({ view } = store.get());
     clearTimeout(timer);
-    if (!step(view.selected)) timer = setTimeout(write, SETTLE_MS);
+    if (!step(view)) timer = setTimeout(write, SETTLE_MS);
   };
 
   follow();

@@ -1,9 +1,10 @@
 import { beforeEach, describe, expect, test } from 'vitest';
 
-import { showTags } from '../testing/page';
+import { fieldWith } from '../testing/field';
+import { showField, showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
-import { act, receive, store } from './app';
-import { selectHealth, selectRange, selectSensors } from './derived';
+import { act, store } from './app';
+import { selectColumns, selectHealth, selectRange, selectSensors } from './derived';
 
 beforeEach(() => {
   showTags([
@@ -14,8 +15,17 @@ beforeEach(() => {
 
 describe('range in use', () => {
   test('is the readings’ while there is no field', () => {
-    expect(selectRange(store.get())).toEqual({ low: 20, high: 30 });
+    expect(selectRange(store.get())).toEqual({ low: 18, high: 30 });
     expect(selectRange(store.get())).toBe(selectRange(store.get()));
+  });
+
+  test('is calm while the field’s values come and go at its edge', () => {
+    act({ type: 'sensor', sensor: 'ph' });
+    const seen = [7.9, 8.05, 7.9, 8.05, 7.9].map((valueMax) => {
+      showField(fieldWith([[6]], { sensor: 'ph', valueMin: 5.2, valueMax }));
+      return selectRange(store.get());
+    });
+    expect(new Set(seen.slice(1)).size).toBe(1);
   });
 
   test('a fixed one comes before all', () => {
@@ -24,20 +34,8 @@ describe('range in use', () => {
   });
 
   test('is the field’s where there is one for this sensor', () => {
-    const value = {
-      sensor: 'temperature',
-      width: 1,
-      height: 1,
-      originX: 0,
-      originY: 0,
-      resolution: 1,
-      valueMin: 21,
-      valueMax: 29,
-      sampleCount: 2,
-      values: Float32Array.of(25),
-    };
-    receive({ type: 'field', field: { value, state: 'ready', message: '' } });
-    expect(selectRange(store.get())).toEqual({ low: 21, high: 29 });
+    showField(fieldWith([[25]], { valueMin: 21, valueMax: 29 }));
+    expect(selectRange(store.get())).toEqual({ low: 18, high: 29 });
     act({ type: 'sensor', sensor: 'ph' });
     expect(selectRange(store.get())).toEqual({ low: 7, high: 7 });
     act({ type: 'sensor', sensor: 'co2' });
@@ -53,4 +51,13 @@ test('an undeclared sensor that a tag reports can be chosen', () => {
 test('health is worked out once a snapshot', () => {
   expect(selectHealth(store.get())).toBe(selectHealth(store.get()));
   expect(selectHealth(store.get()).byTag.size).toBe(2);
+});
+
+test('what is derived can be chosen, and has no column: no tag has readings of it', () => {
+  const names = (sensors: ReturnType<typeof selectSensors>): string[] =>
+    sensors.map(({ name }) => name);
+  expect(names(selectSensors(store.get()))).toEqual(expect.arrayContaining(['co2', 'ph', 'vpd']));
+  expect(names(selectColumns(store.get()))).toEqual(expect.arrayContaining(['co2', 'ph']));
+  expect(names(selectColumns(store.get()))).not.toContain('vpd');
+  expect(selectColumns(store.get())).toBe(selectColumns(store.get()));
 });

@@ -1,28 +1,58 @@
 /** What follows from the state; each remembers its last answer, so that it is worked out once. */
 import { houseHealth, type HouseHealth } from '../domain/health';
+import type { Field, Judgement } from '../contract/types';
+import { symmetricRange } from '../domain/difference';
+import { onExplored } from '../domain/explored';
+import { rounded, withIdeal } from '../domain/autorange';
+import { oldCells, readSites, type ReadSite } from '../domain/old';
 import { rangeOf, type Range } from '../domain/ramp';
-import { sensorsIn, type Sensor } from '../domain/sensors';
+import { errorField } from '../domain/sureness';
+import { zonesOf, type Site, type Zones } from '../domain/zones';
+import {
+  isMeasured,
+  NO_CATALOGUES,
+  rangesFor,
+  type Catalogue,
+  type Sensor,
+} from '../domain/sensors';
 import { filterRows, rowsOf, sortRows, type Row } from '../domain/table';
 import type { Tag } from '../domain/twin';
 import type { AppState } from './app';
+import { sourceOf } from './heat';
 import { memoLast, memoOne } from './memo';
-import { selectNewest, selectShown, selectTags } from './moment';
+import { isHeardNow, selectIsHeard, selectNewest, selectShown, selectTags } from './moment';
+import type { MapPicture } from './picture';
+import type { Difference } from './twin';
+import { isColumnShown } from './settings';
 import { fixedRange, type Sort, type ViewState } from './view';
 
-const healthOfTags = memoOne(houseHealth);
+const healthShown = memoLast(houseHealth);
+const healthNow = memoLast(houseHealth);
 
-export const selectHealth = (state: AppState): ReturnType<typeof houseHealth> =>
-  healthOfTags(selectTags(state));
+/** As the bridge judged the moment that is shown. */
+export const selectHealth = (state: AppState): HouseHealth =>
+  healthShown(selectTags(state), selectShown(state).health, selectIsHeard(state));
 
 /** As it is now, whatever moment is shown; null before anything has come. */
 export function selectNewestHealth(state: AppState): HouseHealth | null {
-  const { snapshot } = selectNewest(state);
-  return snapshot && healthOfTags(snapshot.tags);
+  const { snapshot, health } = selectNewest(state);
+  return snapshot && healthNow(snapshot.tags, health, isHeardNow(state));
 }
+
+/** The sensors with the ranges that held at the moment that is shown: by day, or by night. */
+export function selectCatalogue(state: AppState): Catalogue {
+  const { day, night } = state.twin.sensors.value ?? NO_CATALOGUES;
+  return (selectShown(state).health?.house.day.is_day ?? true) ? day : night;
+}
+
+/** The one in view. */
+export const selectSensor = (state: AppState): Sensor =>
+  selectCatalogue(state).named(state.view.sensor);
 
 const sensorNames = memoLast(
   // The names as one string: a new snapshot with the same sensors keeps the same list.
-  (joined: string): readonly Sensor[] => sensorsIn(joined === '' ? [] : joined.split('\u0000')),
+  (catalogue: Catalogue, joined: string): readonly Sensor[] =>
+    catalogue.with(joined === '' ? [] : joined.split('\u0000')),
 );
 
 const namesIn = memoLast((tags: readonly Tag[], chosen: string): string => {
@@ -32,7 +62,21 @@ const namesIn = memoLast((tags: readonly Tag[], chosen: string): string => {
 });
 
 export const selectSensors = (state: AppState): readonly Sensor[] =>
-  sensorNames(namesIn(selectTags(state), state.view.sensor));
+  sensorNames(selectCatalogue(state), namesIn(selectTags(state), state.view.sensor));
+
+const measuredIn = memoOne((sensors: readonly Sensor[]) => sensors.filter(isMeasured));
+
+/** Those that have a column in the table. */
+export const selectColumns = (state: AppState): readonly Sensor[] =>
+  measuredIn(selectSensors(state));
+
+const notHidden = memoLast((columns: readonly Sensor[], hidden: readonly string[]) =>
+  columns.filter(({ name }) => isColumnShown({ hidden }, name)),
+);
+
+/** Those of them that the operator has not hidden. */
+export const selectShownColumns = (state: AppState): readonly Sensor[] =>
+  notHidden(selectColumns(state), state.settings.hidden);
 
 const range = memoLast((low: number, high: number): Range => ({ low, high }));
 
@@ -40,26 +84,169 @@ const rangeOfReadings = memoLast((tags: readonly Tag[], sensor: string): Range |
   rangeOf(tags.map((tag) => tag.readings.get(sensor))),
 );
 
-/** The range of the colours in use: the fixed one, else the field's, else the readings'. */
+/** The range of colours by value: the fixed one, else what field or readings need, and the ideal. */
 export function selectRange(state: AppState): Range | null {
   const { view } = state;
   const fixed = fixedRange(view);
   if (fixed) return fixed;
-  const field = selectShown(state).field.value;
-  if (field?.sensor === view.sensor && field.sampleCount > 0) {
-    return range(field.valueMin, field.valueMax);
-  }
+  const { field, held } = selectShown(state);
+  const isMapped = field.value?.sensor === view.sensor && field.value.sampleCount > 0;
   const readings = rangeOfReadings(selectTags(state), view.sensor);
-  return readings && range(readings.low, readings.high);
+  const needed =
+    isMapped && held?.sensor === view.sensor ? held.range : readings && rounded(readings);
+  if (!needed) return null;
+  const { low, high } = withIdeal(needed, selectSensor(state).ideal);
+  return range(low, high);
+}
+
+const siteOf = ({ at, species }: Tag): Site[] => (at ? [{ at, species }] : []);
+const sitesIn = memoOne((tags: readonly Tag[]): readonly Site[] => tags.flatMap(siteOf));
+
+/** New tags whose places and plants are those of before keep the list. */
+const sitesKept = memoLast((key: string): readonly Site[] => JSON.parse(key) as Site[]);
+const keyOf = memoOne((sites: readonly Site[]): string => JSON.stringify(sites));
+
+const zonesBy = memoLast(
+  (
+    sites: readonly Site[],
+    sensor: Sensor,
+    width: number,
+    height: number,
+    originX: number,
+    originY: number,
+    resolution: number,
+  ): Zones => zonesOf({ width, height, originX, originY, resolution }, sites, sensor),
+);
+
+/** Which ranges hold where in a field, by the plants of the tags. */
+export function selectZones(state: AppState, field: Field): Zones {
+  const sites = sitesKept(keyOf(sitesIn(selectTags(state))));
+  const { width, height, originX, originY, resolution } = field;
+  return zonesBy(sites, selectSensor(state), width, height, originX, originY, resolution);
+}
+
+/** By value where that is chosen, and where no plant of the house has an ideal of the sensor. */
+export function selectColouring(state: AppState): ViewState['colouring'] {
+  const sensor = selectSensor(state);
+  const hasIdeal =
+    sensor.ideal !== null ||
+    (sensor.species.size > 0 &&
+      selectTags(state).some(({ species }) => rangesFor(sensor, species).ideal));
+  return hasIdeal ? state.view.colouring : 'value';
+}
+
+/** What the heat map shows, and in which range of colours. */
+export interface Heat {
+  readonly field: Field;
+  readonly range: Range;
+  /** The ranges that its colours are about; null: they tell its values, or a difference. */
+  readonly zones: Zones | null;
+  /** What it is the difference of; null: it is the field itself. */
+  readonly difference: Difference | null;
+  /** It is the estimate's error alone. */
+  readonly isError: boolean;
+  /** 1 in each cell whose reading is too old to say, row 0 at the bottom; null: none is. */
+  readonly old: Uint8Array | null;
+}
+
+const heat = memoLast(
+  (
+    field: Field,
+    within: Range,
+    zones: Zones | null,
+    difference: Difference | null,
+    isError: boolean,
+    old: Uint8Array | null,
+  ): Heat => ({ field, range: within, zones, difference, isError, old }),
+);
+
+const readSitesBy = memoOne(({ tags: said }: Judgement) =>
+  memoLast((tags: readonly Tag[], sensor: Sensor) => readSites(tags, said, sensor)),
+);
+const keyOfRead = memoOne((sites: readonly ReadSite[]): string =>
+  sites.some(({ isOld }) => isOld) ? JSON.stringify(sites) : '[]',
+);
+const oldBy = memoLast(
+  (
+    sites: string,
+    width: number,
+    height: number,
+    originX: number,
+    originY: number,
+    resolution: number,
+  ): Uint8Array | null =>
+    oldCells(
+      { width, height, originX, originY, resolution },
+      JSON.parse(sites) as readonly ReadSite[],
+    ),
+);
+
+/**
+ * Where a field of the nearest readings stands for one that is too old to say; what an estimate is
+ * worth by then is in its own error.
+ */
+function selectOld(state: AppState, field: Field): Uint8Array | null {
+  const { health } = selectShown(state);
+  if (!health || field.sensor !== state.view.sensor) return null;
+  const sites = readSitesBy(health)(selectTags(state), selectSensor(state));
+  const { width, height, originX, originY, resolution } = field;
+  return oldBy(keyOfRead(sites), width, height, originX, originY, resolution);
+}
+
+const onMap = memoOne((field: Field) =>
+  memoLast((map: MapPicture | null) => (map ? onExplored(field, map) : field)),
+);
+
+/** The field of the moment that is shown, as far as the house is explored. */
+function selectField(state: AppState): Field | null {
+  const { field, map } = selectShown(state);
+  return field.value && onMap(field.value)(map.value);
+}
+
+const errorOf = memoOne((field: Field): Field | null =>
+  field.sureness ? errorField(field, field.sureness) : null,
+);
+const errorRange = memoOne(({ valueMax }: Field): Range => ({ low: 0, high: valueMax }));
+
+const differenceRange = memoOne(symmetricRange);
+
+/** Null: there is none, or the one that is wanted is not here, or nobody knows its colours yet. */
+export function selectHeat(state: AppState): Heat | null {
+  if (!state.twin.sensors.value) return null;
+  const { compare } = state.view;
+  if (compare) {
+    const { value } = state.twin.difference;
+    const field = value?.field;
+    if (!field || field.sampleCount === 0) return null;
+    const old = sourceOf(state.view) === 'nearest' ? selectOld(state, field) : null;
+    return heat(field, differenceRange(field), null, value, false, old);
+  }
+  const field = selectField(state);
+  const error = field && state.view.heat === 'error' ? errorOf(field) : null;
+  if (error) return heat(error, errorRange(error), null, null, true, null);
+  const within = selectRange(state);
+  if (!field || !within || field.sampleCount === 0) return null;
+  const isIdeal = selectColouring(state) === 'ideal' && field.sensor === state.view.sensor;
+  const old = field.sureness ? null : selectOld(state, field);
+  return heat(field, within, isIdeal ? selectZones(state, field) : null, null, false, old);
+}
+
+/** The field whose known part is shown, empty ones too; null: none of the sensor is here. */
+export function selectMapped(state: AppState): Field | null {
+  const heated = selectHeat(state);
+  if (heated || state.view.compare) return heated?.field ?? null;
+  const value = selectField(state);
+  return value?.sensor === state.view.sensor ? value : null;
 }
 
 const filtered = memoLast(
   (
     tags: readonly Tag[],
-    health: ReturnType<typeof houseHealth>,
+    health: HouseHealth,
     filter: string,
-    status: ViewState['health'],
-  ): readonly Row[] => filterRows(rowsOf(tags, health), filter, status),
+    verdict: ViewState['health'],
+    catalogue: Catalogue,
+  ): readonly Row[] => filterRows(rowsOf(tags, health), filter, verdict, catalogue),
 );
 
 const sorted = memoLast((rows: readonly Row[], sort: Sort): readonly Row[] => sortRows(rows, sort));
@@ -67,5 +254,6 @@ const sorted = memoLast((rows: readonly Row[], sort: Sort): readonly Row[] => so
 /** The table's rows as the operator sees them: filtered and sorted. */
 export function selectRows(state: AppState): readonly Row[] {
   const { filter, health, sort } = state.view;
-  return sorted(filtered(selectTags(state), selectHealth(state), filter, health), sort);
+  const catalogue = selectCatalogue(state);
+  return sorted(filtered(selectTags(state), selectHealth(state), filter, health, catalogue), sort);
 }

@@ -3,7 +3,9 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 import { now } from '../clock';
 import type { Frame } from '../contract/types';
 import { ageSeconds } from '../domain/age';
+import { alarm, alarms } from '../testing/alarms';
 import { status } from '../testing/page';
+import { NOBODY } from '../testing/health';
 import { stateFrame, wireTag } from '../testing/tags';
 import { store } from './app';
 import { selectShown } from './moment';
@@ -72,7 +74,14 @@ test('of many frames the newest is taken, a few times a second', () => {
 
 test('deltas are put together; one that does not fit makes a new connection', () => {
   const header = { stamp: { sec: 50, nanosec: 0 }, frame_id: 'map' };
-  const delta = { type: 'delta', revision: 'd', header, changed: [], removed: [] } as const;
+  const delta = {
+    type: 'delta',
+    revision: 'd',
+    header,
+    changed: [],
+    removed: [],
+    health: NOBODY,
+  } as const;
   FakeSocket.last.speak(status());
   FakeSocket.last.speak(stateFrame([wireTag()], { seq: 1, sec: 49 }));
   FakeSocket.last.speak({ ...delta, seq: 2, base: 1 });
@@ -83,6 +92,17 @@ test('deltas are put together; one that does not fit makes a new connection', ()
   expect(store.get().twin.phase).toBe('reconnecting');
   vi.advanceTimersByTime(1_000);
   expect(store.get().twin.connection.socket.kind).toBe('opening');
+});
+
+test('alarms are taken as they come, also before a state, and change nothing else', () => {
+  FakeSocket.last.speak({ type: 'alarms', ...alarms([alarm('a')]) });
+  expect(store.get().twin.alarms?.alarms).toEqual([alarm('a')]);
+  expect(store.get().twin.phase).toBe('connecting');
+  FakeSocket.last.speak(status());
+  FakeSocket.last.speak(stateFrame([wireTag()], { sec: 70, revision: 'after alarms' }));
+  FakeSocket.last.speak({ type: 'alarms', ...alarms([]) });
+  expect(revision()).toBe('after alarms');
+  expect(store.get().twin.alarms?.alarms).toEqual([]);
 });
 
 test('a large house is calmer', () => {

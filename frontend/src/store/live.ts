@@ -68,6 +68,11 @@ export function startLive(): () => void {
     onBad: tellBad,
     onFrame: (frame, connection) => {
       const { epoch, status } = connection;
+      if (frame.type === 'alarms') {
+        // As it is: alarms change seldom, and nobody is to wait for them.
+        receive({ type: 'alarms', alarms: frame });
+        return;
+      }
       if (frame.type !== 'status') {
         const at = now();
         const next = latestAfter(heardOn === epoch ? latest : null, frame);

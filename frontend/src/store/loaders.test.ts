@@ -1,5 +1,6 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
+import { npyField } from '../testing/field';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { act, store } from './app';
@@ -9,35 +10,13 @@ let asked: string[];
 let stop: () => void;
 let qualityStatus: number;
 
-function npy(values: readonly number[]): ArrayBuffer {
-  const header = `{'descr': '<f4', 'fortran_order': False, 'shape': (1, ${values.length}), }`;
-  const bytes = new Uint8Array(10 + header.length);
-  bytes.set([0x93, 0x4e, 0x55, 0x4d, 0x50, 0x59, 1, 0, header.length, 0]);
-  bytes.set(new TextEncoder().encode(header), 10);
-  const body = new Uint8Array(Float32Array.from(values).buffer);
-  const all = new Uint8Array(bytes.length + body.length);
-  all.set(bytes);
-  all.set(body, bytes.length);
-  return all.buffer;
-}
-
 beforeEach(() => {
   vi.useFakeTimers();
   asked = [];
   qualityStatus = 404;
   vi.stubGlobal('fetch', (url: URL) => {
     asked.push(`${url.pathname}${url.search}`);
-    if (url.pathname === '/api/field.npy') {
-      const headers = {
-        'X-Field-Origin-X': '-1.5',
-        'X-Field-Origin-Y': '0.5',
-        'X-Field-Resolution': '0.05',
-        'X-Field-Value-Min': '1',
-        'X-Field-Value-Max': '2',
-        'X-Field-Sample-Count': '4',
-      };
-      return Promise.resolve(new Response(npy([1, 2]), { headers }));
-    }
+    if (url.pathname === '/api/field.npy') return Promise.resolve(npyField([1, 2]));
     return Promise.resolve(Response.json({ detail: 'none here' }, { status: qualityStatus }));
   });
   showTags([]);

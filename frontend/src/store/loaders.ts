@@ -1,22 +1,28 @@
 /** Fetches what the frames do not carry, whenever the twin's revision says that it changed. */
-import { fetchField, fetchQuality, Refusal } from '../contract/api';
+import { fetchQuality, Refusal } from '../contract/api';
 import type { Field, FieldQuality } from '../contract/types';
 import { resolutionFor } from '../domain/field';
 import type { Snapshot } from '../domain/twin';
-import { boundsOf } from '../geometry/coordinates';
+import { boundsOf, type Bounds } from '../geometry/coordinates';
 import { loadMap, type MapPicture } from './picture';
 import { receive, store, type AppState } from './app';
+import { fetchHeat, sourceOf, type Source } from './heat';
 import { selectNewest } from './moment';
 import { createRefresher, type Task } from './refresher';
 import { NOTHING } from './twin';
 
 const FIELD_INTERVAL_MS = 500;
+/** An estimate costs the twin more, and goes on by itself: what nobody reads becomes less sure. */
+const ESTIMATE_INTERVAL_MS = 1_000;
+const ESTIMATE_TICK_MS = 10_000;
 const MAP_INTERVAL_MS = 1_000;
 const QUALITY_INTERVAL_MS = 3_000;
 /** The server's box is that of the pinned tags widened by its max_distance_m. */
-const ASSUMED_MARGIN_M = 1.5;
+export const ASSUMED_MARGIN_M = 1.5;
 /** Finer cells than this cannot be told apart on a screen, and cost the Wi-Fi. */
 const MAX_CELLS = 60_000;
+/** As the server has it, where no tag has a place. */
+const DEFAULT_RESOLUTION_M = 0.1;
 
 export function startLoaders(): () => void {
   const field = createRefresher<Field>({
@@ -51,16 +57,33 @@ export function startLoaders(): () => void {
 
   let missingSince = -1;
   let seen: AppState | null = null;
+  let ticking: ReturnType<typeof setInterval> | undefined;
+  let ticks = 0;
 
   const update = (): void => {
     const state = store.get();
-    if (seen?.twin === state.twin && seen.view.sensor === state.view.sensor) return;
+    const source = sourceOf(state.view);
+    const isSame =
+      seen?.twin === state.twin &&
+      seen.view.sensor === state.view.sensor &&
+      sourceOf(seen.view) === source;
+    if (isSame) return;
     seen = state;
+    if (source === 'estimate') {
+      ticking ??= setInterval(() => {
+        ticks += 1;
+        seen = null;
+        update();
+      }, ESTIMATE_TICK_MS);
+    } else {
+      clearInterval(ticking);
+      ticking = undefined;
+    }
     const { epoch, status } = state.twin.connection;
     const newest = selectNewest(state);
     const { sensor } = state.view;
     const base = baseKey(state);
-    const wanted = base === null ? null : fieldTask(base, sensor, newest.snapshot);
+    const wanted = base === null ? null : fieldTask(base, sensor, source, ticks, newest.snapshot);
     // What the page does not show any more goes at once: a restarted twin begins empty.
     const { value } = newest.field;
     if (value && (value.sensor !== sensor || (base !== null && !wanted))) {
@@ -76,7 +99,8 @@ export function startLoaders(): () => void {
     if (newest.map.value && !status?.has_map) receive({ type: 'map', map: NOTHING });
     map.want(status?.has_map ? { key: base, group: 'map', run: loadMap } : null);
     quality.want(
-      epoch === missingSince
+      // Of the nearest readings: an estimate tells its own error.
+      epoch === missingSince || source === 'estimate'
         ? null
         : {
             key: `${base}|${sensor}`,
@@ -92,7 +116,11 @@ export function startLoaders(): () => void {
     );
   };
   update();
-  return store.subscribe(update);
+  const stop = store.subscribe(update);
+  return () => {
+    stop();
+    clearInterval(ticking);
+  };
 }
 
 /**
@@ -105,10 +133,32 @@ function baseKey(state: AppState): string | null {
   return snapshot && status && socket.kind === 'open' ? `${epoch}|${snapshot.revision}` : null;
 }
 
-function fieldTask(base: string, sensor: string, snapshot: Snapshot | null): Task<Field> | null {
-  const bounds = boundsOf((snapshot?.tags ?? []).flatMap((tag) => (tag.at ? [tag.at] : [])));
-  if (!bounds) return null;
-  const resolution = resolutionFor(
+function fieldTask(
+  base: string,
+  sensor: string,
+  source: Source,
+  ticks: number,
+  snapshot: Snapshot | null,
+): Task<Field> | null {
+  if (!boundsOfPins(snapshot)) return null;
+  const resolution = fieldResolution(snapshot);
+  const isEstimate = source === 'estimate';
+  return {
+    key: [base, sensor, resolution, source, isEstimate ? ticks : ''].join('|'),
+    group: `${sensor}|${source}`,
+    ...(isEstimate ? { intervalMs: ESTIMATE_INTERVAL_MS } : {}),
+    run: (signal) => fetchHeat(source, { sensor, resolution }, signal),
+  };
+}
+
+const boundsOfPins = (snapshot: Snapshot | null): Bounds | null =>
+  boundsOf((snapshot?.tags ?? []).flatMap((tag) => (tag.at ? [tag.at] : [])));
+
+/** The side of a cell, in metres, for the field of a house as large as this one. */
+export function fieldResolution(snapshot: Snapshot | null): number {
+  const bounds = boundsOfPins(snapshot);
+  if (!bounds) return DEFAULT_RESOLUTION_M;
+  return resolutionFor(
     {
       minX: bounds.minX - ASSUMED_MARGIN_M,
       minY: bounds.minY - ASSUMED_MARGIN_M,
@@ -117,11 +167,6 @@ function fieldTask(base: string, sensor: string, snapshot: Snapshot | null): Tas
     },
     MAX_CELLS,
   );
-  return {
-    key: `${base}|${sensor}|${resolution}`,
-    group: sensor,
-    run: (signal) => fetchField({ sensor, resolution }, signal),
-  };
 }
 
 function reason(error: unknown): string {

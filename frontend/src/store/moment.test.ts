@@ -6,10 +6,11 @@ import { beforeEach, describe, expect, test } from 'vitest';
 import { ageSeconds } from '../domain/age';
 import { snapshotOf } from '../domain/twin';
 import { goLive, showTags, status } from '../testing/page';
+import { judgement, reason } from '../testing/health';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { act, receive, store } from './app';
 import { selectHealth, selectRange, selectRows, selectSensors } from './derived';
-import { selectShown, selectTag, selectTags, shownAt } from './moment';
+import { rosNow, selectAwaited, selectShown, selectTag, selectTags, shownAt } from './moment';
 import { NO_HOUSE, NO_TWIN, type House } from './twin';
 
 const then = (): House => ({
@@ -21,10 +22,14 @@ const then = (): House => ({
     1_000,
     null,
   ),
+  health: judgement({ old: [reason()] }),
 });
 
 beforeEach(() => {
-  showTags([wireTag({ tag_id: 'new', readings: readings({ temperature: 20 }) })]);
+  showTags(
+    [wireTag({ tag_id: 'new', readings: readings({ temperature: 20 }) })],
+    judgement({ new: [reason()] }),
+  );
   receive({ type: 'past', past: { at: 77, house: then() } });
 });
 
@@ -49,7 +54,7 @@ describe('another moment', () => {
       rows: ['old'],
       health: 'old',
       sensors: true,
-      range: { low: 40, high: 40 },
+      range: { low: 18, high: 40 },
       isThere: true,
     });
     act({ type: 'look', view: { moment: null } });
@@ -63,9 +68,28 @@ describe('another moment', () => {
     expect(ageSeconds(tag?.observedAt ?? null, 999_000, shown.ageing)).toBe(30);
   });
 
-  test('that is not here yet shows nothing, not another one', () => {
-    expect(shownAt(store.get().twin, 78)).toMatchObject(NO_HOUSE);
+  test('that is not here yet leaves the last one that came, with its own time', () => {
+    const { twin } = store.get();
+    expect(shownAt(twin, 78)).toBe(shownAt(twin, 77));
+    expect(shownAt(twin, 78).moment).toBe(77);
+    act({ type: 'look', view: { moment: 78 } });
+    expect(selectAwaited(store.get())).toBe(78);
+    act({ type: 'look', view: { moment: 77 } });
+    expect(selectAwaited(store.get())).toBeNull();
+  });
+
+  test('of which nothing has come leaves now, which is called now', () => {
+    receive({ type: 'past', past: null });
+    const { twin } = store.get();
+    expect(shownAt(twin, 78)).toBe(shownAt(twin, null));
+    expect(shownAt(twin, 78).moment).toBeNull();
     expect(shownAt(NO_TWIN, null)).toMatchObject(NO_HOUSE);
+  });
+
+  test('has the map of now, for of maps nobody keeps a past', () => {
+    const picture = { value: null, state: 'failed', message: 'x' } as const;
+    receive({ type: 'map', map: picture });
+    expect(shownAt(store.get().twin, 77).map).toBe(picture);
   });
 
   test('is the same object for the same data', () => {
@@ -97,6 +121,27 @@ describe('how ages go on', () => {
     const when = snapshot?.tags[0]?.scannedAt ?? 'never';
     const age = ageSeconds(when, performance.now(), ageing);
     expect(ageSeconds(when, performance.now() + 3_600_000, ageing)).toBe(age);
+  });
+});
+
+describe('the twin’s time', () => {
+  test('goes on with the page’s clock', () => {
+    goLive();
+    const state = store.get();
+    const { at, takenAt } = state.twin.latest.snapshot ?? { at: { sec: 0 }, takenAt: 0 };
+    expect(rosNow(state, takenAt + 2_500)).toBe(at.sec + 2.5);
+    expect(rosNow(state, takenAt - 2_500)).toBe(at.sec);
+  });
+
+  test.each(['paused', 'no_clock', 'clock_stopped'] as const)('stands still: %s', (reason) => {
+    goLive(status({ twin: reason === 'paused' ? 'live' : 'offline', reason }));
+    const state = store.get();
+    const { at, takenAt } = state.twin.latest.snapshot ?? { at: { sec: 0 }, takenAt: 0 };
+    expect(rosNow(state, takenAt + 60_000)).toBe(at.sec);
+  });
+
+  test('is not known before anything came', () => {
+    expect(rosNow({ ...store.get(), twin: NO_TWIN }, 0)).toBeNull();
   });
 });
 

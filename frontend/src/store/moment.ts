@@ -3,10 +3,11 @@
  * map, notices and exports all ask here, so that another moment moves them all at once.
  */
 import { AGES_UNKNOWN, GROWING, type Ageing } from '../domain/age';
+import { secondsOf } from '../domain/rostime';
 import type { Snapshot, Tag } from '../domain/twin';
 import type { AppState } from './app';
 import { memoLast, memoOne } from './memo';
-import { NO_HOUSE, type House, type TwinState } from './twin';
+import type { House, Past, TwinState } from './twin';
 
 /** The moment to show: null is now, a number a moment in the past, ROS seconds. */
 export type Moment = number | null;
@@ -17,10 +18,15 @@ export interface Shown extends House {
   readonly ageing: Ageing;
 }
 
-/** The same object for the same data and moment. A moment that is not here yet shows nothing. */
+/**
+ * The same object for the same data and moment. A moment in the past is that of the data: while
+ * another one is on its way, the last that came stays, with its own time. Data and moment are told
+ * in one, so that nothing can be taken for what it is not.
+ */
 export function shownAt(twin: TwinState, moment: Moment): Shown {
-  if (moment === null) return SHOWN_NOW[clockOf(twin)](twin.latest);
-  return shownThen(twin.past?.at === moment ? twin.past.house : NO_HOUSE, moment);
+  if (moment === null || twin.past === null) return SHOWN_NOW[clockOf(twin)](twin.latest);
+  const { at, house } = twin.past;
+  return shownThen(house, twin.latest.map, at);
 }
 
 /** How the time of the newest house goes on, as far as anybody knows. */
@@ -39,8 +45,10 @@ const SHOWN_NOW = {
 
 const asTaken = ({ snapshot }: House): Ageing => ({ kind: 'as-of', at: snapshot?.takenAt ?? 0 });
 
-const shownThen = memoLast((house: House, moment: number): Shown => ({
+const shownThen = memoLast((house: House, map: House['map'], moment: number): Shown => ({
   ...house,
+  // Of the map nobody keeps a past; walls and benches stay where they are.
+  map,
   moment,
   // A past moment has one age a reading, however long it is looked at.
   ageing: asTaken(house),
@@ -50,6 +58,38 @@ export const selectShown = ({ twin, view }: AppState): Shown => shownAt(twin, vi
 
 /** The newest there is, whatever is shown: for the connection's word, and for what to fetch. */
 export const selectNewest = ({ twin }: AppState): House => twin.latest;
+
+/** What has come of the past, for its loader. */
+export const selectPast = ({ twin }: AppState): Past | null => twin.past;
+
+/** The moment that is wanted and not shown yet, ROS seconds; null: what is shown is wanted. */
+export function selectAwaited(state: AppState): number | null {
+  const { moment } = state.view;
+  return moment === null || selectShown(state).moment === moment ? null : moment;
+}
+
+/**
+ * The twin's time now, ROS seconds, as far as anybody knows; `at` is the page's clock, ms. Null
+ * before anything has come, and of a twin that has no time.
+ */
+export function rosNow({ twin }: AppState, at: number): number | null {
+  const { snapshot } = twin.latest;
+  if (!snapshot) return null;
+  const taken = secondsOf(snapshot.at);
+  if (taken === 0) return null;
+  const goesOn = clockOf(twin) === 'running';
+  return goesOn ? taken + Math.max(0, at - snapshot.takenAt) / 1000 : taken;
+}
+
+/**
+ * Whether what is shown is heard of: the present of a twin that is silent, or cut off, is not. What
+ * a past moment was like does not depend on it.
+ */
+export const selectIsHeard = (state: AppState): boolean =>
+  selectShown(state).moment !== null || isHeardNow(state);
+
+export const isHeardNow = ({ twin }: AppState): boolean =>
+  twin.phase === 'live' && !twin.isTimeLost;
 
 export const selectSnapshot = (state: AppState): Snapshot | null => selectShown(state).snapshot;
 
@@ -64,3 +104,7 @@ const byId = memoOne(
 
 export const selectTag = (state: AppState, tagId: string): Tag | undefined =>
   byId(selectTags(state)).get(tagId);
+
+/** The same tag as it is now, whatever moment is shown. */
+export const selectNewestTag = ({ twin }: AppState, tagId: string): Tag | undefined =>
+  byId(twin.latest.snapshot?.tags ?? NO_TAGS).get(tagId);

@@ -11,9 +11,15 @@ describe('permalink', () => {
 
   test('everything survives the way there and back', () => {
     const view: Linked = {
+      moment: 1_794_000_000.125,
+      period: { kind: 'own', from: 1_793_000_000, to: 1_794_100_000.5 },
+      compare: { by: 'ago', seconds: 86_400 },
+      chart: { by: 'sensor', tagIds: ['a,b', '2'] },
       sensor: 'soil_moisture',
       selected: 'tag 7/ä&#',
       camera: { x: -1.25, y: 4.5, span: 6.75 },
+      heat: 'error',
+      colouring: 'value',
       ranges: new Map([
         ['soil_moisture', { low: -3, high: 12.5 }],
         ['a,b=&c', { low: 400, high: 1200 }],
@@ -21,7 +27,7 @@ describe('permalink', () => {
       layers: new Set(['map', 'field', 'smooth', 'pins']),
       sort: { column: 'soil_moisture', descending: true },
       filter: 'basil & "pest"',
-      health: 'no-data',
+      health: 'unknown',
     };
     expect(fromFragment(`#${toFragment(view)}`)).toEqual(view);
   });
@@ -32,12 +38,59 @@ describe('permalink', () => {
     expect(toFragment({ ...DEFAULT_VIEW, ranges })).toBe('range.co2=1,2');
   });
 
+  test.each([
+    ['period=week', { kind: 'week' }],
+    ['period=all', { kind: 'all' }],
+    ['period=100,250.5', { kind: 'own', from: 100, to: 250.5 }],
+  ] as const)('%s is a period', (fragment, period) => {
+    expect(fromFragment(fragment).period).toEqual(period);
+    expect(toFragment({ ...DEFAULT_VIEW, period })).toBe(fragment);
+  });
+
+  test.each([
+    ['compare=-604800', { compare: { by: 'ago', seconds: 604_800 } }],
+    ['compare=1794000000.5', { compare: { by: 'moment', at: 1_794_000_000.5 } }],
+    ['heat=estimate', { heat: 'estimate' }],
+    ['chart.tag=5', { chart: { by: 'tag', tagIds: ['5'] } }],
+    ['chart.sensor=5&chart.sensor=7', { chart: { by: 'sensor', tagIds: ['5', '7'] } }],
+  ] as const)('%s is held', (fragment, part) => {
+    expect(fromFragment(fragment)).toMatchObject(part);
+    expect(toFragment({ ...DEFAULT_VIEW, ...part })).toBe(fragment);
+  });
+
+  test('a chart has eight tags at most, and none twice', () => {
+    const ids = (many: number): string =>
+      Array.from({ length: many }, (_, index) => `chart.sensor=${index}`).join('&');
+    expect(fromFragment(ids(8)).chart?.tagIds).toHaveLength(8);
+    expect(fromFragment(ids(9)).chart?.tagIds).toHaveLength(8);
+    expect(fromFragment('chart.sensor=1&chart.sensor=1').chart?.tagIds).toEqual(['1']);
+  });
+
+  test('a moment is held to the millisecond', () => {
+    expect(toFragment({ ...DEFAULT_VIEW, moment: 1_794_000_000.125 })).toBe('at=1794000000.125');
+    expect(fromFragment('at=1794000000.1254').moment).toBe(1_794_000_000.125);
+    expect(fromFragment('at=0').moment).toBe(0);
+  });
+
   test('no layer at all is a choice too', () => {
     const view = { ...DEFAULT_VIEW, layers: new Set<never>() };
     expect(fromFragment(toFragment(view)).layers.size).toBe(0);
   });
 
   test.each([
+    'compare=',
+    'compare=yesterday',
+    'compare=-0',
+    'chart.tag=',
+    'chart=5',
+    'at=',
+    'at=-1',
+    'at=yesterday',
+    'at=1e999',
+    'period=fortnight',
+    'period=5,5',
+    'period=9,1',
+    'period=-1,1',
     'view=1,2',
     'view=1,2,0',
     'view=1,2,-4',
@@ -55,11 +108,21 @@ describe('permalink', () => {
     'health=ill',
     'health=',
     'filter=',
+    'colour=',
+    'colour=rainbow',
+    'heat=',
+    'heat=idw',
   ])('%s is passed over', (fragment) => {
     expect(fromFragment(fragment)).toEqual({
+      moment: null,
+      period: { kind: 'day' },
+      compare: null,
+      chart: null,
       sensor: DEFAULT_VIEW.sensor,
       selected: null,
       camera: null,
+      heat: 'nearest',
+      colouring: 'ideal',
       ranges: new Map(),
       layers: DEFAULT_LAYERS,
       sort: DEFAULT_VIEW.sort,

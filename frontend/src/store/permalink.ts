@@ -1,12 +1,19 @@
 /** The part of the view that a link carries, in the URL's fragment: it never reaches a server. */
-import { HEALTH_STATUSES } from '../domain/health';
+import type { Compare } from '../domain/difference';
+import { VERDICTS } from '../domain/health';
+import { PERIOD_KINDS, type Period } from '../domain/period';
 import type { Range } from '../domain/ramp';
 import type { Camera } from '../geometry/coordinates';
 import {
   DEFAULT_LAYERS,
   DEFAULT_VIEW,
+  chartOf,
+  HEATS,
+  isChosen,
   LAYERS,
   LONGEST_FILTER,
+  roundedMoment,
+  type Charted,
   type Layer,
   type Sort,
   type ViewState,
@@ -14,18 +21,38 @@ import {
 
 export type Linked = Pick<
   ViewState,
-  'sensor' | 'selected' | 'layers' | 'ranges' | 'camera' | 'sort' | 'filter' | 'health'
+  | 'moment'
+  | 'period'
+  | 'compare'
+  | 'chart'
+  | 'sensor'
+  | 'selected'
+  | 'layers'
+  | 'heat'
+  | 'colouring'
+  | 'ranges'
+  | 'camera'
+  | 'sort'
+  | 'filter'
+  | 'health'
 >;
 
 /** The fragment, without "#"; what is as by default is left out. */
 export function toFragment(view: Linked): string {
   const parts = new URLSearchParams();
+  if (view.moment !== null) parts.set('at', String(view.moment));
+  if (view.period.kind === 'own') parts.set('period', `${view.period.from},${view.period.to}`);
+  else if (isChosen(view.period)) parts.set('period', view.period.kind);
+  if (view.compare) parts.set('compare', compareText(view.compare));
+  for (const tagId of view.chart?.tagIds ?? []) parts.append(`chart.${view.chart?.by}`, tagId);
   if (view.sensor !== DEFAULT_VIEW.sensor) parts.set('sensor', view.sensor);
   if (view.selected !== null) parts.set('tag', view.selected);
   if (view.camera) {
     const { x, y, span } = view.camera;
     parts.set('view', [x, y, span].map((metres) => metres.toFixed(2)).join(','));
   }
+  if (view.heat !== DEFAULT_VIEW.heat) parts.set('heat', view.heat);
+  if (view.colouring !== DEFAULT_VIEW.colouring) parts.set('colour', view.colouring);
   for (const [sensor, { low, high }] of view.ranges) {
     parts.set(rangeKey(sensor, view.sensor), `${short(low)},${short(high)}`);
   }
@@ -46,17 +73,51 @@ export function fromFragment(fragment: string): Linked {
   const parts = new URLSearchParams(fragment.replace(/^#/, ''));
   const layers = parts.get('layers');
   const sensor = parts.get('sensor') || DEFAULT_VIEW.sensor;
+  const [moment] = numbers(parts.get('at'), 1) ?? [];
   return {
+    moment: moment === undefined || moment < 0 ? null : roundedMoment(moment),
+    period: periodOf(parts.get('period')),
+    compare: compareOf(parts.get('compare')),
+    chart: chartedIn(parts),
     sensor,
     selected: parts.get('tag') || null,
     camera: cameraOf(numbers(parts.get('view'), 3)),
+    heat: HEATS.find((kind) => kind === parts.get('heat')) ?? DEFAULT_VIEW.heat,
+    colouring: parts.get('colour') === 'value' ? 'value' : 'ideal',
     ranges: rangesOf(parts, sensor),
     layers: layers === null ? DEFAULT_LAYERS : new Set(layers.split(',').filter(isLayer)),
     sort: sortOf(parts.get('sort')),
     filter: (parts.get('filter') ?? '').slice(0, LONGEST_FILTER),
-    health: HEALTH_STATUSES.find((status) => status === parts.get('health')) ?? null,
+    health: VERDICTS.find((verdict) => verdict === parts.get('health')) ?? null,
   };
 }
+
+/** A name, or two moments in their order, ROS seconds. */
+function periodOf(text: string | null): Period {
+  const kind = PERIOD_KINDS.find((each) => each === text);
+  if (kind) return { kind };
+  const [from, to] = numbers(text, 2) ?? [];
+  if (from === undefined || to === undefined || from < 0 || from >= to) return DEFAULT_VIEW.period;
+  return { kind: 'own', from, to };
+}
+
+/** So many seconds before the moment that is shown, with a minus; or a moment, ROS seconds. */
+const compareText = (compare: Compare): string =>
+  String(compare.by === 'ago' ? -compare.seconds : compare.at);
+
+function compareOf(text: string | null): Compare | null {
+  const [value] = numbers(text, 1) ?? [];
+  if (value === undefined || Object.is(value, -0)) return null;
+  return value < 0 ? { by: 'ago', seconds: -value } : { by: 'moment', at: roundedMoment(value) };
+}
+
+const chartedIn = (parts: URLSearchParams): Charted | null => {
+  const of = (by: Charted['by']): Charted => ({
+    by,
+    tagIds: parts.getAll(`chart.${by}`).filter((tagId) => tagId !== ''),
+  });
+  return chartOf(of('tag')) ?? chartOf(of('sensor'));
+};
 
 /** A column's name; a minus before it: descending. */
 function sortOf(text: string | null): Sort {

@@ -6,6 +6,8 @@ export interface Task<T> {
   readonly key: string;
   /** Tasks of one group follow each other calmly; one of another group takes over at once. */
   readonly group: string;
+  /** Shortest time between the starts of two fetches of its group, if not the usual. */
+  readonly intervalMs?: number;
   readonly run: (signal: AbortSignal) => Promise<T>;
 }
 
@@ -48,7 +50,7 @@ export function createRefresher<T>(options: RefresherOptions<T>): Refresher<T> {
     if (running || !wanted || wanted.key === done) return;
     const pause =
       failures === 0
-        ? options.intervalMs
+        ? (wanted.intervalMs ?? options.intervalMs)
         : Math.min(RETRY_LONGEST_MS, RETRY_FIRST_MS * 2 ** (failures - 1));
     timer = setTimeout(start, Math.max(0, startedAt + pause - now()));
   };

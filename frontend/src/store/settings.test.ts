@@ -1,6 +1,13 @@
 import { expect, test, vi } from 'vitest';
 
-import { DEFAULT_SETTINGS, keepSettings, openStorage, readSettings } from './settings';
+import {
+  DEFAULT_SETTINGS,
+  isColumnShown,
+  keepSettings,
+  openStorage,
+  readSettings,
+  withColumn,
+} from './settings';
 
 const storage = (text: string | null): { getItem: () => string | null } => ({
   getItem: () => text,
@@ -8,7 +15,13 @@ const storage = (text: string | null): { getItem: () => string | null } => ({
 
 test('what was kept comes back', () => {
   let kept = '';
-  const settings = { theme: 'dark', unit: 'F', shortcuts: false } as const;
+  const settings = {
+    theme: 'dark',
+    unit: 'F',
+    shortcuts: false,
+    hidden: ['pest', 'co2'],
+    density: 'compact',
+  } as const;
   keepSettings({ setItem: (_, value) => (kept = value) }, settings);
   expect(readSettings(storage(kept))).toEqual(settings);
 });
@@ -19,6 +32,23 @@ test.each([null, '', '{', 'null', '7', '{"theme":"pink","unit":"K"}'])(
     expect(readSettings(storage(text))).toEqual(DEFAULT_SETTINGS);
   },
 );
+
+test('of hidden columns only what can be one comes back, and never that of the tag', () => {
+  const kept = ['pest', 7, null, 'tag', 'x'.repeat(128), 'x'.repeat(129)];
+  const read = (hidden: unknown): unknown =>
+    readSettings(storage(JSON.stringify({ hidden }))).hidden;
+  expect(read(kept)).toEqual(['pest', 'x'.repeat(128)]);
+  expect(read(Array.from({ length: 101 }, String))).toHaveLength(100);
+  expect(read('pest')).toEqual([]);
+});
+
+test('a column is hidden and shown again; that of the tag stays', () => {
+  const hidden = withColumn(withColumn([], 'pest', false), 'tag', false);
+  expect(hidden).toEqual(['pest']);
+  expect(isColumnShown({ hidden }, 'pest')).toBe(false);
+  expect(isColumnShown({ hidden: ['tag'] }, 'tag')).toBe(true);
+  expect(withColumn(hidden, 'pest', true)).toEqual([]);
+});
 
 test('a forbidden storage keeps nothing and does no harm', () => {
   vi.spyOn(window, 'localStorage', 'get').mockImplementation(() => {

@@ -6,9 +6,35 @@ export interface Settings {
   readonly unit: TemperatureUnit;
   /** Single-key shortcuts, which some speech input sets off by chance (WCAG 2.1.4). */
   readonly shortcuts: boolean;
+  /** Columns of the table that are not wanted, by their ids; those of a sensor by its name. */
+  readonly hidden: readonly string[];
+  readonly density: 'usual' | 'compact';
 }
 
-export const DEFAULT_SETTINGS: Settings = { theme: 'system', unit: 'C', shortcuts: true };
+export const DEFAULT_SETTINGS: Settings = {
+  theme: 'system',
+  unit: 'C',
+  shortcuts: true,
+  hidden: [],
+  density: 'usual',
+};
+
+/** More columns nobody has, and longer names nobody reads. */
+const MOST_HIDDEN = 100;
+const LONGEST_ID = 128;
+
+/** The tag's own column always is. */
+export const isColumnShown = ({ hidden }: Pick<Settings, 'hidden'>, id: string): boolean =>
+  id === 'tag' || !hidden.includes(id);
+
+export const withColumn = (
+  hidden: readonly string[],
+  id: string,
+  on: boolean,
+): readonly string[] =>
+  on || id === 'tag'
+    ? hidden.filter((each) => each !== id)
+    : [...new Set([...hidden, id])].slice(-MOST_HIDDEN);
 
 const KEY = 'lupin-twin.settings';
 
@@ -25,7 +51,15 @@ export function readSettings(storage: Pick<Storage, 'getItem'>): Settings {
     theme: kept.theme === 'light' || kept.theme === 'dark' ? kept.theme : 'system',
     unit: kept.unit === 'F' ? 'F' : 'C',
     shortcuts: kept.shortcuts !== false,
+    hidden: idsIn(kept.hidden),
+    density: kept.density === 'compact' ? 'compact' : 'usual',
   };
+}
+
+function idsIn(kept: unknown): readonly string[] {
+  if (!Array.isArray(kept)) return [];
+  const ids = kept.filter((id): id is string => typeof id === 'string' && id.length <= LONGEST_ID);
+  return ids.filter((id) => id !== 'tag').slice(0, MOST_HIDDEN);
 }
 
 /** The browser's storage; where it is forbidden, one that keeps nothing. */

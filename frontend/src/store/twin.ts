@@ -1,6 +1,21 @@
 /** What came from the server: the connection, the greenhouse, and what is fetched about it. */
-import type { Drop, Field, FieldQuality, Latest, StatusFrame } from '../contract/types';
+import type {
+  Alarms,
+  Drop,
+  Field,
+  FieldQuality,
+  Journal,
+  Outward,
+  Judgement,
+  Latest,
+  StatusFrame,
+} from '../contract/types';
 import { INITIAL, phaseOf, type Connection, type Phase } from '../connection/machine';
+import { sharedJudgement } from '../domain/health';
+import type { Catalogues } from '../domain/sensors';
+import { heldRange } from '../domain/autorange';
+import type { Range } from '../domain/ramp';
+import type { Timeline } from '../domain/timeline';
 import { snapshotOf, type Snapshot } from '../domain/twin';
 import type { MapPicture } from './picture';
 
@@ -17,12 +32,63 @@ export const NOTHING: Fetched<never> = { value: null, state: 'waiting', message:
 /** The greenhouse as it was or is at one moment, and what is fetched about that moment. */
 export interface House {
   readonly snapshot: Snapshot | null;
+  /** What the bridge said of that very state. */
+  readonly health: Judgement | null;
   readonly field: Fetched<Field>;
   readonly map: Fetched<MapPicture>;
   readonly quality: FieldQuality | null;
+  /** The range of the field's values, held calm over the fields before it. */
+  readonly held: Held | null;
 }
 
-export const NO_HOUSE: House = { snapshot: null, field: NOTHING, map: NOTHING, quality: null };
+export interface Held {
+  readonly sensor: string;
+  readonly range: Range;
+}
+
+export const NO_HOUSE: House = {
+  snapshot: null,
+  health: null,
+  field: NOTHING,
+  map: NOTHING,
+  quality: null,
+  held: null,
+};
+
+/** What was fetched about a moment in the past. */
+export interface Past {
+  /** The moment that the data are of, ROS seconds. */
+  readonly at: number;
+  /** Empty while nothing has come. */
+  readonly house: House;
+}
+
+/** Why a moment that was asked for is not here. */
+export interface PastFault {
+  /** ROS seconds. */
+  readonly at: number;
+  readonly message: string;
+  /** Asking again would not help: nothing is kept, or the moment has not come. */
+  readonly isLasting: boolean;
+}
+
+/** What is remembered of the period in view; "off": this twin remembers nothing. */
+export interface Remembered {
+  readonly value: Timeline | null;
+  readonly state: 'waiting' | 'ready' | 'failed' | 'off';
+  readonly message: string;
+}
+
+/** The field of one moment less that of another. */
+export interface Difference {
+  /** Null: nothing is known of the other moment. */
+  readonly field: Field | null;
+  /** The moment that was shown, and the other one, ROS seconds. */
+  readonly at: number;
+  readonly against: number;
+}
+
+export const NOT_ASKED: Remembered = { value: null, state: 'waiting', message: '' };
 
 /** Read by `moment.ts` alone, which chooses what the page shows; everyone else asks there. */
 export interface TwinState {
@@ -34,8 +100,16 @@ export interface TwinState {
   readonly unread: { readonly count: number; readonly why: string } | null;
   /** As the frames tell it. */
   readonly latest: House;
-  /** As it was at another moment, ROS seconds; null: nobody has asked. */
-  readonly past: { readonly at: number; readonly house: House } | null;
+  /** The alarms of now and of the last day, whatever moment is shown; null: none were told of yet. */
+  readonly alarms: Alarms | null;
+  /** As it was at the last moment in the past that has come; null: nobody looks back. */
+  readonly past: Past | null;
+  readonly pastFault: PastFault | null;
+  readonly remembered: Remembered;
+  /** What the heat map is when it is compared. */
+  readonly difference: Fetched<Difference>;
+  /** The file of sensors that is in force. */
+  readonly sensors: Fetched<Catalogues>;
 }
 
 export const NO_TWIN: TwinState = {
@@ -44,7 +118,12 @@ export const NO_TWIN: TwinState = {
   isTimeLost: false,
   unread: null,
   latest: NO_HOUSE,
+  alarms: null,
   past: null,
+  pastFault: null,
+  remembered: NOT_ASKED,
+  difference: NOTHING,
+  sensors: NOTHING,
 };
 
 export type TwinAction =
@@ -56,6 +135,7 @@ export type TwinAction =
       /** Set on the first frame of a connection: how old the state was when it was sent. */
       readonly stateAgeSeconds?: number | null;
     }
+  | { readonly type: 'alarms'; readonly alarms: Alarms | null }
   /** The machine slept, or its clock was set. */
   | { readonly type: 'lapse' }
   /** A message was dropped, for this reason; null: that was long ago. */
@@ -63,7 +143,11 @@ export type TwinAction =
   | { readonly type: 'field'; readonly field: Fetched<Field> }
   | { readonly type: 'map'; readonly map: Fetched<MapPicture> }
   | { readonly type: 'quality'; readonly quality: FieldQuality | null }
-  | { readonly type: 'past'; readonly past: TwinState['past'] };
+  | { readonly type: 'past'; readonly past: Past | null }
+  | { readonly type: 'past-fault'; readonly fault: PastFault | null }
+  | { readonly type: 'remembered'; readonly remembered: Remembered }
+  | { readonly type: 'difference'; readonly difference: Fetched<Difference> }
+  | { readonly type: 'sensors'; readonly sensors: Fetched<Catalogues> };
 
 export function reduceTwin(state: TwinState, action: TwinAction): TwinState {
   switch (action.type) {
@@ -78,8 +162,11 @@ export function reduceTwin(state: TwinState, action: TwinAction): TwinState {
       // What was there before a lapse says nothing about how old a state that is sent again is.
       const before = state.isTimeLost ? null : state.latest.snapshot;
       const snapshot = snapshotOf(action.latest, arrivedAt, before);
-      return withLatest({ ...state, isTimeLost: false }, { snapshot });
+      const health = sharedJudgement(state.latest.health, action.latest.health);
+      return withLatest({ ...state, isTimeLost: false }, { snapshot, health });
     }
+    case 'alarms':
+      return { ...state, alarms: action.alarms };
     case 'lapse':
       return { ...state, isTimeLost: true };
     case 'unread': {
@@ -88,14 +175,40 @@ export function reduceTwin(state: TwinState, action: TwinAction): TwinState {
       return { ...state, unread: why === null ? null : { count, why } };
     }
     case 'field':
-      return withLatest(state, { field: action.field });
+      return withLatest(state, {
+        field: action.field,
+        held: heldAfter(state.latest.held, action.field.value),
+      });
     case 'map':
       return withLatest(state, { map: action.map });
     case 'quality':
       return withLatest(state, { quality: action.quality });
     case 'past':
-      return { ...state, past: action.past };
+      return { ...state, past: action.past && heldPast(state, action.past), pastFault: null };
+    case 'past-fault':
+      return { ...state, pastFault: action.fault };
+    case 'remembered':
+      return { ...state, remembered: action.remembered };
+    case 'difference':
+      return { ...state, difference: action.difference };
+    case 'sensors':
+      return { ...state, sensors: action.sensors };
   }
+}
+
+function heldAfter(before: Held | null, field: Field | null): Held | null {
+  // Of an estimate that knows nothing there is no range, however many tags contribute.
+  if (!field?.values.some((value) => !Number.isNaN(value))) return before;
+  const { sensor, valueMin: low, valueMax: high } = field;
+  const held = before?.sensor === sensor ? before.range : null;
+  const range = heldRange(held, { low, high });
+  return before && range === held ? before : { sensor, range };
+}
+
+/** Whoever drags through time begins with the colours of now. */
+function heldPast({ past, latest }: TwinState, { at, house }: Past): Past {
+  const before = past?.house.held ?? latest.held;
+  return { at, house: { ...house, held: heldAfter(before, house.field.value) } };
 }
 
 const withLatest = (state: TwinState, part: Partial<House>): TwinState => ({
@@ -118,7 +231,25 @@ const sameStatus = (a: StatusFrame | null, b: StatusFrame | null): boolean =>
   a?.reason === b?.reason &&
   a?.message === b?.message &&
   a?.has_map === b?.has_map &&
-  sameDrops(a?.drops ?? [], b?.drops ?? []);
+  a?.origin === b?.origin &&
+  sameDrops(a?.drops ?? [], b?.drops ?? []) &&
+  sameJournal(a?.journal, b?.journal) &&
+  sameOutward(a?.outward ?? [], b?.outward ?? []);
+
+const sameJournal = (a?: Journal, b?: Journal): boolean =>
+  a?.state === b?.state &&
+  a?.detail === b?.detail &&
+  a?.set_aside === b?.set_aside &&
+  a?.simulated?.end.sec === b?.simulated?.end.sec;
+
+const sameOutward = (a: readonly Outward[], b: readonly Outward[]): boolean =>
+  a.length === b.length &&
+  a.every(
+    ({ channel, is_failing: isFailing, detail }, index) =>
+      b[index]?.channel === channel &&
+      b[index].is_failing === isFailing &&
+      b[index].detail === detail,
+  );
 
 const sameDrops = (a: readonly Drop[], b: readonly Drop[]): boolean =>
   a.length === b.length &&

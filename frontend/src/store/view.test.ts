@@ -38,3 +38,28 @@ test('smooth is on demand, everything else is on', () => {
   expect(DEFAULT_VIEW.layers.has('smooth')).toBe(false);
   expect(DEFAULT_VIEW.layers.has('field')).toBe(true);
 });
+
+test('a moment is held to the millisecond, and the same one changes nothing', () => {
+  const back = reduceView(DEFAULT_VIEW, { type: 'moment', moment: 12.34567 });
+  expect(back.moment).toBe(12.346);
+  expect(reduceView(back, { type: 'moment', moment: 12.3461 })).toBe(back);
+  expect(reduceView(back, { type: 'moment', moment: -5 }).moment).toBe(0);
+  expect(reduceView(back, { type: 'moment', moment: null }).moment).toBeNull();
+});
+
+test('charts of a tag follow the tag that is chosen, those of a sensor keep theirs', () => {
+  const one = reduceView(DEFAULT_VIEW, { type: 'chart', chart: { by: 'tag', tagIds: ['5'] } });
+  expect(reduceView(one, { type: 'select', tagId: '7' }).chart?.tagIds).toEqual(['7']);
+  expect(reduceView(one, { type: 'select', tagId: null }).chart?.tagIds).toEqual(['5']);
+  const some = { by: 'sensor', tagIds: ['5', '6'] } as const;
+  const several = reduceView(DEFAULT_VIEW, { type: 'chart', chart: some });
+  expect(reduceView(several, { type: 'select', tagId: '7' }).chart).toEqual(some);
+  expect(reduceView(several, { type: 'chart', chart: { by: 'tag', tagIds: [] } }).chart).toBeNull();
+});
+
+test('the list beside the map: a narrow screen shows it, and a filter of the table the table', () => {
+  const alarms = reduceView(DEFAULT_VIEW, { type: 'list', list: 'alarms' });
+  expect(alarms).toMatchObject({ list: 'alarms', pane: 'tags' });
+  expect(reduceView(alarms, { type: 'health', verdict: 'critical' }).list).toBe('tags');
+  expect(reduceView(alarms, { type: 'pane', pane: 'map' }).list).toBe('alarms');
+});

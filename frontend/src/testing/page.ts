@@ -1,10 +1,12 @@
 /** Puts the page's one store into a known state. */
-import type { StatusFrame, TwinTagState } from '../contract/types';
+import type { Field, Judgement, StatusFrame, TwinTagState } from '../contract/types';
 import { INITIAL, step, type ConnectionEvent } from '../connection/machine';
 import { prefer, receive, act } from '../store/app';
 import { DEFAULT_SETTINGS } from '../store/settings';
-import { NOTHING } from '../store/twin';
+import { NOT_ASKED, NOTHING } from '../store/twin';
 import { DEFAULT_VIEW } from '../store/view';
+import { NOBODY } from './health';
+import { CATALOGUES } from './sensors';
 import { stateFrame } from './tags';
 
 export const status = (over: Partial<StatusFrame> = {}): StatusFrame => ({
@@ -14,24 +16,36 @@ export const status = (over: Partial<StatusFrame> = {}): StatusFrame => ({
   message: '',
   state_age_seconds: 0,
   has_map: true,
+  origin: 'robot',
   drops: [],
+  journal: { state: 'recording', detail: 'recording', set_aside: '', simulated: null },
+  outward: [],
   ...over,
 });
 
 let stamp = 1;
 
-/** The defaults, and a state with these tags, just received. */
-export function showTags(tags: readonly TwinTagState[]): void {
+/** The defaults, and a state with these tags, just received, and judged so. */
+export function showTags(tags: readonly TwinTagState[], health: Judgement = NOBODY): void {
   act({ type: 'look', view: DEFAULT_VIEW });
   prefer(DEFAULT_SETTINGS);
+  receive({ type: 'sensors', sensors: { value: CATALOGUES, state: 'ready', message: '' } });
   receive({ type: 'field', field: NOTHING });
   receive({ type: 'map', map: NOTHING });
   receive({ type: 'quality', quality: null });
   receive({ type: 'unread', why: null });
+  receive({ type: 'past', past: null });
+  receive({ type: 'alarms', alarms: null });
+  receive({ type: 'remembered', remembered: NOT_ASKED });
   stamp += 1;
-  const latest = stateFrame(tags, { sec: stamp, revision: `r${stamp}` });
+  const latest = stateFrame(tags, { sec: stamp, revision: `r${stamp}`, health });
   receive({ type: 'state', latest, now: performance.now() });
   goLive();
+}
+
+/** A heat map that has come. */
+export function showField(value: Field): void {
+  receive({ type: 'field', field: { value, state: 'ready', message: '' } });
 }
 
 /** Runs a connection through events and hands it to the store as it is at `now`. */

@@ -1,6 +1,7 @@
 /** Small builders for tests. */
 import type { StateFrame, TwinTagState } from '../contract/types';
 import { tagOf, type Snapshot, type Tag } from '../domain/twin';
+import { NOBODY } from './health';
 
 export function wireTag(over: Partial<TwinTagState> = {}): TwinTagState {
   return {
@@ -37,13 +38,14 @@ export const readings = (values: Record<string, number | null>): TwinTagState['r
 
 export function stateFrame(
   tags: readonly TwinTagState[],
-  { seq = 1, sec = 1000, revision = 'r1' } = {},
+  { seq = 1, sec = 1000, revision = 'r1', health = NOBODY } = {},
 ): StateFrame {
   return {
     type: 'state',
     seq,
     revision,
     state: { header: { stamp: { sec, nanosec: 0 }, frame_id: 'map' }, tags },
+    health,
   };
 }
 

@@ -8,7 +8,7 @@ import type { FailedTry } from '../domain/twin';
 import { useApp } from '../store/app';
 import { selectShown } from '../store/moment';
 import { S } from '../strings';
-import { useTicking } from './useNow';
+import { useTicking } from '../widgets/useNow';
 
 type Format = (seconds: number) => string;
 

@@ -1,21 +1,24 @@
 import { act as settle, fireEvent, render, screen } from '@testing-library/react';
-import { afterEach, beforeEach, expect, test } from 'vitest';
+import { afterEach, beforeAll, beforeEach, expect, test } from 'vitest';
 
-import { receive } from '../store/app';
+import { politeVoice, urgentVoice } from '../alarms/voices';
+import { judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
-import { readings, stateFrame, wireTag } from '../testing/tags';
+import { readings, wireTag } from '../testing/tags';
 import { Announcer } from './Announcer';
-import { startShortcuts } from './shortcuts';
+import { startKeys } from './keys';
+import { loadParts } from './later';
+
+beforeAll(() => loadParts());
 
 const WELL = 22;
 const ILL = 60;
 
 let stop: () => void;
-let sec = 10_000;
 
 beforeEach(() => {
-  showTags(house([ILL, WELL, WELL, WELL, WELL, WELL]));
-  stop = startShortcuts();
+  showTags(house([ILL, WELL, WELL, WELL, WELL, WELL]), judged([ILL, WELL, WELL, WELL, WELL, WELL]));
+  stop = startKeys();
   render(<Announcer />);
 });
 afterEach(() => {
@@ -27,15 +30,18 @@ const house = (temperatures: readonly number[]): ReturnType<typeof wireTag>[] =>
     wireTag({ tag_id: String(index + 1), readings: readings({ temperature }) }),
   );
 
-/** The temperatures of tags 1, 2, …, just received. */
-const measure = (...temperatures: number[]): void => {
-  sec += 1;
-  const latest = stateFrame(house(temperatures), { sec, revision: `r${sec}` });
-  settle(() => {
-    receive({ type: 'state', latest, now: performance.now() });
-  });
-};
-const said = (what: 'said-choice' | 'said-critical'): string | null =>
+/** As a judge might have it. */
+const judged = (temperatures: readonly number[]): ReturnType<typeof judgement> =>
+  judgement(
+    Object.fromEntries(
+      temperatures.map((value, index) => [
+        String(index + 1),
+        value >= ILL ? [reason({ value, limit: 35 })] : 'healthy',
+      ]),
+    ),
+  );
+
+const said = (what: 'said-choice' | 'said-alarms' | 'said-critical'): string | null =>
   screen.getByTestId(what).textContent;
 const press = (key: string): void => {
   settle(() => {
@@ -54,28 +60,24 @@ test('the tag that a key chose is told, with its health and place in the table',
   expect(said('said-choice')).toBe('Tag 6, Healthy, 6 of 6');
 });
 
-test('a tag that becomes critical is told once; one that was so when the page opened is not', () => {
-  expect(said('said-critical')).toBe('');
-  measure(ILL, ILL, WELL);
-  expect(said('said-critical')).toBe('Critical now: Tag 2, Temperature 60.0\u00a0°C');
-  const before = screen.getByTestId('said-critical').firstChild;
-  measure(ILL, ILL + 1, WELL);
-  expect(screen.getByTestId('said-critical').firstChild).toBe(before);
+test('only what is critical cuts in: it has a voice of its own', () => {
+  expect(screen.getByTestId('said-alarms').getAttribute('role')).toBe('status');
+  expect(screen.getByTestId('said-critical').getAttribute('role')).toBe('alert');
+  settle(() => {
+    urgentVoice.dispatch('New: Tag 2');
+  });
+  expect(said('said-critical')).toBe('New: Tag 2');
+  expect(said('said-alarms')).toBe('');
 });
 
 test('the same words said again are another change for a reader to hear', () => {
-  measure(WELL, ILL);
-  const before = screen.getByTestId('said-critical').firstChild;
-  measure(WELL, WELL);
-  measure(WELL, ILL);
-  expect(said('said-critical')).toContain('Tag 2');
-  expect(screen.getByTestId('said-critical').firstChild).not.toBe(before);
-});
-
-test('of many only the first are named', () => {
-  measure(ILL, ILL, ILL, ILL);
-  expect(said('said-critical')).toMatch(/^Critical now: Tag 2.*; Tag 3.*; Tag 4[^;]*C$/);
-  measure(WELL, WELL, WELL, WELL, WELL);
-  measure(ILL, ILL, ILL, ILL, ILL);
-  expect(said('said-critical')).toMatch(/Tag 3[^;]* and 2 more$/);
+  settle(() => {
+    politeVoice.dispatch('New: Tag 3');
+  });
+  const before = screen.getByTestId('said-alarms').firstChild;
+  settle(() => {
+    politeVoice.dispatch('New: Tag 3');
+  });
+  expect(said('said-alarms')).toBe('New: Tag 3');
+  expect(screen.getByTestId('said-alarms').firstChild).not.toBe(before);
 });

@@ -1,23 +1,33 @@
-import { useEffect, type JSX } from 'react';
+import type { JSX } from 'react';
 
+import { politeVoice, urgentVoice } from '../alarms/voices';
+import type { Announcement } from '../store/announcement';
 import { useSelected, type Store } from '../store/create';
-import { chosenTag, criticalTags, startAnnouncing, type Announcement } from './announce';
+import { chosenTag } from './announce';
 
-/** Two voices, so that neither cuts off the other. */
+/** A voice each, so that none cuts off another; only a critical alarm may cut in. */
 export function Announcer(): JSX.Element {
-  useEffect(startAnnouncing, []);
   return (
     <div className="unseen">
       <Voice of={chosenTag} testId="said-choice" />
-      <Voice of={criticalTags} testId="said-critical" />
+      <Voice of={politeVoice} testId="said-alarms" />
+      <Voice of={urgentVoice} testId="said-critical" role="alert" />
     </div>
   );
 }
 
-function Voice({ of, testId }: { of: Store<Announcement, string>; testId: string }): JSX.Element {
+function Voice({
+  of,
+  testId,
+  role = 'status',
+}: {
+  of: Store<Announcement, string>;
+  testId: string;
+  role?: 'status' | 'alert';
+}): JSX.Element {
   const { text, key } = useSelected(of, (said) => said);
   return (
-    <div role="status" data-testid={testId}>
+    <div role={role} data-testid={testId}>
       {/* Anew each time, or the same words twice would be no change to tell of. */}
       <p key={key}>{text}</p>
     </div>

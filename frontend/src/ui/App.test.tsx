@@ -1,12 +1,17 @@
 import { act as flush, fireEvent, render, screen, within } from '@testing-library/react';
-import { beforeEach, describe, expect, test, vi } from 'vitest';
+import { beforeAll, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { mapPoint } from '../geometry/coordinates';
 import { pointedAt } from '../map/pointer';
-import { receive, store } from '../store/app';
-import { goLost, showTags } from '../testing/page';
+import { store } from '../store/app';
+import { judgement, reason } from '../testing/health';
+import { fieldWith } from '../testing/field';
+import { goLost, showField, showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { App } from './App';
+import { loadParts } from './later';
+
+beforeAll(() => loadParts());
 
 beforeEach(() => {
   vi.stubGlobal('fetch', () => Promise.reject(new Error('no server')));
@@ -14,10 +19,19 @@ beforeEach(() => {
     configurable: true,
     value: new EventTarget(),
   });
-  showTags([
-    wireTag({ tag_id: '1', readings: readings({ temperature: 20 }) }),
-    wireTag({ tag_id: '2', readings: readings({ co2: 3000 }), anomaly: true, bug_count: 4 }),
-  ]);
+  showTags(
+    [
+      wireTag({ tag_id: '1', readings: readings({ temperature: 20 }) }),
+      wireTag({ tag_id: '2', readings: readings({ co2: 3200 }), anomaly: true, bug_count: 4 }),
+    ],
+    judgement({
+      1: 'healthy',
+      2: [
+        reason({ sensor: 'co2', value: 3200, limit: 3000 }),
+        reason({ kind: 'pest', sensor: '', value: 4, limit: null }),
+      ],
+    }),
+  );
 });
 
 const app = (): HTMLElement => screen.getByTestId('app');
@@ -26,7 +40,11 @@ describe('page', () => {
   test('carries the connection’s state for style sheets and tests', () => {
     render(<App kiosk={false} />);
     expect(app().dataset).toMatchObject({ connectionState: 'live', fresh: 'true' });
+    const shapes = (): number =>
+      screen.getByTestId('connection').querySelectorAll('svg > *').length;
+    expect(shapes()).toBe(1);
     flush(goLost);
+    expect(shapes()).toBe(1);
     expect(app().dataset).toMatchObject({ connectionState: 'reconnecting', fresh: 'false' });
   });
 
@@ -59,25 +77,7 @@ describe('page', () => {
   });
 
   test('the read-out tells the field’s value under the pointer, or that it is not known', () => {
-    receive({
-      type: 'field',
-      field: {
-        state: 'ready',
-        message: '',
-        value: {
-          sensor: 'temperature',
-          width: 2,
-          height: 1,
-          originX: 0,
-          originY: 0,
-          resolution: 1,
-          valueMin: 21,
-          valueMax: 21,
-          sampleCount: 1,
-          values: Float32Array.of(21, NaN),
-        },
-      },
-    });
+    showField(fieldWith([[21, NaN]]));
     render(<App kiosk={false} />);
     const readout = (x: number): string => {
       flush(() => {
@@ -100,12 +100,12 @@ describe('page', () => {
     expect(app().dataset['pane']).toBe('tags');
   });
 
-  test('a wall screen shows what needs attention, pests first, and nothing to press', () => {
+  test('a wall screen shows what needs attention and why, and nothing to press', () => {
     render(<App kiosk />);
     expect(screen.queryByRole('button', { name: 'Menu' })).toBeNull();
     expect(screen.queryByRole('table')).toBeNull();
     const [first] = document.querySelectorAll('.attention li');
-    expect(first?.textContent).toContain('4 bugs');
-    expect(first?.textContent).toContain('CO₂ 3000');
+    expect(first?.textContent).toContain('4 pests seen');
+    expect(first?.textContent).toContain('CO₂ 3200');
   });
 });

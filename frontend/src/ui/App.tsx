@@ -1,50 +1,50 @@
-import { useEffect, type JSX } from 'react';
+import type { JSX } from 'react';
 
+import type { CycleWish } from '../domain/cycle';
 import { act, useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';
-import { selectSnapshot } from '../store/moment';
+import { selectShown } from '../store/moment';
+import { selectIsRecorded } from '../store/origin';
 import { S } from '../strings';
+import { AlarmsLabel } from './alarms/AlarmCount';
 import { Announcer } from './Announcer';
 import { FrozenBanner } from './FrozenBanner';
 import { Header } from './Header';
-import { HelpDialog } from './HelpDialog';
 import { HealthMark } from './HealthMark';
-import { Icon } from './Icon';
-import { PaperLine } from './PaperLine';
+import { Icon } from '../widgets/Icon';
 import { MapPanel } from './MapPanel';
-import { TagCard } from './TagCard';
 import { TagsPanel } from './TagsPanel';
 import { toast } from './toast';
+import { SimulatedNote } from './SimulatedNote';
 import { Troubles } from './Troubles';
+import { WithParts } from './WithParts';
 
-export function App({ kiosk }: { kiosk: boolean }): JSX.Element {
+export function App({
+  kiosk,
+  cycle = NO_WISH,
+}: {
+  kiosk: boolean;
+  cycle?: CycleWish;
+}): JSX.Element {
   const phase = useApp((state) => state.twin.phase);
   const pane = useApp((state) => state.view.pane);
   const selected = useApp((state) => state.view.selected);
   const message = useSelected(toast, (text) => text);
 
-  const hasTags = useApp((state) => selectSnapshot(state) !== null);
-
-  // The row of the chosen tag comes into view, once its card has taken its place.
-  useEffect(() => {
-    if (selected === null || !hasTags) return undefined;
-    const frame = requestAnimationFrame(() => {
-      document
-        .querySelector(`tr[data-tag-id="${CSS.escape(selected)}"]`)
-        ?.scrollIntoView({ block: 'nearest' });
-    });
-    return () => {
-      cancelAnimationFrame(frame);
-    };
-  }, [selected, hasTags]);
+  const moment = useApp((state) => selectShown(state).moment);
+  const isPast = moment !== null;
+  const isRecorded = useApp(selectIsRecorded);
 
   return (
     <div
       className={kiosk ? 'app kiosk' : 'app'}
       data-testid="app"
       data-connection-state={phase}
-      data-fresh={phase === 'live'}
+      data-fresh={phase === 'live' && !isPast}
+      data-past={isPast}
+      data-recorded={isRecorded}
+      data-moment={moment ?? 'now'}
       data-pane={pane}
     >
       {!kiosk && (
@@ -53,18 +53,23 @@ export function App({ kiosk }: { kiosk: boolean }): JSX.Element {
         </a>
       )}
       <Header kiosk={kiosk} />
+      {kiosk && <WithParts>{(parts) => <parts.KioskNote wish={cycle} />}</WithParts>}
       <div className="banners">
         <FrozenBanner />
         <Troubles />
+        <SimulatedNote />
+        <WithParts>{(parts) => <parts.Meanwhile />}</WithParts>
       </div>
-      <PaperLine />
+      <WithParts>{(parts) => <parts.PaperLine />}</WithParts>
       <main className="panels">
         <MapPanel kiosk={kiosk} />
         <TagsPanel kiosk={kiosk} />
-        {selected !== null && !kiosk && <TagCard key={selected} tagId={selected} />}
+        {selected !== null && !kiosk && (
+          <WithParts>{(parts) => <parts.TagCard key={selected} tagId={selected} />}</WithParts>
+        )}
       </main>
       {!kiosk && <PaneTabs />}
-      <HelpDialog />
+      <WithParts>{(parts) => <parts.HelpDialog />}</WithParts>
       <Announcer />
       <div className="toast" role="status">
         {message}
@@ -73,34 +78,37 @@ export function App({ kiosk }: { kiosk: boolean }): JSX.Element {
   );
 }
 
+const NO_WISH: CycleWish = { seconds: null, refused: null };
+
 /** By hand, because the fragment of the address belongs to the permalink. */
 function skipToTable(event: React.MouseEvent): void {
   event.preventDefault();
-  act({ type: 'pane', pane: 'tags' });
+  act({ type: 'list', list: 'tags' });
   requestAnimationFrame(() => document.getElementById('tags')?.focus());
 }
 
-/** On a narrow screen: map or table. */
+/** On a narrow screen: map, table or alarms. */
 function PaneTabs(): JSX.Element {
-  const pane = useApp((state) => state.view.pane);
-  const status = useApp((state) => selectHealth(state).status);
-  const tab = (name: 'map' | 'tags', label: string): JSX.Element => (
+  const shown = useApp(({ view }) => (view.pane === 'map' ? 'map' : view.list));
+  const verdict = useApp((state) => selectHealth(state).verdict);
+  const tab = (name: 'map' | 'tags' | 'alarms', label: JSX.Element): JSX.Element => (
     <button
       type="button"
-      aria-pressed={pane === name}
+      aria-pressed={shown === name}
       onClick={() => {
-        act({ type: 'pane', pane: name });
+        act(name === 'map' ? { type: 'pane', pane: 'map' } : { type: 'list', list: name });
       }}
     >
-      <Icon name={name === 'map' ? 'map' : 'list'} />
-      {label}
-      {name === 'tags' && <HealthMark status={status} word={false} />}
+      <Icon name={name === 'map' ? 'map' : name === 'tags' ? 'list' : 'bell'} />
+      <span>{label}</span>
+      {name === 'tags' && <HealthMark verdict={verdict} word={false} />}
     </button>
   );
   return (
-    <nav className="pane-tabs" aria-label={`${S.mapRegion} / ${S.tags}`}>
-      {tab('map', S.mapRegion)}
-      {tab('tags', S.tags)}
+    <nav className="pane-tabs" aria-label={`${S.mapRegion} / ${S.tags} / ${S.alarms}`}>
+      {tab('map', <>{S.mapRegion}</>)}
+      {tab('tags', <>{S.tags}</>)}
+      {tab('alarms', <AlarmsLabel />)}
     </nav>
   );
 }

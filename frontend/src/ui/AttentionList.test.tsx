@@ -1,33 +1,46 @@
-import { render, screen } from '@testing-library/react';
+import { render, screen, within } from '@testing-library/react';
 import { expect, test } from 'vitest';
 
+import { judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
-import { readings, wireTag } from '../testing/tags';
+import { wireTag } from '../testing/tags';
 import { AttentionList } from './AttentionList';
 
-const ids = (): (string | undefined)[] =>
-  screen.queryAllByRole('listitem').map((item) => item.dataset['tagId']);
-
-test('lists who needs somebody: pests first, a healthy tag’s too, then the worst', () => {
-  showTags([
-    wireTag({ tag_id: 'well', readings: readings({ temperature: 20 }) }),
-    wireTag({ tag_id: 'warm', readings: readings({ temperature: 30 }) }),
-    wireTag({ tag_id: 'hot', readings: readings({ temperature: 50 }) }),
-    wireTag({
-      tag_id: 'bug',
-      readings: readings({ temperature: 20 }),
-      anomaly: true,
-      bug_count: 2,
-    }),
-  ]);
+const rows = (): HTMLElement[] => [...document.querySelectorAll<HTMLElement>('li[data-tag-id]')];
+const ids = (): (string | undefined)[] => rows().map((item) => item.dataset['tagId']);
+const show = (said: Parameters<typeof judgement>[0]): void => {
+  showTags(
+    Object.keys(said).map((tag_id) => wireTag({ tag_id })),
+    judgement(said),
+  );
   render(<AttentionList />);
-  expect(ids()).toEqual(['bug', 'hot', 'warm']);
-  expect(screen.getAllByRole('listitem')[0]?.textContent).toMatch(/^bugPest2 bugs/);
+};
+const pest = reason({ kind: 'pest', sensor: '', value: 2, limit: null });
+const warm = reason({ verdict: 'stressed', value: 30, limit: 26 });
+
+test('lists who needs somebody and why, the worst first', () => {
+  show({ well: 'healthy', warm: [warm], far: 'unknown', bug: [pest], both: [reason(), pest] });
+  expect(ids()).toEqual(['both', 'bug', 'warm']);
+  const [first] = rows();
+  if (!first) throw new Error('no row');
+  const why = within(first).getAllByRole('listitem');
+  expect(why.map((each) => each.textContent)).toEqual([
+    'Temperature 6.6\u00a0°C, below 10.0 (critical)',
+    '2 pests seen',
+  ]);
 });
 
-test('says so when nobody does', () => {
-  showTags([wireTag({ readings: readings({ temperature: 20 }) })]);
-  render(<AttentionList />);
+test('ends with how many more there are', () => {
+  show(Object.fromEntries(Array.from({ length: 43 }, (_, index) => [`t${index}`, [pest]])));
+  expect(ids()).toHaveLength(40);
+  expect(screen.getByText('+ 3 more')).toBeTruthy();
+});
+
+test('says so when nobody does, and when that is not known', () => {
+  show({ well: 'healthy' });
   expect(ids()).toEqual([]);
   expect(screen.getByRole('heading').textContent).toBe('Nothing needs attention');
+  document.body.replaceChildren();
+  show({ well: 'healthy', far: 'unknown' });
+  expect(screen.getByRole('heading').textContent).toMatch(/of 1 tag nothing is known$/);
 });

@@ -1,65 +1,57 @@
-import { useMemo, type JSX } from 'react';
+import { useMemo, useRef, type JSX } from 'react';
 
-import { readingText } from '../domain/format';
 import { rowsOf, sortRows } from '../domain/table';
-import { sensorNamed } from '../domain/sensors';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
 import { selectTags } from '../store/moment';
 import { S } from '../strings';
 import { Age } from './Age';
-import { HealthMark } from './HealthMark';
-import { PestMark } from './TagRow';
+import { useFitting } from './fitting';
+import { Reasons } from './Reasons';
 
-const LONGEST = 14;
+/** Tags that a screen on the wall may have room for, and reasons of each. */
+const MOST_TAGS = 40;
+const MOST_REASONS = 2;
 
-/** For a wall screen: the tags that need somebody, pests first, then the worst. */
+/** For a wall screen: the tags that need somebody, the worst first. */
 export function AttentionList(): JSX.Element {
   const tags = useApp(selectTags);
   const health = useApp(selectHealth);
-  const unit = useApp((state) => state.settings.unit);
-  const rows = useMemo(() => {
-    const all = sortRows(rowsOf(tags, health), {
-      column: 'health',
-      descending: true,
-    });
-    const bad = all.filter(
-      ({ tag, health: own }) =>
-        tag.anomaly || own.status === 'critical' || own.status === 'stressed',
-    );
-    return [...bad.filter(({ tag }) => tag.anomaly), ...bad.filter(({ tag }) => !tag.anomaly)];
-  }, [tags, health]);
+  const rows = useMemo(
+    () =>
+      sortRows(rowsOf(tags, health), { column: 'health', descending: true }).filter(
+        ({ health: { verdict } }) => verdict === 'critical' || verdict === 'stressed',
+      ),
+    [tags, health],
+  );
+  const list = useRef<HTMLUListElement>(null);
+  const count = useFitting(list, rows.length);
   return (
     <div className="attention">
-      <h3>{rows.length > 0 ? S.attention : S.attentionNone}</h3>
-      <ul>
-        {rows.slice(0, LONGEST).map(({ tag, health: own }) => {
-          const sensor = own.sensor === null ? null : sensorNamed(own.sensor);
-          const isBad = own.status === 'critical' || own.status === 'stressed';
-          return (
-            <li key={tag.id} data-tag-id={tag.id}>
-              <strong>
-                <bdi>{shown(tag.id, 16)}</bdi>
-              </strong>
-              <span className="attention-why">
-                {isBad && sensor && own.value !== null && (
-                  <>
-                    <HealthMark status={own.status} word={false} /> {sensor.label}{' '}
-                    {readingText(sensor, own.value, unit)}
-                  </>
-                )}
-                {tag.anomaly && <PestMark count={tag.bugCount} />}
-              </span>
-              <span className="faint">
-                <Age
-                  when={(own.sensor === null ? null : tag.readAt.get(own.sensor)) ?? tag.scannedAt}
-                />
-              </span>
-            </li>
-          );
-        })}
+      <h3>{rows.length > 0 ? S.attention : noneText(health.counts.unknown)}</h3>
+      <ul ref={list}>
+        {rows.slice(0, MOST_TAGS).map(({ tag, health: own }, index) => (
+          <li key={tag.id} data-fits={index < count} data-tag-id={tag.id} data-health={own.verdict}>
+            <strong>
+              <bdi>{shown(tag.id, 16)}</bdi>
+            </strong>
+            <span className="attention-why">
+              <Reasons health={own} most={MOST_REASONS} />
+            </span>
+            <span className="faint">
+              <Age when={tag.scannedAt} />
+            </span>
+          </li>
+        ))}
       </ul>
+      {rows.length > count && (
+        <p className="attention-more">{S.attentionMore(rows.length - count)}</p>
+      )}
     </div>
   );
 }
+
+/** Of whom nothing is known, nobody knows that he needs nothing. */
+const noneText = (unknown: number): string =>
+  unknown > 0 ? S.attentionNoneKnown(unknown) : S.attentionNone;

@@ -1,8 +1,8 @@
 import { fireEvent, render, screen } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi, type Mock } from 'vitest';
 
-import { sensorNamed } from '../domain/sensors';
 import { Bound } from './Bound';
+import { sensorNamed } from '../testing/sensors';
 
 let onChange: Mock<(value: number) => void>;
 

@@ -1,16 +1,41 @@
 import type { JSX } from 'react';
 
 import { useApp } from '../store/app';
+import { selectShown } from '../store/moment';
+import { selectHasOwnTime, selectIsRecorded } from '../store/origin';
 import { S } from '../strings';
 
 /** The connection's state in a shape and a word; told to screen readers when it changes. */
 export function ConnectionBadge(): JSX.Element {
   const phase = useApp((state) => state.twin.phase);
+  const isPast = useApp((state) => selectShown(state).moment !== null);
+  const isRecorded = useApp(selectIsRecorded);
+  const isOfNow = !useApp(selectHasOwnTime);
+  const isPaused = useApp((state) => state.twin.connection.status?.reason === 'paused');
+  const word =
+    isRecorded && phase === 'live' && !isPast
+      ? S.recordedIs[isPaused ? 'paused' : 'playing']
+      : (isPast ? S.phasePast : S.phase)[phase];
   return (
-    <div className="connection" role="status" data-testid="connection" data-phase={phase}>
+    <div
+      className="connection"
+      role="status"
+      data-testid="connection"
+      data-phase={phase}
+      data-past={isPast}
+      data-of-now={isOfNow}
+    >
       <span className="unseen">{S.phaseLabel}: </span>
       <svg viewBox="0 0 16 16" width="14" height="14" aria-hidden="true">
-        {phase === 'live' && <circle cx="8" cy="8" r="6" className="solid" />}
+        {phase === 'live' && !isPast && (
+          <circle cx="8" cy="8" r="6" className={isOfNow ? 'solid' : 'ring'} />
+        )}
+        {phase === 'live' && isPast && (
+          <>
+            <circle cx="8" cy="8" r="6" className="ring" />
+            <path d="M8 4.500V8l2.500 1.500" className="ring" />
+          </>
+        )}
         {(phase === 'connecting' || phase === 'reconnecting') && (
           <circle cx="8" cy="8" r="6" className="ring turning" />
         )}
@@ -21,7 +46,7 @@ export function ConnectionBadge(): JSX.Element {
           </>
         )}
       </svg>
-      <span>{S.phase[phase]}</span>
+      <span>{word}</span>
     </div>
   );
 }

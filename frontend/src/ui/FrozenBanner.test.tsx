@@ -3,7 +3,8 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { epochOf } from '../clock';
 import { clockText } from '../domain/format';
-import { store } from '../store/app';
+import { act, receive, store } from '../store/app';
+import { NO_HOUSE } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import { ConnectionBadge } from './ConnectionBadge';
@@ -35,15 +36,18 @@ test('a lost connection: frozen, since when, and a way to try now', () => {
 });
 
 test.each([
-  ['stale', /stopped publishing/],
-  ['never_seen', /has not heard/],
-  ['thread_dead', /restarted/],
-  ['shutting_down', /shutting down/],
-] as const)('twin offline, %s: the reason in words', (reason, words) => {
+  ['stale', /fallen silent/, /published on \/twin\/state/],
+  ['never_seen', /has not heard/, /same ROS domain/],
+  ['thread_dead', /restarted/, /ROS thread/],
+  ['shutting_down', /shutting down/, null],
+] as const)('twin offline, %s: the reason in words, the machines behind', (reason, words, more) => {
   showTags([wireTag()]);
   goLive(status({ twin: 'offline', reason }));
   render(<FrozenBanner />);
   expect(text()).toMatch(words);
+  const behind = document.querySelector('details.more');
+  if (more) expect(behind?.textContent).toMatch(more);
+  else expect(behind).toBeNull();
 });
 
 test('each state of the connection has a word of its own', () => {
@@ -62,4 +66,29 @@ test('each state of the connection has a word of its own', () => {
     unmount();
   }
   expect(words.size).toBe(3);
+});
+
+test('behind a look back: live data have stopped, and what is shown stays', () => {
+  showTags([wireTag()]);
+  receive({ type: 'past', past: { at: 50, house: NO_HOUSE } });
+  act({ type: 'moment', moment: 50 });
+  goLost();
+  render(
+    <>
+      <FrozenBanner />
+      <ConnectionBadge />
+    </>,
+  );
+  expect(text()).toContain('Live data have stopped.');
+  expect(text()).toContain('What is shown is past, and stays.');
+  expect(text()).not.toContain('frozen');
+  expect(screen.getByTestId('connection').textContent).toContain('Past · reconnecting');
+});
+
+test('nothing says “Live” while another moment is shown', () => {
+  showTags([wireTag()]);
+  receive({ type: 'past', past: { at: 50, house: NO_HOUSE } });
+  act({ type: 'moment', moment: 50 });
+  render(<ConnectionBadge />);
+  expect(screen.getByTestId('connection').textContent).toBe('Connection: Past');
 });

@@ -1,56 +1,47 @@
 import type { JSX } from 'react';
 
-import type { HealthStatus } from '../domain/health';
+import type { Verdict } from '../contract/types';
+import { MARKS, svgPath } from '../domain/marks';
 import { S } from '../strings';
 
-/** One shape each, so that the state is told without colour. */
-const SHAPES: Readonly<Record<HealthStatus, JSX.Element>> = {
-  healthy: (
-    <>
-      <circle cx="8" cy="8" r="7" className="body" />
-      <path d="M4.8 8.2 7.1 10.4 11.2 5.9" className="mark" />
-    </>
-  ),
-  stressed: (
-    <>
-      <path d="M8 1.2 15.2 14.4H.8Z" className="body" />
-      <path d="M8 5.8v4M8 12.1v.01" className="mark" />
-    </>
-  ),
-  critical: (
-    <>
-      <path d="M4.9.8h6.2l4.1 4.1v6.2l-4.1 4.1H4.9L.8 11.1V4.9Z" className="body" />
-      <path d="M5.4 5.4l5.2 5.2M10.6 5.4l-5.2 5.2" className="mark" />
-    </>
-  ),
-  'no-data': <circle cx="8" cy="8" r="6.3" className="hollow" />,
-};
+/** As large as leaves room for its line in a box of 16. */
+const RADIUS = 6.7;
 
-/** The shape alone, where the word stands beside it anyway. */
-export function HealthShape({ status }: { status: HealthStatus }): JSX.Element {
+/** The same mark as the tag's pin has: one shape each, so that it is told without colour. */
+export function HealthShape({ verdict }: { verdict: Verdict }): JSX.Element {
   return (
-    <span className="health-mark" data-health={status}>
-      <svg viewBox="0 0 16 16" width="16" height="16" aria-hidden="true">
-        {SHAPES[status]}
-      </svg>
+    <span className="health-mark" data-health={verdict}>
+      <VerdictMark verdict={verdict} />
     </span>
   );
 }
 
 export function HealthMark({
-  status,
+  verdict,
   word = true,
 }: {
-  status: HealthStatus;
+  verdict: Verdict;
   /** Without the word to see, it is still there to hear. */
   word?: boolean;
 }): JSX.Element {
   return (
-    <span className="health-mark" data-health={status}>
-      <svg viewBox="0 0 16 16" width="16" height="16" aria-hidden="true">
-        {SHAPES[status]}
-      </svg>
-      <span className={word ? undefined : 'unseen'}>{S.health[status]}</span>
+    <span className="health-mark" data-health={verdict}>
+      <VerdictMark verdict={verdict} />
+      <span className={word ? undefined : 'unseen'}>{S.health[verdict]}</span>
     </span>
+  );
+}
+
+function VerdictMark({ verdict }: { verdict: Verdict }): JSX.Element {
+  const { outline, sign } = MARKS[verdict];
+  return (
+    <svg viewBox="0 0 16 16" width="16" height="16" aria-hidden="true">
+      {outline === 'circle' ? (
+        <circle cx="8" cy="8" r={RADIUS} className="body" />
+      ) : (
+        <path d={svgPath([outline], RADIUS, true)} className="body" />
+      )}
+      {sign.length > 0 && <path d={svgPath(sign, RADIUS)} className="sign" />}
+    </svg>
   );
 }

@@ -1,27 +1,29 @@
-import { fireEvent, render, screen } from '@testing-library/react';
+import { act, fireEvent, render, screen } from '@testing-library/react';
 import { expect, test } from 'vitest';
 
 import { store } from '../store/app';
-import { showTags } from '../testing/page';
-import { readings, wireTag } from '../testing/tags';
+import { judgement, reason } from '../testing/health';
+import { goLost, showTags } from '../testing/page';
+import { wireTag } from '../testing/tags';
 import { HealthSummary } from './HealthSummary';
 
-test('names the state, and the tag and sensor that drive it', () => {
-  showTags([
-    wireTag({ tag_id: '1', readings: readings({ temperature: 20 }) }),
-    wireTag({ tag_id: '5', readings: readings({ temperature: 20, co2: 4000 }) }),
-  ]);
+const house = (): HTMLElement => screen.getByTestId('house-health');
+const driver = (): HTMLElement => screen.getByTestId('health-driver');
+const TAGS = ['1', '5'].map((tag_id) => wireTag({ tag_id }));
+
+test('names the verdict, the tag that it comes from, and why', () => {
+  const co2 = reason({ sensor: 'co2', value: 4000, limit: 3000 });
+  showTags(TAGS, judgement({ 1: 'healthy', 5: [co2] }));
   render(<HealthSummary kiosk={false} />);
-  expect(screen.getByTestId('house-health').dataset['health']).toBe('critical');
+  expect(house().dataset['health']).toBe('critical');
   expect(screen.getByRole('heading').textContent).toBe('House health: Critical');
-  const driver = screen.getByTestId('health-driver');
-  expect(driver.textContent).toBe('Tag 5: CO₂ 4000\u00a0ppm, ideal 400 to 800');
-  fireEvent.click(driver);
+  expect(driver().textContent).toBe('Tag 5: CO₂ 4000\u00a0ppm, above 3000 (critical)');
+  fireEvent.click(driver());
   expect(store.get().view.selected).toBe('5');
 });
 
-test('counts the tags by state, and filters by one', () => {
-  showTags([wireTag({ tag_id: '1', readings: readings({ temperature: 20 }) }), wireTag()]);
+test('counts the tags by verdict, and filters by one', () => {
+  showTags(TAGS, judgement({ 1: 'healthy', 5: 'unknown' }));
   render(<HealthSummary kiosk={false} />);
   const healthy = screen.getByRole('button', { name: /^1 Healthy/ });
   fireEvent.click(healthy);
@@ -31,12 +33,42 @@ test('counts the tags by state, and filters by one', () => {
   expect(store.get().view.health).toBeNull();
 });
 
-test('all is well, and nothing is known', () => {
-  showTags([wireTag({ readings: readings({ temperature: 20 }) })]);
-  const { unmount } = render(<HealthSummary kiosk={false} />);
-  expect(screen.getByTestId('health-driver').textContent).toMatch(/^Every judged reading/);
-  unmount();
-  showTags([]);
+test('all is well, hardly anything is known, and nothing is', () => {
+  showTags(TAGS, judgement({ 1: 'healthy', 5: 'healthy' }));
   render(<HealthSummary kiosk={false} />);
-  expect(screen.getByTestId('health-driver').textContent).toMatch(/^No reading/);
+  expect(driver().textContent).toMatch(/^Every judged reading/);
+  const few = judgement({ 1: 'unknown', 5: 'unknown' });
+  act(() => {
+    showTags(TAGS, few);
+  });
+  expect(house().dataset['health']).toBe('unknown');
+  expect(driver().textContent).toMatch(/^More than half/);
+  // Not "nothing is known": its other sensors may well read.
+  act(() => {
+    showTags(TAGS, judgement({ 1: 'healthy', 5: 'unknown' }));
+  });
+  expect(driver().textContent).toBe('1 tag cannot be judged');
+  act(() => {
+    showTags([]);
+  });
+  expect(driver().textContent).toMatch(/^No reading/);
+});
+
+test('a house that is not heard of is unknown, whatever was said last', () => {
+  showTags(TAGS, judgement({ 1: 'healthy', 5: 'healthy' }));
+  goLost();
+  render(<HealthSummary kiosk={false} />);
+  expect(house().dataset['health']).toBe('unknown');
+  expect(driver().textContent).toMatch(/^The twin is silent/);
+  expect(screen.getByRole('button', { name: /^2 Healthy/ })).toBeTruthy();
+});
+
+test.each([
+  [true, 'light', 'Judged by the ranges for the day: so the light in the house says'],
+  [false, 'clock', 'Judged by the ranges for the night: so the clock says, for no light'],
+  [true, 'assumed', 'Judged by the ranges for the day: assumed'],
+] as const)('whose ranges hold is said: day %s, by %s', (is_day, source, told) => {
+  showTags(TAGS, judgement({}, { is_day, source }));
+  render(<HealthSummary kiosk={false} />);
+  expect(screen.getByRole('heading').title).toContain(told);
 });

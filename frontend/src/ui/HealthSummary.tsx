@@ -1,35 +1,34 @@
 import type { JSX } from 'react';
 
-import { readingText, valueText } from '../domain/format';
-import { HEALTH_STATUSES, type HouseHealth } from '../domain/health';
-import { sensorNamed } from '../domain/sensors';
+import { VERDICTS, type HouseHealth } from '../domain/health';
 import { shown } from '../domain/text';
-import type { TemperatureUnit } from '../domain/units';
 import { act, useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
 import { S } from '../strings';
 import { HealthMark, HealthShape } from './HealthMark';
+import { HouseLine } from './HouseLine';
+import { useReasonText } from './Reasons';
 
-/** The house's state, what drives it, and how many tags are in which state. */
+/** How the house is, why, and how many tags are how. */
 export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
   const health = useApp(selectHealth);
   const filter = useApp((state) => state.view.health);
-  const unit = useApp((state) => state.settings.unit);
-  const driver = driverText(health, unit);
   const { worst } = health;
+  const reason = useReasonText(health.reasons[0] ?? worst?.health.reasons[0] ?? null);
+  const driver = driverText(health, reason);
   return (
     <section
       className="health"
       aria-label={S.healthHeading}
       data-testid="house-health"
-      data-health={health.status}
+      data-health={health.verdict}
     >
       <div className="health-house">
-        <h2>
+        <h2 title={dayText(health)}>
           <span className="unseen">{S.healthHeading}: </span>
-          <HealthMark status={health.status} />
+          <HealthMark verdict={health.verdict} />
         </h2>
-        {worst && worst.deviation !== null && worst.deviation > 0 && !kiosk ? (
+        {worst && !kiosk ? (
           <button
             type="button"
             className="health-driver"
@@ -48,20 +47,21 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
           </p>
         )}
       </div>
+      <HouseLine />
       <ul className="health-counts">
-        {HEALTH_STATUSES.map((status) => (
-          <li key={status}>
+        {VERDICTS.map((verdict) => (
+          <li key={verdict}>
             <button
               type="button"
-              aria-pressed={filter === status}
+              aria-pressed={filter === verdict}
               disabled={kiosk}
-              data-health={status}
+              data-health={verdict}
               onClick={() => {
-                act({ type: 'health', status: filter === status ? null : status });
+                act({ type: 'health', verdict: filter === verdict ? null : verdict });
               }}
             >
-              <HealthShape status={status} />
-              <strong>{health.counts[status]}</strong> <span>{S.health[status]}</span>
+              <HealthShape verdict={verdict} />
+              <strong>{health.counts[verdict]}</strong> <span>{S.health[verdict]}</span>
               {!kiosk && <span className="unseen">{S.healthFilter}</span>}
             </button>
           </li>
@@ -71,20 +71,18 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
   );
 }
 
-/** The tag and sensor that make the house what it is. */
-export function driverText({ worst }: HouseHealth, unit: TemperatureUnit): string {
-  if (worst?.sensor == null || worst.value === null) return S.healthNothing;
-  if (worst.deviation === 0) return S.healthAllWell;
-  const sensor = sensorNamed(worst.sensor);
-  return S.healthDriver(
-    shown(worst.tagId, 24),
-    sensor.label,
-    readingText(sensor, worst.value, unit),
-    sensor.ideal
-      ? S.legendIdeal(
-          valueText(sensor, sensor.ideal[0], unit),
-          valueText(sensor, sensor.ideal[1], unit),
-        )
-      : '',
-  );
+/** What makes the house what it is; `reason` is the house's own, or that of its worst tag. */
+function driverText({ verdict, worst, counts }: HouseHealth, reason: string): string {
+  if (worst) return S.healthDriver(shown(worst.tagId, 24), reason);
+  if (reason !== '') return reason;
+  if (verdict === 'healthy') return S.healthAllWell;
+  const { unknown } = counts;
+  if (unknown === 0) return S.healthNothing;
+  const all = VERDICTS.reduce((sum, each) => sum + counts[each], 0);
+  return 2 * unknown > all ? S.healthMostUnknown : S.healthSomeUnknown(unknown);
+}
+
+/** Whose ranges hold, and how that is known. */
+function dayText({ day }: HouseHealth): string | undefined {
+  return day ? S.healthDay(day.is_day, S.healthDaySource[day.source]) : undefined;
 }

@@ -2,7 +2,7 @@ import { useEffect, useRef, type JSX } from 'react';
 
 import { prefer, useApp } from '../store/app';
 import { S } from '../strings';
-import { Icon } from './Icon';
+import { Icon } from '../widgets/Icon';
 
 const ID = 'help-dialog';
 
@@ -37,6 +37,7 @@ export function HelpDialog(): JSX.Element {
           </form>
         </header>
         <Keys title={S.helpGlobal} keys={S.keys.global} />
+        <Keys title={S.helpTime} keys={S.keys.time} />
         <Keys title={S.helpMap} keys={S.keys.map} />
         <label className="check">
           <input

@@ -4,6 +4,7 @@ import { beforeEach, describe, expect, test, vi } from 'vitest';
 import { canvasPoint } from '../geometry/coordinates';
 import { pinUnderMouse } from '../map/pointer';
 import { act } from '../store/app';
+import { judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { HoverCard } from './HoverCard';
@@ -21,7 +22,15 @@ const card = (): HTMLElement | null => screen.queryByTestId('hover-card');
 
 beforeEach(() => {
   point(null);
-  showTags([
+  const said = judgement({
+    7: [
+      reason({ value: 40, limit: 35 }),
+      reason({ kind: 'pest', sensor: '', value: 2, limit: null }),
+      reason({ kind: 'reading_failed', verdict: 'stressed', sensor: 'co2', value: null }),
+      reason({ kind: 'old', verdict: 'unknown', sensor: 'humidity', value: null, limit: 600 }),
+    ],
+  });
+  const tags = [
     wireTag({
       tag_id: '7',
       readings: readings({ humidity: 60, co2: null, temperature: 40 }),
@@ -33,7 +42,8 @@ beforeEach(() => {
       tag_id: 'many',
       readings: readings(Object.fromEntries(Array.from({ length: 11 }, (_, i) => [`s${i}`, i]))),
     }),
-  ]);
+  ];
+  showTags(tags, said);
 });
 
 describe('card of the pin under the mouse', () => {
@@ -43,9 +53,9 @@ describe('card of the pin under the mouse', () => {
     point('7');
     const text = card()?.textContent;
     expect(text).toContain('Tag 7Critical');
-    expect(text).toContain('Pest2 bugs');
+    expect(text).toContain('2 pests seenCO₂: the sensor gives no value1 more');
     expect(text).toMatch(
-      /Temperature40\.0\u00a0°C \d\u00a0sHumidity60\.0\u00a0% \d\u00a0sCO₂failed \d\u00a0s/,
+      /Temperature40\.0\u00a0°C too high by 14\.0\u00a0°C \d\u00a0sHumidity60\.0\u00a0% ideal \d\u00a0sCO₂failed +\d\u00a0s/,
     );
     expect(text).toContain('lupin');
     point(null);

@@ -1,22 +1,24 @@
 import { useLayoutEffect, useRef, type JSX } from 'react';
 
 import { readingText, shortAgeText } from '../domain/format';
-import { sensorNamed } from '../domain/sensors';
+import { idealText } from '../domain/ideal';
+import { rangesFor } from '../domain/sensors';
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';
 import { beside } from '../geometry/beside';
 import { pinUnderMouse, type PinUnderMouse } from '../map/pointer';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
-import { selectHealth } from '../store/derived';
+import { selectCatalogue, selectHealth } from '../store/derived';
 import { selectTag } from '../store/moment';
 import { S } from '../strings';
-import { Age, AgeFact, Tried } from './Age';
+import { Age, AgeFact } from './Age';
 import { HealthMark } from './HealthMark';
-import { PestMark } from './TagRow';
+import { Reasons } from './Reasons';
 
 /** A tag may carry any number of sensors; the card that opens with a click has them all. */
 const MOST_READINGS = 8;
+const MOST_REASONS = 3;
 
 /**
  * A tag in short, beside the pin that the mouse is on. For eyes alone: card and table tell the
@@ -35,6 +37,7 @@ function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
   const root = useRef<HTMLDivElement>(null);
   const health = useApp((state) => selectHealth(state).byTag.get(tag.id));
   const unit = useApp((state) => state.settings.unit);
+  const catalogue = useApp(selectCatalogue);
   const chosen = useApp((state) => state.view.sensor);
   // Where it fits depends on its size, which is known once it is there and before it is seen.
   useLayoutEffect(() => {
@@ -60,18 +63,21 @@ function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
         <strong>
           <bdi>{S.card(shown(tag.id, 20))}</bdi>
         </strong>
-        {health && <HealthMark status={health.status} />}
+        {health && <HealthMark verdict={health.verdict} />}
       </header>
-      {tag.anomaly && <PestMark count={tag.bugCount} />}
+      {health && <Reasons health={health} most={MOST_REASONS} />}
       <dl>
         {names.slice(0, MOST_READINGS).map((name) => {
-          const sensor = sensorNamed(name);
+          const sensor = catalogue.named(name);
           const value = tag.readings.get(name);
+          const how =
+            value == null ? null : idealText(sensor, rangesFor(sensor, tag.species), value, unit);
           return (
             <div key={name} data-sensor={name} data-chosen={name === chosen}>
               <dt>{shown(sensor.label, 20)}</dt>
               <dd>
                 {value == null ? S.sensorFailed : readingText(sensor, value, unit)}{' '}
+                {how !== null && <span>{how}</span>}{' '}
                 <span className="faint">
                   <Age when={tag.readAt.get(name) ?? 'never'} format={shortAgeText} />
                 </span>
@@ -82,11 +88,6 @@ function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
         {names.length === 0 && <AgeFact label={S.columns.age} when={tag.scannedAt} />}
       </dl>
       {hidden > 0 && <p className="faint">{S.cardMore(hidden)}</p>}
-      {tag.failedTry && (
-        <p className="faint">
-          <Tried failed={tag.failedTry} />
-        </p>
-      )}
       {names.length === 0 && <p className="faint">{S.cardNoReadings}</p>}
       <p className="faint">{tag.species ? <bdi>{shown(tag.species, 28)}</bdi> : S.unclassified}</p>
     </div>

@@ -1,33 +1,21 @@
 import { fireEvent, render, screen, within } from '@testing-library/react';
-import { beforeEach, describe, expect, test } from 'vitest';
+import { beforeAll, beforeEach, describe, expect, test } from 'vitest';
 
 import { act, prefer, receive, store } from '../store/app';
 import { fixedRange } from '../store/view';
-import { showTags } from '../testing/page';
+import { fieldWith } from '../testing/field';
+import { judgement, NOBODY, reason } from '../testing/health';
+import { showField, showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
+import { loadParts } from './later';
 import { Legend } from './Legend';
+
+beforeAll(() => loadParts());
 
 beforeEach(() => {
   showTags([wireTag({ readings: readings({ temperature: 20 }) })]);
-  receive({
-    type: 'field',
-    field: {
-      state: 'ready',
-      message: '',
-      value: {
-        sensor: 'temperature',
-        width: 1,
-        height: 1,
-        originX: 0,
-        originY: 0,
-        resolution: 1,
-        valueMin: 12.34,
-        valueMax: 30,
-        sampleCount: 9,
-        values: Float32Array.of(20),
-      },
-    },
-  });
+  act({ type: 'colouring', colouring: 'value' });
+  showField(fieldWith([[20]], { valueMin: 12.34, valueMax: 30, sampleCount: 9 }));
 });
 
 const at = (id: string): string => screen.getByTestId(id).textContent;
@@ -36,10 +24,10 @@ describe('legend', () => {
   test('tells sensor, unit, range, how many contribute, and what transparent means', () => {
     render(<Legend kiosk={false} />);
     expect(at('legend')).toContain('Temperature °C');
-    expect(at('range-low')).toBe('12.3');
+    expect(at('range-low')).toBe('12.0');
     expect(at('range-high')).toBe('30.0\u00a0°C');
     expect(at('sample-count')).toBe('9 tags contribute');
-    expect(at('legend')).toMatch(/No colour: the minimum, or not known/);
+    expect(at('legend')).toMatch(/No colour: the minimum. Hatched: not known/);
   });
 
   test('shows the error where the server gives one, and nothing where it does not', () => {
@@ -59,7 +47,27 @@ describe('legend', () => {
     });
     prefer({ unit: 'F' });
     rerender(<Legend kiosk={false} />);
-    expect(at('rmse')).toBe('leave-one-out error ±2.7\u00a0°F');
+    expect(at('rmse')).toBe('typically off by ±2.7\u00a0°F');
+  });
+
+  test('says what is too old to say, by both colourings, and of no moment when nothing was', () => {
+    const { rerender } = render(<Legend kiosk={false} />);
+    expect(screen.queryByTestId('legend-old')).toBeNull();
+    const { field } = store.get().twin.latest;
+    const old = reason({ kind: 'old', verdict: 'unknown', sensor: '' });
+    const wire = wireTag({ readings: readings({ temperature: 20 }) });
+    showTags([wire], judgement({ [wire.tag_id]: [old] }));
+    receive({ type: 'field', field });
+    for (const colouring of ['ideal', 'value'] as const) {
+      act({ type: 'colouring', colouring });
+      rerender(<Legend kiosk={false} />);
+      expect(at('legend-old')).toBe(' Faint and hatched: too old to say');
+    }
+    const { latest } = store.get().twin;
+    receive({ type: 'past', past: { at: 50, house: { ...latest, health: NOBODY } } });
+    act({ type: 'moment', moment: 50 });
+    rerender(<Legend kiosk={false} />);
+    expect(screen.queryByTestId('legend-old')).toBeNull();
   });
 
   test('a field of another sensor does not count', () => {
@@ -73,6 +81,36 @@ describe('legend', () => {
     act({ type: 'sensor', sensor: 'humidity' });
     render(<Legend kiosk={false} />);
     expect(at('sample-count')).toBe('The heat map is on its way');
+  });
+
+  test('tells what the colours mean against the ideal, and has one click to either', () => {
+    act({ type: 'colouring', colouring: 'ideal' });
+    const species = { species: 'Tulip', readings: readings({ temperature: 20 }) };
+    showTags([wireTag(species)], judgement({}, { is_day: false, source: 'light' }));
+    render(<Legend kiosk={false} />);
+    expect(
+      [...screen.getByTestId('ideal-scale').querySelectorAll('[data-part]')].map(
+        (part) => part.textContent,
+      ),
+    ).toEqual([
+      'too low below 15.0',
+      'ideal by night 15.0 – 24.0\u00a0°C',
+      'too high above 24.0\u00a0°C',
+    ]);
+    expect(at('ideal-species')).toBe('tulip 8.0 – 18.0\u00a0°C');
+    fireEvent.click(screen.getByRole('radio', { name: 'Value' }));
+    expect(screen.queryByTestId('ideal-scale')).toBeNull();
+    expect(store.get().view.colouring).toBe('value');
+    fireEvent.click(screen.getByRole('radio', { name: 'Ideal' }));
+    expect(screen.queryByTestId('range-low')).toBeNull();
+  });
+
+  test('a sensor without an ideal is coloured by value, and says so', () => {
+    act({ type: 'colouring', colouring: 'ideal' });
+    act({ type: 'sensor', sensor: 'dew_point' });
+    render(<Legend kiosk={false} />);
+    expect(at('no-ideal')).toContain('coloured by value');
+    expect(screen.getByTestId('range-low')).toBeTruthy();
   });
 
   test('a fixed range stays while the data change, and can be typed', () => {
@@ -95,13 +133,16 @@ describe('legend', () => {
   test('has a key for every look of a pin', () => {
     render(<Legend kiosk={false} />);
     const keys = within(screen.getByRole('list')).getAllByRole('listitem');
-    expect(keys.slice(0, 4).map((key) => key.textContent)).toEqual([
-      'reading',
+    expect(keys.slice(0, 7).map((key) => key.textContent)).toEqual([
+      'Critical',
+      'Stressed',
+      'Unknown',
+      'Healthy',
       'has no such sensor',
       'sensor failed',
       'pest seen',
     ]);
-    // As on the map: an outline with a stroke through it, and neither filled nor dashed.
-    expect(keys[2]?.querySelector('path')?.getAttribute('class')).toBe('key-pin failed');
+    // The very marks that the map has.
+    expect(keys[0]?.querySelector('[data-health=critical] .body')).not.toBeNull();
   });
 });

@@ -1,52 +1,115 @@
 import { useMemo, type CSSProperties, type JSX, type ReactNode } from 'react';
 
 import type { FieldQuality } from '../contract/types';
+import { VERDICTS } from '../domain/health';
 import { numberText, readingText, valueText } from '../domain/format';
 import { fraction, rgbText, sensorColour, type Range } from '../domain/ramp';
-import { RAMP, sensorNamed, type Sensor } from '../domain/sensors';
+import type { Sensor } from '../domain/sensors';
 import { speciesLooks, UNKNOWN_SPECIES, type BloomLook } from '../domain/species';
 import { shown } from '../domain/text';
 import { differenceToShown, unitOf, type TemperatureUnit } from '../domain/units';
 import { speciesOf } from '../draw/scene';
 import { useApp } from '../store/app';
-import { selectRange } from '../store/derived';
+import { selectColouring, selectHeat, selectRange, selectSensor } from '../store/derived';
 import { selectShown, selectTags } from '../store/moment';
 import { S } from '../strings';
-import { RangeControl } from './RangeControl';
+import { ColouringControl } from './ColouringControl';
+import { ErrorScale, EstimateFacts } from './estimate';
+import { HealthShape } from './HealthMark';
+import { HeatControl } from './HeatControl';
+import { IdealLegend } from './IdealLegend';
+import { WithParts } from './WithParts';
 
 export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
-  const name = useApp((state) => state.view.sensor);
+  const sensor = useApp(selectSensor);
+  const { name } = sensor;
   const unit = useApp((state) => state.settings.unit);
   const range = useApp(selectRange);
   const field = useApp((state) => selectShown(state).field.value);
   const quality = useApp((state) => selectShown(state).quality);
-  const sensor = sensorNamed(name);
   const samples = field?.sensor === name ? field.sampleCount : 0;
   const isFetching = useApp(
     (state) =>
       selectShown(state).field.value?.sensor !== name &&
       selectTags(state).some((tag) => tag.at && tag.readings.get(name) != null),
   );
+  const isIdealWished = useApp((state) => state.view.colouring === 'ideal');
+  const isIdeal = useApp((state) => selectColouring(state) === 'ideal');
+  const isEstimate = useApp((state) => state.view.heat !== 'nearest');
+  const isError = useApp((state) => selectHeat(state)?.isError ?? false);
+  const isOld = useApp((state) => Boolean(selectHeat(state)?.old));
+  const told = useApp((state) => state.twin.sensors);
+  if (!told.value) {
+    return (
+      <section className="legend" aria-label={S.legend} data-testid="legend">
+        <p role="status">
+          {told.state === 'failed' ? S.legendFailed(shown(told.message, 300)) : S.legendWaiting}
+        </p>
+      </section>
+    );
+  }
   return (
     <section className="legend" aria-label={S.legend} data-testid="legend">
+      <WithParts>{(parts) => <parts.DifferenceLegend />}</WithParts>
       <div className="legend-scale">
         <div className="legend-title">
           <strong>{shown(sensor.label, 32)}</strong> <span>{unitOf(sensor, unit)}</span>
         </div>
-        <Ramp sensor={sensor} range={range} unit={unit} />
+        {isError ? (
+          <ErrorScale />
+        ) : isIdeal ? (
+          <IdealLegend sensor={sensor} />
+        ) : (
+          <Ramp sensor={sensor} range={range} unit={unit} />
+        )}
       </div>
       <div className="legend-facts">
         <span data-testid="sample-count">
           {samples > 0 ? S.legendTags(samples) : isFetching ? S.legendFetching : S.legendNoTags}
         </span>
-        {quality?.sensor_type === name && <Quality quality={quality} sensor={sensor} unit={unit} />}
-        {/* One of the two is displayed. */}
-        <span className="legend-note">{S.legendTransparent}</span>
-        <span className="legend-note short">{S.legendTransparentShort}</span>
+        {!isEstimate && quality?.sensor_type === name && (
+          <Quality quality={quality} sensor={sensor} unit={unit} />
+        )}
+        {isEstimate && <EstimateFacts />}
+        {!isEstimate && (
+          <>
+            {/* One of the two is displayed. */}
+            <span className="legend-note">
+              <HatchedSign /> {isIdeal ? S.legendHatched : S.legendTransparent}
+            </span>
+            <span className="legend-note short">
+              <HatchedSign /> {isIdeal ? S.legendHatchedShort : S.legendTransparentShort}
+            </span>
+          </>
+        )}
+        {isOld && (
+          <span className="legend-old" data-testid="legend-old">
+            <HatchedSign isFaint /> {S.legendOld}
+          </span>
+        )}
+        {isIdealWished && !isIdeal && <span data-testid="no-ideal">{S.legendNoIdeal}</span>}
       </div>
       <Keys />
-      {!kiosk && <RangeControl sensor={sensor} range={range} />}
+      {!kiosk && (
+        <div className="legend-controls">
+          <HeatControl place="legend" />
+          {!isError && <ColouringControl />}
+          {!isIdeal && !isError && (
+            <WithParts>{(parts) => <parts.RangeControl sensor={sensor} range={range} />}</WithParts>
+          )}
+        </div>
+      )}
     </section>
+  );
+}
+
+/** As the map is where nothing is known, or faintly coloured where it is too old. */
+function HatchedSign({ isFaint = false }: { isFaint?: boolean }): JSX.Element {
+  return (
+    <svg viewBox="0 0 16 12" width="20" height="12" aria-hidden="true" className="key-hatched">
+      {isFaint && <rect width="16" height="12" className="key-faint" />}
+      <path d="M-2 8 6 0M0 14 14 0M8 14 18 4" />
+    </svg>
   );
 }
 
@@ -74,7 +137,7 @@ function Quality({
   );
 }
 
-/** The colours of pins (above) and heat map (below) from the lowest to the highest value. */
+/** The colours of the heat map from the lowest to the highest value. */
 function Ramp({
   sensor,
   range,
@@ -89,14 +152,12 @@ function Ramp({
   const from = ideal && fraction(range, ideal[0]);
   const to = ideal && fraction(range, ideal[1]);
   const style = {
-    '--ramp': rgbText(colour),
-    '--ramp-field': rgbText(colour, RAMP.maxAlpha),
+    '--ramp-field': rgbText(colour, sensor.maxAlpha),
     '--ideal': ((from ?? 0) + (to ?? 1)) / 2,
   } as CSSProperties;
   return (
     <div className="ramp" style={style}>
       <div className="ramp-bar" aria-hidden="true">
-        <span className="ramp-pins" />
         <span className="ramp-field" />
         {from !== null && to !== null && to > from && (
           <span
@@ -111,6 +172,7 @@ function Ramp({
         {sensor.ideal && (
           <span className="ramp-note">
             {S.legendIdeal(
+              S.idealParts[sensor.part ?? 'any'],
               valueText(sensor, sensor.ideal[0], unit),
               valueText(sensor, sensor.ideal[1], unit),
             )}
@@ -122,7 +184,7 @@ function Ramp({
   );
 }
 
-/** What pins and dots mean. */
+/** What pins and dots mean; a pin is the mark of its tag's verdict. */
 function Keys(): JSX.Element {
   const tags = useApp(selectTags);
   const species = useMemo(() => [...speciesLooks(speciesOf(tags))], [tags]);
@@ -131,28 +193,30 @@ function Keys(): JSX.Element {
     // May scroll on a phone, so the keyboard must be able to reach it.
     // eslint-disable-next-line jsx-a11y/no-noninteractive-tabindex
     <ul className="legend-keys" aria-label={S.legend} tabIndex={0}>
+      {VERDICTS.map((verdict) => (
+        <li key={verdict} data-verdict={verdict}>
+          <HealthShape verdict={verdict} />
+          {S.health[verdict]}
+        </li>
+      ))}
       <li>
         <KeySign>
-          <path d="M8 1.5 14.5 8 8 14.5 1.5 8Z" className="key-pin" />
-        </KeySign>
-        {S.pinValue}
-      </li>
-      <li>
-        <KeySign>
-          <path d="M8 1.5 14.5 8 8 14.5 1.5 8Z" className="key-pin hollow dashed" />
+          <circle cx="8" cy="8" r="6.5" className="key-pin dashed" />
         </KeySign>
         {S.pinLacking}
       </li>
       <li>
         <KeySign>
-          <path d="M8 1.5 14.5 8 8 14.5 1.5 8ZM5 11 11 5" className="key-pin failed" />
+          <circle cx="8" cy="8" r="6.5" className="key-pin" />
+          <path d="M5 11 11 5" className="key-pin" />
         </KeySign>
         {S.pinFailed}
       </li>
       <li>
         <KeySign>
           <circle cx="8" cy="8" r="6.2" className="key-pest" />
-          <path d="M8 4.6v4M8 11v.01" className="key-pest-mark" />
+          <ellipse cx="8" cy="8.6" rx="1.7" ry="2.6" className="key-bug" />
+          <path d="M5 7.2h6M5 9.8h6M8 4.8v1.5" className="key-bug" />
         </KeySign>
         {S.pinPest}
       </li>

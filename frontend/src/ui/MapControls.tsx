@@ -4,8 +4,10 @@ import { commandMap } from '../map/commands';
 import { act, useApp } from '../store/app';
 import { LAYERS } from '../store/view';
 import { S } from '../strings';
-import { Disclosure } from './Disclosure';
-import { Icon, type IconName } from './Icon';
+import { Disclosure } from '../widgets/Disclosure';
+import { Icon, type IconName } from '../widgets/Icon';
+import { HeatControl } from './HeatControl';
+import { WithParts } from './WithParts';
 
 export function MapControls(): JSX.Element {
   const button = (label: string, icon: IconName, action: () => void): JSX.Element => (
@@ -49,6 +51,8 @@ function LayerList(): JSX.Element {
           <span>{S.layers[layer]}</span>
         </label>
       ))}
+      <HeatControl place="layers" />
+      <WithParts>{(parts) => <parts.CompareControl />}</WithParts>
     </>
   );
 }

@@ -1,9 +1,11 @@
 import { beforeEach, describe, expect, test } from 'vitest';
 
 import { act, receive, store } from '../store/app';
-import { NO_HOUSE, NO_TWIN } from '../store/twin';
+import { NO_HOUSE, NO_TWIN, type House } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
-import { readings, wireTag } from '../testing/tags';
+import { timelineOf } from '../domain/timeline';
+import { readings, snapshot, tag, wireTag } from '../testing/tags';
+import { wireTimeline } from '../testing/timeline';
 import { noticeFor } from './Notices';
 
 const id = (): string | undefined => noticeFor(store.get())?.id;
@@ -28,9 +30,15 @@ describe('the most basic lack is told first', () => {
     showTags([wireTag({ readings: readings({ temperature: 20 }) })]);
   });
 
-  test('no tags', () => {
+  test('no tags; a twin that was heard is there, whatever it lacks', () => {
     showTags([]);
     expect(id()).toBe('no-tags');
+    goLive(status({ twin: 'offline', reason: 'no_clock' }));
+    expect(noticeFor(store.get())).toMatchObject({
+      id: 'no-twin',
+      title: 'No tags yet',
+      hint: expect.stringContaining('does not know the time') as string,
+    });
   });
 
   test('no pins', () => {
@@ -55,6 +63,49 @@ describe('the most basic lack is told first', () => {
   });
 
   test('nothing is lacking', () => {
+    expect(id()).toBeUndefined();
+  });
+});
+
+describe('of a moment in the past', () => {
+  const at = 5_025;
+  const come = (house: House): void => {
+    showTags([wireTag({ readings: readings({ temperature: 20 }) })]);
+    act({ type: 'moment', moment: at });
+    receive({ type: 'past', past: { at, house } });
+  };
+
+  test('that has not come, nothing is there yet, whatever there is now', () => {
+    come(NO_HOUSE);
+    expect(noticeFor(store.get())).toMatchObject({
+      id: 'past-fetching',
+      title: 'Fetching sim 01:23:45',
+      large: true,
+    });
+  });
+
+  test('that cannot be had, the reason is told', () => {
+    come(NO_HOUSE);
+    receive({ type: 'past-fault', fault: { at, message: 'no journal is kept', isLasting: true } });
+    expect(noticeFor(store.get())).toMatchObject({ id: 'past-failed', hint: 'no journal is kept' });
+  });
+
+  test('of which nothing is known, it says since when anything is', () => {
+    come({ ...NO_HOUSE, snapshot: snapshot([]) });
+    expect(noticeFor(store.get())).toMatchObject({
+      id: 'past-nothing',
+      hint: 'Nothing is remembered yet.',
+    });
+    const value = timelineOf(wireTimeline({ from: 7_200, to: 9_000 }));
+    receive({ type: 'remembered', remembered: { value, state: 'ready', message: '' } });
+    expect(noticeFor(store.get())?.hint).toBe('What is remembered begins at sim 02:00:00.');
+  });
+
+  test('with tags there is nothing to say', () => {
+    come({
+      ...NO_HOUSE,
+      snapshot: snapshot([tag({ readings: readings({ temperature: 20 }) })]),
+    });
     expect(id()).toBeUndefined();
   });
 });

@@ -1,16 +1,20 @@
 import type { JSX } from 'react';
 
-import { sensorNamed } from '../domain/sensors';
+import { rosText } from '../domain/rostime';
 import { shown } from '../domain/text';
 import { useApp, type AppState } from '../store/app';
+import { selectSensor } from '../store/derived';
 import { selectShown, selectTags } from '../store/moment';
 import { S } from '../strings';
-import { offlineReason } from './FrozenBanner';
+import { More } from '../widgets/More';
+import { offlineMore, offlineReason } from './FrozenBanner';
 
 interface Notice {
   readonly id: string;
   readonly title: string;
   readonly hint?: string;
+  /** What only who looks after the machines needs. */
+  readonly more?: string;
   /** In the middle of an otherwise empty map. */
   readonly large?: boolean;
 }
@@ -18,37 +22,77 @@ interface Notice {
 /** What is missing, and what to do about it; the most basic lack first and alone. */
 export function noticeFor(state: AppState): Notice | null {
   const { phase, connection } = state.twin;
-  const { snapshot, field, map } = selectShown(state);
+  const { snapshot, field, map, moment } = selectShown(state);
   const offline = {
     id: 'no-twin',
     title: S.emptyNoTwin,
     hint: offlineReason(connection.status),
+    more: offlineMore(connection.status),
     large: true,
   };
+  if (moment !== null && !snapshot?.tags.length) {
+    return pastNotice(state, moment, snapshot !== null);
+  }
   if (!snapshot) {
     if (phase === 'offline') return offline;
     return phase === 'connecting'
       ? { id: 'connecting', title: S.emptyConnecting, hint: S.emptyConnectingHint, large: true }
-      : { id: 'unreachable', title: S.emptyUnreachable, hint: S.emptyUnreachableHint, large: true };
+      : {
+          id: 'unreachable',
+          title: S.emptyUnreachable,
+          hint: S.emptyUnreachableHint,
+          more: S.emptyUnreachableMore,
+          large: true,
+        };
   }
   if (snapshot.tags.length === 0) {
-    if (phase === 'offline') return offline;
-    return { id: 'no-tags', title: S.emptyNoTags, hint: S.emptyNoTagsHint, large: true };
+    // It was heard: what is wrong with it is told, and not that there is none.
+    if (phase === 'offline') return { ...offline, title: S.emptyNoTags };
+    return {
+      id: 'no-tags',
+      title: S.emptyNoTags,
+      hint: S.emptyNoTagsHint,
+      more: S.emptyNoTagsMore,
+      large: true,
+    };
   }
   if (!snapshot.tags.some((tag) => tag.at)) {
     return { id: 'no-pins', title: S.emptyNoPins, hint: S.emptyNoPinsHint };
   }
-  if (!snapshot.tags.some((tag) => tag.at && tag.readings.get(state.view.sensor) != null)) {
-    const label = shown(sensorNamed(state.view.sensor).label, 32);
+  const { sensor } = state.view;
+  const isMapped = field.value?.sensor === sensor && field.value.sampleCount > 0;
+  if (!isMapped && !snapshot.tags.some((tag) => tag.at && tag.readings.get(sensor) != null)) {
+    const label = shown(selectSensor(state).label, 32);
     return { id: 'no-reading', title: S.emptyNoReading(label), hint: S.emptyNoReadingHint };
   }
   if (field.state === 'failed') {
     return { id: 'field-failed', title: S.fieldFailed(shown(field.message, 160)) };
   }
   if (!map.value && (!connection.status?.has_map || map.state === 'failed')) {
-    return { id: 'no-map', title: S.emptyNoMap };
+    return { id: 'no-map', title: S.emptyNoMap, more: S.emptyNoMapMore };
   }
   return null;
+}
+
+/** Of a moment in the past there is nothing to show: not yet, not at all, or because it was so. */
+function pastNotice({ twin }: AppState, moment: number, hasCome: boolean): Notice {
+  const { pastFault, remembered } = twin;
+  const when = rosText(moment);
+  if (hasCome) {
+    const reach = remembered.value?.reach;
+    const hint = reach ? S.pastReach(rosText(reach.from)) : S.pastReachNothing;
+    return { id: 'past-nothing', title: S.pastNothing(when), hint, large: true };
+  }
+  if (pastFault) {
+    const hint = shown(pastFault.message, 160);
+    return { id: 'past-failed', title: S.pastFailed(when), hint, large: true };
+  }
+  return {
+    id: 'past-fetching',
+    title: S.pastFetching(when),
+    hint: S.pastFetchingHint,
+    large: true,
+  };
 }
 
 /** In the middle of an empty map, or at the edge of one that has something to show. */
@@ -56,6 +100,7 @@ export function Notices({ place }: { place: 'middle' | 'edge' }): JSX.Element | 
   const id = useApp((state) => noticeFor(state)?.id);
   const title = useApp((state) => noticeFor(state)?.title);
   const hint = useApp((state) => noticeFor(state)?.hint);
+  const more = useApp((state) => noticeFor(state)?.more);
   const large = useApp((state) => noticeFor(state)?.large ?? false);
   if (!id || large !== (place === 'middle')) return null;
   return (
@@ -67,6 +112,7 @@ export function Notices({ place }: { place: 'middle' | 'edge' }): JSX.Element | 
     >
       <strong>{title}</strong>
       {hint && <span>{hint}</span>}
+      {more && <More label={S.more} text={more} />}
     </div>
   );
 }

@@ -2,7 +2,7 @@ import { act as flush, render, screen } from '@testing-library/react';
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { act, prefer } from '../store/app';
-import { showTags } from '../testing/page';
+import { goLive, showTags, status } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { PaperLine } from './PaperLine';
 
@@ -24,12 +24,21 @@ test('paper says when it was, when it was printed, and what is on it', () => {
   flush(() => {
     window.dispatchEvent(new Event('beforeprint'));
   });
-  expect(screen.getByTestId('paper-line').textContent).toBe(
-    'As of 2026-05-01 14:03:22, printed 2026-05-01 14:04:27 Temperature 20.0 – 30.0\u00a0°C',
-  );
+  const when = 'As of 1 May 2026, 14:03:22, printed 1 May 2026, 14:04:27';
+  const line = (): string => screen.getByTestId('paper-line').textContent;
+  expect(line()).toBe(`${when} Temperature against its ideal 18.0 – 26.0\u00a0°C`);
+  flush(() => {
+    act({ type: 'colouring', colouring: 'value' });
+  });
+  expect(line()).toBe(`${when} Temperature 18.0 – 30.0\u00a0°C`);
   flush(() => {
     prefer({ unit: 'F' });
     act({ type: 'range', range: { low: 0, high: 100 } });
   });
-  expect(screen.getByTestId('paper-line').textContent).toMatch(/Temperature 32\.0 – 212\u00a0°F$/);
+  expect(line()).toMatch(/Temperature 32\.0 – 212\u00a0°F$/);
+  flush(() => {
+    goLive(status({ origin: 'recorded' }));
+  });
+  // Not when it was played.
+  expect(line()).toMatch(/^As of sim \d\d:\d\d:\d\d \(Recording\), printed 1 May 2026, 14:04:27/);
 });

@@ -2,20 +2,30 @@ import { useEffect, useState, type JSX } from 'react';
 import { flushSync } from 'react-dom';
 
 import { epochOf, timeOfDay } from '../clock';
-import { momentText, rangeText } from '../domain/format';
-import { sensorNamed } from '../domain/sensors';
+import { rangeText } from '../domain/format';
+import { dateText, rosText, secondsOf } from '../domain/rostime';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
-import { selectRange } from '../store/derived';
-import { selectSnapshot } from '../store/moment';
+import { selectColouring, selectRange, selectSensor } from '../store/derived';
+import { selectShown, selectSnapshot } from '../store/moment';
+import { selectHasOwnTime, selectOrigin } from '../store/origin';
 import { S } from '../strings';
 
 /** What and when, on paper alone: "Live" and "5 s" mean nothing an hour later. */
 export function PaperLine(): JSX.Element | null {
   const [printedAt, setPrintedAt] = useState(() => timeOfDay());
   const takenAt = useApp((state) => selectSnapshot(state)?.takenAt);
-  const sensor = sensorNamed(useApp((state) => state.view.sensor));
+  const moment = useApp((state) => selectShown(state).moment);
+  const origin = useApp(selectOrigin);
+  // Of a run with a time of its own: that, and not when it came here.
+  const ownAt = useApp((state) => {
+    const snapshot = selectHasOwnTime(state) ? selectSnapshot(state) : null;
+    return snapshot && secondsOf(snapshot.at);
+  });
+  const sensor = useApp(selectSensor);
   const range = useApp(selectRange);
+  const isIdeal = useApp((state) => selectColouring(state) === 'ideal');
+  const { ideal } = sensor;
   const unit = useApp((state) => state.settings.unit);
   useEffect(() => {
     const onPrint = (): void => {
@@ -30,10 +40,17 @@ export function PaperLine(): JSX.Element | null {
     };
   }, []);
   if (takenAt === undefined) return null;
+  const label = shown(sensor.label, 32);
+  const scale = isIdeal && ideal ? { low: ideal[0], high: ideal[1] } : range;
+  const then = moment ?? ownAt;
+  const time = then === null ? dateText(epochOf(takenAt)) : rosText(then);
+  const taken = origin === null ? time : `${time} (${S.origin[origin]})`;
   return (
     <p className="paper-line" data-testid="paper-line">
-      <strong>{S.paper(momentText(epochOf(takenAt)), momentText(printedAt))}</strong>{' '}
-      <span>{S.paperRange(shown(sensor.label, 32), rangeText(sensor, range, unit))}</span>
+      <strong>{S.paper(taken, dateText(printedAt))}</strong>{' '}
+      <span>
+        {S.paperRange(isIdeal ? S.legendAgainst(label) : label, rangeText(sensor, scale, unit))}
+      </span>
     </p>
   );
 }

@@ -1,7 +1,7 @@
 import { expect, test } from 'vitest';
 
-import { sensorNamed } from '../domain/sensors';
 import { startingRange } from './RangeControl';
+import { sensorNamed } from '../testing/sensors';
 
 const temperature = sensorNamed('temperature');
 

@@ -1,5 +1,6 @@
 import type { JSX } from 'react';
 
+import { rounded } from '../domain/autorange';
 import { readingText } from '../domain/format';
 import type { Range } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
@@ -7,7 +8,7 @@ import { act, useApp } from '../store/app';
 import { fixedRange } from '../store/view';
 import { S } from '../strings';
 import { Bound } from './Bound';
-import { Segmented } from './Segmented';
+import { Segmented } from '../widgets/Segmented';
 
 /** Automatic colours follow the data; a fixed range lets two moments be compared. */
 export function RangeControl({
@@ -78,15 +79,7 @@ export function RangeControl({
 
 /** What is in use now, rounded outwards; without one, the ideal range. */
 export function startingRange({ ideal }: Sensor, range: Range | null): Range {
-  if (range && range.high > range.low) {
-    const step = 10 ** Math.floor(Math.log10(range.high - range.low) - 0.5);
-    const decimals = Math.max(0, -Math.floor(Math.log10(step)));
-    const round = (value: number): number => Number(value.toFixed(decimals));
-    return {
-      low: round(Math.floor(range.low / step) * step),
-      high: round(Math.ceil(range.high / step) * step),
-    };
-  }
+  if (range && range.high > range.low) return rounded(range);
   if (ideal) return { low: ideal[0], high: ideal[1] };
   return range ? { low: range.low - 1, high: range.high + 1 } : { low: 0, high: 1 };
 }

@@ -6,7 +6,7 @@ import { unitOf } from '../domain/units';
 import { act, useApp } from '../store/app';
 import { selectSensors } from '../store/derived';
 import { S } from '../strings';
-import { Segmented } from './Segmented';
+import { Segmented } from '../widgets/Segmented';
 
 /** Which sensor the map shows. */
 export function SensorPicker(): JSX.Element {

@@ -2,23 +2,31 @@ import { fireEvent, render, screen } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { act, receive, store } from '../store/app';
+import { judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { TagCard } from './TagCard';
 
 beforeEach(() => {
   vi.stubGlobal('fetch', () => Promise.reject(new Error('no server')));
-  showTags([
+  const said = judgement({
+    7: [
+      reason({ value: 9, limit: 10 }),
+      reason({ kind: 'pest', sensor: '', value: 3, limit: null }),
+    ],
+  });
+  const tags = [
     wireTag({
       tag_id: '7',
-      readings: readings({ temperature: 10, co2: null, ph: 6.5 }),
+      readings: readings({ temperature: 9, co2: null, ph: 6.5 }),
       species: 'tulip',
       species_confidence: 0.8,
       anomaly: true,
       bug_count: 3,
       flower_count: 12,
     }),
-  ]);
+  ];
+  showTags(tags, said);
   act({ type: 'select', tagId: '7' });
 });
 
@@ -26,12 +34,31 @@ describe('card', () => {
   test('tells everything about its tag', () => {
     render(<TagCard tagId="7" />);
     const card = screen.getByRole('complementary', { name: 'Tag 7' });
-    for (const text of ['10.0\u00a0°C', 'below ideal', 'failed', '6.5', 'tulip', '80', '12']) {
+    for (const text of ['9.0\u00a0°C', 'below ideal', 'failed', '6.5', 'tulip', '80', '12']) {
       expect(card.textContent).toContain(text);
     }
-    expect(card.textContent).toContain('3 bugs');
+    expect(card.textContent).toContain('3 pests seen');
     expect(card.textContent).toContain('Critical');
     expect(card.textContent).toContain('x 1.00 m, y 2.00 m');
+  });
+
+  test('names the ideal range of its species, and whether it is that of day or night', () => {
+    const tags = [
+      wireTag({
+        tag_id: '7',
+        species: 'Tulip',
+        readings: readings({ temperature: 9, soil_moisture: 30 }),
+      }),
+    ];
+    const ideals = (): (string | null)[] =>
+      [...document.querySelectorAll('.card-ideal')].map(({ textContent }) => textContent);
+    showTags(tags, judgement({ 7: 'healthy' }));
+    const { unmount } = render(<TagCard tagId="7" />);
+    expect(ideals()).toEqual(['ideal by day 12.0 to 20.0 °C', 'ideal 25.0 to 60.0 %']);
+    unmount();
+    showTags(tags, judgement({ 7: 'healthy' }, { is_day: false, source: 'light' }));
+    render(<TagCard tagId="7" />);
+    expect(ideals()[0]).toBe('ideal by night 8.0 to 18.0 °C');
   });
 
   test('closes', () => {

@@ -2,31 +2,40 @@ import { useEffect, useRef, type JSX } from 'react';
 
 import type { When } from '../domain/age';
 import { metresText, percentText, readingText, valueText } from '../domain/format';
-import { deviation, sideOf, statusOf } from '../domain/health';
-import { sensorNamed } from '../domain/sensors';
+import { rangeReason, sideOf } from '../domain/health';
+import { rangesFor } from '../domain/sensors';
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';
 import { unitOf, type TemperatureUnit } from '../domain/units';
-import type { TagHistory } from '../contract/types';
+import type { TagHealth, TagHistory } from '../contract/types';
 import { commandMap } from '../map/commands';
 import { act, useApp } from '../store/app';
-import { selectHealth } from '../store/derived';
-import { selectTag } from '../store/moment';
+import { selectCatalogue, selectHealth } from '../store/derived';
+import { selectNewestTag, selectShown, selectTag } from '../store/moment';
 import { S } from '../strings';
 import { Age, AgeFact, Tried, useAgeStep } from './Age';
+import { CardEstimate } from './estimate';
 import { HealthMark } from './HealthMark';
-import { Icon } from './Icon';
+import { inTime } from './inTime';
+import { Icon } from '../widgets/Icon';
+import { Reasons } from './Reasons';
 import { Sparkline } from './Sparkline';
-import { PestMark } from './TagRow';
 import { Tries } from './Tries';
-import { useHistory } from './useHistory';
+import { asOf, useHistory } from './useHistory';
+
+// Charts come after the first paint, and their library with them.
+const CardChart = inTime(async () => (await import('../charts/CardChart')).default);
 
 /** Everything about one tag, over the map. */
 export function TagCard({ tagId }: { tagId: string }): JSX.Element {
   const tag = useApp((state) => selectTag(state, tagId));
   const health = useApp((state) => selectHealth(state).byTag.get(tagId));
   const unit = useApp((state) => state.settings.unit);
-  const history = useHistory(tagId, tag?.observation);
+  const moment = useApp((state) => selectShown(state).moment);
+  // What is newest says whether there is more to fetch, whatever moment is shown.
+  const newest = useApp((state) => selectNewestTag(state, tagId)?.observation);
+  const fetched = useHistory(tagId, newest);
+  const history = fetched && asOf(fetched, moment);
   const root = useRef<HTMLElement>(null);
   const cameFrom = useRef<Element | null>(null);
 
@@ -52,7 +61,7 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
         <h2>
           <bdi>{S.card(shown(tagId, 24))}</bdi>
         </h2>
-        {health && <HealthMark status={health.status} />}
+        {health && <HealthMark verdict={health.verdict} />}
         <button
           type="button"
           className="icon-button"
@@ -65,28 +74,34 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
           <Icon name="close" />
         </button>
       </header>
-      {tag ? <CardBody tag={tag} unit={unit} history={history} /> : <p>{S.cardGone}</p>}
+      {tag ? (
+        <CardBody tag={tag} health={health} unit={unit} history={history} />
+      ) : (
+        <p>{moment === null ? S.cardGone : S.cardGoneThen}</p>
+      )}
     </aside>
   );
 }
 
 function CardBody({
   tag,
+  health,
   unit,
   history,
 }: {
   tag: Tag;
+  health: TagHealth | undefined;
   unit: TemperatureUnit;
   history: TagHistory | null;
 }): JSX.Element {
   const { at } = tag;
+  // Where nobody asks for the estimate, only what it left out is of interest.
+  const isEstimated = useApp((state) => state.view.heat !== 'nearest');
+  const hasChanged = health?.reasons.some(({ kind }) => kind === 'changed') ?? false;
+  const isCharted = useApp((state) => state.view.chart !== null);
   return (
     <div className="card-body">
-      {tag.anomaly && (
-        <p className="card-pest">
-          <PestMark count={tag.bugCount} />
-        </p>
-      )}
+      {health && <Reasons health={health} />}
       {tag.readings.size === 0 && <p className="faint">{S.cardNoReadings}</p>}
       <ul className="card-readings">
         {[...tag.readings].map(([name, value]) => (
@@ -94,12 +109,16 @@ function CardBody({
             key={name}
             name={name}
             value={value}
+            species={tag.species}
+            health={health}
             when={tag.readAt.get(name) ?? 'never'}
             unit={unit}
             values={history?.sensors.find((each) => each.name === name)?.values ?? []}
           />
         ))}
       </ul>
+      {(isEstimated || hasChanged) && <CardEstimate tag={tag} health={health} />}
+      {tag.readings.size > 0 && !isCharted && <CardChart tagId={tag.id} />}
       <dl className="card-facts">
         <AgeFact label={S.cardScanned} when={tag.scannedAt} />
         {tag.lookedAt !== 'never' && <AgeFact label={S.cardLooked} when={tag.lookedAt} />}
@@ -157,18 +176,24 @@ function CardBody({
 function CardReading({
   name,
   value,
+  species,
+  health,
   when,
   unit,
   values,
 }: {
   name: string;
   value: number | null;
+  species: string;
+  health: TagHealth | undefined;
   when: When;
   unit: TemperatureUnit;
   values: TagHistory['sensors'][number]['values'];
 }): JSX.Element {
-  const sensor = sensorNamed(name);
-  const side = value === null ? null : sideOf(sensor.ideal, value);
+  const sensor = useApp((state) => selectCatalogue(state).named(name));
+  const { ideal } = rangesFor(sensor, species);
+  const reason = rangeReason(health, name);
+  const side = reason && sideOf(reason);
   const step = useAgeStep(when);
   return (
     <li data-sensor={name} data-age={step}>
@@ -182,13 +207,9 @@ function CardReading({
       <span className="card-spark">
         <Sparkline sensor={sensor} values={values} unit={unit} />
       </span>
-      {sensor.ideal && (
-        <span
-          className="card-ideal"
-          data-side={side}
-          data-health={value === null ? null : statusOf(deviation(sensor.ideal, value))}
-        >
-          {side && side !== 'within' && (
+      {ideal && (
+        <span className="card-ideal" data-side={side} data-health={reason?.verdict}>
+          {side && (
             <>
               <Icon name={side === 'below' ? 'down' : 'up'} size={12} />
               {S[side]}
@@ -196,8 +217,9 @@ function CardReading({
             </>
           )}
           {S.healthIdeal(
-            valueText(sensor, sensor.ideal[0], unit),
-            valueText(sensor, sensor.ideal[1], unit),
+            S.idealParts[sensor.part ?? 'any'],
+            valueText(sensor, ideal[0], unit),
+            valueText(sensor, ideal[1], unit),
             unitOf(sensor, unit),
           )}
         </span>

@@ -2,24 +2,35 @@ import { memo, type JSX } from 'react';
 
 import type { When } from '../domain/age';
 import { percentText, shortAgeText, valueText } from '../domain/format';
-import { deviation, sideOf, statusOf, type TagHealth } from '../domain/health';
-import type { Sensor } from '../domain/sensors';
+import type { TagHealth } from '../contract/types';
+import { rangeReason, sideOf } from '../domain/health';
+import { reasonsText } from '../domain/reasons';
+import type { Catalogue, Sensor } from '../domain/sensors';
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';
 import type { TemperatureUnit } from '../domain/units';
 import { S } from '../strings';
 import { Age, Tried, useAgeStep } from './Age';
 import { HealthMark } from './HealthMark';
-import { Icon } from './Icon';
+import { Icon } from '../widgets/Icon';
+import type { HourAgo } from '../store/hourAgo';
+import { isColumnShown } from '../store/settings';
+import { TrendLine } from './TrendLine';
 
 interface Props {
   /** Its place among all rows, from 0. */
   readonly index: number;
   readonly tag: Tag;
   readonly health: TagHealth;
+  readonly catalogue: Catalogue;
+  /** Those that have a column. */
   readonly sensors: readonly Sensor[];
   readonly chosen: string;
   readonly unit: TemperatureUnit;
+  /** Columns that are not wanted. */
+  readonly hidden: readonly string[];
+  /** What was known an hour before; null: not known. */
+  readonly then: HourAgo | null;
   readonly selected: boolean;
   readonly hovered: boolean;
 }
@@ -28,17 +39,22 @@ export const TagRow = memo(function TagRow({
   index,
   tag,
   health,
+  catalogue,
   sensors,
   chosen,
   unit,
+  hidden,
+  then,
   selected,
   hovered,
 }: Props): JSX.Element {
+  const has = (id: string): boolean => isColumnShown({ hidden }, id);
+  const why = reasonsText(catalogue, health.reasons, unit);
   return (
     <tr
       aria-rowindex={index + 2}
       data-tag-id={tag.id}
-      data-health={health.status}
+      data-health={health.verdict}
       data-pinned={tag.at !== null}
       data-pest={tag.anomaly}
       data-selected={selected}
@@ -55,42 +71,61 @@ export const TagRow = memo(function TagRow({
           </span>
         )}
       </th>
-      <td className="cell-health">
-        <HealthMark status={health.status} />
-      </td>
-      <td className="number cell-age">
-        <Age when={tag.scannedAt} format={shortAgeText} />
-      </td>
+      {has('health') && (
+        <td className="cell-health" title={why}>
+          <HealthMark verdict={health.verdict} />
+          {why !== '' && (
+            <>
+              <span className="unseen">: </span>
+              <span className="why">{why}</span>
+            </>
+          )}
+        </td>
+      )}
+      {has('age') && (
+        <td className="number cell-age">
+          <Age when={tag.scannedAt} format={shortAgeText} />
+        </td>
+      )}
       {sensors.map((sensor) => (
         <td
           key={sensor.name}
           className={sensor.name === chosen ? 'number chosen' : 'number other'}
           data-sensor={sensor.name}
         >
-          <TableReading sensor={sensor} tag={tag} unit={unit} />
+          <TableReading sensor={sensor} tag={tag} health={health} unit={unit} />
+          {sensor.name === chosen && has('trend') && (
+            <TrendLine sensor={sensor} tag={tag} health={health} then={then} unit={unit} />
+          )}
         </td>
       ))}
-      <td className="cell-pest">{tag.anomaly && <PestMark count={tag.bugCount} />}</td>
-      <td className="cell-species">
-        {tag.species ? (
-          <>
-            <bdi>{shown(tag.species, 28)}</bdi>
-            {tag.speciesConfidence !== null && (
-              <span className="faint" title={S.confidence(percentText(tag.speciesConfidence))}>
-                {percentText(tag.speciesConfidence)}
-              </span>
-            )}
-          </>
-        ) : (
-          <span className="faint">{S.noSensor}</span>
-        )}
-        {tag.failedTry && (
-          <span className="tried">
-            <Tried failed={tag.failedTry} />
-          </span>
-        )}
-      </td>
-      <td className="number optional">{tag.flowerCount > 0 ? tag.flowerCount : ''}</td>
+      {has('pest') && (
+        <td className="cell-pest">{tag.anomaly && <PestMark count={tag.bugCount} />}</td>
+      )}
+      {has('species') && (
+        <td className="cell-species">
+          {tag.species ? (
+            <>
+              <bdi>{shown(tag.species, 28)}</bdi>
+              {tag.speciesConfidence !== null && (
+                <span className="faint" title={S.confidence(percentText(tag.speciesConfidence))}>
+                  {percentText(tag.speciesConfidence)}
+                </span>
+              )}
+            </>
+          ) : (
+            <span className="faint">{S.noSensor}</span>
+          )}
+          {tag.failedTry && (
+            <span className="tried">
+              <Tried failed={tag.failedTry} />
+            </span>
+          )}
+        </td>
+      )}
+      {has('flowers') && (
+        <td className="number optional">{tag.flowerCount > 0 ? tag.flowerCount : ''}</td>
+      )}
     </tr>
   );
 });
@@ -112,17 +147,19 @@ export function PestMark({ count }: { count: number }): JSX.Element {
 function TableReading({
   sensor,
   tag,
+  health,
   unit,
 }: {
   sensor: Sensor;
   tag: Tag;
+  health: TagHealth;
   unit: TemperatureUnit;
 }): JSX.Element {
   const when = tag.readAt.get(sensor.name) ?? 'never';
   const step = useAgeStep(when);
   return (
     <span className="reading" data-age={when === 'never' ? undefined : step}>
-      <Reading sensor={sensor} value={tag.readings.get(sensor.name)} unit={unit} />
+      <Reading sensor={sensor} value={tag.readings.get(sensor.name)} health={health} unit={unit} />
       {isOlder(when, tag.scannedAt) && (
         <span className="own-age">
           {' '}
@@ -143,10 +180,12 @@ const isOlder = (when: When, row: When): boolean =>
 function Reading({
   sensor,
   value,
+  health,
   unit,
 }: {
   sensor: Sensor;
   value: number | null | undefined;
+  health: TagHealth;
   unit: TemperatureUnit;
 }): JSX.Element {
   if (value === undefined) {
@@ -164,19 +203,16 @@ function Reading({
       </span>
     );
   }
-  const side = sideOf(sensor.ideal, value);
+  const reason = rangeReason(health, sensor.name);
+  const side = reason && sideOf(reason);
   return (
     <>
-      {side === 'below' || side === 'above' ? (
-        <span
-          className="beyond"
-          data-health={sensor.ideal && statusOf(deviation(sensor.ideal, value))}
-          title={side === 'below' ? S.below : S.above}
-        >
+      {side && (
+        <span className="beyond" data-health={reason.verdict} title={S[side]}>
           <Icon name={side === 'below' ? 'down' : 'up'} size={12} />
-          <span className="unseen">{side === 'below' ? S.below : S.above} </span>
+          <span className="unseen">{S[side]} </span>
         </span>
-      ) : null}
+      )}
       {valueText(sensor, value, unit)}
     </>
   );

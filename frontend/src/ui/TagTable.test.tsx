@@ -1,15 +1,22 @@
-import { fireEvent, render, screen, within } from '@testing-library/react';
+import { act as flush, fireEvent, render, screen, within } from '@testing-library/react';
 import { beforeEach, describe, expect, test } from 'vitest';
 
 import { act, prefer, store } from '../store/app';
+import { judgement, reason } from '../testing/health';
+import { hourAgo } from '../store/hourAgo';
 import { showTags } from '../testing/page';
-import { readings, wireTag } from '../testing/tags';
+import { readings, tag, wireTag } from '../testing/tags';
 import { TagTable } from './TagTable';
 
 const noPose = { position: { x: 0, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 0 } };
 
 beforeEach(() => {
-  showTags([
+  const said = judgement({
+    2: 'unknown',
+    9: [reason({ kind: 'reading_failed', verdict: 'stressed', sensor: 'humidity', value: null })],
+    10: [reason({ value: 40, limit: 35 })],
+  });
+  const tags = [
     wireTag({
       tag_id: '9',
       readings: readings({ temperature: 20, humidity: null }),
@@ -18,7 +25,8 @@ beforeEach(() => {
     }),
     wireTag({ tag_id: '10', readings: readings({ temperature: 40 }), anomaly: true, bug_count: 2 }),
     wireTag({ tag_id: '2', pose: noPose, stale_seconds: null }),
-  ]);
+  ];
+  showTags(tags, said);
 });
 
 const row = (id: string): HTMLElement => {
@@ -45,7 +53,7 @@ describe('table', () => {
   test('shows readings, a failed sensor, species with confidence, pest and health', () => {
     render(<TagTable />);
     const cell = (id: string, sensor: string): string =>
-      row(id).querySelector(`[data-sensor="${sensor}"]`)?.textContent ?? '';
+      row(id).querySelector(`[data-sensor="${sensor}"] .reading`)?.textContent ?? '';
     expect(cell('9', 'temperature')).toBe('20.0');
     expect(cell('9', 'humidity')).toBe('failed');
     expect(cell('9', 'co2')).toContain('no such sensor');
@@ -53,7 +61,10 @@ describe('table', () => {
     expect(row('9').textContent).toContain('rose91');
     expect(row('10').textContent).toContain('Pest');
     expect(row('10').dataset['health']).toBe('critical');
-    expect(row('2').dataset['health']).toBe('no-data');
+    expect(row('2').dataset['health']).toBe('unknown');
+    const why = row('9').querySelector('.cell-health');
+    expect(why?.getAttribute('title')).toBe('Humidity: the sensor gives no value');
+    expect(why?.textContent).toBe('Stressed: Humidity: the sensor gives no value');
   });
 
   test('sorts by a column, up and down, and says so', () => {
@@ -98,7 +109,76 @@ describe('table', () => {
     prefer({ unit: 'F' });
     render(<TagTable />);
     expect(head(/^Temperature/).textContent).toContain('°F');
-    expect(row('9').querySelector('[data-sensor="temperature"]')?.textContent).toBe('68.0');
+    expect(row('9').querySelector('[data-sensor="temperature"] .reading')?.textContent).toBe(
+      '68.0',
+    );
+  });
+
+  const trends = (): (string | null)[] =>
+    [...document.querySelectorAll('.trend')].map((each) => each.textContent);
+  const tags = [
+    wireTag({ tag_id: 'a', readings: readings({ temperature: 22 }) }),
+    wireTag({ tag_id: 'b', readings: readings({ temperature: 20 }) }),
+    wireTag({ tag_id: 'c', readings: readings({ co2: 500 }) }),
+  ];
+
+  test('the sensor in view has its trend, or why there is none', () => {
+    const health = judgement({ a: [reason({ verdict: 'stressed' })], b: 'healthy', c: 'healthy' });
+    showTags(tags, health);
+    render(<TagTable />);
+    expect(trends()).toEqual(['– an hour ago: not known', '– an hour ago: not known']);
+    const before = tag({
+      tag_id: 'a',
+      readings: [
+        {
+          name: 'temperature',
+          value: 20.5,
+          observed_at: { sec: 1, nanosec: 0 },
+          stale_seconds: 1,
+        },
+      ],
+    });
+    const { at } = store.get().twin.latest.snapshot ?? { at: { sec: 0 } };
+    flush(() => {
+      hourAgo.dispatch({
+        of: at.sec,
+        tags: new Map([['a', { tag: before, health: { verdict: 'healthy', reasons: [] } }]]),
+      });
+    });
+    expect(trends()).toEqual([
+      '\u2197 Temperature against an hour ago: +1.5\u00a0°C',
+      '– no reading an hour ago',
+    ]);
+    // An answer of long ago is none.
+    flush(() => {
+      hourAgo.dispatch({ of: at.sec - 601, tags: new Map() });
+    });
+    expect(trends()[0]).toBe('– an hour ago: not known');
+    hourAgo.dispatch(null);
+  });
+
+  test('columns that are not wanted are not there, and rows may be close together', () => {
+    showTags(tags, judgement({ a: [reason()] }));
+    prefer({ hidden: ['health', 'trend', 'co2', 'species', 'pest'], density: 'compact' });
+    render(<TagTable />);
+    const columns = [...document.querySelectorAll<HTMLElement>('thead th')];
+    const ids = columns.map((each) => each.dataset['column']);
+    expect(ids).not.toContain('co2');
+    expect(ids).not.toContain('health');
+    expect(ids).toContain('tag');
+    expect(row('a').children).toHaveLength(ids.length);
+    expect(document.querySelectorAll('col')).toHaveLength(ids.length);
+    expect(trends()).toEqual([]);
+    expect(screen.getByRole('table').dataset['density']).toBe('compact');
+  });
+
+  test('a verdict has its reasons beside it', () => {
+    showTags(tags, judgement({ a: [reason()] }));
+    render(<TagTable />);
+    expect(row('a').querySelector('.why')?.textContent).toBe(
+      'Temperature 6.6\u00a0°C, below 10.0 (critical)',
+    );
+    expect(row('b').querySelector('.why')).toBeNull();
   });
 
   test('strings from the wire are text and nothing else', () => {

@@ -14,25 +14,39 @@ import type { Sensor } from '../domain/sensors';
 import { shown } from '../domain/text';
 import { unitOf } from '../domain/units';
 import { act, store, useApp } from '../store/app';
-import { selectRows, selectSensors } from '../store/derived';
+import { selectCatalogue, selectRows, selectShownColumns } from '../store/derived';
+import { useSelected } from '../store/create';
+import { hourAgo, selectHourAgo } from '../store/hourAgo';
 import { selectTags } from '../store/moment';
+import { isColumnShown } from '../store/settings';
 import { S } from '../strings';
-import { Icon } from './Icon';
+import { Icon } from '../widgets/Icon';
 import { TagRow } from './TagRow';
+import { useChosenInSight } from './chosenInSight';
 import { partsOf, SHORT_TABLE, useVisibleRows } from './visibleRows';
+
+/** Beside the tag's own, and those of sensors. */
+const COLUMNS = ['health', 'age', 'pest', 'species', 'flowers'];
 
 /** Every tag, also those without a pin and those whose scan failed. */
 export function TagTable(): JSX.Element {
-  const sensors = useApp(selectSensors);
+  const catalogue = useApp(selectCatalogue);
+  const sensors = useApp(selectShownColumns);
   const chosen = useApp((state) => state.view.sensor);
   const selected = useApp((state) => state.view.selected);
   const hovered = useApp((state) => state.view.hovered);
   const unit = useApp((state) => state.settings.unit);
   const rows = useApp(selectRows);
   const hasTags = useApp((state) => selectTags(state).length > 0);
-  const columns = 6 + sensors.length;
+  const density = useApp((state) => state.settings.density);
+  const hidden = useApp((state) => state.settings.hidden);
+  const last = useSelected(hourAgo, (known) => known);
+  const then = useApp((state) => selectHourAgo(state, last));
+  const has = (id: string): boolean => isColumnShown({ hidden }, id);
+  const columns = ['tag', ...COLUMNS].filter(has).length + sensors.length;
   const body = useRef<HTMLTableSectionElement>(null);
   const sight = useVisibleRows(body, rows.length);
+  useChosenInSight(body, hasTags ? selected : null, sight.rowHeight);
   // A row that has the focus stays, or the focus would be lost with it; and the rows beside it,
   // where the Tab key leads.
   const [focused, setFocused] = useState<string | null>(null);
@@ -46,6 +60,7 @@ export function TagTable(): JSX.Element {
     // eslint-disable-next-line jsx-a11y/click-events-have-key-events, jsx-a11y/no-noninteractive-element-interactions
     <table
       className={rows.length > SHORT_TABLE ? 'tags long' : 'tags'}
+      data-density={density}
       data-testid="tag-table"
       aria-rowcount={rows.length + 1}
       onFocus={(event) => {
@@ -62,25 +77,27 @@ export function TagTable(): JSX.Element {
       <caption className="unseen">{S.tableCaption}</caption>
       <colgroup>
         <col className="col-tag" />
-        <col className="col-health" />
-        <col className="col-age" />
+        {has('health') && <col className="col-health" />}
+        {has('age') && <col className="col-age" />}
         {sensors.map((sensor) => (
           <col
             key={sensor.name}
             className={sensor.name === chosen ? 'col-sensor' : 'col-sensor other'}
           />
         ))}
-        <col className="col-pest" />
-        <col className="col-species" />
-        <col className="col-flowers optional" />
+        {has('pest') && <col className="col-pest" />}
+        {has('species') && <col className="col-species" />}
+        {has('flowers') && <col className="col-flowers optional" />}
       </colgroup>
       <thead>
         <tr aria-rowindex={1}>
           <ColumnHead id="tag">{S.columns.tag}</ColumnHead>
-          <ColumnHead id="health">{S.columns.health}</ColumnHead>
-          <ColumnHead id="age" className="number">
-            {S.columns.age}
-          </ColumnHead>
+          {has('health') && <ColumnHead id="health">{S.columns.health}</ColumnHead>}
+          {has('age') && (
+            <ColumnHead id="age" className="number">
+              {S.columns.age}
+            </ColumnHead>
+          )}
           {sensors.map((sensor) => (
             <SensorHead
               key={sensor.name}
@@ -89,11 +106,13 @@ export function TagTable(): JSX.Element {
               chosen={sensor.name === chosen}
             />
           ))}
-          <ColumnHead id="pest">{S.columns.pest}</ColumnHead>
-          <ColumnHead id="species">{S.columns.species}</ColumnHead>
-          <ColumnHead id="flowers" className="number optional">
-            {S.columns.flowers}
-          </ColumnHead>
+          {has('pest') && <ColumnHead id="pest">{S.columns.pest}</ColumnHead>}
+          {has('species') && <ColumnHead id="species">{S.columns.species}</ColumnHead>}
+          {has('flowers') && (
+            <ColumnHead id="flowers" className="number optional">
+              {S.columns.flowers}
+            </ColumnHead>
+          )}
         </tr>
       </thead>
       <tbody ref={body}>
@@ -114,9 +133,12 @@ export function TagTable(): JSX.Element {
                 index={part.index}
                 tag={row.tag}
                 health={row.health}
+                catalogue={catalogue}
                 sensors={sensors}
                 chosen={chosen}
                 unit={unit}
+                hidden={hidden}
+                then={then}
                 selected={row.tag.id === selected}
                 hovered={row.tag.id === hovered}
               />
@@ -132,7 +154,7 @@ export function TagTable(): JSX.Element {
                 className="text-button"
                 onClick={() => {
                   act({ type: 'filter', text: '' });
-                  act({ type: 'health', status: null });
+                  act({ type: 'health', verdict: null });
                 }}
               >
                 {S.filterClear}

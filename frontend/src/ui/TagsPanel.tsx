@@ -1,26 +1,30 @@
 import type { JSX } from 'react';
 
-import { saveTable } from '../export/actions';
 import { act, useApp } from '../store/app';
 import { selectRows } from '../store/derived';
 import { selectTags } from '../store/moment';
 import { LONGEST_FILTER } from '../store/view';
 import { S } from '../strings';
-import { AttentionList } from './AttentionList';
+import { ListChoice } from './alarms/ListChoice';
 import { HealthSummary } from './HealthSummary';
-import { Icon } from './Icon';
+import { loadParts } from './later';
+import { Icon } from '../widgets/Icon';
 import { EmptyTable } from './Notices';
+import { FILTER_ID } from './filterField';
+import { TableSettings } from './TableSettings';
 import { TagTable } from './TagTable';
 import { LONGEST_ON_PAPER } from './visibleRows';
-
-export const FILTER_ID = 'tag-filter';
+import { WithParts } from './WithParts';
 
 export function TagsPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
+  const list = useApp((state) => state.view.list);
   return (
     <section className="tags-panel" aria-label={S.tags} id="tags" tabIndex={-1}>
       <HealthSummary kiosk={kiosk} />
       {kiosk ? (
-        <AttentionList />
+        <WithParts>{(parts) => <parts.AttentionList />}</WithParts>
+      ) : list === 'alarms' ? (
+        <WithParts>{(parts) => <parts.AlarmPanel />}</WithParts>
       ) : (
         <>
           <FilterBar />
@@ -37,6 +41,12 @@ export function TagsPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
   );
 }
 
+const saveTable = (): void => {
+  void loadParts().then((parts) => {
+    parts.saveTable();
+  });
+};
+
 /** Where paper ends, the table does not. */
 function PaperRest(): JSX.Element | null {
   const count = useApp((state) => selectRows(state).length);
@@ -51,6 +61,7 @@ function FilterBar(): JSX.Element {
   const count = useApp((state) => selectRows(state).length);
   return (
     <div className="filter-bar">
+      <ListChoice />
       <label className="search">
         <span className="unseen">{S.filter}</span>
         <Icon name="search" size={18} />
@@ -72,8 +83,9 @@ function FilterBar(): JSX.Element {
         {status && ` · ${S.health[status]}`}
       </span>
       <button type="button" className="text-button" title={S.saveCsv} onClick={saveTable}>
-        <Icon name="download" size={18} /> {S.saveCsvShort}
+        <Icon name="download" size={18} /> <span className="csv-word">{S.saveCsvShort}</span>
       </button>
+      <TableSettings />
     </div>
   );
 }

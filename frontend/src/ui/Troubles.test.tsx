@@ -1,8 +1,11 @@
 import { act as flush, render, screen } from '@testing-library/react';
 import { beforeEach, expect, test } from 'vitest';
 
-import { receive } from '../store/app';
+import type { Journal } from '../contract/types';
+import { act, receive } from '../store/app';
+import { NO_HOUSE } from '../store/twin';
 import { goLive, showTags, status } from '../testing/page';
+import { later } from './later';
 import { Troubles } from './Troubles';
 
 beforeEach(() => {
@@ -10,7 +13,9 @@ beforeEach(() => {
 });
 
 const lines = (): string[] =>
-  [...screen.getByTestId('troubles').querySelectorAll('p')].map((line) => line.textContent);
+  [...screen.getByTestId('troubles').querySelectorAll(':scope > div')].map(
+    (line) => line.textContent,
+  );
 
 test('messages that could not be read are counted, and the last is named', () => {
   render(<Troubles />);
@@ -19,7 +24,7 @@ test('messages that could not be read are counted, and the last is named', () =>
     receive({ type: 'unread', why: 'state.seq: is missing' });
   });
   expect(lines()).toEqual([
-    'A message from the bridge could not be read and was dropped. The last: state.seq: is missing',
+    'A message from the server could not be read and was dropped. The last: state.seq: is missing',
   ]);
   flush(() => {
     receive({ type: 'unread', why: 'a message that is no JSON' });
@@ -27,6 +32,18 @@ test('messages that could not be read are counted, and the last is named', () =>
   expect(lines()[0]).toMatch(/^2 messages .* The last: a message that is no JSON$/);
   flush(() => {
     receive({ type: 'unread', why: null });
+  });
+  expect(lines()).toEqual([]);
+});
+
+test('a part of the page that has not arrived is told', () => {
+  render(<Troubles />);
+  flush(() => {
+    later.dispatch({ parts: null, isLate: true });
+  });
+  expect(lines()).toEqual([expect.stringMatching(/^Part of the page has not arrived\. Cards/)]);
+  flush(() => {
+    later.dispatch({ parts: null, isLate: false });
   });
   expect(lines()).toEqual([]);
 });
@@ -40,7 +57,103 @@ test('what the twin dropped is told with its count, and a pause as one', () => {
   );
   render(<Troubles />);
   expect(lines()).toEqual([
-    'Time is paused. The simulation stands still, and so do all ages.',
+    'Time is paused. The simulation, or the recording, stands still, and so do all ages.',
     'The twin dropped 12 messages in the last minutes. The last: frame odom, expected map',
+  ]);
+});
+
+test('a recording stands still because it is paused, or over', () => {
+  goLive(status({ reason: 'paused', origin: 'recorded' }));
+  render(<Troubles />);
+  expect(lines()).toEqual([
+    'The recording stands still. It is paused or has come to its end, and no age goes on.',
+  ]);
+});
+
+const recording: Journal = {
+  state: 'recording',
+  detail: 'recording',
+  set_aside: '',
+  simulated: null,
+};
+const journal = (over: Partial<Journal>): void => {
+  flush(() => {
+    goLive(status({ journal: { ...recording, ...over } }));
+  });
+};
+
+test.each([
+  ['failing', 'Nothing is being recorded.', /Database or disk is full\. The twin goes on,/],
+  ['slow', 'The recording lags behind.', /What waits is written as the disk keeps up/],
+  ['in_use', 'This twin does not record: another one does.', /Stop one of them, or give/],
+  [
+    'foreign',
+    "This twin does not record: its file is somebody else's.",
+    /Give the twin another file/,
+  ],
+  ['off', 'Nothing is recorded.', /After a restart the twin knows nothing of before/],
+] as const)('a journal that is %s is told, with why and what to do', (state, title, hint) => {
+  render(<Troubles />);
+  journal({ state, detail: 'database or disk is full' });
+  expect(lines()).toHaveLength(1);
+  expect(lines()[0]).toContain(title);
+  expect(lines()[0]).toMatch(hint);
+  expect(lines()[0]).toContain('Database or disk is full.');
+  // It heals by itself.
+  journal({});
+  expect(lines()).toEqual([]);
+});
+
+test('a journal that does well, starts, or is not told of is no trouble', () => {
+  render(<Troubles />);
+  for (const state of ['recording', 'starting', 'unknown'] as const) {
+    journal({ state });
+    expect(lines()).toEqual([]);
+  }
+  // Nor is a state that this page does not know yet.
+  journal({ state: 'constructor' as Journal['state'] });
+  expect(lines()).toEqual([]);
+});
+
+test('a damaged journal that was set aside is told by its name', () => {
+  render(<Troubles />);
+  journal({ set_aside: '/home/x/j.sqlite.damaged-20261121T141500Z' });
+  expect(lines()).toEqual([
+    'A damaged recording was set aside. What could be read of it was kept, and recording goes on. ' +
+      'The old file is /home/x/j.sqlite.damaged-20261121T141500Z.',
+  ]);
+});
+
+test.each([
+  ['mqtt', 'Home automation (MQTT) is not being told. '],
+  ['webhook', 'Alarms are not being passed on (webhook). '],
+  ['constructor', 'constructor is not being told. '],
+])('that %s does not reach its receiver is told until it does', (channel, title) => {
+  render(<Troubles />);
+  const outward = (isFailing: boolean, detail: string): void => {
+    flush(() => {
+      goLive(status({ outward: [{ channel: channel as 'mqtt', is_failing: isFailing, detail }] }));
+    });
+  };
+  outward(false, '');
+  expect(lines()).toEqual([]);
+  outward(true, 'connection refused (mqtt://broker.lan:1883)');
+  expect(lines()).toEqual([
+    `${title}Connection refused (mqtt://broker.lan:1883). ` +
+      'It is tried again and again; this page is not affected.',
+  ]);
+  outward(true, 'no answer within 10 s');
+  expect(lines()[0]).toContain('No answer within 10 s.');
+  outward(false, '');
+  expect(lines()).toEqual([]);
+});
+
+test('a moment that could not be fetched, and which one is shown instead', () => {
+  receive({ type: 'past', past: { at: 5_025, house: NO_HOUSE } });
+  act({ type: 'moment', moment: 3_600 });
+  receive({ type: 'past-fault', fault: { at: 3_600, message: 'too busy', isLasting: false } });
+  render(<Troubles />);
+  expect(lines()).toEqual([
+    'sim 01:00:00 could not be fetched. Shown is sim 01:23:45; it is tried again. too busy',
   ]);
 });

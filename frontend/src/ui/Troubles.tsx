@@ -1,19 +1,33 @@
 import type { JSX } from 'react';
 
+import type { Journal, Outward } from '../contract/types';
+import { rosText } from '../domain/rostime';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
+import { useSelected } from '../store/create';
+import { selectShown, type Moment } from '../store/moment';
 import type { TwinState } from '../store/twin';
-import { S } from '../strings';
+import { LANGUAGE_TROUBLE, S } from '../strings';
+import { More } from '../widgets/More';
+import { later } from './later';
 
 /** Something that an operator should know of while the page goes on. */
 export interface Trouble {
   readonly id: string;
   readonly title: string;
   readonly detail?: string;
+  /** What only who looks after the machines needs. */
+  readonly more?: string;
 }
 
-export function troublesOf({ unread, phase, connection }: TwinState): readonly Trouble[] {
+export function troublesOf(
+  { unread, phase, connection, pastFault }: TwinState,
+  moment: Moment = null,
+  isLate = false,
+): readonly Trouble[] {
   const troubles: Trouble[] = [];
+  if (LANGUAGE_TROUBLE !== null) troubles.push({ id: 'language', title: LANGUAGE_TROUBLE });
+  if (isLate) troubles.push({ id: 'parts', title: S.partsLate, detail: S.partsLateHint });
   if (unread) {
     troubles.push({
       id: 'unread',
@@ -23,7 +37,21 @@ export function troublesOf({ unread, phase, connection }: TwinState): readonly T
   }
   const { status } = connection;
   if (phase === 'live' && status?.reason === 'paused') {
-    troubles.push({ id: 'paused', title: S.paused, detail: S.pausedHint });
+    troubles.push(
+      status.origin === 'recorded'
+        ? { id: 'paused', title: S.recordedPaused, detail: S.recordedPausedHint }
+        : { id: 'paused', title: S.paused, detail: S.pausedHint },
+    );
+  }
+  troubles.push(...journalTroubles(status?.journal));
+  troubles.push(...outwardTroubles(status?.outward ?? []));
+  // Where nothing is shown at all, the page says why in the place of the map.
+  if (pastFault && moment !== null && pastFault.at !== moment) {
+    troubles.push({
+      id: 'past',
+      title: S.pastFault(rosText(pastFault.at)),
+      detail: S.pastFaultShown(rosText(moment), shown(pastFault.message, 160)),
+    });
   }
   for (const { reason, message, count } of status?.drops ?? []) {
     troubles.push({
@@ -35,16 +63,60 @@ export function troublesOf({ unread, phase, connection }: TwinState): readonly T
   return troubles;
 }
 
+const TOLD = new Map<string, { title: string; hint: string }>(Object.entries(S.journal));
+
+/** What is not kept, or was lost sight of. */
+function journalTroubles(journal: Journal | undefined): readonly Trouble[] {
+  if (!journal) return [];
+  const troubles: Trouble[] = [];
+  const told = TOLD.get(journal.state);
+  if (told) {
+    const detail = `${sentence(journal.detail)} ${told.hint}`.trim();
+    troubles.push({
+      id: `journal ${journal.state}`,
+      title: told.title,
+      detail,
+      more: S.journalMore,
+    });
+  }
+  if (journal.set_aside) {
+    const detail = S.setAsideHint(shown(journal.set_aside, 160));
+    troubles.push({ id: 'journal set aside', title: S.setAside, detail });
+  }
+  return troubles;
+}
+
+const CHANNELS = new Map<string, string>(Object.entries(S.outward));
+
+/** Who is not told outside of the page. A channel that this page does not know is called by name. */
+function outwardTroubles(channels: readonly Outward[]): readonly Trouble[] {
+  return channels
+    .filter((it) => it.is_failing)
+    .map(({ channel, detail }) => ({
+      id: `outward ${channel}`,
+      title: CHANNELS.get(channel) ?? S.outwardOther(shown(channel, 40)),
+      detail: `${sentence(detail)} ${S.outwardHint}`.trim(),
+    }));
+}
+
+function sentence(text: string): string {
+  const said = shown(text, 240);
+  return said && `${said.charAt(0).toUpperCase()}${said.slice(1)}.`;
+}
+
 /** A line each, below the header. */
 export function Troubles(): JSX.Element {
   const twin = useApp((state) => state.twin);
+  const moment = useApp((state) => selectShown(state).moment);
+  const isLate = useSelected(later, (it) => it.isLate);
   return (
     // There before there is something to tell, or a screen reader would not hear it.
     <div role="status" className="troubles" data-testid="troubles">
-      {troublesOf(twin).map(({ id, title, detail }) => (
-        <p key={id} data-trouble={id}>
+      {troublesOf(twin, moment, isLate).map(({ id, title, detail, more }) => (
+        <div key={id} data-trouble={id}>
           <strong>{title}</strong> {detail && <span>{detail}</span>}
-        </p>
+          {more && <More label={S.more} text={more} />}
+        </div>
       ))}
     </div>
   );

@@ -8,6 +8,7 @@ import { Painter } from '../map/painter';
 import { act, receive, store } from '../store/app';
 import { NO_HOUSE } from '../store/twin';
 import { showTags } from '../testing/page';
+import { judgement, reason } from '../testing/health';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { HealthSummary } from './HealthSummary';
 import { Legend } from './Legend';
@@ -24,7 +25,7 @@ const tagWith = (temperature: number, stale: number, x: number): ReturnType<type
 
 beforeEach(() => {
   vi.stubGlobal('fetch', () => Promise.reject(new Error('no server')));
-  showTags([tagWith(22, 5, 1)]);
+  showTags([tagWith(22, 5, 1)], judgement({ a: 'healthy' }));
 });
 
 /** Text without what a screen reader or a title adds. */
@@ -48,12 +49,20 @@ test('table, card, legend, health and map are those of the moment', () => {
   const then = stateFrame([tagWith(40, 7_200, 3)], { sec: 500 });
   receive({
     type: 'past',
-    past: { at: 500, house: { ...NO_HOUSE, snapshot: snapshotOf(then, 0, null) } },
+    past: {
+      at: 500,
+      house: {
+        ...NO_HOUSE,
+        snapshot: snapshotOf(then, 0, null),
+        health: judgement({ a: [reason({ value: 40, limit: 35 })] }),
+      },
+    },
   });
   const pin = (): unknown => {
     const [first] = painter.scene(store.get(), performance.now()).pins;
-    return [first?.texts[0], first?.at.x, first?.strength];
+    return [first?.texts[0], first?.at.x, first?.verdict];
   };
+  act({ type: 'colouring', colouring: 'value' });
   render(
     <>
       <TagTable />
@@ -64,9 +73,9 @@ test('table, card, legend, health and map are those of the moment', () => {
   );
   expect(text('tag-table')).toContain('22.0');
   expect(text('tag-card')).toContain('22.0');
-  expect(text('range-high')).toContain('22.0');
+  expect(text('range-high')).toContain('26.0');
   expect(screen.getByTestId('house-health').dataset['health']).toBe('healthy');
-  expect(pin()).toEqual(['a · 22.0\u00a0°C', 1, 1]);
+  expect(pin()).toEqual(['a · 22.0\u00a0°C', 1, 'healthy']);
 
   go(500);
   for (const part of ['tag-table', 'tag-card', 'range-high']) {
@@ -75,7 +84,7 @@ test('table, card, legend, health and map are those of the moment', () => {
   }
   expect(text('tag-table')).toContain('2\u00a0h');
   expect(screen.getByTestId('house-health').dataset['health']).toBe('critical');
-  expect(pin()).toEqual(['a · 40.0\u00a0°C', 3, expect.closeTo(0.33, 1)]);
+  expect(pin()).toEqual(['a · 40.0\u00a0°C', 3, 'critical']);
 
   go(null);
   expect(text('tag-table')).toContain('22.0');

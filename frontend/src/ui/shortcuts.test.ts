@@ -1,11 +1,15 @@
 import { fireEvent } from '@testing-library/react';
-import { afterEach, beforeEach, describe, expect, test } from 'vitest';
+import { afterEach, beforeAll, beforeEach, describe, expect, test } from 'vitest';
 
 import { onMapCommand, type MapCommand } from '../map/commands';
-import { prefer, store } from '../store/app';
+import { act, prefer, store } from '../store/app';
 import { showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
-import { startShortcuts } from './shortcuts';
+import { playback } from '../timebar/playback';
+import { startKeys } from './keys';
+import { loadParts } from './later';
+
+beforeAll(() => loadParts());
 
 let stop: () => void;
 let commands: MapCommand[];
@@ -15,7 +19,7 @@ beforeEach(() => {
   showTags(['1', '2', '3'].map((tag_id) => wireTag({ tag_id })));
   commands = [];
   unhear = onMapCommand((command) => commands.push(command));
-  stop = startShortcuts();
+  stop = startKeys();
 });
 afterEach(() => {
   stop();
@@ -67,5 +71,31 @@ describe('keys', () => {
     prefer({ shortcuts: false });
     press('u');
     expect(store.get().settings.unit).toBe('C');
+  });
+
+  test('l leads back to now, and is nothing while now is shown', () => {
+    act({ type: 'moment', moment: 50 });
+    press('l');
+    expect(store.get().view.moment).toBeNull();
+    press('l');
+    expect(store.get().view.moment).toBeNull();
+  });
+
+  test('Escape closes the card first, and then leads back to now', () => {
+    act({ type: 'look', view: { moment: 0.5, selected: '2' } });
+    press('Escape');
+    expect(store.get().view).toMatchObject({ moment: 0.5, selected: null });
+    press('Escape');
+    expect(store.get().view.moment).toBeNull();
+  });
+
+  test('the space bar plays the past, but presses a button that has the focus', () => {
+    const button = document.body.appendChild(document.createElement('button'));
+    press(' ', {}, button);
+    expect(playback.get().isPlaying).toBe(false);
+    press(' ');
+    expect(playback.get().isPlaying).toBe(true);
+    press(' ');
+    expect(playback.get().isPlaying).toBe(false);
   });
 });

@@ -4,31 +4,32 @@ import { commandMap } from '../map/commands';
 import { act, prefer, store } from '../store/app';
 import { selectRows, selectSensors } from '../store/derived';
 import { isDark } from '../store/theme';
+import type { ViewState } from '../store/view';
 import { S } from '../strings';
+import { backToLive } from '../timebar/backToLive';
+import { togglePlayback } from '../timebar/playback';
+import { ALARMS_ID } from './alarms/ListChoice';
 import { chosenTag } from './announce';
 import { openHelp } from './HelpDialog';
-import { FILTER_ID } from './TagsPanel';
+import { FILTER_ID } from './filterField';
 
-export function startShortcuts(): () => void {
-  const onKeyDown = (event: KeyboardEvent): void => {
-    if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
-    if (document.querySelector('dialog[open]')) return;
-    if (event.key === 'Escape') {
-      escape(event);
-      return;
-    }
-    if (!store.get().settings.shortcuts || isTyping(event.target)) return;
-    if (runKey(event.key)) event.preventDefault();
-  };
-  document.addEventListener('keydown', onKeyDown);
-  return () => {
-    document.removeEventListener('keydown', onKeyDown);
-  };
+/** What a key that was pressed stands for. */
+export function onKey(event: KeyboardEvent): void {
+  if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
+  if (document.querySelector('dialog[open]')) return;
+  if (event.key === 'Escape') {
+    escape(event);
+    return;
+  }
+  if (!store.get().settings.shortcuts || isTyping(event.target)) return;
+  if (event.key === ' ' && takesSpace(event.target)) return;
+  if (runKey(event.key)) event.preventDefault();
 }
 
 function isTyping(target: EventTarget | null): boolean {
   return (
     target instanceof HTMLTextAreaElement ||
+    target instanceof HTMLSelectElement ||
     (target instanceof HTMLInputElement && target.type !== 'radio' && target.type !== 'checkbox')
   );
 }
@@ -38,8 +39,17 @@ function escape(event: KeyboardEvent): void {
     act({ type: 'filter', text: '' });
     return;
   }
-  act({ type: 'select', tagId: null });
+  // What lies on top goes first.
+  const { chart, selected } = store.get().view;
+  if (chart) act({ type: 'chart', chart: null });
+  else if (selected !== null) act({ type: 'select', tagId: null });
+  else backToLive();
 }
+
+/** Whether the space bar is the element's own: it presses buttons, and opens the nearest tag. */
+const takesSpace = (target: EventTarget | null): boolean =>
+  target instanceof Element &&
+  target.closest('button, a, input, select, [role=application]') !== null;
 
 /** Does what a key stands for; false: nothing. */
 function runKey(key: string): boolean {
@@ -52,7 +62,7 @@ function runKey(key: string): boolean {
   }
   switch (key.toLowerCase()) {
     case '/':
-      act({ type: 'pane', pane: 'tags' });
+      act({ type: 'list', list: 'tags' });
       // The pane may only now become visible.
       requestAnimationFrame(() => document.getElementById(FILTER_ID)?.focus());
       return true;
@@ -69,7 +79,20 @@ function runKey(key: string): boolean {
       act({ type: 'layer', layer: 'smooth', on: !view.layers.has('smooth') });
       return true;
     case 'l':
+      if (view.moment === null) return false;
+      backToLive();
+      return true;
+    case 'y':
       document.querySelector<HTMLButtonElement>('.layers > button')?.click();
+      return true;
+    case 'c':
+      return toggleCharts(view);
+    case ' ':
+      togglePlayback();
+      return true;
+    case 'a':
+      act({ type: 'list', list: 'alarms' });
+      requestAnimationFrame(() => document.getElementById(ALARMS_ID)?.focus());
       return true;
     case 'u':
       prefer({ unit: settings.unit === 'C' ? 'F' : 'C' });
@@ -85,6 +108,14 @@ function runKey(key: string): boolean {
   }
 }
 
+/** Opens the charts of the chosen tag, or closes them; false: no tag is chosen. */
+function toggleCharts({ chart, selected }: ViewState): boolean {
+  if (!chart && selected === null) return false;
+  act({ type: 'pane', pane: 'map' });
+  act({ type: 'chart', chart: chart ? null : { by: 'tag', tagIds: [selected ?? ''] } });
+  return true;
+}
+
 /** The tag after or before the chosen one, in the table's order. */
 function stepTag(by: 1 | -1): void {
   const state = store.get();
@@ -97,5 +128,5 @@ function stepTag(by: 1 | -1): void {
   if (!row) return;
   const { tag, health } = row;
   act({ type: 'select', tagId: tag.id });
-  chosenTag.dispatch(S.tagChosen(shown(tag.id, 24), S.health[health.status], at + 1, rows.length));
+  chosenTag.dispatch(S.tagChosen(shown(tag.id, 24), S.health[health.verdict], at + 1, rows.length));
 }

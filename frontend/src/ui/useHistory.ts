@@ -1,7 +1,20 @@
 import { useEffect, useState } from 'react';
 
 import { fetchHistory } from '../contract/api';
-import type { TagHistory } from '../contract/types';
+import type { TagHistory, WireTime } from '../contract/types';
+import { secondsOf } from '../domain/rostime';
+import { memoLast } from '../store/memo';
+
+/** Of the last scans and tries those that had been made by then, ROS seconds; null: now. */
+export const asOf = memoLast((history: TagHistory, moment: number | null): TagHistory => {
+  if (moment === null) return history;
+  const wasMade = ({ stamp }: { readonly stamp: WireTime }): boolean => secondsOf(stamp) <= moment;
+  return {
+    ...history,
+    tries: history.tries.filter(wasMade),
+    sensors: history.sensors.map(({ name, values }) => ({ name, values: values.filter(wasMade) })),
+  };
+});
 
 /** The last scans of a tag, fetched anew after each observation; null until they are here. */
 export function useHistory(tagId: string, observation: string | undefined): TagHistory | null {

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import ctypes
-import os
-import signal
 import sys
 from collections.abc import Callable, Sequence
 from typing import NoReturn
 
 from lupin_twin import stop_signals
 
-_PR_SET_PDEATHSIG = 1
-
 SPEED_LIMITS = (0.1, 50.0)
 DAY_SPEED_LIMITS = (0.0, 3600.0)
 SEED_LIMITS = (0, 2**32 - 1)
+SINCE_MORNING_LIMITS = (0.0, 86_400.0)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -52,6 +48,12 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         help="the same seed gives the same patrol (default 0)",
     )
     parser.add_argument(
+        "--since-morning",
+        type=_number(float, "a number", *SINCE_MORNING_LIMITS),
+        default=0.0,
+        help="patrol seconds since nine o'clock, when it begins (default 0)",
+    )
+    parser.add_argument(
         "--once", action="store_true", help="end after one pass, its retries included"
     )
     parser.add_argument(
@@ -83,21 +85,20 @@ def main() -> int:
     except RuntimeError as error:  # what rclpy raises for ROS arguments that it cannot parse
         return _refuse(f"cannot use these ROS arguments: {error}")
     if options.end_with_parent:
-        _end_with_parent()
-    mission = Mission(GreenhouseSimulator(), options.seed, options.day_speed)
+        stop_signals.end_with_parent()
+    begin_s = options.since_morning
+    mission = Mission(GreenhouseSimulator(), options.seed, options.day_speed, begin_s=begin_s)
     try:
-        play(mission.events(), speed=options.speed, once=options.once, ros_arguments=sys.argv)
+        play(
+            mission.events(),
+            begin_s=begin_s,
+            speed=options.speed,
+            once=options.once,
+            ros_arguments=sys.argv,
+        )
     except ParameterError as error:
         return _refuse(str(error))
     return 0
-
-
-def _end_with_parent() -> None:
-    """Have the kernel send SIGTERM when the parent is gone (prctl(2))."""
-    parent = os.getppid()
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
-    if os.getppid() != parent:  # it went before the kernel was asked
-        sys.exit(0)
 
 
 def _refuse(reason: str) -> int:
@@ -109,7 +110,7 @@ def _number(
     convert: Callable[[str], float], kind: str, lowest: float, highest: float
 ) -> Callable[[str], float]:
     """Make an argparse type for numbers within closed limits (NaN is in none)."""
-    limits = f"expected {kind} from {lowest:g} to {highest:.12g}"
+    limits = f"expected {kind} from {lowest:.15g} to {highest:.15g}"
 
     def read(text: str) -> float:
         try:

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from math import cos, sin
 
 from lupin_patrol.exploration import Grid
 from lupin_patrol.geometry import Point, Rect
+from lupin_patrol.house import TAG_HEIGHT_M
 from lupin_patrol.perception import Sighting
 from lupin_patrol.plants import Look
 
@@ -28,6 +30,12 @@ class TagPose:
 
     position: Point
     yaw: float
+
+    @property
+    def numbers(self) -> tuple[float, float, float, float, float, float, float]:
+        """x, y, z (m) and the quaternion's x, y, z, w, as a pose of ROS has them."""
+        x, y = self.position
+        return x, y, TAG_HEIGHT_M, 0.0, 0.0, sin(self.yaw / 2), cos(self.yaw / 2)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,6 @@ serialises a wrong type as garbage.
 from __future__ import annotations
 
 from array import array
-from math import cos, sin
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, Point32, Pose, PoseStamped, Quaternion
@@ -23,7 +22,6 @@ from std_msgs.msg import Header
 
 from lupin_patrol.events import FlowersSeen, MapGrown, ScanStatus, TagPose, TagScanned
 from lupin_patrol.events import TagsDiscovered as TagsDiscoveredEvent
-from lupin_patrol.house import TAG_HEIGHT_M
 from lupin_patrol.perception import Sighting
 from lupin_patrol.plants import Bloom
 
@@ -105,13 +103,8 @@ def _pose(pose: TagPose | None) -> Pose:
     if pose is None:
         # w defaults to 1 in ROS 2, which would pin the tag at the origin.
         return Pose(orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=0.0))
-    x, y = pose.position
-    return Pose(
-        position=Point(x=float(x), y=float(y), z=float(TAG_HEIGHT_M)),
-        orientation=Quaternion(
-            x=0.0, y=0.0, z=float(sin(pose.yaw / 2)), w=float(cos(pose.yaw / 2))
-        ),
-    )
+    x, y, z, qx, qy, qz, qw = map(float, pose.numbers)
+    return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
 
 
 def _flower_point(bloom: Bloom) -> FlowerPoint:

@@ -55,31 +55,50 @@ _DETAILS = {
 class Mission:
     """One robot on patrol in the simulator's greenhouse.
 
-    `day_speed` is how many simulated seconds pass in one second of patrol time.
+    `day_speed` is how many simulated seconds pass in one second of patrol time. The robot leaves
+    its dock at `begin_s`; time of day and plants are as if it had at 0. Passes count from
+    `first_pass`, and no two passes are alike.
     """
 
-    def __init__(self, simulator: Any, seed: int, day_speed: float) -> None:
+    def __init__(
+        self,
+        simulator: Any,
+        seed: int,
+        day_speed: float,
+        *,
+        begin_s: float = 0.0,
+        first_pass: int = 0,
+    ) -> None:
         self.house = read_house(simulator)
         self._climate = Climate(simulator)
-        self._plants = Plants(self.house, seed)
+        self._plants = Plants(self.house, seed, first_pass)
         self._roadmap = Roadmap(self.house)
         self._exploration = Exploration(self.house)
         self._detector = TagDetector(self.house, self._plants, seed)
         self._seed = seed
         self._day_speed = day_speed
         self._position = DOCK
-        self._now_s = 0.0
-        self._map_due_s = 0.0
+        self._now_s = begin_s
+        self._first_pass = first_pass
+        self._looks_around = True
+        self._map_due_s = begin_s
         self._map_is_new = False
         order = tour(self._roadmap, DOCK, [tag.stop for tag in self.house.tags])
         self._tour = [self.house.tags[index] for index in order]
 
     def events(self) -> Iterator[Event]:
         """Patrol for ever. To be called once: a mission is one robot's life."""
-        yield from self._look(0)
-        for pass_index in count():
+        yield from self._look(self._first_pass)
+        for pass_index in count(self._first_pass):
             yield from self._patrol(pass_index)
             yield from self._drive(DOCK, pass_index)
+
+    def visits(self) -> Iterator[TagScanned | FlowersSeen]:
+        """The scans and looks of `events`, a tenth of the work: nobody looks around on the way."""
+        self._looks_around = False
+        for event in self.events():
+            if isinstance(event, TagScanned | FlowersSeen):
+                yield event
 
     def _patrol(self, pass_index: int) -> Iterator[Event]:
         """Visit every tag once, then the failed ones again, the nearest first."""
@@ -112,7 +131,7 @@ class Mission:
     def _retry_status(self, tag: Tag, pass_index: int) -> ScanStatus:
         """Decide a retry. It succeeds in the first pass, so that a demo shows every tag."""
         chance = stream(self._seed, "retry", tag.tag_id, pass_index)
-        fails = pass_index > 0 and chance.random() < _RETRY_FAILS
+        fails = pass_index > self._first_pass and chance.random() < _RETRY_FAILS
         return ScanStatus.SCAN_FAILED if fails else ScanStatus.OK
 
     def _visit(
@@ -126,7 +145,9 @@ class Mission:
         readings: tuple[tuple[str, float], ...] = ()
         if status is ScanStatus.OK:
             chance = stream(self._seed, "scan", tag.tag_id, pass_index, attempt)
-            pose = _locate(tag, pass_index, chance)
+            # The first pass builds the map and so defines where the tags are: it is exact. The
+            # later ones localise themselves in it.
+            pose = _locate(tag, 0.0 if pass_index == self._first_pass else 1.0, chance)
             readings = self._climate.read(tag.sensors, tag.position, time_of_day_s, chance)
         yield TagScanned(
             at_s=self._now_s,
@@ -153,6 +174,8 @@ class Mission:
             yield from self._look(pass_index)
 
     def _look(self, pass_index: int) -> Iterator[Event]:
+        if not self._looks_around:
+            return
         if self._detector.look_from(self._position, pass_index):
             yield TagsDiscovered(self._now_s, self._detector.sightings())
         self._map_is_new |= self._exploration.look_from(self._position)
@@ -168,13 +191,8 @@ class Mission:
         return length_of(self._roadmap.way(self._position, goal))
 
 
-def _locate(tag: Tag, pass_index: int, chance: Random) -> TagPose:
-    """Say where a tag is, to about a centimetre.
-
-    The first pass builds the map and so defines where the tags are: it is exact. The later ones
-    localise themselves in it.
-    """
-    noise = 0.0 if pass_index == 0 else 1.0
+def _locate(tag: Tag, noise: float, chance: Random) -> TagPose:
+    """Say where a tag is, to about a centimetre times `noise`."""
     return TagPose(
         (
             tag.position[0] + noise * chance.gauss(0.0, _POSE_NOISE_M),

@@ -39,6 +39,7 @@ from lupin_patrol.events import (
 from lupin_patrol.messages import discovered_tags, flower, occupancy_grid, tag_reading
 from lupin_twin import stop_signals
 from lupin_twin.habits import Habits, latched
+from lupin_twin.half_made import remove_half_made
 from lupin_twin.spinning import end_spinning, spin_until_shutdown
 
 # The contract's depth. One pass makes more observations than that (two for each of 29 tags), so a
@@ -125,10 +126,13 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
         return str(value)
 
 
-def play(events: Iterator[Event], *, speed: float, once: bool, ros_arguments: list[str]) -> None:
+def play(
+    events: Iterator[Event], *, begin_s: float, speed: float, once: bool, ros_arguments: list[str]
+) -> None:
     """Play events until a stop signal comes or, with `once`, the first pass is completed.
 
-    `speed` is patrol seconds per second. `ros_arguments` is the whole command line.
+    The first is due at `begin_s`, patrol seconds as in `at_s`, or later. `speed` is patrol seconds
+    per second. `ros_arguments` is the whole command line.
     Raises ParameterError, before anything was published.
     """
     stop = _stop_flag()
@@ -139,7 +143,7 @@ def play(events: Iterator[Event], *, speed: float, once: bool, ros_arguments: li
             return
         start = monotonic()
         for event in events:
-            if stop.wait(max(0.0, start + event.at_s / speed - monotonic())):
+            if stop.wait(max(0.0, start + (event.at_s - begin_s) / speed - monotonic())):
                 return
             node.publish(event)
             if once and isinstance(event, PassCompleted):
@@ -151,6 +155,7 @@ def play(events: Iterator[Event], *, speed: float, once: bool, ros_arguments: li
 def _running_node(ros_arguments: list[str]) -> Iterator[PatrolNode]:
     """Start a node that listens (to /clock, to parameter services) in a thread of its own."""
     rclpy.init(args=ros_arguments, signal_handler_options=SignalHandlerOptions.NO)
+    remove_half_made(rclpy.get_default_context().get_domain_id())
     executor = SingleThreadedExecutor()
     try:
         node = PatrolNode()

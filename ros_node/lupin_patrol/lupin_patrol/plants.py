@@ -57,8 +57,9 @@ class Look:
 class Plants:
     """All plants of a greenhouse. Each table grows one species; a bloom belongs to one tag."""
 
-    def __init__(self, house: House, seed: int) -> None:
+    def __init__(self, house: House, seed: int, first_pass: int = 0) -> None:
         self._seed = seed
+        self._first_pass = first_pass
         self._tag_ids = [tag.tag_id for tag in house.tags]
         self._blooms: dict[str, list[Bloom]] = {tag_id: [] for tag_id in self._tag_ids}
         self._species: dict[str, str] = {}
@@ -81,9 +82,11 @@ class Plants:
         _LONGEST_OUTBREAK passes. There is one in the very first pass, so that a demo shows it.
         """
         bugs = 0
-        for start in range(max(0, pass_index - _LONGEST_OUTBREAK + 1), pass_index + 1):
+        for start in range(
+            max(self._first_pass, pass_index - _LONGEST_OUTBREAK + 1), pass_index + 1
+        ):
             chance = stream(self._seed, "outbreak", start)
-            breaks_out = chance.random() < _OUTBREAK or start == 0
+            breaks_out = chance.random() < _OUTBREAK or start == self._first_pass
             where = chance.choice(self._tag_ids)
             passes = chance.randint(1, _LONGEST_OUTBREAK)
             at_first = chance.randint(3, 12)

@@ -1,6 +1,6 @@
 """Start the twin: `ros2 launch lupin_twin twin.launch.py [namespace:=gh1] [use_sim_time:=true]`.
 
-`params_file:=…` names a file of parameters.
+`ros2 launch lupin_twin twin.launch.py --show-args` lists what can be given.
 """
 
 from pathlib import Path
@@ -9,27 +9,24 @@ from ament_index_python.packages import get_package_share_directory
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchContext, LaunchDescription
+from lupin_twin.launching import ARGUMENTS, overrides, params_file
 
 
 def generate_launch_description() -> LaunchDescription:
-    """One node, its parameters from a file, and the clock to go by where it is given here."""
-    default_params = Path(get_package_share_directory("lupin_twin")) / "config" / "twin.yaml"
+    """One node, its parameters from a file, and what of them is given here."""
     return LaunchDescription(
         [
-            DeclareLaunchArgument(
-                "params_file", default_value=str(default_params), description="parameters, YAML"
-            ),
-            DeclareLaunchArgument(
-                "namespace",
-                default_value="",
-                description="moves the node, its topics and its services, such as gh1",
-            ),
-            DeclareLaunchArgument(
-                "use_sim_time",
-                default_value="",
-                description="true follows /clock; not given: what the file says",
+            *(
+                DeclareLaunchArgument(
+                    argument.name,
+                    default_value=argument.default,
+                    description=argument.description,
+                    choices=argument.choices,
+                )
+                for argument in ARGUMENTS
             ),
             OpaqueFunction(function=twin),
         ]
@@ -38,16 +35,25 @@ def generate_launch_description() -> LaunchDescription:
 
 def twin(context: LaunchContext) -> list[Node]:
     """The node. What stands after the file overrides it, so only what was given stands there."""
-    parameters = [LaunchConfiguration("params_file")]
-    if LaunchConfiguration("use_sim_time").perform(context):
-        parameters.append({"use_sim_time": LaunchConfiguration("use_sim_time")})
+    given = {a.name: LaunchConfiguration(a.name).perform(context) for a in ARGUMENTS}
+    default = Path(get_package_share_directory("lupin_twin")) / "config" / "twin.yaml"
+    parameters = [params_file(given, str(default), lambda path: Path(path).is_file())]
+    if changed := overrides(given):
+        # With their types: launch would read a text as YAML, and `off` as false.
+        parameters.append({name: typed(value) for name, value in changed.items()})
     return [
         Node(
             package="lupin_twin",
             executable="twin_node",
             name="lupin_twin",
-            namespace=LaunchConfiguration("namespace"),
+            namespace=given["namespace"],
             output="screen",
             parameters=parameters,
+            ros_arguments=["--log-level", given["log_level"]],
         )
     ]
+
+
+def typed(value: bool | str | list[str]) -> ParameterValue:  # a value
+    """The value as it is."""
+    return ParameterValue(value, value_type=list[str] if isinstance(value, list) else type(value))

@@ -9,13 +9,16 @@ from threading import Event, Thread, main_thread
 from typing import NoReturn
 
 from lupin_twin import stop_signals
-from lupin_twin.leaving import leave
+from lupin_twin.half_made import remove_half_made
+from lupin_twin.leaving import leave_after
+from lupin_twin.one_core import use_one_core
 
 USAGE_ERROR = 2
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the twin until a signal ends it; returns the exit code, 1 if its thread has died."""
+    use_one_core()
     stop_signals.block()  # before anything slow is imported
     import rclpy  # noqa: PLC0415  # see above
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
@@ -26,6 +29,7 @@ def main(args: Sequence[str] | None = None) -> int:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # the parent of all that rclpy raises for bad arguments
         return _refuse(f"cannot start ROS: {error}")
+    remove_half_made(rclpy.get_default_context().get_domain_id())
     try:
         return _run()
     except ParameterError as error:
@@ -36,7 +40,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def command() -> NoReturn:
     """`main` as a process of its own."""
-    leave(main())
+    leave_after(main)
 
 
 def _run() -> int:

@@ -6,6 +6,7 @@ long as nobody moves the clock. So whoever shows an age asks here first.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final
 
 from lupin_twin.state import ClockState
@@ -16,6 +17,12 @@ STANDS_AFTER_S: Final = 3.0
 REPORT_LAG_S: Final = 2.0
 # From here on it is worth listening whether `/clock` still comes.
 LISTEN_AFTER_S: Final = 1.0
+CLOCK_SAYS: Final[Mapping[ClockState, str]] = {
+    "running": "ROS time runs",
+    "paused": "ROS time is paused: /clock is published and stands",
+    "stopped": "ROS time has stopped, nothing comes on /clock: ages are not known until it does",
+    "none": "there is no ROS time yet (use_sim_time, and nothing on /clock): ages are not known",
+}
 
 
 class ClockWatch:

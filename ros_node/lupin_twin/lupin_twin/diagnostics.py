@@ -6,14 +6,15 @@ Also what a consumer reads of it again. Times are seconds.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Final
+from typing import Final, Literal, get_args
 
 from lupin_twin.counts import LATE, LOST, Counts, Recent
 from lupin_twin.drops import Reason
 from lupin_twin.journal.condition import OFF as NO_JOURNAL
-from lupin_twin.journal.condition import Condition
+from lupin_twin.journal.condition import UNKNOWN as UNKNOWN_JOURNAL
+from lupin_twin.journal.condition import Condition, JournalState
 from lupin_twin.state import ClockState
 
 # The topic of all nodes of a robot, and of all robots in one domain.
@@ -41,6 +42,49 @@ _CLOCK: Final[Mapping[ClockState, tuple[int, str]]] = {
 }
 
 
+# Where observations come from, as far as a twin says. sim_time: it goes by `/clock`, and so they
+# come from a simulation or from a recording that is played.
+Origin = Literal["unknown", "robot", "simulated", "recorded", "sim_time"]
+_ORIGIN: Final[Mapping[Origin, str]] = {
+    "unknown": "nobody says where observations come from",
+    "robot": "observations are a robot's",
+    "simulated": "observations are simulated",
+    "recorded": "observations are played from a recording",
+    "sim_time": "time is that of /clock: a simulation's, or that of a recording that is played",
+}
+
+
+def origin_of(said: str, *, is_simulated: bool) -> Origin:
+    """What the parameter says; and by a clock that is simulated (`is_simulated`) no robot works."""
+    origin: Origin = next((one for one in get_args(Origin) if one == said), "unknown")
+    return "sim_time" if is_simulated and origin == "robot" else origin
+
+
+@dataclass(frozen=True, slots=True)
+class Estimates:
+    """How the estimates do: what is wrong with fits, by sensor, and whose share says a wrong model.
+
+    `fits_failed` and `not_graded`, scans that came too fast for it, are since the start.
+    """
+
+    problems: Mapping[str, str] = field(default_factory=dict)
+    distrusted: tuple[str, ...] = ()
+    fits_failed: int = 0
+    not_graded: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Layers:
+    """What is published for viewers: messages so far by topic, and of how many topics it is wanted.
+
+    `problems` says of a topic why there is nothing on it.
+    """
+
+    published: Mapping[str, int] = field(default_factory=dict)
+    watched: int = 0
+    problems: Mapping[str, str] = field(default_factory=dict)
+
+
 @dataclass(frozen=True, slots=True)
 class Health:
     """What is looked at. `inputs` is how many publish on each topic that is listened to.
@@ -59,6 +103,9 @@ class Health:
     fields_computed: int
     slowest_field_s: float
     journal: Condition = NO_JOURNAL
+    estimates: Estimates = Estimates()
+    layers: Layers = Layers()
+    origin: Origin = "robot"
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +122,7 @@ def findings(health: Health) -> Iterator[Finding]:
     """All that is to be said, one by one."""
     level, message = _CLOCK[health.clock]
     yield Finding("clock", level, message, {"state": health.clock})
+    yield Finding("origin", OK, _ORIGIN[health.origin], {"origin": health.origin})
     yield _inputs(health)
     counts = health.counts
     recent = [drop for drop in counts.recent if drop.reason != LOST]
@@ -111,6 +159,15 @@ def findings(health: Health) -> Iterator[Finding]:
         f"{health.fields_computing} being computed",
         {"computed": str(health.fields_computed), "slowest, s": f"{health.slowest_field_s:.3f}"},
     )
+    yield _estimates(health.estimates)
+    layers = health.layers
+    wrong = "; ".join(f"{topic}: {why}" for topic, why in layers.problems.items())
+    yield Finding(
+        "layers",
+        WARN if wrong else OK,
+        _shown(wrong) or f"{layers.watched} of {len(layers.published)} topics have subscribers",
+        {topic: str(count) for topic, count in layers.published.items()},
+    )
     journal = health.journal
     yield Finding(
         "journal",
@@ -124,6 +181,8 @@ def findings(health: Health) -> Iterator[Finding]:
             "lost": str(journal.lost),
             "refused": str(journal.refused),
             "set aside": journal.set_aside,
+            # Start and end of what no robot observed, ns of ROS time.
+            "simulated": " ".join(map(str, journal.simulated_ns or ())),
         },
     )
     several = health.twins > 1
@@ -132,6 +191,20 @@ def findings(health: Health) -> Iterator[Finding]:
         ERROR if several else OK,
         f"{health.twins} twins publish on the same topic" if several else "no other twin",
         {"twins": str(health.twins)},
+    )
+
+
+def _estimates(said: Estimates) -> Finding:
+    wrong = [f"{sensor}: {why}" for sensor, why in said.problems.items()]
+    wrong += [
+        f"{sensor}: the model is wrong, by what it foretold; is day_length_s right?"
+        for sensor in said.distrusted
+    ]
+    return Finding(
+        "estimates",
+        WARN if wrong else OK,
+        _shown("; ".join(wrong)) or "nothing is wrong",
+        {"fits failed": str(said.fits_failed), "scans not graded": str(said.not_graded)},
     )
 
 
@@ -165,18 +238,26 @@ def _shown(text: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SelfReport:
-    """How a twin's clock does, and what it dropped, lost and met; None: it does not say."""
+    """How a twin's clock does, and what it dropped, lost and met; None: it does not say.
+
+    `origin` is where its observations come from; `journal` has of its counts those that are told.
+    """
 
     clock: ClockState | None = None
     counts: Counts | None = None
+    journal: Condition = UNKNOWN_JOURNAL
+    origin: Origin = "unknown"
 
 
 def self_report(said: Iterable[Finding]) -> SelfReport:
     """What `findings` said, as far as it can be read; reasons that are not ours are nobody's."""
-    values = {finding.name: finding.values for finding in said}
+    by_name = {finding.name: finding for finding in said}
+    values = {name: finding.values for name, finding in by_name.items()}
+    journal = _journal(by_name["journal"]) if "journal" in by_name else UNKNOWN_JOURNAL
     clock = next((state for state in _CLOCK if state == values.get("clock", {}).get("state")), None)
+    origin = origin_of(values.get("origin", {}).get("origin", ""), is_simulated=False)
     if "drops" not in values:
-        return SelfReport(clock)
+        return SelfReport(clock, journal=journal, origin=origin)
     both = {**values["drops"], **values.get("queues", {})}
     dropped = {reason: _number(both, reason) for reason in _REASONS}
     recent = tuple(
@@ -191,7 +272,33 @@ def self_report(said: Iterable[Finding]) -> SelfReport:
             _number(both, _ERRORS),
             recent,
         ),
+        journal,
+        origin,
     )
+
+
+def _journal(said: Finding) -> Condition:
+    values = said.values
+    state = next((state for state in JournalState if state == values.get("state")), None)
+    if state is None:
+        return UNKNOWN_JOURNAL
+    start, _, end = values.get("simulated", "").partition(" ")
+    return Condition(
+        state,
+        _shown(said.message),
+        path=_shown(values.get("file", "")),
+        written=_number(values, "written"),
+        waiting=_number(values, "waiting"),
+        lost=_number(values, "lost"),
+        refused=_number(values, "refused"),
+        set_aside=_shown(values.get("set aside", "")),
+        simulated_ns=(int(start), int(end)) if _are_stamps(start, end) else None,
+    )
+
+
+def _are_stamps(*texts: str) -> bool:
+    # As of numbers below: no stamp has more digits.
+    return all(text.isascii() and text.isdigit() and len(text) <= 19 for text in texts)
 
 
 def _number(values: Mapping[str, str], key: str) -> int:

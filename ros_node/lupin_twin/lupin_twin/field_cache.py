@@ -6,6 +6,7 @@ Pure: it holds immutable grids under hashable keys and has no lock; it belongs t
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Hashable
 from typing import Final, NamedTuple
 
 from lupin_twin.grid import FieldGrid
@@ -14,7 +15,7 @@ MAX_ENTRIES: Final = 64
 
 
 class FieldKey(NamedTuple):
-    """Everything that a field depends on, as long as the node's rules do not change.
+    """Everything that a field depends on; `rules` are those by which it is made.
 
     `observation_count` stands for the store's whole content. `map_revision` is None where the map
     has no say, so that a new map then leaves the cache as it is.
@@ -28,6 +29,7 @@ class FieldKey(NamedTuple):
     bbox_max_x: float
     bbox_max_y: float
     map_revision: int | None
+    rules: Hashable
 
 
 class FieldCache:

@@ -15,6 +15,7 @@ from typing import Any, Final
 from lupin_twin.field_cache import FieldKey
 from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused
 from lupin_twin.grid import FieldGrid
+from lupin_twin.refusals import passing
 from lupin_twin.workers import Workers
 
 # Fields that wait for a worker or are computed, each with all who wait for it.
@@ -55,14 +56,14 @@ class FieldDesk:
         """
         if sum(map(len, self._waiting.values())) >= MAX_WAITING:
             raise FieldRefused(
-                f"{MAX_WAITING} requests wait for fields, which is the limit: ask again later"
+                passing(f"{MAX_WAITING} requests wait for fields, which is the limit")
             )
         if job.key in self._waiting:
             self._waiting[job.key].append(reply)
             return
         if len(self._waiting) >= MAX_FIELDS:
             raise FieldRefused(
-                f"{MAX_FIELDS} fields are being computed, which is the limit: ask again later"
+                passing(f"{MAX_FIELDS} fields are being computed, which is the limit")
             )
         self._waiting[job.key] = [reply]
         future = self._workers.submit(job.compute, job.cost_s)

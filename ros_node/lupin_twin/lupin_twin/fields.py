@@ -7,17 +7,18 @@ thread may compute it. Metres in the map frame throughout.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
+from lupin_twin.bounds import MAX_TEXT_LENGTH
 from lupin_twin.explored import OccupancyMap, explored_mask
 from lupin_twin.field_cache import FieldCache, FieldKey
 from lupin_twin.grid import FieldGrid, grid_dimensions
 from lupin_twin.idw import compute_idw_field, never
-from lupin_twin.state import MAX_TEXT_LENGTH, TwinStore
+from lupin_twin.state import TwinStore
 
 # The revision of a map that has not come yet; a real one is never negative.
 _NO_MAP_REVISION = -1
@@ -101,6 +102,21 @@ def cost_s(request: FieldRequest, samples: int, rules: FieldRules) -> float:
     return width * height * _CELL_S + pairs * pair_s
 
 
+def check_sensor_type(name: str) -> None:
+    """See that a sensor is named.
+
+    Raises:
+        FieldRefused: the name is empty, or longer than any that is heard.
+
+    """
+    if not name:
+        raise FieldRefused("sensor_type is empty, must name a sensor")
+    if len(name) > MAX_TEXT_LENGTH:
+        raise FieldRefused(
+            f"sensor_type {name[:24]!r}… has {len(name)} characters, the limit is {MAX_TEXT_LENGTH}"
+        )
+
+
 def check_request(request: FieldRequest, max_grid_cells: int) -> tuple[int, int]:
     """(width, height) of the grid that `request` asks for; nothing is allocated.
 
@@ -109,13 +125,7 @@ def check_request(request: FieldRequest, max_grid_cells: int) -> tuple[int, int]
             `max_grid_cells` cells.
 
     """
-    if not request.sensor_type:
-        raise FieldRefused("sensor_type is empty, must name a sensor")
-    if len(request.sensor_type) > MAX_TEXT_LENGTH:
-        raise FieldRefused(
-            f"sensor_type {request.sensor_type[:24]!r}… has {len(request.sensor_type)} characters, "
-            f"the limit is {MAX_TEXT_LENGTH}"
-        )
+    check_sensor_type(request.sensor_type)
     if request.past_float32:
         raise FieldRefused(f"{request.past_float32} m, must fit into float32 (1.4e-45 to 3.4e38)")
     try:
@@ -137,6 +147,49 @@ def check_request(request: FieldRequest, max_grid_cells: int) -> tuple[int, int]
     return width, height
 
 
+def compute_field(
+    request: FieldRequest,
+    samples: Sequence[tuple[float, float, float]],
+    occupancy: OccupancyMap | None,
+    rules: FieldRules,
+    should_stop: Callable[[], bool] = never,
+) -> FieldGrid:
+    """The field of `samples`; unexplored cells are NaN where the rules clip (all, without a map).
+
+    Raises:
+        FieldRefused: see `check_request`.
+        lupin_twin.idw.Abandoned: `should_stop`, asked now and then, said so.
+
+    """
+    mask = None
+    if rules.clip_to_explored:
+        width, height = check_request(request, rules.max_grid_cells)
+        if occupancy is None:
+            mask = np.zeros((height, width), dtype=np.bool_)
+        else:
+            mask = explored_mask(
+                occupancy,
+                width=width,
+                height=height,
+                origin_x=request.bbox_min_x,
+                origin_y=request.bbox_min_y,
+                resolution=request.resolution,
+            )
+    return compute_idw_field(
+        samples,
+        bbox_min_x=request.bbox_min_x,
+        bbox_min_y=request.bbox_min_y,
+        bbox_max_x=request.bbox_max_x,
+        bbox_max_y=request.bbox_max_y,
+        resolution=request.resolution,
+        falloff_radius_m=rules.falloff_radius_m,
+        max_distance_m=rules.max_distance_m,
+        power=rules.idw_power,
+        explored_mask=mask,
+        should_stop=should_stop,
+    )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class FieldJob:
     """A field to be computed: all it depends on, immutable, so that any thread may do it.
@@ -156,40 +209,8 @@ class FieldJob:
         return cost_s(self.request, len(self.samples), self.rules)
 
     def compute(self, should_stop: Callable[[], bool] = never) -> FieldGrid:
-        """The field; unexplored cells are NaN where the rules clip (all, where no map has come).
-
-        Raises:
-            lupin_twin.idw.Abandoned: `should_stop`, asked now and then, said so.
-
-        """
-        request = self.request
-        mask = None
-        if self.rules.clip_to_explored:
-            width, height = check_request(request, self.rules.max_grid_cells)
-            if self.occupancy is None:
-                mask = np.zeros((height, width), dtype=np.bool_)
-            else:
-                mask = explored_mask(
-                    self.occupancy,
-                    width=width,
-                    height=height,
-                    origin_x=request.bbox_min_x,
-                    origin_y=request.bbox_min_y,
-                    resolution=request.resolution,
-                )
-        return compute_idw_field(
-            self.samples,
-            bbox_min_x=request.bbox_min_x,
-            bbox_min_y=request.bbox_min_y,
-            bbox_max_x=request.bbox_max_x,
-            bbox_max_y=request.bbox_max_y,
-            resolution=request.resolution,
-            falloff_radius_m=self.rules.falloff_radius_m,
-            max_distance_m=self.rules.max_distance_m,
-            power=self.rules.idw_power,
-            explored_mask=mask,
-            should_stop=should_stop,
-        )
+        """`compute_field` of all this."""
+        return compute_field(self.request, self.samples, self.occupancy, self.rules, should_stop)
 
 
 class FieldEngine:
@@ -244,6 +265,7 @@ class FieldEngine:
             bbox_max_x=request.bbox_max_x,
             bbox_max_y=request.bbox_max_y,
             map_revision=map_revision,
+            rules=self.rules,
         )
 
 

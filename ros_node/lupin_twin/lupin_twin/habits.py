@@ -6,11 +6,14 @@ that cannot be read is told of with its topic.
 
 from __future__ import annotations
 
+import math
 import time
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, Final
 
+from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
@@ -24,6 +27,25 @@ from lupin_twin.ros_parameters import naming
 from lupin_twin.throttle import Throttle
 
 WARNING_PERIOD_S: Final = 5.0
+# So long, s, messages that wait are taken one right behind the other before others have their turn.
+DRAIN_S: Final = 0.02
+# A message that waited for longer, s, before it was read tells that the thread does not keep up:
+# at 200 a second, ten of the fifty that may wait. It is believed for as long as says the other.
+BEHIND_S: Final = 0.05
+BELIEVED_S: Final = 0.25
+
+
+def waker(condition: Any) -> Callable[[], None]:
+    """What wakes a node's thread by a guard condition; nothing, where the node is gone by then.
+
+    Work that was begun for a node may end after it.
+    """
+
+    def wake() -> None:
+        with suppress(InvalidHandle):
+            condition.trigger()
+
+    return wake
 
 
 def latched(depth: int) -> QoSProfile:
@@ -62,6 +84,8 @@ class Habits:
         # How long before it was received the message in hand was published, s, by the two clocks.
         self.published_ago_s = 0.0
         self._node = node
+        self._drains: list[Callable[[], None]] = []
+        self._behind_until_s = -math.inf
         self._throttle = Throttle(WARNING_PERIOD_S)
 
     def subscribe(
@@ -93,9 +117,10 @@ class Habits:
         gaps = Gaps()
         qos = latched(depth) if is_wanted is None else QoSProfile(depth=depth)
 
-        def take(data: bytes, info: dict[str, Any]) -> None:
+        def read(data: bytes, info: dict[str, Any]) -> None:
             if is_wanted is not None and not is_wanted(data):
                 return
+            self._see_wait(info["received_timestamp"])
             name = str(subscription.topic_name)
             self.published_ago_s = (info["received_timestamp"] - info["source_timestamp"]) / 1e9
             number = info["publication_sequence_number"]
@@ -114,9 +139,56 @@ class Habits:
 
         with naming(parameter, topic):
             subscription = self._node.create_subscription(
-                shape.message_type, topic, take, qos, callback_group=group, raw=True
+                shape.message_type, topic, read, qos, callback_group=group, raw=True
             )
+        if depth > 1:
+            self._drain_behind(subscription, read, depth)
         return str(subscription.topic_name)
+
+    def _drain_behind(
+        self, subscription: Any, read: Callable[[bytes, dict[str, Any]], None], depth: int
+    ) -> None:
+        """Take, behind each message, those that wait.
+
+        The executor brings one message a round, beside whatever else is due: where that takes its
+        time, more come than are taken, and the queue overruns.
+        """
+
+        def drain(most: float, most_s: float) -> None:
+            until_s = time.monotonic() + most_s
+            handle, kind = subscription.handle, subscription.msg_type
+            taken = 0
+            with handle:
+                while (more := handle.take_message(kind, True)) is not None:
+                    read(*more)
+                    taken += 1
+                    if taken >= most or time.monotonic() > until_s:
+                        return
+
+        def take(data: bytes, info: dict[str, Any]) -> None:
+            read(data, info)
+            drain(math.inf, DRAIN_S)
+
+        subscription.callback = take
+        self._drains.append(lambda: drain(depth, math.inf))
+
+    def drain(self) -> None:
+        """Take the messages that wait, before something that keeps the thread for long.
+
+        All that there is room for, however long that takes: so nothing waits when that begins.
+        """
+        for drain in self._drains:
+            drain()
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether messages have lately waited for long: what can wait should."""
+        return time.monotonic() < self._behind_until_s
+
+    def _see_wait(self, received_ns: int) -> None:
+        # By the clock that the middleware stamped it with, if it did.
+        if received_ns and time.time_ns() - received_ns > BEHIND_S * 1e9:
+            self._behind_until_s = time.monotonic() + BELIEVED_S
 
     def drop(self, drop: Drop, topic: str) -> None:
         """Count and tell of something that was dropped."""

@@ -131,6 +131,17 @@ class History:
         tag = self._tags.get(tag_id)
         return TagHistory() if tag is None else TagHistory(tag.scans.past, tag.tries.past)
 
+    def all_later(self) -> Callable[[], dict[str, TagHistory]]:
+        """What is kept of every tag now, for any thread to make values of by the call."""
+        lines = [
+            (tag_id, list(tag.scans.entries), list(tag.tries.entries))
+            for tag_id, tag in self._tags.items()
+        ]
+        return lambda: {
+            tag_id: TagHistory(tuple(scan for _, scan in scans), tuple(past for _, past in tries))
+            for tag_id, scans, tries in lines
+        }
+
     # --- a twin's own: every observation ------------------------------------------------------
 
     def knows(self, write: Scan | Look) -> bool:

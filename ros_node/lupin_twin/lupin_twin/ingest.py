@@ -11,19 +11,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+from lupin_twin.bounds import MAX_TEXT_LENGTH, Rejected
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.history import History
-from lupin_twin.state import (
-    MAX_TEXT_LENGTH,
-    STATUS_OK,
-    Flower,
-    Look,
-    Pose,
-    Reading,
-    Rejected,
-    Scan,
-    TwinStore,
-)
+from lupin_twin.state import STATUS_OK, Flower, Look, Pose, Reading, Scan, TwinStore
 
 # lupin_msgs/Observation; the other kinds are in `history`, which keeps them.
 KIND_ANOMALY: Final = 2

@@ -20,6 +20,8 @@ from typing import Final
 
 # So many in a row may be behind before anything is said.
 FEW: Final = 5
+# What was published so long before it was received comes out of a publisher's latch.
+LATCHED_AFTER_S: Final = 0.5
 # Messages out of a latch count again only after so long.
 APART_S: Final = 2.0
 # A broken producer may call itself something else each time: the rest is counted together.

@@ -7,10 +7,28 @@ import os
 import sys
 import threading
 import time
+from collections.abc import Callable
 from typing import Final, NoReturn
 
 # An idle worker ends at once when it is told to; who takes longer is at work.
 IDLE_WORKERS_END_S: Final = 0.1
+
+
+def leave_after(main: Callable[[], int]) -> NoReturn:
+    """Run `main` and `leave` with what it returns, and in the same way where it raises.
+
+    As Python puts itself away, no thread may be within SQLite or a disk that hangs.
+    """
+    try:
+        code = main()
+    except SystemExit as ended:
+        if isinstance(ended.code, str):
+            sys.stderr.write(f"{ended.code}\n")
+        code = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
+    except BaseException as error:  # noqa: BLE001  # as Python itself would end
+        sys.excepthook(type(error), error, error.__traceback__)
+        code = 1
+    leave(code)
 
 
 def leave(code: int) -> NoReturn:

@@ -7,12 +7,14 @@ belongs to, and takes microseconds, but for the start: that waits for what was k
 from __future__ import annotations
 
 import re
-from collections import deque
-from collections.abc import Mapping
+from collections import Counter, deque
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
 from lupin_twin import ingest
+from lupin_twin.bounds import MAX_TEXT_LENGTH
 from lupin_twin.drops import Drop
 from lupin_twin.history import KIND_FLOWER, KIND_TAG_READING, History
 from lupin_twin.ingest import Pin
@@ -22,7 +24,8 @@ from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rows import LookRow, PinRow, Row, ScanRow
 from lupin_twin.journal.runs import Clock, is_new_run
 from lupin_twin.journal.writer import Journal
-from lupin_twin.state import MAX_TEXT_LENGTH, Look, Scan, TwinStore
+from lupin_twin.recall import Recall
+from lupin_twin.state import Look, Scan, TwinStore
 
 NO_JOURNAL: Final = "off"
 
@@ -54,6 +57,16 @@ def journal_path(
     return state_folder(environ) / f"{'.'.join(names)}.sqlite"
 
 
+def demo_journal_path(environ: Mapping[str, str], seed: int) -> Path:
+    """Where a demo keeps its journal: apart from a real twin's, and each seed for itself.
+
+    Raises:
+        RuntimeError: there is no home to keep it in.
+
+    """
+    return state_folder(environ) / f"demo-seed-{seed}.sqlite"
+
+
 def state_folder(environ: Mapping[str, str]) -> Path:
     """The user's folder for what outlives a process (XDG Base Directory Specification).
 
@@ -68,7 +81,7 @@ def state_folder(environ: Mapping[str, str]) -> Path:
 
 
 class Memory:
-    """A store, its history, and the journal of both, if one is kept.
+    """A store, its history, and the journal of both, if one is kept; `recall` asks that.
 
     `buffer_len` scans of a series are restored at most.
     """
@@ -82,28 +95,29 @@ class Memory:
         self._buffer_len = buffer_len
         self._clock: Clock | None = None
         self._begun_ns: deque[int] = deque(maxlen=MAX_NEW_RUNS)
+        self.recall = Recall(lambda: self.condition, heal=self.heal)
 
-    def follow(self, now: Clock) -> None:
+    def follow(self, now: Clock) -> str | None:
         """Keep to a clock: the first moment of it restores, one that goes back begins a new run.
 
-        0 is a simulated clock that has not started: nothing is known then of when anything was.
-        One that goes back time and again stays in a run, as at its latest, until it may begin
-        another (`MAX_NEW_RUNS`).
+        Returns what of the journal is known again, in words, once it is. A moment of 0 is a
+        simulated clock that has not started: nothing is known then of when anything was. One that
+        goes back time and again stays in a run, as at its latest, until it may begin another
+        (`MAX_NEW_RUNS`).
         """
         if self._journal is None or now.stamp_ns <= 0:
-            return
+            return None
         before = self._clock
         if before is None:
             self._clock = now
             self._journal.begin(now, self._buffer_len)
-            self._take(self._journal.take_restored(_START_WAIT_S), now)
-            return
+            return self._take(self._journal.take_restored(_START_WAIT_S), now)
         is_new = before.is_simulated != now.is_simulated or is_new_run(before, now)
         if not is_new or self._may_begin(now.arrival_ns):
             self._clock = now
             if is_new:
-                self._journal.begin(now)
-        self._take(self._journal.take_restored(), now)
+                self._journal.begin(now, before_ns=before.stamp_ns)
+        return self._take(self._journal.take_restored(), now)
 
     def apply(self, write: ingest.Write, arrival_ns: int, mission: str = "") -> Drop | None:
         """Write what is now and what was, and hand it over; returns what the store refused."""
@@ -111,8 +125,10 @@ class Memory:
         dropped = ingest.apply(write, self._store, self._history)
         if dropped is not None or self._journal is None:
             return dropped
-        stamp_ns = 0 if self._clock is None else self._clock.stamp_ns
         if write.pose is not None and not was_pinned:
+            now_ns = 0 if self._clock is None else self._clock.stamp_ns
+            # A place belongs to the moment of the scan that brought it, as its readings do.
+            stamp_ns = now_ns if isinstance(write, Pin) else write.stamp_ns
             self._journal.write(PinRow(write.tag_id, stamp_ns, arrival_ns, write.pose))
         if not isinstance(write, Pin):
             self._journal.write(_row(write, arrival_ns, mission[:MAX_TEXT_LENGTH]))
@@ -123,8 +139,14 @@ class Memory:
         """How the journal is doing."""
         return OFF if self._journal is None else self._journal.condition
 
+    def heal(self, damage: str) -> None:
+        """Have a journal in which somebody has met damage set aside; from any thread."""
+        if self._journal is not None:
+            self._journal.heal(damage)
+
     def close(self) -> None:
-        """Write what is waiting."""
+        """Answer nothing more, and write what is waiting."""
+        self.recall.close()
         if self._journal is not None:
             self._journal.close()
 
@@ -135,20 +157,42 @@ class Memory:
         begun.append(arrival_ns)
         return True
 
-    def _take(self, restored: Restored | None, now: Clock) -> None:
+    def _take(self, restored: Restored | None, now: Clock) -> str | None:
         if restored is None:
-            return
+            return None
         for row in restored.rows:
             ingest.apply(_write(row), self._store, self._history)
         # The count goes on where it was: it never falls, over a restart either.
         self._store.observation_count = max(self._store.observation_count, restored.count)
         if self._store.hold_to(now.stamp_ns):
             self._history.hold_to(now.stamp_ns)
+        return f"journal {self.condition.path}: {_told(restored.rows, now)}"
 
 
 def open_journal(path: Path | None, holder: str, days: float, max_mb: float) -> Journal | None:
     """A journal at work, None where none is kept; `holder` is what others are told who has it."""
     return None if path is None else Journal(path, holder, Limits(days, int(max_mb * 1e6)))
+
+
+def _told(rows: Sequence[Row], now: Clock) -> str:
+    if not rows:
+        return "nothing was known before"
+    counts = Counter(type(row) for row in rows)
+    oldest_ns = min(row.stamp_ns for row in rows)
+    what = ", ".join(
+        f"{counts[kind]:,} {name}"
+        for kind, name in ((PinRow, "places"), (ScanRow, "scans and tries"), (LookRow, "looks"))
+    )
+    tags = len({row.tag_id for row in rows})
+    return f"{tags:,} tags are known again, of {what}; the oldest is of {_moment(oldest_ns, now)}"
+
+
+def _moment(stamp_ns: int, now: Clock) -> str:
+    try:
+        moment = datetime.fromtimestamp(stamp_ns / 1e9, UTC)
+    except (OverflowError, ValueError):
+        return f"second {stamp_ns // 10**9}"
+    return f"second {stamp_ns / 1e9:.3f}" if now.is_simulated else f"{moment:%Y-%m-%dT%H:%M:%SZ}"
 
 
 def _row(write: Scan | Look, arrival_ns: int, mission: str) -> Row:

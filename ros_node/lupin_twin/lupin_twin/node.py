@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -17,28 +17,34 @@ from lupin_msgs.msg import TwinState, TwinTimes
 from lupin_msgs.srv import GetField
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from lupin_twin import convert, ingest, shapes
-from lupin_twin.clock_watch import ClockWatch
+from lupin_twin import convert, convert_field, ingest, shapes
+from lupin_twin.clock_watch import CLOCK_SAYS, ClockWatch
 from lupin_twin.deferred import Later, allow_later
 from lupin_twin.diagnostic_messages import diagnostics
-from lupin_twin.diagnostics import TOPIC, Health, findings
+from lupin_twin.diagnostics import TOPIC, Health, Origin, findings, origin_of
 from lupin_twin.drops import Drop, Reason
+from lupin_twin.estimate_service import EstimateRules, EstimateService, Known
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.field_cache import FieldCache
 from lupin_twin.field_desk import FieldDesk
-from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused, FieldRules
+from lupin_twin.field_rules import field_rules
+from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused
 from lupin_twin.grid import FieldGrid
-from lupin_twin.habits import Habits, latched
+from lupin_twin.habits import Habits, latched, waker
 from lupin_twin.history import History, TagHistory, kind_of
+from lupin_twin.journal.condition import JournalState
 from lupin_twin.journal.runs import Clock as RunClock
-from lupin_twin.lateness import Lateness
+from lupin_twin.lateness import LATCHED_AFTER_S, Lateness
+from lupin_twin.layer_service import LAYER_LOOK_S, LayerService, Shown
 from lupin_twin.memory import Memory, journal_path, open_journal
+from lupin_twin.other_twins import OtherTwins
 from lupin_twin.parameters import ParameterError, TwinParameters
-from lupin_twin.ros_parameters import declare, naming, naming_own_parameters
+from lupin_twin.past_desk import PastDesk
+from lupin_twin.past_service import JournalPast, PastService, RecentPast
+from lupin_twin.ros_parameters import AdjustableNode, declare, naming, naming_own_parameters
 from lupin_twin.state import ClockState, Look, Scan, Snapshot, TwinStore
 from lupin_twin.twin_count import TwinCount
 from lupin_twin.workers import Workers
@@ -47,29 +53,11 @@ NODE_NAME: Final = "lupin_twin"
 # How often it is looked at whether ROS time runs, s, however rarely the state is published.
 CLOCK_LOOK_S: Final = 0.5
 DIAGNOSTICS_PERIOD_S: Final = 1.0
-CLOCK_SAYS: Final[Mapping[ClockState, str]] = {
-    "running": "ROS time runs",
-    "paused": "ROS time is paused: /clock is published and stands",
-    "stopped": "ROS time has stopped, nothing comes on /clock: ages are not known until it does",
-    "none": "there is no ROS time yet (use_sim_time, and nothing on /clock): ages are not known",
-}
-
-# What was published so long before it was received comes out of a publisher's latch.
-LATCHED_AFTER_S: Final = 0.5
+# How often it is looked at whether a sensor's model is to be fitted anew, s.
+FIT_LOOK_S: Final = 1.0
 
 
-def field_rules(parameters: TwinParameters) -> FieldRules:
-    """The parameters that say how fields are made."""
-    return FieldRules(
-        idw_power=parameters.idw_power,
-        falloff_radius_m=parameters.idw_falloff_radius_m,
-        max_distance_m=parameters.idw_max_distance_m,
-        clip_to_explored=parameters.clip_to_explored,
-        max_grid_cells=parameters.max_grid_cells,
-    )
-
-
-class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
+class TwinNode(AdjustableNode):
     """Fuses observations and discovered tags into `/twin/state` and `/twin/get_field`.
 
     Raises:
@@ -93,12 +81,12 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         )
         self.occupancy_map: OccupancyMap | None = None
         self.twins = TwinCount()
-        self._others: Any = None
         self._clock_watch = ClockWatch()
         self._observed_s: float | None = None
         self._clock_subscription: Any = None
         self._clock_told: ClockState = "running"
         self._map_revision = 0
+        self._rules_revision = 0
         self._topics: dict[str, str] = {}
         self._listeners: list[Callable[[Snapshot], None]] = []
         self._states = convert.StateMessages()
@@ -108,7 +96,32 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         computed = self.create_guard_condition(
             self.habits.guarded("get_field", self._on_computed), self._group
         )
-        self._desk = FieldDesk(self.fields, self._workers, computed.trigger)
+        self._desk = FieldDesk(self.fields, self._workers, waker(computed))
+        found = self.create_guard_condition(
+            self.habits.guarded("the past", self._on_found), self._group
+        )
+        self._past_desk = PastDesk(self._workers, waker(found), lambda: self.habits.is_behind)
+        self.estimates = EstimateService(
+            self.habits,
+            Known(self.store, self.history, self.memory.recall, lambda: self.occupancy_map),
+            EstimateRules(self.parameters.day_length_s, self.parameters.max_grid_cells),
+            self._now_ns,
+            waker(found),
+        )
+        self.layers = LayerService(
+            self.habits,
+            Shown(
+                self.store,
+                self.fields,
+                self.estimates,
+                lambda: self.occupancy_map,
+                self.snapshot,
+                self._now_ns,
+                lambda: self.parameters.layer_rate_hz,
+                self.parameters.day_length_s,
+            ),
+            waker(found),
+        )
         self._connect()
         self._say_start()
         self._publish_state()
@@ -121,9 +134,9 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         return self.habits.callback_errors
 
     @property
-    def revision(self) -> tuple[int, int]:
-        """(observation_count, map revision): changes exactly when a field could."""
-        return self.store.observation_count, self._map_revision
+    def revision(self) -> tuple[int, int, int]:
+        """(observation_count, map revision, rules revision): changes exactly when a field could."""
+        return self.store.observation_count, self._map_revision, self._rules_revision
 
     def add_listener(self, listener: Callable[[Snapshot], None], heartbeat_s: float) -> None:
         """Call `listener(snapshot)` on this thread now, after each change, and as a heartbeat.
@@ -181,10 +194,22 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 GetField, p.field_service_name, self._on_get_field, callback_group=group
             )
         allow_later(service)
+        past = (
+            RecentPast(self.history, self._workers)
+            if self.memory.condition.state is JournalState.OFF
+            else JournalPast(self.memory.recall, self.store, p.frame_id)
+        )
+        PastService(self.habits, self._past_desk, past, self.store, self._now_ns).offer(self, group)
+        self.estimates.offer(self, group)
+        self.layers.offer(self, p.layers, p.frame_id)
+        self._others = OtherTwins(self, self.habits, self.twins, p.state_topic, group)
         self._diagnostics = self.create_publisher(DiagnosticArray, TOPIC, 10)
         self._every(DIAGNOSTICS_PERIOD_S, "diagnostics timer", self._publish_diagnostics)
         self._every(CLOCK_LOOK_S, "clock timer", self._look_at_clock)
-        self._every(1.0 / p.state_publish_rate_hz, "state timer", self._publish_state)
+        self._every(FIT_LOOK_S, "estimate timer", self.estimates.go_on)
+        self._every(LAYER_LOOK_S, "layers timer", self.layers.look)
+        self._state_timer = self._publish_at(p.state_publish_rate_hz)
+        self.adjust_by(self._adjust)
 
     def _say_start(self) -> None:
         # Who waits for a twin that hears nothing looks for a name or a domain that is another.
@@ -195,10 +220,22 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
             f"{self.parameters.frame_id!r}"
         )
 
-    def _every(self, period_s: float, what: str, callback: Callable[[], None]) -> None:
+    def _publish_at(self, rate_hz: float) -> Any:
+        return self._every(1.0 / rate_hz, "state timer", self._publish_state)
+
+    def _adjust(self, now: TwinParameters) -> None:
+        if self._state_timer.timer_period_ns != int(1e9 / now.state_publish_rate_hz):
+            self.destroy_timer(self._state_timer)
+            self._state_timer = self._publish_at(now.state_publish_rate_hz)
+        if (rules := field_rules(now)) != self.fields.rules:
+            self.fields.rules = rules
+            self._rules_revision += 1
+            self._tell_listeners()
+
+    def _every(self, period_s: float, what: str, callback: Callable[[], None]) -> Any:
         # The steady clock: a paused simulation is no reason to look dead. Stamps and ages in the
         # state follow ROS time all the same.
-        self.create_timer(
+        return self.create_timer(
             period_s,
             self.habits.guarded(what, callback),
             callback_group=self._group,
@@ -260,10 +297,10 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def _on_get_field(self, request: Any, response: Any) -> Any:
         try:
             answer = self.fields.lookup(
-                convert.field_request(request), self.store, self.occupancy_map
+                convert_field.request_of(request), self.store, self.occupancy_map
             )
             if not isinstance(answer, FieldJob):
-                return convert.fill_field_response(response, answer)
+                return convert_field.fill_response(response, answer)
             # Longer than a tick, perhaps: not on this thread, where messages wait.
             later = Later()
             self._desk.ask(
@@ -276,10 +313,16 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def _on_computed(self) -> None:
         self._desk.deliver()
 
+    def _on_found(self) -> None:
+        self.habits.drain()
+        self._past_desk.deliver()
+        self.estimates.deliver()
+        self.layers.deliver()
+
     def _field_response(self, response: Any, field: FieldGrid | Exception) -> Any:
         if not isinstance(field, Exception):
-            return convert.fill_field_response(response, field)
-        refusal = convert.refusal()
+            return convert_field.fill_response(response, field)
+        refusal = convert_field.refusal()
         if isinstance(field, FieldRefused):
             refusal.error_message = str(field)
         else:
@@ -290,6 +333,8 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def destroy_node(self) -> None:
         """End the workers and the journal too; what they compute is for nobody then."""
         self._workers.close()
+        self.estimates.close()
+        self.layers.close()
         self.memory.close()
         super().destroy_node()
 
@@ -306,39 +351,27 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
             fields_computing=self._desk.computing,
             fields_computed=self._desk.computed,
             slowest_field_s=self._desk.slowest_s,
+            estimates=self.estimates.state(),
+            layers=self.layers.state(),
+            origin=self.origin,
         )
         self._diagnostics.publish(
             diagnostics(findings(health), self.get_fully_qualified_name(), self._now_ns())
         )
 
     def _publish_state(self) -> None:
+        # Of a large house each of the two keeps this thread for tenths of a second.
+        self.habits.drain()
         snapshot = self.snapshot()
         self._state_publisher.publish(self._states.build(snapshot))
+        self.habits.drain()
         self._times_publisher.publish(self._times.build(snapshot))
-        topic = self._state_publisher.topic_name
-        publishers = int(self.count_publishers(topic))
-        self._listen_for_others(publishers > 1)
-        if self.twins.see(publishers):
-            self.habits.warn(
-                ("twins", 0),
-                f"{self.twins.value} nodes publish {topic}: consumers get a mixture; "
-                "stop all twins but one, or give them ROS domains of their own",
-            )
+        self._others.look(self._state_publisher.topic_name)
 
-    def _listen_for_others(self, wanted: bool) -> None:
-        """Hear the states that are published, ours too: a dead twin's shadow publishes none."""
-        if wanted and self._others is None:
-            self._others = self.create_subscription(
-                TwinState,
-                self.parameters.state_topic,
-                lambda _, info: self.twins.hear(int(info["publication_sequence_number"])),
-                QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE),
-                callback_group=self._group,
-                raw=True,
-            )
-        elif not wanted and self._others is not None:
-            self.destroy_subscription(self._others)
-            self._others = None
+    @property
+    def origin(self) -> Origin:
+        """Where what is observed comes from."""
+        return origin_of(self.parameters.origin, is_simulated=self.get_clock().ros_time_is_active)
 
     # --- small parts ------------------------------------------------------------------------
 
@@ -348,7 +381,9 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         )
         if dropped is not None:
             self.habits.drop(dropped, topic)
-        return dropped is None
+            return False
+        self.estimates.hear(write)
+        return True
 
     def _tell_listeners(self) -> None:
         if self._listeners:
@@ -357,6 +392,7 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 listener(snapshot)
 
     def _look_at_clock(self) -> None:
+        self._past_desk.go_on()
         before = self._clock_watch.state
         self._now_ns()
         if self._clock_watch.state != before:
@@ -401,7 +437,10 @@ class TwinNode(Node):  # type: ignore[misc]  # rclpy is not typed
         return now_ns
 
     def _follow(self, now_ns: int, *, is_simulated: bool) -> None:
-        self.memory.follow(RunClock(now_ns, time.time_ns(), is_simulated))
+        told = self.memory.follow(RunClock(now_ns, time.time_ns(), is_simulated))
+        if told is not None:
+            self.get_logger().info(told)
+            self.estimates.restore()
         condition = self.memory.condition
         if not condition.is_well:
             self.habits.warn(("journal", condition.state), f"journal: {condition.detail}")

@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Final
+
+# Of the parameter of that name, see `diagnostics.Origin`.
+ORIGINS: Final = ("robot", "simulated", "recorded")
+# Of a parameter that is a list.
+MAX_NAMES: Final = 16
 
 
 class ParameterError(ValueError):
@@ -18,6 +24,8 @@ def _parameter(
     high: float = math.inf,
     *,
     may_be_empty: bool = False,
+    choices: tuple[str, ...] = (),
+    fixed: str = "",
 ) -> Any:
     return field(
         default=default,
@@ -26,15 +34,25 @@ def _parameter(
             "low": low,
             "high": high,
             "may_be_empty": may_be_empty,
+            "choices": choices,
+            "fixed": fixed,
         },
     )
+
+
+# Why a parameter is read at the start and never again.
+_NAMED: Final = "what others have found under this name cannot follow: start the twin anew"
+_MEANING: Final = "what is known already was taken in by it: start the twin anew"
+_MADE: Final = "room was made by it as the twin started: start the twin anew"
 
 
 @dataclass(frozen=True, slots=True)
 class TwinParameters:
     """Every parameter of `lupin_twin`, checked at construction.
 
-    Lengths are metres, rates hertz. Ranges are closed; a name must not be empty.
+    Lengths are metres, rates hertz. Ranges are closed; a name must not be empty. Of a list, which
+    ROS cannot tell from nothing when it is empty, empty names do not count. Those that are not
+    `fixed` may be changed while the twin runs.
 
     Raises:
         ParameterError: a value of the wrong type, not finite, or out of its range.
@@ -42,22 +60,32 @@ class TwinParameters:
     """
 
     observations_topic: str = _parameter(
-        "floranova/observations", "topic of lupin_msgs/Observation to subscribe to"
+        "floranova/observations", "topic of lupin_msgs/Observation to subscribe to", fixed=_NAMED
     )
     discovered_tags_topic: str = _parameter(
-        "perception/discovered_tags", "topic of lupin_msgs/DiscoveredTags to subscribe to"
+        "perception/discovered_tags",
+        "topic of lupin_msgs/DiscoveredTags to subscribe to",
+        fixed=_NAMED,
     )
-    map_topic: str = _parameter("map", "topic of nav_msgs/OccupancyGrid to subscribe to")
-    state_topic: str = _parameter("twin/state", "topic of lupin_msgs/TwinState to publish")
+    map_topic: str = _parameter(
+        "map", "topic of nav_msgs/OccupancyGrid to subscribe to", fixed=_NAMED
+    )
+    state_topic: str = _parameter(
+        "twin/state", "topic of lupin_msgs/TwinState to publish", fixed=_NAMED
+    )
     times_topic: str = _parameter(
-        "twin/times", "topic of lupin_msgs/TwinTimes to publish right behind the state"
+        "twin/times",
+        "topic of lupin_msgs/TwinTimes to publish right behind the state",
+        fixed=_NAMED,
     )
-    field_service_name: str = _parameter("twin/get_field", "name of the GetField service")
+    field_service_name: str = _parameter(
+        "twin/get_field", "name of the GetField service", fixed=_NAMED
+    )
     state_publish_rate_hz: float = _parameter(
         1.0, "how often the state is published, by the steady clock", 0.01, 100.0
     )
-    frame_id: str = _parameter("map", "the frame that every pose has to be in")
-    buffer_len: int = _parameter(32, "scans kept per tag for its history", 1, 10_000)
+    frame_id: str = _parameter("map", "the frame that every pose has to be in", fixed=_MEANING)
+    buffer_len: int = _parameter(32, "scans kept per tag for its history", 1, 10_000, fixed=_MADE)
     idw_power: float = _parameter(2.0, "exponent of the distance in the weights", 0.01, 100.0)
     idw_falloff_radius_m: float = _parameter(
         1.5, "tags up to this distance are averaged, m", 0.001, 10_000.0
@@ -68,19 +96,45 @@ class TwinParameters:
     clip_to_explored: bool = _parameter(
         False, "NaN wherever the latest map does not know the floor"
     )
-    max_grid_cells: int = _parameter(1_000_000, "largest field served, cells", 1, 100_000_000)
-    field_cache_mb: float = _parameter(64.0, "memory for computed fields, MB", 0.0, 100_000.0)
+    max_grid_cells: int = _parameter(
+        1_000_000, "largest field served, cells", 1, 100_000_000, fixed=_MADE
+    )
+    field_cache_mb: float = _parameter(
+        64.0, "memory for computed fields, MB", 0.0, 100_000.0, fixed=_MADE
+    )
+    day_length_s: float = _parameter(
+        86_400.0,
+        "how long a day takes, s of ROS time: what comes daily is estimated by it",
+        1.0,
+        1e7,
+        fixed=_MEANING,
+    )
+
+    origin: str = _parameter(
+        "robot",
+        "where observations come from; whoever looks at the twin is told",
+        choices=ORIGINS,
+        fixed=_MEANING,
+    )
+
+    layers: tuple[str, ...] = _parameter(
+        (), "sensors whose fields are published as points for viewers such as RViz", fixed=_NAMED
+    )
+    layer_rate_hz: float = _parameter(
+        1.0, "how often layers and markers are published at most, while they change", 0.01, 5.0
+    )
 
     journal: str = _parameter(
         "",
         "file that keeps what was observed; off: none; empty: the user's, by domain and namespace",
         may_be_empty=True,
+        fixed=_MADE,
     )
     journal_days: float = _parameter(
-        90.0, "how long scans and looks are kept in the journal, days", 0.01, 36_500.0
+        90.0, "how long scans and looks are kept in the journal, days", 0.01, 36_500.0, fixed=_MADE
     )
     journal_max_mb: float = _parameter(
-        4000.0, "size past which the journal gives up its oldest scans, MB", 10.0, 1e7
+        4000.0, "size past which the journal gives up its oldest scans, MB", 10.0, 1e7, fixed=_MADE
     )
 
     def __post_init__(self) -> None:
@@ -90,6 +144,8 @@ class TwinParameters:
 
 
 def _checked(name: str, value: object, default: object, metadata: Any) -> object:
+    if isinstance(default, tuple):
+        return _names(name, value)
     expected: Final = type(default)
     # YAML and the command line read 2 as an integer; where a number is meant, so it is a number.
     if name == "journal" and value is False:
@@ -102,6 +158,10 @@ def _checked(name: str, value: object, default: object, metadata: Any) -> object
         )
     if isinstance(value, str) and not value and not metadata["may_be_empty"]:
         raise ParameterError(f"parameter {name} is empty, expected a name")
+    if metadata["choices"] and value not in metadata["choices"]:
+        raise ParameterError(
+            f"parameter {name} is {value!r}, expected {_one_of(metadata['choices'])}"
+        )
     if isinstance(value, int | float) and not isinstance(value, bool):
         low, high = metadata["low"], metadata["high"]
         if not low <= value <= high:  # false for NaN too
@@ -109,8 +169,62 @@ def _checked(name: str, value: object, default: object, metadata: Any) -> object
     return value
 
 
-def describe(name: str) -> tuple[str, str]:
-    """(description, allowed range) of a parameter, for `ros2 param describe` and the README."""
+def _names(name: str, value: object) -> tuple[str, ...]:
+    if value is None or isinstance(value, str):
+        value = [value or ""]
+    if not isinstance(value, list | tuple) or not all(isinstance(one, str) for one in value):
+        raise ParameterError(f"parameter {name} is {value!r}, expected a list of names")
+    names = tuple(filter(None, value))
+    if len(names) > MAX_NAMES:
+        raise ParameterError(
+            f"parameter {name} is {len(names)} names, expected {MAX_NAMES} at most"
+        )
+    return names
+
+
+def _one_of(choices: tuple[str, ...]) -> str:
+    return f"{', '.join(choices[:-1])} or {choices[-1]}"
+
+
+@dataclass(frozen=True, slots=True)
+class Described:
+    """What is told of a parameter; `low` None: it has no range. `fixed` empty: it may change.
+
+    `choices` empty: any name.
+    """
+
+    description: str
+    low: float | None
+    high: float
+    fixed: str
+    choices: tuple[str, ...] = ()
+
+    @property
+    def range(self) -> str:
+        """The allowed range in words; empty, where there is none."""
+        if self.choices:
+            return _one_of(self.choices)
+        return "" if self.low is None else f"{self.low} to {self.high}"
+
+
+def describe(name: str) -> Described:
+    """What `ros2 param describe` and the README tell of a parameter."""
     spec = next(spec for spec in fields(TwinParameters) if spec.name == name)
-    low, high = spec.metadata["low"], spec.metadata["high"]
-    return spec.metadata["description"], "" if low is None else f"{low} to {high}"
+    told = spec.metadata
+    return Described(told["description"], told["low"], told["high"], told["fixed"], told["choices"])
+
+
+def changed(now: TwinParameters, wanted: Mapping[str, object]) -> TwinParameters:
+    """The parameters with some changed while the twin runs.
+
+    Raises:
+        ParameterError: one that is fixed, or a value that the twin could not start with either.
+
+    """
+    for name, value in wanted.items():
+        if why := describe(name).fixed:
+            raise ParameterError(
+                f"parameter {name} is {getattr(now, name)!r} and cannot become {value!r} while "
+                f"the twin runs: {why}"
+            )
+    return replace(now, **wanted)  # type: ignore[arg-type]  # checked there

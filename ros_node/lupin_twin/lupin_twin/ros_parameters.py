@@ -5,19 +5,26 @@ For the twin's node, and for whoever else reads some of the twin's parameters.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import fields
 from typing import Any, Final
 
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
 from rclpy.exceptions import (
     InvalidParameterTypeException,
     InvalidServiceNameException,
     InvalidTopicNameException,
 )
+from rclpy.node import Node
+from rclpy.parameter import Parameter
 
-from lupin_twin.parameters import ParameterError, TwinParameters, describe
+from lupin_twin.parameters import ParameterError, TwinParameters, changed, describe
 
 ALL_NAMES: Final = tuple(spec.name for spec in fields(TwinParameters))
 
@@ -31,27 +38,80 @@ def declare(node: Any, names: Iterable[str] = ALL_NAMES) -> TwinParameters:
         ParameterError: a value of the wrong type or out of its range.
 
     """
-    defaults = TwinParameters()
+    defaults, given = TwinParameters(), _overrides(node)
+    # Before ROS sees one: its own complaint about a range is another. And what another node of the
+    # twin's reads from the same file has to be right here as well.
+    TwinParameters(**{name: given[name] for name in ALL_NAMES if name in given})
     values = {}
     for name in names:
-        description, limits = describe(name)
+        default = getattr(defaults, name)
         values[name] = node.declare_parameter(
-            name,
-            getattr(defaults, name),
-            # dynamic_typing: `idw_power: 2` is an integer to YAML; the range check takes it.
-            ParameterDescriptor(
-                description=description,
-                additional_constraints=limits,
-                read_only=True,
-                dynamic_typing=True,
-            ),
+            name, _for_ros(default), _descriptor(name, default)
         ).value
     for name in unknown_overrides(node):
         node.get_logger().warning(f"parameter {name} is unknown and has no effect")
-    # What another node of the twin's reads from the same file has to be right here as well.
-    given = {name: value for name, value in _overrides(node).items() if name in ALL_NAMES}
-    TwinParameters(**given)
     return TwinParameters(**values)
+
+
+def _for_ros(value: Any) -> Any:
+    """A list without anything in it has no type in ROS: one empty name stands for it."""
+    return [*value] or [""] if isinstance(value, tuple) else value
+
+
+def _descriptor(name: str, default: object) -> ParameterDescriptor:
+    told = describe(name)
+    descriptor = ParameterDescriptor(
+        description=told.description,
+        additional_constraints="; ".join(
+            filter(None, (" | ".join(told.choices), told.fixed and f"read only: {told.fixed}"))
+        ),
+        read_only=bool(told.fixed),
+        # `idw_power: 2` is an integer to YAML; our own check takes it.
+        dynamic_typing=True,
+    )
+    if told.low is not None:
+        if isinstance(default, int):
+            descriptor.integer_range = [
+                IntegerRange(from_value=int(told.low), to_value=int(told.high))
+            ]
+        else:
+            descriptor.floating_point_range = [
+                FloatingPointRange(from_value=float(told.low), to_value=float(told.high))
+            ]
+    return descriptor
+
+
+class AdjustableNode(Node):  # type: ignore[misc]  # rclpy is not typed
+    """A node of which some parameters may be changed while it runs.
+
+    `ros2 param set` comes to the methods below. They ask before rclpy does: that refuses what is
+    read only, or out of its range, in words that name neither the reason nor the limit.
+    """
+
+    parameters = TwinParameters()
+    _on_change: Callable[[TwinParameters], None] | None = None
+
+    def adjust_by(self, on_change: Callable[[TwinParameters], None]) -> None:
+        """Have `on_change(parameters)` called after each change; `declare` comes before."""
+        self._on_change = on_change
+
+    def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
+        """One after the other."""
+        return [self.set_parameters_atomically([one]) for one in parameter_list]
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """All of them or, with the reason, none."""
+        wanted = {one.name: one.value for one in parameter_list if one.name in ALL_NAMES}
+        try:
+            new = changed(self.parameters, wanted)
+        except ParameterError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        result = super().set_parameters_atomically(parameter_list)
+        if result.successful and new != self.parameters:
+            self.parameters = new
+            if self._on_change is not None:
+                self._on_change(new)
+        return result
 
 
 def unknown_overrides(node: Any) -> list[str]:

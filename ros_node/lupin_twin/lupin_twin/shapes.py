@@ -14,14 +14,14 @@ from lupin_msgs import msg as lupin
 from nav_msgs import msg as nav
 from std_msgs import msg as std
 
-from lupin_twin.cdr import MessageShape
-from lupin_twin.state import (
+from lupin_twin.bounds import (
     MAX_BLOOMS_PER_TAG,
     MAX_FOOTPRINT_POINTS,
     MAX_ITEMS,
     MAX_SENSORS_PER_TAG,
     MAX_TAGS,
 )
+from lupin_twin.cdr import MessageShape
 
 MAX_STATUSES: Final = 1_000
 MAX_STATUS_VALUES: Final = 10_000

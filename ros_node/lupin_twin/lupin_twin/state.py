@@ -15,29 +15,23 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-NANOSECONDS_PER_SECOND = 1_000_000_000
+from lupin_twin.bounds import (
+    MAX_BLOOMS_PER_TAG,
+    MAX_FOOTPRINT_POINTS,
+    MAX_ITEMS,
+    MAX_SENSORS_PER_TAG,
+    MAX_TAGS,
+    check_length,
+    check_texts,
+)
 
-# Bounds on what one robot may make us keep. A greenhouse compartment has hundreds of tags and a
-# tag carries a handful of sensors; the bounds are far above that and keep memory finite when a
-# producer is broken or hostile.
-MAX_TAGS = 20_000
-MAX_SENSORS_PER_TAG = 64
-MAX_TEXT_LENGTH = 256
-MAX_BLOOMS_PER_TAG = 2_000
-MAX_FOOTPRINT_POINTS = 64
-# And on all of it together, for those multiply: each reading, flower and footprint point counted,
-# 20,000 tags with ten sensors and forty flowers. A reading with its name is some hundred bytes.
-MAX_ITEMS = 1_000_000
+NANOSECONDS_PER_SECOND = 1_000_000_000
 
 # lupin_msgs/Observation: the status of a try that brought what it should; others say why not.
 STATUS_OK = 0
 
 # The largest number that a field, which is float32, can hold.
 FLOAT32_MAX = 3.4028234663852886e38
-
-
-class Rejected(ValueError):
-    """A write that the store refuses; the message names the field, the value and the limit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -321,6 +315,11 @@ class TwinStore:
         self._observed = {tag_id: min(at_ns, now_ns) for tag_id, at_ns in self._observed.items()}
         return True
 
+    @property
+    def size(self) -> tuple[int, int]:
+        """How many tags are kept, and how many readings, flowers and footprint points of theirs."""
+        return len(self._tags), self._items
+
     def knows(self, tag_id: str) -> bool:
         """Whether the tag was ever heard of."""
         return tag_id in self._tags
@@ -335,10 +334,9 @@ class TwinStore:
         return Snapshot(stamp_ns=now_ns, frame_id=frame_id, tags=tuple(self._tags.values()))
 
     def samples_for_sensor(self, sensor_type: str) -> tuple[tuple[float, float, float], ...]:
-        """(x, y, value) of every tag with a pose and a finite reading of this sensor.
+        """(x, y, value) of every tag with a pose and a finite reading of a sensor (`samples_of`).
 
         Metres in the map frame and the sensor's unit, in the order the tags were first heard of.
-        One NaN must not poison a neighbourhood, so readings that are not finite are left out.
         """
         return samples_of(self._tags.values(), sensor_type)
 
@@ -420,7 +418,7 @@ def samples_of(
 ) -> tuple[tuple[float, float, float], ...]:
     """(x, y, value) of the tags with a pose and a finite reading of `sensor_type`, in order.
 
-    Finite in the field's own type: a number past float32 would paint its neighbourhood infinite.
+    Finite in the field's own type: a NaN, or a number past float32, would poison a neighbourhood.
     """
     return tuple(
         (tag.pose.x, tag.pose.y, reading.value)
@@ -429,18 +427,3 @@ def samples_of(
         for reading in tag.readings
         if reading.name == sensor_type and abs(reading.value) <= FLOAT32_MAX  # false for NaN
     )
-
-
-def check_texts(*texts: str) -> None:
-    """Raise `Rejected` for a text longer than `MAX_TEXT_LENGTH` characters."""
-    for text in texts:
-        if len(text) > MAX_TEXT_LENGTH:
-            raise Rejected(
-                f"text {text[:24]!r}… has {len(text)} characters, the limit is {MAX_TEXT_LENGTH}"
-            )
-
-
-def check_length(what: str, length: int, limit: int) -> None:
-    """Raise `Rejected` where `length` of `what` is past `limit`."""
-    if length > limit:
-        raise Rejected(f"{what}: {length}, the limit is {limit}")

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import signal
+import socket
 import ssl
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import httpx
 import pytest
@@ -15,13 +17,14 @@ from cryptography.hazmat.primitives.serialization import (
     PrivateFormat,
     load_pem_private_key,
 )
-from websockets.sync.client import connect
 
 from lupin_bridge.access.tls import TlsError, check_pair
 from tests.support.access import BEARER, TOKEN, Served, refused_start, served
+from tests.support.raw_ws import frames_of, handshake_request
 from tests.support.tls import Certificate, certificate
-from tests.support.waiting import wait_for
-from tests.support.web import Listener, ws_url
+from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.web import ws_url
+from tests.support.wss import wss
 
 
 @pytest.fixture(scope="module")
@@ -106,11 +109,47 @@ def test_https_and_wss_are_served_and_announced(secure: Served) -> None:
 
 def test_every_frame_comes_over_wss(secure: Served, ours: Certificate) -> None:
     url = ws_url(secure.url)
-    with connect(url, additional_headers=BEARER, ssl=ours.trust, proxy=None) as connection:
-        frames = Listener(connection)
-        first = frames.until("state")["seq"]
+    with wss(url, ours.trust, BEARER) as connection:
+        first = connection.next_state()["seq"]
         for number in range(1, 4):
-            assert frames.until("state")["seq"] == first + number
+            assert connection.next_state()["seq"] == first + number
+
+
+def states_in(data: bytes) -> int:
+    return sum(text.startswith(b'{"type":"state"') for _, text in frames_of(data))
+
+
+def test_who_asks_in_one_piece_with_the_end_of_the_handshake_is_not_cut_off(
+    ours: Certificate,
+) -> None:
+    """As a quick client does: the server's tickets are still unsent when the request comes."""
+    with served(*ours.options, "--client-timeout-s", "2", trust=ours.trust) as live:
+        address = urlsplit(live.url)
+        incoming, outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
+        tls = ours.trust.wrap_bio(incoming, outgoing, server_hostname=address.hostname)
+        with socket.create_connection((address.hostname, address.port), PATIENCE_S) as client:
+
+            def take() -> None:
+                block = client.recv(1 << 16)
+                assert block, "the connection was cut off"
+                incoming.write(block)
+
+            while True:
+                try:
+                    tls.do_handshake()
+                    break
+                except ssl.SSLWantReadError:
+                    client.sendall(outgoing.read())
+                    take()
+            tls.write(handshake_request(address.netloc, "/ws/state"))
+            client.sendall(outgoing.read())
+            received = b""
+            while states_in(received.partition(b"\r\n\r\n")[2]) < 5:
+                try:
+                    received += tls.read(1 << 16)
+                except ssl.SSLWantReadError:
+                    take()
+        assert "cut off" not in live.process.output
 
 
 def test_the_own_origin_is_https_then(secure: Served) -> None:
@@ -153,7 +192,7 @@ def renew(ours: Certificate, folder: Path) -> Certificate:
     new = certificate(folder)
     new.key.replace(ours.key)
     new.cert.replace(ours.cert)
-    return Certificate(ours.cert, ours.key, new.trust)
+    return Certificate(ours.cert, ours.key, new.trust, new.authority)
 
 
 def is_trusted(live: Served, trust: ssl.SSLContext) -> bool:
@@ -170,11 +209,10 @@ def test_a_new_pair_is_served_to_whoever_connects_from_now_on(
     old = certificate(tmp_path)
     with (
         served(*old.options, trust=old.trust) as live,
-        connect(ws_url(live.url), ssl=old.trust, proxy=None) as connection,
+        wss(ws_url(live.url), old.trust) as connection,
         live.client() as kept,
     ):
-        frames = Listener(connection)
-        frames.until("state")
+        connection.next_state()
         assert kept.get("/healthz").status_code == 200
         new = renew(old, tmp_path / "new")
         if is_told:
@@ -183,8 +221,11 @@ def test_a_new_pair_is_served_to_whoever_connects_from_now_on(
         assert not is_trusted(live, old.trust)
         assert live.process.output.count("new connections get the TLS certificate") == 1
         # Who was there before goes on.
-        frames.rest()
-        frames.until("state")
+        now_s = kept.get("/api/state").json()["header"]["stamp"]["sec"]
+        wait_for(
+            lambda: connection.next_state()["state"]["header"]["stamp"]["sec"] > now_s,
+            "a later state",
+        )
         assert kept.get("/healthz").status_code == 200
 
 

@@ -15,12 +15,14 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from lupin_bridge.field import formats as field_formats
+from lupin_bridge.field.colour import rgb
 from lupin_bridge.field.formats import FORMATS, JSON, NPY, PNG
-from lupin_bridge.field.sensors import sensor
+from lupin_bridge.judge.choosing import own_sensors
 from lupin_bridge.stream import schema
 from lupin_twin.grid import FieldGrid
 
-TEMPERATURE_RGB = sensor("temperature").rgb
+SENSORS = own_sensors()
+TEMPERATURE_RGB = rgb(8, 72, 50)
 ALPHA_MAX = 153  # 60 % of 255
 
 
@@ -91,6 +93,16 @@ def test_json_has_no_number_that_json_does_not_know_and_short_decimals() -> None
     assert (body["value_min"], body["value_max"], body["sample_count"]) == (10.0, 30.0, 5)
 
 
+def test_a_large_field_is_written_in_parts_that_are_one_list(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    whole = field_formats.write_json(GRID)
+    monkeypatch.setattr(field_formats, "_AT_ONCE", 4)
+    assert field_formats.write_json(GRID) == whole
+    parts = list(field_formats.numbers(GRID.values))
+    assert parts == [b"10.0,null,20.0,12.5", b",", b"15.0,30.0"]
+
+
 def test_a_refusal_is_get_fields_failure_body() -> None:
     refused = schema.GetFieldResponse.model_validate_json(field_formats.refusal_json('no "x"'))
     assert (refused.ok, refused.error_message) == (False, 'no "x"')
@@ -126,7 +138,7 @@ def test_row_0_of_npy_lies_at_the_smallest_y() -> None:
 @example(grid_of([[0.0, 1.4e-45, 4.2e-45]]), 1)  # its inverse is
 @settings(max_examples=200)
 def test_every_pixel_of_a_png_is_the_ramps(grid: FieldGrid, scale: int) -> None:
-    picture = decoded(field_formats.write_png(grid, "temperature", scale))
+    picture = decoded(field_formats.write_png(grid, "temperature", SENSORS, scale))
     assert picture.shape == (grid.height * scale, grid.width * scale, 4)
     span = grid.value_max - grid.value_min
     for row in range(grid.height):
@@ -146,21 +158,21 @@ def test_every_pixel_of_a_png_is_the_ramps(grid: FieldGrid, scale: int) -> None:
 
 
 def test_the_top_row_of_a_png_lies_at_the_largest_y() -> None:
-    alphas = decoded(field_formats.write_png(GRID, "temperature"))[:, :, 3]
+    alphas = decoded(field_formats.write_png(GRID, "temperature", SENSORS))[:, :, 3]
     bottom = [0, 0, ALPHA_MAX / 2]  # 10 is the minimum, NaN is transparent, 20 is half-way
     top = [ALPHA_MAX / 8, ALPHA_MAX / 4, ALPHA_MAX]
     np.testing.assert_allclose(alphas.astype(float), [top, bottom], atol=0.81)
 
 
 def test_one_value_everywhere_is_shown_and_no_value_anywhere_is_not() -> None:
-    one = decoded(field_formats.write_png(grid_of([[7.0, 7.0]]), "co2"))
+    one = decoded(field_formats.write_png(grid_of([[7.0, 7.0]]), "co2", SENSORS))
     assert one[:, :, 3].tolist() == [[ALPHA_MAX, ALPHA_MAX]]
-    none = decoded(field_formats.write_png(grid_of([[math.nan, math.nan]]), "co2"))
+    none = decoded(field_formats.write_png(grid_of([[math.nan, math.nan]]), "co2", SENSORS))
     assert none[:, :, 3].tolist() == [[0, 0]]
 
 
 def test_a_png_says_what_it_shows() -> None:
-    with Image.open(io.BytesIO(field_formats.write_png(GRID, "temperature", 2))) as image:
+    with Image.open(io.BytesIO(field_formats.write_png(GRID, "temperature", SENSORS, 2))) as image:
         image.load()
         assert image.size == (6, 4)
         assert image.text == {  # type: ignore[attr-defined]  # Pillow's PngImageFile
@@ -181,9 +193,10 @@ def test_a_png_says_what_it_shows() -> None:
 
 
 def test_write_goes_by_the_format() -> None:
-    assert field_formats.write(GRID, JSON, "co2") == field_formats.write_json(GRID)
-    assert field_formats.write(GRID, NPY, "co2") == field_formats.write_npy(GRID)
-    assert field_formats.write(GRID, PNG, "co2", 3) == field_formats.write_png(GRID, "co2", 3)
+    assert field_formats.write(GRID, JSON, "co2", SENSORS) == field_formats.write_json(GRID)
+    assert field_formats.write(GRID, NPY, "co2", SENSORS) == field_formats.write_npy(GRID)
+    picture = field_formats.write_png(GRID, "co2", SENSORS, 3)
+    assert field_formats.write(GRID, PNG, "co2", SENSORS, 3) == picture
     assert [known.media_type for known in FORMATS] == [
         "application/json",
         "image/png",

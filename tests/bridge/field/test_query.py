@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
+from urllib.parse import unquote
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from lupin_bridge.field import query as field_query
@@ -213,11 +214,15 @@ def test_metadata_goes_into_headers_that_any_client_can_read() -> None:
     }
 
 
+@example("  a b ")
+@example(" ")
 @given(st.text(st.characters(codec="utf-8"), max_size=40))
 def test_no_sensor_name_can_break_out_of_a_header_or_a_folder(name: str) -> None:
     headers = field_query.headers({"Sensor": name}, f"{name}.png")
     for value in headers.values():
         assert re.fullmatch(r"[\x20-\x7e]*", value), "a header is one line of ASCII"
+        assert value == value.strip(), "or it would not be sent"
+    assert unquote(headers["X-Field-Sensor"]) == name
     file_name = re.fullmatch(r'inline; filename="(.*)"', headers["Content-Disposition"])
     assert file_name is not None
     assert re.fullmatch(r"[A-Za-z0-9._-]+", file_name[1])

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from lupin_bridge.rosbridge.protocol import CallService, Refused
 from lupin_bridge.rosbridge.services import FieldCall, absolute, answer, is_type
-from lupin_bridge.twin.source import TwinNames
+from lupin_bridge.twin.names import TwinNames
 from lupin_twin.fields import FieldRequest
 
 NAMES = TwinNames("/house/state", "/house/get_field")
@@ -109,9 +109,13 @@ def test_another_service_is_refused(service: str) -> None:
 
 
 def test_rosapi_tells_what_is_here() -> None:
-    assert values("/rosapi/topics") == {
-        "topics": ["/house/state"],
-        "types": ["lupin_msgs/msg/TwinState"],
+    topics = values("/rosapi/topics")
+    assert dict(zip(topics["topics"], topics["types"], strict=True)) == {
+        "/house/state": "lupin_msgs/msg/TwinState",
+        "/floranova/observations": "lupin_msgs/msg/Observation",
+        "/perception/discovered_tags": "lupin_msgs/msg/DiscoveredTags",
+        "/map": "nav_msgs/msg/OccupancyGrid",
+        "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
     }
     services = values("rosapi/services")["services"]
     assert services[0] == FIELD_SERVICE

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -12,22 +13,17 @@ from websockets.client import ClientProtocol
 from websockets.protocol import State
 from websockets.uri import parse_uri
 
-from lupin_bridge.rosbridge.session import (
-    MAX_BURST,
-    MAX_MESSAGES_PER_S,
-    MAX_SUBSCRIPTIONS,
-    Reaction,
-    Session,
-    TooManyMessages,
-)
+from lupin_bridge.rosbridge.session import MAX_SUBSCRIPTIONS, Reaction, Session
+from lupin_bridge.serving.client_pace import MAX_BURST, MAX_MESSAGES_PER_S, TooManyMessages
 from lupin_bridge.stream.frames import FrameWriter, StateFrame
 from lupin_bridge.stream.hub import Client, Hub
 from lupin_bridge.stream.status import Liveness
-from lupin_bridge.twin.source import TwinNames
+from lupin_bridge.twin.names import TwinNames
 from lupin_twin.state import Snapshot, TagState
 
 TOPIC = "/twin/state"
 NAMES = TwinNames(TOPIC, "/twin/get_field")
+SERVED = "/twin/state, /floranova/observations, /perception/discovered_tags, /map, /diagnostics"
 
 
 @pytest.fixture
@@ -67,7 +63,7 @@ def frame(*tag_ids: str) -> StateFrame:
 
 def test_who_subscribes_is_due_the_state_and_gets_no_other_reply(session: Session) -> None:
     assert not session.is_subscribed
-    assert subscribe(session) == Reaction(state_is_due=True)
+    assert subscribe(session) == Reaction(state_is_due=True, subscribed=TOPIC)
     assert session.is_subscribed
 
 
@@ -129,14 +125,14 @@ def test_to_end_what_was_never_begun_is_worth_a_warning(
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"topic": "/cmd_vel"}, "topic '/cmd_vel' is not served, expected /twin/state"),
-        ({"topic": "/twin/state/"}, "topic '/twin/state/' is not served, expected /twin/state"),
+        ({"topic": "/cmd_vel"}, f"topic '/cmd_vel' is not served, expected one of {SERVED}"),
+        ({"topic": "/map/"}, f"topic '/map/' is not served, expected one of {SERVED}"),
         (
             {"type": "std_msgs/String"},
             "type is 'std_msgs/String', expected lupin_msgs/msg/TwinState",
         ),
         ({"throttle_rate": -1}, "throttle_rate is -1, must not be less than 0"),
-        ({"compression": "cbor-raw"}, "compression is 'cbor-raw', expected 'none'"),
+        ({"compression": "zip"}, "compression is 'zip', expected none, cbor, cbor-raw or png"),
     ],
 )
 def test_a_refused_subscription_changes_nothing(
@@ -150,11 +146,11 @@ def test_a_refused_subscription_changes_nothing(
 
 @pytest.mark.parametrize("type_", ["lupin_msgs/msg/TwinState", "lupin_msgs/TwinState", "", None])
 def test_the_type_may_be_given_in_both_forms(session: Session, type_: object) -> None:
-    assert subscribe(session, type=type_) == Reaction(state_is_due=True)
+    assert subscribe(session, type=type_) == Reaction(state_is_due=True, subscribed=TOPIC)
 
 
 def test_a_subscription_with_warnings_stands(session: Session) -> None:
-    reaction = subscribe(session, "a", queue_length=10, compression="cbor", fragment_size=9)
+    reaction = subscribe(session, "a", queue_length=10, compression="png", fragment_size=9)
     assert [reply["level"] for reply in replies(reaction)] == ["warning"] * 3
     assert {reply["id"] for reply in replies(reaction)} == {"a"}
     assert reaction.state_is_due
@@ -169,6 +165,27 @@ def test_subscriptions_are_bounded(session: Session) -> None:
     assert not subscribe(session, 0, throttle_rate=1).replies, "replacing one is no new one"
     unsubscribe(session, 0)
     assert not subscribe(session, "one more").replies
+
+
+def test_other_topics_are_fed_as_their_last_subscription_wants_it(session: Session) -> None:
+    assert subscribe(session, topic="map", throttle_rate=500) == Reaction(subscribed="map")
+    assert not session.is_subscribed
+    feed = session.feeds["map"]
+    assert (feed.topic.name, feed.topic.type_name) == ("/map", "nav_msgs/msg/OccupancyGrid")
+    assert (feed.name, feed.compression, feed.min_interval_s) == ("map", "none", 0.5)
+    subscribe(session, "b", topic="map", throttle_rate=100, compression="cbor")
+    assert session.feeds == {"map": replace(feed, compression="cbor", min_interval_s=0.1)}
+    unsubscribe(session, "b", topic="map")
+    assert session.feeds == {"map": feed}
+    unsubscribe(session, topic="map")
+    assert session.feeds == {}
+
+
+def test_a_state_in_cbor_is_fed_too_and_not_written_for_all(session: Session) -> None:
+    assert not subscribe(session, compression="cbor-raw").state_is_due
+    assert (session.is_subscribed, session.feeds[TOPIC].compression) == (False, "cbor-raw")
+    assert subscribe(session).state_is_due
+    assert (session.is_subscribed, session.feeds) == (True, {})
 
 
 # --- the state on the wire --------------------------------------------------------------------
@@ -262,15 +279,15 @@ def test_a_call_with_a_warning_is_made_all_the_same(session: Session) -> None:
 
 def test_rosapi_is_answered_at_once(session: Session) -> None:
     reaction = send(session, op="call_service", service="/rosapi/topics", id="a")
-    assert replies(reaction) == [
-        {
-            "op": "service_response",
-            "id": "a",
-            "service": "/rosapi/topics",
-            "values": {"topics": [TOPIC], "types": ["lupin_msgs/msg/TwinState"]},
-            "result": True,
-        }
-    ]
+    [response] = replies(reaction)
+    values = response.pop("values")
+    assert response == {
+        "op": "service_response",
+        "id": "a",
+        "service": "/rosapi/topics",
+        "result": True,
+    }
+    assert (values["topics"][0], values["types"][0]) == (TOPIC, "lupin_msgs/msg/TwinState")
 
 
 @pytest.mark.parametrize(

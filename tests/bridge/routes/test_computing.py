@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import ExitStack, asynccontextmanager
+from types import SimpleNamespace
 from typing import Any
 from urllib.parse import urlencode
 
@@ -14,22 +15,24 @@ import numpy as np
 import pytest
 
 from lupin_bridge.routes import map as routes_map
-from lupin_bridge.routes.computing import is_large
+from lupin_bridge.routes.computing import is_large, within_time
 from lupin_bridge.routes.state import AGES_HOLD_S
 from lupin_bridge.serving.http_protocol import PIECE_BYTES
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.state_json import StateJson
+from lupin_bridge.twin.source import TwinTimeoutError
 from lupin_twin.explored import OccupancyMap, occupancy_map
 from lupin_twin.fields import FieldJob, FieldRequest, cost_s
 from lupin_twin.grid import FieldGrid
 from lupin_twin.node import TwinNode
 from lupin_twin.state import Pose, Reading, Scan
-from lupin_twin.workers import LARGE_THREADS, SMALL_S, ShouldStop
+from lupin_twin.workers import LARGE_THREADS, SMALL_S, Job, ShouldStop, Workers
 from tests.support.inprocess import Running, run, running
 from tests.support.waiting import PATIENCE_S, until
 from tests.support.web import deaf_client
 
-EAGER = Settings(field_rate_hz=10_000.0, field_concurrency=1_000)
+# And no machine is too busy for an answer.
+EAGER = Settings(field_rate_hz=10_000.0, field_concurrency=1_000, field_timeout_s=60.0)
 
 
 def field(sensor: str = "co2", cells: int = 4, suffix: str = "json") -> str:
@@ -92,6 +95,16 @@ def held(monkeypatch: pytest.MonkeyPatch) -> Held:
     return Held(monkeypatch)
 
 
+def fields_at(workers: Workers) -> tuple[int, int]:
+    """How many fields wait, and how many are computed; the twin's own work may be among them."""
+
+    def count(jobs: Iterable[Job[object]]) -> int:
+        works = [getattr(job, "_work", None) for job in tuple(jobs)]
+        return sum(isinstance(getattr(work, "__self__", None), FieldJob) for work in works)
+
+    return count(workers._waiting), count(workers._running)
+
+
 def ask(it: Running, *paths: str) -> list[asyncio.Task[httpx.Response]]:
     return [asyncio.create_task(it.http.get(path)) for path in paths]
 
@@ -104,11 +117,13 @@ def test_a_flood_of_the_dearest_fields_does_not_hold_up_a_tiny_one(domain: int, 
         async with house() as it:
             flood = ask(it, *(field(f"co2 {n}", LARGE) for n in range(40)))
             workers = it.bridge.source.workers
-            await until(lambda: workers.waiting == 24 - LARGE_THREADS, "a queue that is full")
+            full = (24 - LARGE_THREADS, LARGE_THREADS)
+            await until(lambda: fields_at(workers) == full, "a queue that is full")
+            await until(lambda: sum(task.done() for task in flood) == 16, "the refusals")
             refused = [task for task in flood if task.done()]
             tiny = await it.http.get(field("co2 50"))
             assert tiny.status_code == 200
-            assert workers.waiting == 24 - LARGE_THREADS, "it passed them all"
+            assert fields_at(workers)[0] == full[0], "it passed them all"
             assert len(refused) == 16
             for task in refused:
                 answer = await task
@@ -144,13 +159,14 @@ def test_a_client_that_leaves_takes_its_work_along(domain: int, held: Held) -> N
             paths = [field(f"co2 {n}", LARGE) for n in range(6)]
             leaving = ask(it, *paths)
             workers = it.bridge.source.workers
-            await until(lambda: workers.waiting == 6 - LARGE_THREADS, "work")
+            await until(lambda: len(held.begun) == LARGE_THREADS, "work")
+            await until(lambda: fields_at(workers)[0] == 6 - LARGE_THREADS, "the rest behind it")
             at_work = list(held.begun)
             (staying,) = ask(it, field(at_work[0], LARGE))
             await until(lambda: it.bridge.admission._in_flight["127.0.0.1"] == 7, "who stays")
             for task in leaving:
                 task.cancel()
-            await until(lambda: (workers.waiting, workers.running) == (0, 1), "the others' end")
+            await until(lambda: fields_at(workers) == (0, 1), "the others' end")
             assert workers.abandoned == 5
             held.gate.set()
             assert (await staying).status_code == 200
@@ -159,15 +175,28 @@ def test_a_client_that_leaves_takes_its_work_along(domain: int, held: Held) -> N
     run(domain, test())
 
 
+def test_work_that_asks_no_twin_has_as_long_and_is_given_up() -> None:
+    async def test() -> None:
+        bridge: Any = SimpleNamespace(settings=Settings(field_timeout_s=0.1))
+        work = asyncio.create_task(asyncio.Event().wait())
+        text = r"the answer was not there within 0\.1 s \(field_timeout_s\)"
+        with pytest.raises(TwinTimeoutError, match=text):
+            await within_time(bridge, work)
+        assert work.cancelled()
+
+    asyncio.run(test())
+
+
 def test_a_time_out_ends_the_work_too(domain: int, held: Held) -> None:
     async def test() -> None:
-        settings = Settings(field_rate_hz=10_000.0, field_timeout_s=0.2)
+        # Long enough for all four to be at work, or waiting for it, by then.
+        settings = Settings(field_rate_hz=10_000.0, field_timeout_s=1.0)
         async with house(settings) as it:
             answers = await asyncio.gather(*ask(it, *(field(f"co2 {n}", LARGE) for n in range(4))))
             assert [answer.status_code for answer in answers] == [504] * 4
-            assert "0.2 s (field_timeout_s)" in answers[0].json()["detail"]
+            assert "1 s (field_timeout_s)" in answers[0].json()["detail"]
             workers = it.bridge.source.workers
-            await until(lambda: (workers.waiting, workers.running) == (0, 0), "the end of it all")
+            await until(lambda: fields_at(workers) == (0, 0), "the end of it all")
             assert workers.abandoned == 4
             assert it.bridge.admission.being_computed == 0
 

@@ -14,7 +14,7 @@ from lupin_twin.state import TwinStore
 from tests.support.inprocess import Running, run, running
 from tests.support.messages import scan
 from tests.support.ros import Peer
-from tests.support.waiting import until
+from tests.support.waiting import PATIENCE_S, until
 from tests.support.web import bridge, ws_url
 
 
@@ -22,7 +22,7 @@ def test_a_live_bridge_is_healthy_and_ready() -> None:
     with bridge() as live:
         health = schema.Health.model_validate(live.json("/healthz"))
         assert (health.ok, health.callback_errors) == (True, 0)
-        ready = schema.Readiness.model_validate(live.json("/readyz"))
+        ready = schema.StatusFrame.model_validate(live.json("/readyz"))
         assert (ready.twin, ready.reason) == ("live", "live")
         assert ready.state_age_seconds is not None
         for path in ("/healthz", "/readyz"):
@@ -38,7 +38,10 @@ async def end_ros_thread(served: Running) -> None:
 
 def test_when_the_ros_thread_ends_health_says_so_and_every_client_is_told(domain: int) -> None:
     async def test() -> None:
-        async with running() as served, connect(ws_url(served.url), proxy=None) as listener:
+        async with (
+            running() as served,
+            connect(ws_url(served.url), proxy=None, open_timeout=PATIENCE_S) as listener,
+        ):
             assert json.loads(await listener.recv())["reason"] == "live"
             await end_ros_thread(served)
             while (frame := json.loads(await listener.recv())).get("reason") != "thread_dead":
@@ -56,7 +59,7 @@ def test_when_the_ros_thread_ends_health_says_so_and_every_client_is_told(domain
             assert (await served.http.get("/api/tags/7/history")).status_code == 503
             answer = await served.http.get("/api/field?sensor_type=co2")
             assert (answer.status_code, answer.headers["retry-after"]) == (503, "3")
-            async with connect(ws_url(served.url), proxy=None) as late:
+            async with connect(ws_url(served.url), proxy=None, open_timeout=PATIENCE_S) as late:
                 assert json.loads(await late.recv())["reason"] == "thread_dead"
 
     run(domain, test())

@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import random
 from collections.abc import Iterator
+from contextlib import suppress
 
 import pytest
 from lupin_msgs.msg import TwinTagState
 from websockets.exceptions import ConnectionClosed
 
-from lupin_bridge.rosbridge.session import MAX_BURST
+from lupin_bridge.serving.client_pace import MAX_BURST
 from tests.support import messages
 from tests.support.proc_stat import resident_mb
 from tests.support.rosbridge import FIELD, FIELD_ARGS, TOPIC, Message, Ros, ros_at, tags
@@ -20,8 +21,9 @@ from tests.support.web import Bridge, bridge
 @pytest.fixture(scope="module")
 def house() -> Iterator[Bridge]:
     """A twin with two tags, 1 and 2."""
-    with bridge() as running:
+    with bridge(afresh=True) as running:
         running.peer.wait_for_twin()
+        running.peer.until(lambda: running.peer.node.count_publishers(TOPIC), "its publisher")
         running.peer.observe(
             messages.scan("1", {"temperature": 20.0}, at=(0.0, 0.0)),
             messages.scan("2", {"temperature": 30.0, "co2": 400.0}, at=(1.0, 0.0)),
@@ -203,17 +205,15 @@ def test_a_message_past_the_servers_limit_ends_the_connection_alone(house: Bridg
 def test_who_floods_is_closed_with_the_reason(house: Bridge) -> None:
     with ros_at(house.url) as flood, ros_at(house.url) as other:
         flood.send(op="set_level", level="none")
+        with suppress(ConnectionClosed):  # it may hear the answer before it has said all
+            for _ in range(100 * MAX_BURST):
+                flood.connection.send("{}")
         with pytest.raises(ConnectionClosed) as closed:
-            send_often(flood, "{}", 100 * MAX_BURST)
+            flood.next()
         assert closed.value.rcvd is not None
         assert closed.value.rcvd.code == 1008
         assert closed.value.rcvd.reason == "more than 100 messages a second after 500 at once"
         assert other.is_quiet()
-
-
-def send_often(ros: Ros, message: str, times: int) -> None:
-    for _ in range(times):
-        ros.connection.send(message)
 
 
 def garbage(chance: random.Random) -> str | bytes:
@@ -279,12 +279,15 @@ def test_names_are_the_ones_that_ros_knows() -> None:
     remapping = ("--ros-args", "-r", "/twin/state:=/house/state", "-p", "field_service_name:=field")
     with bridge(*remapping) as house, ros_at(house.url) as ros:
         topics = ros.call("/rosapi/topics")["values"]
-        assert topics == {"topics": ["/house/state"], "types": ["lupin_msgs/msg/TwinState"]}
+        assert (topics["topics"][0], topics["types"][0]) == (
+            "/house/state",
+            "lupin_msgs/msg/TwinState",
+        )
         assert ros.call("/rosapi/services")["values"]["services"][0] == "/field"
         ros.subscribe(topic="/house/state")
         assert ros.next()["topic"] == "/house/state"
         ros.subscribe()
-        assert "expected /house/state" in ros.first("status")["msg"]
+        assert "expected one of /house/state, /flor" in ros.first("status")["msg"]
 
 
 def test_one_client_too_many_is_turned_away_and_told_so() -> None:
@@ -298,13 +301,13 @@ def test_one_client_too_many_is_turned_away_and_told_so() -> None:
 
 
 def test_the_limits_of_fields_hold_here_too() -> None:
-    with bridge("--field-rate-hz", "0.1") as house, ros_at(house.url) as ros:
+    with bridge("--field-rate-hz", "0.01") as house, ros_at(house.url) as ros:
         assert ros.call(FIELD, args=FIELD_ARGS)["result"] is True
         assert ros.call(FIELD, args=FIELD_ARGS)["result"] is True, "what is kept costs nothing"
         other = {**FIELD_ARGS, "resolution": 0.125}
         response = ros.call(FIELD, args=other)
         assert response["result"] is False
         assert response["values"] == (
-            "127.0.0.1 asks for more than 0.1 computed answers a second, the limit (field_rate_hz)"
+            "127.0.0.1 asks for more than 0.01 computed answers a second, the limit (field_rate_hz)"
         )
         assert house.get("/api/field", **other).status_code == 429, "of one client, together"

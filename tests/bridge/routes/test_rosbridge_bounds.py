@@ -16,13 +16,13 @@ from lupin_bridge.stream.frames import StateFrame
 from lupin_bridge.twin.source import TwinUnavailableError
 from lupin_twin.fields import FieldRequest
 from tests.support import inprocess
+from tests.support.raw_ws import deaf
 from tests.support.rosbridge import (
     FIELD,
     FIELD_ARGS,
     LARGE_CALL,
     TOPIC,
     Ros,
-    deaf,
     masked,
     ros_at,
 )
@@ -143,7 +143,7 @@ def test_who_has_not_subscribed_is_sent_nothing_and_counts_as_sent_nothing(
     async def test() -> None:
         async with inprocess.running() as here:
             hub = here.bridge.hub
-            reader, writer = await deaf(here.url)
+            reader, writer = await deaf(here.url, "/rosbridge")
             await until(lambda: len(hub) == 1, "the client")
             writer.write(masked({"op": "set_level", "level": "none"}))
             published, plain = 0, hub.publish
@@ -158,7 +158,7 @@ def test_who_has_not_subscribed_is_sent_nothing_and_counts_as_sent_nothing(
             assert (hub.frames_sent, hub.bytes_sent) == (0, 0)
             writer.write(masked({"op": "subscribe", "topic": TOPIC}))
             assert b'"op":"publish"' in await reader.read(1 << 16)
-            assert hub.frames_sent >= 1
+            await until(lambda: hub.frames_sent >= 1, "a state that counts")
             writer.transport.abort()
 
     inprocess.run(domain, test())
@@ -197,12 +197,12 @@ def test_many_messages_at_once_do_not_hold_up_the_others(
             nonlocal turns
             while True:
                 turns += 1
-                await asyncio.sleep(0)
+                await asyncio.sleep(0)  # until the next turn of the loop
 
         monkeypatch.setattr(Session, "receive", receive)
         async with inprocess.running() as here:
             other = asyncio.create_task(somebody_else())
-            _reader, writer = await deaf(here.url)
+            _reader, writer = await deaf(here.url, "/rosbridge")
             writer.write(masked({"op": "set_level", "level": "none"}) * 100)
             await until(lambda: len(at_turn) == 100, "all of them")
             assert len(set(at_turn)) == 100, "somebody else's turn came after each"
@@ -259,7 +259,7 @@ def test_a_client_that_takes_no_reply_is_closed_and_meanwhile_holds_little(
     async def test() -> None:
         async with inprocess.running(Settings(client_timeout_s=1.0)) as here:
             # A reader that is let go of would be emptied by asyncio.
-            _reader, writer = await deaf(here.url)
+            _reader, writer = await deaf(here.url, "/rosbridge")
             hub = here.bridge.hub
             await until(lambda: len(hub) == 1, "the client")
             if is_subscribed:
@@ -288,9 +288,12 @@ def test_a_client_that_takes_no_reply_is_closed_and_meanwhile_holds_little(
 def test_a_client_that_was_slow_to_take_a_reply_stays(domain: int) -> None:
     async def test() -> None:
         async with inprocess.running() as here:
-            reader, writer = await deaf(here.url)
+            reader, writer = await deaf(here.url, "/rosbridge")
             writer.write(masked(LARGE_CALL) * 3)
             await until(lambda: here.bridge.hub.blocked == 1, "a full socket")
+            # Each with a reply of its own, to the same question too.
+            unsent = here.bridge.hub.unsent
+            await until(lambda: unsent.bytes > 8_000_000, "two replies to count for all clients")
             while here.bridge.hub.blocked:
                 assert await reader.read(1 << 20), "it was closed"
             assert len(here.bridge.hub) == 1

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import re
 import secrets
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from http.cookies import Morsel, SimpleCookie
+from importlib.resources import files
 
 import httpx
 import pytest
@@ -58,6 +60,35 @@ def test_without_its_script_the_page_sends_the_token_nowhere(closed: Served) -> 
     fields = re.findall(r"<(?:input|button|select|textarea)[^>]*>", closed.get("/signin").text)
     assert fields
     assert not [field for field in fields if re.search(r"\sname=", field)]
+
+
+@pytest.mark.parametrize(
+    ("query", "accepts", "language", "says"),
+    [
+        ("", "fr,de-AT;q=0.9", "de", "Zugangscode (Token)"),
+        ("?lang=nl", "de", "nl", "Toegangscode (token)"),
+        ("", "es", "es", "Código de acceso (token)"),
+        ("?lang=xx", "de", "en", "Access token"),
+    ],
+)
+def test_the_page_speaks_the_language_of_who_asks(
+    closed: Served, query: str, accepts: str, language: str, says: str
+) -> None:
+    answer = closed.get(f"/signin{query}", {"Accept-Language": accepts})
+    assert f'<html lang="{language}">' in answer.text
+    assert f">{says}</label>" in answer.text
+    assert answer.headers["content-language"] == language
+    assert answer.headers["vary"] == "Accept-Language"
+
+
+def test_all_languages_of_the_page_say_the_same_things() -> None:
+    text = files("lupin_bridge.routes").joinpath("signin_page/words.json").read_text("utf-8")
+    english, *others = json.loads(text).values()
+    assert len(others) == 3
+    for words in others:
+        assert words.keys() == english.keys()
+        assert not {key for key in english if words[key] == english[key]}
+        assert [key for key in words if "%" in words[key]] == ["refused"]
 
 
 # --- the exchange -------------------------------------------------------------------------------
@@ -144,7 +175,13 @@ def ending_in(seconds: float) -> dict[str, str]:
 def listening(closed: Served, headers: dict[str, str], path: str) -> Iterator[ClientConnection]:
     """A WebSocket of that session."""
     url = closed.url.replace("http", "ws", 1) + path
-    with connect(url, additional_headers=headers, proxy=None, ping_interval=None) as connection:
+    with connect(
+        url,
+        additional_headers=headers,
+        proxy=None,
+        ping_interval=None,
+        open_timeout=PATIENCE_S,
+    ) as connection:
         if path == "/rosbridge":
             connection.send('{"op": "subscribe", "topic": "/twin/state"}')
         connection.recv(timeout=PATIENCE_S)

@@ -97,6 +97,8 @@ def test_who_asks_for_deltas_gets_the_state_once_and_then_what_changes(live: Bri
             changed: list[str] = []
             while tag_id not in changed:
                 delta = listener.next()
+                if delta["type"] in ("alarms", "status"):
+                    continue
                 assert (delta["type"], delta["base"]) == ("delta", last)
                 schema.DeltaFrame.model_validate(delta)
                 last = delta["seq"]

@@ -10,7 +10,10 @@ from contextlib import ExitStack, suppress
 import pytest
 
 from lupin_bridge.serving.admission import (
+    ALL_EXPORTS,
     BURST_S,
+    CLIENT_EXPORTS,
+    EXPORTS,
     IN_FLIGHT,
     LARGE,
     RATE,
@@ -23,6 +26,7 @@ from lupin_bridge.settings import Settings
 from lupin_bridge.stream import schema
 from tests.support.access import Served, served
 from tests.support.inprocess import run, running
+from tests.support.waiting import until
 
 ROUTES = ("/api/field", "/api/field.json", "/api/field.png", "/api/field.npy", "/api/field/quality")
 QUERY = "?sensor_type=co2&resolution=1&bbox_min_x=0&bbox_min_y=0&bbox_max_x=4&bbox_max_y=4"
@@ -51,6 +55,45 @@ def test_a_request_that_fails_gives_its_place_back() -> None:
     for _ in range(3):
         with pytest.raises(ZeroDivisionError), admission.request("a", 0.0), admission.computing():
             raise ZeroDivisionError
+
+
+def admitted(rate_hz: float, seconds: float) -> int:
+    """How many requests of a client get in that come evenly, by the limits as they are set."""
+    settings = Settings()
+    admission = Admission(
+        settings.field_rate_hz, settings.field_concurrency, settings.field_total_concurrency
+    )
+    count = 0
+    for number in range(round(rate_hz * seconds)):
+        with suppress(ClientLimitError), admission.request("page", number / rate_hz):
+            count += 1
+    return count
+
+
+def test_a_page_that_is_dragged_through_the_past_is_let_in_and_a_flood_is_not() -> None:
+    moments_hz, seconds = 10.0, 60.0
+    # A state, a field, and the field that is compared with it.
+    assert admitted(3 * moments_hz, seconds) == 3 * moments_hz * seconds
+    allowed = Settings().field_rate_hz * (seconds + BURST_S)
+    assert admitted(1_000.0, seconds) == pytest.approx(allowed, abs=1)
+
+
+def test_a_client_has_one_export_at_a_time_and_all_together_have_few() -> None:
+    admission = Admission(rate_hz=1000.0, concurrency=9, total_concurrency=9)
+    with ExitStack() as running_:
+        running_.enter_context(admission.export("a"))
+        with pytest.raises(ClientLimitError, match="a has 1 export under way, the limit") as more:
+            running_.enter_context(admission.export("a"))
+        assert more.value.headers == {"Retry-After": "5"}
+        for number in range(EXPORTS - 1):
+            running_.enter_context(admission.export(str(number)))
+        assert admission.exporting == EXPORTS
+        with pytest.raises(BusyError, match=f"{EXPORTS} exports are under way, the limit"):
+            running_.enter_context(admission.export("b"))
+    assert admission.exporting == 0
+    with admission.export("a"):
+        pass
+    assert admission.refused == {CLIENT_EXPORTS: 1, ALL_EXPORTS: 1}
 
 
 def test_a_client_has_its_rate_and_is_told_when_to_come_back() -> None:
@@ -139,7 +182,7 @@ def test_clients_that_are_gone_leave_nothing_behind() -> None:
 
 # --- at the routes ------------------------------------------------------------------------------
 
-RATE_HZ = 0.1
+RATE_HZ = 0.01
 BURST = max(1, math.floor(RATE_HZ * BURST_S))
 
 
@@ -162,7 +205,7 @@ def test_every_route_of_a_field_has_the_limit(slow: Served, route: str) -> None:
         refusal = schema.GetFieldResponse.model_validate_json(second.content)
         assert not refusal.ok
         assert (refusal.values, refusal.width, refusal.sample_count) == ([], 0, 0)
-        assert "for more than 0.1 computed answers a second, the limit (field_rate_hz)" in (
+        assert "for more than 0.01 computed answers a second, the limit (field_rate_hz)" in (
             refusal.error_message
         )
 
@@ -188,7 +231,8 @@ def test_every_other_answer_that_is_computed_has_it_too(slow: Served, route: str
         assert 1 <= int(answer.headers["retry-after"]) <= 1 / RATE_HZ
         detail = schema.ErrorMessage.model_validate_json(answer.content).detail
         assert detail == (
-            f"{address} asks for more than 0.1 computed answers a second, the limit (field_rate_hz)"
+            f"{address} asks for more than {RATE_HZ} computed answers a second, the limit"
+            " (field_rate_hz)"
         )
 
 
@@ -226,14 +270,20 @@ def test_with_all_places_taken_it_is_503_until_one_is_free(domain: int) -> None:
 def test_a_place_is_held_until_the_twin_has_answered_and_then_given_back(domain: int) -> None:
     """Of a twin that does not answer, no more clients wait than the limit allows."""
 
-    async def never(_work: object) -> None:
-        await asyncio.Event().wait()
-
     async def test() -> None:
-        async with running(Settings(field_concurrency=3, field_timeout_s=0.5)) as it:
+        time_is_up = asyncio.Event()
+
+        async def never(_work: object) -> None:
+            await time_is_up.wait()
+            raise TimeoutError
+
+        async with running(Settings(field_concurrency=3)) as it:
             it.twin._thread.call = never  # type: ignore[method-assign, assignment]
             fields = [f"/api/field{QUERY.replace('co2', f'{n}')}" for n in range(8)]
-            answers = await asyncio.gather(*map(it.http.get, fields))
+            asked = [asyncio.create_task(it.http.get(field)) for field in fields]
+            await until(lambda: sum(each.done() for each in asked) == 5, "the refusals")
+            time_is_up.set()
+            answers = await asyncio.gather(*asked)
             assert sorted(answer.status_code for answer in answers) == [429] * 5 + [504] * 3
             assert not it.bridge.admission._in_flight
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.serving.kept import ENTRY_BYTES, Answer, Kept
+from lupin_bridge.serving.kept import ENTRY_BYTES, MAX_NEWEST, Answer, Kept
 
 
 def answer(size: int) -> Answer:
@@ -101,3 +101,14 @@ def test_the_bound_holds_whatever_happens(steps: list[Step]) -> None:
         give_back()
     assert kept.bytes == sum(entry.bytes for entry in kept._entries.values())
     assert all(entry.readers == 0 for entry in kept._entries.values())
+
+
+def test_the_newest_etags_are_told() -> None:
+    kept = Kept()
+    for number in range(MAX_NEWEST + 1):
+        kept.put(f'"{number}"', Answer(b"", "text/plain"))
+    assert kept.newest_tags() == [f'"{number}"' for number in range(MAX_NEWEST, 0, -1)]
+    kept.put(("no", "tag"), Answer(b"", "text/plain"))
+    lent = kept.lend('"1"')
+    assert lent is not None
+    assert kept.newest_tags()[:2] == ['"1"', f'"{MAX_NEWEST}"']

@@ -21,6 +21,7 @@ from lupin_bridge.stream.frames import (
     FrameWriter,
     StateFrame,
     binary_frame,
+    binary_head,
     status_frame,
     text_frame,
 )
@@ -69,6 +70,7 @@ def test_a_frame_is_whole_and_unmasked() -> None:
         for make, opcode in ((text_frame, Opcode.TEXT), (binary_frame, Opcode.BINARY)):
             frame = received(make(b"x" * size))
             assert (frame.opcode, frame.fin, bytes(frame.data)) == (opcode, True, b"x" * size)
+        assert binary_head(size) + b"x" * size == binary_frame(b"x" * size)
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)

@@ -7,11 +7,13 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.stream.frames import CBOR, FrameWriter
+from lupin_bridge.stream.alarms_json import alarms_frame
+from lupin_bridge.stream.frames import CBOR, JSON, FrameWriter, encoded
 from lupin_bridge.stream.hub import CLOSE_POLICY, Client, Hub
 from lupin_bridge.stream.status import Reason, Status
 from lupin_twin.state import Snapshot, TagState
 from tests.bridge.stream.test_frames import content, received
+from tests.support.seen import alarm
 
 TIMEOUT_S = 30.0
 
@@ -45,6 +47,8 @@ class Socket:
 def in_short(frame: dict[str, Any]) -> Any:
     if frame["type"] == "status":
         return frame["reason"]
+    if frame["type"] == "alarms":
+        return {alarm["tag_id"] for alarm in frame["alarms"]}
     return frame["seq"] if frame["type"] == "state" else (frame["base"], frame["seq"])
 
 
@@ -69,6 +73,11 @@ class Stage:
     def announce(self, reason: Reason, now_s: float = 0.0) -> None:
         self.reason = reason
         self.hub.announce(now_s)
+
+    def alarms(self, *tag_ids: str, now_s: float = 0.0) -> None:
+        """Tell of active alarms at these tags."""
+        text = alarms_frame([alarm(tag_id) for tag_id in tag_ids], "journal", 0)
+        self.hub.tell_alarms({which: encoded(text, which) for which in (JSON, CBOR)}, now_s)
 
     def join(self, socket: Socket, now_s: float = 0.0, **asked: Any) -> Client:
         client = Client(socket, **asked)
@@ -126,6 +135,19 @@ def test_everyone_gets_every_frame_and_every_status_once(stage: Stage) -> None:
     for socket in sockets:
         assert socket.got == ["live", 1, 2, "stale"]
     assert sockets[0].wires[1] is sockets[1].wires[1], "one serialisation serves all"
+
+
+def test_who_is_told_nothing_for_a_second_is_told_the_status_again(stage: Stage) -> None:
+    often, seldom, full, rosbridge = (Socket(), Socket(), Socket(room=1), Socket())
+    stage.join(often, 10.0)
+    stage.join(seldom, 10.0, min_interval_s=5.0)
+    stage.join(full, 10.0)
+    stage.join(rosbridge, 10.0, wants_status=False)
+    for now_s in (10.9, 11.0, 11.9, 12.0, 14.9, 15.0):
+        stage.hub.remind(now_s)
+        stage.hub.serve_all(now_s)
+    assert (often.got, seldom.got) == (["live"] * 4, ["live"] * 2)
+    assert (full.got, rosbridge.got) == (["live"], [])
 
 
 def test_who_wants_no_status_or_no_state_gets_none(stage: Stage) -> None:
@@ -341,3 +363,86 @@ def test_nor_is_the_time_before_a_client_came(stage: Stage) -> None:
     for now_s in (100.5, 101.1, 101.25, 102.15, 102.25):
         stage.publish(now_s)
     assert socket.got == [1, 4, 6]
+
+
+# --- alarms -------------------------------------------------------------------------------------
+
+
+def test_alarms_go_to_everyone_at_every_change_and_whole(stage: Stage) -> None:
+    sockets = [Socket(), Socket()]
+    stage.publish()
+    for socket in sockets:
+        stage.join(socket, delta=True, wants_status=False)
+    stage.alarms("a")
+    stage.publish()
+    stage.alarms("a", "b")
+    stage.alarms()
+    for socket in sockets:
+        assert socket.got == [1, {"a"}, (1, 2), {"a", "b"}, set()]
+    assert sockets[0].wires[1] is sockets[1].wires[1], "one serialisation serves all"
+
+
+def test_who_joins_gets_the_alarms_behind_the_first_state_and_not_before(stage: Stage) -> None:
+    early, late = Socket(), Socket()
+    stage.announce("live")
+    stage.alarms("a")
+    stage.join(early)
+    assert early.got == ["live"]
+    stage.publish()
+    assert early.got == ["live", 1, {"a"}]
+    stage.alarms("b")
+    stage.join(late, 1.0)
+    assert late.got == ["live", 1, {"b"}]
+
+
+def test_a_blocked_client_gets_only_the_newest_alarms(stage: Stage) -> None:
+    socket = Socket()
+    stage.publish()
+    client = stage.join(socket, wants_status=False)
+    socket.room = 0
+    stage.alarms("a")
+    stage.publish(1.0)
+    stage.alarms("b")
+    stage.alarms("c")
+    assert client.blocked_since_s is not None
+    socket.room = 1
+    stage.hub.serve(client, 2.0)
+    assert socket.got == [1, 2], "room for the state alone"
+    socket.room = 9
+    stage.hub.serve(client, 2.0)
+    stage.hub.serve(client, 2.0)
+    assert socket.got == [1, 2, {"c"}]
+    assert client.blocked_since_s is None
+
+
+def test_a_rate_for_states_does_not_hold_up_alarms(stage: Stage) -> None:
+    socket = Socket()
+    stage.publish()
+    stage.join(socket, min_interval_s=100.0, wants_status=False)
+    stage.publish(1.0)
+    stage.alarms("a", now_s=1.0)
+    assert socket.got == [1, {"a"}]
+
+
+def test_alarms_are_told_in_cbor_to_who_asked(stage: Stage) -> None:
+    socket = Socket()
+    stage.publish()
+    stage.join(socket, encoding=CBOR, wants_status=False)
+    stage.alarms("a")
+    frame = content(socket.wires[1], CBOR)
+    assert in_short(frame) == {"a"}
+    assert json.loads(json.dumps(frame)) == json.loads(alarms_frame([alarm("a")], "journal", 0))
+
+
+def test_who_does_not_want_alarms_gets_none_and_is_not_taken_for_stuck(stage: Stage) -> None:
+    socket = Socket()
+    stage.publish()
+    client = stage.join(socket, wants_alarms=False, wants_status=False)
+    stage.alarms("a")
+    socket.room = 0
+    stage.alarms("b")
+    stage.publish(1.0)
+    assert socket.got == [1]
+    socket.room = 9
+    stage.hub.serve(client, 2.0)
+    assert socket.got == [1, 2]

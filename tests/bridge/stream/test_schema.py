@@ -123,7 +123,7 @@ def live() -> Iterator[Bridge]:
         ("/api/field?sensor_type=temperature", schema.GetFieldResponse),
         ("/api/field.json?sensor_type=nobody", schema.GetFieldResponse),
         ("/healthz", schema.Health),
-        ("/readyz", schema.Readiness),
+        ("/readyz", schema.StatusFrame),
     ],
 )
 def test_what_a_live_bridge_answers_is_of_the_contracts_type(

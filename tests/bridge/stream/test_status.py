@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
 
 from lupin_bridge.bridge import WATCH_PERIOD_S
 from lupin_bridge.stream import schema
-from lupin_bridge.stream.status import STALE_AFTER_S, Liveness, Reason, Status
+from lupin_bridge.stream.status import STALE_AFTER_S, Liveness, Outward, Reason, Status
 from lupin_twin.counts import Recent
+from lupin_twin.journal.condition import Condition, JournalState
 from lupin_twin.state import ClockState
 
 
@@ -82,6 +83,9 @@ def test_what_is_news_for_clients_and_what_for_people() -> None:
     for more in (Status("stale", 3.0), Status("live", 0.1, twin_count=2)):
         assert more.is_news_after(live)
         assert more.says_more_than(live)
+    recorded = Liveness(last_state_s=0.0, origin="recorded").status(0.1)
+    assert recorded.is_news_after(live)
+    assert schema.StatusFrame.model_validate(recorded.frame()).origin == "recorded"
     mapped = Status("live", 0.1, has_map=True)
     assert mapped.is_news_after(live)
     assert not mapped.says_more_than(live)
@@ -115,3 +119,42 @@ def test_what_was_dropped_is_news_when_it_grows_much_and_when_it_is_long_ago() -
     assert not status(1).says_more_than(Status("live", 0.1))
     [drop] = schema.StatusFrame.model_validate(status(5).frame()).drops
     assert (drop.reason, drop.message, drop.count) == ("frame", "dropped a message", 5)
+
+
+def test_how_a_channel_does_is_told_when_that_changes() -> None:
+    def status(is_failing: bool, detail: str = "") -> Status:
+        return Status("live", 0.1, outward=(Outward("mqtt", is_failing, detail),))
+
+    failing, well = status(True, "refused"), status(False)
+    assert failing.is_news_after(well)
+    assert status(True, "no answer").is_news_after(failing)
+    assert well.is_news_after(failing)
+    assert not status(True, "refused").is_news_after(failing)
+    assert not failing.says_more_than(well), "the channel has logged it"
+    (told,) = schema.StatusFrame.model_validate(failing.frame()).outward
+    assert (told.channel, told.is_failing, told.detail) == ("mqtt", True, "refused")
+    liveness = Liveness(last_state_s=0.0, outward=(Outward("webhook", False, ""),))
+    assert liveness.status(0.0).outward[0].channel == "webhook"
+
+
+def test_how_the_journal_does_is_told_when_that_changes() -> None:
+    def status(state: JournalState, detail: str = "", **more: Any) -> Status:
+        return Status("live", 0.1, journal=Condition(state, detail, **more))
+
+    failing = status(JournalState.FAILING, "no room")
+    assert failing.is_news_after(Status("live", 0.1))
+    assert not failing.says_more_than(Status("live", 0.1)), "the twin has logged it"
+    assert status(JournalState.FAILING, "read-only").is_news_after(failing)
+    recording = status(JournalState.RECORDING, written=1)
+    assert recording.is_news_after(failing)
+    assert not status(JournalState.RECORDING, written=2, waiting=3).is_news_after(recording)
+    assert status(JournalState.RECORDING, set_aside="/old").is_news_after(recording)
+    # How far behind it is changes every second.
+    slow = status(JournalState.SLOW, "2 s behind")
+    assert not status(JournalState.SLOW, "3 s behind").is_news_after(slow)
+    told = schema.StatusFrame.model_validate(slow.frame()).journal
+    assert (told.state, told.detail, told.simulated) == ("slow", "2 s behind", None)
+    filled = status(JournalState.RECORDING, simulated_ns=(1_000_000_002, 3_000_000_000))
+    stretch = schema.StatusFrame.model_validate(filled.frame()).journal.simulated
+    assert stretch is not None
+    assert (stretch.start.sec, stretch.start.nanosec, stretch.end.sec) == (1, 2, 3)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rclpy.parameter import Parameter
 
 from lupin_bridge.twin.local_twin import LocalTwin
 from lupin_bridge.twin.source import Told, TwinTimeoutError
@@ -309,6 +310,11 @@ def test_parameters_come_from_the_ros_arguments(domain: int, stage_of: Callable[
             assert (rules.max_grid_cells, rules.max_distance_m) == (9, 0.75)
             assert stage.twin.names().state_topic == "/north/state"
             assert stage.twin.names().field_service == "/twin/get_field"
+            revision = stage.twin.revision()
+            wanted = [Parameter("idw_max_distance_m", value=0.25)]
+            await stage.twin._thread.call(lambda node: node.set_parameters(wanted))
+            await until(lambda: stage.twin.rules().max_distance_m == 0.25, "the new rules")
+            assert stage.twin.revision() != revision
 
     run(domain, test())
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine
-from typing import Any
 
 import pytest
 
 from lupin_bridge.twin.shared import Shared
+from tests.support.waiting import until
 
 
 class Work:
@@ -32,12 +31,10 @@ class Work:
         return number
 
 
-async def waiting(
-    shared: Shared[int], work: Callable[[], Coroutine[Any, Any, int]], *keys: str
-) -> list[asyncio.Task[int]]:
+async def waiting(shared: Shared[int], work: Work, *keys: str) -> list[asyncio.Task[int]]:
     tasks = [asyncio.create_task(shared.get(key, work)) for key in keys]
-    await asyncio.sleep(0)  # all have asked
-    await asyncio.sleep(0)  # and the work has begun
+    # Work begins a turn of the loop after it was asked for: by then all have asked.
+    await until(lambda: work.started == len(set(keys)), "the work")
     return tasks
 
 
@@ -63,8 +60,8 @@ def test_it_lives_while_anyone_waits_and_ends_with_the_last() -> None:
         assert (first.cancelled(), work.cancelled) == (True, 0)
         second.cancel()
         await asyncio.wait([second])
-        await asyncio.sleep(0)
-        assert (work.cancelled, len(shared)) == (1, 0)
+        await until(lambda: work.cancelled == 1, "the end of the work")
+        assert len(shared) == 0
 
     asyncio.run(test())
 

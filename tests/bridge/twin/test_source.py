@@ -6,12 +6,14 @@ import inspect
 import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from lupin_bridge.twin.local_twin import LocalTwin
+from lupin_bridge.twin.looking import Itself
 from lupin_bridge.twin.source import (
     STUCK_AFTER_S,
     Told,
@@ -21,12 +23,17 @@ from lupin_bridge.twin.source import (
     ailment,
 )
 from lupin_bridge.twin.web_twin import WebTwin
+from lupin_twin.estimate_report import ReportRequest
+from lupin_twin.estimates import EstimateRequest
 from lupin_twin.fields import FieldRefused, FieldRequest
+from lupin_twin.past import NotRemembered, PastRefused, SeriesRequest
+from lupin_twin.state import Reading
 from tests.support.inprocess import run
 from tests.support.messages import discovered, occupancy_grid, pose, scan
 from tests.support.processes import OFTEN, twin_node
 from tests.support.ros import Peer
-from tests.support.waiting import until
+from tests.support.store import S
+from tests.support.waiting import until, until_answered
 
 SOURCES = [LocalTwin, WebTwin]
 MEMBERS = [name for name in vars(TwinSource) if not name.startswith("_")]
@@ -78,9 +85,9 @@ class Stage:
 
 
 @asynccontextmanager
-async def stage_of(source_type: type, domain: int) -> AsyncIterator[Stage]:
+async def stage_of(source_type: type, domain: int, *ros_args: str) -> AsyncIterator[Stage]:
     """A started source; for `WebTwin`, with a twin in a process of its own."""
-    arguments = (*OFTEN, "-p", "max_grid_cells:=1000")
+    arguments = (*OFTEN, "-p", "max_grid_cells:=1000", *ros_args)
     with Peer(domain) as peer:
         if source_type is WebTwin:
             with twin_node(domain, *arguments):
@@ -109,7 +116,7 @@ def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
     async def test() -> None:
         async with stage_of(source_type, domain) as stage:
             source, peer = stage.source, stage.peer
-            alive = [source.is_alive]
+            assert source.is_alive
             assert source.occupancy_map() is None
             revisions = []
 
@@ -133,7 +140,10 @@ def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
             revisions.append(stage.told[-1].revision)
             assert len(set(revisions)) == 3
 
-            history = await source.history("1")
+            # A state's times may come behind it.
+            history = await until_answered(
+                lambda: source.history("1"), "the scan", lambda it: it is not None and it.scans
+            )
             assert history is not None
             assert [(scan.stamp_ns, scan.readings[0].value) for scan in history.scans] == [
                 (5_000_000_000, 400.0)
@@ -145,8 +155,8 @@ def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
             assert (source.callback_errors, source.calls_waiting) == (0, 0)
             with pytest.raises(FieldRefused, match="sensor_type is empty"):
                 await source.field(FieldRequest("", 0.5, 0.0, 0.0, 1.0, 1.0))
-        alive.append(source.is_alive)
-        assert alive == [True, False]
+        # A thread that has not ended in time is left behind, and ends for itself.
+        await until(lambda: not source.is_alive, "its end")
         assert stage.deaths == []
         with pytest.raises(TwinUnavailableError):
             await source.field(REQUEST)
@@ -175,3 +185,96 @@ def test_a_thread_that_only_a_restart_helps_is_told(
     is_alive: bool, stuck_s: float, said: str | None
 ) -> None:
     assert ailment(Thread(is_alive, stuck_s)) == said  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("source_type", SOURCES)
+def test_a_source_tells_of_the_past(domain: int, source_type: type) -> None:
+    async def test() -> None:
+        async with stage_of(source_type, domain) as stage:
+            source = stage.source
+            stage.peer.observe(
+                scan("1", {"co2": 400.0}, stamp_s=5.0, at=(0.5, 2.5)),
+                scan("1", {"co2": 500.0, "light": 9.0}, stamp_s=50.0),
+                scan("1", status=2, stamp_s=60.0),
+            )
+            co2 = SeriesRequest("1", "co2")
+            await stage.tag("1")
+
+            # The last of them is kept.
+            failures = SeriesRequest("*", "~failures", 1, 100 * S)
+            failed = await until_answered(
+                lambda: source.series(failures), "the failure", lambda it: it.stamps_ns
+            )
+            past = await source.series(co2)
+            assert (past.means, past.start_ns) == ((400.0, 500.0), 5 * S)
+            await until(lambda: stage.told[-1].snapshot.stamp_ns >= past.end_ns - 1, "time to pass")
+            assert (failed.stamps_ns, failed.means, failed.bucket_ns) == ((60 * S,), (2.0,), None)
+            counted = await source.series(replace(co2, start_ns=5 * S, end_ns=65 * S, max_points=1))
+            assert (counted.counts, counted.bucket_ns) == ((2,), 60 * S)
+
+            then = await source.ask(Itself(49 * S), 0.0)
+            assert (then.stamp_ns, then.frame_id, then.has_times) == (49 * S, "map", True)
+            [tag] = [tag for tag in then.tags if tag.readings]
+            assert tag.readings == (Reading("co2", 400.0, 5 * S),)
+            assert tag.stale_seconds(then.now_ns) == 44.0
+            with pytest.raises(PastRefused, match="later than now"):
+                await source.ask(Itself(2**31 * S - 1), 0.0)
+
+            box = FieldRequest("co2", 0.5, 0.0, 0.0, 3.0, 1.0)
+            result = await source.estimate(EstimateRequest(box, 55 * S))
+            assert (result.estimate.sample_count, result.estimate.reading_count) == (1, 2)
+            assert result.estimate.grid.mean.shape == (2, 6)
+            assert source.estimate_revision(EstimateRequest(box, 55 * S)) == result.revision
+            assert source.estimate_revision(EstimateRequest(box, 54 * S)) is None
+            with pytest.raises(FieldRefused, match="no tag has a reading"):
+                await source.estimate(EstimateRequest(box))
+
+            report = await source.estimate_report(ReportRequest("co2"))
+            assert (report.fitted_at_ns, report.tags, report.record.since_ns) == (None, (), None)
+
+            rows = [row async for lot in source.rows(1, 100 * S, None, None, list) for row in lot]
+            assert [(row.stamp_ns, row.sensor, row.status) for row in rows] == [
+                (5 * S, "co2", 0),
+                (50 * S, "co2", 0),
+                (50 * S, "light", 0),
+                (60 * S, "", 2),
+            ]
+            assert {(row.tag_id, row.x, row.y) for row in rows} == {("1", 0.5, 2.5)}
+            assert {row.source for row in rows} == {"" if source_type is WebTwin else "test"}
+
+    run(domain, test())
+
+
+@pytest.mark.parametrize("source_type", SOURCES)
+def test_without_a_journal_the_last_scans_can_be_asked_for_and_nothing_else(
+    domain: int, source_type: type
+) -> None:
+    async def test() -> None:
+        async with stage_of(source_type, domain, "-p", "journal:=off") as stage:
+            source = stage.source
+            stage.peer.observe(
+                scan("1", {"co2": 400.0}, stamp_s=5.0), scan("1", status=2, stamp_s=60.0)
+            )
+            await until(
+                lambda: any(
+                    tag.last_try is not None and tag.last_try.status
+                    for told in stage.told[-1:]
+                    for tag in told.snapshot.tags
+                ),
+                "both",
+            )
+            past = await source.series(SeriesRequest("1", "co2"))
+            assert (past.stamps_ns, past.means) == ((5 * S,), (400.0,))
+            scans = await source.series(SeriesRequest("*", "~scans", 1, 100 * S))
+            assert scans.stamps_ns == (5 * S,)
+            for question in (
+                source.estimate(EstimateRequest(REQUEST, 5 * S)),
+                source.ask(Itself(5 * S), 0.0),
+                source.series(SeriesRequest("*", "~runs")),
+                anext(source.rows(1, 100 * S, None, None, list)),
+            ):
+                with pytest.raises(NotRemembered, match="parameter journal") as refused:
+                    await question
+                assert refused.value.is_lasting
+
+    run(domain, test())

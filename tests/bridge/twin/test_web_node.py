@@ -12,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from lupin_msgs.msg import SensorReading, TwinState, TwinTagState, TwinTimes
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 
 from lupin_bridge.twin import ros_logs
@@ -72,8 +73,10 @@ class Stage:
         times = deserialize_message(convert.TimesMessages().build(snapshot), TwinTimes)
         peer.publish("/twin/times", times, depth=1)
         peer.publish("/twin/state", convert.StateMessages().build(snapshot), depth=1)
-        self.until(lambda: self.told and self.told[-1].has_times, "times")
-        return self.told_of(self.stamp_s * S)
+        told = self.told_of(self.stamp_s * S)
+        if not told.has_times:  # it came before its own
+            self.until(lambda: self.told[-1].has_times, "its times")
+        return self.told[-1]
 
     def told_of(self, stamp_ns: int) -> Snapshot:
         """The snapshot of that stamp."""
@@ -343,10 +346,13 @@ def test_only_the_twin_that_is_followed_is_heard_on_diagnostics(stage: Stage, pe
     publish = peer.node.create_publisher(DiagnosticArray, "/diagnostics", 10).publish
 
     stage.take(peer, tag("1"))
+    assert stage.node.journal.state == "unknown"
     assert stage.node.twin_counts is None, "a twin that says nothing has not dropped nothing"
     # Another greenhouse's is in the same message, before it and behind it, and in one of its own.
     theirs = diagnostics([Finding("drops", 0, "", {"kind": "100"})], "/gh2/peer", 0)
-    ours = diagnostics([drops], "/peer", 0)
+    journal = Finding("journal", 2, "no room", {"state": "failing"})
+    origin = Finding("origin", 0, "", {"origin": "simulated"})
+    ours = diagnostics([drops, journal, origin], "/peer", 0)
     ours.status = [*theirs.status, *ours.status, *theirs.status]
 
     def heard() -> Counts | None:
@@ -358,6 +364,8 @@ def test_only_the_twin_that_is_followed_is_heard_on_diagnostics(stage: Stage, pe
     counts = stage.until(heard, "what the twin says")
     assert counts == Counts({"frame": 7}, 0, (Recent("frame", "odom", 2),))
     assert stage.node.habits.counts().dropped == {}
+    assert (stage.node.journal.state, stage.node.journal.detail) == ("failing", "no room")
+    assert stage.node.origin == "simulated"
 
 
 # --- the rest -----------------------------------------------------------------------------------
@@ -426,3 +434,12 @@ def test_parameters_are_read_as_the_twin_reads_them(domain: int) -> None:
     with stage_in(domain, "--ros-args", "-p", "idw_power:=3") as stage:
         assert stage.node.rules.idw_power == 3.0
         assert isinstance(stage.node.rules.idw_power, float)
+
+
+def test_its_own_rules_may_be_changed_as_the_twins(stage: Stage) -> None:
+    revision, epoch = stage.node.revision, stage.node.epoch
+    assert stage.node.set_parameters([Parameter("idw_max_distance_m", value=4.0)])[0].successful
+    assert stage.node.rules.max_distance_m == 4.0
+    assert (stage.node.revision != revision, stage.node.epoch) == (True, epoch + 1)
+    [result] = stage.node.set_parameters([Parameter("map_topic", value="other")])
+    assert "cannot become 'other' while the twin runs" in result.reason

@@ -17,9 +17,11 @@ import pytest
 from lupin_msgs.msg import SensorReading, TwinState, TwinTagState
 from lupin_msgs.srv import GetField
 
-from lupin_bridge.twin import web_node, web_twin
+from lupin_bridge.twin import trust, web_node
 from lupin_bridge.twin.source import Told, TwinTimeoutError, TwinUnavailableError
-from lupin_bridge.twin.web_twin import MAX_REQUESTS, TRUST_S, WebTwin
+from lupin_bridge.twin.trust import TRUST_S
+from lupin_bridge.twin.web_node import Service as Asked
+from lupin_bridge.twin.web_twin import MAX_REQUESTS, WebTwin
 from lupin_twin.fields import FieldRefused, FieldRequest
 from tests.support.inprocess import run
 from tests.support.live import attached, wait_until_ready
@@ -30,6 +32,7 @@ from tests.support.waiting import PATIENCE_S, until, wait_for
 
 # A state every 3 s.
 SLOW = ("--ros-args", "-p", "state_publish_rate_hz:=0.33")
+SAYS = {"refused": "not that one", "busy": "32 fields are being computed: ask again later"}
 REQUEST = FieldRequest("co2", 0.5, 0.0, 0.0, 1.0, 0.5)
 
 
@@ -43,8 +46,8 @@ class Service:
 
     def _answer(self, request: Any, response: Any) -> Any:
         self.asked.append(request)
-        if request.sensor_type == "refused":
-            response.error_message = "not that one"
+        if request.sensor_type in SAYS:
+            response.error_message = SAYS[request.sensor_type]
             return response
         response.ok = True
         response.width, response.height, response.sample_count = 2, 1, 1
@@ -88,13 +91,13 @@ async def started(timeout_s: float = 20.0) -> AsyncIterator[tuple[WebTwin, list[
 
 async def found(twin: WebTwin) -> None:
     """Wait until the service is there to be asked."""
-    client = await twin._thread.call(lambda node: node.field_client)
+    client = await twin._thread.call(lambda node: node.clients_of_twin[Asked.FIELD])
     await until(client.service_is_ready, "the service")
 
 
 def pending(twin: WebTwin) -> int:
     """Requests that the ROS client still keeps."""
-    return len(twin._thread._require_node().field_client._pending_requests)
+    return len(twin._thread._require_node().clients_of_twin[Asked.FIELD]._pending_requests)
 
 
 def test_without_a_twin_a_field_is_refused_at_once_by_the_services_name(domain: int) -> None:
@@ -154,7 +157,10 @@ def test_a_field_and_a_refusal_are_the_services(domain: int) -> None:
                 assert (result.grid.width, result.grid.height) == (2, 1)
                 assert service.asked[0].bbox_max_x == 1.0
                 with pytest.raises(FieldRefused, match="not that one"):
-                    await twin.field(FieldRequest("refused", 0.5, 0.0, 0.0, 1.0, 1.0))
+                    await twin.field(replace(REQUEST, sensor_type="refused"))
+                # Nobody's mistake, and it passes.
+                with pytest.raises(TwinUnavailableError, match="32 fields are being computed"):
+                    await twin.field(replace(REQUEST, sensor_type="busy"))
 
     run(domain, test())
 
@@ -270,7 +276,7 @@ def test_an_answer_that_came_after_a_change_stands_for_nothing(domain: int) -> N
 def test_so_many_answers_stand_and_the_oldest_goes_first(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(web_twin, "MAX_TRUSTED", 2)
+    monkeypatch.setattr(trust, "MAX_TRUSTED", 2)
 
     async def test() -> None:
         with service_in(domain) as service:

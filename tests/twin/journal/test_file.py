@@ -2,12 +2,16 @@ from __future__ import annotations
 
 import os
 import sqlite3
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from lupin_twin.journal import file as file_module
+from lupin_twin.journal import rollups
 from lupin_twin.journal.file import JournalFile
+from lupin_twin.journal.packing import unpack_buckets
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rollups import get_meta
 from lupin_twin.journal.runs import Carries, Clock
@@ -74,6 +78,26 @@ def test_a_file_that_is_removed_or_replaced_is_noticed(
         path.rename(path.with_name("moved"))
         with pytest.raises(FileNotFoundError, match="removed or replaced"):
             file.look_after()
+
+
+def test_of_what_waits_to_be_folded_so_much_is_held_in_memory_and_all_of_it_is_folded(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept(path, [scan(at_ns=NOW + n * 600 * SECOND, t=1.0) for n in range(600)])
+    monkeypatch.setattr(file_module, "_FOLD_ROWS", 100)
+    monkeypatch.setattr(rollups, "_ROWS_READ", 30)
+    most = 0
+    with opened(path) as file:
+        while file.look_after():
+            folding = file._folding
+            most = max(most, 0 if folding is None else len(folding._hours))
+        assert get_meta(file._connection, "rolled_id") == 600
+        # A hundred rows, six an hour.
+        assert 15 <= most <= 18
+        assert not file.look_after()
+    with opened(path) as file:
+        rolled = file._connection.execute("SELECT buckets FROM rollup").fetchall()
+    assert sum(unpack_buckets(packed, 1)[0].n for (packed,) in rolled) == 600
 
 
 def test_upkeep_folds_purges_shrinks_and_checkpoints(
@@ -146,6 +170,42 @@ def test_a_damaged_file_is_set_aside_and_read_as_far_as_it_goes(
     assert aside.name.startswith("j.sqlite.damaged-20")
     assert aside.read_bytes() == damaged
     assert is_whole(path)
+
+
+@pytest.mark.parametrize(
+    ("flipped", "lost"),
+    [
+        ("UPDATE sensors SET names = '[\"temperature\"}' WHERE names LIKE '%co2%'", "co2"),
+        ("UPDATE sensors SET names = '5' WHERE names LIKE '%co2%'", "co2"),
+        ("UPDATE sensors SET names = '[[1]]' WHERE names LIKE '%co2%'", "co2"),
+        ("UPDATE tag SET tag_id = CAST(x'b7' AS TEXT) WHERE tag_id = 'lily'", "lily"),
+        ("UPDATE name SET text = CAST(x'f27f' AS TEXT) WHERE text = 'other'", "other"),
+        ("UPDATE run SET carries = 7", ""),
+    ],
+)
+def test_a_flipped_byte_in_a_text_costs_what_it_names_and_nothing_else(
+    path: Path, flipped: str, lost: str
+) -> None:
+    """No check of SQLite's sees it; until it is set aside, nothing could be restored or written."""
+    rows = [
+        scan("1", temperature=1.0),
+        scan("1", co2=400.0),
+        scan("lily", temperature=2.0),
+        scan("1", NOW + 1, source="other", temperature=3.0),
+    ]
+    kept(path, rows)
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute(flipped)
+        connection.commit()
+    with opened(path) as file:
+        found = set(file.restore(file.first_run(CLOCK), 1).rows)
+        assert bool(file.set_aside) is bool(lost)
+        assert file.append([(file.first_run(CLOCK), scan("1", NOW + 2, co2=500.0))]) == (1, 0)
+    assert found == {row for row in rows if not lost or lost not in repr(row)}
+    # What was lost is not found damaged at every start again.
+    with opened(path) as file:
+        assert file.restore(file.first_run(CLOCK), 1).damaged == 0
+        assert not file.set_aside
 
 
 def test_salvage_that_takes_long_goes_on_in_steps_and_after_a_restart(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.journal.lock import InUse, Lock
+from lupin_twin.journal.lock import InUse, Lock, holder_of
 
 
 def test_a_second_holder_is_refused_by_name(tmp_path: Path) -> None:
@@ -21,3 +21,12 @@ def test_what_is_let_go_of_can_be_held(tmp_path: Path) -> None:
     for _ in range(2):
         with Lock(tmp_path / "j.sqlite", "a twin"):
             pass
+
+
+def test_who_holds_it_can_be_asked_without_holding_it(tmp_path: Path) -> None:
+    journal = tmp_path / "j.sqlite"
+    assert holder_of(journal) is None
+    assert list(tmp_path.iterdir()) == []
+    with Lock(journal, "/lupin_twin"):
+        assert holder_of(journal) == f"/lupin_twin (process {os.getpid()})"
+    assert holder_of(journal) is None

@@ -6,11 +6,14 @@ from pathlib import Path
 
 import pytest
 
+from lupin_twin.journal.asof import state_at
 from lupin_twin.journal.file import JournalFile
+from lupin_twin.journal.reading import ending
 from lupin_twin.journal.restoring import restore
 from lupin_twin.journal.rows import Row, ScanRow
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader, transaction
+from lupin_twin.journal.spans import MAX_RUNS
 from tests.support.journal import CLOCK, NOW, SECOND, kept, known, look, opened, pin, restored, scan
 
 
@@ -92,6 +95,46 @@ def test_what_the_twin_lived_through_is_held_to_the_next_runs_beginning(path: Pa
         rows = file.restore(third, 1).rows
     begun = 50 * SECOND
     assert rows == (early, replace(late, stamp_ns=begun), replace(later, stamp_ns=begun))
+
+
+def test_what_was_the_newest_as_the_clock_went_back_twice_stays_so(path: Path) -> None:
+    with opened(path) as file:
+        first = file.first_run(sim(0, 0))
+        second = file.next_run(first, sim(50, 900))
+        third = file.next_run(second, sim(30, 1000))
+        newer, late = sim_scan("1", 100), sim_scan("1", 40)
+        file.append([(first, newer), (second, late)])
+        rows = file.restore(third, 1).rows
+        (tag,) = state_at(file._connection, 35 * SECOND, "map").tags
+    # The second was none when it came, though both are of one moment by now.
+    begun = 30 * SECOND
+    assert rows == (replace(late, stamp_ns=begun), replace(newer, stamp_ns=begun))
+    assert [reading.observed_at_ns for reading in tag.readings] == [begun]
+
+
+def test_thousands_of_runs_behind_cost_a_little_and_places_are_known_through_them(
+    path: Path,
+) -> None:
+    count = 2_000
+    kept(path, [pin(), scan("1"), scan("2")])
+    with opened(path) as file:
+        begun_ns = [NOW + n % 7 * SECOND for n in range(2, count + 2)]
+        with transaction(file._connection):
+            file._connection.executemany(
+                "INSERT INTO run VALUES (?, 0, ?, ?, 0, ?, 2, NULL)",
+                [(n, at, at + n, n - 1) for n, at in enumerate(begun_ns, 2)],
+            )
+        now = ending(file._connection, is_simulated=False)
+        assert now is not None
+        assert now.run.id == count + 1
+        asked: list[str] = []
+        file._connection.set_trace_callback(asked.append)
+        assert file.restore(now.run, 2).rows == (replace(pin(), stamp_ns=min(begun_ns)),)
+        assert len(asked) < 10 * MAX_RUNS
+        asked.clear()
+        (tag,) = state_at(file._connection, NOW + 60 * SECOND, "map").tags
+        assert (tag.tag_id, tag.pose) == ("7", pin().pose)
+        assert len(asked) < 20 * MAX_RUNS
 
 
 def test_a_run_that_a_damaged_file_has_follow_itself_ends(path: Path) -> None:

@@ -6,16 +6,19 @@ from pathlib import Path
 
 import pytest
 
+from lupin_twin.journal.reading import runs
 from lupin_twin.journal.retention import (
     ROLLUP_DAYS,
     Limits,
     purge_rollups_step,
     purge_step,
+    purged_ns,
     shrink_step,
     used_bytes,
 )
-from lupin_twin.journal.rollups import HOUR_NS, set_meta
+from lupin_twin.journal.rollups import set_meta
 from lupin_twin.journal.schema import open_reader, open_writer, transaction
+from lupin_twin.past import HOUR_NS, SLOT_NS
 from tests.support.journal import NOW, SECOND, kept, look, pin, restored, scan
 
 DAY = 24 * HOUR_NS
@@ -34,7 +37,7 @@ def path(tmp_path: Path) -> Path:
 @pytest.fixture
 def file(path: Path) -> Iterator[sqlite3.Connection]:
     connection = open_writer(path)
-    set_meta(connection, rolled_id=ROWS + 2)
+    set_meta(connection, rolled_id=ROWS + 2, tallied_id=ROWS + 2)
     yield connection
     connection.close()
 
@@ -68,7 +71,7 @@ def test_what_is_past_its_age_goes_and_nothing_else(file: sqlite3.Connection) ->
 def test_what_is_too_large_loses_its_oldest(file: sqlite3.Connection) -> None:
     limit = used_bytes(file) * 2 // 3
     steps = purge(file, Limits(ENOUGH, limit), NOW)
-    assert 0.9 * limit < used_bytes(file) <= limit
+    assert 0.8 * limit < used_bytes(file) <= limit
     assert steps > 1
     left = scans(file)
     assert left == [NOW + n * 60 * SECOND for n in range(ROWS - len(left), ROWS)]
@@ -78,8 +81,9 @@ def test_within_its_limits_nothing_goes(file: sqlite3.Connection) -> None:
     assert purge(file, Limits(1.0, used_bytes(file)), NOW + DAY) == 0
 
 
-def test_what_is_in_no_rollup_yet_stays(file: sqlite3.Connection) -> None:
-    set_meta(file, rolled_id=500)
+@pytest.mark.parametrize("counted", ["rolled_id", "tallied_id"])
+def test_what_is_in_no_rollup_or_tally_yet_stays(file: sqlite3.Connection, counted: str) -> None:
+    set_meta(file, **{counted: 500})
     purge(file, Limits(0.0, 0), NOW + 99 * DAY)
     assert scans(file)[0] == NOW + 498 * 60 * SECOND
 
@@ -126,6 +130,32 @@ def test_rollups_are_kept_for_ten_years(file: sqlite3.Connection) -> None:
     assert file.execute("SELECT count(*) FROM rollup").fetchone() == (2,)
     purge_rollups_step(file, (hour + 1 + ROLLUP_DAYS * 24) * HOUR_NS, 0)
     assert file.execute("SELECT hour FROM rollup").fetchall() == [(hour + 1,)]
+
+
+def test_tallies_and_changes_are_kept_for_ten_years(file: sqlite3.Connection) -> None:
+    for table, unit_ns in (("tally", SLOT_NS), ("tally_hour", HOUR_NS)):
+        for slot in (NOW // unit_ns, NOW // unit_ns + 1):
+            file.execute(
+                f"INSERT INTO {table} (run, slot, first_ns, last_ns, gap_ns)"
+                " VALUES (1, ?, 0, 0, 0)",
+                (slot,),
+            )
+    file.execute("INSERT INTO change VALUES (1, 1, 1, ?, 1, 1)", (NOW,))
+    purge_rollups_step(file, NOW + ROLLUP_DAYS * DAY, 0)
+    assert [count(file, table) for table in ("tally", "tally_hour", "change")] == [2, 2, 1]
+    purge_rollups_step(file, NOW + ROLLUP_DAYS * DAY + HOUR_NS, 0)
+    assert [count(file, table) for table in ("tally", "tally_hour", "change")] == [0, 1, 0]
+
+
+def count(file: sqlite3.Connection, table: str) -> int:
+    return int(file.execute(f"SELECT count(*) FROM {table}").fetchone()[0])
+
+
+def test_where_scans_were_given_up_is_known(file: sqlite3.Connection) -> None:
+    run = runs(file)[1]
+    assert purged_ns(file, run) == -1
+    purge(file, Limits(1.0, ENOUGH), NOW + DAY + 10 * 60 * SECOND)
+    assert purged_ns(file, run) == scans(file)[0] - 60 * SECOND
 
 
 def test_rollups_of_many_series_go_in_steps(

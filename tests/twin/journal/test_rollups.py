@@ -4,12 +4,13 @@ import math
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lupin_twin.journal.packing import Bucket, unpack_buckets
-from lupin_twin.journal.rollups import HOUR_NS, Folding, get_meta, set_meta, unfolded_from
+from lupin_twin.journal.rollups import Folded, Folding, get_meta, set_meta
 from lupin_twin.journal.schema import open_writer, transaction
+from lupin_twin.past import HOUR_NS
 from tests.support.journal import CLOCK, NOW, kept, opened, scan, select
 
 HOUR = NOW // HOUR_NS
@@ -70,17 +71,28 @@ def test_each_reading_is_counted_once_however_often_folding_is_cut_short(
         if fold(path, 50, 8 + lives):
             break
         kept(path, [scan("new", NOW + 99, temperature=7.0)])
-    assert unfolded_from_file(path) == 50
+    assert folded_to(path, 1) == 50
     found = buckets(path)
     assert sum(bucket.n for (bucket,) in found.values()) == 50
     assert [bucket.high for (bucket,) in found.values()] == [40.0 + n for n in range(10)]
 
 
-def unfolded_from_file(path: Path) -> int:
+def folded_to(path: Path, series: int) -> int:
     connection = open_writer(path)
-    number = unfolded_from(connection)
+    number = Folded(connection).up_to(series)
     connection.close()
     return number
+
+
+def test_while_it_folds_it_says_of_each_series_how_far_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lupin_twin.journal.rollups._ROWS_WRITTEN", 1)
+    path = tmp_path / "j.sqlite"
+    kept(path, [scan(tag, NOW) for tag in "123"])
+    assert not fold(path, 3, 3)  # read, and two of three series written
+    assert [folded_to(path, series) for series in (1, 2, 3)] == [3, 3, 0]
+    assert len(buckets(path)) == 2
 
 
 def test_a_damaged_row_and_a_damaged_rollup_cost_themselves_alone(tmp_path: Path) -> None:
@@ -107,6 +119,7 @@ def test_the_files_own_numbers_are_kept(tmp_path: Path) -> None:
     connection.close()
 
 
+@settings(deadline=None, max_examples=50)
 @given(st.lists(st.tuples(st.integers(0, 3), st.floats(-1e6, 1e6)), min_size=1, max_size=40))
 def test_rollups_are_those_of_a_plain_sum(
     tmp_path_factory: pytest.TempPathFactory, told: list[tuple[int, float]]

@@ -1,12 +1,18 @@
 from __future__ import annotations
 
 import sqlite3
+from contextlib import closing, suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from lupin_twin.journal import schema
 from lupin_twin.journal.schema import (
+    FILE_ERRORS,
+    VERSION,
     DamagedFile,
+    Empty,
     Foreign,
     find_damage,
     open_reader,
@@ -52,11 +58,84 @@ def test_a_database_of_somebody_else_is_told_and_left(tmp_path: Path) -> None:
     assert find_damage(foreign) is None
 
 
+def test_a_database_without_anything_in_it_is_somebody_elses_too(tmp_path: Path) -> None:
+    foreign = tmp_path / "theirs.sqlite"
+    with closing(sqlite3.connect(foreign)) as connection:
+        connection.executescript("CREATE TABLE theirs (x); DROP TABLE theirs;")
+    with pytest.raises(Foreign, match="not a journal of lupin-twin"):
+        open_reader(foreign)
+
+
+@pytest.mark.parametrize("after", range(6))
+def test_a_file_that_is_being_made_is_empty_or_whole_but_never_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, after: int
+) -> None:
+    """Its tables come when the reader has asked so often."""
+    path = tmp_path / "j.sqlite"
+    maker = sqlite3.connect(path, isolation_level=None, timeout=0.0)
+    make = (
+        f"BEGIN; {schema._TABLES} PRAGMA application_id = {schema.APPLICATION_ID};"
+        f"PRAGMA user_version = {VERSION}"
+    )
+    for statement in make.split(";"):
+        maker.execute(statement)
+    steps = iter(range(after))
+
+    class Reader(schema.Reader):
+        def execute(self, *asked: Any) -> sqlite3.Cursor:
+            if next(steps, None) is None and maker.in_transaction:
+                with suppress(sqlite3.OperationalError):  # it waits for the reader
+                    maker.execute("COMMIT")
+            return super().execute(*asked)
+
+    monkeypatch.setattr(schema, "Reader", Reader)
+    with closing(maker), suppress(Empty):
+        open_reader(path).close()
+
+
+def test_whoever_looks_between_two_steps_of_making_it_finds_it_empty_or_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Or a twin that is killed there would find somebody else's file the next time."""
+    path, found = tmp_path / "j.sqlite", list[str]()
+
+    class Maker(sqlite3.Connection):
+        def __init__(self, *args: Any, **options: Any) -> None:
+            super().__init__(*args, **options)
+            self.set_trace_callback(look)
+
+    def look(_: str) -> None:
+        try:
+            open_reader(path).close()
+            found.append("whole")
+        except Exception as error:  # noqa: BLE001  # which nobody would hear of from here
+            found.append(type(error).__name__)
+
+    connect = sqlite3.connect
+
+    def watched(name: object, **options: Any) -> sqlite3.Connection:
+        return connect(name, **{**({"factory": Maker} if name == path else {}), **options})  # type: ignore[call-overload,no-any-return]
+
+    monkeypatch.setattr(sqlite3, "connect", watched)
+    open_writer(path).close()
+    assert set(found) == {"Empty", "whole"}
+
+
+def test_a_file_that_is_being_made_is_called_empty_and_is_not_damaged(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    with closing(sqlite3.connect(path, isolation_level=None)) as maker:
+        maker.execute("BEGIN IMMEDIATE")
+        maker.execute("CREATE TABLE meta (x)")
+        with pytest.raises(Empty, match="is empty: a journal that is just being made"):
+            open_reader(path)
+        assert find_damage(path) is None
+
+
 def test_a_newer_version_is_told_and_left(path: Path) -> None:
     connection = sqlite3.connect(path)
-    connection.execute("PRAGMA user_version = 2")
+    connection.execute(f"PRAGMA user_version = {VERSION + 1}")
     connection.close()
-    with pytest.raises(Foreign, match="version 2, this is version 1"):
+    with pytest.raises(Foreign, match=f"version {VERSION + 1}, this is version {VERSION}"):
         open_writer(path)
 
 
@@ -76,6 +155,20 @@ def test_a_journal_with_a_damaged_header_is_damaged_and_not_somebody_elses(path:
     with pytest.raises(DamagedFile) as caught:
         open_writer(path)
     assert says_damaged(caught.value)
+
+
+def test_a_flipped_letter_in_a_table_s_definition_is_damage(path: Path) -> None:
+    whole = path.read_bytes()
+    for letter in ("scan_at", "stamp_ns + run", "readings BLOB"):
+        at = whole.index(letter.encode())
+        for bit in (0x02, 0x80):  # another letter, and none at all
+            broken = bytearray(whole)
+            broken[at + 2] ^= bit
+            path.write_bytes(broken)
+            assert find_damage(path), f"{letter} {bit}"
+            with pytest.raises(FILE_ERRORS) as caught:
+                open_writer(path)
+            assert says_damaged(caught.value)
 
 
 def test_a_missing_file_and_a_locked_one_are_no_damage(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from lupin_twin.journal import writer
 from lupin_twin.journal.condition import JournalState
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
@@ -82,10 +83,14 @@ def test_before_the_clock_begins_nothing_is_written_and_nothing_lost(path: Path)
 def test_rows_belong_to_the_clock_by_which_they_were_heard(path: Path) -> None:
     with recording(path, Clock(5 * SECOND, NOW, is_simulated=True)) as journal:
         journal.write(scan("a", 9 * SECOND))
-        journal.begin(Clock(2 * SECOND, NOW + 9 * SECOND, is_simulated=True))
+        after = Clock(2 * SECOND, NOW + 9 * SECOND, is_simulated=True)
+        journal.begin(after, before_ns=11 * SECOND)
         journal.write(scan("b", 3 * SECOND))
     assert select(path, "SELECT tag_id, run FROM scans ORDER BY id") == [("a", 1), ("b", 2)]
-    assert select(path, "SELECT id, follows, carries FROM run") == [(1, None, 0), (2, 1, 2)]
+    assert select(path, "SELECT id, follows, carries, ended_stamp_ns FROM run") == [
+        (1, None, 0, 11 * SECOND),
+        (2, 1, 2, None),
+    ]
 
 
 def test_a_second_twin_is_refused_by_name_and_takes_over_when_the_first_has_ended(
@@ -147,6 +152,15 @@ def test_damage_that_is_met_while_it_records_has_the_file_set_aside_too(
     assert known(path) == {scan("1"), scan("2")}
 
 
+def test_rows_wait_for_others_from_when_they_came_and_late_ones_do_not(path: Path) -> None:
+    journal = Journal(path, "/test", LIMITS)  # follows no clock yet, and so writes nothing
+    assert journal._gather_s() == writer._GATHER_S
+    journal.write(scan())
+    assert journal._gather_s() < writer._GATHER_S
+    wait_for(lambda: journal._gather_s() <= 0.0, "the row to be late")
+    journal.close(30.0)
+
+
 def test_a_file_that_is_removed_is_made_anew(path: Path) -> None:
     with recording(path) as journal:
         journal.write(scan("1"))
@@ -192,6 +206,7 @@ def test_handing_over_takes_microseconds_while_the_writer_writes(path: Path) -> 
 def test_age_and_size_are_kept_to(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("lupin_twin.journal.file._PURGE_EVERY_S", 0.0)
     monkeypatch.setattr("lupin_twin.journal.file._FOLD_EVERY_S", 0.0)
+    monkeypatch.setattr("lupin_twin.journal.file._TALLY_EVERY_S", 0.0)
     old = time.time_ns() - 3 * 86_400 * SECOND
     with recording(path, Clock(old, old, is_simulated=False), limits=Limits(1.0, 10**9)) as journal:
         for n in range(1000):

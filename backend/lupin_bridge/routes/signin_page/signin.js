@@ -5,18 +5,22 @@ const input = document.querySelector('input');
 const button = document.querySelector('button');
 const message = document.querySelector('#message');
 
-const enter = () => location.replace('./');
+// What it may have to say, in the page's language.
+const words = form.dataset;
+
+// The page's language goes along.
+const enter = () => location.replace(`./${location.search}`);
 
 /** What went wrong, for a person; the bridge words its refusals itself. */
 const reasonOf = async (response) => {
   const body = await response.json().catch(() => ({}));
-  return body.detail ?? `The bridge answered ${response.status}.`;
+  return body.detail ?? words.refused.replace('%', response.status);
 };
 
 const signIn = async () => {
   const token = input.value.trim();
   if (!/^[\w.~+/-]+=*$/.test(token)) {
-    return 'A token holds letters, digits and -._~+/ only.';
+    return words.odd;
   }
   const headers = { Authorization: `Bearer ${token}` };
   const response = await fetch('api/signin', { headers, cache: 'no-store' });
@@ -24,7 +28,7 @@ const signIn = async () => {
     enter();
     return '';
   }
-  return response.status === 401 ? 'This is not the right token.' : reasonOf(response);
+  return response.status === 401 ? words.wrong : reasonOf(response);
 };
 
 form.addEventListener('submit', (event) => {
@@ -32,7 +36,7 @@ form.addEventListener('submit', (event) => {
   button.disabled = true;
   message.textContent = '';
   signIn()
-    .catch(() => 'The bridge does not answer.')
+    .catch(() => words.silent)
     .then((text) => {
       message.textContent = text;
       button.disabled = false;

@@ -7,6 +7,7 @@ import sqlite3
 from collections.abc import Callable, Iterable
 from typing import Final, TypeVar
 
+from lupin_twin.journal.changes import put_change
 from lupin_twin.journal.packing import columns, pack_numbers, pack_shape, seal
 from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, LookRow, PinRow, Row, ScanRow
 from lupin_twin.journal.runs import Run
@@ -73,6 +74,7 @@ class Appender:
             self._put_scan(row, series, lag_us, mission)
         else:
             self._put_look(row, series, lag_us, mission)
+            put_change(self._execute, self.last_id, (run.id, tag), row)
         return True
 
     def _put_scan(self, scan: ScanRow, series: int, lag_us: int, mission: int) -> None:

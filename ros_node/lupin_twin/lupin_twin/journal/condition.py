@@ -12,6 +12,7 @@ from enum import StrEnum
 class JournalState(StrEnum):
     """What the journal is at. Only in `recording` is everything kept as promised."""
 
+    UNKNOWN = "unknown"  # the twin is elsewhere, and does not say
     OFF = "off"
     STARTING = "starting"
     RECORDING = "recording"
@@ -28,6 +29,8 @@ class Condition:
     `waiting` rows are handed over and not written yet, the oldest of them for `behind_s`. `lost`
     rows were given up because too many were waiting, `refused` rows could not be written by
     their own fault, `repeated` ones were there already. `set_aside` names the last damaged file.
+    `simulated_ns` is the stretch of ROS time, start and end, that a simulation filled in and no
+    robot observed, None if there is none.
     """
 
     state: JournalState
@@ -41,11 +44,16 @@ class Condition:
     refused: int = 0
     file_bytes: int = 0
     set_aside: str = ""
+    simulated_ns: tuple[int, int] | None = None
 
     @property
     def is_well(self) -> bool:
         """Whether nothing has to be told."""
-        return self.state in (JournalState.OFF, JournalState.STARTING, JournalState.RECORDING)
+        return self.state in _WELL
 
 
+_WELL = frozenset(
+    {JournalState.UNKNOWN, JournalState.OFF, JournalState.STARTING, JournalState.RECORDING}
+)
+UNKNOWN = Condition(JournalState.UNKNOWN, "the twin does not say whether it keeps a journal")
 OFF = Condition(JournalState.OFF, "no journal is kept")

@@ -11,15 +11,29 @@ from pathlib import Path
 from typing import Final
 
 from lupin_twin.journal.appending import Appender
-from lupin_twin.journal.reading import ending
+from lupin_twin.journal.prefilling import Stretch, simulated
+from lupin_twin.journal.reading import ending, heard_until
 from lupin_twin.journal.restoring import Restored, restore
-from lupin_twin.journal.retention import Limits, purge_rollups_step, purge_step, shrink_step
+from lupin_twin.journal.retention import (
+    Limits,
+    note_limits,
+    purge_rollups_step,
+    purge_step,
+    shrink_step,
+)
 from lupin_twin.journal.rollups import Folding, get_meta
 from lupin_twin.journal.rows import Row
 from lupin_twin.journal.runs import Carries, Clock, Run, carried_at_start, goes_on
 from lupin_twin.journal.salvage import Salvage, set_aside
-from lupin_twin.journal.schema import find_damage, open_writer, says_damaged, transaction
+from lupin_twin.journal.schema import (
+    FILE_ERRORS,
+    find_damage,
+    open_writer,
+    says_damaged,
+    transaction,
+)
 from lupin_twin.journal.syncing import Syncing
+from lupin_twin.journal.tallying import TALLIED, tally_step
 
 # A file up to this size is read through for damage as it is opened: a quarter of a second.
 _CHECKED_BYTES: Final = 64_000_000
@@ -27,7 +41,11 @@ _CHECKED_BYTES: Final = 64_000_000
 _LOG_BYTES: Final = 8_000_000
 # So much of a damaged file is read before the twin goes on with what is there.
 _SALVAGE_S: Final = 1.5
+# Readers count what is not tallied yet; the rarer it is done, the fewer pages are written.
+_TALLY_EVERY_S: Final = 60.0
+_TALLY_ROWS: Final = 1_000
 _FOLD_EVERY_S: Final = 3600.0
+# So many waiting rows are a reason to fold, and so many are held in memory at most.
 _FOLD_ROWS: Final = 50_000
 _PURGE_EVERY_S: Final = 60.0
 _PURGE_ROLLUPS_EVERY_S: Final = 86_400.0
@@ -57,6 +75,7 @@ class JournalFile:
     """
 
     def __init__(self, path: Path, limits: Limits, *, is_sound: bool | None) -> None:
+        self.simulated: Stretch | None = None
         self._path = path
         self._limits = limits
         self.set_aside = ""
@@ -84,7 +103,7 @@ class JournalFile:
     def _open(self) -> None:
         try:
             self._connection = open_writer(self._path)
-        except sqlite3.Error as error:
+        except FILE_ERRORS as error:
             if not says_damaged(error):
                 raise
             self._set_aside()
@@ -92,13 +111,14 @@ class JournalFile:
         try:
             self._salvage()
             self._appender = Appender(self._connection)
+            self.simulated = simulated(self._connection)
             self._folding: Folding | None = None
-            self._folded_s = self._purged_s = self._looked_s = 0.0
+            self._tallied_s = self._folded_s = self._purged_s = self._looked_s = 0.0
             self._purging = False
             self._shrinking = False
             self._rollups_purged_s, self._rollup_series = time.monotonic(), 0
             self._syncing = Syncing(self._path)
-        except BaseException:
+        except BaseException:  # whatever it was: nobody has this object, and could close it
             self._connection.close()
             raise
         self._inode = self._path.stat().st_ino
@@ -129,12 +149,19 @@ class JournalFile:
         """The run that a twin which starts now is in: the last one, or a new one."""
         last = ending(self._connection, is_simulated=now.is_simulated)
         if last is not None and goes_on(last, now):
+            with self._transaction():
+                self._go_on_with(last.run.id)
             return last.run
         follows = None if last is None else last.run.id
         return self._new_run(now, follows, carried_at_start(now))
 
-    def next_run(self, before: Run, now: Clock) -> Run:
-        """A new run of a clock that has gone back while the twin lived."""
+    def next_run(self, before: Run, now: Clock, ended_ns: int | None = None) -> Run:
+        """A new run of a clock that has gone back, from `ended_ns`, while the twin lived."""
+        if ended_ns is not None:
+            with self._transaction():
+                self._connection.execute(
+                    "UPDATE run SET ended_stamp_ns = ? WHERE id = ?", (ended_ns, before.id)
+                )
         return self._new_run(now, before.id, Carries.ALL)
 
     def _new_run(self, now: Clock, follows: int | None, carries: Carries) -> Run:
@@ -144,12 +171,12 @@ class JournalFile:
         return run
 
     def keep_runs(self, runs: Sequence[Run]) -> None:
-        """Have the runs in the file, as they are in another one that is gone."""
+        """Have the runs in the file, as they are in another one that is gone; the last goes on."""
         if not runs:
             return
         with self._transaction():
             self._connection.executemany(
-                "INSERT OR IGNORE INTO run VALUES (?, ?, ?, ?, ?, ?, ?)",
+                "INSERT OR IGNORE INTO run VALUES (?, ?, ?, ?, ?, ?, ?, NULL)",
                 [
                     (
                         run.id,
@@ -163,6 +190,19 @@ class JournalFile:
                     for run in runs
                 ],
             )
+            self._go_on_with(runs[-1].id)
+
+    def _go_on_with(self, run: int) -> None:
+        """One run goes on; another, whose end nobody saw, ended with the last heard in it."""
+        self._connection.execute("UPDATE run SET ended_stamp_ns = NULL WHERE id = ?", (run,))
+        unended = self._connection.execute(
+            "SELECT id, begun_stamp_ns FROM run WHERE ended_stamp_ns IS NULL AND id != ?", (run,)
+        ).fetchall()
+        for other, begun_ns in unended:
+            self._connection.execute(
+                "UPDATE run SET ended_stamp_ns = ? WHERE id = ?",
+                (max(begun_ns, heard_until(self._connection, other)), other),
+            )
 
     def restore(self, run: Run, scans_per_series: int) -> Restored:
         """What is known in a run. A file of which that cannot be read is set aside once."""
@@ -170,7 +210,7 @@ class JournalFile:
             restored = restore(self._connection, run, scans_per_series)
             if not restored.damaged or self.set_aside:
                 return restored
-        except sqlite3.Error as error:
+        except FILE_ERRORS as error:
             if self.set_aside or not says_damaged(error):
                 raise
         self.close()
@@ -221,26 +261,40 @@ class JournalFile:
             self._connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
         if self._salvaging is not None:
             return self._salvage_step()
-        return self._fold(now_s) or self._purge(now_s)
+        return self._tally(now_s) or self._fold(now_s) or self._purge(now_s)
+
+    def _tally(self, now_s: float) -> bool:
+        waiting = self._appender.last_id - get_meta(self._connection, TALLIED)
+        is_time = now_s - self._tallied_s >= _TALLY_EVERY_S
+        if not waiting or not (is_time or waiting >= _TALLY_ROWS):
+            return False
+        self._tallied_s = now_s
+        with self._transaction():
+            return tally_step(self._connection)
 
     def _fold(self, now_s: float) -> bool:
         if self._folding is None:
-            waiting = self._appender.last_id - get_meta(self._connection, "rolled_id")
+            rolled_id = get_meta(self._connection, "rolled_id")
+            waiting = self._appender.last_id - rolled_id
             is_time = now_s - self._folded_s >= _FOLD_EVERY_S or not self._folded_s
             if not waiting or not (is_time or waiting >= _FOLD_ROWS):
                 return False
-            self._folding = Folding(self._connection, self._appender.last_id)
+            last_id = min(self._appender.last_id, rolled_id + _FOLD_ROWS)
+            self._folding = Folding(self._connection, last_id)
         with self._transaction():
             has_more = self._folding.step()
-        if not has_more:
-            self._folding, self._folded_s = None, now_s
-        return has_more
+        if has_more:
+            return True
+        self._folding, self._folded_s = None, now_s
+        return bool(self._appender.last_id - get_meta(self._connection, "rolled_id") >= _FOLD_ROWS)
 
     def _purge(self, now_s: float) -> bool:
         if not self._purging and not self._shrinking:
             if now_s - self._purged_s < _PURGE_EVERY_S:
                 return False
             self._purged_s, self._purging = now_s, True
+            with self._transaction():
+                note_limits(self._connection, self._limits)
         if self._purging:
             with self._transaction():
                 self._purging = purge_step(self._connection, self._limits, time.time_ns())

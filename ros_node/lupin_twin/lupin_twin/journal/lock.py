@@ -22,17 +22,13 @@ class Lock:
     """
 
     def __init__(self, journal: Path, holder: str) -> None:
-        self._descriptor = os.open(
-            journal.with_name(journal.name + ".lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600
-        )
+        self._descriptor = os.open(_beside(journal), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            other = os.read(self._descriptor, 512).decode("utf-8", "replace").strip()
+            other = _name_in(self._descriptor)
             os.close(self._descriptor)
-            raise InUse(
-                f"the journal {journal} is in use by {other or 'another process'}"
-            ) from None
+            raise InUse(f"the journal {journal} is in use by {other}") from None
         except BaseException:
             os.close(self._descriptor)
             raise
@@ -52,3 +48,31 @@ class Lock:
 
     def __exit__(self, *_: object) -> None:
         self.release()
+
+
+def holder_of(journal: Path) -> str | None:
+    """Who writes a journal, None if nobody does; for a moment it holds the lock with others.
+
+    Raises:
+        OSError: the lock is there and may not be read.
+
+    """
+    try:
+        descriptor = os.open(_beside(journal), os.O_RDONLY | os.O_CLOEXEC)
+    except FileNotFoundError:
+        return None
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return _name_in(descriptor)
+    finally:
+        os.close(descriptor)
+    return None
+
+
+def _beside(journal: Path) -> Path:
+    return journal.with_name(journal.name + ".lock")
+
+
+def _name_in(descriptor: int) -> str:
+    return os.read(descriptor, 512).decode("utf-8", "replace").strip() or "another process"

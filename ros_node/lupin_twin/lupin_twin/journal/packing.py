@@ -1,8 +1,10 @@
 """Readings, flowers and rollups as bytes, with a check that tells a flipped bit.
 
 Pure. Numbers are little-endian. Nothing is rounded: numbers that float32 holds exactly are kept as
-that, all others as float64. The last two bytes are the low half of a CRC-32 over the row's
-own columns and the bytes before: SQLite has no checksums, and a wrong value must not pass for one.
+that, all others as float64. The last two bytes are a check over the row's own columns and the bytes
+before: SQLite has no checksums, and a wrong value must not pass for one. It is the high half of
+Adler-32 (RFC 1950, section 8.2), which any one byte that is wrong changes, and which, being a
+weighted sum, `columns` computes for many rows at once.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 from lupin_twin.state import Bloom, Flower
 
@@ -23,25 +26,45 @@ class Damaged(ValueError):
 
 
 def seal(columns: bytes, body: bytes) -> bytes:
-    """The body with the check over it and the row's other columns behind it."""
-    return body + _CHECK.pack(zlib.crc32(body, zlib.crc32(columns)) & 0xFFFF)
+    """The body with the check over the row's other columns and it behind it."""
+    return body + _CHECK.pack(zlib.adler32(body, zlib.adler32(columns)) >> 16)
 
 
-def unseal(columns: bytes, sealed: bytes) -> bytes:
+def unseal(columns: bytes, sealed: object) -> bytes:
     """The body of what `seal` gave.
 
     Raises:
-        Damaged: the check does not fit.
+        Damaged: the check does not fit, or a flipped bit has made something else of the bytes.
 
     """
-    if len(sealed) < _CHECK.size or seal(columns, sealed[: -_CHECK.size]) != sealed:
+    if not isinstance(sealed, bytes) or seal(columns, sealed[: -_CHECK.size]) != sealed:
         raise Damaged("the check of a row does not fit")
     return sealed[: -_CHECK.size]
 
 
+# What stands for no value among a row's columns.
+NOTHING = -(2**63)
+_COLUMN = struct.Struct("<q")
+
+
 def columns(*values: int | str | None) -> bytes:
-    """The row's other columns, for the check."""
-    return " ".join(map(str, values)).encode("utf-8", "surrogatepass")
+    """The row's other columns, for the check: eight bytes a number or nothing, texts as they are.
+
+    `columns.whole` checks many rows at once by the same rule.
+
+    Raises:
+        Damaged: a column is none of these.
+
+    """
+    try:
+        return b"".join(
+            value.encode("utf-8", "surrogatepass")
+            if isinstance(value, str)
+            else _COLUMN.pack(NOTHING if value is None else value)
+            for value in values
+        )
+    except struct.error as error:
+        raise Damaged(f"a column is no number that fits: {error}") from error
 
 
 @lru_cache(maxsize=256)
@@ -100,10 +123,24 @@ def pack_shape(flower: Flower) -> bytes:
     )
 
 
-def unpack_shape(
-    packed: bytes,
-) -> tuple[float, tuple[Bloom, ...], tuple[tuple[float, float, float], ...]]:
-    """(confidence, blooms, footprint) of what `pack_shape` packed.
+class ShapeKind(NamedTuple):
+    """What a packed look says before its numbers, which begin at `start`.
+
+    `marks` are (anomaly, species) of each flower.
+    """
+
+    start: int
+    marks: tuple[tuple[bool, str], ...]
+    corners: int
+
+    @property
+    def numbers(self) -> int:
+        """How many follow: the confidence, five of each flower, three of each corner."""
+        return 1 + 5 * len(self.marks) + 3 * self.corners
+
+
+def shape_kind(packed: bytes) -> ShapeKind:
+    """The beginning of what `pack_shape` packed.
 
     Raises:
         Damaged: it is not whole.
@@ -120,24 +157,34 @@ def unpack_shape(
             at += length
         marks = [_BLOOM.unpack_from(packed, at + i * _BLOOM.size) for i in range(bloom_count)]
         at += bloom_count * _BLOOM.size
-        numbers = iter(unpack_numbers(packed[at:], 1 + 5 * bloom_count + 3 * corner_count))
-        confidence = next(numbers)
-        blooms = []
-        for anomaly, index in marks:
-            x, y, z, height_m, sure = (next(numbers) for _ in range(5))
-            blooms.append(Bloom(x, y, z, height_m, species[index], sure, anomaly))
-        corners = tuple((next(numbers), next(numbers), next(numbers)) for _ in range(corner_count))
+        return ShapeKind(at, tuple((odd, species[index]) for odd, index in marks), corner_count)
     except (struct.error, UnicodeDecodeError, IndexError) as error:
         raise Damaged(f"a look cannot be read: {error}") from error
+
+
+def unpack_shape(
+    packed: bytes,
+) -> tuple[float, tuple[Bloom, ...], tuple[tuple[float, float, float], ...]]:
+    """(confidence, blooms, footprint) of what `pack_shape` packed.
+
+    Raises:
+        Damaged: it is not whole.
+
+    """
+    kind = shape_kind(packed)
+    numbers = iter(unpack_numbers(packed[kind.start :], kind.numbers))
+    confidence = next(numbers)
+    blooms = []
+    for anomaly, species in kind.marks:
+        x, y, z, height_m, sure = (next(numbers) for _ in range(5))
+        blooms.append(Bloom(x, y, z, height_m, species, sure, anomaly))
+    corners = tuple((next(numbers), next(numbers), next(numbers)) for _ in range(kind.corners))
     return confidence, tuple(blooms), corners
 
 
 @dataclass(slots=True)
 class Bucket:
-    """Finite readings of one sensor in one hour: how many, their mean, the least and the largest.
-
-    `low` and `high` are kept as float32.
-    """
+    """Finite readings of one sensor in a while: how many, their mean, the least and the largest."""
 
     n: int = 0
     mean: float = 0.0
@@ -160,22 +207,29 @@ class Bucket:
             self.high = max(self.high, other.high)
 
 
-_COUNT_SHORT, _COUNT_LONG = struct.Struct("<Hdff"), struct.Struct("<Idff")
-_FLOAT32_MAX = 3.4028234663852886e38
+# By what a sensor takes in them: the least and the largest as float32 where that holds all exactly.
+_LAYOUTS = {
+    layout.size: layout for layout in map(struct.Struct, ("<Hdff", "<Idff", "<Hddd", "<Iddd"))
+}
+_NARROW = struct.Struct("<ff")
 
 
 def pack_buckets(buckets: Sequence[Bucket]) -> bytes:
     """One hour of a tag's sensors, in the order of their set."""
-    layout = _COUNT_SHORT if all(bucket.n <= 0xFFFF for bucket in buckets) else _COUNT_LONG
+    count = "H" if all(bucket.n <= 0xFFFF for bucket in buckets) else "I"
+    ends = "ff" if all(map(_is_narrow, buckets)) else "dd"
+    layout = struct.Struct(f"<{count}d{ends}")
     return b"".join(
-        layout.pack(
-            bucket.n,
-            bucket.mean,
-            max(-_FLOAT32_MAX, min(_FLOAT32_MAX, bucket.low)),
-            max(-_FLOAT32_MAX, min(_FLOAT32_MAX, bucket.high)),
-        )
-        for bucket in buckets
+        layout.pack(bucket.n, bucket.mean, bucket.low, bucket.high) for bucket in buckets
     )
+
+
+def _is_narrow(bucket: Bucket) -> bool:
+    ends = (bucket.low, bucket.high)
+    try:
+        return _NARROW.unpack(_NARROW.pack(*ends)) == ends
+    except OverflowError:
+        return False
 
 
 def unpack_buckets(packed: bytes, count: int) -> list[Bucket]:
@@ -185,10 +239,11 @@ def unpack_buckets(packed: bytes, count: int) -> list[Bucket]:
         Damaged: it is of no length that so many have.
 
     """
-    for layout in (_COUNT_SHORT, _COUNT_LONG):
-        if layout.size * count == len(packed):
-            return [
-                Bucket(*numbers) if numbers[0] else Bucket()
-                for numbers in layout.iter_unpack(packed)
-            ]
-    raise Damaged(f"{len(packed)} bytes are not the rollup of {count} sensors")
+    return [Bucket(*numbers) for numbers in _layout_of(packed, count).iter_unpack(packed)]
+
+
+def _layout_of(packed: bytes, count: int) -> struct.Struct:
+    layout = _LAYOUTS.get(len(packed) // count) if count else None
+    if layout is None or layout.size * count != len(packed):
+        raise Damaged(f"{len(packed)} bytes are not the rollup of {count} sensors")
+    return layout

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import sqlite3
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Final
 
 from lupin_twin.journal.packing import Damaged, columns, unpack_numbers, unpack_shape, unseal
 from lupin_twin.journal.rows import LookRow, PinRow, ScanRow
 from lupin_twin.journal.runs import Carries, Clock, Ending, Run
+from lupin_twin.journal.schema import DamagedFile
 from lupin_twin.state import Flower, Pose, Reading
 
 
@@ -28,6 +30,7 @@ class Series:
     sensors: tuple[str, ...]
 
 
+_CARRIES: Final = frozenset(Carries)
 SCAN: Final = "id, series, stamp_ns, own_stamp_ns, lag_us, mission, detail, readings"
 LOOK: Final = (
     "id, series, stamp_ns, own_stamp_ns, lag_us, mission, species, anomaly, flower_count,"
@@ -35,15 +38,48 @@ LOOK: Final = (
 )
 
 
+@contextmanager
+def one_view(connection: sqlite3.Connection) -> Iterator[None]:
+    """All that is read within is of one moment; keep it short, for the log grows meanwhile."""
+    if connection.in_transaction:
+        yield
+        return
+    connection.execute("BEGIN")
+    try:
+        yield
+    finally:
+        connection.rollback()  # does nothing where an interrupted statement has ended it
+
+
 def runs(connection: sqlite3.Connection) -> dict[int, Run]:
     """Every run, by id, in the order in which they began."""
     return {
-        row[0]: Run(row[0], Clock(row[2], row[3], bool(row[1])), row[5], Carries(row[6]))
+        row[0]: Run(row[0], Clock(row[2], row[3], bool(row[1])), row[5], _carries(row[6]))
         for row in connection.execute(
             "SELECT id, is_simulated, begun_stamp_ns, begun_arrival_ns, lead_ns, follows, carries"
             " FROM run ORDER BY id"
         )
     }
+
+
+def _carries(number: int) -> Carries:
+    return Carries(number) if number in _CARRIES else Carries.NOTHING
+
+
+def sensor_names(text: str) -> tuple[str, ...]:
+    """The names of a set of sensors.
+
+    Raises:
+        DamagedFile: it is no list of names.
+
+    """
+    try:
+        names = json.loads(text)
+    except (ValueError, RecursionError):
+        names = None
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise DamagedFile(f"{text[:64]!r} is no set of sensors")
+    return tuple(names)
 
 
 def ending(connection: sqlite3.Connection, *, is_simulated: bool) -> Ending | None:
@@ -68,6 +104,18 @@ def ending(connection: sqlite3.Connection, *, is_simulated: bool) -> Ending | No
     return Ending(run, last)
 
 
+def heard_until(connection: sqlite3.Connection, run: int) -> int:
+    """The latest stamp in a run, 0 where there is none: a step for each of its series."""
+    newest = "SELECT (SELECT max(stamp_ns) FROM {0} WHERE series = s.id) AS ns FROM series AS s"
+    (last_ns,) = connection.execute(
+        f"SELECT max(ns) FROM ({newest.format('scan')} WHERE run = ?1"  # noqa: S608  # constants
+        f" UNION ALL {newest.format('look')} WHERE run = ?1"
+        " UNION ALL SELECT max(stamp_ns) FROM pin WHERE run = ?1)",
+        (run,),
+    ).fetchone()
+    return int(last_ns or 0)
+
+
 class Names:
     """Texts by their numbers, read from the file as they are asked for."""
 
@@ -88,9 +136,9 @@ class Names:
 
 def all_series(connection: sqlite3.Connection, run: Run | None = None) -> Iterator[Series]:
     """The series of a run, or of all; tags in the order in which they were first heard of."""
-    by_id = runs(connection)
+    by_id = runs(connection) if run is None else {run.id: run}
     sensors = {
-        number: tuple(json.loads(names))
+        number: sensor_names(names)
         for number, names in connection.execute("SELECT id, names FROM sensors")
     }
     where, values = ("", ()) if run is None else ("WHERE run = ?", (run.id,))

@@ -16,16 +16,14 @@ from lupin_twin.journal.reading import (
     all_series,
     look_of,
     pins,
-    runs,
     scan_of,
 )
 from lupin_twin.journal.rows import LookRow, Row, ScanRow
 from lupin_twin.journal.runs import Carries, Run
+from lupin_twin.journal.spans import MAX_RUNS, behind
 
 # Scans that are read at most, for the histories of all tags: the newest of a series always is.
 _MAX_SCANS: Final = 20_000
-# Runs behind the present one whose readings can still be the newest of a tag.
-_MAX_RUNS: Final = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,21 +45,29 @@ def restore(connection: sqlite3.Connection, run: Run, scans_per_series: int) -> 
     Of runs before it what it carries: their places, or all, where what was later than the next
     run's beginning counts as made then.
     """
-    found: list[tuple[int, int, int, Row]] = []
+    places: list[tuple[int, int, Row]] = []
+    # Of each run, the newest first: its rows, and its beginning, which those before are held to.
+    heard: list[tuple[list[tuple[int, int, Row]], int]] = []
     damaged = 0
-    for depth, (past, begun_ns, carries) in enumerate(_behind(connection, run)):
+    for depth, (past, begun_ns, carries) in enumerate(behind(connection, run)):
         for tag, number, pin in pins(connection, past):
             if pin is None:
                 damaged += 1
             else:
-                found.append((tag, -depth, number, _held(pin, begun_ns)))
-        if carries is Carries.ALL and depth < _MAX_RUNS:
+                places.append((tag, number, _held(pin, begun_ns)))
+        rows: list[tuple[int, int, Row]] = []
+        if carries is Carries.ALL and depth < MAX_RUNS:
             for tag, number, row in _newest(connection, past, scans_per_series):
                 if row is None:
                     damaged += 1
                 else:
-                    found.append((tag, -depth, number, _held(row, begun_ns)))
-    found.sort(key=lambda entry: entry[:3])
+                    rows.append((tag, number, row))
+            heard.append((rows, past.begun.stamp_ns))
+    # Numbers ascend over runs that follow each other: the first place is that of the first of them.
+    found = sorted([*places, *heard[0][0]], key=lambda entry: entry[1])
+    if any(rows for rows, _ in heard[1:]):
+        found = [*sorted(places, key=lambda entry: entry[1]), *_carried(heard)]
+    found.sort(key=lambda entry: entry[0])
     (count,) = connection.execute(
         "SELECT max(coalesce((SELECT max(id) FROM scan), 0),"
         " coalesce((SELECT max(id) FROM look), 0), coalesce((SELECT max(id) FROM pin), 0))"
@@ -69,19 +75,22 @@ def restore(connection: sqlite3.Connection, run: Run, scans_per_series: int) -> 
     return Restored(run, tuple(row for *_, row in found), count, damaged)
 
 
-def _behind(connection: sqlite3.Connection, run: Run) -> Iterator[tuple[Run, int | None, Carries]]:
-    """The run and those it follows: each with what it is held to, and what of it still holds."""
-    by_id = runs(connection)
-    begun_ns: int | None = None
-    carries = Carries.ALL
-    past: Run | None = run
-    while past is not None and carries is not Carries.NOTHING:
-        yield past, begun_ns, carries
-        begun_ns = min(past.begun.stamp_ns, past.begun.stamp_ns if begun_ns is None else begun_ns)
-        carries = min(carries, past.carries)
-        # A run follows an earlier one; a damaged file may say otherwise.
-        follows = past.follows
-        past = by_id.get(follows) if follows is not None and follows < past.id else None
+def _carried(heard: list[tuple[list[tuple[int, int, Row]], int]]) -> list[tuple[int, int, Row]]:
+    """The rows of all runs, so that of those that were held to one moment the right one is last.
+
+    As it was when the clock went back: what was the newest before stays so, whatever comes that is
+    no later.
+    """
+    order: list[tuple[int, int, Row]] = []
+    held_ns: int | None = None
+    for rows, begun_ns in reversed(heard):
+        held_ns = begun_ns if held_ns is None else min(held_ns, begun_ns)
+        if rows:
+            order = [(tag, number, _held(row, held_ns)) for tag, number, row in order]
+            order += sorted(rows, key=lambda entry: entry[1])
+            order.sort(key=lambda entry: entry[2].stamp_ns)
+            held_ns = None
+    return [(tag, number, _held(row, held_ns)) for tag, number, row in order]
 
 
 def _held(row: Row, begun_ns: int | None) -> Row:

@@ -1,7 +1,8 @@
 """What is given up, by age and by size, a little at a time: the oldest first.
 
 Rows go by ranges of their numbers, which lie together in the file; the pages they leave are used
-again, and what is left over is given back to the disk. Only what is in the rollups already goes.
+again, and what is left over is given back to the disk. Only what is in rollups and tallies already
+goes.
 """
 
 from __future__ import annotations
@@ -10,7 +11,10 @@ import sqlite3
 from dataclasses import dataclass
 from typing import Final
 
-from lupin_twin.journal.rollups import HOUR_NS, get_meta, set_meta
+from lupin_twin.journal.rollups import get_meta, set_meta
+from lupin_twin.journal.runs import Run
+from lupin_twin.journal.tallying import TALLIED, purge_tallies
+from lupin_twin.past import HOUR_NS
 
 _DAY_NS: Final = 24 * HOUR_NS
 ROLLUP_DAYS: Final = 3652  # ten years
@@ -23,12 +27,26 @@ _PAGES: Final = 128
 _FREE_PAGES: Final = 256
 
 
+# The limits stand in the file, for who looks at it without its twin.
+KEPT_NS: Final = "kept_ns"
+KEPT_BYTES: Final = "kept_bytes"
+# With the number of a run behind it: see `purged_ns`.
+_HORIZON: Final = "purged_ns:"
+
+
 @dataclass(frozen=True, slots=True)
 class Limits:
     """How long scans and looks are kept, and how large the file may be."""
 
     days: float
     max_bytes: int
+
+
+def note_limits(connection: sqlite3.Connection, limits: Limits) -> None:
+    """Have the limits in the file."""
+    noted = {KEPT_NS: int(limits.days * _DAY_NS), KEPT_BYTES: limits.max_bytes}
+    if any(get_meta(connection, key) != value for key, value in noted.items()):
+        set_meta(connection, **noted)
 
 
 def used_bytes(connection: sqlite3.Connection) -> int:
@@ -52,7 +70,7 @@ def purge_step(connection: sqlite3.Connection, limits: Limits, now_ns: int) -> b
         " JOIN series ON series.id = series JOIN run ON run.id = run ORDER BY look.id LIMIT ?",
         (_ROWS,),
     ).fetchall()
-    rolled_id = get_meta(connection, "rolled_id")
+    rolled_id = min(get_meta(connection, "rolled_id"), get_meta(connection, TALLIED))
     # Where both go on past what was read, only what both were read up to can go.
     reach = min((rows[-1][0] for rows in (oldest, looks) if len(rows) == _ROWS), default=rolled_id)
     known = [(n, arrival) for n, arrival in (*oldest, *looks) if n <= min(reach, rolled_id)]
@@ -61,11 +79,28 @@ def purge_step(connection: sqlite3.Connection, limits: Limits, now_ns: int) -> b
     last = max((n for n, arrival in known if is_too_large or arrival < horizon_ns), default=0)
     if not last:
         return False
+    _keep_horizons(connection, last)
     connection.execute("DELETE FROM scan WHERE id <= ?", (last,))
     connection.execute("DELETE FROM look WHERE id <= ?", (last,))
     # The numbers go on when everything is gone.
     set_meta(connection, purged_id=max(last, get_meta(connection, "purged_id")))
     return True
+
+
+def purged_ns(connection: sqlite3.Connection, run: Run) -> int:
+    """The last stamp of a run of which something was given up; -1 if nothing was."""
+    return get_meta(connection, f"{_HORIZON}{run.id}", -1)
+
+
+def _keep_horizons(connection: sqlite3.Connection, last: int) -> None:
+    for table in ("scan", "look"):
+        for run, stamp_ns in connection.execute(
+            f"SELECT run, max(stamp_ns) FROM {table}"  # noqa: S608  # a constant
+            f" JOIN series ON series.id = series WHERE {table}.id <= ? GROUP BY run",
+            (last,),
+        ).fetchall():
+            key = f"{_HORIZON}{run}"
+            set_meta(connection, **{key: max(stamp_ns, get_meta(connection, key, -1))})
 
 
 def purge_rollups_step(connection: sqlite3.Connection, now_ns: int, after_series: int) -> int:
@@ -78,6 +113,9 @@ def purge_rollups_step(connection: sqlite3.Connection, now_ns: int, after_series
         " WHERE series.id > ? ORDER BY series.id LIMIT ?",
         (after_series, _SERIES),
     ).fetchall()
+    if not after_series:
+        for run, lead_ns in connection.execute("SELECT id, lead_ns FROM run").fetchall():
+            purge_tallies(connection, run, now_ns - ROLLUP_DAYS * _DAY_NS - lead_ns)
     for number, lead_ns in series:
         horizon = (now_ns - ROLLUP_DAYS * _DAY_NS - lead_ns) // HOUR_NS
         connection.execute("DELETE FROM rollup WHERE series = ? AND hour < ?", (number, horizon))

@@ -2,7 +2,7 @@
 
 Rows are folded in the order in which they were written, each once, whatever its stamp: a late one
 is merged into the hour it belongs to. How far that has come stands in the file, so that it goes on
-where it was after a crash. What is not folded yet, `unfolded_from`, a reader adds from the scans.
+where it was after a crash. What is not folded yet (`Folded`) a reader adds from the scans.
 """
 
 from __future__ import annotations
@@ -21,23 +21,35 @@ from lupin_twin.journal.packing import (
     unseal,
 )
 from lupin_twin.journal.reading import SCAN
-
-HOUR_NS: Final = 3_600_000_000_000
+from lupin_twin.past import HOUR_NS
 
 # What one step reads or writes: some ten milliseconds, for observations wait behind it.
 _ROWS_READ: Final = 1_000
 _ROWS_WRITTEN: Final = 200
 
 
-def unfolded_from(connection: sqlite3.Connection) -> int:
-    """The number of the write up to which scans are in the rollups."""
-    return get_meta(connection, "rolled_id")
+class Folded:
+    """How far folding has come, as of one view of the file.
+
+    `is_usable` is false while a damaged file is being read: rollups and scans do not fit yet.
+    """
+
+    def __init__(self, connection: sqlite3.Connection) -> None:
+        self._all_to = get_meta(connection, "rolled_id")
+        self._some_to = get_meta(connection, "rolling_to")
+        self._some = get_meta(connection, "rolling_series")
+        found = connection.execute("SELECT 1 FROM meta WHERE key = 'salvage'").fetchone()
+        self.is_usable = found is None
+
+    def up_to(self, series: int) -> int:
+        """The number of the write up to which the scans of a series are in the rollups."""
+        return self._some_to if series <= self._some else self._all_to
 
 
-def get_meta(connection: sqlite3.Connection, key: str) -> int:
-    """A number of the file's own, 0 where it was never set."""
+def get_meta(connection: sqlite3.Connection, key: str, default: int = 0) -> int:
+    """A number of the file's own, `default` where it was never set."""
     found = connection.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
-    return int(found[0]) if found else 0
+    return int(found[0]) if found else default
 
 
 def set_meta(connection: sqlite3.Connection, **values: int) -> None:

@@ -3,26 +3,30 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote
 
+from lupin_twin.journal.carving import carve
 from lupin_twin.journal.packing import Damaged, columns, unseal
-from lupin_twin.journal.reading import LOOK, SCAN
-from lupin_twin.journal.rollups import set_meta
-from lupin_twin.journal.schema import transaction
+from lupin_twin.journal.reading import LOOK, SCAN, sensor_names
+from lupin_twin.journal.rollups import get_meta, set_meta
+from lupin_twin.journal.schema import PAGE_SIZE, DamagedFile, transaction
 
 _ROWS: Final = 500
+_LEAST_ROW_BYTES: Final = 20
 # What gives the other rows their meaning, and the few that are looked up by what they say.
 _SMALL: Final = {
-    "run": "id, is_simulated, begun_stamp_ns, begun_arrival_ns, lead_ns, follows, carries",
+    "run": "id, is_simulated, begun_stamp_ns, begun_arrival_ns, lead_ns, follows, carries,"
+    " ended_stamp_ns",
     "tag": "id, tag_id",
     "name": "id, text",
     "sensors": "id, names",
     "series": "id, run, tag, kind, status, source, sensors",
     "pin": "id, run, tag, stamp_ns, lag_us, pose",
+    "change": "id, run, tag, stamp_ns, anomaly, bug_count",
 }
 _LARGE: Final = {
     "scan": SCAN,
@@ -51,13 +55,15 @@ def set_aside(path: Path, when: str) -> Path:
 class Salvage:
     """Copies what can be read of a damaged journal into a new one, the newest first.
 
-    Rows keep their numbers. A row whose check does not fit, or whose series is lost, is left.
+    Rows keep their numbers. A row whose check does not fit, or whose series is lost, is left. Where
+    the tree above rows is damaged, they are looked for on every page.
     """
 
     def __init__(self, aside: Path, connection: sqlite3.Connection) -> None:
         self._aside = aside
         self._connection = connection
         self.rows = 0
+        self._is_torn = False
 
     def steps(self) -> Iterator[None]:
         """Each step is one transaction; after the first, names, series and pins are there.
@@ -70,28 +76,86 @@ class Salvage:
         except sqlite3.Error:
             return
         with closing(source):
-            known: set[int] = set()
+            kept: dict[str, set[int]] = {}
             with transaction(self._connection):
                 for table, what in _SMALL.items():
                     rows = [row for lot in _readable(source, table, what) for row in lot]
+                    rows = [row for row in rows if _has_meaning(table, row, kept)]
                     self._insert(table, what, rows)
-                    if table == "series":
-                        known = {row[0] for row in rows}
+                    kept[table] = {row[0] for row in rows}
+                known = kept["series"]
                 # The numbers go on past all that may have been lost at the end.
-                set_meta(self._connection, purged_id=_largest_id(source) + 1_000_000)
+                last_id = max(_largest_id(source), *_noted(source), self._most_rows())
+                set_meta(
+                    self._connection, purged_id=last_id + 1_000_000, salvaged_id=last_id + 1_000_000
+                )
             yield
-            for table, what in _LARGE.items():
-                for lot in _readable(source, table, what):
-                    whole = [row for row in lot if row[1] in known and _is_whole(row)]
-                    with transaction(self._connection):
-                        self._insert(table, what, whole)
-                    self.rows += len(whole)
+            for table in _LARGE:
+                for lot in _readable(source, table, _LARGE[table], self._tear):
+                    self._keep(table, lot, known)
                     yield
+            if self._is_torn:
+                yield from self._carve(known, _noted(source)[0])
+            yield from self._tallies(source)
             yield from self._rollups(source, sorted(known))
+
+    def _tear(self) -> None:
+        self._is_torn = True
+
+    def _keep(self, table: str, rows: list[tuple[Any, ...]], known: set[int]) -> None:
+        whole = [row for row in rows if row[1] in known and _is_whole(row)]
+        with transaction(self._connection):
+            self._insert(table, _LARGE[table], whole)
+        self.rows += len(whole)
+
+    def _carve(self, known: set[int], purged_id: int) -> Iterator[None]:
+        """What stands on the pages, found without the trees; some of it is there already."""
+        tables = {len(what.split(",")): table for table, what in _LARGE.items()}
+        found: dict[str, list[tuple[Any, ...]]] = {table: [] for table in _LARGE}
+        for rows in carve(self._aside, PAGE_SIZE, tuple(tables)):
+            for row in rows:
+                # What was given up stays so, though its page was not written since.
+                if row[0] > purged_id:
+                    found[tables[len(row)]].append(row)
+            for table, waiting in found.items():
+                if len(waiting) >= _ROWS:
+                    self._keep(table, waiting, known)
+                    waiting.clear()
+                    yield
+        for table, waiting in found.items():
+            self._keep(table, waiting, known)
+        yield
+
+    def _most_rows(self) -> int:
+        return self._aside.stat().st_size // _LEAST_ROW_BYTES
+
+    def _tallies(self, source: sqlite3.Connection) -> Iterator[None]:
+        """All of them or none: without, what was salvaged is counted again."""
+        tallied = 0
+        for table in ("tally", "tally_hour"):
+            try:
+                ((tallied,),) = source.execute("SELECT value FROM meta WHERE key = 'tallied_id'")
+                rows = source.execute(f"SELECT * FROM {table}").fetchall()  # noqa: S608
+            except (sqlite3.Error, ValueError):
+                with transaction(self._connection):
+                    self._connection.execute("DELETE FROM tally")
+                return
+            for first in range(0, len(rows), _ROWS):
+                with transaction(self._connection):
+                    self._connection.executemany(
+                        f"INSERT OR REPLACE INTO {table} VALUES ({', '.join('?' * 17)})",  # noqa: S608
+                        rows[first : first + _ROWS],
+                    )
+                yield
+        with transaction(self._connection):
+            set_meta(self._connection, tallied_id=int(tallied))
 
     def _rollups(self, source: sqlite3.Connection, known: list[int]) -> Iterator[None]:
         try:
-            rolled = source.execute("SELECT key, value FROM meta WHERE key LIKE 'roll%'").fetchall()
+            rolled = source.execute(
+                "SELECT key, value FROM meta WHERE key LIKE 'roll%' OR key LIKE 'purged_ns:%'"
+                " OR key LIKE 'simulated%'"
+            ).fetchall()
         except sqlite3.Error:
             return
         for first in range(0, len(known), _ROWS):
@@ -116,9 +180,33 @@ class Salvage:
         )
 
 
+def _noted(source: sqlite3.Connection) -> tuple[int, int]:
+    """Up to which number rows were given up, and folded; 0 where that cannot be read."""
+    try:
+        return get_meta(source, "purged_id"), get_meta(source, "rolled_id")
+    except sqlite3.Error:
+        return 0, 0
+
+
 def _largest_id(source: sqlite3.Connection) -> int:
     lots = [next(_readable(source, table, "id"), []) for table in (*_LARGE, "pin")]
     return max((int(lot[0][0]) for lot in lots if lot), default=0)
+
+
+def _has_meaning(table: str, row: tuple[Any, ...], kept: Mapping[str, set[int]]) -> bool:
+    """Whether a small row says something, and what it refers to is there.
+
+    A series without its tag or sensors would be found damaged at each start again.
+    """
+    if table == "sensors":
+        try:
+            sensor_names(row[1])
+        except DamagedFile:
+            return False
+    if table == "series":
+        _, _, tag, _, _, source, sensors = row
+        return tag in kept["tag"] and source in kept["name"] and sensors in kept["sensors"]
+    return True
 
 
 def _is_whole(row: tuple[Any, ...]) -> bool:
@@ -138,14 +226,17 @@ def _open_damaged(path: Path) -> sqlite3.Connection:
     return connection
 
 
-def _readable(source: sqlite3.Connection, table: str, what: str) -> Iterator[list[tuple[Any, ...]]]:
-    """The rows of a table in lots, newest first, without those that lie on damaged pages."""
+def _readable(
+    source: sqlite3.Connection, table: str, what: str, on_damage: Callable[[], None] = lambda: None
+) -> Iterator[list[tuple[Any, ...]]]:
+    """The rows of a table in lots, newest first, without those that cannot be reached."""
     below = _LAST_ID
     while True:
         sizes = (_ROWS, _ROWS // 20, 1)
         lots = (_lot(source, table, what, below, size) for size in sizes)
         lot = next((lot for lot in lots if lot is not None), None)
         if lot is None:
+            on_damage()
             below = _past_damage(source, table, what, below)
             if below <= 0:
                 return

@@ -7,6 +7,7 @@ thread.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from pathlib import Path
@@ -16,27 +17,38 @@ from lupin_twin.journal.condition import Condition, JournalState
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.lock import InUse, Lock
 from lupin_twin.journal.pending import MAX_WEIGHT, Entry, Pending
+from lupin_twin.journal.prefilling import Stretch
 from lupin_twin.journal.restoring import Restored
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rows import Row
 from lupin_twin.journal.runs import Clock, Run
-from lupin_twin.journal.schema import Foreign, says_damaged
+from lupin_twin.journal.schema import DamagedFile, Foreign, says_damaged
 
-# Rows wait so long for others to share a commit with; half of the 100 ms in which they are safe
-# from a killed process.
+# Rows wait so long for others to share a commit with, from when the first of them was handed over;
+# half of the 100 ms in which they are safe from a killed process. Late ones do not wait.
 _GATHER_S: Final = 0.04
 _MAX_BATCH: Final = 500
-_SLOW_S: Final = 2.0
+# Ten times what is promised: a checkpoint on a slow disk is no reason yet to alarm anybody.
+_SLOW_S: Final = 1.0
 _RETRY_S: Final = (0.5, 1.0, 2.0, 5.0, 10.0)
 # With nothing to write: how often the file is looked after.
 _IDLE_S: Final = 1.0
+# What readers say has a file set aside no oftener: were it their fault, copies would fill the disk.
+_HEAL_EVERY_S: Final = 86_400.0
+
+
+_HEALED_IN: Final = (JournalState.RECORDING, JournalState.FAILING)
 
 
 class _Era(NamedTuple):
-    """A clock that the twin has followed; `scans` are restored per series at the start."""
+    """A clock that the twin has followed; `scans` are restored per series at the start.
+
+    `before_ns` is where the one before it had come to, where the twin saw it go back.
+    """
 
     clock: Clock
     scans: int
+    before_ns: int | None
 
 
 class Journal:
@@ -60,18 +72,21 @@ class Journal:
         self._written = self._repeated = self._refused = 0
         self._is_sound: bool | None = None
         self._failures = 0
+        self._met_damage = ""
+        self._heals_from_s = -math.inf
         self._set_aside = ""
+        self._simulated: Stretch | None = None
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
         self._thread.start()
 
     # --- for the twin -------------------------------------------------------------------------
 
-    def begin(self, clock: Clock, scans_per_series: int = 1) -> None:
-        """Follow a clock from now on: the first one, or one that has gone back.
+    def begin(self, clock: Clock, scans_per_series: int = 1, before_ns: int | None = None) -> None:
+        """Follow a clock from now on: the first one, or one that has gone back from `before_ns`.
 
         Nothing is written before the first. With that, the journal restores.
         """
-        self._eras.append(_Era(clock, scans_per_series))
+        self._eras.append(_Era(clock, scans_per_series, before_ns))
         self._pending.arrived.set()
 
     def write(self, row: Row) -> None:
@@ -112,7 +127,17 @@ class Journal:
             refused=told.refused,
             file_bytes=told.file_bytes,
             set_aside=told.set_aside,
+            simulated_ns=told.simulated_ns,
         )
+
+    def heal(self, damage: str) -> None:
+        """Have the file set aside, as somebody has met damage in it; for any thread.
+
+        What can be read of it is read, as at a start. That is done once a day at most.
+        """
+        if self._told.state in _HEALED_IN and time.monotonic() >= self._heals_from_s:
+            self._met_damage = damage
+            self._pending.arrived.set()
 
     def close(self, wait_s: float = 1.5) -> None:
         """Write what is waiting and let go of the file; a disk that hangs is not waited for."""
@@ -148,12 +173,12 @@ class Journal:
         try:
             self._is_sound = True
             self._set_aside = file.set_aside or self._set_aside
+            self._simulated = file.simulated
             file.keep_runs(self._runs)
-            self._catch_up(file)
-            self._tell(JournalState.RECORDING, self._summary())
             is_last = False
             while not is_last:
                 is_last = self._stop.is_set()
+                self._see_damage()
                 self._catch_up(file)
                 self._write(file, is_last=is_last)
                 has_more = file.look_after() if not is_last else False
@@ -161,16 +186,28 @@ class Journal:
                 if not is_last and not self._pending.arrived.wait(0.0 if has_more else _IDLE_S):
                     continue
                 # Others may be about to come.
-                self._stop.wait(_GATHER_S)
+                if not is_last:
+                    self._stop.wait(self._gather_s())
         finally:
             file.close()
+
+    def _gather_s(self) -> float:
+        *_, oldest_s = self._pending.counts()
+        return _GATHER_S if oldest_s is None else oldest_s + _GATHER_S - time.monotonic()
+
+    def _see_damage(self) -> None:
+        damage, self._met_damage = self._met_damage, ""
+        # Two may have met it, one of them a little later.
+        if damage and time.monotonic() >= self._heals_from_s:
+            self._heals_from_s = time.monotonic() + _HEAL_EVERY_S
+            raise DamagedFile(f"it is damaged ({damage}), and is being set aside")
 
     def _catch_up(self, file: JournalFile) -> None:
         """Give each clock that the twin has followed its run; the first one restores."""
         while len(self._runs) < len(self._eras):
             era = self._eras[len(self._runs)]
             if self._runs:
-                self._runs.append(file.next_run(self._runs[-1], era.clock))
+                self._runs.append(file.next_run(self._runs[-1], era.clock, era.before_ns))
             else:
                 run = file.first_run(era.clock)
                 restored = file.restore(run, era.scans)
@@ -221,6 +258,7 @@ class Journal:
             refused=self._refused,
             file_bytes=self._told.file_bytes if file_bytes is None else file_bytes,
             set_aside=self._set_aside,
+            simulated_ns=self._simulated,
         )
 
     def _tell_failure(self, error: Exception) -> None:

@@ -1,0 +1,315 @@
+"""From the twin to the alarms: the past at the start, and then what has come since.
+
+The journal is followed write by write, in lots, on workers; while nothing changes, nothing is done.
+Where none is kept, or it fails, what the states tell is taken instead, and that is said.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Final, TypeVar
+
+from lupin_bridge.alarms.board import AlarmBoard, AlarmSource
+from lupin_bridge.alarms.hearing import RUN, writes_between
+from lupin_bridge.alarms.ledger import Change, Ledger, Page
+from lupin_bridge.judge.alarm import HOUSE, Alarm, alarm_id
+from lupin_bridge.judge.choosing import Criteria
+from lupin_bridge.judge.following import Follower, Found
+from lupin_bridge.judge.verdict import Kind, Reason, Verdict
+from lupin_bridge.twin.source import Told, TwinSource, TwinUnavailableError
+from lupin_twin.journal.condition import JournalState
+from lupin_twin.past import NotRemembered, PastRefused
+from lupin_twin.past_writes import PastWrite, PastWrites, RunSpan, WritesRequest
+from lupin_twin.state import NANOSECONDS_PER_SECOND, Snapshot
+
+log = logging.getLogger(__name__)
+
+DAY_NS: Final = 86_400 * NANOSECONDS_PER_SECOND
+# Writes that are read at once: some tens of milliseconds of a worker.
+LOT: Final = 500
+LOT_S: Final = 0.05
+# And of the past in all: a large house's last day, a small one's weeks.
+REACH_COUNT: Final = 300_000
+# What is observed stands in the journal so long after; and once more, for a disk that is slow.
+JOURNAL_S: Final = 0.15
+AGAIN_S: Final = 1.5
+RETRY_S: Final = 5.0
+# A journal that has not answered for so long says nothing of now, although the twin is there.
+UNANSWERED_S: Final = 30.0
+# All is read again no oftener than this, whatever comes late.
+OVER_AGAIN_S: Final = 30.0
+_NOT_KEPT: Final = frozenset(
+    {JournalState.OFF, JournalState.FAILING, JournalState.IN_USE, JournalState.FOREIGN}
+)
+# Numbers of what is heard here: beyond those of any journal.
+_FIRST_HEARD: Final = 2**62
+_ALL_TIME: Final = (RunSpan(RUN, 0, 2**63 - 1),)
+_SILENCES: Final = 100
+_AS_BEFORE: Final = Found((), is_whole=False)
+
+ResultT = TypeVar("ResultT")
+
+
+class AlarmFeed:
+    """Keeps `board` as it follows from what the twin observes. Belongs to the event loop.
+
+    `now_ns` tells ROS time, None where it is not known; `days` is how far back the past is read.
+    """
+
+    def __init__(
+        self,
+        source: TwinSource,
+        criteria: Criteria,
+        board: AlarmBoard,
+        now_ns: Callable[[], int | None],
+        days: float,
+    ) -> None:
+        self._source = source
+        self._criteria = criteria
+        self._board = board
+        self._now_ns = now_ns
+        self._reach_ns = int(days * DAY_NS)
+        self._wake = asyncio.Event()
+        self._follower: Follower | None = None
+        self._journal = ""
+        self._last = 0
+        self._written = 0
+        self._since_ns: int | None = None
+        self._due_ns = 2**63 - 1
+        self._is_caught_up = False
+        self._generation = 0
+        self._over_again_s = -OVER_AGAIN_S
+        # Tags of which something came too late, and those of which that was so before.
+        self._late: frozenset[str] = frozenset()
+        self._wide: frozenset[str] = frozenset()
+        self.missed = 0
+        self._says: AlarmSource = "journal"
+        self._seen: Snapshot | None = None
+        self._heard: list[PastWrite] = []
+        self._heard_number = _FIRST_HEARD
+        self._silences: list[Alarm] = []
+        self._ledger = Ledger()
+        self._again: asyncio.TimerHandle | None = None
+        self._task: asyncio.Task[None] | None = None
+
+    def start(self) -> None:
+        """Begin to follow."""
+        self._task = asyncio.create_task(self._run(), name="alarms")
+
+    async def stop(self) -> None:
+        """End."""
+        if self._again is not None:
+            self._again.cancel()
+        if self._task is not None:
+            self._task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._task
+
+    # --- what happens ----------------------------------------------------------------------------
+
+    def on_state(self, told: Told) -> None:
+        """The twin has told its state; costs nothing where that and the journal are as before."""
+        before, now = self._seen, told.snapshot
+        is_new = before is None or before.tags != now.tags
+        is_kept = told.journal.state not in _NOT_KEPT
+        if is_kept == (self._says == "heard"):
+            self._begin("journal" if is_kept else "heard")
+            before, is_new = None, True
+        if is_new:
+            if not is_kept:
+                if before is not None and now.stamp_ns < before.stamp_ns:
+                    self._begin("heard")
+                    before = None
+                writes = writes_between(before, now, self._heard_number)
+                self._heard_number += len(writes)
+                self._heard += writes
+            self._seen = now
+        # What comes late, or is written late, is in the journal and changes nothing that is now.
+        is_written = is_kept and told.journal.written != self._written
+        self._written = told.journal.written
+        if is_new or is_written or now.stamp_ns >= self._due_ns:
+            self._wake.set()
+
+    def on_silence(self, *, is_silent: bool, last_ns: int | None) -> None:
+        """The twin has fallen silent, or speaks again; `last_ns` is its newest stamp."""
+        open_now = self._silences[-1] if self._silences else None
+        was_silent = open_now is not None and open_now.is_active
+        if is_silent == was_silent or last_ns is None:
+            return
+        if open_now is None or not was_silent:
+            reason = Reason(Kind.SILENT, Verdict.UNKNOWN, since_ns=last_ns)
+            name = alarm_id(HOUSE, Kind.SILENT, "", 0, last_ns)
+            self._silences = [*self._silences, Alarm(name, reason, HOUSE, last_ns)][-_SILENCES:]
+        else:
+            over = Alarm(
+                open_now.id,
+                open_now.reason,
+                HOUSE,
+                open_now.raised_at_ns,
+                max(last_ns, open_now.raised_at_ns),
+            )
+            self._silences[-1] = over
+        self._wake.set()
+
+    # --- following -------------------------------------------------------------------------------
+
+    def _begin(self, says: AlarmSource) -> None:
+        """Forget all that was read, to read it again."""
+        self._generation += 1
+        self._says = says
+        self._follower, self._last, self._journal = None, 0, ""
+        self._heard, self._seen = [], None
+        self._since_ns, self._is_caught_up = None, False
+        self._late = frozenset()
+
+    async def _run(self) -> None:
+        loop = asyncio.get_running_loop()
+        why, answered_s = "", loop.time()
+        while True:
+            await self._wake.wait()
+            await asyncio.sleep(JOURNAL_S)
+            self._wake.clear()
+            try:
+                await (self._take_heard() if self._says == "heard" else self._follow())
+            except (NotRemembered, PastRefused, TwinUnavailableError) as error:
+                if str(error) != why:
+                    log.info("alarms are as they were: %s", error)
+                why = str(error)
+                if isinstance(error, NotRemembered) and error.is_lasting:
+                    self._hear_instead()
+                else:
+                    self._ask_again(loop, RETRY_S)
+                await self._tell_silence(loop.time() - answered_s)
+            except Exception:  # nobody waits for this task: it begins anew whatever it was
+                log.exception("alarms are as they were, and are worked out anew")
+                self._begin(self._says)
+                self._ask_again(loop, RETRY_S)
+                await self._tell_silence(loop.time() - answered_s)
+            else:
+                why, answered_s = "", loop.time()
+
+    def _ask_again(self, loop: asyncio.AbstractEventLoop, wait_s: float) -> None:
+        if self._again is not None:
+            self._again.cancel()
+        self._again = loop.call_later(wait_s, self._wake.set)
+
+    def _hear_instead(self) -> None:
+        """The twin keeps no journal, though it did not say so."""
+        seen = self._seen
+        self._begin("heard")
+        if seen is not None:
+            self._heard = writes_between(None, seen, self._heard_number)
+            self._heard_number += len(self._heard)
+            self._seen = seen
+        self._wake.set()
+
+    async def _take_heard(self) -> None:
+        lot, self._heard = self._heard, []
+        if self._follower is None:
+            self._follower = self._new(_ALL_TIME)
+        for first in range(0, len(lot), LOT):
+            await self._take(lot[first : first + LOT])
+        await self._tell()
+
+    async def _follow(self) -> None:
+        loop, had = asyncio.get_running_loop(), self._last
+        while True:
+            generation = self._generation
+            asked = WritesRequest(self._last, self._reach_ns / 1e9, REACH_COUNT, LOT)
+            past = await self._source.writes(asked)
+            if generation != self._generation:
+                return  # it was begun anew meanwhile, and has been woken
+            if self._is_another(past):
+                self._begin("journal")
+                continue
+            if self._follower is None:
+                self._follower = self._new(past.spans)
+            self._journal, self._last = past.journal, past.last
+            await self._take(past.writes)
+            if generation != self._generation:
+                return
+            if self._late and loop.time() >= self._over_again_s + OVER_AGAIN_S:
+                # What came late belongs to what is no longer kept as it was.
+                self._over_again_s = loop.time()
+                self._wide |= self._late
+                self._begin("journal")
+                continue
+            if past.is_all:
+                break
+        await self._tell()
+        if self._late:
+            self._ask_again(loop, max(AGAIN_S, self._over_again_s + OVER_AGAIN_S - loop.time()))
+        elif self._last != had:
+            self._ask_again(loop, AGAIN_S)
+
+    def _is_another(self, past: PastWrites) -> bool:
+        """Whether it is another journal than the one read so far, or the clock began a new run."""
+        is_other_axis = self._follower is not None and self._follower.spans != past.spans
+        is_other = bool(self._journal) and past.journal != self._journal
+        return is_other or past.last < self._last or is_other_axis
+
+    def _new(self, spans: Sequence[RunSpan]) -> Follower:
+        criteria = self._criteria
+        return Follower(
+            criteria.sensors, criteria.is_day, spans, criteria.recent_s, wide=self._wide
+        )
+
+    async def _take(self, lot: Sequence[PastWrite]) -> None:
+        follower = self._follower
+        if follower is None or not lot:
+            return
+        oldest_ns = min(write.stamp_ns for write in lot)
+        if self._since_ns is None or oldest_ns < self._since_ns:
+            self._since_ns = oldest_ns
+        missed = follower.missed
+        late = await self._on_worker(lambda _: follower.take(lot))
+        # A journal is read again for those tags, and more of them is kept; once more is no use.
+        is_lost = follower.wide if self._says == "journal" else late
+        self._late |= late - is_lost
+        self._missed(follower.missed - missed + len(late & is_lost))
+
+    def _missed(self, count: int) -> None:
+        if count and not self.missed:
+            log.warning(
+                "something was heard so late that alarms are told as if it had not been: more of "
+                "it is in lupin_alarms_missed"
+            )
+        self.missed += count
+
+    async def _tell(self) -> None:
+        follower, now_ns = self._follower, self._now_ns()
+        if follower is None or now_ns is None:
+            return
+        moment_ns, since_ns = now_ns, max(0, now_ns - self._reach_ns)
+        beside = tuple(alarm for alarm in self._silences if alarm.raised_at_ns <= moment_ns)
+
+        def find(_: object) -> tuple[Page, Change, int]:
+            found = follower.found(moment_ns, since_ns)
+            return *self._ledger.take(found, beside, since_ns), found.due_ns
+
+        page, change, due_ns = await self._on_worker(find)
+        self._due_ns = due_ns
+        is_past, self._is_caught_up = not self._is_caught_up, True
+        begins_ns = moment_ns if self._since_ns is None else self._since_ns
+        self._board.put(page, replace(change, is_past=is_past), self._says, begins_ns)
+
+    async def _tell_silence(self, unanswered_s: float) -> None:
+        """The rest is as it was: of a twin that is gone nobody else says anything.
+
+        Of one that is there, and a journal that does not answer, nobody may take it for all there
+        is.
+        """
+        now, beside = self._board.now, tuple(self._silences)
+        page, change = await self._on_worker(lambda _: self._ledger.take(_AS_BEFORE, beside))
+        is_gone = any(alarm.is_active for alarm in beside)
+        is_old = unanswered_s >= UNANSWERED_S and not is_gone
+        source: AlarmSource = "starting" if is_old else now.source
+        self._board.put(page, change, source, now.since_ns)
+
+    async def _on_worker(self, work: Callable[[object], ResultT]) -> ResultT:
+        """Done where it holds up nobody; the loop only takes over what comes of it."""
+        return await asyncio.wrap_future(self._source.workers.submit(work, LOT_S))

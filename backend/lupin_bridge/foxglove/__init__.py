@@ -1,0 +1,1 @@
+"""The read-only part of Foxglove's WebSocket protocol."""

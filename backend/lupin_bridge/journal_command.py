@@ -1,0 +1,367 @@
+"""`lupin-twin journal`: what is in a journal, whether it is whole, its rows, the file made small.
+
+Everything but `vacuum` reads, also while a twin writes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sqlite3
+import sys
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import closing
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import IO, Final
+
+from lupin_bridge.bags.topics import SUFFIX
+from lupin_bridge.judge.choosing import own_sensors
+from lupin_bridge.past import table
+from lupin_bridge.past.moments import MAX_SECONDS, moment
+from lupin_twin.journal.checking import find_all_damage
+from lupin_twin.journal.export import rows
+from lupin_twin.journal.lock import InUse, holder_of
+from lupin_twin.journal.overview import Overview, RunExtent, overview
+from lupin_twin.journal.schema import FILE_ERRORS, Empty, Foreign, open_reader, says_damaged
+from lupin_twin.journal.vacuuming import NotPossible, hear_interrupts, vacuum
+from lupin_twin.memory import demo_journal_path, journal_path
+from lupin_twin.past import NotRemembered, PastRefused, PastRow, seconds
+
+ACTIONS: Final[Mapping[str, str]] = {
+    "info": "what is in it: size, rows, tags, sensors, how far back, runs of the clock",
+    "check": "read all of it for damage; exit code 1 if there is any",
+    "export": "its readings and failed tries as CSV, or its observations as a recording",
+    "vacuum": "make the file as small as what is in it; its twin has to be stopped",
+}
+FAILED: Final = 1
+INTERRUPTED: Final = 130
+_MAX_TOLD: Final = 20
+_RUNS_TOLD: Final = 10
+# Past every stamp.
+_END_NS: Final = (MAX_SECONDS + 1) * 10**9
+_EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
+_TELL_EVERY_S: Final = 0.5
+
+
+class JournalError(Exception):
+    """What is asked for cannot be done; the message is the one line that says why."""
+
+
+def add_parser(roles: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add `journal` and its actions to the command's options."""
+    text = "what a twin remembers: info, check, export, vacuum"
+    parser = roles.add_parser("journal", help=text, description=text, allow_abbrev=False)
+    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+    for action, what in ACTIONS.items():
+        own = actions.add_parser(action, help=what, description=what, allow_abbrev=False)
+        which = own.add_mutually_exclusive_group()
+        which.add_argument("--journal", metavar="PATH", help="the file")
+        which.add_argument(
+            "--demo", metavar="SEED", type=int, help="that of the demo with this seed (make run: 0)"
+        )
+        which.add_argument(
+            "--namespace", default="", help="that of the twin in this namespace (default: none)"
+        )
+        own.add_argument(
+            "--domain",
+            type=int,
+            metavar="ID",
+            help="that of the twin in this ROS domain (default: ROS_DOMAIN_ID, or 0)",
+        )
+        if action == "export":
+            own.add_argument(
+                "recording",
+                metavar="FILE.mcap",
+                nargs="?",
+                type=Path,
+                help="not CSV: the observations themselves, for ROS's own tools",
+            )
+            when = "seconds of ROS time, or ISO 8601 with an offset"
+            own.add_argument("--from", dest="start", metavar="TIME", help=f"from then on: {when}")
+            own.add_argument("--to", dest="end", metavar="TIME", help=f"until before then: {when}")
+            own.add_argument("--tag", metavar="ID", help="one tag alone")
+            own.add_argument("--sensor", metavar="NAME", help="one sensor alone")
+            own.add_argument("--output", metavar="FILE", help="not to the standard output")
+
+
+def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
+    """Do what the options ask for, to the standard output; returns the process's exit code."""
+    try:
+        path = _path(options, environ)
+        if options.action == "export":
+            code = _export(path, options)
+        else:
+            code = {"info": _info, "check": _check, "vacuum": _vacuum}[options.action](path)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Who reads has heard enough. Python would complain of it once more as it ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except (JournalError, PastRefused, NotRemembered, InUse, Empty, Foreign, NotPossible) as error:
+        return _fail(str(error))
+    except (*FILE_ERRORS, OSError) as error:
+        if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_INTERRUPT:
+            return INTERRUPTED
+        wrong = "is damaged" if says_damaged(error) else "cannot be read or written"
+        return _fail(f"the journal {path} {wrong}: {error}")
+    return code
+
+
+# --- which file ----------------------------------------------------------------------------------
+
+
+def _path(options: argparse.Namespace, environ: Mapping[str, str]) -> Path:
+    path: Path | None
+    try:
+        if options.demo is not None:
+            path = demo_journal_path(environ, options.demo)
+        else:
+            path = journal_path(
+                options.journal or "", environ, _domain(options, environ), options.namespace
+            )
+    except RuntimeError as error:
+        raise JournalError(f"there is no home to look for a journal in: {error}") from error
+    if path is None:
+        raise JournalError("--journal is 'off', must be a file")
+    if path.is_file():
+        return path
+    others = sorted(file.name for file in path.parent.glob("*.sqlite"))
+    there = f"; in its folder there are {', '.join(others[:9])}" if others else ""
+    raise JournalError(f"there is no journal {path}{there}")
+
+
+def _domain(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
+    if options.domain is not None:
+        return int(options.domain)
+    given = environ.get("ROS_DOMAIN_ID") or "0"
+    if not given.isdecimal():
+        raise JournalError(f"ROS_DOMAIN_ID is {given!r}, must be a whole number")
+    return int(given)
+
+
+def _reader(path: Path) -> sqlite3.Connection:
+    try:
+        connection = open_reader(path)
+    except sqlite3.OperationalError:
+        # SQLite wants to write beside a file that it reads. Where nobody can, nobody writes it.
+        if path.with_name(path.name + "-wal").exists() or holder_of(path) is not None:
+            raise
+        connection = open_reader(path, is_still=True)
+    hear_interrupts(connection)
+    return connection
+
+
+# --- info ----------------------------------------------------------------------------------------
+
+
+def _info(path: Path) -> int:
+    with closing(_reader(path)) as connection:
+        found = overview(connection, path)
+    lines = [("file", f"{path}"), *_lines(found, holder_of(path))]
+    width = max(len(what) for what, _ in lines)
+    for what, text in lines:
+        sys.stdout.write(f"{what:<{width}}  {text}\n")
+    return 0
+
+
+def _lines(found: Overview, holder: str | None) -> list[tuple[str, str]]:
+    rows = found.rows
+    extents = [extent for extent in found.runs if extent.first_ns is not None]
+    hidden = max(0, len(found.runs) - _RUNS_TOLD)
+    return [
+        ("size", f"{_mb(found.file_bytes)}, {_mb(found.free_bytes)} of it free"),
+        ("log", _mb(found.log_bytes)),
+        ("recording", holder or "nobody"),
+        ("scans", f"{rows['scan']:,}, of them {found.failures:,} failed"),
+        ("looks", f"{rows['look']:,}"),
+        ("places", f"{rows['pin']:,}"),
+        ("tags", f"{rows['tag']:,}"),
+        ("sensors", ", ".join(found.sensors) or "none"),
+        ("reach", _reach(extents)),
+        ("rollups", f"{rows['rollup']:,} hours of a tag{_rolled(found.rolled_ns)}"),
+        ("retention", _retention(found)),
+        (
+            "runs",
+            f"{len(found.runs):,} of the clock" + (f", the last {_RUNS_TOLD}" if hidden else ""),
+        ),
+        *(("", _run_line(extent)) for extent in found.runs[hidden:]),
+        *(("set aside", f"{name}, {_mb(size)}") for name, size in found.set_aside),
+    ]
+
+
+def _reach(extents: list[RunExtent]) -> str:
+    of_wall = [extent for extent in extents if not extent.run.begun.is_simulated]
+    if not of_wall:
+        return "simulated clocks alone, see runs" if extents else "nothing"
+    first = min(extent.first_ns or 0 for extent in of_wall)
+    last = max(extent.last_ns or 0 for extent in of_wall)
+    return f"{_iso(first)} to {_iso(last)}"
+
+
+def _rolled(stretch_ns: tuple[int, int] | None) -> str:
+    return "" if stretch_ns is None else f", {_iso(stretch_ns[0])} to {_iso(stretch_ns[1])}"
+
+
+def _retention(found: Overview) -> str:
+    if not found.kept_ns:
+        return "not told yet by its twin"
+    return (
+        f"{found.kept_ns / 86_400e9:g} days and {_mb(found.kept_bytes)} at most;"
+        " rollups for ten years"
+    )
+
+
+def _run_line(extent: RunExtent) -> str:
+    begun = extent.run.begun
+    if extent.first_ns is None or extent.last_ns is None:
+        stretch = "nothing is in it"
+    elif begun.is_simulated:
+        stretch = f"second {extent.first_ns / 1e9:.3f} to {extent.last_ns / 1e9:.3f}"
+    else:
+        stretch = f"{_iso(extent.first_ns)} to {_iso(extent.last_ns)}"
+    clock = "simulated clock" if begun.is_simulated else "wall clock"
+    return f"{extent.run.id}: {clock}, begun {_iso(begun.arrival_ns)}: {stretch}"
+
+
+# --- check ---------------------------------------------------------------------------------------
+
+
+def _check(path: Path) -> int:
+    found = 0
+    progress = _Progress()
+    with closing(_reader(path)) as connection:
+        for wrong in find_all_damage(connection, progress.tell):
+            found += 1
+            if found <= _MAX_TOLD:
+                progress.clear()
+                sys.stdout.write(f"{wrong}\n")
+    progress.clear()
+    if found > _MAX_TOLD:
+        sys.stdout.write(f"and {found - _MAX_TOLD:,} more\n")
+    sys.stdout.write(f"{path} is {f'damaged in {found:,} places' if found else 'whole'}\n")
+    return FAILED if found else 0
+
+
+# --- export --------------------------------------------------------------------------------------
+
+
+def _export(path: Path, options: argparse.Namespace) -> int:
+    start_ns = 0 if options.start is None else moment("--from", options.start)
+    end_ns = _END_NS if options.end is None else moment("--to", options.end)
+    if end_ns < start_ns:
+        raise JournalError(f"--to is {seconds(end_ns)}, before --from, {seconds(start_ns)}")
+    if options.recording is not None:
+        return _record(path, options, start_ns, end_ns)
+    with closing(_reader(path)) as connection:
+        lots = rows(connection, start_ns, end_ns, options.tag, options.sensor)
+        if options.output is None:
+            _write_csv(lots, sys.stdout.buffer)
+            return 0
+        try:
+            # Unbuffered: what could not be written is told here, and not as the file is closed.
+            with Path(options.output).open("wb", buffering=0) as output:
+                _write_csv(lots, output)
+        except OSError as error:
+            raise JournalError(f"cannot write {options.output}: {error.strerror}") from error
+    return 0
+
+
+def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int) -> int:
+    target: Path = options.recording
+    for name in ("tag", "sensor", "output"):
+        if getattr(options, name) is not None:
+            raise JournalError(f"--{name} is for CSV: {target} has whole observations")
+    if target.suffix != SUFFIX:
+        raise JournalError(f"{target} does not end in {SUFFIX}: that is how its form is known")
+    try:
+        # Here, where it is needed: it knows ROS.
+        from lupin_bridge.bags.journal_export import export  # noqa: PLC0415
+
+        with closing(_reader(path)) as connection:
+            made = export(connection, target, start_ns, end_ns, options.namespace)
+    except FileExistsError as error:
+        raise JournalError(f"{target} is there already, and nothing is overwritten") from error
+    except (OSError, LookupError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise JournalError(f"cannot make {target}: {why}") from error
+    if not made.observations + made.tags:
+        raise JournalError(f"the journal {path} holds nothing of that period")
+    damaged = f"; {made.damaged:,} rows are damaged and left out" if made.damaged else ""
+    sys.stdout.write(
+        f"{made.observations:,} observations and {made.tags:,} messages of discovered tags are in"
+        f" {target}{damaged}\n"
+    )
+    return 0
+
+
+def _write_csv(lots: Iterable[Sequence[PastRow]], output: IO[bytes]) -> None:
+    sensors = own_sensors()
+    _write(output, table.HEADER)
+    for lot in lots:
+        _write(output, table.lines(lot, sensors))
+
+
+def _write(output: IO[bytes], text: bytes) -> None:
+    rest = memoryview(text)
+    while rest:
+        rest = rest[output.write(rest) :]
+
+
+# --- vacuum --------------------------------------------------------------------------------------
+
+
+def _vacuum(path: Path) -> int:
+    progress = _Progress()
+    before, after = vacuum(path, "lupin-twin journal vacuum", lambda s: progress.tell("copying", s))
+    progress.clear()
+    sys.stdout.write(f"{path}: {_mb(before)} before, {_mb(after)} after\n")
+    return 0
+
+
+# --- telling -------------------------------------------------------------------------------------
+
+
+class _Progress:
+    """How far it is, on the standard error: one line that is written over, if a person looks."""
+
+    def __init__(self) -> None:
+        self._is_seen = sys.stderr.isatty()
+        self._what = ""
+        self._told_s = 0.0
+
+    def tell(self, what: str, share: float) -> None:
+        is_new, self._what = what != self._what, what
+        if not self._is_seen:
+            if is_new:
+                sys.stderr.write(f"{what}\n")
+            return
+        if is_new or time.monotonic() - self._told_s >= _TELL_EVERY_S:
+            self._told_s = time.monotonic()
+            sys.stderr.write(f"\r\x1b[K{what} {share:.0%}")
+            sys.stderr.flush()
+
+    def clear(self) -> None:
+        if self._is_seen:
+            sys.stderr.write("\r\x1b[K")
+            sys.stderr.flush()
+
+
+def _mb(count: int) -> str:
+    return f"{count / 1e6:,.1f} MB"
+
+
+def _iso(stamp_ns: int) -> str:
+    try:
+        moment = _EPOCH + timedelta(microseconds=stamp_ns // 1000)
+    except OverflowError:
+        return f"second {stamp_ns // 10**9}"
+    return moment.isoformat(timespec="seconds").replace("+00:00", "Z")
+
+
+def _fail(message: str) -> int:
+    sys.stderr.write(f"lupin-twin: {' '.join(message.split())}\n")
+    return FAILED

@@ -1,0 +1,1 @@
+"""What the twin says, judged: by the ranges of one file, for page, frames and HTTP alike."""

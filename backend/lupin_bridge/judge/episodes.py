@@ -1,0 +1,276 @@
+"""The episodes of one tag: what was wrong from when to when, by its occasions alone. Pure.
+
+An occasion is all that was heard of a tag with one stamp. A reason that holds at two occasions in a
+row, of those that can tell, raises an alarm; one that has not held at two clears it. Tries that
+fail raise one only where they go on for the tag's usual interval: a second try in one round says no
+more than the first. A sensor that scans leave out is old once its reading holds no longer, but not
+before three times the sensor's own last interval: what every tenth scan has is not missing from the
+others. Heard once, it has no interval yet. Too little light raises one after two hours: before, it
+may be dawn or dusk. A pest is seen or not: one look raises, one clears. What
+is out of its range is so until it lies within by 5 % of the range's width: a value that wobbles
+about a limit is one episode.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from lupin_bridge.judge.alarm import Alarm, alarm_id
+from lupin_bridge.judge.daylight import LIGHT
+from lupin_bridge.judge.derived import DERIVED
+from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.judge.rhythm import INTERVALS, LONGEST_NS, holds_ns, interval_ns
+from lupin_bridge.judge.verdict import Kind, Reason, Verdict, derive, judge_value, worst
+from lupin_twin.history import KIND_FLOWER
+from lupin_twin.past_writes import PastWrite
+from lupin_twin.state import STATUS_OK, Reading
+
+# Occasions in a row that raise, and that clear.
+HOLD: Final = 2
+# Of a range's width: so far within it lies what is no longer out of it.
+DEADBAND: Final = 0.05
+# Dawn and dusk, and a cloud, are over by then.
+TWILIGHT_NS: Final = 2 * 3600 * 1_000_000_000
+# Episodes of a tag that are kept: a sensor that goes wild has no more.
+MAX_EPISODES: Final = 100
+
+# Kind, sensor, and what tells two of those apart: the side of a range, the kind of a try.
+Key = tuple[Kind, str, str]
+IsDay = Callable[[int], bool]
+_DIM: Final[Key] = (Kind.RANGE, LIGHT, "low")
+
+
+@dataclass(frozen=True, slots=True)
+class _Watch:
+    """One reason at a tag: how it stands, and how often in a row it has not been so."""
+
+    began_ns: int
+    reason: Reason
+    worst: float | None
+    against: int
+    raised_at_ns: int | None = None
+    raised_as: Verdict | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Finding:
+    """What an occasion says of a key; `reason` None: nothing new, though it may still hold."""
+
+    key: Key
+    holds: bool
+    still_holds: bool
+    reason: Reason | None = None
+    worse: Callable[[float, float], float] | None = None
+
+
+class TagEpisodes:
+    """A tag's episodes in one run of the clock; `step` takes its occasions in the order of time.
+
+    `recent_ns` fixes how long readings hold; None: it is learnt.
+    """
+
+    __slots__ = (
+        "_done",
+        "_heard_ns",
+        "_recent_ns",
+        "_run_ns",
+        "_scans_ns",
+        "_sensors",
+        "_species",
+        "_tag_id",
+        "_watches",
+    )
+
+    def __init__(
+        self, tag_id: str, run_ns: int, sensors: Sensors, recent_ns: int | None = None
+    ) -> None:
+        self._tag_id = tag_id
+        self._run_ns = run_ns
+        self._sensors = sensors
+        self._recent_ns = recent_ns
+        self._species = ""
+        self._scans_ns: tuple[int, ...] = ()
+        # Of each sensor, the last scan that had it, and how long it was from the one before.
+        self._heard_ns: dict[str, tuple[int, int]] = {}
+        self._watches: dict[Key, _Watch] = {}
+        self._done: tuple[Alarm, ...] = ()
+
+    def copy(self) -> TagEpisodes:
+        """The same, to go on from here apart."""
+        other = TagEpisodes(self._tag_id, self._run_ns, self._sensors, self._recent_ns)
+        other._species, other._done = self._species, self._done
+        other._scans_ns, other._heard_ns = self._scans_ns, dict(self._heard_ns)
+        other._watches = dict(self._watches)
+        return other
+
+    def alarms(self, ended_ns: int | None = None) -> Iterator[Alarm]:
+        """All of them; those that are open end at `ended_ns`, where the run has."""
+        yield from self._done
+        for key, watch in self._watches.items():
+            if watch.raised_at_ns is not None:
+                yield self._alarm(key, watch, ended_ns)
+
+    def step(self, writes: Sequence[PastWrite], is_day: IsDay) -> None:
+        """The next occasion: `writes` of one stamp, in the order of hearing."""
+        stamp_ns = writes[0].stamp_ns
+        for write in writes:
+            if write.has_seen:
+                self._species = write.species
+        readings = readings_of(writes)
+        if readings:
+            self._scans_ns = (*self._scans_ns, stamp_ns)[-INTERVALS - 1 :]
+            for name in [reading.name for reading in readings]:
+                before_ns, _ = self._heard_ns.get(name, (stamp_ns, 0))
+                self._heard_ns[name] = (stamp_ns, stamp_ns - before_ns)
+        for finding in self._findings(writes, readings, stamp_ns, is_day):
+            self._note(finding, stamp_ns)
+
+    # --- what an occasion says -----------------------------------------------------------------
+
+    def _findings(
+        self,
+        writes: Sequence[PastWrite],
+        readings: Sequence[Reading],
+        stamp_ns: int,
+        is_day: IsDay,
+    ) -> Iterator[_Finding]:
+        day: bool | None = None
+        for reading in (*readings, *derive(readings)):
+            name = reading.name
+            is_finite = math.isfinite(reading.value)
+            key = (Kind.READING_FAILED, name, "")
+            if name not in DERIVED and (not is_finite or key in self._watches):
+                failed = Reason(Kind.READING_FAILED, Verdict.STRESSED, name, since_ns=stamp_ns)
+                yield _Finding(key, not is_finite, not is_finite, failed)
+            if is_finite:
+                day = is_day(stamp_ns) if day is None else day
+                yield from self._of_range(reading, is_day=day)
+        if readings:
+            yield from self._of_age({reading.name for reading in readings}, stamp_ns)
+        for kind, status in {write.kind: write.status for write in writes}.items():
+            fails, key = status != STATUS_OK, (Kind.SCAN_FAILED, "", str(kind))
+            if fails or key in self._watches:
+                reason = Reason(
+                    Kind.SCAN_FAILED, Verdict.STRESSED, value=float(status), since_ns=stamp_ns
+                )
+                yield _Finding(key, fails, fails, reason)
+        look = next((w for w in reversed(writes) if w.kind == KIND_FLOWER and w.has_seen), None)
+        if look is not None:
+            bugs = float(look.bug_count)
+            pest = Reason(Kind.PEST, Verdict.CRITICAL, value=bugs, since_ns=stamp_ns)
+            yield _Finding((Kind.PEST, "", ""), look.anomaly, look.anomaly, pest, max)
+
+    def _of_range(self, reading: Reading, *, is_day: bool) -> Iterator[_Finding]:
+        ranges = self._sensors.named(reading.name).ranges(is_day=is_day, species=self._species)
+        ideal, value = ranges.ideal, reading.value
+        for side in ("low", "high"):
+            key = (Kind.RANGE, reading.name, side)
+            if ideal is None:
+                yield _Finding(key, holds=False, still_holds=False)
+                continue
+            is_out = value < ideal.low if side == "low" else value > ideal.high
+            if not is_out and key not in self._watches:
+                continue
+            band = DEADBAND * ideal.width
+            is_near = value < ideal.low + band if side == "low" else value > ideal.high - band
+            reason = judge_value(reading, ranges) if is_out else None
+            yield _Finding(key, is_out, is_near, reason, min if side == "low" else max)
+
+    def _of_age(self, told: Collection[str], stamp_ns: int) -> Iterator[_Finding]:
+        """Of the sensors that were heard before, those that a scan told and those it left out."""
+        holds: int | None = None
+        for name, (last_ns, interval) in self._heard_ns.items():
+            key = (Kind.OLD, name, "")
+            if name in told:
+                if key in self._watches:
+                    yield _Finding(key, holds=False, still_holds=False)
+                continue
+            if holds is None:
+                holds = holds_ns(interval_ns(self._scans_ns))
+            own = holds_ns(interval) if interval else LONGEST_NS
+            limit_ns = self._recent_ns or max(holds, own)
+            is_old = stamp_ns - last_ns > limit_ns
+            old = Reason(Kind.OLD, Verdict.UNKNOWN, name, limit=limit_ns / 1e9, since_ns=last_ns)
+            yield _Finding(key, is_old, is_old, old)
+
+    # --- how it goes on ------------------------------------------------------------------------
+
+    def _note(self, finding: _Finding, stamp_ns: int) -> None:
+        watch = self._watches.get(finding.key)
+        at_once = finding.key[0] is Kind.PEST
+        if watch is None:
+            if finding.holds and finding.reason is not None:
+                value = finding.reason.value if finding.worse else None
+                watch = _Watch(stamp_ns, finding.reason, value, 0)
+                if at_once:
+                    verdict = finding.reason.verdict
+                    watch = replace(watch, raised_at_ns=stamp_ns, raised_as=verdict)
+                self._watches[finding.key] = watch
+            return
+        if watch.raised_at_ns is None and not finding.holds:
+            del self._watches[finding.key]
+        elif not finding.still_holds:
+            watch = replace(watch, against=watch.against + 1)
+            self._watches[finding.key] = watch
+            if watch.against == (1 if at_once else HOLD):
+                done = self._alarm(finding.key, watch, stamp_ns)
+                self._done = (*self._done, done)[-MAX_EPISODES:]
+                del self._watches[finding.key]
+        else:
+            self._watches[finding.key] = self._gone_on(watch, finding, stamp_ns)
+
+    def _gone_on(self, watch: _Watch, finding: _Finding, stamp_ns: int) -> _Watch:
+        """The watch after one more occasion at which its reason held."""
+        watch = replace(watch, against=0)
+        now = finding.reason
+        if now is None:
+            return watch
+        if finding.worse is not None and now.value is not None and watch.worst is not None:
+            watch = replace(watch, worst=finding.worse(watch.worst, now.value))
+        reason = watch.reason
+        verdict = worst((reason.verdict, now.verdict)) or now.verdict
+        if watch.raised_at_ns is None and self._has_lasted(finding.key, watch, stamp_ns):
+            # It is raised now, with what is so now, and began with the first of them; what is old
+            # is so since its last reading.
+            is_old = now.kind is Kind.OLD
+            reason = now if is_old else replace(now, since_ns=watch.began_ns)
+            watch = replace(watch, raised_at_ns=stamp_ns, raised_as=verdict)
+        return replace(watch, reason=replace(reason, verdict=verdict))
+
+    def _has_lasted(self, key: Key, watch: _Watch, stamp_ns: int) -> bool:
+        if key == _DIM:
+            return stamp_ns - watch.began_ns >= TWILIGHT_NS
+        if key[0] is not Kind.SCAN_FAILED:
+            return True
+        usual_ns = interval_ns(self._scans_ns)
+        if usual_ns is None:
+            # Scanned once, it was the next round's turn when it failed.
+            usual_ns = watch.began_ns - self._scans_ns[0] if self._scans_ns else 0
+        return stamp_ns - watch.began_ns >= usual_ns
+
+    def _alarm(self, key: Key, watch: _Watch, cleared_at_ns: int | None) -> Alarm:
+        assert watch.raised_at_ns is not None
+        kind, sensor, which = key
+        return Alarm(
+            id=alarm_id(self._tag_id, f"{kind} {which}", sensor, self._run_ns, watch.began_ns),
+            reason=watch.reason,
+            tag_id=self._tag_id,
+            raised_at_ns=watch.raised_at_ns,
+            cleared_at_ns=cleared_at_ns,
+            worst=watch.worst,
+            raised_as=watch.raised_as,
+        )
+
+
+def readings_of(writes: Sequence[PastWrite]) -> tuple[Reading, ...]:
+    """The readings of an occasion: of one sensor, what was heard last."""
+    stamp_ns = writes[0].stamp_ns
+    latest = {
+        name: value
+        for write in writes
+        for name, value in zip(write.sensors, write.values, strict=True)
+    }
+    return tuple(Reading(name, value, stamp_ns) for name, value in latest.items())

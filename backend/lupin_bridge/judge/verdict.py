@@ -1,0 +1,231 @@
+"""What is to be said of a tag, and of the house: a verdict, and the reasons for it as data.
+
+Pure, and without memory. Times are ns of ROS time. A verdict is that of the worst reason; healthy
+is only what was judged and is recent.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from types import MappingProxyType
+from typing import Final
+
+from lupin_bridge.judge.derived import DERIVED
+from lupin_bridge.judge.ranges import Ranges, Sensors
+from lupin_twin.state import NO_FLOWER, STATUS_OK, Reading, TagState
+
+# Readings that do not hold any more say nothing about now, but until then nobody may forget that
+# the last that was heard of a tag was alarming.
+FORGOTTEN_NS: Final = 24 * 3600 * 1_000_000_000
+
+
+class Verdict(StrEnum):
+    """From the worst to the best; a tag of which nothing is known is no better than unknown."""
+
+    CRITICAL = "critical"
+    STRESSED = "stressed"
+    UNKNOWN = "unknown"
+    HEALTHY = "healthy"
+
+
+NOTHING_CHANGED: Final[Mapping[str, int]] = MappingProxyType({})
+_ORDER: Final = {verdict: index for index, verdict in enumerate(Verdict)}
+
+
+def worst(verdicts: Iterable[Verdict]) -> Verdict | None:
+    """The worst of them, None of none."""
+    return min(verdicts, key=_ORDER.__getitem__, default=None)
+
+
+class Kind(StrEnum):
+    """What a reason is about; the last two are the house's alone."""
+
+    RANGE = "range"
+    READING_FAILED = "reading_failed"
+    SCAN_FAILED = "scan_failed"
+    PEST = "pest"
+    OLD = "old"
+    CHANGED = "changed"
+    SILENT = "silent"
+    STOPPED = "stopped"
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """Why: `value` and the `limit` that it passed, in the sensor's unit.
+
+    `since_ns` is the observation that says so; None: there was none. Of `old`, `limit` is how long
+    readings hold, s, and `since_ns` the last one: its age would change all the time. Of `pest`,
+    `value` is how many were counted, of `scan_failed` the status of the try.
+    """
+
+    kind: Kind
+    verdict: Verdict
+    sensor: str = ""
+    value: float | None = None
+    limit: float | None = None
+    since_ns: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """A verdict and its reasons, worst first."""
+
+    verdict: Verdict
+    reasons: tuple[Reason, ...] = ()
+
+
+def judge_tag(
+    tag: TagState,
+    now_ns: int,
+    sensors: Sensors,
+    *,
+    holds_ns: int,
+    is_day: bool,
+    changed: Mapping[str, int] = NOTHING_CHANGED,
+) -> Health:
+    """What is to be said of a tag at `now_ns`, where its readings hold for `holds_ns`.
+
+    `changed` are the sensors that do not read as everything else foretells, and since when.
+    """
+    reasons: list[Reason] = []
+    was_judged = False
+    species = tag.flower.species
+    readings = (*tag.readings, *derive(tag.readings))
+    for reading in readings:
+        ranges = sensors.named(reading.name).ranges(is_day=is_day, species=species)
+        age_ns = _age_ns(reading.observed_at_ns, now_ns)
+        if age_ns is not None and age_ns > FORGOTTEN_NS:
+            continue
+        if not math.isfinite(reading.value):
+            if reading.name not in DERIVED:
+                reasons.append(
+                    Reason(
+                        Kind.READING_FAILED,
+                        Verdict.STRESSED,
+                        reading.name,
+                        since_ns=reading.observed_at_ns,
+                    )
+                )
+            continue
+        reason = judge_value(reading, ranges)
+        if reason is not None:
+            reasons.append(reason)
+        elif ranges.ideal is not None and age_ns is not None and age_ns <= holds_ns:
+            was_judged = True
+    reasons += _of_age(tag, now_ns, holds_ns)
+    reasons += _of_changes(tag, changed)
+    reasons += _of_tries(tag)
+    reasons += _of_flowers(tag)
+    reasons.sort(key=lambda reason: _ORDER[reason.verdict])
+    verdict = worst(reason.verdict for reason in reasons)
+    if verdict is None:
+        verdict = Verdict.HEALTHY if was_judged else Verdict.UNKNOWN
+    return Health(verdict, tuple(reasons))
+
+
+def judge_value(reading: Reading, ranges: Ranges) -> Reason | None:
+    """What is wrong with a finite value: outside critical, outside ideal, or nothing."""
+    for verdict, span in (
+        (Verdict.CRITICAL, ranges.critical),
+        (Verdict.STRESSED, ranges.ideal),
+    ):
+        if span is None or span.low <= reading.value <= span.high:
+            continue
+        limit = span.low if reading.value < span.low else span.high
+        return Reason(
+            Kind.RANGE, verdict, reading.name, reading.value, limit, reading.observed_at_ns
+        )
+    return None
+
+
+def derive(readings: Sequence[Reading]) -> list[Reading]:
+    """The derived quantities of readings that are of one scan; a sensor of that name goes first."""
+    by_name = {reading.name: reading for reading in readings}
+    found = []
+    for derived in DERIVED.values():
+        first, second = (by_name.get(name) for name in derived.sources)
+        if derived.name in by_name or first is None or second is None:
+            continue
+        if first.observed_at_ns == second.observed_at_ns:
+            value = derived.formula(first.value, second.value)
+            if math.isfinite(value):
+                found.append(Reading(derived.name, value, first.observed_at_ns))
+    return found
+
+
+def with_derived(tags: Sequence[TagState], sensor_type: str) -> Sequence[TagState]:
+    """The tags, those that have what it takes with a reading of the derived `sensor_type` too."""
+    if sensor_type not in DERIVED:
+        return tags
+    return [replace(tag, readings=(*tag.readings, *derive(tag.readings))) for tag in tags]
+
+
+def judge_house(tags: Mapping[Verdict, int], *, is_silent: bool) -> Health:
+    """The house is its worst tag; unknown where more than half of its tags are, or none speaks.
+
+    `tags` is how many have each verdict.
+    """
+    if is_silent:
+        return Health(Verdict.UNKNOWN, (Reason(Kind.SILENT, Verdict.UNKNOWN),))
+    if 2 * tags.get(Verdict.UNKNOWN, 0) > sum(tags.values()):
+        return Health(Verdict.UNKNOWN)
+    return Health(worst(v for v, count in tags.items() if count) or Verdict.UNKNOWN)
+
+
+def _age_ns(observed_at_ns: int | None, now_ns: int) -> int | None:
+    return None if observed_at_ns is None else max(0, now_ns - observed_at_ns)
+
+
+def _of_age(tag: TagState, now_ns: int, holds_ns: int) -> Iterable[Reason]:
+    """Each sensor whose reading does not hold any more; one reason where none does."""
+    ages = {r.name: _age_ns(r.observed_at_ns, now_ns) for r in tag.readings}
+    old = {name: age for name, age in ages.items() if age is None or age > holds_ns}
+    limit_s = holds_ns / 1e9
+    if not tag.readings:
+        yield Reason(Kind.OLD, Verdict.UNKNOWN, limit=limit_s)
+    elif len(old) == len(ages):
+        newest = max(
+            tag.readings, key=lambda r: -1 if r.observed_at_ns is None else r.observed_at_ns
+        )
+        yield _old("", newest, limit_s)
+    else:
+        for reading in tag.readings:
+            if reading.name in old:
+                yield _old(reading.name, reading, limit_s)
+
+
+def _old(sensor: str, reading: Reading, limit_s: float) -> Reason:
+    since_ns = reading.observed_at_ns
+    return Reason(Kind.OLD, Verdict.UNKNOWN, sensor, limit=limit_s, since_ns=since_ns)
+
+
+def _of_changes(tag: TagState, changed: Mapping[str, int]) -> Iterable[Reason]:
+    for reading in tag.readings:
+        if reading.name in changed and math.isfinite(reading.value):
+            yield Reason(
+                Kind.CHANGED,
+                Verdict.STRESSED,
+                reading.name,
+                value=reading.value,
+                since_ns=changed[reading.name],
+            )
+
+
+def _of_tries(tag: TagState) -> Iterable[Reason]:
+    last = tag.last_try
+    if last is not None and last.status != STATUS_OK:
+        yield Reason(
+            Kind.SCAN_FAILED, Verdict.STRESSED, value=float(last.status), since_ns=last.stamp_ns
+        )
+
+
+def _of_flowers(tag: TagState) -> Iterable[Reason]:
+    flower = tag.flower
+    if flower is not NO_FLOWER and flower.anomaly:
+        yield Reason(
+            Kind.PEST, Verdict.CRITICAL, value=float(flower.bug_count), since_ns=tag.looked_at_ns
+        )

@@ -1,0 +1,68 @@
+"""The web contract of the past as types; what `stream.schema` says of the rest holds here too."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from lupin_bridge.stream.schema import Contract, HistoryReading, Time
+
+
+class Stretch(Contract):
+    """A stretch of time, `from` <= t < `to`."""
+
+    from_: Time = Field(alias="from")
+    to: Time
+
+
+class Bucket(Contract):
+    """The readings of a stretch of `bucket_s`; only finite ones count."""
+
+    start: Time
+    n: int
+    mean: float
+    min: float
+    max: float
+
+
+class History(Stretch):
+    """One sensor of one tag over a period: `readings`, or `buckets` where they are too many."""
+
+    tag_id: str
+    sensor_type: str
+    unit: str
+    is_bucketed: bool
+    bucket_s: float | None = Field(description="s, length of a bucket; null: these are readings")
+    readings: list[HistoryReading] = Field(description="oldest first")
+    buckets: list[Bucket] = Field(description="oldest first; one without a reading is absent")
+    gaps: list[Stretch] = Field(
+        description="no reading for longer than three times what is usual here: draw no line"
+    )
+
+
+class TimelineBucket(Contract):
+    """What happened within `bucket_s`."""
+
+    start: Time
+    scans: int = Field(description="tries at sensors that succeeded")
+    failures: int = Field(description="tries that failed, looks too")
+    looks: int = Field(description="looks that saw the flowers")
+    pests_seen: int = Field(description="looks with an anomaly where the look before had none")
+    pests_cleared: int = Field(description="looks without one where the look before had one")
+
+
+class ClockRun(Stretch):
+    """A run of the clock: a simulated one that starts over begins another."""
+
+    is_simulated: bool
+
+
+class Timeline(Stretch):
+    """What happened over a period, and what of the past is remembered at all."""
+
+    bucket_s: float = Field(description="s, length of a bucket")
+    reach: Stretch | None = Field(description="what is remembered at all; null: nothing is")
+    buckets: list[TimelineBucket] = Field(
+        description="oldest first; one in which nothing happened is absent"
+    )
+    silences: list[Stretch] = Field(description="stretches in which nothing was tried")
+    runs: list[ClockRun] = Field(description="the runs of the clock that meet this period")

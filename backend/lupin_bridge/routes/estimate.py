@@ -1,0 +1,116 @@
+"""The estimate of one sensor, with how sure it is, as JSON, PNG or NPY."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from fastapi import APIRouter, Request, Response
+
+from lupin_bridge.bridge import Bridge
+from lupin_bridge.field import estimate_formats
+from lupin_bridge.field import query as field_query
+from lupin_bridge.field.formats import PNG, FieldFormat
+from lupin_bridge.field.query import FieldQuery
+from lupin_bridge.past import query as past_query
+from lupin_bridge.routes.computing import (
+    box_of_all_tags,
+    on_worker,
+    unless_known,
+    write_s,
+)
+from lupin_bridge.routes.documented import AT, FIELD, parameter
+from lupin_bridge.routes.in_formats import InFormats
+from lupin_bridge.routes.tools import REVALIDATE, bridge_of
+from lupin_bridge.serving.kept import Answer
+from lupin_bridge.stream.estimate_schema import GetEstimateResponse
+from lupin_twin.estimates import EstimateRequest, cost_s
+from lupin_twin.fields import FieldRefused, check_request
+from lupin_twin.workers import SMALL_S
+
+router = APIRouter()
+
+_LAYER = parameter(
+    "layer",
+    {"type": "string", "enum": list(field_query.LAYERS), "default": field_query.LAYERS[0]},
+    "PNG only: which of the two numbers; transparent where the estimate is not known",
+)
+ESTIMATE: Final = InFormats(
+    name="estimate",
+    summary="The estimate of one sensor",
+    description="""From all readings of a day, in space and time, with its error.
+
+That of now is made for the newest reading or the last whole minute of the day, whichever is
+later: until then its ETag holds, unless something is heard, or a model fitted anew. Of a moment
+that has passed it is made by the model of now.""",
+    parameters=[*FIELD, AT, _LAYER],
+    model=GetEstimateResponse,
+    refusal_json=estimate_formats.refusal_json,
+)
+
+
+async def _answer(request: Request, field_format: FieldFormat) -> Response:
+    bridge = bridge_of(request)
+    query = field_query.parse(request.query_params.multi_items(), field_query.ESTIMATE_NAMES)
+    if query.layer != field_query.LAYERS[0] and field_format != PNG:
+        raise FieldRefused(f"layer is {query.layer!r}, but only a PNG has one")
+    at_ns = past_query.at_of(query.at, bridge.ros_time_ns) or 0
+    asked = EstimateRequest(query.request(box_of_all_tags(bridge)), at_ns)
+    max_cells = bridge.source.rules().max_grid_cells
+    width, height = check_request(asked.box, max_cells)
+    field_query.check_scale(query, field_format, width * height, max_cells)
+    revision = bridge.source.estimate_revision(asked)
+    key = (bridge.source.revision(), asked, field_format.name, query.layer, query.scale)
+    return await unless_known(
+        request,
+        revision and _etag(revision, asked, query, field_format),
+        key,
+        lambda: _computed(bridge, asked, query, field_format),
+    )
+
+
+async def _computed(
+    bridge: Bridge, asked: EstimateRequest, query: FieldQuery, field_format: FieldFormat
+) -> Answer:
+    """The estimate in a format, with its ETag; it is kept."""
+    max_cells = bridge.source.rules().max_grid_cells
+    width, height = check_request(asked.box, max_cells)
+    tags = 0 if bridge.latest is None else len(bridge.latest.snapshot.tags)
+    writing_s = 2 * write_s(width * height, query.scale)
+    is_large = cost_s(asked, tags, max_cells) + writing_s > SMALL_S
+    sensor_type, sensors = query.sensor_type, bridge.criteria.sensors
+    with (
+        bridge.admission.computing(is_large=is_large),
+        bridge.metrics.estimate_seconds.time(),
+    ):
+        result = await bridge.source.estimate(asked)
+        body = await on_worker(
+            bridge,
+            lambda _: estimate_formats.write(
+                result.estimate,
+                field_format,
+                sensor_type,
+                sensors,
+                layer=query.layer,
+                scale=query.scale,
+            ),
+            writing_s,
+        )
+    tag = _etag(result.revision, asked, query, field_format)
+    headers = field_query.headers(
+        estimate_formats.metadata(result.estimate, sensors.named(sensor_type)),
+        f"{sensor_type}.{field_format.name}",
+        "Estimate",
+    )
+    answer = Answer(body, field_format.media_type, {**headers, "ETag": tag, **REVALIDATE})
+    bridge.kept.put(tag, answer)
+    return answer
+
+
+def _etag(
+    revision: str, asked: EstimateRequest, query: FieldQuery, field_format: FieldFormat
+) -> str:
+    kind = f"estimate {field_format.name} {query.layer} {asked.at_ns}"
+    return field_query.etag(revision, asked.box, kind, query.scale)
+
+
+ESTIMATE.register(router, _answer)

@@ -1,0 +1,141 @@
+"""What estimates are worth: how often they were right, who is off, where another tag helps."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Sequence
+from hashlib import blake2b
+from typing import Any, Final
+
+from fastapi import APIRouter, Request, Response
+
+from lupin_bridge.bridge import Bridge
+from lupin_bridge.estimates.following import MAX_SENSORS, newest_of
+from lupin_bridge.query_string import values_of
+from lupin_bridge.routes.computing import on_worker, or_refusal, unless_known
+from lupin_bridge.routes.documented import NOT_REMEMBERED, SENSOR, parameter
+from lupin_bridge.routes.tools import (
+    JSON_TYPE,
+    REVALIDATE,
+    bridge_of,
+    error_response,
+    read_route,
+)
+from lupin_bridge.serving.kept import Answer
+from lupin_bridge.stream import estimate_schema, report_json
+from lupin_bridge.twin.source import TwinUnavailableError
+from lupin_twin.estimate_report import DEFAULT_PLACES, MAX_PLACES, ReportRequest
+from lupin_twin.fields import FieldRefused
+
+router = APIRouter()
+
+_PLACES: Final = parameter(
+    "places",
+    {"type": "integer", "minimum": 1, "maximum": MAX_PLACES, "default": DEFAULT_PLACES},
+    "at most so many places",
+)
+_ONE: Final = parameter(
+    "sensor_type", {"type": "string"}, "of this sensor alone; default: of every one"
+)
+# What looking through the tags for their sensors takes for each, and what writing one.
+_LOOK_TAG_S: Final = 5e-6
+_WRITE_TAG_S: Final = 10e-6
+
+
+@read_route(
+    router,
+    "/api/estimate/quality",
+    summary="How often the estimates of each sensor were right",
+    responses={**NOT_REMEMBERED, 200: {"model": estimate_schema.EstimateQualities}},
+    openapi_extra={"parameters": [_ONE]},
+)
+async def quality(request: Request) -> Response:
+    """Each new scan is held against what was foretold for it before it was heard.
+
+    9 of 10 are to lie inside. Counts are by the hour, over the last day and week, since the twin
+    was started.
+    """
+
+    async def body(bridge: Bridge, values: dict[str, str]) -> bytes:
+        names = [values["sensor_type"]] if "sensor_type" in values else await _sensors(bridge)
+        reports = {name: await bridge.reports.of(ReportRequest(name)) for name in names}
+        return report_json.qualities(reports)
+
+    return await _answer(request, ("sensor_type",), body)
+
+
+@read_route(
+    router,
+    "/api/estimate/tags",
+    summary="What was expected of each tag's newest reading, and which tags have changed",
+    responses={**NOT_REMEMBERED, 200: {"model": estimate_schema.ExpectedTags}},
+    openapi_extra={"parameters": [SENSOR]},
+)
+async def tags(request: Request) -> Response:
+    """By all other tags, and by the tag's own readings but for its last ones."""
+
+    async def body(bridge: Bridge, values: dict[str, str]) -> bytes:
+        sensor = values.get("sensor_type", "")
+        report = await bridge.reports.of(ReportRequest(sensor))
+        cost_s = len(report.tags) * _WRITE_TAG_S
+        return await on_worker(bridge, lambda _: report_json.tags(sensor, report), cost_s)
+
+    return await _answer(request, ("sensor_type",), body)
+
+
+@read_route(
+    router,
+    "/api/estimate/advice",
+    summary="Where another tag helps the estimate most",
+    responses={**NOT_REMEMBERED, 200: {"model": estimate_schema.Advice}},
+    openapi_extra={"parameters": [SENSOR, _PLACES]},
+)
+async def advice(request: Request) -> Response:
+    """Of the free floor on the map, or about the tags without one; the best place first."""
+
+    async def body(bridge: Bridge, values: dict[str, str]) -> bytes:
+        sensor = values.get("sensor_type", "")
+        asked = ReportRequest(sensor, _places(values.get("places", str(DEFAULT_PLACES))))
+        return report_json.advice(sensor, await bridge.reports.of(asked))
+
+    return await _answer(request, ("sensor_type", "places"), body)
+
+
+Body = Callable[[Bridge, dict[str, str]], Awaitable[bytes]]
+
+
+async def _answer(request: Request, names: Sequence[str], body: Body) -> Response:
+    async def answer() -> Response:
+        try:
+            values = values_of(request.query_params.multi_items(), names, FieldRefused)
+            key = (request.url.path, *sorted(values.items()))
+            return await unless_known(request, None, key, lambda: _made(request, values, body))
+        except FieldRefused as error:
+            return error_response(str(error), 400)
+
+    return await or_refusal(answer())
+
+
+async def _made(request: Request, values: dict[str, str], body: Body) -> Answer:
+    bridge = bridge_of(request)
+    with bridge.admission.computing(is_large=True):
+        text = await body(bridge, values)
+    headers: dict[str, Any] = {"ETag": f'"{blake2b(text, digest_size=12).hexdigest()}"'}
+    return Answer(text, JSON_TYPE, {**headers, **REVALIDATE})
+
+
+async def _sensors(bridge: Bridge) -> list[str]:
+    if bridge.latest is None:
+        raise TwinUnavailableError("no twin has been heard yet")
+    snapshot = bridge.latest.snapshot
+    newest = await on_worker(
+        bridge, lambda _: newest_of(snapshot), len(snapshot.tags) * _LOOK_TAG_S
+    )
+    return sorted(newest)[:MAX_SENSORS]
+
+
+def _places(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and len(text) <= 6):
+        raise FieldRefused(f"places is {text[:64]!r}, expected a whole number")
+    if not 1 <= int(text) <= MAX_PLACES:
+        raise FieldRefused(f"places is {int(text)}, the limits are 1 and {MAX_PLACES}")
+    return int(text)

@@ -1,0 +1,70 @@
+"""The past: one sensor's readings, and what happened when."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request, Response
+
+from lupin_bridge.past import query, schema
+from lupin_bridge.past.asked import History, Timeline
+from lupin_bridge.routes.as_of import response_of_past
+from lupin_bridge.routes.computing import or_refusal
+from lupin_bridge.routes.documented import NOT_REMEMBERED, PERIOD, POINTS, parameter
+from lupin_bridge.routes.tools import bridge_of, read_route
+from lupin_twin.bounds import MAX_TEXT_LENGTH
+from lupin_twin.past import Event
+
+router = APIRouter()
+
+_NAME = {"type": "string", "minLength": 1, "maxLength": MAX_TEXT_LENGTH}
+
+
+@read_route(
+    router,
+    "/api/history",
+    summary="The readings of one sensor of one tag over a period",
+    responses={200: {"model": schema.History}, **NOT_REMEMBERED},
+    openapi_extra={
+        "parameters": [
+            parameter("tag_id", _NAME, "one tag; for events, `*` is the whole house", True),
+            parameter(
+                "sensor_type",
+                _NAME,
+                f"name of a sensor, as in a reading; or an event: {', '.join(Event)}",
+                True,
+            ),
+            *PERIOD,
+            POINTS,
+        ]
+    },
+)
+async def history_route(request: Request) -> Response:
+    """Readings, or buckets of equal length where there are more than `points`; gaps are told."""
+    return await or_refusal(_history(request))
+
+
+@read_route(
+    router,
+    "/api/timeline",
+    summary="What happened when: scans, failures, looks, pests, silences, runs of the clock",
+    responses={200: {"model": schema.Timeline}, **NOT_REMEMBERED},
+    openapi_extra={
+        "parameters": [*PERIOD, POINTS, parameter("tag_id", _NAME, "one tag alone; default: all")]
+    },
+)
+async def timeline_route(request: Request) -> Response:
+    """Events counted in buckets of equal length, and how far back anything is remembered."""
+    return await or_refusal(_timeline(request))
+
+
+async def _history(request: Request) -> Response:
+    bridge = bridge_of(request)
+    now_ns = bridge.ros_time_ns
+    asked = query.history(request.query_params.multi_items(), now_ns)
+    sensors = bridge.criteria.sensors
+    return await response_of_past(request, History(asked, now_ns, sensors), "history")
+
+
+async def _timeline(request: Request) -> Response:
+    bridge = bridge_of(request)
+    asked = query.timeline(request.query_params.multi_items(), bridge.ros_time_ns)
+    return await response_of_past(request, Timeline(asked), "timeline")

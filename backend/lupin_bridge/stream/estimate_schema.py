@@ -1,0 +1,95 @@
+"""What the routes of the estimate carry, as types; see `schema`."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from lupin_bridge.stream.schema import Contract, Time
+
+
+class GetEstimateResponse(Contract):
+    """GetEstimate's response. A refusal has `ok` false, the reason, and everything else zero."""
+
+    ok: bool
+    error_message: str
+    mean: list[float | None] = Field(description="sensor's unit, row-major, row 0 at bbox_min_y")
+    sd: list[float | None] = Field(
+        description="sensor's unit, as mean: 9 of 10 times the truth is within 1.645 sd"
+    )
+    width: int
+    height: int
+    origin_x: float
+    origin_y: float
+    resolution_used: float
+    sd_known: float = Field(description="a cell whose sd is not below this is not known")
+    sample_count: int = Field(description="tags that contribute")
+    reading_count: int = Field(description="readings that contribute")
+
+
+class Graded(Contract):
+    """New scans that were foretold, and those of them within the interval for 9 of 10."""
+
+    scans: int
+    inside: int
+
+
+class EstimateQuality(Contract):
+    """How often a sensor's estimates were right; a day is one of the twin's `day_length_s`."""
+
+    fitted_at: Time | None = Field(description="null: no model was fitted yet")
+    fit_problem: str = Field(
+        description="why the last fit came to nothing, or that the readings tell of a longer day "
+        "than day_length_s; empty: neither"
+    )
+    graded_since: Time | None = Field(description="the counts are since then; null: none yet")
+    day: Graded
+    week: Graded
+    share_day: float | None = Field(description="inside of scans; null: there are none")
+    share_week: float | None
+    is_trusted: bool = Field(
+        description="false: chance does not explain how far a share is from 0.9; the model is "
+        "wrong, a day's length for one"
+    )
+
+
+class EstimateQualities(Contract):
+    """`/api/estimate/quality`: by sensor."""
+
+    sensors: dict[str, EstimateQuality]
+
+
+class ExpectedReading(Contract):
+    """A tag's newest reading beside what all others foretell for it; sensor's unit."""
+
+    measured: float
+    observed_at: Time
+    expected: float
+    expected_sd: float = Field(description="a reading's noise included")
+    z: float = Field(description="how far its last readings are off together, in sds")
+    offset: float = Field(description="by how much they are off")
+    left_out: bool = Field(description="it has changed: the estimate does without it")
+
+
+class ExpectedTags(Contract):
+    """`/api/estimate/tags`: what was expected of each tag with a place, as of a moment."""
+
+    sensor_type: str
+    at: Time
+    tags: dict[str, ExpectedReading]
+
+
+class AdvisedPlace(Contract):
+    """Where another tag helps; m, map frame."""
+
+    x: float
+    y: float
+    error_ratio: float = Field(
+        description="the error with a tag there, and at the places before it, without: 1"
+    )
+
+
+class Advice(Contract):
+    """`/api/estimate/advice`: where another tag helps most, the best place first."""
+
+    sensor_type: str
+    places: list[AdvisedPlace]

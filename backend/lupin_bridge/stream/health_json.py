@@ -1,0 +1,85 @@
+"""What the judge says as JSON text: `schema.Judgement`, whole or only what has changed.
+
+Pure. A tag's text is kept until its health is another: it is told for hours as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import orjson
+
+from lupin_bridge.judge.judging import Judged
+from lupin_bridge.judge.patrol import Patrol
+from lupin_bridge.judge.verdict import Health, Reason
+from lupin_bridge.stream.state_json import stamp
+
+
+class HealthJson:
+    """Writes what was judged; made for one stream of it."""
+
+    def __init__(self) -> None:
+        self._kept: dict[str, tuple[Health, bytes]] = {}
+        self._whole: tuple[Judged, bytes] | None = None
+
+    def whole(self, judged: Judged) -> bytes:
+        """The house and every tag."""
+        if self._whole is None or self._whole[0] is not judged:
+            if len(self._kept) > 2 * len(judged.tags):
+                self._kept.clear()
+            self._whole = judged, self._text(judged, judged.tags)
+        return self._whole[1]
+
+    def delta(self, before: Judged, now: Judged) -> bytes:
+        """The house, and the tags of whom not the same was said `before`; who is gone is absent."""
+        if now is before:
+            return self._text(now, ())
+        if now.number == before.number + 1:
+            return self._text(now, sorted(now.changed & now.tags.keys()))
+        known = before.tags
+        return self._text(now, [key for key, one in now.tags.items() if known.get(key) is not one])
+
+    def _text(self, judged: Judged, tag_ids: Iterable[str]) -> bytes:
+        tags = [b"%b:%b" % (orjson.dumps(tag_id), self._tag(tag_id, judged)) for tag_id in tag_ids]
+        return b'{"house":%b,"tags":{%b}}' % (orjson.dumps(_house(judged)), b",".join(tags))
+
+    def _tag(self, tag_id: str, judged: Judged) -> bytes:
+        health = judged.tags[tag_id]
+        kept = self._kept.get(tag_id)
+        if kept is None or kept[0] is not health:
+            kept = self._kept[tag_id] = health, orjson.dumps(_health(health))
+        return kept[1]
+
+
+def _house(judged: Judged) -> dict[str, Any]:
+    day = {"is_day": judged.day.is_day, "source": judged.day.source}
+    return {**_health(judged.house), "day": day, "patrol": _patrol(judged.patrol)}
+
+
+def _patrol(patrol: Patrol) -> dict[str, Any]:
+    interval_ns, last_ns = patrol.interval_ns, patrol.last_scan_ns
+    return {
+        "interval_s": None if interval_ns is None else interval_ns / 1e9,
+        "last_scan": None if last_ns is None else stamp(last_ns),
+        "overdue": patrol.overdue,
+    }
+
+
+def _health(health: Health) -> dict[str, Any]:
+    return {
+        "verdict": health.verdict,
+        "reasons": [reason_json(reason) for reason in health.reasons],
+    }
+
+
+def reason_json(reason: Reason) -> dict[str, Any]:
+    """`schema.HealthReason`."""
+    return {
+        "kind": reason.kind,
+        "verdict": reason.verdict,
+        "sensor": reason.sensor,
+        "value": reason.value,
+        "limit": reason.limit,
+        "since": None if reason.since_ns is None else stamp(reason.since_ns),
+    }

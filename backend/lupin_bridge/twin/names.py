@@ -1,0 +1,64 @@
+"""What a twin's topics and service are called in ROS, and how its topics are to be heard. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+# What is the largest that a twin itself takes in, see `lupin_twin.shapes`.
+_LARGEST: Final = 64_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class TwinNames:
+    """From the root on and after remapping; `field_layers` is what those of fields begin with."""
+
+    state_topic: str
+    field_service: str
+    observations_topic: str = "/floranova/observations"
+    discovered_tags_topic: str = "/perception/discovered_tags"
+    map_topic: str = "/map"
+    diagnostics_topic: str = "/diagnostics"
+    field_layers: str = "/twin/field/"
+    tags_layer: str = "/twin/tags"
+    planters_layer: str = "/twin/planters"
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A topic and how it is to be heard.
+
+    `name` is from the root on, `type_name` such as `lupin_msgs/msg/TwinState`. `latched`: reliable
+    and transient local, so that the last ones come to who is late; otherwise as ROS has it by
+    default. What is held of it are `depth` samples and `max_bytes` in all, at most.
+    """
+
+    name: str
+    type_name: str
+    latched: bool = True
+    depth: int = 1
+    max_bytes: int = _LARGEST
+
+
+def topics_of(names: TwinNames) -> tuple[Topic, ...]:
+    """A twin's state, what it listens to, and what it says of itself."""
+    return (
+        Topic(names.state_topic, "lupin_msgs/msg/TwinState"),
+        Topic(
+            names.observations_topic, "lupin_msgs/msg/Observation", depth=50, max_bytes=8_000_000
+        ),
+        Topic(
+            names.discovered_tags_topic,
+            "lupin_msgs/msg/DiscoveredTags",
+            depth=50,
+            max_bytes=16_000_000,
+        ),
+        Topic(names.map_topic, "nav_msgs/msg/OccupancyGrid"),
+        Topic(
+            names.diagnostics_topic,
+            "diagnostic_msgs/msg/DiagnosticArray",
+            latched=False,
+            depth=10,
+            max_bytes=4_000_000,
+        ),
+    )

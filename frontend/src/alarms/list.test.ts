@@ -1,0 +1,125 @@
+import { describe, expect, test } from 'vitest';
+
+import type { Alarm } from '../contract/types';
+import { alarm } from '../testing/alarms';
+import { reason } from '../testing/health';
+import { markSeen, NOTHING_KEPT, shelve, type Kept } from './kept';
+import {
+  calling,
+  EMPTY_LIST,
+  LISTED_S,
+  listOf,
+  newsOf,
+  sharedList,
+  type AlarmList,
+  type Item,
+} from './list';
+
+const AT = 1_800_000_000_000;
+const NOW_S = 1_000;
+const list = (alarms: readonly Alarm[], kept: Kept = NOTHING_KEPT): AlarmList =>
+  listOf(alarms, kept, NOW_S, AT);
+const ids = (items: readonly Item[]): string[] => items.map(({ alarm: { id } }) => id);
+const stressed = { verdict: 'stressed' } as const;
+
+describe('order', () => {
+  test('active: the worst first, of equals the newest', () => {
+    const shown = list([
+      alarm('mild, new', { raised: 990, reason: stressed }),
+      alarm('bad, old', { raised: 100 }),
+      alarm('not known', { raised: 995, reason: { verdict: 'unknown' } }),
+      alarm('bad, new', { raised: 500 }),
+    ]);
+    expect(ids(shown.active)).toEqual(['bad, new', 'bad, old', 'mild, new', 'not known']);
+  });
+
+  test('over: what was cleared last first; no more than a day', () => {
+    const far = LISTED_S + NOW_S;
+    const over = [
+      alarm('early', { raised: 500, cleared: NOW_S }),
+      alarm('late', { raised: 100, cleared: NOW_S + 1 }),
+    ];
+    expect(ids(list(over).over)).toEqual(['late', 'early']);
+    expect(ids(listOf(over, NOTHING_KEPT, far - 1, AT).over)).toEqual(['late', 'early']);
+    expect(ids(listOf(over, NOTHING_KEPT, far, AT).over)).toEqual(['late']);
+    // Of a twin that has no time nobody knows how long ago that was.
+    expect(listOf(over, NOTHING_KEPT, null, AT).over).toHaveLength(2);
+  });
+
+  test('of what came at once the order is the same, however it came', () => {
+    const two = [alarm('b'), alarm('a')];
+    expect(ids(list(two).active)).toEqual(['a', 'b']);
+    expect(ids(list(two.toReversed()).active)).toEqual(['a', 'b']);
+  });
+});
+
+describe('seen and put aside', () => {
+  const mild = { alarm: alarm('a', { reason: stressed }), verdict: 'stressed' } as const;
+
+  test('what was seen calls for nobody, until it gets worse', () => {
+    const kept = markSeen(NOTHING_KEPT, [mild], AT);
+    expect(calling(list([mild.alarm]))).toHaveLength(1);
+    expect(calling(list([mild.alarm], kept))).toEqual([]);
+    expect(list([mild.alarm], kept).active[0]?.isSeen).toBe(true);
+    const worse = { ...mild.alarm, reason: reason() };
+    expect(calling(list([worse], kept))).toHaveLength(1);
+  });
+
+  test('what is put aside stands apart with its end, comes back then, or when it gets worse', () => {
+    const kept = shelve(NOTHING_KEPT, mild, AT + 1_000);
+    const shown = list([mild.alarm], kept);
+    expect(shown.active).toEqual([]);
+    expect(shown.shelved[0]?.shelvedUntil).toBe(AT + 1_000);
+    expect(calling(shown)).toEqual([]);
+    expect(listOf([mild.alarm], kept, NOW_S, AT + 1_000).shelved).toEqual([]);
+    const worse = list([{ ...mild.alarm, reason: reason() }], kept);
+    expect(calling(worse)).toHaveLength(1);
+    // The same thing that comes again is still put aside.
+    expect(list([alarm('later', { raised: 990, reason: stressed })], kept).active).toEqual([]);
+  });
+});
+
+describe('news', () => {
+  const a = alarm('a', { reason: stressed });
+  const b = alarm('b', { tag_id: '2' });
+  const told = (before: AlarmList, now: AlarmList): string[][] => {
+    const { raised, cleared } = newsOf(before, now);
+    return [ids(raised), ids(cleared)];
+  };
+
+  test('is what has come, got worse or is over; what stays is none', () => {
+    expect(told(EMPTY_LIST, list([a]))).toEqual([['a'], []]);
+    expect(told(list([a]), list([b, a]))).toEqual([['b'], []]);
+    expect(told(list([a]), list([{ ...a, reason: reason() }]))).toEqual([['a'], []]);
+    expect(told(list([{ ...a, reason: reason() }]), list([a]))).toEqual([[], []]);
+    const over = { ...a, cleared_at: { sec: 999, nanosec: 0 } };
+    expect(told(list([a, b]), list([over, b]))).toEqual([[], ['a']]);
+    expect(told(EMPTY_LIST, list([over]))).toEqual([[], []]);
+    expect(told(list([a]), list([]))).toEqual([[], []]);
+  });
+
+  test('not what is seen or put aside; what comes back from there is', () => {
+    const mild = { alarm: a, verdict: 'stressed' } as const;
+    const kept = shelve(NOTHING_KEPT, mild, AT + 1_000);
+    expect(told(EMPTY_LIST, list([a], kept))).toEqual([[], []]);
+    expect(told(EMPTY_LIST, list([a], markSeen(NOTHING_KEPT, [mild], AT)))).toEqual([[], []]);
+    expect(told(list([a], kept), list([a]))).toEqual([['a'], []]);
+  });
+});
+
+test('what is the same stays the same, and the rest is not', () => {
+  const before = list([alarm('a'), alarm('b')]);
+  expect(sharedList(before, list([alarm('a'), alarm('b')]))).toBe(before);
+  const next = sharedList(before, list([alarm('a'), alarm('b', { worst: 3 })]));
+  expect(next).not.toBe(before);
+  expect(next.active[0]).toBe(before.active[0]);
+  expect(next.active[1]).not.toBe(before.active[1]);
+  expect(next.over).toBe(before.over);
+});
+
+test('five hundred are put in order, the newest first, and are kept where they are the same', () => {
+  const many = Array.from({ length: 500 }, (_, at) => alarm(`a${at}`, { raised: at }));
+  const first = list(many);
+  expect(first.active.map(({ alarm: { id } }) => id)).toEqual(many.map(({ id }) => id).reverse());
+  expect(sharedList(first, list(structuredClone(many)))).toBe(first);
+});

@@ -1,0 +1,289 @@
+/** How alarms come to who is not looking: title, icon, voices, sound, notification. */
+import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
+
+import type { Alarm } from '../contract/types';
+import { act, receive, store } from '../store/app';
+import { NO_HOUSE } from '../store/twin';
+import { alarm, tellAlarms } from '../testing/alarms';
+import { showTags } from '../testing/page';
+import { wireTag } from '../testing/tags';
+import { badgeOf, startBadge } from './badge';
+import { NOTHING_KEPT } from './kept';
+import { calling } from './list';
+import { notifyState, startNotify, wishNotify } from './notify';
+import { own, seeAlarms } from './own';
+import { QUIET_MS, soundState, startSound, wishSound } from './sound';
+import { startTitle, titleOf } from './title';
+import { politeVoice, startVoices, urgentVoice } from './voices';
+import { alarmList, startAlarms } from './watch';
+
+const STRESSED = { verdict: 'stressed' } as const;
+const cold = alarm('cold', { tag_id: '1' });
+const warm = alarm('warm', { tag_id: '2', reason: { ...STRESSED, value: 30, limit: 26 } });
+let stops: (() => void)[];
+
+const start = (...starts: (() => () => void)[]): void => {
+  stops = [startAlarms, ...starts].map((each) => each());
+  // What the page opens with.
+  tellAlarms();
+};
+
+beforeEach(() => {
+  own.dispatch(NOTHING_KEPT);
+  showTags([wireTag()]);
+});
+afterEach(() => {
+  for (const stop of stops.reverse()) stop();
+  vi.restoreAllMocks();
+  vi.unstubAllGlobals();
+});
+
+describe('title', () => {
+  test('counts what is active and not seen, and says which moment is shown', () => {
+    start(startTitle);
+    expect(document.title).toBe('Lupin twin');
+    tellAlarms(cold, warm, alarm('over', { cleared: 950 }));
+    expect(document.title).toBe('(2) Lupin twin');
+    act({ type: 'moment', moment: 50 });
+    receive({ type: 'past', past: { at: 50, house: NO_HOUSE } });
+    expect(document.title).toBe('(2) sim 00:00:50 (past) · Lupin twin');
+    seeAlarms(calling(alarmList.get()));
+    expect(document.title).toBe('sim 00:00:50 (past) · Lupin twin');
+    expect(titleOf(0, null)).toBe('Lupin twin');
+    expect(titleOf(2, null, true)).toBe('(2) Recording · Lupin twin');
+  });
+});
+
+describe('icon', () => {
+  test('has the number, the worst by form and colour, and is the page’s own again', () => {
+    const link = document.createElement('link');
+    link.rel = 'icon';
+    link.href = './lupin.svg';
+    document.head.append(link);
+    start(startBadge);
+    const drawn = (): string => decodeURIComponent(link.href);
+    expect(link.href).toMatch(/\/lupin\.svg$/);
+    tellAlarms(warm);
+    expect(drawn()).toMatch(/^data:image\/svg\+xml,<svg .*<circle.*>1<\/text>/);
+    tellAlarms(warm, cold);
+    expect(drawn()).toMatch(/<path.*>2<\/text>/);
+    seeAlarms(calling(alarmList.get()));
+    expect(link.href).toMatch(/\/lupin\.svg$/);
+    link.remove();
+  });
+
+  test('beyond nine it says so', () => {
+    expect(badgeOf(0, 'critical')).toBeNull();
+    expect(decodeURIComponent(badgeOf(9, 'critical') ?? '')).toContain('>9<');
+    expect(decodeURIComponent(badgeOf(10, 'critical') ?? '')).toContain('>9+<');
+  });
+});
+
+describe('voices', () => {
+  const said = (): string[] => [politeVoice.get().text, urgentVoice.get().text];
+  const keys = (): number => politeVoice.get().key + urgentVoice.get().key;
+
+  test('one announcement a change; only a critical alarm cuts in', () => {
+    politeVoice.dispatch('');
+    urgentVoice.dispatch('');
+    start(startVoices);
+    const before = keys();
+    tellAlarms(warm);
+    expect(said()).toEqual(['New: Tag 2: Temperature 30.0\u00a0°C, above 26.0', '']);
+    tellAlarms(cold, warm, alarm('other', { tag_id: '3' }));
+    expect(said()[1]).toMatch(/^New: Tag 1: [^;]*; Tag 3: [^;]*$/);
+    expect(keys()).toBe(before + 2);
+    // A frame without news, and a state, are no change.
+    tellAlarms(cold, warm, alarm('other', { tag_id: '3' }));
+    showTags([wireTag()]);
+    expect(keys()).toBe(before + 2);
+  });
+
+  test('what is over is told once, in the same breath as what is new', () => {
+    start(startVoices);
+    tellAlarms(warm);
+    tellAlarms({ ...warm, cleared_at: { sec: 990, nanosec: 0 } }, alarm('x', { reason: STRESSED }));
+    expect(said()[0]).toMatch(/^New: Tag 1: .*\. Over: Tag 2: Temperature/);
+  });
+});
+
+/** As much of the browser's Web Audio as the sound touches: jsdom has none. */
+class Audio {
+  state: 'suspended' | 'running';
+  notes = 0;
+  currentTime = 0;
+  destination = {};
+  constructor(readonly allowed: boolean) {
+    this.state = 'suspended';
+  }
+  resume(): Promise<void> {
+    if (this.allowed) this.state = 'running';
+    return Promise.resolve();
+  }
+  close(): Promise<void> {
+    return Promise.resolve();
+  }
+  createOscillator(): unknown {
+    this.notes += 1;
+    const ignore = (): void => undefined;
+    const node = {
+      frequency: { value: 0 },
+      connect: (next: unknown) => next,
+      start: ignore,
+      stop: ignore,
+    };
+    return node;
+  }
+  createGain(): unknown {
+    const gain = { setValueAtTime: () => gain, linearRampToValueAtTime: () => gain };
+    return { gain, connect: (next: unknown) => next };
+  }
+}
+
+describe('sound', () => {
+  const many = (count: number): Alarm[] =>
+    Array.from({ length: count }, (_, at) =>
+      alarm(`a${at}`, { tag_id: String(at), reason: STRESSED }),
+    );
+
+  test('only on wish, at once when it is wished, and then at most one in ten seconds', async () => {
+    const audio = new Audio(true);
+    const make = (): AudioContext => audio as unknown as AudioContext;
+    const at = Math.ceil(performance.now()); // or ten seconds later is a hair less than that
+    const clock = vi.spyOn(performance, 'now').mockReturnValue(at);
+    vi.spyOn(Date, 'now').mockReturnValue(1_800_000_000_000);
+    start(() => startSound(make));
+    tellAlarms(...many(1));
+    expect(audio.notes).toBe(0);
+    await wishSound(true, make);
+    expect(soundState.get()).toBe('ready');
+    expect(audio.notes).toBe(2);
+    clock.mockReturnValue(at + QUIET_MS - 1);
+    tellAlarms(...many(2));
+    expect(audio.notes).toBe(2);
+    clock.mockReturnValue(at + QUIET_MS);
+    tellAlarms(...many(3));
+    expect(audio.notes).toBe(4);
+    clock.mockReturnValue(at + 2 * QUIET_MS);
+    tellAlarms(cold, ...many(3));
+    expect(audio.notes).toBe(8);
+    clock.mockReturnValue(at + 3 * QUIET_MS);
+    await wishSound(false, make);
+    tellAlarms(...many(4));
+    expect(audio.notes).toBe(8);
+  });
+
+  test('kept from another day it waits for a click, and says so', async () => {
+    const audio = new Audio(false);
+    own.dispatch({ ...NOTHING_KEPT, sound: true });
+    start(() => startSound(() => audio as unknown as AudioContext));
+    expect(soundState.get()).toBe('waits');
+    document.dispatchEvent(new Event('pointerup'));
+    await vi.waitFor(() => {
+      expect(soundState.get()).toBe('waits');
+    });
+    audio.resume = () => {
+      audio.state = 'running';
+      return Promise.resolve();
+    };
+    document.dispatchEvent(new Event('keyup'));
+    await vi.waitFor(() => {
+      expect(soundState.get()).toBe('ready');
+    });
+    tellAlarms(warm);
+    expect(audio.notes).toBe(2);
+  });
+
+  test('a browser that cannot says so', async () => {
+    start();
+    await wishSound(true, () => {
+      throw new Error('no device');
+    });
+    expect(soundState.get()).toBe('none');
+    soundState.dispatch('waits');
+  });
+});
+
+describe('notification', () => {
+  const shown: { title: string; body: string; onclick?: () => void; close: () => void }[] = [];
+  /** As the browser's own: jsdom has none. */
+  const browser = (permission: string, answer = permission): { asked: number } => {
+    const log = { asked: 0 };
+    class Shown {
+      static permission = permission;
+      static requestPermission(): Promise<string> {
+        log.asked += 1;
+        Shown.permission = answer;
+        return Promise.resolve(answer);
+      }
+      onclick?: () => void;
+      body: string;
+      constructor(
+        readonly title: string,
+        { body }: { body: string },
+      ) {
+        this.body = body;
+        shown.push(this);
+      }
+      close(): void {
+        shown.length = 0;
+      }
+    }
+    vi.stubGlobal('Notification', Shown);
+    vi.stubGlobal('isSecureContext', true);
+    return log;
+  };
+  beforeEach(() => {
+    shown.length = 0;
+    vi.spyOn(document, 'hasFocus').mockReturnValue(false);
+  });
+
+  test('is asked for by the click alone, and tells of all that is new in one', async () => {
+    const log = browser('default', 'granted');
+    start(startNotify);
+    tellAlarms(warm);
+    expect([log.asked, shown.length]).toEqual([0, 0]);
+    await wishNotify(true);
+    expect([log.asked, own.get().notify, notifyState.get()]).toEqual([1, true, 'granted']);
+    tellAlarms(cold, warm, alarm('other', { tag_id: '3' }));
+    expect(shown.map(({ title }) => title)).toEqual(['2 new alarms']);
+    expect(shown[0]?.body).toMatch(/^New: Tag 1: .*; Tag 3: /);
+    shown[0]?.onclick?.();
+    expect(store.get().view.selected).toBe('1');
+    expect(shown).toEqual([]);
+  });
+
+  test('not while somebody looks', async () => {
+    browser('granted');
+    start(startNotify);
+    await wishNotify(true);
+    vi.spyOn(document, 'hasFocus').mockReturnValue(true);
+    tellAlarms(warm);
+    expect(shown).toEqual([]);
+  });
+
+  test('refused, not secure, or not to be had: it stays off and is said', async () => {
+    browser('default', 'denied');
+    start(startNotify);
+    await wishNotify(true);
+    expect([own.get().notify, notifyState.get()]).toEqual([false, 'refused']);
+    vi.stubGlobal('isSecureContext', false);
+    await wishNotify(true);
+    expect([own.get().notify, notifyState.get()]).toEqual([false, 'insecure']);
+  });
+
+  test('a browser that lets no page make them is found out, and said', async () => {
+    browser('granted');
+    start(startNotify);
+    await wishNotify(true);
+    const Failing = Object.assign(
+      function fail() {
+        throw new TypeError('Illegal constructor');
+      },
+      { permission: 'granted' },
+    );
+    vi.stubGlobal('Notification', Failing);
+    tellAlarms(warm);
+    expect([own.get().notify, notifyState.get()]).toEqual([false, 'none']);
+  });
+});

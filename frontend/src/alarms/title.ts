@@ -1,0 +1,29 @@
+/** The name of the page's tab: how many alarms call for somebody, and which moment is shown. */
+import { rosText } from '../domain/rostime';
+import { store } from '../store/app';
+import { selectShown } from '../store/moment';
+import { selectIsRecorded } from '../store/origin';
+import { S } from '../strings';
+import { calling } from './list';
+import { alarmList } from './watch';
+
+export const titleOf = (count: number, moment: number | null, isRecorded = false): string => {
+  const shown = moment === null ? S.product : S.pastTitle(rosText(moment));
+  const title = isRecorded ? `${S.origin.recorded} · ${shown}` : shown;
+  return count === 0 ? title : S.alarmsTitle(count, title);
+};
+
+/** Keeps it so; returns the way to stop. */
+export function startTitle(): () => void {
+  const update = (): void => {
+    const state = store.get();
+    const { moment } = selectShown(state);
+    const title = titleOf(calling(alarmList.get()).length, moment, selectIsRecorded(state));
+    if (document.title !== title) document.title = title;
+  };
+  update();
+  const stops = [store.subscribe(update), alarmList.subscribe(update)];
+  return () => {
+    for (const stop of stops) stop();
+  };
+}

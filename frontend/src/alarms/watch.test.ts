@@ -1,0 +1,140 @@
+import { afterEach, beforeEach, expect, test, vi } from 'vitest';
+
+import { act, receive } from '../store/app';
+import { alarm, alarms, tellAlarms } from '../testing/alarms';
+import { showTags } from '../testing/page';
+import { wireTag } from '../testing/tags';
+import { NOTHING_KEPT } from './kept';
+import { calling } from './list';
+import { meanwhile, startMeanwhile } from './meanwhile';
+import { own, seeAlarms, shelveAlarm, startOwn, unshelveAlarm } from './own';
+import { alarmList, onNews, startAlarms } from './watch';
+
+const STRESSED = { verdict: 'stressed' } as const;
+let stops: (() => void)[];
+let told: string[];
+const kept = new Map<string, string>();
+const storage = {
+  getItem: (key: string) => kept.get(key) ?? null,
+  setItem: (key: string, text: string) => void kept.set(key, text),
+};
+
+const start = (): void => {
+  stops = [
+    startOwn(storage),
+    startAlarms(),
+    startMeanwhile(),
+    onNews(({ raised, cleared }) => {
+      told.push(...raised.map(({ alarm: { id } }) => id));
+      told.push(...cleared.map(({ alarm: { id } }) => `-${id}`));
+    }),
+  ];
+};
+const stop = (): void => {
+  for (const each of stops.reverse()) each();
+};
+
+beforeEach(() => {
+  vi.useFakeTimers({ toFake: ['setTimeout', 'clearTimeout', 'Date'] });
+  told = [];
+  kept.clear();
+  own.dispatch(NOTHING_KEPT);
+  showTags([wireTag()]);
+  start();
+});
+afterEach(() => {
+  stop();
+  vi.useRealTimers();
+});
+
+const ids = (): string[] => calling(alarmList.get()).map(({ alarm: { id } }) => id);
+const item = (id: string): ReturnType<typeof calling>[number] => {
+  const { active, shelved } = alarmList.get();
+  const found = [...active, ...shelved].find((each) => each.alarm.id === id);
+  if (!found) throw new Error(`no alarm ${id}`);
+  return found;
+};
+
+test('what the page opens with is no news; what comes later is, once', () => {
+  tellAlarms(alarm('a'));
+  expect(told).toEqual([]);
+  expect(ids()).toEqual(['a']);
+  tellAlarms(alarm('b', { tag_id: '2' }), alarm('a'));
+  tellAlarms(alarm('b', { tag_id: '2' }), alarm('a'));
+  expect(told).toEqual(['b']);
+  tellAlarms(alarm('b', { tag_id: '2', cleared: 950 }), alarm('a'));
+  expect(told).toEqual(['b', '-b']);
+});
+
+test('a bridge that starts anew and goes through the past tells nothing twice', () => {
+  tellAlarms(alarm('a'));
+  receive({ type: 'alarms', alarms: alarms([], { source: 'starting', since: null }) });
+  expect(ids()).toEqual([]);
+  tellAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
+  expect(told).toEqual(['b']);
+});
+
+test('what gets worse is told again, seen or not', () => {
+  tellAlarms(alarm('a', { reason: STRESSED }));
+  seeAlarms([item('a')]);
+  expect(ids()).toEqual([]);
+  tellAlarms(alarm('a'));
+  expect(ids()).toEqual(['a']);
+  expect(told).toEqual(['a']);
+});
+
+test('seen holds after a reload, and what is done here is no news', () => {
+  tellAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
+  seeAlarms([item('a')]);
+  shelveAlarm(item('b'), 15);
+  expect(ids()).toEqual([]);
+  unshelveAlarm(item('b').alarm);
+  expect(ids()).toEqual(['b']);
+  stop();
+  own.dispatch(NOTHING_KEPT);
+  start();
+  tellAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
+  expect(ids()).toEqual(['b']);
+  expect(told).toEqual([]);
+});
+
+test('what was put aside comes back by itself when its time is over, and is told', () => {
+  tellAlarms(alarm('a'));
+  shelveAlarm(item('a'), 15);
+  expect(alarmList.get().shelved).toHaveLength(1);
+  vi.advanceTimersByTime(15 * 60_000 - 1);
+  expect(ids()).toEqual([]);
+  vi.advanceTimersByTime(1);
+  expect(ids()).toEqual(['a']);
+  expect(told).toEqual(['a']);
+  expect(own.get().shelved.size).toBe(0);
+});
+
+test('what another tab of the browser has seen is seen here', () => {
+  tellAlarms(alarm('a'));
+  kept.set('lupin-twin.alarms', JSON.stringify({ seen: [['a', 'critical', Date.now()]] }));
+  window.dispatchEvent(new StorageEvent('storage', { key: 'lupin-twin.alarms' }));
+  expect(ids()).toEqual([]);
+});
+
+test('while another moment is shown, what comes is told apart until it is seen or over', () => {
+  const now = (): string[] => meanwhile.get().map(({ alarm: { id } }) => id);
+  tellAlarms(alarm('a'));
+  act({ type: 'moment', moment: 50 });
+  expect(now()).toEqual([]);
+  const b = alarm('b', { tag_id: '2', reason: STRESSED });
+  const c = alarm('c', { tag_id: '3' });
+  tellAlarms(b, alarm('a'));
+  tellAlarms(c, b, alarm('a'));
+  expect(now()).toEqual(['c', 'b']);
+  seeAlarms([item('b')]);
+  expect(now()).toEqual(['c']);
+  tellAlarms({ ...c, cleared_at: { sec: 990, nanosec: 0 } }, b, alarm('a'));
+  expect(now()).toEqual([]);
+  tellAlarms(alarm('d', { tag_id: '4' }), alarm('a'));
+  expect(now()).toEqual(['d']);
+  act({ type: 'moment', moment: null });
+  expect(now()).toEqual([]);
+  act({ type: 'moment', moment: 60 });
+  expect(now()).toEqual([]);
+});

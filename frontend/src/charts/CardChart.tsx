@@ -1,0 +1,64 @@
+import { useMemo, useRef, type JSX } from 'react';
+
+import { act, useApp } from '../store/app';
+import { selectCatalogue } from '../store/derived';
+import { S } from '../strings';
+import { Icon } from '../widgets/Icon';
+import { modelOf, pairsOf } from './charted';
+import { PlotView } from './PlotView';
+import { useFeed } from './useFeed';
+import { useSensorsOf } from './useSensorsOf';
+import { pointsFor, useSize } from './useSize';
+import { ChartState } from './ChartState';
+
+const HEIGHT = 132;
+
+/** The sensor in view, or the tag's first, over the period of the time bar. */
+export default function CardChart({ tagId }: { tagId: string }): JSX.Element | null {
+  const inView = useApp((state) => state.view.sensor);
+  const unit = useApp((state) => state.settings.unit);
+  const moment = useApp((state) => state.view.moment);
+  const catalogue = useApp(selectCatalogue);
+  const sensors = useSensorsOf(tagId);
+  const sensor = sensors.includes(inView) ? inView : sensors[0];
+  const place = useRef<HTMLDivElement>(null);
+  const { width } = useSize(place);
+  const plan = useMemo(
+    () => (sensor === undefined ? null : { sensor, tagIds: [tagId] }),
+    [sensor, tagId],
+  );
+  const pairs = useMemo(() => (plan ? pairsOf([plan]) : []), [plan]);
+  const { fed, span } = useFeed(pairs, pointsFor(width));
+  const model = useMemo(
+    () => (plan && span ? modelOf(catalogue, plan, fed, span, unit, moment) : null),
+    [catalogue, plan, fed, span, unit, moment],
+  );
+  if (!plan) return null;
+  return (
+    <div className="card-chart" ref={place} data-testid="card-chart" data-state={fed.state}>
+      {fed.state === 'missing' ? (
+        <p className="faint">{S.chartMissingShort}</p>
+      ) : (
+        <>
+          {model && model.lines.length > 0 ? (
+            <PlotView model={model} height={HEIGHT} />
+          ) : (
+            <ChartState fed={fed} isTimeKnown={span !== null} lacks={null} />
+          )}
+          <button
+            type="button"
+            className="text-button"
+            onClick={() => {
+              // On a narrow screen the charts are where the map is.
+              act({ type: 'pane', pane: 'map' });
+              act({ type: 'chart', chart: { by: 'tag', tagIds: [tagId] } });
+            }}
+          >
+            <Icon name="chart" size={16} />
+            {S.charts}
+          </button>
+        </>
+      )}
+    </div>
+  );
+}

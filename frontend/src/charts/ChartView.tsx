@@ -1,0 +1,142 @@
+import { useMemo, useRef, useState, type JSX } from 'react';
+
+import { now } from '../clock';
+import { act, store, useApp } from '../store/app';
+import { selectCatalogue } from '../store/derived';
+import { rosNow } from '../store/moment';
+import type { Charted } from '../store/view';
+import { S } from '../strings';
+import { Icon, type IconName } from '../widgets/Icon';
+import { Segmented } from '../widgets/Segmented';
+import { modelOf, pairsOf, plansOf, tagLabel } from './charted';
+import { ChartFiles } from './ChartFiles';
+import { ChartState } from './ChartState';
+import { ChartTables } from './ChartTables';
+import { PlotView } from './PlotView';
+import { TagChoice } from './TagChoice';
+import { useFeed } from './useFeed';
+import { useSensorsOf } from './useSensorsOf';
+import { pointsFor, useSize } from './useSize';
+import { useZoomed, zoomBack, zoomBy } from './zoom';
+
+const LEAST_HEIGHT = 140;
+/** Height of a chart's title and margins, and of the legend of several lines, CSS pixels. */
+const AROUND = 42;
+const LEGEND = 24;
+
+/** The charts of a tag, or of a sensor: over the map, above the time bar whose period they have. */
+export default function ChartView({ charted }: { charted: Charted }): JSX.Element {
+  const sensor = useApp((state) => state.view.sensor);
+  const unit = useApp((state) => state.settings.unit);
+  const moment = useApp((state) => state.view.moment);
+  const catalogue = useApp(selectCatalogue);
+  const isZoomed = useZoomed();
+  const [isTable, setTable] = useState(false);
+  const body = useRef<HTMLDivElement>(null);
+  const size = useSize(body);
+  const [tagId = ''] = charted.tagIds;
+  const sensors = useSensorsOf(tagId);
+
+  const plans = useMemo(() => plansOf(charted, sensors, sensor), [charted, sensors, sensor]);
+  const pairs = useMemo(() => pairsOf(plans), [plans]);
+  const { fed, span } = useFeed(pairs, pointsFor(size.width));
+  const models = useMemo(
+    () => (span ? plans.map((plan) => modelOf(catalogue, plan, fed, span, unit, moment)) : []),
+    [catalogue, plans, fed, span, unit, moment],
+  );
+  const withLines = models.filter(({ lines }) => lines.length > 0);
+  const around = AROUND + (charted.by === 'sensor' ? LEGEND : 0);
+  const share = Math.floor(size.height / Math.max(1, plans.length)) - around;
+
+  const zoom = (factor: number) => (): void => {
+    const nowS = rosNow(store.get(), now());
+    if (span && nowS !== null) zoomBy(span, factor, nowS);
+  };
+
+  return (
+    <section className="chart-view" aria-label={S.charts} data-testid="chart-view">
+      <header>
+        <h2>
+          <bdi>{charted.by === 'tag' ? tagLabel(tagId) : S.charts}</bdi>
+        </h2>
+        <Segmented
+          legend={S.chartsByLegend}
+          value={charted.by}
+          options={[
+            { value: 'tag', label: S.chartsBy.tag },
+            { value: 'sensor', label: S.chartsBy.sensor },
+          ]}
+          onChange={(by) => {
+            act({ type: 'chart', chart: { by, tagIds: charted.tagIds } });
+          }}
+        />
+        <div className="chart-tools">
+          <Tool icon="plus" label={S.chartZoomIn} onClick={zoom(0.5)} />
+          <Tool icon="minus" label={S.chartZoomOut} onClick={zoom(2)} />
+          {isZoomed && <Tool icon="fit" label={S.chartWhole} onClick={zoomBack} />}
+          <Tool
+            icon={isTable ? 'chart' : 'list'}
+            label={isTable ? S.chartPlots : S.chartTable}
+            onClick={() => {
+              setTable(!isTable);
+            }}
+          />
+          <Tool
+            icon="close"
+            label={S.cardClose}
+            onClick={() => {
+              act({ type: 'chart', chart: null });
+            }}
+          />
+        </div>
+      </header>
+      {charted.by === 'sensor' && <TagChoice tagIds={charted.tagIds} />}
+      <div className="chart-body" ref={body}>
+        <ChartState
+          fed={fed}
+          isTimeKnown={span !== null}
+          lacks={plans.length === 0 ? S.chartNoSensors : null}
+        />
+        {isTable && <ChartTables models={withLines} />}
+        {!isTable &&
+          withLines.map((model) => (
+            <PlotView
+              key={model.sensor.name}
+              model={model}
+              height={Math.max(LEAST_HEIGHT, share)}
+            />
+          ))}
+      </div>
+      {withLines.length > 0 && span && (
+        <ChartFiles
+          models={withLines}
+          span={span}
+          tagId={charted.tagIds.length === 1 || charted.by === 'tag' ? tagId : undefined}
+          sensor={charted.by === 'sensor' ? sensor : undefined}
+        />
+      )}
+    </section>
+  );
+}
+
+function Tool({
+  icon,
+  label,
+  onClick,
+}: {
+  icon: IconName;
+  label: string;
+  onClick: () => void;
+}): JSX.Element {
+  return (
+    <button
+      type="button"
+      className="icon-button"
+      aria-label={label}
+      title={label}
+      onClick={onClick}
+    >
+      <Icon name={icon} />
+    </button>
+  );
+}

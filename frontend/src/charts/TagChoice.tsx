@@ -1,0 +1,62 @@
+import type { JSX } from 'react';
+
+import { shown } from '../domain/text';
+import { act, useApp } from '../store/app';
+import { selectTags } from '../store/moment';
+import { MOST_CHARTED } from '../store/view';
+import { S } from '../strings';
+import { Icon } from '../widgets/Icon';
+import { tagLabel } from './charted';
+import { LineSign } from './PlotView';
+
+/** The tags of one chart: each can go, and another be added while there is room. */
+export function TagChoice({ tagIds }: { tagIds: readonly string[] }): JSX.Element {
+  const sensor = useApp((state) => state.view.sensor);
+  const tags = useApp(selectTags);
+  const others = tags.filter(({ id, readings }) => readings.has(sensor) && !tagIds.includes(id));
+  const choose = (next: readonly string[]): void => {
+    act({ type: 'chart', chart: { by: 'sensor', tagIds: next } });
+  };
+  return (
+    <div className="chart-tags">
+      <ul>
+        {tagIds.map((tagId, look) => (
+          <li key={tagId}>
+            <LineSign look={look} />
+            <bdi>{tagLabel(tagId)}</bdi>
+            {tagIds.length > 1 && (
+              <button
+                type="button"
+                className="chip-close"
+                aria-label={S.chartRemoveTag(shown(tagId, 24))}
+                onClick={() => {
+                  choose(tagIds.filter((each) => each !== tagId));
+                }}
+              >
+                <Icon name="close" size={14} />
+              </button>
+            )}
+          </li>
+        ))}
+      </ul>
+      {tagIds.length < MOST_CHARTED && others.length > 0 && (
+        <select
+          aria-label={S.chartAddTag}
+          value=""
+          onChange={(event) => {
+            choose([...tagIds, event.target.value]);
+          }}
+        >
+          <option value="" disabled>
+            {S.chartAddTag}
+          </option>
+          {others.map(({ id }) => (
+            <option key={id} value={id}>
+              {tagLabel(id)}
+            </option>
+          ))}
+        </select>
+      )}
+    </div>
+  );
+}

@@ -1,0 +1,189 @@
+/** What a chart has below and above its lines: drawn by functions that keep no state. */
+import { toShown } from '../domain/units';
+import { isStroked, lookOf, markerPath } from './looks';
+import { pointsOf, type Line, type PlotModel } from './model';
+import type { ChartPalette } from './palette';
+
+/** Where things lie on the canvas, in its own pixels. */
+export interface Frame {
+  readonly context: CanvasRenderingContext2D;
+  readonly box: {
+    readonly left: number;
+    readonly top: number;
+    readonly width: number;
+    readonly height: number;
+  };
+  /** Canvas pixels a CSS pixel. */
+  readonly ratio: number;
+  readonly x: (at: number) => number;
+  /** Of a value in the unit that is shown. */
+  readonly y: (value: number) => number;
+}
+
+/** Closer together than this, markers would hide the line; CSS pixels. */
+const MARKER_ROOM = 9;
+const MARKER_SIZE = 6;
+
+/** Gaps, ideal range and what buckets range over. */
+export function drawBelow(frame: Frame, model: PlotModel, palette: ChartPalette): void {
+  const { context, box } = frame;
+  context.save();
+  context.beginPath();
+  context.rect(box.left, box.top, box.width, box.height);
+  context.clip();
+  drawIdeal(frame, model, palette);
+  // With several, one's gap lies behind another's line.
+  const [only] = model.lines;
+  if (only && model.lines.length === 1) drawGaps(frame, only, palette);
+  for (const line of model.lines) drawRanges(frame, line, model, palette);
+  context.restore();
+}
+
+function drawIdeal(frame: Frame, { sensor, unit }: PlotModel, palette: ChartPalette): void {
+  if (!sensor.ideal) return;
+  const { context, box, ratio, y } = frame;
+  const [low, high] = sensor.ideal.map((value) => y(toShown(sensor, value, unit)));
+  if (low === undefined || high === undefined) return;
+  context.fillStyle = palette.ideal;
+  context.fillRect(box.left, high, box.width, low - high);
+  context.strokeStyle = palette.idealLine;
+  context.lineWidth = ratio;
+  context.setLineDash([2 * ratio, 4 * ratio]);
+  context.beginPath();
+  for (const edge of [low, high]) {
+    context.moveTo(box.left, Math.round(edge) + 0.5);
+    context.lineTo(box.left + box.width, Math.round(edge) + 0.5);
+  }
+  context.stroke();
+  context.setLineDash([]);
+}
+
+/** Hatched, so that an empty stretch is seen to be told and not forgotten. */
+function drawGaps(
+  { context, box, ratio, x }: Frame,
+  { series }: Line,
+  palette: ChartPalette,
+): void {
+  context.strokeStyle = palette.gap;
+  context.lineWidth = ratio;
+  for (const gap of series.gaps) {
+    const left = Math.max(box.left, x(gap.from));
+    const right = Math.min(box.left + box.width, x(gap.to));
+    if (right - left < 3 * ratio) continue;
+    context.save();
+    context.beginPath();
+    context.rect(left, box.top, right - left, box.height);
+    context.clip();
+    context.beginPath();
+    const step = 9 * ratio;
+    for (let at = left - box.height - ((left - box.height) % step); at < right; at += step) {
+      context.moveTo(at, box.top + box.height);
+      context.lineTo(at + box.height, box.top);
+    }
+    context.stroke();
+    context.restore();
+  }
+}
+
+/** From the least to the most of each bucket, as wide as the bucket: none joins two of them. */
+function drawRanges(frame: Frame, line: Line, model: PlotModel, palette: ChartPalette): void {
+  const { series } = line;
+  if (series.bucketS === null) return;
+  const { context, ratio, x, y } = frame;
+  const { sensor, unit } = model;
+  context.globalAlpha = model.lines.length === 1 ? 0.28 : 0.14;
+  context.fillStyle = palette.lines[lookOf(line.look).colour] ?? palette.ink;
+  context.beginPath();
+  for (const { start, min, max } of series.buckets) {
+    const left = x(start);
+    const right = Math.min(x(start + series.bucketS), x(series.to));
+    const top = y(toShown(sensor, max, unit));
+    const height = Math.max(ratio, y(toShown(sensor, min, unit)) - top);
+    context.rect(left, top, Math.max(ratio, right - left), height);
+  }
+  context.fill();
+  context.globalAlpha = 1;
+}
+
+/** Markers of readings, marks of looks and failures, and the moment that is shown. */
+export function drawAbove(frame: Frame, model: PlotModel, palette: ChartPalette): void {
+  const { context, box } = frame;
+  context.save();
+  context.beginPath();
+  context.rect(box.left, box.top, box.width, box.height);
+  context.clip();
+  // The last line's dashes are still in force.
+  context.setLineDash([]);
+  for (const line of model.lines) {
+    drawMarkers(frame, line, model, palette);
+    drawMarks(frame, line, palette);
+  }
+  drawMoment(frame, model, palette);
+  context.restore();
+}
+
+/** Each reading where there is room; a point between two breaks always, or it would not be seen. */
+function drawMarkers(frame: Frame, line: Line, model: PlotModel, palette: ChartPalette): void {
+  const { context, ratio, x, y, box } = frame;
+  const { colour, marker } = lookOf(line.look);
+  const points = pointsOf(line.series, (value) => toShown(model.sensor, value, model.unit));
+  const seen = points.filter(
+    ({ at, value }) => value !== null && at >= model.span.from && at <= model.span.to,
+  );
+  const hasRoom = line.series.bucketS === null && seen.length * MARKER_ROOM * ratio <= box.width;
+  const stroke = palette.lines[colour] ?? palette.ink;
+  context.strokeStyle = stroke;
+  context.fillStyle = stroke;
+  context.lineWidth = 1.5 * ratio;
+  points.forEach(({ at, value }, index) => {
+    if (value === null) return;
+    const isAlone =
+      (points[index - 1]?.value ?? null) === null && (points[index + 1]?.value ?? null) === null;
+    if (!hasRoom && !isAlone) return;
+    const path = new Path2D(markerPath(marker, x(at), y(value), MARKER_SIZE * ratio));
+    if (isStroked(marker)) context.stroke(path);
+    else context.fill(path);
+  });
+}
+
+/** Marks of one kind closer together than this are one mark; CSS pixels. */
+const MARK_ROOM = 7;
+const MARK_SIZE = 7;
+
+/** A cross for what failed, a flower's ring for a look, along the lower edge. */
+function drawMarks(frame: Frame, { marks }: Line, palette: ChartPalette): void {
+  const { context, ratio, x, box } = frame;
+  const bottom = box.top + box.height;
+  context.lineWidth = 1.75 * ratio;
+  for (const kind of ['look', 'failure'] as const) {
+    const isFailure = kind === 'failure';
+    context.strokeStyle = isFailure ? palette.failure : palette.look;
+    const y = bottom - (isFailure ? 8 : 19) * ratio;
+    let last = -Infinity;
+    for (const mark of marks) {
+      const at = x(mark.at + mark.widthS / 2);
+      if (mark.kind !== kind || at - last < MARK_ROOM * ratio) continue;
+      last = at;
+      const size = MARK_SIZE * ratio;
+      context.stroke(new Path2D(markerPath(isFailure ? 'cross' : 'ring', at, y, size)));
+    }
+  }
+}
+
+function drawMoment(
+  { context, box, ratio, x }: Frame,
+  { moment }: PlotModel,
+  palette: ChartPalette,
+): void {
+  if (moment === null) return;
+  const at = Math.round(x(moment));
+  context.strokeStyle = palette.moment;
+  context.fillStyle = palette.moment;
+  context.lineWidth = 2 * ratio;
+  context.beginPath();
+  context.moveTo(at, box.top);
+  context.lineTo(at, box.top + box.height);
+  context.stroke();
+  const size = 9 * ratio;
+  context.fill(new Path2D(markerPath('down', at, box.top + size / 2, size)));
+}

@@ -1,0 +1,16 @@
+import { expect, test } from 'vitest';
+
+import { lookOf, markerPath, MOST_LINES } from './looks';
+
+const all = Array.from({ length: MOST_LINES }, (_, index) => lookOf(index));
+
+test('each line of a chart has a colour, a dash and a marker that no other has', () => {
+  expect(new Set(all.map(({ colour }) => colour)).size).toBe(MOST_LINES);
+  expect(new Set(all.map(({ dash }) => dash.join())).size).toBe(MOST_LINES);
+  expect(new Set(all.map(({ marker }) => marker)).size).toBe(MOST_LINES);
+});
+
+test('a marker is a path around its point', () => {
+  for (const { marker } of all) expect(markerPath(marker, 10, 20, 6)).toMatch(/^M[-\d. LMaZ]+$/);
+  expect(markerPath('square', 10, 20, 10)).toBe('M5.5 15.5L14.5 15.5L14.5 24.5L5.5 24.5Z');
+});

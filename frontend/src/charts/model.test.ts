@@ -1,0 +1,116 @@
+import { describe, expect, test } from 'vitest';
+
+import type { Series } from '../domain/series';
+import { aligned, pointsOf, valueRange, type PlotModel } from './model';
+import { sensorNamed } from '../testing/sensors';
+import { seriesWith } from '../testing/series';
+
+const model = (all: readonly Series[], over: Partial<PlotModel> = {}): PlotModel => ({
+  sensor: sensorNamed('temperature'),
+  unit: 'C',
+  lines: all.map((each, look) => ({ series: each, look, label: each.tagId, marks: [] })),
+  span: { from: 0, to: 100 },
+  moment: null,
+  ...over,
+});
+
+const same = (value: number): number => value;
+
+describe('the points of a line', () => {
+  test('break in each gap, and at a reading that is no number', () => {
+    const readings = [
+      { at: 10, value: 20 },
+      { at: 20, value: null },
+      { at: 80, value: 21 },
+    ];
+    const gaps = [{ from: 20, to: 80 }];
+    expect(pointsOf(seriesWith({ readings, gaps }), same)).toEqual([
+      { at: 10, value: 20 },
+      { at: 20, value: null },
+      { at: 50, value: null },
+      { at: 80, value: 21 },
+    ]);
+  });
+
+  test('of buckets are their means, in their middle', () => {
+    const bucket = { start: 40, n: 3, mean: 21, min: 20, max: 22 };
+    expect(pointsOf(seriesWith({ bucketS: 10, buckets: [bucket] }), same)).toEqual([
+      { at: 45, value: 21 },
+    ]);
+  });
+});
+
+describe('several lines over common times', () => {
+  const one = seriesWith({
+    readings: [
+      { at: 10, value: 20 },
+      { at: 30, value: 30 },
+    ],
+  });
+  const other = seriesWith({
+    tagId: '2',
+    readings: [{ at: 20, value: 10 }],
+    gaps: [{ from: 20, to: 40 }],
+  });
+
+  test('are bridged where another has a time, and broken at their own gaps', () => {
+    expect(aligned(model([one, other]))).toEqual([
+      [10, 20, 30],
+      [20, undefined, 30],
+      [undefined, 10, null],
+    ]);
+  });
+
+  test('are in the unit that is shown', () => {
+    expect(aligned(model([one], { unit: 'F' }))).toEqual([
+      [10, 30],
+      [68, 86],
+    ]);
+  });
+
+  test('may have nothing at all', () => {
+    expect(aligned(model([seriesWith()]))).toEqual([[], []]);
+  });
+});
+
+describe('the axis of the values', () => {
+  const reading = (...values: number[]): Series =>
+    seriesWith({ readings: values.map((value, at) => ({ at, value })) });
+
+  test('takes the least and the most of buckets, not their means alone', () => {
+    const buckets = [{ start: 0, n: 9, mean: 21, min: 10, max: 40 }];
+    const [low, high] = valueRange(model([seriesWith({ bucketS: 10, buckets })]));
+    expect(low).toBeCloseTo(10 - 30 * 0.08);
+    expect(high).toBeCloseTo(40 + 30 * 0.08);
+  });
+
+  test('takes the ideal range in while the values keep their share of the height', () => {
+    // Ideal is 50 to 75, and values that spread over ten of these 25 keep 40 %.
+    const humidity = { sensor: sensorNamed('humidity') };
+    expect(valueRange(model([reading(60, 70)], humidity))[1]).toBeCloseTo(75 + 25 * 0.08);
+    expect(valueRange(model([reading(60, 69.9)], humidity))[1]).toBeLessThan(75);
+    // Far above it, the ideal range stays out.
+    expect(valueRange(model([reading(40, 44)]))[0]).toBeGreaterThan(39);
+  });
+
+  test('makes no mountains of noise, and has one without any reading', () => {
+    const [low, high] = valueRange(model([reading(22, 22)]));
+    expect(high - low).toBeGreaterThan(0.8);
+    expect(valueRange(model([seriesWith()]))[0]).toBeLessThan(18);
+    const unknown = { sensor: sensorNamed('spin') };
+    expect(valueRange(model([reading(0, 0)], unknown))[1]).toBeGreaterThan(0.5);
+    expect(valueRange(model([seriesWith()], unknown))).toEqual([-0.08, 1.08]);
+  });
+
+  test('leaves room below the values for marks', () => {
+    const plain = model([reading(10, 30)]);
+    const mark = { at: 5, widthS: 1, kind: 'look' as const, count: 1 };
+    const marked = { ...plain, lines: plain.lines.map((line) => ({ ...line, marks: [mark] })) };
+    expect(valueRange(plain)[0]).toBeCloseTo(10 - 20 * 0.08);
+    expect(valueRange(marked)[0]).toBeCloseTo(10 - 20 * 0.3);
+  });
+
+  test('is in the unit that is shown', () => {
+    expect(valueRange(model([seriesWith()], { unit: 'F' }))[0]).toBeCloseTo((18 - 0.64) * 1.8 + 32);
+  });
+});

@@ -1,0 +1,104 @@
+/** What one chart shows: one sensor, as one or several tags read it. Pure. */
+import type { Sensor } from '../domain/sensors';
+import type { Span } from '../domain/period';
+import { middleOf, type Mark, type Series } from '../domain/series';
+import { toShown, type TemperatureUnit } from '../domain/units';
+
+export interface Line {
+  readonly series: Series;
+  /** Place among the looks. */
+  readonly look: number;
+  readonly label: string;
+  readonly marks: readonly Mark[];
+}
+
+export interface PlotModel {
+  readonly sensor: Sensor;
+  readonly unit: TemperatureUnit;
+  readonly lines: readonly Line[];
+  readonly span: Span;
+  /** The moment that the page shows, ROS seconds; null: now. */
+  readonly moment: number | null;
+}
+
+/** A point of a line in the unit that is shown; null breaks the line. */
+export interface Point {
+  readonly at: number;
+  readonly value: number | null;
+}
+
+/** The points of a series in their order, with a break in each gap. */
+export function pointsOf(series: Series, shown: (value: number) => number): Point[] {
+  const value = (of: number | null): number | null => (of === null ? null : shown(of));
+  const points: Point[] = [
+    ...series.readings.map((reading) => ({ at: reading.at, value: value(reading.value) })),
+    ...series.buckets.map((bucket) => ({
+      at: middleOf(bucket, series),
+      value: value(bucket.mean),
+    })),
+    ...series.gaps.map(({ from, to }) => ({ at: (from + to) / 2, value: null })),
+  ];
+  return points.sort((a, b) => a.at - b.at);
+}
+
+/** Common times, and per line its values: null is a break, undefined not of this line. */
+export type Aligned = [number[], ...(number | null | undefined)[][]];
+
+export function aligned({ lines, sensor, unit }: PlotModel): Aligned {
+  const all = lines.map(({ series }) => pointsOf(series, (value) => toShown(sensor, value, unit)));
+  const times = [...new Set(all.flatMap((points) => points.map(({ at }) => at)))].sort(
+    (a, b) => a - b,
+  );
+  const place = new Map(times.map((time, index) => [time, index]));
+  const values = all.map((points) => {
+    const column = new Array<number | null | undefined>(times.length).fill(undefined);
+    for (const { at, value } of points) column[place.get(at) ?? 0] = value;
+    return column;
+  });
+  return [times, ...values];
+}
+
+/** Room above and below the values, as a share of how far they spread. */
+const ROOM = 0.08;
+/** Marks stand below the values and not among them. */
+const ROOM_FOR_MARKS = 0.3;
+/** The ideal range comes into the picture as long as the values keep this share of the height. */
+const LEAST_SHARE = 0.4;
+/** A spread that is less than this share of the ideal range would make mountains of noise. */
+const LEAST_OF_IDEAL = 0.1;
+
+/** The values' axis, in the unit that is shown. */
+export function valueRange({ lines, sensor, unit }: PlotModel): [low: number, high: number] {
+  let low = Infinity;
+  let high = -Infinity;
+  const take = (value: number | null): void => {
+    if (value === null) return;
+    low = Math.min(low, value);
+    high = Math.max(high, value);
+  };
+  for (const { series } of lines) {
+    for (const { value } of series.readings) take(value);
+    for (const { min, max } of series.buckets) {
+      take(min);
+      take(max);
+    }
+  }
+  const { ideal } = sensor;
+  if (low > high) [low, high] = ideal ?? [0, 1];
+  const least = ideal ? LEAST_OF_IDEAL * (ideal[1] - ideal[0]) : Math.abs(low) * 0.01 || 1;
+  if (high - low < least) {
+    const middle = (low + high) / 2;
+    [low, high] = [middle - least / 2, middle + least / 2];
+  }
+  if (ideal) {
+    const spread = high - low;
+    // Each end on its own: one that is far off stays out, and the other still helps.
+    for (const bound of ideal) {
+      const [down, up] = [Math.min(low, bound), Math.max(high, bound)];
+      if (spread >= LEAST_SHARE * (up - down)) [low, high] = [down, up];
+    }
+  }
+  const room = (high - low) * ROOM;
+  const below = lines.some(({ marks }) => marks.length > 0) ? (high - low) * ROOM_FOR_MARKS : room;
+  return [toShown(sensor, low - below, unit), toShown(sensor, high + room, unit)];
+}

@@ -1,0 +1,35 @@
+/** The colours of charts, as the style sheet has them now: light or dark, forced, or for paper. */
+export interface ChartPalette {
+  readonly lines: readonly string[];
+  readonly ink: string;
+  readonly text: string;
+  readonly grid: string;
+  readonly surface: string;
+  readonly ideal: string;
+  readonly idealLine: string;
+  readonly gap: string;
+  readonly failure: string;
+  readonly look: string;
+  readonly moment: string;
+  readonly font: string;
+}
+
+export function readPalette(): ChartPalette {
+  const style = getComputedStyle(document.documentElement);
+  const read = (name: string): string => style.getPropertyValue(`--chart-${name}`).trim();
+  return {
+    lines: Array.from({ length: 8 }, (_, index) => read(String(index + 1))),
+    ink: read('ink'),
+    text: read('text'),
+    grid: read('grid'),
+    surface: read('surface'),
+    ideal: read('ideal'),
+    idealLine: read('ideal-line'),
+    gap: read('gap'),
+    failure: read('failure'),
+    look: read('look'),
+    moment: read('moment'),
+    // Larger where the page's text is.
+    font: `${Math.round(11.5 * (parseFloat(style.fontSize) / 16 || 1))}px ${style.getPropertyValue('--font')}`,
+  };
+}

@@ -1,0 +1,197 @@
+/** One chart on the page: uPlot with the layers of `layers.ts`, told what to show and how large. */
+import uPlot from 'uplot';
+
+import type { Span } from '../domain/period';
+import { hasDate } from '../domain/rostime';
+import { timeTicks, type Tick } from '../domain/ticks';
+import { drawAbove, drawBelow, type Frame } from './layers';
+import { lookOf } from './looks';
+import { aligned, valueRange, type PlotModel } from './model';
+import { readPalette } from './palette';
+
+export interface PlotHandlers {
+  /** The time that the mouse is on, ROS seconds; null: on none. */
+  readonly onPoint: (at: number | null) => void;
+  readonly onPick: (at: number) => void;
+  readonly onZoom: (span: Span) => void;
+}
+
+export interface PlotSize {
+  readonly width: number;
+  readonly height: number;
+}
+
+/** A drag that is shorter is a click, CSS pixels. */
+const SHORTEST_DRAG = 6;
+/** Charts of one view have one cursor. */
+const SYNC_KEY = 'lupin-charts';
+
+export interface Plot {
+  readonly show: (model: PlotModel, size: PlotSize) => void;
+  /** Marks a time, ROS seconds, as the mouse would, and tells nobody; null: none. */
+  readonly point: (at: number | null) => void;
+  /** Draws anew in the colours that are in force now, at once: a printer does not wait. */
+  readonly recolour: () => void;
+  readonly destroy: () => void;
+}
+
+export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
+  let palette = readPalette();
+  let model: PlotModel | null = null;
+  let chart: uPlot | null = null;
+  let shape = '';
+  let ticks: readonly Tick[] = [];
+
+  const frameOf = (u: uPlot): Frame => ({
+    context: u.ctx,
+    box: u.bbox,
+    ratio: uPlot.pxRatio,
+    x: (at) => u.valToPos(at, 'x', true),
+    y: (value) => u.valToPos(value, 'y', true),
+  });
+
+  const build = (first: PlotModel, size: PlotSize): uPlot => {
+    const u = new uPlot(
+      {
+        ...size,
+        class: 'plot',
+        legend: { show: false },
+        padding: [8, 10, 0, 0],
+        cursor: {
+          y: false,
+          points: { size: 8, width: 2, stroke: () => palette.surface, fill: colourOf },
+          drag: { x: true, y: false, setScale: false, dist: SHORTEST_DRAG },
+          sync: {
+            key: SYNC_KEY,
+            scales: ['x', null],
+            // Another's drag is not one's own.
+            filters: { pub: (type) => type !== 'mousedown' && type !== 'mouseup' },
+          },
+        },
+        scales: {
+          x: {
+            time: false,
+            range: () => [model?.span.from ?? 0, model?.span.to ?? 1],
+          },
+          y: { range: () => (model ? valueRange(model) : [0, 1]) },
+        },
+        series: [
+          {},
+          ...first.lines.map(({ look }) => ({
+            stroke: () => palette.lines[lookOf(look).colour] ?? palette.ink,
+            width: 1.75,
+            dash: [...lookOf(look).dash],
+            points: { show: false },
+          })),
+        ],
+        axes: [
+          {
+            ...axisLook(
+              () => palette.text,
+              () => palette.grid,
+            ),
+            font: palette.font,
+            size: 44,
+            lineGap: 1.2,
+            splits: (self) => {
+              ticks = ticksOf(model, self.bbox.width / uPlot.pxRatio);
+              return ticks.map(({ at }) => at);
+            },
+            values: () => ticks.map(({ text }) => text),
+          },
+          {
+            ...axisLook(
+              () => palette.text,
+              () => palette.grid,
+            ),
+            font: palette.font,
+            size: 48,
+            space: 34,
+          },
+        ],
+        hooks: {
+          drawAxes: [
+            (self) => {
+              if (model) drawBelow(frameOf(self), model, palette);
+            },
+          ],
+          draw: [
+            (self) => {
+              if (model) drawAbove(frameOf(self), model, palette);
+            },
+          ],
+          setCursor: [
+            (self) => {
+              const { left } = self.cursor;
+              handlers.onPoint(left === undefined || left < 0 ? null : self.posToVal(left, 'x'));
+            },
+          ],
+          setSelect: [
+            (self) => {
+              const { left, width } = self.select;
+              self.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+              if (width < SHORTEST_DRAG) return;
+              handlers.onZoom({
+                from: self.posToVal(left, 'x'),
+                to: self.posToVal(left + width, 'x'),
+              });
+            },
+          ],
+        },
+      },
+      aligned(first),
+      element,
+    );
+    u.over.addEventListener('click', (event) => {
+      handlers.onPick(u.posToVal(event.offsetX, 'x'));
+    });
+    return u;
+  };
+
+  const colourOf = (_: uPlot, series: number): string => {
+    const look = model?.lines[series - 1]?.look ?? 0;
+    return palette.lines[lookOf(look).colour] ?? palette.ink;
+  };
+
+  return {
+    show: (next, size) => {
+      const before = model;
+      model = next;
+      const nextShape = next.lines.map(({ look }) => look).join();
+      if (!chart || shape !== nextShape) {
+        chart?.destroy();
+        chart = build(next, size);
+        shape = nextShape;
+        return;
+      }
+      if (chart.width !== size.width || chart.height !== size.height) chart.setSize(size);
+      if (before !== next) chart.setData(aligned(next));
+    },
+    point: (at) => {
+      const left = at === null ? -10 : (chart?.valToPos(at, 'x') ?? -10);
+      chart?.setCursor({ left, top: at === null ? -10 : 0 }, false);
+    },
+    recolour: () => {
+      palette = readPalette();
+      chart?.batch(() => {
+        chart?.redraw();
+      });
+    },
+    destroy: () => {
+      chart?.destroy();
+      chart = null;
+    },
+  };
+}
+
+/** A tick needs so many pixels of the axis. */
+const TICK_ROOM = 70;
+
+const ticksOf = (model: PlotModel | null, width: number): readonly Tick[] =>
+  model ? timeTicks(model.span, width / TICK_ROOM, !hasDate(model.span.to)) : [];
+
+const axisLook = (text: () => string, grid: () => string): Partial<uPlot.Axis> => ({
+  stroke: text,
+  grid: { stroke: grid, width: 1 },
+  ticks: { stroke: grid, width: 1, size: 5 },
+});

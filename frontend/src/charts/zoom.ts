@@ -1,0 +1,48 @@
+/** A part of the period, chosen in a chart, becomes the period: time bar and link follow. */
+import type { Period, Span } from '../domain/period';
+import { act, store, useApp } from '../store/app';
+import { createStore, useSelected } from '../store/create';
+
+/** Nothing is to be seen in less, seconds. */
+export const SHORTEST_S = 10;
+
+/** The period before the first zoom; null: nobody has zoomed. */
+export const wholePeriod = createStore<Period | null, Period | null>(null, (_, period) => period);
+
+/** Widened to what a chart can show, around its middle; never before the beginning of time. */
+export function zoomedSpan({ from, to }: Span): Span {
+  const middle = (from + to) / 2;
+  const half = Math.max(to - from, SHORTEST_S) / 2;
+  const start = Math.max(0, middle - half);
+  return { from: round(start), to: round(Math.max(start + SHORTEST_S, middle + half)) };
+}
+
+/** To the millisecond, as the link holds it. */
+const round = (at: number): number => Math.round(at * 1000) / 1000;
+
+export function zoomTo(span: Span): void {
+  const { period } = store.get().view;
+  if (period.kind !== 'own' || wholePeriod.get() === null) wholePeriod.dispatch(period);
+  act({ type: 'period', period: { kind: 'own', ...zoomedSpan(span) } });
+}
+
+/** In (below 1) or out around the middle, but never beyond now. */
+export function zoomBy(span: Span, factor: number, now: number): void {
+  const half = ((span.to - span.from) * factor) / 2;
+  const to = Math.min(now, (span.from + span.to) / 2 + half);
+  zoomTo({ from: to - 2 * half, to });
+}
+
+export function zoomBack(): void {
+  const period = wholePeriod.get();
+  if (!period) return;
+  wholePeriod.dispatch(null);
+  act({ type: 'period', period });
+}
+
+/** Whether there is a whole period to go back to. */
+export function useZoomed(): boolean {
+  const whole = useSelected(wholePeriod, (period) => period);
+  const isOwn = useApp((state) => state.view.period.kind === 'own');
+  return isOwn && whole !== null;
+}

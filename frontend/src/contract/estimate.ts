@@ -1,0 +1,115 @@
+/** The routes of the estimate: a field with its error, and what the twin says of how good it is. */
+import { fieldParameters, get, numberIn, read, type FieldQuery } from './api';
+import {
+  boolean,
+  count,
+  list,
+  number,
+  numberOrNull,
+  object,
+  orNull,
+  record,
+  type Check,
+} from './check';
+import { npyOf } from './npy';
+import { MAX_SENSORS, TEXT, TIME } from './shapes';
+import type { Advice, Expected, ExpectedTags, Grade, Grades, Place } from './types';
+
+/** More than any twin keeps. */
+const MAX_TAGS = 100_000;
+/** What the server gives at most. */
+const MAX_PLACES = 20;
+
+/** As the server sends it; whatever a cell's error is, its mean is told. */
+export interface Estimate {
+  readonly width: number;
+  readonly height: number;
+  readonly originX: number;
+  readonly originY: number;
+  readonly resolution: number;
+  readonly sdKnown: number;
+  readonly sampleCount: number;
+  readonly readingCount: number;
+  /** Row-major, row 0 at the bottom; not-a-number where the house is not explored. */
+  readonly mean: Float32Array;
+  readonly sd: Float32Array;
+}
+
+export async function fetchEstimate(query: FieldQuery, signal: AbortSignal): Promise<Estimate> {
+  const response = await get(`api/estimate.npy?${fieldParameters(query)}`, signal);
+  const { shape, values } = npyOf(await response.arrayBuffer(), 3);
+  const [layers = 0, height = 0, width = 0] = shape;
+  if (layers !== 2) throw new Error(`estimate: ${layers} grids, expected mean and sd`);
+  const header = numberIn(response);
+  return {
+    width,
+    height,
+    originX: header('X-Estimate-Origin-X'),
+    originY: header('X-Estimate-Origin-Y'),
+    resolution: header('X-Estimate-Resolution'),
+    sdKnown: header('X-Estimate-Sd-Known'),
+    sampleCount: header('X-Estimate-Sample-Count'),
+    readingCount: header('X-Estimate-Reading-Count'),
+    mean: values.subarray(0, height * width),
+    sd: values.subarray(height * width),
+  };
+}
+
+const FORETOLD = object({ scans: count, inside: count });
+const GRADE = object({
+  fitted_at: orNull(TIME),
+  fit_problem: TEXT,
+  day: FORETOLD,
+  week: FORETOLD,
+  share_day: numberOrNull,
+  is_trusted: boolean,
+});
+
+/** null: no tag has this sensor. */
+export async function fetchGrade(sensor: string, signal: AbortSignal): Promise<Grade | null> {
+  const GRADES = object({ sensors: record(GRADE, MAX_SENSORS) });
+  const body = await read<Grades>(
+    'estimate/quality',
+    GRADES,
+    await asked('quality', { sensor_type: sensor }, signal),
+  );
+  return Object.hasOwn(body.sensors, sensor) ? (body.sensors[sensor] ?? null) : null;
+}
+
+const EXPECTED: Check = object({
+  measured: number,
+  expected: number,
+  expected_sd: number,
+  left_out: boolean,
+});
+
+export async function fetchExpected(
+  sensor: string,
+  signal: AbortSignal,
+): Promise<Readonly<Record<string, Expected>>> {
+  const response = await asked('tags', { sensor_type: sensor }, signal);
+  const TAGS = object({ tags: record(EXPECTED, MAX_TAGS) });
+  return (await read<ExpectedTags>('estimate/tags', TAGS, response)).tags;
+}
+
+const PLACES = object({
+  places: list(object({ x: number, y: number, error_ratio: number }), MAX_PLACES),
+});
+
+/** The best first. */
+export async function fetchAdvice(
+  sensor: string,
+  places: number,
+  signal: AbortSignal,
+): Promise<readonly Place[]> {
+  const query = { sensor_type: sensor, places: String(places) };
+  const response = await asked('advice', query, signal);
+  return (await read<Advice>('estimate/advice', PLACES, response)).places;
+}
+
+const asked = (
+  what: string,
+  query: Readonly<Record<string, string>>,
+  signal: AbortSignal,
+): Promise<Response> =>
+  get(`api/estimate/${what}?${new URLSearchParams(query).toString()}`, signal);

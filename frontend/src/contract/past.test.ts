@@ -1,0 +1,60 @@
+import { describe, expect, test, vi } from 'vitest';
+
+import { judgement, NOBODY, reason } from '../testing/health';
+import { stateFrame } from '../testing/tags';
+import { wireTimeline } from '../testing/timeline';
+import { fetchStateAt, fetchTimeline, momentParameter } from './past';
+
+const { signal } = new AbortController();
+
+const answering = (body: unknown, health: unknown = NOBODY): string[] => {
+  const asked: string[] = [];
+  vi.stubGlobal('fetch', (url: URL) => {
+    asked.push(`${url.pathname}${url.search}`);
+    return Promise.resolve(Response.json(url.pathname === '/api/health' ? health : body));
+  });
+  return asked;
+};
+
+describe('the state of a moment', () => {
+  const { state } = stateFrame([], { sec: 1_794_000_000 });
+  const half = { ...state, header: { ...state.header, stamp: { sec: 12, nanosec: 500_000_000 } } };
+
+  test('is asked for to the millisecond, with the verdicts of that moment', async () => {
+    const health = judgement({ 1: [reason()] });
+    const asked = answering(half, health);
+    await expect(fetchStateAt(12.5, signal)).resolves.toMatchObject({ state: half, health });
+    expect(asked).toEqual(['/api/state?at=12.500', '/api/health?at=12.500']);
+    expect([momentParameter(1_794_000_000.125), momentParameter(1e-7)]).toEqual([
+      '1794000000.125',
+      '0.000',
+    ]);
+  });
+
+  test('of any other moment is none: a server that knows no past gives the present', async () => {
+    answering(state);
+    await expect(fetchStateAt(12.5, signal)).rejects.toThrow(
+      'the answer is about 1794000000.000 s, asked was 12.500 s',
+    );
+  });
+
+  test('is checked to the last field', async () => {
+    answering({ header: state.header, tags: [{}] });
+    await expect(fetchStateAt(1_794_000_000, signal)).rejects.toThrow('state.tags[0].tag_id');
+    answering(state, { house: NOBODY.house, tags: { 1: { verdict: 'fine', reasons: [] } } });
+    await expect(fetchStateAt(1_794_000_000, signal)).rejects.toThrow('health.tags["1"].verdict');
+  });
+});
+
+test('what happened is asked for over a period, or over all there is', async () => {
+  const wire = wireTimeline({ from: 5, to: 9.5 });
+  const asked = answering(wire);
+  await expect(fetchTimeline({ from: 5, to: 9.5 }, 240, signal)).resolves.toEqual(wire);
+  await fetchTimeline(null, 240, signal);
+  expect(asked).toEqual([
+    '/api/timeline?points=240&from=5.000&to=9.500',
+    '/api/timeline?points=240',
+  ]);
+  answering({ ...wire, silences: [{ from: 5 }] });
+  await expect(fetchTimeline(null, 240, signal)).rejects.toThrow('timeline.silences[0].from');
+});

@@ -1,0 +1,76 @@
+/** The routes of the past: how it was at a moment, and what happened when. Times are ROS seconds. */
+import { get, read } from './api';
+import { boolean, count, list, number, object, orNull } from './check';
+import { HEALTH, TAGS } from './frames';
+import { HEADER, TIME } from './shapes';
+import type { Judgement, Latest, Timeline, TwinState } from './types';
+
+/** What the server gives at most of each. */
+const MAX_POINTS = 5_000;
+/** Stamps are exact to the nanosecond, and a moment that is asked for to the millisecond. */
+const SAME_MOMENT_S = 0.0005;
+
+const STATE = object({ header: HEADER, tags: TAGS });
+const STRETCH = object({ from: TIME, to: TIME });
+
+export const TIMELINE = object({
+  from: TIME,
+  to: TIME,
+  bucket_s: number,
+  reach: orNull(STRETCH),
+  buckets: list(
+    object({
+      start: TIME,
+      scans: count,
+      failures: count,
+      looks: count,
+      pests_seen: count,
+      pests_cleared: count,
+    }),
+    MAX_POINTS,
+  ),
+  silences: list(STRETCH, MAX_POINTS),
+  runs: list(object({ from: TIME, to: TIME, is_simulated: boolean }), MAX_POINTS),
+});
+
+/** A moment as the routes read it: never with an exponent. */
+export const momentParameter = (at: number): string => Math.max(0, at).toFixed(3);
+
+/**
+ * Every tag as of a moment, and what is to be said of it. An answer about any other moment is an error: a server that does not
+ * know `at` would give the present.
+ */
+export async function fetchStateAt(at: number, signal: AbortSignal): Promise<Latest> {
+  const query = `at=${momentParameter(at)}`;
+  // Both or none: no moment has the verdicts of another one.
+  const [state, health] = await Promise.all([
+    get(`api/state?${query}`, signal).then((it) => read<TwinState>('state', STATE, it)),
+    get(`api/health?${query}`, signal).then((it) => read<Judgement>('health', HEALTH, it)),
+  ]);
+  const { sec, nanosec } = state.header.stamp;
+  const told = sec + nanosec / 1e9;
+  if (Math.abs(told - at) > SAME_MOMENT_S) {
+    throw new Error(`the answer is about ${told.toFixed(3)} s, asked was ${at.toFixed(3)} s`);
+  }
+  return { seq: 0, revision: `at ${sec}.${nanosec}`, state, health };
+}
+
+/**
+ * What happened over a period, in so many buckets; without a period, over all that is kept. With
+ * a tag only what happened there.
+ */
+export async function fetchTimeline(
+  span: { readonly from: number; readonly to: number } | null,
+  points: number,
+  signal: AbortSignal,
+  tagId?: string,
+): Promise<Timeline> {
+  const parts = new URLSearchParams({ points: String(points) });
+  if (span) {
+    parts.set('from', momentParameter(span.from));
+    parts.set('to', momentParameter(span.to));
+  }
+  if (tagId !== undefined) parts.set('tag_id', tagId);
+  const response = await get(`api/timeline?${parts.toString()}`, signal);
+  return read<Timeline>('timeline', TIMELINE, response);
+}

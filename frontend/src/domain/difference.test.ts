@@ -1,0 +1,85 @@
+import { describe, expect, test } from 'vitest';
+
+import type { Field } from '../contract/types';
+import {
+  differenceOf,
+  differenceText,
+  divergingColour,
+  divergingShade,
+  otherMoment,
+  symmetricRange,
+} from './difference';
+import { fieldWith } from '../testing/field';
+import { sensorNamed } from '../testing/sensors';
+
+const field = (values: readonly number[], over: Partial<Field> = {}): Field =>
+  fieldWith([values], { resolution: 0.1, valueMin: 0, valueMax: 0, sampleCount: 3, ...over });
+
+test('the other moment is so long before the one that is shown, or one for ever', () => {
+  expect(otherMoment({ by: 'ago', seconds: 86_400 }, 100_000)).toBe(13_600);
+  expect(otherMoment({ by: 'moment', at: 500 }, 100_000)).toBe(500);
+});
+
+describe('a difference', () => {
+  test('is the field that is shown less the other, and not known where either is not', () => {
+    const shown = field([20, 21, NaN, 18]);
+    const then = field([18.5, 23, 20, NaN], { sampleCount: 2 });
+    const between = differenceOf(shown, then);
+    expect([...between.values]).toEqual([1.5, -2, NaN, NaN]);
+    expect([between.valueMin, between.valueMax, between.sampleCount]).toEqual([-2, 1.5, 2]);
+  });
+
+  test('of nothing known is empty, as a field is', () => {
+    const between = differenceOf(field([NaN, 1]), field([1, NaN]));
+    expect([between.valueMin, between.valueMax, between.sampleCount]).toEqual([0, 0, 0]);
+  });
+
+  test.each(['sensor', 'width', 'height', 'originX', 'originY', 'resolution'] as const)(
+    'of two with another %s is none',
+    (key) => {
+      const other = field([1, 2], { [key]: key === 'sensor' ? 'co2' : 9 });
+      expect(() => differenceOf(field([1, 2]), other)).toThrow(`difference: ${key} is`);
+    },
+  );
+});
+
+describe('its colours', () => {
+  const range = symmetricRange(field([], { valueMin: -1, valueMax: 3 }));
+
+  test('range as far below 0 as above', () => {
+    expect(range).toEqual({ low: -3, high: 3 });
+    expect(symmetricRange(field([], { valueMin: -4, valueMax: -1 }))).toEqual({ low: -4, high: 4 });
+  });
+
+  test('are grey and to be seen at 0, blue below and orange above, the same far off', () => {
+    const none = divergingColour(range, 0);
+    const less = divergingColour(range, -3);
+    const more = divergingColour(range, 3);
+    expect(none.rgb).toEqual([128, 128, 128]);
+    expect(none.alpha).toBeGreaterThan(0.1);
+    expect(less.rgb[2]).toBeGreaterThan(less.rgb[0] + 100);
+    expect(more.rgb[0]).toBeGreaterThan(more.rgb[2] + 100);
+    expect(less.alpha).toBe(more.alpha);
+    expect(divergingColour(range, -99)).toEqual(less);
+    expect(divergingColour(range, 1).alpha).toBeCloseTo(divergingColour(range, -1).alpha);
+  });
+
+  test('are grey where nothing has changed anywhere', () => {
+    expect(divergingColour({ low: 0, high: 0 }, 0).rgb).toEqual([128, 128, 128]);
+  });
+
+  test('colour a pixel', () => {
+    const data = new Uint8ClampedArray(8);
+    divergingShade(range)(data, 4, 3, 0);
+    expect([...data]).toEqual([0, 0, 0, 0, 222, 92, 0, 204]);
+  });
+});
+
+test('a difference is told with its sign and unit, and has no offset of 32 °F', () => {
+  const temperature = sensorNamed('temperature');
+  expect(differenceText(temperature, 1.3, 'C')).toBe('+1.3\u00a0°C');
+  expect(differenceText(temperature, -1, 'F')).toBe('\u22121.8\u00a0°F');
+  expect(differenceText(temperature, 0, 'C')).toBe('0.0\u00a0°C');
+  expect(differenceText(temperature, -0.001, 'C')).toBe('0.00\u00a0°C');
+  expect(differenceText(sensorNamed('spin'), 4, 'C')).toBe('+4.0');
+});

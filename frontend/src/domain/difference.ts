@@ -1,0 +1,102 @@
+/** A field less another of the same house at another moment: yesterday against today. Pure. */
+import type { Field } from '../contract/types';
+import { numberText } from './format';
+import { fraction, mix, rangeOf, rgbText, type Range, type Rgb, type Shade } from './ramp';
+import type { Sensor } from './sensors';
+import { differenceToShown, unitOf, type TemperatureUnit } from './units';
+
+/** What the moment that is shown is compared with: so many seconds before it, or one moment. */
+export type Compare =
+  { readonly by: 'ago'; readonly seconds: number } | { readonly by: 'moment'; readonly at: number };
+
+export const DAY_S = 86_400;
+export const WEEK_S = 7 * DAY_S;
+
+/** The other moment, ROS seconds. */
+export const otherMoment = (compare: Compare, shownAt: number): number =>
+  compare.by === 'moment' ? compare.at : shownAt - compare.seconds;
+
+/**
+ * What is shown less what was then, cell by cell, on their one grid; not known where either is
+ * not. `valueMin` and `valueMax` range over what is known; both are 0 where nothing is.
+ *
+ * @throws Error where the two do not lie on one grid.
+ */
+export function differenceOf(shown: Field, then: Field): Field {
+  for (const key of ['sensor', 'width', 'height', 'originX', 'originY', 'resolution'] as const) {
+    if (shown[key] !== then[key]) {
+      throw new Error(`difference: ${key} is ${shown[key]} and was ${then[key]}`);
+    }
+  }
+  if (Boolean(shown.sureness) !== Boolean(then.sureness)) {
+    throw new Error('difference: one of the two is no estimate');
+  }
+  const values = shown.values.map((value, index) => value - (then.values[index] ?? NaN));
+  const known = rangeOf(values);
+  const { sensor, width, height, originX, originY, resolution } = shown;
+  return {
+    ...{ sensor, width, height, originX, originY, resolution },
+    values,
+    valueMin: known?.low ?? 0,
+    valueMax: known?.high ?? 0,
+    sampleCount: known ? Math.min(shown.sampleCount, then.sampleCount) : 0,
+  };
+}
+
+/** As far below 0 as above it, or a small change would look like a large one of the other kind. */
+export function symmetricRange({ valueMin, valueMax }: Field): Range {
+  const most = Math.max(Math.abs(valueMin), Math.abs(valueMax));
+  return { low: -most, high: most };
+}
+
+/** Less is blue and more is orange, which no common colour blindness takes for each other. */
+const LESS: Rgb = [0, 92, 200];
+const MORE: Rgb = [222, 92, 0];
+/** No change is grey and to be seen: it is not the same as not known. */
+const SAME: Rgb = [128, 128, 128];
+const FAINTEST = 0.2;
+const STRONGEST = 0.8;
+
+/** Colour and alpha of a difference in a symmetric range. */
+export function divergingColour(range: Range, value: number): { rgb: Rgb; alpha: number } {
+  const signed = range.high > 0 ? 2 * fraction(range, value) - 1 : 0;
+  const size = Math.abs(signed);
+  return {
+    rgb: mix(SAME, signed < 0 ? LESS : MORE, Math.sqrt(size)),
+    alpha: FAINTEST + (STRONGEST - FAINTEST) * size,
+  };
+}
+
+const STOPS = [-1, -0.75, -0.5, -0.25, 0, 0.25, 0.5, 0.75, 1];
+
+/** The colours from the most that it is less to the most that it is more, evenly apart. */
+export const divergingColours = (): string[] =>
+  STOPS.map((stop) => {
+    const { rgb, alpha } = divergingColour({ low: -1, high: 1 }, stop);
+    return rgbText(rgb, alpha);
+  });
+
+export const divergingShade =
+  (range: Range): Shade =>
+  (data, at, value) => {
+    const { rgb, alpha } = divergingColour(range, value);
+    data[at] = rgb[0];
+    data[at + 1] = rgb[1];
+    data[at + 2] = rgb[2];
+    data[at + 3] = 255 * alpha;
+  };
+
+/** A difference with its sign, without its unit; no sign where nothing is left to show. */
+export function signedText(sensor: Sensor, value: number, unit: TemperatureUnit): string {
+  const text = numberText(differenceToShown(sensor, value, unit));
+  const isNothing = !/[1-9]/.test(text);
+  if (isNothing) return text.replace('\u2212', '');
+  return value > 0 ? `+${text}` : text;
+}
+
+/** The same with its unit: "+1.3 °C". */
+export function differenceText(sensor: Sensor, value: number, unit: TemperatureUnit): string {
+  const suffix = unitOf(sensor, unit);
+  const text = signedText(sensor, value, unit);
+  return suffix ? `${text}\u00a0${suffix}` : text;
+}

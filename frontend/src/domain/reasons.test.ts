@@ -1,0 +1,91 @@
+import { describe, expect, test } from 'vitest';
+
+import { reason } from '../testing/health';
+import { reasonsText, reasonText } from './reasons';
+import { CATALOGUE } from '../testing/sensors';
+
+const text = (over: Parameters<typeof reason>[0], age: number | null = null): string =>
+  reasonText(CATALOGUE, reason(over), 'C', age);
+const NBSP = '\u00a0';
+const old = { kind: 'old', verdict: 'unknown', sensor: '', value: null } as const;
+
+describe('a reason in words', () => {
+  test.each([
+    [{}, null, `Temperature 6.6${NBSP}°C, below 10.0 (critical)`],
+    [
+      { verdict: 'stressed', value: 30, limit: 26 } as const,
+      null,
+      `Temperature 30.0${NBSP}°C, above 26.0`,
+    ],
+    [
+      { sensor: 'vpd', value: 1.68, limit: 1.3, verdict: 'stressed' } as const,
+      null,
+      `Vapour pressure deficit 1.7${NBSP}kPa, above 1.3`,
+    ],
+    [
+      { kind: 'reading_failed', sensor: 'humidity', value: null } as const,
+      60,
+      'Humidity: the sensor gives no value',
+    ],
+    [
+      { kind: 'scan_failed', sensor: '', value: 1, limit: null } as const,
+      180,
+      `Last scan failed: not reachable, 3${NBSP}min ago`,
+    ],
+    [
+      { kind: 'scan_failed', sensor: '', value: 2, limit: null } as const,
+      null,
+      'Last scan failed: not decoded',
+    ],
+    [{ kind: 'pest', sensor: '', value: 3, limit: null } as const, 5, '3 pests seen'],
+    [{ kind: 'pest', sensor: '', value: 0, limit: null } as const, 5, 'Pest seen'],
+    [{ ...old, limit: 1_800 }, 345_600, `Not scanned for 4${NBSP}d (readings hold 30${NBSP}min)`],
+    [
+      { ...old, limit: 86_400, sensor: 'soil_moisture' },
+      90_000,
+      `Soil moisture: no reading for 1${NBSP}d (readings hold 1${NBSP}d)`,
+    ],
+    [{ ...old, limit: 600 }, null, `Not scanned lately (readings hold 10${NBSP}min)`],
+    [
+      { ...old, limit: 5_400, since: null },
+      null,
+      `No scan whose time is known (readings hold 1${NBSP}h 30${NBSP}min)`,
+    ],
+    [
+      { kind: 'changed', value: 22, limit: null } as const,
+      null,
+      `Temperature 22.0${NBSP}°C, changed against its own past and its neighbours`,
+    ],
+    [
+      { kind: 'silent', sensor: '', value: null, limit: null } as const,
+      null,
+      'The twin is silent: what was heard last says nothing about now',
+    ],
+    [
+      { kind: 'stopped', sensor: '', value: null, limit: null } as const,
+      null,
+      'No tag is being scanned: the robot has stopped, or is not heard',
+    ],
+    [{ kind: 'door_open' as never, sensor: '', value: null, limit: null }, null, 'door open'],
+  ] as const)('%o', (over, age, told) => {
+    expect(text(over, age)).toBe(told);
+  });
+
+  test('follows the unit that is chosen', () => {
+    expect(reasonText(CATALOGUE, reason(), 'F', null)).toBe(
+      `Temperature 43.9${NBSP}°F, below 50.0 (critical)`,
+    );
+  });
+
+  test('of a name that some twin made up stays short', () => {
+    expect(text({ sensor: '\u202e' + 'x'.repeat(500) }).length).toBeLessThan(80);
+  });
+});
+
+test('all of them are one line, the worst first', () => {
+  const pest = reason({ kind: 'pest', sensor: '', value: 1, limit: null });
+  expect(reasonsText(CATALOGUE, [reason(), pest], 'C')).toBe(
+    `Temperature 6.6${NBSP}°C, below 10.0 (critical); 1 pest seen`,
+  );
+  expect(reasonsText(CATALOGUE, [], 'C')).toBe('');
+});

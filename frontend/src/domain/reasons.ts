@@ -1,0 +1,70 @@
+/** Why a tag or the house has its verdict, in words. */
+import type { HealthReason } from '../contract/types';
+import { S } from '../strings';
+import { ageText, readingText, shortAgeText, valueText } from './format';
+import { isOfRange, sideOf } from './health';
+import type { Catalogue } from './sensors';
+import { shown } from './text';
+import { tryKind } from './tries';
+import type { TemperatureUnit } from './units';
+
+/** Of a name that some twin made up. */
+const LONGEST_NAME = 32;
+
+/**
+ * A reason as a sentence without its full stop. `age` is how long ago the observation was that
+ * says so, seconds; null: that is told elsewhere, or nobody knows.
+ */
+export function reasonText(
+  sensors: Catalogue,
+  reason: HealthReason,
+  unit: TemperatureUnit,
+  age: number | null,
+): string {
+  const { kind, sensor: name, value, limit } = reason;
+  const sensor = sensors.named(name);
+  const label = name === '' ? '' : shown(sensor.label, LONGEST_NAME);
+  const R = S.reasons;
+  if (isOfRange(reason)) {
+    return R.range(
+      `${label} ${readingText(sensor, reason.value, unit)}`,
+      R.sides[sideOf(reason)],
+      valueText(sensor, reason.limit, unit),
+      reason.verdict === 'critical',
+    );
+  }
+  switch (kind) {
+    case 'range':
+      // Without its numbers it says no more than that.
+      return R.other(S.reasons.outOfRange, label);
+    case 'reading_failed':
+      return R.readingFailed(label);
+    case 'scan_failed':
+      return R.scanFailed(S.tried[tryKind(value ?? NaN)], age === null ? null : shortAgeText(age));
+    case 'pest':
+      return R.pest(value ?? 0);
+    case 'old':
+      return R.old(
+        label,
+        age === null ? null : shortAgeText(age),
+        limit === null ? null : ageText(limit).replace(/\u00a0(h|d) 0\u00a0\w+$/, '\u00a0$1'),
+        reason.since !== null,
+      );
+    case 'silent':
+      return R.silent;
+    case 'stopped':
+      return R.stopped;
+    case 'changed':
+      return R.changed(value === null ? label : `${label} ${readingText(sensor, value, unit)}`);
+    default:
+      // Of a later server.
+      return R.other(shown((kind as string).replaceAll('_', ' '), LONGEST_NAME), label);
+  }
+}
+
+/** All reasons in one line, the worst first. */
+export const reasonsText = (
+  sensors: Catalogue,
+  reasons: readonly HealthReason[],
+  unit: TemperatureUnit,
+): string => reasons.map((reason) => reasonText(sensors, reason, unit, null)).join('; ');

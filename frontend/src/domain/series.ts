@@ -1,0 +1,214 @@
+/**
+ * What one sensor of one tag read over a period: each reading, or buckets where there are too many
+ * to show. All times are ROS seconds. Where the robot was away is a gap, and nothing bridges it.
+ */
+import type { History, Timeline, WireTime } from '../contract/types';
+import type { Span } from './period';
+import { secondsOf } from './rostime';
+
+export interface Reading {
+  readonly at: number;
+  /** Null: the sensor gave no number. */
+  readonly value: number | null;
+}
+
+/** All finite readings of `bucketS` seconds from `start` on. */
+export interface Bucket {
+  readonly start: number;
+  readonly n: number;
+  readonly mean: number;
+  readonly min: number;
+  readonly max: number;
+}
+
+/** Tries that came to nothing, or looks at the flowers, somewhere in `widthS` seconds from `at` on. */
+export interface Mark {
+  readonly at: number;
+  readonly widthS: number;
+  readonly kind: 'failure' | 'look';
+  readonly count: number;
+}
+
+export interface Series extends Span {
+  readonly tagId: string;
+  readonly sensor: string;
+  /** Width of a bucket, seconds; null: these are readings. */
+  readonly bucketS: number | null;
+  /** By their time; one of the two lists is empty. */
+  readonly readings: readonly Reading[];
+  readonly buckets: readonly Bucket[];
+  readonly gaps: readonly Span[];
+}
+
+const spanOf = (span: { readonly from: WireTime; readonly to: WireTime }): Span => ({
+  from: secondsOf(span.from),
+  to: secondsOf(span.to),
+});
+
+/** The series that the bridge told. */
+export const seriesOf = (wire: History): Series => ({
+  ...spanOf(wire),
+  tagId: wire.tag_id,
+  sensor: wire.sensor_type,
+  bucketS: wire.bucket_s,
+  readings: wire.readings.map(({ stamp, value }) => ({ at: secondsOf(stamp), value })),
+  buckets: wire.buckets.map((bucket) => ({ ...bucket, start: secondsOf(bucket.start) })),
+  gaps: wire.gaps.map(spanOf),
+});
+
+/** What a tag's timeline tells of tries and looks; scans are told by the readings themselves. */
+export const marksOf = ({ buckets, bucket_s: widthS }: Timeline): Mark[] =>
+  buckets.flatMap(({ start, failures, looks }) =>
+    [
+      { kind: 'failure' as const, count: failures },
+      { kind: 'look' as const, count: looks },
+    ].flatMap(({ kind, count }) =>
+      count > 0 ? [{ at: secondsOf(start), widthS, kind, count }] : [],
+    ),
+  );
+
+/** A silence is a gap when it is longer than so many times what is usual in the series. */
+const GAP_INTERVALS = 3;
+
+/** Where a bucket stands in a picture: its middle, but never later than the series goes. */
+export const middleOf = ({ start }: Bucket, { bucketS, to }: Series): number =>
+  Math.max(start, Math.min(start + (bucketS ?? 0) / 2, to));
+
+/** The longest silence that is no gap yet, seconds; infinite while nothing tells what is usual. */
+export function quietS({ readings, buckets, bucketS }: Series): number {
+  if (bucketS === null) return GAP_INTERVALS * median(intervals(readings.map(({ at }) => at)));
+  const many = buckets.reduce((sum, { n }) => sum + n, 0);
+  const [first, last] = [buckets[0], buckets.at(-1)];
+  if (!first || !last || many < 2) return Infinity;
+  // Of readings in buckets only their number is known, and how many buckets they lie in.
+  const usual = (bucketS * buckets.length) / many;
+  return Math.max(bucketS, GAP_INTERVALS * usual);
+}
+
+const intervals = (times: readonly number[]): number[] =>
+  times.slice(1).map((time, index) => time - (times[index] ?? time));
+
+function median(values: readonly number[]): number {
+  const sorted = [...values].sort((a, b) => a - b);
+  const middle = sorted.length >> 1;
+  const upper = sorted[middle];
+  const lower = sorted[middle - 1];
+  if (upper === undefined) return Infinity;
+  return sorted.length % 2 === 1 || lower === undefined ? upper : (lower + upper) / 2;
+}
+
+/**
+ * The series as it goes on: with the readings that were heard since it was fetched, and over a
+ * period that has moved with the time. The next fetch brings the server's own word.
+ */
+export function goneOn(series: Series, heard: readonly Reading[], { from, to }: Span): Series {
+  const quiet = quietS(series);
+  let grown: Series = { ...series, from, to };
+  for (const reading of heard) grown = withReading(grown, reading, quiet);
+  const end = lastTime(grown);
+  const cut = grown.gaps
+    .filter((gap) => gap.to > from && gap.from < to)
+    .map((gap) => ({ from: Math.max(gap.from, from), to: Math.min(gap.to, to) }));
+  const closed = cut.filter((gap) => end === null || gap.from < end);
+  if (end !== null && to - end > quiet) closed.push({ from: end, to });
+  const width = grown.bucketS ?? 0;
+  return {
+    ...grown,
+    readings: grown.readings.filter(({ at }) => at >= from),
+    buckets: grown.buckets.filter(({ start }) => start + width > from),
+    gaps: end === null ? cut : closed,
+  };
+}
+
+/** The time of the last that the series has; null: it has nothing. */
+export function lastTime({ readings, buckets, bucketS }: Series): number | null {
+  const bucket = buckets.at(-1);
+  return readings.at(-1)?.at ?? (bucket ? bucket.start + (bucketS ?? 0) : null);
+}
+
+function withReading(series: Series, reading: Reading, quiet: number): Series {
+  const { bucketS } = series;
+  const last = series.readings.at(-1)?.at ?? series.buckets.at(-1)?.start ?? -Infinity;
+  if (reading.at <= last || reading.at > series.to) return series;
+  if (bucketS === null) {
+    const gaps = withGap(series.gaps, last, reading.at, quiet);
+    return { ...series, readings: [...series.readings, reading], gaps };
+  }
+  if (reading.value === null) return series;
+  const { at, value } = reading;
+  // Buckets follow each other without end; the first of all begins with the period.
+  const origin = Number.isFinite(last) ? last : series.from;
+  const start = origin + Math.floor((at - origin) / bucketS) * bucketS;
+  const before = series.buckets.at(-1);
+  if (before?.start === start) {
+    const n = before.n + 1;
+    const grown = {
+      start,
+      n,
+      mean: before.mean + (value - before.mean) / n,
+      min: Math.min(before.min, value),
+      max: Math.max(before.max, value),
+    };
+    return { ...series, buckets: [...series.buckets.slice(0, -1), grown] };
+  }
+  const gaps = withGap(series.gaps, last + bucketS, start, quiet);
+  const bucket = { start, n: 1, mean: value, min: value, max: value };
+  return { ...series, buckets: [...series.buckets, bucket], gaps };
+}
+
+/** What was silent up to now ends with a reading, or was no gap after all. */
+function withGap(gaps: readonly Span[], last: number, at: number, quiet: number): readonly Span[] {
+  if (!Number.isFinite(last)) return gaps.map((gap) => (gap.to > at ? { ...gap, to: at } : gap));
+  const before = gaps.filter((gap) => gap.from < last);
+  return at - last > quiet ? [...before, { from: last, to: at }] : before;
+}
+
+/** What a series has at a moment: the reading nearest to it, or its bucket; null: a gap. */
+export function pointAt(series: Series, at: number): Reading | Bucket | null {
+  const { bucketS, gaps, readings, buckets } = series;
+  if (bucketS !== null) {
+    return buckets.find(({ start }) => at >= start && at < start + bucketS) ?? null;
+  }
+  if (gaps.some(({ from, to }) => at > from && at < to)) return null;
+  let nearest: Reading | null = null;
+  for (const reading of readings) {
+    if (nearest && Math.abs(reading.at - at) > Math.abs(nearest.at - at)) break;
+    nearest = reading;
+  }
+  return nearest;
+}
+
+/** The last reading or bucket that had begun by then: what was known at that moment. */
+export function lastUntil({ readings, buckets }: Series, at: number): Reading | Bucket | null {
+  return (
+    readings.findLast((reading) => reading.at <= at) ??
+    buckets.findLast(({ start }) => start <= at) ??
+    null
+  );
+}
+
+/** What is to be told of a series in one sentence. */
+export interface SeriesSummary {
+  readonly count: number;
+  readonly latest: { readonly at: number; readonly value: number } | null;
+  readonly min: number | null;
+  readonly max: number | null;
+  readonly gaps: number;
+}
+
+export function summaryOf(series: Series): SeriesSummary {
+  const points =
+    series.bucketS === null
+      ? series.readings.flatMap(({ at, value }) =>
+          value === null ? [] : [{ at, value, n: 1, min: value, max: value }],
+        )
+      : series.buckets.map((bucket) => ({ ...bucket, at: bucket.start, value: bucket.mean }));
+  const last = points.at(-1);
+  return {
+    count: points.reduce((sum, { n }) => sum + n, 0),
+    latest: last ? { at: last.at, value: last.value } : null,
+    min: points.reduce<number | null>((least, { min }) => Math.min(least ?? min, min), null),
+    max: points.reduce<number | null>((most, { max }) => Math.max(most ?? max, max), null),
+    gaps: series.gaps.length,
+  };
+}

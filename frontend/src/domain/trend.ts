@@ -1,0 +1,65 @@
+/** A reading against the same an hour before, as far as the bridge lets either stand. Pure. */
+import type { TagHealth } from '../contract/types';
+import { numberText, written } from './format';
+import type { Sensor } from './sensors';
+import type { Tag } from './twin';
+import { differenceToShown, toShown, unitOf, type TemperatureUnit } from './units';
+
+/** How long ago the other reading is looked for, seconds of the twin's time. */
+export const TREND_S = 3_600;
+
+/** A tag, and what the bridge said of it at that moment. */
+export interface TagThen {
+  readonly tag: Tag;
+  readonly health: TagHealth;
+}
+
+export type Trend =
+  /** `by`: what is now less what was then, in the sensor's unit. */
+  | { readonly kind: 'by'; readonly by: number }
+  /** No reading of then, or none that held then. */
+  | { readonly kind: 'none' }
+  /** The reading of now is that of then. */
+  | { readonly kind: 'same' };
+
+/** Null: there is no reading now that holds, and nothing to compare. */
+export function trendOf(sensor: string, now: TagThen, then: TagThen | null): Trend | null {
+  const value = held(sensor, now);
+  if (value === null) return null;
+  const before = then && held(sensor, then);
+  if (then === null || before === null) return { kind: 'none' };
+  if (sameReading(sensor, now.tag, then.tag)) return { kind: 'same' };
+  return { kind: 'by', by: value - before };
+}
+
+/** The value of a reading that has not grown too old, as the bridge judges age; null: there is none. */
+function held(sensor: string, { tag, health }: TagThen): number | null {
+  const isOld = health.reasons.some(
+    (reason) => reason.kind === 'old' && (reason.sensor === '' || reason.sensor === sensor),
+  );
+  return isOld ? null : (tag.readings.get(sensor) ?? null);
+}
+
+function sameReading(sensor: string, a: Tag, b: Tag): boolean {
+  const at = ({ wire }: Tag): string =>
+    JSON.stringify(wire.readings.find(({ name }) => name === sensor)?.observed_at ?? null);
+  return at(a) !== 'null' && at(a) === at(b);
+}
+
+/**
+ * The difference as precise as its value is shown: what rounds to nothing is level. `text` has its
+ * sign and its unit.
+ */
+export function differenceShown(
+  sensor: Sensor,
+  value: number,
+  by: number,
+  unit: TemperatureUnit,
+): { readonly way: 'up' | 'down' | 'level'; readonly text: string } {
+  const digits = /[.,](\d+)$/.exec(numberText(toShown(sensor, value, unit)))?.[1]?.length ?? 0;
+  const shown = differenceToShown(sensor, by, unit).toFixed(digits);
+  const way = Number(shown) > 0 ? 'up' : Number(shown) < 0 ? 'down' : 'level';
+  const suffix = unitOf(sensor, unit);
+  const number = way === 'level' ? shown.replace('-', '') : `${way === 'up' ? '+' : ''}${shown}`;
+  return { way, text: suffix ? `${written(number)}\u00a0${suffix}` : written(number) };
+}

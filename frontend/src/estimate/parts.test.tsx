@@ -1,0 +1,222 @@
+import { act as flush, render, screen } from '@testing-library/react';
+import { beforeEach, describe, expect, test, vi } from 'vitest';
+
+import type { Expected, Field, Grade, Place } from '../contract/types';
+import { mapPoint } from '../geometry/coordinates';
+import { pointedAt } from '../map/pointer';
+import { act, moveViewport, prefer, receive, store } from '../store/app';
+import { selectTag } from '../store/moment';
+import { bodies, estimated, expectedReading, grade } from '../testing/estimate';
+import { judgement, reason } from '../testing/health';
+import { goLive, showField, showTags } from '../testing/page';
+import { readings, wireTag } from '../testing/tags';
+import { Legend } from '../ui/Legend';
+import { Readout } from '../ui/Readout';
+import { CardEstimate } from './CardEstimate';
+import { AdviceMarks } from './AdviceMarks';
+import { EstimateFacts } from './EstimateFacts';
+
+let grades: Readonly<Record<string, Grade>>;
+let expected: Readonly<Record<string, Expected>>;
+let places: readonly Place[] | null;
+
+const NBSP = '\u00a0';
+const tags = [
+  wireTag({
+    tag_id: '7',
+    pose: { position: { x: 1, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } },
+    readings: readings({ temperature: 22 }).map((each) => ({ ...each, stale_seconds: 720 })),
+  }),
+];
+
+beforeEach(() => {
+  grades = { temperature: grade() };
+  expected = {};
+  places = [];
+  vi.stubGlobal('fetch', (url: URL) => {
+    const path = url.pathname;
+    if (path.endsWith('quality')) return Promise.resolve(Response.json(bodies.quality(grades)));
+    if (path.endsWith('tags')) return Promise.resolve(Response.json(bodies.tags(expected)));
+    return Promise.resolve(
+      places
+        ? Response.json(bodies.advice(places))
+        : Response.json({ detail: 'no such service' }, { status: 503 }),
+    );
+  });
+  showTags(tags);
+  goLive();
+  act({ type: 'heat', heat: 'estimate' });
+});
+
+const nearest = (field: Field): Field => {
+  const { sureness, ...rest } = field;
+  expect(sureness).toBeDefined();
+  return rest;
+};
+const text = (id: string): string => screen.getByTestId(id).textContent;
+
+describe('readout', () => {
+  const point = (x: number): void => {
+    flush(() => {
+      pointedAt.dispatch(mapPoint(x, 0.5));
+    });
+  };
+
+  test('tells the estimate, plus or minus what, how many tags are near, and how old', async () => {
+    showField(estimated([22.4, NaN], [0.79, 1.6]));
+    render(<Readout />);
+    point(0.5);
+    await screen.findByTestId('readout-near');
+    expect(text('readout')).toContain(`22.4${NBSP}±${NBSP}1.3${NBSP}°C`);
+    expect(text('readout-near')).toBe(`1 tag near, oldest reading 12${NBSP}min`);
+    point(1.5);
+    expect(text('readout')).toContain('not known');
+    point(0.5);
+    flush(() => {
+      prefer({ unit: 'F' });
+    });
+    expect(text('readout')).toContain(`72.3${NBSP}±${NBSP}2.3${NBSP}°F`);
+  });
+
+  test('the error alone is told where the value is not known', async () => {
+    showField(estimated([22.4, NaN], [0.79, 2]));
+    act({ type: 'heat', heat: 'error' });
+    render(<Readout />);
+    point(1.5);
+    await screen.findByTestId('readout-near');
+    expect(text('readout')).toContain(`±${NBSP}3.3${NBSP}°C`);
+    expect(screen.queryByTestId('readout-ideal')).toBeNull();
+  });
+});
+
+describe('legend', () => {
+  test('says how sure, and how well it has foretold, in words', async () => {
+    showField(estimated([22.4], [0.5]));
+    render(<Legend kiosk={false} />);
+    expect((await screen.findByTestId('foretold')).textContent).toBe(
+      '9 of 10 scans fell into the range foretold for them',
+    );
+    expect(text('estimate-key')).toContain(`off by more than ±1.6${NBSP}°C`);
+    expect(text('legend')).toContain('Last day: 412 of 458 scans, last week: 2900 of 3200 scans.');
+    expect(text('legend')).toContain('90 % interval');
+    expect(screen.queryByTestId('estimate-warning')).toBeNull();
+    expect(screen.getByRole('combobox', { name: 'Heat map made of' })).toHaveProperty(
+      'value',
+      'estimate',
+    );
+  });
+
+  test('counts each scan while there are fewer than ten', async () => {
+    grades = { temperature: grade({ day: { scans: 9, inside: 7 }, share_day: 7 / 9 }) };
+    showField(estimated([22.4], [0.5]));
+    render(<EstimateFacts />);
+    const told = await screen.findByTestId('foretold');
+    expect(told.textContent).toBe('7 of 9 scans fell into the range foretold for them');
+  });
+
+  test.each([
+    [0.42, 'only 4 of 10 scans fell'],
+    [0.995, 'wider than need be'],
+  ])('warns where the shares do not fit the errors: %d', async (share, words) => {
+    grades = { temperature: grade({ share_day: share, is_trusted: false }) };
+    showField(estimated([22.4], [0.5]));
+    render(<EstimateFacts />);
+    const warning = await screen.findByTestId('estimate-warning');
+    expect(warning.textContent).toContain('Do not rely on the ±');
+    expect(warning.textContent).toContain(words);
+  });
+
+  test.each([
+    [404, grade(), 'This twin makes no estimate'],
+    [503, grade(), 'There is no estimate just now'],
+    [503, grade({ fitted_at: null, share_day: null }), 'it needs ten scans of a sensor'],
+  ])('refused with %d it says why the nearest readings are shown', async (status, said, words) => {
+    grades = { temperature: said };
+    const why = { status, message: 'the reason <b>' };
+    showField(nearest(estimated([22.4], [0.5], { noEstimate: why })));
+    render(<EstimateFacts />);
+    await vi.waitFor(() => {
+      expect(text('estimate-missing')).toContain(words);
+    });
+    expect(document.body.textContent).toContain('the reason <b>');
+    expect(screen.getAllByRole('status')).toHaveLength(1);
+  });
+
+  test('the error alone has a scale of its own, from none to the most', async () => {
+    showField(estimated([22.4, NaN], [0.5, 2]));
+    act({ type: 'heat', heat: 'error' });
+    render(<Legend kiosk={false} />);
+    expect((await screen.findByTestId('error-high')).textContent).toBe(`±${NBSP}3.3${NBSP}°C`);
+    expect(screen.queryByTestId('ideal-scale')).toBeNull();
+    expect(screen.queryByTestId('estimate-key')).toBeNull();
+  });
+});
+
+describe('card', () => {
+  const card = (): void => {
+    const tag = selectTag(store.get(), '7');
+    if (tag) render(<CardEstimate tag={tag} health={store.get().twin.latest.health?.tags['7']} />);
+  };
+
+  test('tells what was measured against what was expected', async () => {
+    expected = { '7': expectedReading() };
+    card();
+    expect((await screen.findByTestId('card-estimate')).textContent).toBe(
+      `Temperature: measured 22.4, expected 22.1${NBSP}±${NBSP}1.3${NBSP}°C`,
+    );
+  });
+
+  test('says what the estimate leaves out, of every sensor', async () => {
+    const changed = reason({ kind: 'changed', sensor: 'humidity', verdict: 'stressed' });
+    showTags(tags, judgement({ '7': [changed] }));
+    expected = { '7': expectedReading({ expected: 19, left_out: true }) };
+    card();
+    await screen.findByText('Temperature changed: left out of the estimate');
+    expect(text('card-estimate')).toContain('Humidity changed: left out of the estimate');
+  });
+});
+
+describe('where another tag would help', () => {
+  beforeEach(() => {
+    moveViewport({ size: { width: 400, height: 300 }, view: { x: 0, y: 300, scale: 100 } });
+  });
+
+  test('is numbered marks in their places, which are a list with by how much', async () => {
+    places = [
+      { x: 1, y: 2, error_ratio: 0.83 },
+      { x: 3, y: 1, error_ratio: 0.7 },
+      { x: 50, y: 1, error_ratio: 0.6 },
+    ];
+    render(<AdviceMarks />);
+    await screen.findByRole('list', { name: 'Where another tag would help' });
+    expect(
+      screen.getByRole('button', { name: /^1\. x 1\.00 m, y 2\.00 m: a tag here/ }),
+    ).toBeTruthy();
+    expect(
+      screen.getByRole('button', { name: /^2\. .* each mark before it .* 70\u00a0%/ }),
+    ).toBeTruthy();
+    const marks = [...document.querySelectorAll<HTMLElement>('.advice li')];
+    expect(marks.map(({ style }) => style.transform)).toEqual([
+      'translate(100px, 100px)',
+      'translate(300px, 200px)',
+      'translate(5000px, 200px)',
+    ]);
+    expect(marks.map(({ dataset }) => dataset['inView'])).toEqual(['true', 'true', 'false']);
+  });
+
+  test('says where there is none, or none of the past', async () => {
+    render(<AdviceMarks />);
+    await screen.findByText('No place is known where another tag would help');
+    flush(() => {
+      receive({ type: 'past', past: { at: 5, house: store.get().twin.latest } });
+      act({ type: 'moment', moment: 5 });
+    });
+    expect(text('advice-note')).toBe('Where another tag would help is known of now alone');
+  });
+
+  test('a twin that has no such service says so', async () => {
+    places = null;
+    render(<AdviceMarks />);
+    await screen.findByText('Where another tag would help is not known: no such service');
+  });
+});

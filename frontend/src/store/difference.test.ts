@@ -1,0 +1,92 @@
+import { afterEach, beforeEach, expect, test, vi } from 'vitest';
+
+import { readings, wireTag } from '../testing/tags';
+import { npy } from '../testing/npy';
+import { showTags } from '../testing/page';
+import { act, store } from './app';
+import { selectHeat } from './derived';
+import { startDifference } from './difference';
+
+let asked: URLSearchParams[] = [];
+/** What the bridge knows of the moment that is shown, and of the one before. */
+let known = { now: 22, then: 20.5, samplesThen: 1 };
+let stop: () => void;
+
+beforeEach(() => {
+  vi.useFakeTimers({ toFake: ['setTimeout', 'clearTimeout', 'setInterval', 'clearInterval'] });
+  asked = [];
+  known = { now: 22, then: 20.5, samplesThen: 1 };
+  vi.stubGlobal('fetch', (url: URL) => {
+    asked.push(url.searchParams);
+    const isThen = url.searchParams.has('at');
+    const value = isThen ? known.then : known.now;
+    return Promise.resolve(
+      new Response(npy(1, 2, [value, NaN]), {
+        headers: {
+          'X-Field-Origin-X': url.searchParams.get('bbox_min_x') ?? '',
+          'X-Field-Origin-Y': url.searchParams.get('bbox_min_y') ?? '',
+          'X-Field-Resolution': url.searchParams.get('resolution') ?? '',
+          'X-Field-Value-Min': String(value),
+          'X-Field-Value-Max': String(value),
+          'X-Field-Sample-Count': String(isThen ? known.samplesThen : 1),
+        },
+      }),
+    );
+  });
+  showTags([wireTag({ readings: readings({ temperature: 22 }) })]);
+  stop = startDifference();
+});
+afterEach(() => {
+  stop();
+  act({ type: 'compare', compare: null });
+  vi.useRealTimers();
+});
+
+const settled = async (): Promise<void> => {
+  await vi.advanceTimersByTimeAsync(500);
+};
+
+test('nothing is fetched while nothing is compared', async () => {
+  await settled();
+  expect(asked).toEqual([]);
+});
+
+test('both fields are asked for on one box, and their difference is the heat map', async () => {
+  act({ type: 'compare', compare: { by: 'moment', at: 500 } });
+  // What is shown meanwhile is no difference, and not shown as one.
+  expect(selectHeat(store.get())).toBeNull();
+  await settled();
+  expect(asked.map((query) => query.get('at'))).toEqual([null, '500.000']);
+  const boxes = asked.map((query) => [...query].filter(([key]) => key.startsWith('bbox')).join());
+  expect(new Set(boxes).size).toBe(1);
+  expect(asked[0]?.get('bbox_max_y')).toBe('3.5');
+  const heat = selectHeat(store.get());
+  expect([...(heat?.field.values ?? [])]).toEqual([1.5, NaN]);
+  expect(heat?.range).toEqual({ low: -1.5, high: 1.5 });
+  expect(heat?.difference?.against).toBe(500);
+});
+
+test('where memory has nothing of then, there is no heat map and it is told', async () => {
+  known.samplesThen = 0;
+  act({ type: 'compare', compare: { by: 'moment', at: 500 } });
+  await settled();
+  expect(store.get().twin.difference).toMatchObject({ state: 'ready', value: { field: null } });
+  expect(selectHeat(store.get())).toBeNull();
+});
+
+test('before all time nothing is asked for', async () => {
+  act({ type: 'compare', compare: { by: 'ago', seconds: 1e12 } });
+  await settled();
+  expect(asked).toHaveLength(1);
+  expect(store.get().twin.difference.value?.field).toBeNull();
+});
+
+test('no difference of one sensor is shown as that of another, nor after it ends', async () => {
+  act({ type: 'compare', compare: { by: 'moment', at: 500 } });
+  await settled();
+  act({ type: 'sensor', sensor: 'co2' });
+  expect(selectHeat(store.get())).toBeNull();
+  act({ type: 'sensor', sensor: 'temperature' });
+  act({ type: 'compare', compare: null });
+  expect(store.get().twin.difference.value).toBeNull();
+});

@@ -1,0 +1,121 @@
+/**
+ * Fetches what the heat map is when it is compared: the field of the moment that is shown, and that
+ * of the other one, on one grid.
+ */
+import { now } from '../clock';
+import { differenceOf, otherMoment, type Compare } from '../domain/difference';
+import type { Snapshot } from '../domain/twin';
+import { boundsOf, type Bounds } from '../geometry/coordinates';
+import { receive, store, type AppState } from './app';
+import { fetchHeat, sourceOf } from './heat';
+import { ASSUMED_MARGIN_M, fieldResolution } from './loaders';
+import { rosNow, selectNewest, selectShown } from './moment';
+import { createSeeker, type Wish } from './seeker';
+import { NOTHING, type Difference } from './twin';
+
+/** Live, the other moment moves on with now; this far at once, seconds. */
+const STEP_S = 10;
+const TICK_MS = 2_000;
+
+export function startDifference(): () => void {
+  const seeker = createSeeker<Difference>({
+    onValue: (value) => {
+      receive({ type: 'difference', difference: { value, state: 'ready', message: '' } });
+    },
+    onError: (error) => {
+      const message = error instanceof Error ? error.message : String(error);
+      receive({ type: 'difference', difference: { value: null, state: 'failed', message } });
+    },
+  });
+  let before: AppState | null = null;
+  const update = (): void => {
+    const state = store.get();
+    const { compare, sensor } = state.view;
+    const { difference } = state.twin;
+    if (compare === null) {
+      seeker.want(null);
+      if (difference !== NOTHING) receive({ type: 'difference', difference: NOTHING });
+      return;
+    }
+    // Of another sensor, or to another moment, it is none of what is wanted.
+    const isOther = before?.view.compare !== compare || before.view.sensor !== sensor;
+    before = state;
+    if (isOther && difference !== NOTHING) receive({ type: 'difference', difference: NOTHING });
+    const wish = wishFor(state, compare);
+    if (wish) seeker.want(wish);
+  };
+  update();
+  let seen = store.get();
+  const stop = store.subscribe(() => {
+    const state = store.get();
+    const isSame =
+      seen.view.compare === state.view.compare &&
+      seen.view.sensor === state.view.sensor &&
+      sourceOf(seen.view) === sourceOf(state.view) &&
+      seen.twin.connection === state.twin.connection &&
+      selectShown(seen) === selectShown(state);
+    seen = state;
+    if (!isSame) update();
+  });
+  const timer = setInterval(update, TICK_MS);
+  return () => {
+    stop();
+    clearInterval(timer);
+    seeker.want(null);
+  };
+}
+
+function wishFor(state: AppState, compare: Compare): Wish<Difference> | null {
+  const { moment, snapshot } = selectShown(state);
+  const { epoch, socket } = state.twin.connection;
+  const nowS = rosNow(state, now());
+  const resolution = fieldResolution(selectNewest(state).snapshot);
+  const box = boxOf(snapshot, resolution);
+  if (!snapshot || !box || nowS === null || socket.kind !== 'open') return null;
+  const { sensor } = state.view;
+  const source = sourceOf(state.view);
+  const at = moment ?? Math.floor(nowS / STEP_S) * STEP_S;
+  const against = otherMoment(compare, at);
+  const { minX, minY, maxX, maxY } = box;
+  const what = [
+    epoch,
+    sensor,
+    source,
+    moment ?? snapshot.revision,
+    against,
+    minX,
+    minY,
+    maxX,
+    maxY,
+  ];
+  return {
+    key: what.join('|'),
+    run: (signal) => {
+      const query = { sensor, resolution, box };
+      return Promise.all([
+        fetchHeat(source, moment === null ? query : { ...query, at: moment }, signal),
+        against < 0 ? null : fetchHeat(source, { ...query, at: against }, signal),
+      ]).then(([shown, then]) => ({
+        field: then && then.sampleCount > 0 ? differenceOf(shown, then) : null,
+        at,
+        against,
+      }));
+    },
+  };
+}
+
+/** Around all pins, in whole cells: both fields lie on the same ones. */
+function boxOf(snapshot: Snapshot | null, resolution: number): Bounds | null {
+  const bounds = boundsOf((snapshot?.tags ?? []).flatMap((tag) => (tag.at ? [tag.at] : [])));
+  if (!bounds) return null;
+  const down = (metres: number): number => round(Math.floor(metres / resolution) * resolution);
+  const up = (metres: number): number => round(Math.ceil(metres / resolution) * resolution);
+  return {
+    minX: down(bounds.minX - ASSUMED_MARGIN_M),
+    minY: down(bounds.minY - ASSUMED_MARGIN_M),
+    maxX: up(bounds.maxX + ASSUMED_MARGIN_M),
+    maxY: up(bounds.maxY + ASSUMED_MARGIN_M),
+  };
+}
+
+const round = (metres: number): number => Math.round(metres * 1e6) / 1e6;

@@ -1,0 +1,116 @@
+import { afterEach, beforeEach, expect, test, vi } from 'vitest';
+
+import { npyEstimate } from '../testing/estimate';
+import { npyField } from '../testing/field';
+import { goLost, showTags } from '../testing/page';
+import { readings, stateFrame, wireTag } from '../testing/tags';
+import { act, receive, store } from './app';
+import { selectHeat } from './derived';
+import { startLoaders } from './loaders';
+
+let asked: string[];
+let refusal: number | null;
+let stop: () => void;
+
+const tags = [wireTag({ readings: readings({ temperature: 20 }) })];
+const count = (part: string): number => asked.filter((url) => url.includes(part)).length;
+const field = (): ReturnType<typeof store.get>['twin']['latest']['field'] =>
+  store.get().twin.latest.field;
+/** Another state, and nothing else. */
+const hear = (sec: number): void => {
+  const latest = stateFrame(tags, { sec, revision: `heard ${sec}` });
+  receive({ type: 'state', latest, now: performance.now() });
+};
+/** Its code is loaded with the first estimate, which no clock of a test hurries. */
+const until = async (look: () => boolean): Promise<void> => {
+  for (let tries = 0; tries < 1_000 && !look(); tries++) {
+    await vi.dynamicImportSettled();
+    await vi.advanceTimersByTimeAsync(50);
+  }
+  expect(look()).toBe(true);
+};
+
+beforeEach(() => {
+  vi.useFakeTimers();
+  asked = [];
+  refusal = null;
+  vi.stubGlobal('fetch', (url: URL) => {
+    asked.push(`${url.pathname}${url.search}`);
+    if (url.pathname === '/api/field.npy') return Promise.resolve(npyField([1, 2]));
+    if (url.pathname !== '/api/estimate.npy' || refusal !== null) {
+      const detail = { detail: 'ten scans are needed' };
+      return Promise.resolve(Response.json(detail, { status: refusal ?? 404 }));
+    }
+    return Promise.resolve(npyEstimate([21, 22, 23], [0.5, 1.2, 2]));
+  });
+  showTags([]);
+  goLost();
+  stop = startLoaders();
+});
+afterEach(() => {
+  stop();
+  vi.useRealTimers();
+});
+
+test('the estimate that is chosen takes the place of the nearest readings, with its errors', async () => {
+  showTags(tags);
+  await until(() => field().value !== null);
+  expect(count('estimate')).toBe(0);
+  act({ type: 'heat', heat: 'estimate' });
+  // What was there stays until it has come.
+  expect(field().value?.values).toHaveLength(2);
+  await until(() => field().value?.sureness !== undefined);
+  expect(selectHeat(store.get())).toMatchObject({ isError: false, field: { valueMax: 22 } });
+  act({ type: 'heat', heat: 'error' });
+  // Both came in one.
+  expect(selectHeat(store.get())?.isError).toBe(true);
+  const before = count('estimate.npy');
+  await vi.advanceTimersByTimeAsync(1_000);
+  expect(count('estimate.npy')).toBe(before);
+});
+
+test('it goes on with the time: what nobody reads becomes less sure', async () => {
+  showTags(tags);
+  act({ type: 'heat', heat: 'estimate' });
+  await until(() => count('estimate.npy') === 1);
+  await vi.advanceTimersByTimeAsync(30_000);
+  expect(count('estimate.npy')).toBe(4);
+  act({ type: 'heat', heat: 'nearest' });
+  await vi.advanceTimersByTimeAsync(30_000);
+  expect(count('estimate.npy')).toBe(4);
+});
+
+test('a house that changes ten times a second costs one estimate a second', async () => {
+  showTags(tags);
+  act({ type: 'heat', heat: 'estimate' });
+  await until(() => count('estimate.npy') === 1);
+  for (let change = 0; change < 30; change++) {
+    hear(1_000 + change);
+    await vi.advanceTimersByTimeAsync(100);
+  }
+  expect(count('estimate.npy')).toBeLessThanOrEqual(5);
+});
+
+test.each([
+  [404, 'co2'],
+  [503, 'humidity'],
+])('refused with %d, the nearest readings stay, with the reason', async (status, sensor) => {
+  refusal = status;
+  showTags(tags);
+  act({ type: 'sensor', sensor });
+  act({ type: 'heat', heat: 'estimate' });
+  await until(() => field().value?.noEstimate !== undefined);
+  expect(field().value?.noEstimate).toEqual({ status, message: 'ten scans are needed' });
+  expect(selectHeat(store.get())).toMatchObject({ isError: false, field: { sampleCount: 4 } });
+  act({ type: 'heat', heat: 'error' });
+  expect(selectHeat(store.get())?.isError).toBe(false);
+  // Asked again now and then, and not with every reading.
+  const before = count('estimate.npy');
+  for (let change = 0; change < 5; change++) {
+    hear(2_000 + change);
+    await vi.advanceTimersByTimeAsync(1_000);
+  }
+  expect(count('estimate.npy')).toBe(before);
+  refusal = null;
+  await until(() => field().value?.sureness !== undefined);
+});

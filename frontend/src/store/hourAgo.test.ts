@@ -1,0 +1,92 @@
+import { afterEach, beforeEach, expect, test, vi } from 'vitest';
+
+import { judgement } from '../testing/health';
+import { readings, stateFrame, wireTag } from '../testing/tags';
+import { showTags } from '../testing/page';
+import { act, prefer, receive } from './app';
+import { hourAgo, startHourAgo } from './hourAgo';
+import { NO_HOUSE } from './twin';
+
+const NOW_S = 100_000;
+
+let asked: (string | null)[];
+let answers: boolean;
+let stop: () => void;
+
+const hear = (sec: number): void => {
+  const latest = stateFrame([wireTag()], { sec });
+  receive({ type: 'state', latest, now: performance.now() });
+};
+
+beforeEach(() => {
+  vi.useFakeTimers();
+  asked = [];
+  answers = true;
+  vi.stubGlobal('fetch', (url: URL) => {
+    if (!answers) return Promise.reject(new Error('no past'));
+    const { pathname, searchParams } = url;
+    const at = Number(searchParams.get('at'));
+    if (pathname.endsWith('health')) return Promise.resolve(Response.json(judgement({})));
+    asked.push(searchParams.get('at'));
+    const tags = [wireTag({ readings: readings({ temperature: 20 }) })];
+    return Promise.resolve(Response.json(stateFrame(tags, { sec: at }).state));
+  });
+  showTags([wireTag()]);
+  hear(NOW_S);
+});
+afterEach(() => {
+  stop();
+  vi.useRealTimers();
+});
+
+const pass = (ms: number): Promise<unknown> => vi.advanceTimersByTimeAsync(ms);
+
+test('an hour before now is asked for once, and again after some minutes', async () => {
+  stop = startHourAgo();
+  await pass(10);
+  expect(hourAgo.get()?.tags.get('1')?.tag.readings.get('temperature')).toBe(20);
+  for (const second of [1, 2, 100, 299]) {
+    hear(NOW_S + second);
+    await pass(10);
+  }
+  expect(asked).toHaveLength(1);
+  expect(Math.round(Number(asked[0]))).toBe(NOW_S - 3_600);
+  hear(NOW_S + 302);
+  await pass(10);
+  expect(asked).toHaveLength(2);
+});
+
+test('another moment is asked for once it stays', async () => {
+  stop = startHourAgo();
+  await pass(10);
+  for (const moment of [50_000, 50_100, 50_200]) {
+    act({ type: 'moment', moment });
+    receive({ type: 'past', past: { at: moment, house: NO_HOUSE } });
+    await pass(100);
+  }
+  await pass(1_000);
+  expect(asked.slice(1).map(Number)).toEqual([46_600]);
+});
+
+test('nobody asks for a trend that nobody wants to see, nor for what was before all time', async () => {
+  prefer({ hidden: ['trend'] });
+  stop = startHourAgo();
+  await pass(1_000);
+  prefer({ hidden: [] });
+  hear(3_599);
+  await pass(1_000);
+  expect(asked).toEqual([]);
+});
+
+test('a twin that keeps no past is asked again after a minute, not with each frame', async () => {
+  answers = false;
+  stop = startHourAgo();
+  await pass(10);
+  answers = true;
+  hear(NOW_S + 1);
+  await pass(50_000);
+  expect(asked).toEqual([]);
+  hear(NOW_S + 2);
+  await pass(11_000);
+  expect(asked).toHaveLength(1);
+});

@@ -1,0 +1,162 @@
+/** Fetches the greenhouse as of the moment that is wanted, and the field of that moment with it. */
+import { fetchQuality, Refusal } from '../contract/api';
+import { fetchStateAt } from '../contract/past';
+import type { Field, Judgement } from '../contract/types';
+import { snapshotOf, type Snapshot } from '../domain/twin';
+import { receive, store, type AppState } from './app';
+import { fetchHeat, sourceOf, type Source } from './heat';
+import { fieldResolution } from './loaders';
+import { selectNewest, selectPast } from './moment';
+import { createSeeker, type Wish } from './seeker';
+import { NO_HOUSE, NOTHING, type Fetched, type Past } from './twin';
+
+/**
+ * What was shown stays for so long while the first moment is on its way, with its own label: most
+ * answers are there before anybody would see an empty page.
+ */
+const PATIENCE_MS = 300;
+/** How far off a field is, is asked for once the moment stays. */
+const QUALITY_AFTER_MS = 400;
+
+interface Came {
+  readonly at: number;
+  readonly snapshot: Snapshot;
+  readonly health: Judgement;
+  readonly field: Fetched<Field>;
+}
+
+export function startPast(): () => void {
+  let patience: ReturnType<typeof setTimeout> | undefined;
+  let calm: ReturnType<typeof setTimeout> | undefined;
+  let judging = new AbortController();
+  /** The last connection that was open. */
+  let heardOn = 0;
+
+  const show = ({ at, snapshot, health, field }: Came): void => {
+    clearTimeout(patience);
+    receive({ type: 'past', past: { at, house: { ...NO_HOUSE, snapshot, health, field } } });
+    forgetQuality();
+    calm = setTimeout(askQuality, QUALITY_AFTER_MS);
+  };
+  const showNothing = (at: number): void => {
+    clearTimeout(patience);
+    receive({ type: 'past', past: { at, house: NO_HOUSE } });
+  };
+
+  const losePatience = (): void => {
+    const { moment } = store.get().view;
+    if (moment !== null) showNothing(moment);
+  };
+
+  const forgetQuality = (): void => {
+    clearTimeout(calm);
+    judging.abort();
+    judging = new AbortController();
+  };
+  const askQuality = (): void => {
+    const past = selectPast(store.get());
+    const field = past?.house.field.value;
+    if (!past || !field || field.sureness || past.at !== store.get().view.moment) return;
+    const { signal } = judging;
+    fetchQuality(field.sensor, signal, past.at).then(
+      (quality) => {
+        if (signal.aborted) return;
+        receive({ type: 'past', past: { ...past, house: { ...past.house, quality } } });
+      },
+      () => {
+        // The legend does without.
+      },
+    );
+  };
+
+  const seeker = createSeeker<Came>({
+    onValue: show,
+    onError: (error, isLasting) => {
+      const { moment } = store.get().view;
+      if (moment === null) return;
+      if (selectPast(store.get()) === null || isLasting) showNothing(moment);
+      const message = error instanceof Error ? error.message : String(error);
+      receive({ type: 'past-fault', fault: { at: moment, message, isLasting } });
+    },
+  });
+
+  let seen: AppState | null = null;
+  const update = (): void => {
+    const state = store.get();
+    if (seen?.view === state.view && seen.twin === state.twin) return;
+    seen = state;
+    const { moment, sensor } = state.view;
+    const past = selectPast(state);
+    if (moment === null) {
+      clearTimeout(patience);
+      patience = undefined;
+      forgetQuality();
+      seeker.want(null);
+      if (past) receive({ type: 'past', past: null });
+      return;
+    }
+    const fault = state.twin.pastFault;
+    if (fault && fault.at !== moment) receive({ type: 'past-fault', fault: null });
+    if (!past && !selectNewest(state).snapshot) showNothing(moment);
+    else if (!past) patience ??= setTimeout(losePatience, PATIENCE_MS);
+    else patience = undefined;
+    const { value } = past?.house.field ?? NOTHING;
+    if (past && value && value.sensor !== sensor) {
+      // No colours of one sensor under the scale of another.
+      receive({ type: 'past', past: withoutField(past) });
+    }
+    const { epoch, socket } = state.twin.connection;
+    // Each connection asks anew: another server may be behind it, or more was heard meanwhile.
+    if (socket.kind === 'open') heardOn = epoch;
+    seeker.want(wishFor(state, moment, heardOn));
+  };
+  update();
+  const stop = store.subscribe(update);
+  return () => {
+    stop();
+    clearTimeout(patience);
+    forgetQuality();
+    seeker.want(null);
+  };
+}
+
+const withoutField = (past: Past): Past => ({
+  ...past,
+  house: { ...past.house, field: NOTHING, quality: null },
+});
+
+function wishFor(state: AppState, at: number, epoch: number): Wish<Came> {
+  const { sensor } = state.view;
+  const source = sourceOf(state.view);
+  const resolution = fieldResolution(selectNewest(state).snapshot);
+  return {
+    key: `${epoch}|${at}|${sensor}|${resolution}|${source}`,
+    run: (signal) => cameOf(at, sensor, resolution, source, signal),
+  };
+}
+
+async function cameOf(
+  at: number,
+  sensor: string,
+  resolution: number,
+  source: Source,
+  signal: AbortSignal,
+): Promise<Came> {
+  // Both or none: no moment has the field of another one.
+  const [latest, field] = await Promise.all([
+    fetchStateAt(at, signal),
+    fetchHeat(source, { sensor, resolution, at }, signal).then(
+      (value): Fetched<Field> => ({ value, state: 'ready', message: '' }),
+      (error: unknown): Fetched<Field> => {
+        // What may pass is tried again with the rest.
+        if (!(error instanceof Refusal) || error.status !== 400) throw error;
+        return { value: null, state: 'failed', message: error.message };
+      },
+    ),
+  ]);
+  const before = selectPast(store.get())?.house.snapshot ?? null;
+  // In milliseconds of ROS time, where nothing but differences counts.
+  const snapshot = snapshotOf(latest, at * 1000, before);
+  const hasPins = snapshot.tags.some((tag) => tag.at);
+  return { at, snapshot, health: latest.health, field: hasPins ? field : NOTHING };
+}

@@ -1,0 +1,117 @@
+import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
+
+import { goLive, goLost, showTags } from '../testing/page';
+import { wireTag } from '../testing/tags';
+import { wireTimeline } from '../testing/timeline';
+import { act, receive, store } from './app';
+import { askedSpan, startRemembered, turnOf } from './remembered';
+import { NOT_ASKED } from './twin';
+
+let asked: URLSearchParams[];
+let answer: () => Response;
+let stop: () => void;
+
+beforeEach(() => {
+  vi.useFakeTimers();
+  asked = [];
+  answer = () => Response.json(wireTimeline({ from: 0, to: 240 }));
+  vi.stubGlobal('fetch', (url: URL) => {
+    asked.push(url.searchParams);
+    return Promise.resolve(answer());
+  });
+  receive({ type: 'remembered', remembered: NOT_ASKED });
+  showTags([wireTag()]);
+  stop = startRemembered();
+});
+afterEach(() => {
+  stop();
+  expect(vi.getTimerCount()).toBe(0);
+  vi.useRealTimers();
+});
+
+const pass = (ms: number): Promise<unknown> => vi.advanceTimersByTimeAsync(ms);
+
+describe('what is asked', () => {
+  test('is whole buckets, so that those that have passed stay the same', () => {
+    const first = askedSpan({ kind: 'hour' }, 1_000_007);
+    const next = askedSpan({ kind: 'hour' }, 1_000_009);
+    expect(first).toEqual({ from: 996_420, to: 1_000_020 });
+    expect(next).toEqual(first);
+    expect(askedSpan({ kind: 'hour' }, 1_000_021)).toEqual({ from: 996_435, to: 1_000_035 });
+  });
+
+  test('is all there is, or exactly what was chosen', () => {
+    expect(askedSpan({ kind: 'all' }, 50)).toBeNull();
+    expect(askedSpan({ kind: 'own', from: 3, to: 10 }, 50)).toEqual({ from: 3, to: 10 });
+  });
+
+  test('is asked again once a bucket, and at least every half minute; not of what is over', () => {
+    const turns = (kind: 'hour' | 'day' | 'all'): number =>
+      new Set(Array.from({ length: 600 }, (_, s) => turnOf({ kind }, 1e9 + s))).size;
+    expect([turns('hour'), turns('day'), turns('all')]).toEqual([41, 21, 21]);
+    expect(turnOf({ kind: 'own', from: 3, to: 10 }, 50)).toBe(0);
+    expect(turnOf({ kind: 'own', from: 3, to: 1e9 }, 50)).not.toBe(0);
+  });
+});
+
+test('it is fetched when there is a twin, and again as time goes on', async () => {
+  await pass(0);
+  expect(store.get().twin.remembered).toMatchObject({ state: 'ready', value: { to: 240 } });
+  expect(asked).toHaveLength(1);
+  await pass(31_000);
+  expect(asked.length).toBeGreaterThan(1);
+});
+
+test('another period is fetched at once, and nothing of the last is left', async () => {
+  await pass(0);
+  answer = () => Response.json({ detail: 'busy' }, { status: 503 });
+  act({ type: 'period', period: { kind: 'all' } });
+  expect(store.get().twin.remembered).toEqual(NOT_ASKED);
+  await pass(0);
+  expect(asked.at(-1)?.has('from')).toBe(false);
+  expect(store.get().twin.remembered).toMatchObject({ state: 'failed', message: 'busy' });
+});
+
+test('after a reconnect the gap is refilled', async () => {
+  await pass(0);
+  goLost();
+  await pass(5_000);
+  const before = asked.length;
+  receive({
+    type: 'connection',
+    connection: { ...store.get().twin.connection, epoch: 99 },
+    now: performance.now(),
+  });
+  await pass(5_000);
+  expect(asked).toHaveLength(before);
+  goLive();
+  const { connection } = store.get().twin;
+  receive({ type: 'connection', connection: { ...connection, epoch: 99 }, now: performance.now() });
+  await pass(2_000);
+  expect(asked.length).toBeGreaterThan(before);
+});
+
+test('a twin that keeps nothing says so, and is not asked again', async () => {
+  answer = () => Response.json({ detail: 'no journal is kept' }, { status: 404 });
+  act({ type: 'period', period: { kind: 'week' } });
+  await pass(0);
+  const count = asked.length;
+  expect(store.get().twin.remembered).toEqual({
+    value: null,
+    state: 'off',
+    message: 'no journal is kept',
+  });
+  await pass(120_000);
+  expect(asked).toHaveLength(count);
+});
+
+test('what fails for now leaves what there was', async () => {
+  await pass(0);
+  answer = () => Response.json({ detail: 'busy' }, { status: 503 });
+  await pass(31_000);
+  expect(store.get().twin.remembered).toMatchObject({
+    state: 'failed',
+    message: 'busy',
+    value: { to: 240 },
+  });
+});

@@ -1,0 +1,98 @@
+/** Keeps what is remembered of the period in view up to date, calmly. */
+import { now } from '../clock';
+import { Refusal } from '../contract/api';
+import { fetchTimeline } from '../contract/past';
+import { endsNow, spanOf, type Period, type Span } from '../domain/period';
+import { timelineOf } from '../domain/timeline';
+import { receive, store } from './app';
+import { rosNow, selectNewest } from './moment';
+import { createRefresher } from './refresher';
+import { NOT_ASKED, type Remembered } from './twin';
+
+/** Enough for the widest bar: a bucket is two or three pixels there. */
+const BUCKETS = 240;
+const INTERVAL_MS = 1_000;
+/** What is new is looked for once a bucket, but not more and not less often than this, seconds. */
+const SOONEST_S = 5;
+const LATEST_S = 30;
+
+/** The stretch to ask for: whole buckets, so that those that have passed stay as they are. */
+export function askedSpan(period: Period, nowS: number): Span | null {
+  if (period.kind === 'all') return null;
+  const span = spanOf(period, nowS, null);
+  if (!endsNow(period)) return span;
+  const bucketS = (span.to - span.from) / BUCKETS;
+  const to = Math.ceil(span.to / bucketS) * bucketS;
+  return { from: Math.max(0, to - (span.to - span.from)), to };
+}
+
+/** Which look at the period this is; another one may bring something new. */
+export function turnOf(period: Period, nowS: number): number {
+  if (period.kind === 'all') return Math.floor(nowS / LATEST_S);
+  const { from, to } = spanOf(period, nowS, null);
+  if (to < nowS) return 0;
+  const bucketS = (to - from) / BUCKETS;
+  return Math.floor(nowS / Math.min(LATEST_S, Math.max(SOONEST_S, bucketS)));
+}
+
+export function startRemembered(): () => void {
+  let group = '';
+  /** The connection whose server keeps nothing. */
+  let offSince = -1;
+  const refresher = createRefresher<Remembered>({
+    intervalMs: INTERVAL_MS,
+    onValue: (remembered) => {
+      receive({ type: 'remembered', remembered });
+    },
+    onError: (error) => {
+      const { value } = store.get().twin.remembered;
+      const message = error instanceof Error ? error.message : String(error);
+      receive({ type: 'remembered', remembered: { value, state: 'failed', message } });
+    },
+  });
+
+  const update = (): void => {
+    const state = store.get();
+    const { epoch, socket, status } = state.twin.connection;
+    const nowS = rosNow(state, now());
+    if (socket.kind !== 'open' || status === null || nowS === null || epoch === offSince) return;
+    const { period } = state.view;
+    const next = JSON.stringify(period);
+    const { value } = state.twin.remembered;
+    if (next !== group) {
+      group = next;
+      // What is known of another period is of no use; how far memory reaches stays true.
+      if (value) receive({ type: 'remembered', remembered: NOT_ASKED });
+    }
+    refresher.want({
+      key: `${epoch}|${group}|${turnOf(period, nowS)}`,
+      group,
+      run: (signal) =>
+        fetchTimeline(askedSpan(period, nowS), BUCKETS, signal).then(
+          (wire): Remembered => ({ value: timelineOf(wire), state: 'ready', message: '' }),
+          (error: unknown): Remembered => {
+            if (!(error instanceof Refusal) || error.status !== 404) throw error;
+            offSince = epoch;
+            return { value: null, state: 'off', message: error.message };
+          },
+        ),
+    });
+  };
+  update();
+  const timer = setInterval(update, INTERVAL_MS);
+  let seen = store.get();
+  const stop = store.subscribe(() => {
+    const state = store.get();
+    const isSame =
+      seen.view.period === state.view.period &&
+      seen.twin.connection.epoch === state.twin.connection.epoch &&
+      (selectNewest(seen).snapshot === null) === (selectNewest(state).snapshot === null);
+    seen = state;
+    if (!isSame) update();
+  });
+  return () => {
+    stop();
+    clearInterval(timer);
+    refresher.want(null);
+  };
+}

@@ -1,0 +1,36 @@
+/** Alarms as the bridge might tell of them. */
+import type { Alarm, Alarms, HealthReason } from '../contract/types';
+import { receive } from '../store/app';
+import { reason } from './health';
+
+type Given = Partial<Omit<Alarm, 'reason' | 'raised_at' | 'cleared_at'>> & {
+  readonly reason?: Partial<HealthReason>;
+  /** ROS seconds. */
+  readonly raised?: number;
+  readonly cleared?: number | null;
+};
+
+export const alarm = (
+  id: string,
+  { raised = 900, cleared = null, ...over }: Given = {},
+): Alarm => ({
+  id,
+  tag_id: '1',
+  raised_at: { sec: raised, nanosec: 0 },
+  cleared_at: cleared === null ? null : { sec: cleared, nanosec: 0 },
+  worst: null,
+  ...over,
+  reason: reason(over.reason),
+});
+
+export const alarms = (list: readonly Alarm[], over: Partial<Alarms> = {}): Alarms => ({
+  alarms: list,
+  source: 'journal',
+  since: { sec: 1, nanosec: 0 },
+  ...over,
+});
+
+/** A frame of alarms has come. */
+export const tellAlarms = (...list: readonly Alarm[]): void => {
+  receive({ type: 'alarms', alarms: alarms(list) });
+};

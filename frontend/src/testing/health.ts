@@ -1,0 +1,37 @@
+/** What the bridge's judge might say. Nothing follows from readings here: verdicts are given. */
+import type { HealthReason, Judgement, Verdict } from '../contract/types';
+
+const ORDER: readonly Verdict[] = ['critical', 'stressed', 'unknown', 'healthy'];
+
+const worst = (verdicts: readonly Verdict[]): Verdict =>
+  ORDER.find((verdict) => verdicts.includes(verdict)) ?? 'unknown';
+
+export const reason = (over: Partial<HealthReason> = {}): HealthReason => ({
+  kind: 'range',
+  verdict: 'critical',
+  sensor: 'temperature',
+  value: 6.6,
+  limit: 10,
+  since: { sec: 100, nanosec: 0 },
+  ...over,
+});
+
+/** What is said of each tag: a verdict without a reason, or reasons, the worst of which decides. */
+export function judgement(
+  said: Readonly<Record<string, Verdict | readonly HealthReason[]>>,
+  day: Judgement['house']['day'] = { is_day: true, source: 'assumed' },
+  patrol: Judgement['house']['patrol'] = { interval_s: null, last_scan: null, overdue: 0 },
+): Judgement {
+  const tags = Object.fromEntries(
+    Object.entries(said).map(([id, each]) => {
+      const reasons = typeof each === 'string' ? [] : each;
+      const verdict = typeof each === 'string' ? each : worst(each.map((reason) => reason.verdict));
+      return [id, { verdict, reasons }];
+    }),
+  );
+  const verdict = worst(Object.values(tags).map((tag) => tag.verdict));
+  return { house: { verdict, reasons: [], day, patrol }, tags };
+}
+
+/** Nobody was judged. */
+export const NOBODY: Judgement = judgement({});

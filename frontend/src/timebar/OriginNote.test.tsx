@@ -1,0 +1,80 @@
+import { act as flush, render, screen } from '@testing-library/react';
+import { beforeEach, expect, test } from 'vitest';
+
+import type { StatusFrame } from '../contract/types';
+import { act, receive, store } from '../store/app';
+import { selectOrigin } from '../store/origin';
+import { NO_HOUSE } from '../store/twin';
+import { goLive, goLost, showTags, status } from '../testing/page';
+import { wireTag } from '../testing/tags';
+import { ConnectionBadge } from '../ui/ConnectionBadge';
+import { LiveButton } from './LiveButton';
+import { OriginNote } from './OriginNote';
+import { PastFrame } from './PastFrame';
+
+const shows = (origin: StatusFrame['origin'], reason: StatusFrame['reason'] = 'live'): void => {
+  flush(() => {
+    goLive(status({ origin, reason }));
+  });
+};
+const badge = (): HTMLElement => screen.getByTestId('connection');
+
+beforeEach(() => {
+  showTags([wireTag()]);
+  render(
+    <>
+      <OriginNote />
+      <ConnectionBadge />
+      <PastFrame />
+      <LiveButton />
+    </>,
+  );
+});
+
+test('of a robot, or of who does not say, there is nothing to tell', () => {
+  for (const origin of ['robot', 'unknown', 'later'] as StatusFrame['origin'][]) {
+    shows(origin);
+    expect(selectOrigin(store.get())).toBeNull();
+    expect(screen.queryByTestId('origin')).toBeNull();
+    expect(screen.queryByTestId('recorded-frame')).toBeNull();
+    expect(badge().textContent).toBe('Connection: Live');
+    expect(badge().dataset['ofNow']).toBe('true');
+  }
+});
+
+test('a simulation is live, and told at first sight; one by /clock is not green', () => {
+  shows('simulated');
+  expect(screen.getByTestId('origin').textContent).toMatch(/^SimulatedNo robot is at work/);
+  expect(badge().textContent).toBe('Connection: Live');
+  expect(badge().dataset['ofNow']).toBe('true');
+  shows('sim_time');
+  expect(screen.getByTestId('origin').textContent).toMatch(/^Simulated time/);
+  expect(badge().dataset['ofNow']).toBe('false');
+  expect(screen.queryByTestId('recorded-frame')).toBeNull();
+});
+
+test('a recording is never live: header, badge, frame and the way back say so, and of when', () => {
+  shows('recorded');
+  expect(screen.getByTestId('origin').textContent).toMatch(/^Recording.*nothing here is of now/);
+  expect(screen.getByTestId('origin').querySelector('strong')?.textContent).toMatch(/^sim 00:00:/);
+  expect(badge().textContent).toBe('Connection: Playing');
+  expect(badge().dataset['ofNow']).toBe('false');
+  expect(screen.getByTestId('recorded-frame').textContent).toMatch(/^Recording: sim 00:00:/);
+  expect(screen.getByRole('button').textContent).toBe('Back to the recording');
+  shows('recorded', 'paused');
+  expect(badge().textContent).toBe('Connection: Stands still');
+  expect(document.body.textContent).not.toMatch(/live/i);
+  flush(goLost);
+  expect(badge().textContent).toBe('Connection: Reconnecting');
+});
+
+test('looking back in a recording, the moment is that of the past alone', () => {
+  shows('recorded');
+  flush(() => {
+    receive({ type: 'past', past: { at: 1, house: NO_HOUSE } });
+    act({ type: 'moment', moment: 1 });
+  });
+  expect(screen.queryByTestId('recorded-frame')).toBeNull();
+  expect(screen.getByTestId('past-frame').textContent).toBe('Past: sim 00:00:01');
+  expect(screen.getByTestId('origin').querySelector('strong')).toBeNull();
+});

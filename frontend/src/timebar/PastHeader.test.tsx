@@ -1,0 +1,67 @@
+import { act as flush, fireEvent, render, screen } from '@testing-library/react';
+import { afterEach, beforeEach, expect, test, vi } from 'vitest';
+
+import { startTitle } from '../alarms/title';
+import { act, receive, store } from '../store/app';
+import { NO_HOUSE } from '../store/twin';
+import { showTags } from '../testing/page';
+import { stateFrame, wireTag } from '../testing/tags';
+import { PastFrame } from './PastFrame';
+import { PastHeader } from './PastHeader';
+
+let stop: () => void;
+
+beforeEach(() => {
+  vi.spyOn(performance, 'now').mockReturnValue(performance.now());
+  showTags([]);
+  receive({
+    type: 'state',
+    latest: stateFrame([wireTag()], { sec: 10_000 }),
+    now: performance.now(),
+  });
+  stop = startTitle();
+});
+afterEach(() => {
+  stop();
+});
+
+const look = (at: number | null, came: number | null): void => {
+  flush(() => {
+    act({ type: 'moment', moment: at });
+    receive({ type: 'past', past: came === null ? null : { at: came, house: NO_HOUSE } });
+  });
+};
+
+test('header, frame and title say the moment of what is shown, not the one that is wanted', () => {
+  render(
+    <>
+      <PastHeader />
+      <PastFrame />
+    </>,
+  );
+  const told = (): unknown[] => [
+    screen.queryByTestId('past-header')?.querySelector('strong')?.textContent ?? null,
+    screen.queryByTestId('past-frame')?.textContent ?? null,
+    document.title,
+  ];
+  expect(told()).toEqual([null, null, 'Lupin twin']);
+  look(2_500, null);
+  expect(told()).toEqual([null, null, 'Lupin twin']);
+  look(2_400, 2_500);
+  expect(told()).toEqual([
+    'sim 00:41:40',
+    'Past: sim 00:41:40',
+    'sim 00:41:40 (past) · Lupin twin',
+  ]);
+  expect(screen.getByTestId('past-header').textContent).toContain('2\u00a0h 5\u00a0min ago');
+  fireEvent.click(screen.getByRole('button', { name: 'Back to live' }));
+  expect(store.get().view.moment).toBeNull();
+  expect(told()).toEqual([null, null, 'Lupin twin']);
+});
+
+test('how long ago is not told where nobody knows what time it is', () => {
+  look(2_500, 2_500);
+  receive({ type: 'lapse' });
+  render(<PastHeader />);
+  expect(screen.getByTestId('past-header').textContent).not.toContain('ago');
+});

@@ -1,0 +1,35 @@
+import type { JSX } from 'react';
+
+import { ageText } from '../domain/format';
+import { rosText } from '../domain/rostime';
+import { store, useApp } from '../store/app';
+import { rosNow, selectShown } from '../store/moment';
+import { S } from '../strings';
+import { useTicking } from '../widgets/useNow';
+import { LiveButton } from './LiveButton';
+
+/** In the header while the page shows another moment: which one, and the way back. */
+export function PastHeader(): JSX.Element | null {
+  const moment = useApp((state) => selectShown(state).moment);
+  const isLooking = useApp((state) => state.view.moment !== null);
+  // Of a twin that has no time nobody knows how long ago.
+  const ago = useTicking((now) => {
+    const nowS = rosNow(store.get(), now);
+    return nowS === null || moment === null ? null : ageText(Math.max(0, nowS - moment));
+  });
+  const isTimeLost = useApp((state) => state.twin.isTimeLost);
+  if (moment === null || !isLooking) return null;
+  return (
+    <div className="past-header" data-testid="past-header">
+      <span className="past-word">{S.past}</span>
+      <strong>{rosText(moment)}</strong>
+      {/* What counts on by itself is not read out each second. */}
+      {ago !== null && !isTimeLost && (
+        <span className="past-ago" aria-hidden="true">
+          {S.agoSuffix(ago)}
+        </span>
+      )}
+      <LiveButton />
+    </div>
+  );
+}

@@ -1,0 +1,234 @@
+import {
+  useLayoutEffect,
+  useMemo,
+  useRef,
+  useState,
+  type JSX,
+  type KeyboardEvent,
+  type PointerEvent,
+} from 'react';
+
+import { endsNow, type Span } from '../domain/period';
+import { hasDate, rosText } from '../domain/rostime';
+import { timeTicks } from '../domain/ticks';
+import type { Timeline } from '../domain/timeline';
+import { contextOf } from '../draw/surface';
+import { act, store, useApp } from '../store/app';
+import { useSelected } from '../store/create';
+import { pointedBy, pointedTime } from '../store/pointed';
+import { selectAwaited, selectShown } from '../store/moment';
+import { onThemeChange } from '../store/theme';
+import { S } from '../strings';
+import { chosenAt, momentAt, pixelS, stepped, xOf, type Axis } from './axis';
+import { columnAt, columnsOf, type Column } from './columns';
+import { BAR_PX, drawBar } from './draw';
+import { readBarPalette } from './palette';
+import { pause } from './playback';
+import { newestWord } from './newest';
+
+/** Room that the text of a time needs, CSS pixels. */
+const TICK_ROOM_PX = 76;
+const FAR = 10;
+const PAGES = 10;
+
+/** The bar itself: a slider whose right end is now. */
+export function Slider({
+  span,
+  timeline,
+  nowS,
+}: {
+  span: Span;
+  timeline: Timeline | null;
+  nowS: number;
+}): JSX.Element {
+  const [width, setWidth] = useState(0);
+  const [theme, setTheme] = useState(0);
+  const [pointed, setPointed] = useState<number | null>(null);
+  /** While it is dragged the bar stays where it is. */
+  const [held, setHeld] = useState<Span | null>(null);
+  const element = useRef<HTMLDivElement>(null);
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const moment = useApp((state) => state.view.moment);
+  const shown = useApp((state) => selectShown(state).moment);
+  const awaited = useApp(selectAwaited);
+  const newest = useApp(newestWord);
+  const ofChart = useSelected(pointedTime, pointedBy('chart'));
+  const { from, to } = held ?? span;
+  const axis = useMemo((): Axis => ({ from, to, width }), [from, to, width]);
+  const columns = useMemo(
+    () => (timeline && width > 0 ? columnsOf(timeline, axis) : []),
+    [timeline, axis, width],
+  );
+
+  useLayoutEffect(() => {
+    const box = element.current;
+    if (!box) return undefined;
+    const observer = new ResizeObserver(() => {
+      setWidth(box.clientWidth);
+    });
+    observer.observe(box);
+    setWidth(box.clientWidth);
+    const stop = onThemeChange(() => {
+      setTheme((count) => count + 1);
+    });
+    return () => {
+      observer.disconnect();
+      stop();
+    };
+  }, []);
+
+  useLayoutEffect(() => {
+    const target = canvas.current;
+    if (!target || width === 0) return;
+    const ratio = window.devicePixelRatio || 1;
+    target.width = Math.round(width * ratio);
+    target.height = Math.round(BAR_PX * ratio);
+    const surface = { context: contextOf(target), size: { width, height: BAR_PX }, ratio };
+    const ticks = timeTicks(axis, width / TICK_ROOM_PX, !hasDate(axis.to));
+    drawBar(surface, { axis, timeline, columns, ticks }, readBarPalette());
+  }, [axis, columns, timeline, width, theme]);
+
+  const at = (event: PointerEvent): number =>
+    event.clientX - (element.current?.getBoundingClientRect().left ?? 0);
+  const go = (next: number | null): void => {
+    act({ type: 'moment', moment: next });
+  };
+  const onPointerDown = (event: PointerEvent): void => {
+    if (event.button !== 0) return;
+    pause();
+    setHeld({ from, to });
+    event.currentTarget.setPointerCapture(event.pointerId);
+    go(chosenAt(axis, at(event), nowS));
+  };
+  const onPointerMove = (event: PointerEvent): void => {
+    const x = event.pointerType === 'touch' && !held ? null : at(event);
+    setPointed(x);
+    pointedTime.dispatch(x === null ? null : { at: momentAt(axis, x), by: 'bar' });
+    if (held) go(chosenAt(axis, at(event), nowS));
+  };
+  const letGo = (): void => {
+    setHeld(null);
+  };
+  const onKeyDown = (event: KeyboardEvent): void => {
+    if (event.altKey || event.ctrlKey || event.metaKey) return;
+    const step = stepOf(event, axis);
+    if (event.key === 'Home') go(from);
+    else if (event.key === 'End') {
+      // What was fetched may end a moment before now, also where the period goes on with the time.
+      go(endsNow(store.get().view.period) || to >= nowS ? null : to);
+    } else if (step !== null) go(stepped(axis, moment, step, nowS));
+    else return;
+    event.preventDefault();
+    pause();
+  };
+
+  const cursor = moment ?? Math.min(nowS, to);
+  const place = (seconds: number): number => Math.min(width, Math.max(0, xOf(axis, seconds)));
+  const isOutside = cursor < from || cursor > to;
+  return (
+    <div
+      ref={element}
+      className="timebar-slider"
+      role="slider"
+      tabIndex={0}
+      aria-label={S.timebarSlider}
+      aria-orientation="horizontal"
+      aria-valuemin={Math.floor(from)}
+      aria-valuemax={Math.ceil(Math.max(to, cursor))}
+      aria-valuenow={Math.max(Math.floor(from), Math.round(cursor))}
+      aria-valuetext={valueText(moment, columnAt(columns, xOf(axis, cursor)), newest)}
+      data-testid="timebar-slider"
+      data-span={`${from},${to}`}
+      style={{ height: `${BAR_PX}px` }}
+      onPointerDown={onPointerDown}
+      onPointerMove={onPointerMove}
+      onPointerUp={letGo}
+      onPointerCancel={letGo}
+      onLostPointerCapture={letGo}
+      onPointerLeave={() => {
+        setPointed(null);
+        pointedTime.dispatch(null);
+      }}
+      onKeyDown={onKeyDown}
+    >
+      <canvas ref={canvas} aria-hidden="true" />
+      {awaited !== null && shown !== null && (
+        <span className="timebar-arrived" style={{ left: `${place(shown)}px` }} />
+      )}
+      <span
+        className="timebar-cursor"
+        data-live={moment === null}
+        data-awaited={awaited !== null}
+        data-outside={isOutside}
+        style={{ left: `${place(cursor)}px` }}
+      />
+      {ofChart !== null && ofChart >= from && ofChart <= to && (
+        <span
+          className="timebar-pointed"
+          data-testid="timebar-pointed"
+          data-at={ofChart}
+          style={{ left: `${place(ofChart)}px` }}
+        />
+      )}
+      {pointed !== null && (
+        <Bubble axis={axis} x={pointed} nowS={nowS} column={columnAt(columns, pointed)} />
+      )}
+    </div>
+  );
+}
+
+/** What a key is worth, seconds; null: it is none of the bar's. */
+function stepOf({ key, shiftKey }: KeyboardEvent, axis: Axis): number | null {
+  const step = pixelS(axis) * (shiftKey ? FAR : 1);
+  const page = (axis.to - axis.from) / PAGES;
+  switch (key) {
+    case 'ArrowLeft':
+    case 'ArrowDown':
+      return -step;
+    case 'ArrowRight':
+    case 'ArrowUp':
+      return step;
+    case 'PageDown':
+      return -page;
+    case 'PageUp':
+      return page;
+    default:
+      return null;
+  }
+}
+
+const countsText = ({ scans, failures, pestsSeen, pestsCleared }: Column): string =>
+  S.timebarCounts(scans, failures, pestsSeen, pestsCleared);
+
+const valueText = (moment: number | null, column: Column | undefined, newest: string): string => {
+  const time = moment === null ? newest : rosText(moment);
+  return column ? `${time}, ${countsText(column)}` : time;
+};
+
+/** Beside the mouse: which moment that is, and what happened about then. */
+function Bubble({
+  axis,
+  x,
+  nowS,
+  column,
+}: {
+  axis: Axis;
+  x: number;
+  nowS: number;
+  column: Column | undefined;
+}): JSX.Element {
+  const chosen = chosenAt(axis, x, nowS);
+  const left = Math.min(axis.width, Math.max(0, x));
+  const side = left > axis.width / 2 ? 'before' : 'after';
+  return (
+    <span
+      className="timebar-bubble"
+      data-side={side}
+      style={{ left: `${left}px` }}
+      aria-hidden="true"
+    >
+      <strong>{chosen === null ? newestWord() : rosText(momentAt(axis, x))}</strong>
+      {column && <span>{countsText(column)}</span>}
+    </span>
+  );
+}

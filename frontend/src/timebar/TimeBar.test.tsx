@@ -1,0 +1,199 @@
+import { act as flush, fireEvent, render, screen } from '@testing-library/react';
+import { beforeEach, describe, expect, test, vi } from 'vitest';
+
+import { timelineOf } from '../domain/timeline';
+import { act, receive, store } from '../store/app';
+import { pointedTime } from '../store/pointed';
+import { NO_HOUSE, NO_TWIN } from '../store/twin';
+import { goLive, goLost, showTags, status } from '../testing/page';
+import { stateFrame, wireTag } from '../testing/tags';
+import { wireTime, wireTimeline } from '../testing/timeline';
+import { TimeBar } from './TimeBar';
+
+const NOW = 10_000;
+
+const remember = (from: number, to: number): void => {
+  const buckets = [
+    { start: wireTime(9_000), scans: 3, failures: 1, looks: 0, pests_seen: 1, pests_cleared: 0 },
+  ];
+  const value = timelineOf(wireTimeline({ from, to, bucket_s: 15, buckets }));
+  receive({ type: 'remembered', remembered: { value, state: 'ready', message: '' } });
+};
+
+beforeEach(() => {
+  // The page's clock stands still.
+  vi.spyOn(performance, 'now').mockReturnValue(performance.now());
+  vi.spyOn(HTMLElement.prototype, 'clientWidth', 'get').mockReturnValue(1_000);
+  showTags([wireTag()]);
+  const latest = stateFrame([wireTag()], { sec: NOW });
+  receive({ type: 'state', latest, now: performance.now() });
+  act({ type: 'period', period: { kind: 'hour' } });
+  remember(9_000, NOW);
+  HTMLElement.prototype.setPointerCapture = () => undefined;
+});
+
+const slider = (): HTMLElement => screen.getByRole('slider', { name: 'Time shown' });
+const moment = (): number | null => store.get().view.moment;
+const cursor = (): DOMStringMap =>
+  document.querySelector<HTMLElement>('.timebar-cursor')?.dataset ?? {};
+
+describe('the mouse on a chart and on the bar', () => {
+  const pointed = (): HTMLElement | null => screen.queryByTestId('timebar-pointed');
+
+  test('what is pointed at in a chart is drawn on the bar, where it has it', () => {
+    render(<TimeBar />);
+    expect(pointed()).toBeNull();
+    flush(() => {
+      pointedTime.dispatch({ at: 9_500, by: 'chart' });
+    });
+    expect(pointed()?.style.left).toBe('500px');
+    flush(() => {
+      pointedTime.dispatch({ at: 8_900, by: 'chart' });
+    });
+    expect(pointed()).toBeNull();
+  });
+
+  test('what is pointed at on the bar is told to the charts, and not drawn twice', () => {
+    render(<TimeBar />);
+    fireEvent.pointerMove(slider(), { clientX: 250 });
+    expect(pointedTime.get()).toEqual({ at: 9_250, by: 'bar' });
+    expect(pointed()).toBeNull();
+    fireEvent.pointerLeave(slider());
+    expect(pointedTime.get()).toBeNull();
+  });
+});
+
+test('the end of the bar is not live while the page is not', () => {
+  render(<TimeBar />);
+  const said = (): string[] => [
+    screen.getByTestId('timebar-when').textContent,
+    slider().getAttribute('aria-valuetext') ?? '',
+  ];
+  expect(said()).toEqual(['Live', 'Live']);
+  flush(() => {
+    goLive(status({ twin: 'offline', reason: 'stale' }));
+  });
+  expect(said()).toEqual(['Twin offline', 'Twin offline']);
+  flush(goLost);
+  expect(said()).toEqual(['Reconnecting', 'Reconnecting']);
+});
+
+describe('the slider', () => {
+  test('says where it stands, in words', () => {
+    render(<TimeBar />);
+    expect(slider().getAttribute('aria-valuetext')).toBe('Live');
+    expect(slider().getAttribute('aria-valuenow')).toBe(`${NOW}`);
+    flush(() => {
+      act({ type: 'moment', moment: 9_004 });
+    });
+    expect(slider().getAttribute('aria-valuetext')).toBe(
+      'sim 02:30:04, 3 scans, 1 failed, 1 pest seen',
+    );
+    expect(slider().getAttribute('aria-valuenow')).toBe('9004');
+    expect(cursor()['live']).toBe('false');
+  });
+
+  test('steps by a pixel, by ten, by a tenth, to its ends, and into now', () => {
+    render(<TimeBar />);
+    const press = (key: string, shiftKey = false): number | null => {
+      fireEvent.keyDown(slider(), { key, shiftKey });
+      return moment();
+    };
+    expect(press('ArrowLeft')).toBe(NOW - 1);
+    expect(press('ArrowLeft', true)).toBe(NOW - 11);
+    expect(press('ArrowRight')).toBe(NOW - 10);
+    expect(press('PageDown')).toBe(NOW - 110);
+    expect(press('PageUp')).toBe(NOW - 10);
+    expect(press('ArrowRight', true)).toBeNull();
+    expect(press('Home')).toBe(9_000);
+    expect(press('ArrowLeft')).toBe(9_000);
+    expect(press('End')).toBeNull();
+    expect(press('x')).toBeNull();
+  });
+
+  test('follows the pointer while it is held, on a bar that stays where it is', () => {
+    render(<TimeBar />);
+    const at = (clientX: number): object => ({ clientX, button: 0, pointerId: 1 });
+    fireEvent.pointerMove(slider(), at(300));
+    expect(moment()).toBeNull();
+    fireEvent.pointerDown(slider(), at(500));
+    expect(moment()).toBe(9_500);
+    flush(() => {
+      remember(9_100, NOW + 100);
+    });
+    fireEvent.pointerMove(slider(), at(200));
+    expect(moment()).toBe(9_200);
+    fireEvent.pointerUp(slider(), at(200));
+    fireEvent.pointerMove(slider(), at(800));
+    expect(moment()).toBe(9_200);
+    expect(slider().dataset['span']).toBe('9100,10100');
+  });
+
+  test('is hollow while its moment is on the way, and shows what has come', () => {
+    receive({ type: 'past', past: { at: 9_700, house: NO_HOUSE } });
+    act({ type: 'moment', moment: 9_500 });
+    render(<TimeBar />);
+    expect(cursor()['awaited']).toBe('true');
+    expect(document.querySelector<HTMLElement>('.timebar-arrived')?.style.left).toBe('700px');
+    flush(() => {
+      receive({ type: 'past', past: { at: 9_500, house: NO_HOUSE } });
+    });
+    expect(cursor()['awaited']).toBe('false');
+  });
+
+  test('a moment beyond its ends is marked at the end', () => {
+    act({ type: 'moment', moment: 500 });
+    render(<TimeBar />);
+    expect(cursor()['outside']).toBe('true');
+    expect(slider().getAttribute('aria-valuetext')).toBe('sim 00:08:20');
+  });
+});
+
+describe('the period', () => {
+  test('is one of a few, or begins as what is in view', () => {
+    render(<TimeBar />);
+    const choice = screen.getByLabelText('Period');
+    fireEvent.change(choice, { target: { value: 'own' } });
+    expect(store.get().view.period).toEqual({ kind: 'own', from: 9_000, to: NOW });
+    const from = screen.getByLabelText<HTMLInputElement>('From');
+    expect(from.value).toBe('2:30:00');
+    fireEvent.change(from, { target: { value: '2:00:00' } });
+    expect(store.get().view.period).toMatchObject({ from: 7_200 });
+    fireEvent.change(from, { target: { value: '9:00:00' } });
+    expect(store.get().view.period).toMatchObject({ from: 7_200 });
+    expect(from.getAttribute('aria-invalid')).toBe('true');
+    expect(screen.getByText('hh:mm:ss since the simulation began')).not.toBeNull();
+    fireEvent.change(choice, { target: { value: 'week' } });
+    expect(store.get().view.period).toEqual({ kind: 'week' });
+  });
+});
+
+test('a twin that remembers nothing says so, and how to change it', () => {
+  receive({
+    type: 'remembered',
+    remembered: { value: null, state: 'off', message: 'no journal is kept' },
+  });
+  render(<TimeBar />);
+  const bar = screen.getByTestId('timebar');
+  expect(bar.textContent).toContain('this twin remembers nothing');
+  // Plain words: neither a parameter nor what the bridge said.
+  expect(bar.textContent).not.toMatch(/journal/);
+  expect(screen.queryByRole('slider')).toBeNull();
+});
+
+test('what could not be fetched is told, beside what is known', () => {
+  const { remembered } = store.get().twin;
+  receive({
+    type: 'remembered',
+    remembered: { ...remembered, state: 'failed', message: 'too busy' },
+  });
+  render(<TimeBar />);
+  expect(screen.getByTestId('timebar').textContent).toContain('too busy');
+  expect(slider()).not.toBeNull();
+});
+
+test('before the twin has told its time there is no bar', () => {
+  vi.spyOn(store, 'get').mockReturnValue({ ...store.get(), twin: NO_TWIN });
+  const { container } = render(<TimeBar />);
+  expect(container.childElementCount).toBe(0);
+});

@@ -1,0 +1,5 @@
+import { act } from '../store/app';
+
+export function backToLive(): void {
+  act({ type: 'moment', moment: null });
+}

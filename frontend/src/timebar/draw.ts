@@ -1,0 +1,181 @@
+/** Draws the bar. Each mark has a shape and a place of its own; colour comes on top. */
+import type { Timeline } from '../domain/timeline';
+import type { Tick } from '../domain/ticks';
+import { clear, type Surface } from '../draw/surface';
+import { xOf, type Axis } from './axis';
+import { beforeMemory, runStarts, stretchesOf, type Column, type Stretch } from './columns';
+
+export interface BarPalette {
+  readonly ink: string;
+  readonly muted: string;
+  readonly line: string;
+  readonly scan: string;
+  readonly failure: string;
+  readonly pest: string;
+  readonly cleared: string;
+  readonly silence: string;
+  readonly surface: string;
+  readonly font: string;
+}
+
+/** Heights from the top, CSS pixels: marks of pests, bars of scans, bars of failures, times. */
+const MARKS_PX = 14;
+const SCANS_PX = 24;
+const FAILURES_PX = 8;
+const TICKS_PX = 16;
+export const BAR_PX = MARKS_PX + SCANS_PX + FAILURES_PX + TICKS_PX;
+
+const BASE_PX = MARKS_PX + SCANS_PX;
+const FLOOR_PX = BASE_PX + FAILURES_PX;
+const HATCH_PX = 6;
+
+export interface Bar {
+  readonly axis: Axis;
+  /** Null: it has not come yet. */
+  readonly timeline: Timeline | null;
+  readonly columns: readonly Column[];
+  readonly ticks: readonly Tick[];
+}
+
+export function drawBar(surface: Surface, bar: Bar, palette: BarPalette): void {
+  const { context } = surface;
+  const { axis, timeline } = bar;
+  clear(surface);
+  context.save();
+  const before = timeline && beforeMemory(timeline, axis);
+  if (before) hatch(context, before, palette.line, 1);
+  for (const silence of stretchesOf(timeline?.silences ?? [], axis)) {
+    hatch(context, silence, palette.silence, -1);
+  }
+  drawTicks(context, bar, palette);
+  context.strokeStyle = palette.muted;
+  context.lineWidth = 1;
+  line(context, 0, BASE_PX + 0.5, axis.width, BASE_PX + 0.5);
+  drawColumns(context, bar.columns, palette);
+  for (const x of timeline ? runStarts(timeline, axis) : []) drawRunStart(context, x, palette);
+  context.restore();
+}
+
+/** Slanted lines over a stretch; `slant` 1 leans to the right, -1 to the left. */
+function hatch(
+  context: CanvasRenderingContext2D,
+  { x, width }: Stretch,
+  colour: string,
+  slant: 1 | -1,
+): void {
+  context.save();
+  context.beginPath();
+  context.rect(x, MARKS_PX, width, SCANS_PX + FAILURES_PX);
+  context.clip();
+  context.strokeStyle = colour;
+  context.lineWidth = 1.5;
+  const height = SCANS_PX + FAILURES_PX;
+  const first = Math.floor((x - height) / HATCH_PX) * HATCH_PX;
+  for (let at = first; at < x + width + height; at += HATCH_PX) {
+    line(
+      context,
+      at,
+      slant > 0 ? FLOOR_PX : MARKS_PX,
+      at + height,
+      slant > 0 ? MARKS_PX : FLOOR_PX,
+    );
+  }
+  context.restore();
+}
+
+function drawTicks(context: CanvasRenderingContext2D, bar: Bar, palette: BarPalette): void {
+  const { axis, ticks } = bar;
+  context.font = palette.font;
+  context.textBaseline = 'alphabetic';
+  context.strokeStyle = palette.line;
+  context.lineWidth = 1;
+  context.fillStyle = palette.muted;
+  let free = 0;
+  for (const { at, text } of ticks) {
+    const x = Math.round(xOf(axis, at)) + 0.5;
+    line(context, x, MARKS_PX, x, FLOOR_PX + 3);
+    // The date stands beside the first time of a day.
+    const [time = '', day] = text.split('\n');
+    const label = day === undefined ? time : `${day} ${time}`;
+    const { width } = context.measureText(label);
+    const left = Math.min(axis.width - width, Math.max(0, x - width / 2));
+    if (left < free) continue;
+    context.fillText(label, left, BAR_PX - 3);
+    free = left + width + 10;
+  }
+}
+
+function drawColumns(
+  context: CanvasRenderingContext2D,
+  columns: readonly Column[],
+  palette: BarPalette,
+): void {
+  for (const { x, width, scanHeight, failureHeight, pestsSeen, pestsCleared } of columns) {
+    const inner = Math.max(1, width - 1);
+    if (scanHeight > 0) {
+      context.fillStyle = palette.scan;
+      context.fillRect(
+        x,
+        BASE_PX - scanHeight * (SCANS_PX - 2),
+        inner,
+        scanHeight * (SCANS_PX - 2),
+      );
+    }
+    if (failureHeight > 0) {
+      context.fillStyle = palette.failure;
+      context.fillRect(x, BASE_PX + 1, inner, Math.max(3, failureHeight * (FAILURES_PX - 1)));
+    }
+    const middle = x + width / 2;
+    if (pestsSeen > 0) drawPest(context, middle, palette);
+    // Where both lie in one column, the one that needs somebody is on top.
+    else if (pestsCleared > 0) drawCleared(context, middle, palette);
+  }
+}
+
+/** A full triangle on its tip. */
+function drawPest(context: CanvasRenderingContext2D, x: number, palette: BarPalette): void {
+  context.beginPath();
+  context.moveTo(x - 5, 2.5);
+  context.lineTo(x + 5, 2.5);
+  context.lineTo(x, MARKS_PX - 2);
+  context.closePath();
+  context.fillStyle = palette.pest;
+  context.fill();
+  context.strokeStyle = palette.surface;
+  context.lineWidth = 1;
+  context.stroke();
+}
+
+/** An empty ring. */
+function drawCleared(context: CanvasRenderingContext2D, x: number, palette: BarPalette): void {
+  context.beginPath();
+  context.arc(x, MARKS_PX / 2, 4, 0, 2 * Math.PI);
+  context.fillStyle = palette.surface;
+  context.fill();
+  context.strokeStyle = palette.cleared;
+  context.lineWidth = 2;
+  context.stroke();
+}
+
+/** A dashed line over the whole height. */
+function drawRunStart(context: CanvasRenderingContext2D, x: number, palette: BarPalette): void {
+  context.save();
+  context.strokeStyle = palette.ink;
+  context.lineWidth = 1.5;
+  context.setLineDash([4, 3]);
+  line(context, x, 0, x, FLOOR_PX);
+  context.restore();
+}
+
+function line(
+  context: CanvasRenderingContext2D,
+  x: number,
+  y: number,
+  toX: number,
+  toY: number,
+): void {
+  context.beginPath();
+  context.moveTo(x, y);
+  context.lineTo(toX, toY);
+  context.stroke();
+}

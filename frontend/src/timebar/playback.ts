@@ -1,0 +1,81 @@
+/**
+ * Plays the past: the moment goes on by a clock of its own, whatever has come of it by then. What
+ * comes too late is dropped, so that it never lags. It ends in now.
+ */
+import { now } from '../clock';
+import { act, store } from '../store/app';
+import { createStore } from '../store/create';
+import { barSpan, twinNow } from './span';
+
+/** Seconds of the past a second. */
+export const SPEEDS = [60, 300, 900, 3_600] as const;
+export type Speed = (typeof SPEEDS)[number];
+
+/** Ten moments a second. */
+const TICK_MS = 100;
+
+export interface Playback {
+  readonly isPlaying: boolean;
+  readonly speed: Speed;
+}
+
+export const playback = createStore<Playback, Partial<Playback>>(
+  { isPlaying: false, speed: 300 },
+  (state, change) => ({ ...state, ...change }),
+);
+
+let timer: ReturnType<typeof setInterval> | undefined;
+let unsubscribe: () => void = () => undefined;
+/** The moment that was last played, ROS seconds, and when that was, ms. */
+let at = 0;
+let since = 0;
+
+export function pause(): void {
+  clearInterval(timer);
+  unsubscribe();
+  if (playback.get().isPlaying) playback.dispatch({ isPlaying: false });
+}
+
+/** From the moment that is shown; from now, from the beginning of the bar. */
+export function play(): void {
+  const nowS = twinNow();
+  if (nowS === null) return;
+  pause();
+  const state = store.get();
+  go(state.view.moment ?? barSpan(state, nowS).from);
+  playback.dispatch({ isPlaying: true });
+  timer = setInterval(tick, TICK_MS);
+  // Whoever takes the moment elsewhere has taken over.
+  unsubscribe = store.subscribe(() => {
+    const { moment } = store.get().view;
+    if (moment === null || Math.abs(moment - at) > 0.001) pause();
+  });
+}
+
+export function togglePlayback(): void {
+  if (playback.get().isPlaying) pause();
+  else play();
+}
+
+export function chooseSpeed(speed: Speed): void {
+  playback.dispatch({ speed });
+}
+
+function go(moment: number): void {
+  at = moment;
+  since = now();
+  act({ type: 'moment', moment });
+}
+
+function tick(): void {
+  const nowS = twinNow();
+  const next = at + ((now() - since) / 1000) * playback.get().speed;
+  if (nowS === null || store.get().twin.pastFault?.isLasting) {
+    pause();
+  } else if (next >= nowS) {
+    pause();
+    act({ type: 'moment', moment: null });
+  } else {
+    go(next);
+  }
+}

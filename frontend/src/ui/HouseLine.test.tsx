@@ -1,0 +1,45 @@
+import { render, screen } from '@testing-library/react';
+import { expect, test } from 'vitest';
+
+import type { Judgement } from '../contract/types';
+import { judgement } from '../testing/health';
+import { showTags } from '../testing/page';
+import { wireTag } from '../testing/tags';
+import { HouseLine } from './HouseLine';
+
+const line = (patrol: Judgement['house']['patrol']): string | undefined => {
+  const health = judgement({ '1': 'healthy' }, undefined, patrol);
+  showTags([wireTag()], health);
+  render(<HouseLine />);
+  return screen.queryByTestId('house-line')?.textContent;
+};
+
+test('tells the rhythm, the last scan and who is overdue', () => {
+  // The builders' states are seconds old, whatever their stamp says.
+  const told = line({ interval_s: 40, last_scan: { sec: 0, nanosec: 1 }, overdue: 2 });
+  expect(told).toMatch(/^a scan every 40\u00a0s · last scan .+ ago · 2 tags overdue$/);
+});
+
+test.each([
+  [0.52, '0.5\u00a0s'],
+  [7.25, '7.3\u00a0s'],
+  [95, '1\u00a0min 35\u00a0s'],
+  [600, '10\u00a0min'],
+  [43_200, '12\u00a0h'],
+])('of %s s between two scans', (interval_s, told) => {
+  expect(line({ interval_s, last_scan: null, overdue: 0 })).toBe(
+    `a scan every ${told} · no scan yet · no tag overdue`,
+  );
+});
+
+test('without a rhythm it has none to tell', () => {
+  expect(line({ interval_s: null, last_scan: null, overdue: 1 })).toBe(
+    'no scan yet · 1 tag overdue',
+  );
+});
+
+test('nothing is told of a house without tags', () => {
+  showTags([], judgement({}));
+  render(<HouseLine />);
+  expect(screen.queryByTestId('house-line')).toBeNull();
+});

@@ -1,0 +1,59 @@
+import type { JSX } from 'react';
+
+import { readingText, valueText } from '../domain/format';
+import { IDEAL_ALPHA, idealParts } from '../domain/ideal';
+import { rangesFor, type Sensor } from '../domain/sensors';
+import { shown } from '../domain/text';
+import { useApp } from '../store/app';
+import { selectTags } from '../store/moment';
+import { S } from '../strings';
+
+/** What the colours mean while they tell how values lie against their ideal. */
+export function IdealLegend({ sensor }: { sensor: Sensor }): JSX.Element {
+  const unit = useApp((state) => state.settings.unit);
+  // The species of the house that have an ideal of their own, as one text: the same for the same.
+  const own = useApp((state) =>
+    [...new Set(selectTags(state).map(({ species }) => species.toLowerCase()))]
+      .filter((species) => sensor.species.has(species))
+      .sort()
+      .join('\u0000'),
+  );
+  const { ideal } = sensor;
+  const colours = idealParts(IDEAL_ALPHA);
+  const part = S.idealParts[sensor.part ?? 'any'];
+  const low = ideal && valueText(sensor, ideal[0], unit);
+  const high = ideal && readingText(sensor, ideal[1], unit);
+  const step = (name: keyof typeof colours, word: string, limits: string | null): JSX.Element => (
+    <div data-part={name}>
+      <span
+        className="ideal-bar"
+        aria-hidden="true"
+        style={{ backgroundImage: `linear-gradient(to right, ${colours[name].join(', ')})` }}
+      />
+      <strong>{word}</strong> {limits && <span>{limits}</span>}
+    </div>
+  );
+  return (
+    <div className="ideal-scale" data-testid="ideal-scale">
+      <div className="ideal-parts">
+        {step('low', S.tooLow(null), low && S.legendBelow(low))}
+        {step('right', part, low && high && `${low} – ${high}`)}
+        {step('high', S.tooHigh(null), high && S.legendAbove(high))}
+      </div>
+      {own !== '' && (
+        <p className="faint" data-testid="ideal-species">
+          {own
+            .split('\u0000')
+            .map((species) => {
+              const range = rangesFor(sensor, species).ideal;
+              const limits = range
+                ? `${valueText(sensor, range[0], unit)} – ${readingText(sensor, range[1], unit)}`
+                : '–';
+              return `${shown(species, 24)} ${limits}`;
+            })
+            .join('; ')}
+        </p>
+      )}
+    </div>
+  );
+}

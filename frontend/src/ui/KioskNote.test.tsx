@@ -1,0 +1,35 @@
+import { render, screen } from '@testing-library/react';
+import { afterEach, expect, test } from 'vitest';
+
+import { sensorNamed } from '../testing/sensors';
+import { nextSensor } from '../store/cycle';
+import { showTags } from '../testing/page';
+import { KioskNote } from './KioskNote';
+
+const NONE = { seconds: null, refused: null };
+
+afterEach(() => {
+  nextSensor.dispatch(null);
+});
+
+test('names the key that leads out, and nothing else without a round', () => {
+  showTags([]);
+  render(<KioskNote wish={NONE} />);
+  expect(screen.getByTestId('kiosk-note').textContent).toBe('Leave Esc');
+  expect(screen.getByRole('button')).toBeInstanceOf(HTMLButtonElement);
+});
+
+test('says which sensor is shown, which comes next and when', () => {
+  showTags([]);
+  nextSensor.dispatch({ sensor: sensorNamed('humidity'), at: performance.now() + 22_500 });
+  render(<KioskNote wish={{ seconds: 30, refused: null }} />);
+  expect(screen.getByTestId('cycle').textContent).toBe('Temperature next: Humidity in 23\u00a0s');
+});
+
+test('a wish that cannot be had is said, with its limits and no more of it than fits', () => {
+  showTags([]);
+  render(<KioskNote wish={{ seconds: null, refused: 'x'.repeat(500) }} />);
+  const said = screen.getByRole('status').textContent;
+  expect(said).toContain('5 to 3600 seconds');
+  expect(said.length).toBeLessThan(120);
+});

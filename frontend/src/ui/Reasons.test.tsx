@@ -1,0 +1,96 @@
+/** The table of states of the bridge's own tests: the page says what the judge says, in words. */
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+
+import { act as flush, render, screen } from '@testing-library/react';
+import { beforeEach, expect, test, vi } from 'vitest';
+
+import type { HealthReason, Verdict } from '../contract/types';
+import { act } from '../store/app';
+import { judgement } from '../testing/health';
+import { showTags } from '../testing/page';
+import { readings, wireTag } from '../testing/tags';
+import { HealthSummary } from './HealthSummary';
+import { TagCard } from './TagCard';
+import { TagTable } from './TagTable';
+
+interface Case {
+  readonly name: string;
+  readonly readings: Readonly<Record<string, readonly [number | null, number | null]>>;
+  readonly is_day?: boolean;
+  readonly verdict: Verdict;
+  readonly reasons: readonly (readonly [
+    HealthReason['kind'],
+    Verdict,
+    string,
+    number | null,
+    number | null,
+  ])[];
+}
+
+const TABLE = join(import.meta.dirname, '../../../tests/bridge/judge/verdicts.json');
+const CASES = JSON.parse(readFileSync(TABLE, 'utf8')) as readonly Case[];
+const WORDS: Readonly<Record<Verdict, string>> = {
+  critical: 'Critical',
+  stressed: 'Stressed',
+  unknown: 'Unknown',
+  healthy: 'Healthy',
+};
+/** What has to be read in the words for each kind. */
+const SAYS: Readonly<Record<HealthReason['kind'], RegExp>> = {
+  range: /, (below|above) [\d.]+( \(critical\))?$/,
+  reading_failed: /: the sensor gives no value$/,
+  scan_failed: /^Last scan failed: (not reachable|not decoded)/,
+  pest: /^\d+ pests? seen$/,
+  old: /(^Not scanned|^No scan|: no(t| reading) ).* \(readings hold 10\u00a0min\)$/,
+  changed: /changed/,
+  silent: /silent/,
+  stopped: /stopped/,
+};
+
+beforeEach(() => {
+  vi.stubGlobal('fetch', () => Promise.reject(new Error('no server')));
+});
+
+test.each(CASES)('$name', (state) => {
+  const values = Object.entries(state.readings).map(([name, [value]]) => [name, value] as const);
+  const told = state.reasons.map(([kind, verdict, sensor, value, limit]) => ({
+    ...{ kind, verdict, sensor, value, limit },
+    since: { sec: 0, nanosec: 0 },
+  }));
+  const judged = judgement({ 7: told.length > 0 ? told : state.verdict });
+  expect(judged.tags['7']?.verdict).toBe(state.verdict);
+  showTags([wireTag({ tag_id: '7', readings: readings(Object.fromEntries(values)) })], judged);
+  act({ type: 'select', tagId: '7' });
+  render(
+    <>
+      <HealthSummary kiosk={false} />
+      <TagCard tagId="7" />
+      <TagTable />
+    </>,
+  );
+  expect(screen.getByTestId('house-health').dataset['health']).toBe(state.verdict);
+  expect(screen.getByTestId('tag-card').querySelector('header')?.textContent).toContain(
+    WORDS[state.verdict],
+  );
+  const row = document.querySelector<HTMLElement>('tr[data-tag-id="7"]');
+  expect(row?.dataset['health']).toBe(state.verdict);
+  const lines = [...document.querySelectorAll('[data-testid=reasons] li')];
+  expect(lines).toHaveLength(told.length);
+  for (const [index, { kind, verdict, sensor, value, limit }] of told.entries()) {
+    const line = lines[index];
+    expect(line?.textContent).toMatch(SAYS[kind]);
+    expect(line?.querySelector('.health-mark')?.getAttribute('data-health')).toBe(verdict);
+    if (kind !== 'range' || value === null || limit === null) continue;
+    expect(line?.textContent).toContain(value < limit ? 'below' : 'above');
+    // The reading that is out of its range is marked where it stands, and no other one.
+    const marks = [...(row?.querySelectorAll('.beyond') ?? [])];
+    const cell = row?.querySelector(`[data-sensor="${sensor}"]`);
+    if (state.readings[sensor]) expect(marks.some((mark) => cell?.contains(mark))).toBe(true);
+  }
+  const ranged = told.filter(({ kind, sensor }) => kind === 'range' && state.readings[sensor]);
+  expect(row?.querySelectorAll('.beyond')).toHaveLength(ranged.length);
+  flush(() => {
+    act({ type: 'select', tagId: null });
+  });
+});

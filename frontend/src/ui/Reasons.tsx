@@ -1,0 +1,53 @@
+import type { JSX } from 'react';
+
+import type { HealthReason, TagHealth } from '../contract/types';
+import { ageSeconds } from '../domain/age';
+import { reasonText } from '../domain/reasons';
+import { whenOf } from '../domain/twin';
+import { useApp } from '../store/app';
+import { selectCatalogue } from '../store/derived';
+import { selectShown } from '../store/moment';
+import { S } from '../strings';
+import { useTicking } from '../widgets/useNow';
+import { HealthShape } from './HealthMark';
+
+/** A reason in words, with its age as of the moment that is shown. */
+export function useReasonText(reason: HealthReason | null): string {
+  const { snapshot, ageing } = useApp(selectShown);
+  const unit = useApp((state) => state.settings.unit);
+  const catalogue = useApp(selectCatalogue);
+  return useTicking((now) => {
+    if (!reason) return '';
+    const when = reason.since && snapshot ? whenOf(reason.since, snapshot) : 'unknown';
+    return reasonText(catalogue, reason, unit, ageSeconds(when, now, ageing));
+  });
+}
+
+export function Reason({ reason }: { reason: HealthReason }): JSX.Element {
+  return <>{useReasonText(reason)}</>;
+}
+
+/** Why a tag has its verdict, the worst first; nothing where there is no reason. */
+export function Reasons({
+  health,
+  most = Infinity,
+}: {
+  health: TagHealth;
+  most?: number;
+}): JSX.Element | null {
+  const { reasons } = health;
+  if (reasons.length === 0) return null;
+  return (
+    <ul className="reasons" aria-label={S.reasonsLabel} data-testid="reasons">
+      {reasons.slice(0, most).map((reason) => (
+        <li key={`${reason.kind} ${reason.sensor}`} data-kind={reason.kind}>
+          <HealthShape verdict={reason.verdict} />
+          <span>
+            <Reason reason={reason} />
+          </span>
+        </li>
+      ))}
+      {reasons.length > most && <li className="faint">{S.cardMore(reasons.length - most)}</li>}
+    </ul>
+  );
+}

@@ -1,0 +1,48 @@
+import { act as flush, render, screen } from '@testing-library/react';
+import { beforeEach, expect, test } from 'vitest';
+
+import { rosText } from '../domain/rostime';
+import { act, receive } from '../store/app';
+import { NO_HOUSE } from '../store/twin';
+import { goLive, showTags, status } from '../testing/page';
+import { SimulatedNote } from './SimulatedNote';
+
+const START = 1_763_440_800;
+const END = 1_763_700_000;
+const time = (sec: number): { sec: number; nanosec: number } => ({ sec, nanosec: 0 });
+
+const note = (): string => screen.getByTestId('simulated').textContent;
+const lookBack = (at: number | null): void => {
+  flush(() => {
+    if (at !== null) receive({ type: 'past', past: { at, house: NO_HOUSE } });
+    act({ type: 'moment', moment: at });
+  });
+};
+
+beforeEach(() => {
+  showTags([]);
+  const journal = { state: 'recording', detail: '', set_aside: '' } as const;
+  goLive(status({ journal: { ...journal, simulated: { start: time(START), end: time(END) } } }));
+});
+
+test('a moment that a simulation made is said to be simulated, and no other', () => {
+  render(<SimulatedNote />);
+  expect(note()).toBe('');
+  lookBack(END - 1);
+  expect(note()).toBe(
+    `Simulated. No robot observed this: the demo began with days made up until ${rosText(END)}.`,
+  );
+  lookBack(END);
+  expect(note()).toBe('');
+  lookBack(START);
+  expect(note()).not.toBe('');
+  lookBack(null);
+  expect(note()).toBe('');
+});
+
+test('where nothing was filled in, nothing is simulated', () => {
+  goLive(status());
+  render(<SimulatedNote />);
+  lookBack(START);
+  expect(note()).toBe('');
+});

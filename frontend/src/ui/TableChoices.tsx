@@ -1,0 +1,54 @@
+import type { JSX } from 'react';
+
+import { shown } from '../domain/text';
+import { prefer, useApp } from '../store/app';
+import { selectColumns } from '../store/derived';
+import { isColumnShown, withColumn, type Settings } from '../store/settings';
+import { S } from '../strings';
+import { Segmented } from '../widgets/Segmented';
+
+/** What can be chosen of the table: its columns, and how high its rows are. */
+export function TableChoices(): JSX.Element {
+  const sensors = useApp(selectColumns);
+  const hidden = useApp((state) => state.settings.hidden);
+  const density = useApp((state) => state.settings.density);
+  const columns = [
+    ['health', S.columns.health],
+    ['age', S.columns.age],
+    ...sensors.map(({ name, label }) => [name, shown(label, 24)] as const),
+    ['trend', S.trend],
+    ['pest', S.columns.pest],
+    ['species', S.columns.species],
+    ['flowers', S.columns.flowers],
+  ] as const;
+  return (
+    <>
+      <fieldset className="columns">
+        <legend>{S.tableColumns}</legend>
+        {columns.map(([id, label]) => (
+          <label key={id} className="check">
+            <input
+              type="checkbox"
+              checked={isColumnShown({ hidden }, id)}
+              onChange={(event) => {
+                prefer({ hidden: withColumn(hidden, id, event.target.checked) });
+              }}
+            />
+            <span>{label}</span>
+          </label>
+        ))}
+      </fieldset>
+      <Segmented<Settings['density']>
+        legend={S.density}
+        value={density}
+        options={[
+          { value: 'usual', label: S.densities.usual },
+          { value: 'compact', label: S.densities.compact },
+        ]}
+        onChange={(value) => {
+          prefer({ density: value });
+        }}
+      />
+    </>
+  );
+}

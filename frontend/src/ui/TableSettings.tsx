@@ -1,0 +1,15 @@
+import type { JSX } from 'react';
+
+import { S } from '../strings';
+import { Disclosure } from '../widgets/Disclosure';
+import { Icon } from '../widgets/Icon';
+import { WithParts } from './WithParts';
+
+/** Which columns the table has, and how high its rows are: kept in this browser. */
+export function TableSettings(): JSX.Element {
+  return (
+    <Disclosure label={S.tableButton} button={<Icon name="columns" />} className="table-settings">
+      <WithParts>{(parts) => <parts.TableChoices />}</WithParts>
+    </Disclosure>
+  );
+}

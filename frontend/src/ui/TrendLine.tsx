@@ -1,0 +1,55 @@
+import type { JSX } from 'react';
+
+import type { TagHealth } from '../contract/types';
+import type { Sensor } from '../domain/sensors';
+import { shown } from '../domain/text';
+import { differenceShown, trendOf } from '../domain/trend';
+import type { Tag } from '../domain/twin';
+import type { TemperatureUnit } from '../domain/units';
+import type { HourAgo } from '../store/hourAgo';
+import { S } from '../strings';
+
+const ARROWS = { up: '\u2197', down: '\u2198', level: '\u2192' } as const;
+
+/** A reading against an hour ago: an arrow and the difference, or why there is none. */
+export function TrendLine({
+  sensor,
+  tag,
+  health,
+  then,
+  unit,
+}: {
+  sensor: Sensor;
+  tag: Tag;
+  health: TagHealth;
+  /** Null: nobody knows what was an hour ago. */
+  then: HourAgo | null;
+  unit: TemperatureUnit;
+}): JSX.Element | null {
+  const value = tag.readings.get(sensor.name);
+  const trend = trendOf(sensor.name, { tag, health }, then?.tags.get(tag.id) ?? null);
+  if (!trend || value == null) return null;
+  const title = S.trendTitle(shown(sensor.label, 32));
+  if (!then || trend.kind !== 'by') {
+    const text = !then ? S.trendUnknown : trend.kind === 'same' ? S.trendSame : S.trendNone;
+    return (
+      <span className="trend" data-trend={then ? trend.kind : 'unknown'} title={text}>
+        {trend.kind === 'same' && then ? (
+          text
+        ) : (
+          // Quiet: with a young memory it stands in every row.
+          <>
+            <span aria-hidden="true">–</span> <span className="unseen">{text}</span>
+          </>
+        )}
+      </span>
+    );
+  }
+  const { way, text } = differenceShown(sensor, value, trend.by, unit);
+  return (
+    <span className="trend" data-trend={way} title={`${title}: ${text}`}>
+      <span aria-hidden="true">{ARROWS[way]}</span> <span className="unseen">{title}: </span>
+      {text}
+    </span>
+  );
+}

@@ -1,0 +1,40 @@
+import type { JSX } from 'react';
+
+import { epochOf } from '../../clock';
+import { clockText } from '../../domain/format';
+import { rosText, secondsOf } from '../../domain/rostime';
+import { useApp } from '../../store/app';
+import { selectNewest, selectShown } from '../../store/moment';
+import { S } from '../../strings';
+
+/** What the list is about, and what it does not know. */
+export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
+  const alarms = useApp((state) => state.twin.alarms);
+  const moment = useApp((state) => selectShown(state).moment);
+  const phase = useApp((state) => state.twin.phase);
+  const takenAt = useApp((state) => selectNewest(state).snapshot?.takenAt ?? null);
+  const isStarting = alarms?.source === 'starting';
+  // Of a silent twin the bridge goes on to tell: that is an alarm itself.
+  const isLost = phase !== 'live' && phase !== 'offline';
+  const isKnown = alarms !== null && !isLost && !isStarting;
+  return (
+    <div className="alarm-notes">
+      {moment !== null && <p data-note="now">{S.alarmsOfNow(rosText(moment))}</p>}
+      {isLost && takenAt !== null && (
+        <p data-note="lost">{S.alarmsLost(clockText(epochOf(takenAt)))}</p>
+      )}
+      {isStarting && <p data-note="starting">{S.alarmsStarting}</p>}
+      {isEmpty && (
+        <p className="alarm-none" data-note={isKnown ? 'none' : 'unknown'}>
+          {isKnown ? S.alarmsNone : S.alarmsNotYet}
+        </p>
+      )}
+      {isEmpty && isKnown && <p className="faint">{S.alarmsNoneHint}</p>}
+      {alarms?.source === 'heard' && alarms.since && (
+        <p className="faint" data-note="heard">
+          {S.alarmsHeard(rosText(secondsOf(alarms.since)))}
+        </p>
+      )}
+    </div>
+  );
+}

@@ -1,0 +1,30 @@
+/**
+ * What the first view can do without, in one piece that comes right behind it: cards, lists and
+ * tools that somebody has to ask for first. Only `later.ts` loads it.
+ */
+import '../styles/card.css';
+import '../styles/hover.css';
+import '../styles/timebar.css';
+
+export { startBadge } from '../alarms/badge';
+export { startNotify } from '../alarms/notify';
+export { startSound } from '../alarms/sound';
+export { saveTable } from '../export/actions';
+export { startDifference } from '../store/difference';
+export { startOpening } from '../store/opening';
+export { startRemembered } from '../store/remembered';
+export { TimeBar } from '../timebar/TimeBar';
+export { AlarmPanel } from './alarms/AlarmPanel';
+export { Meanwhile } from './alarms/Meanwhile';
+export { AttentionList } from './AttentionList';
+export { CompareControl } from './CompareControl';
+export { DifferenceLegend } from './DifferenceLegend';
+export { HelpDialog, openHelp } from './HelpDialog';
+export { HoverCard } from './HoverCard';
+export { KioskNote, startLeaving } from './KioskNote';
+export { Menu } from './Menu';
+export { onKey } from './shortcuts';
+export { PaperLine } from './PaperLine';
+export { RangeControl } from './RangeControl';
+export { TableChoices } from './TableChoices';
+export { TagCard } from './TagCard';

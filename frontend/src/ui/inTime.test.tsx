@@ -1,0 +1,34 @@
+import { render, screen } from '@testing-library/react';
+import { expect, test, vi } from 'vitest';
+import type { JSX } from 'react';
+
+import { inTime } from './inTime';
+
+const Greeting = ({ name }: { name: string }): JSX.Element => <p>Hello {name}</p>;
+
+test('a part is loaded when it is first shown, once, and is given what it was given', async () => {
+  const load = vi.fn(() => Promise.resolve(Greeting));
+  const Part = inTime(load);
+  expect(load).not.toHaveBeenCalled();
+  render(
+    <>
+      <Part name="you" />
+      <Part name="me" />
+    </>,
+  );
+  await screen.findByText('Hello you');
+  expect(screen.getByText('Hello me')).toBeTruthy();
+  expect(load).toHaveBeenCalledTimes(1);
+});
+
+test('one that does not come says so, and what is beside it stays', async () => {
+  const Part = inTime<{ name: string }>(() => Promise.reject(new TypeError('gone')));
+  render(
+    <>
+      <Part name="you" />
+      <p>the map</p>
+    </>,
+  );
+  expect((await screen.findByRole('status')).textContent).toContain('Load the page again');
+  expect(screen.getByText('the map')).toBeTruthy();
+});

@@ -1,0 +1,26 @@
+/** What is loaded when it is first shown, and not by who never looks at it. */
+import { createElement, lazy, Suspense, type ComponentType, type JSX } from 'react';
+
+import { S } from '../strings';
+
+/** A component that cannot be loaded says so; the rest of the page goes on. */
+export function inTime<Props extends object>(
+  load: () => Promise<ComponentType<Props>>,
+): (props: Props) => JSX.Element {
+  const Part = lazy(async (): Promise<{ default: ComponentType<Props> }> => {
+    try {
+      return { default: await load() };
+    } catch {
+      return { default: Missing };
+    }
+  });
+  return function InTime(props: Props): JSX.Element {
+    return <Suspense>{createElement(Part as ComponentType<Props>, props)}</Suspense>;
+  };
+}
+
+const Missing = (): JSX.Element => (
+  <span className="part-missing" role="status">
+    {S.partMissing}
+  </span>
+);

@@ -1,0 +1,23 @@
+import { fireEvent } from '@testing-library/react';
+import { expect, test } from 'vitest';
+
+import { store } from '../store/app';
+import { showTags } from '../testing/page';
+import { wireTag } from '../testing/tags';
+import { startKeys } from './keys';
+import { later, loadParts } from './later';
+
+test('a key that comes before what it is for is not lost, and from then on each is taken at once', async () => {
+  showTags([wireTag()]);
+  const stop = startKeys();
+  fireEvent.keyDown(document.body, { key: 'a' });
+  expect(later.get().parts).toBeNull();
+  expect(store.get().view.list).toBe('tags');
+  await loadParts();
+  expect(store.get().view.list).toBe('alarms');
+  fireEvent.keyDown(document.body, { key: '/' });
+  expect(store.get().view.list).toBe('tags');
+  stop();
+  fireEvent.keyDown(document.body, { key: 'a' });
+  expect(store.get().view.list).toBe('tags');
+});

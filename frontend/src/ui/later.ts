@@ -1,0 +1,37 @@
+/** Loads what the first view can do without (`behind.ts`), and keeps trying where it does not come. */
+import { createStore } from '../store/create';
+import type * as everyPart from './behind';
+
+export type Parts = typeof everyPart;
+
+/** What has come of it. */
+export interface Later {
+  readonly parts: Parts | null;
+  /** It did not come when it was last asked for. */
+  readonly isLate: boolean;
+}
+
+export const later = createStore<Later, Later>({ parts: null, isLate: false }, (_, next) => next);
+
+/** Between two tries, ms: doubled each time, up to the longest. */
+const FIRST_MS = 1_000;
+const LONGEST_MS = 30_000;
+
+let coming: Promise<Parts> | null = null;
+
+/** Asks for them once, however often it is called; comes back with them. */
+export const loadParts = (load = (): Promise<Parts> => import('./behind')): Promise<Parts> =>
+  (coming ??= tried(load));
+
+async function tried(load: () => Promise<Parts>): Promise<Parts> {
+  for (let pause = FIRST_MS; ; pause = Math.min(2 * pause, LONGEST_MS)) {
+    try {
+      const parts = await load();
+      later.dispatch({ parts, isLate: false });
+      return parts;
+    } catch {
+      later.dispatch({ parts: null, isLate: true });
+    }
+    await new Promise((resolve) => setTimeout(resolve, pause));
+  }
+}

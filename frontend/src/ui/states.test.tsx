@@ -1,0 +1,239 @@
+/** The table of states of the bridge's own tests, as two of the page's languages tell it. */
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+
+import { render } from '@testing-library/react';
+import { afterAll, beforeAll, beforeEach, describe, expect, test, vi } from 'vitest';
+
+import type { Alarm, HealthReason, Verdict } from '../contract/types';
+
+type Told = readonly [HealthReason['kind'], Verdict, string, number | null, number | null];
+interface Tag {
+  readonly readings: Readonly<Record<string, readonly [number | null, number]>>;
+  readonly verdict: Verdict;
+  readonly reasons: readonly Told[];
+  readonly species?: string;
+}
+interface House {
+  readonly verdict: Verdict;
+  readonly reasons: readonly HealthReason['kind'][];
+  readonly day: readonly [boolean, 'light' | 'clock' | 'assumed'];
+  readonly overdue: number;
+}
+interface State {
+  readonly name: string;
+  readonly tags: Readonly<Record<string, Tag | string>>;
+  readonly house: House;
+  readonly alarms: readonly (readonly [string, HealthReason['kind'], string, Verdict])[];
+}
+
+const FILE = join(import.meta.dirname, '../../../tests/bridge/judge/states.json');
+const { alike, states } = JSON.parse(readFileSync(FILE, 'utf8')) as {
+  readonly alike: Readonly<Record<string, Tag>>;
+  readonly states: readonly State[];
+};
+
+/** What a reader has to find, whatever else is said. */
+interface Language {
+  readonly verdicts: Readonly<Record<Verdict, string>>;
+  readonly sensors: Readonly<Record<string, string>>;
+  readonly sides: readonly [below: string, above: string];
+  readonly says: Readonly<Record<HealthReason['kind'], RegExp>>;
+  readonly tag: string;
+  readonly house: string;
+  readonly most: RegExp;
+}
+const LANGUAGES: Readonly<Record<'en' | 'de', Language>> = {
+  en: {
+    verdicts: {
+      critical: 'Critical',
+      stressed: 'Stressed',
+      unknown: 'Unknown',
+      healthy: 'Healthy',
+    },
+    sensors: {
+      temperature: 'Temperature',
+      humidity: 'Humidity',
+      co2: 'CO₂',
+      light: 'Light',
+      soil_moisture: 'Soil moisture',
+      vpd: 'Vapour pressure deficit',
+    },
+    sides: ['below', 'above'],
+    says: {
+      range: /\d.*, (below|above) \d/,
+      reading_failed: /the sensor gives no value$/,
+      scan_failed: /^Last scan failed: (not reachable|not decoded)/,
+      pest: /^\d+ pests? seen$/,
+      old: /[Nn]ot scanned|[Nn]o scan|no reading/,
+      changed: /changed/,
+      silent: /twin is silent/,
+      stopped: /^No tag is being scanned/,
+    },
+    tag: 'Tag 1',
+    house: 'Whole house',
+    most: /More than half/,
+  },
+  de: {
+    verdicts: {
+      critical: 'Kritisch',
+      stressed: 'Gestresst',
+      unknown: 'Unbekannt',
+      healthy: 'Gesund',
+    },
+    sensors: {
+      temperature: 'Temperatur',
+      humidity: 'Luftfeuchte',
+      co2: 'CO₂',
+      light: 'Licht',
+      soil_moisture: 'Bodenfeuchte',
+      vpd: 'Dampfdruckdefizit',
+    },
+    sides: ['unter', 'über'],
+    says: {
+      range: /\d.*, (unter|über) \d/,
+      reading_failed: /Der Sensor liefert keinen Wert$/,
+      scan_failed: /^Letzte Messung gescheitert: (nicht erreichbar|nicht erkannt|nicht lesbar)/,
+      pest: /^\d+ Schädlinge? gesehen$/,
+      old: /gemessen|kein Messwert|[Kk]eine Messung/,
+      changed: /verändert/,
+      silent: /Zwilling schweigt/,
+      stopped: /kein Messpunkt mehr gemessen/,
+    },
+    tag: 'Messpunkt 1',
+    house: 'Ganzes Haus',
+    most: /Mehr als die Hälfte/,
+  },
+};
+
+const tagsOf = (state: State): [string, Tag][] =>
+  Object.entries(state.tags).map(([id, tag]) => {
+    const own = typeof tag === 'string' ? alike[tag] : tag;
+    if (!own) throw new Error(`tag ${id} of “${state.name}” is like none`);
+    return [id, own];
+  });
+
+const SINCE = { sec: 0, nanosec: 0 };
+const reasonOf = ([kind, verdict, sensor, value, limit]: Told): HealthReason => ({
+  ...{ kind, verdict, sensor, value, limit },
+  since: SINCE,
+});
+
+describe.each(['en', 'de'] as const)('%s', (language) => {
+  const words = LANGUAGES[language];
+
+  /** The page's modules, which took their words as they were loaded. */
+  const load = async () => ({
+    ...(await import('../testing/page')),
+    ...(await import('../testing/tags')),
+    ...(await import('./HealthSummary')),
+    ...(await import('./TagTable')),
+    ...(await import('../alarms/words')),
+    ...(await import('../alarms/title')),
+    ...(await import('../alarms/speech')),
+    ...(await import('../store/app')),
+  });
+  let page: Awaited<ReturnType<typeof load>>;
+
+  beforeAll(async () => {
+    history.replaceState(null, '', `/?lang=${language}`);
+    vi.resetModules();
+    page = await load();
+  });
+  afterAll(() => {
+    history.replaceState(null, '', '/');
+  });
+  beforeEach(() => {
+    vi.stubGlobal('fetch', () => Promise.reject(new Error('no server')));
+  });
+
+  /** Whether a text says what a reason is about. */
+  const expectSaid = (text: string, [kind, , sensor, value, limit]: Told): void => {
+    expect(text).toMatch(words.says[kind]);
+    if (sensor !== '') expect(text).toContain(words.sensors[sensor]);
+    if (kind === 'range' && value !== null && limit !== null) {
+      expect(text).toContain(words.sides[value < limit ? 0 : 1]);
+    }
+  };
+
+  test.each(states)('$name', (state) => {
+    const { house } = state;
+    const tags = tagsOf(state);
+    const { wireTag, readings, showTags, HealthSummary, TagTable } = page;
+    showTags(
+      tags.map(([tag_id, tag]) => {
+        const values = Object.entries(tag.readings).map(([name, [value]]) => [name, value]);
+        return wireTag({
+          tag_id,
+          species: tag.species ?? '',
+          readings: readings(Object.fromEntries(values) as Record<string, number | null>),
+        });
+      }),
+      {
+        house: {
+          verdict: house.verdict,
+          reasons: house.reasons.map((kind) => reasonOf([kind, house.verdict, '', null, null])),
+          day: { is_day: house.day[0], source: house.day[1] },
+          patrol: { interval_s: 120, last_scan: SINCE, overdue: house.overdue },
+        },
+        tags: Object.fromEntries(
+          tags.map(([id, { verdict, reasons }]) => [
+            id,
+            { verdict, reasons: reasons.map(reasonOf) },
+          ]),
+        ),
+      },
+    );
+    const { container } = render(
+      <>
+        <HealthSummary kiosk={false} />
+        <TagTable />
+      </>,
+    );
+
+    const summary = container.querySelector<HTMLElement>('[data-testid=house-health]');
+    expect(summary?.dataset['health']).toBe(house.verdict);
+    expect(summary?.textContent).toContain(words.verdicts[house.verdict]);
+    // Not more is said to be unknown than is.
+    const unknown = tags.filter(([, { verdict }]) => verdict === 'unknown').length;
+    const isMost = 2 * unknown > tags.length;
+    if (house.verdict === 'unknown' && house.reasons.length === 0 && unknown > 0) {
+      expect(words.most.test(summary?.textContent ?? '')).toBe(isMost);
+    }
+    for (const kind of house.reasons) expect(container.textContent).toMatch(words.says[kind]);
+    for (const [id, { verdict, reasons }] of tags) {
+      const row = container.querySelector<HTMLElement>(`tr[data-tag-id="${id}"]`);
+      expect(row?.dataset['health']).toBe(verdict);
+      // Its sign, whose shape and colour are the verdict's, and its word.
+      const mark = row?.querySelector('.health-mark');
+      expect(mark?.getAttribute('data-health')).toBe(verdict);
+      expect(mark?.textContent).toContain(words.verdicts[verdict]);
+      const why = row?.querySelector('.why')?.textContent ?? '';
+      expect(why === '' ? [] : why.split('; ')).toHaveLength(reasons.length);
+      for (const [index, each] of reasons.entries()) expectSaid(why.split('; ')[index] ?? '', each);
+    }
+
+    const speech = page.selectSpeech(page.store.get());
+    for (const [tag_id, kind, sensor, verdict] of state.alarms) {
+      const of = tags.find(([id]) => id === tag_id)?.[1].reasons ?? [];
+      const told: Told = of.find((it) => it[0] === kind && it[2] === sensor) ?? [
+        kind,
+        verdict,
+        sensor,
+        null,
+        null,
+      ];
+      const alarm: Alarm = {
+        ...{ id: `${tag_id} ${kind}`, tag_id, raised_at: SINCE, cleared_at: null, worst: null },
+        reason: reasonOf(told),
+      };
+      const text = page.alarmText(alarm, speech);
+      expect(text.startsWith(tag_id === '' ? words.house : words.tag.replace('1', tag_id))).toBe(
+        true,
+      );
+      expectSaid(text.slice(text.indexOf(': ') + 2), told);
+    }
+    const calls = state.alarms.length;
+    expect(page.titleOf(calls, null)).toBe(calls === 0 ? 'Lupin twin' : `(${calls}) Lupin twin`);
+  });
+});

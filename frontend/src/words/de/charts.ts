@@ -1,0 +1,56 @@
+/** Die Verläufe und ihre Tabellen. */
+import type { CHARTS as ENGLISH } from '../en/charts';
+import type { In } from '../shape';
+import { counted } from './counted';
+
+export const CHARTS: In<typeof ENGLISH> = {
+  charts: 'Verläufe',
+  chartOf: (sensor) => `Verlauf: ${sensor}`,
+  chartsBy: { tag: 'Ein Messpunkt', sensor: 'Mehrere' },
+  chartsByLegend: 'Was gezeigt wird',
+  chartSpan: (from, to) => `${from} bis ${to}`,
+  chartSummary: (count, latest, at, low, high, gaps) =>
+    `${counted(count, 'Messwert', 'Messwerte')}, der letzte ${latest} um ${at}, ` +
+    `zwischen ${low} und ${high}, ${gaps === 0 ? 'keine Lücke' : counted(gaps, 'Lücke', 'Lücken')}.`,
+  chartEmpty: 'Kein Messwert in diesem Zeitraum.',
+  chartNothing: '–',
+  chartLoading: 'Die Vergangenheit kommt gleich',
+  chartFailed: (reason) => `Die Vergangenheit konnte nicht geladen werden: ${reason}`,
+  chartMissing: 'Dieser Zwilling bewahrt keine Vergangenheit auf.',
+  chartMissingHint:
+    'Verläufe brauchen eine Aufzeichnung. Bis dahin zeigt der Messpunkt nur seine letzten Messungen.',
+  chartMissingMore:
+    'Den Zwilling ohne „journal:=off“ starten oder im Parameter „journal“ eine Datei nennen.',
+  chartMissingShort: 'Kein Verlauf: Dieser Zwilling zeichnet nichts auf.',
+  chartNoTime: 'Der Zwilling kennt noch keine Zeit und damit keine Vergangenheit.',
+  chartNoSensors: 'Dieser Messpunkt hat keinen Sensor.',
+  chartNoTags: 'Kein Messpunkt hat diesen Sensor.',
+  chartTable: 'Als Tabelle zeigen',
+  chartPlots: 'Als Verlauf zeigen',
+  chartZoomIn: 'Vergrößern',
+  chartZoomOut: 'Verkleinern',
+  chartWhole: 'Ganzer Zeitraum',
+  chartCsvShown: 'CSV des Gezeigten',
+  chartCsvAll: 'CSV aller Messwerte',
+  chartAddTag: 'Messpunkt hinzufügen',
+  chartRemoveTag: (tag) => `Messpunkt ${tag} aus dem Verlauf entfernen`,
+  chartWhich: 'Tabelle von',
+  chartKeys: { ideal: 'ideal', range: 'kleinster bis größter', gap: 'es kam nichts' },
+  chartFailure: 'fehlgeschlagener Versuch',
+  chartLook: 'Blütenkontrolle',
+  chartHint: 'Ziehen: vergrößern. Klicken: das Haus zu dieser Zeit.',
+  chartTableCaption: (label, sensor, span) => `${label}, ${sensor}, ${span}`,
+  chartColumns: {
+    time: 'Zeit',
+    until: 'Bis',
+    value: 'Wert',
+    count: 'Messwerte',
+    mean: 'Mittel',
+    min: 'Kleinster',
+    max: 'Größter',
+    event: 'Ereignis',
+  },
+  chartGap: (length) => `${length} lang kam nichts`,
+  chartFailures: (count) => counted(count, 'fehlgeschlagener Versuch', 'fehlgeschlagene Versuche'),
+  chartLooks: (count) => counted(count, 'Blütenkontrolle', 'Blütenkontrollen'),
+};

@@ -1,0 +1,78 @@
+/** Verdicts and their reasons. */
+import { counted } from './counted';
+
+export const HEALTH = {
+  health: {
+    healthy: 'Healthy',
+    stressed: 'Stressed',
+    critical: 'Critical',
+    unknown: 'Unknown',
+  },
+  /** Why a tag or the house has its verdict. */
+  reasons: {
+    sides: { below: 'below', above: 'above' },
+    range: (reading: string, side: string, limit: string, isCritical: boolean): string =>
+      `${reading}, ${side} ${limit}${isCritical ? ' (critical)' : ''}`,
+    readingFailed: (sensor: string): string => `${sensor}: the sensor gives no value`,
+    scanFailed: (outcome: string, age: string | null): string =>
+      `Last scan failed: ${outcome}${age === null ? '' : `, ${age} ago`}`,
+    pest: (count: number): string =>
+      count > 0 ? `${counted(count, 'pest', 'pests')} seen` : 'Pest seen',
+    /** An empty sensor: none of the tag's has a reading that holds. */
+    old: (sensor: string, age: string | null, holds: string | null, isDated: boolean): string => {
+      const since = !isDated
+        ? sensor === ''
+          ? 'No scan whose time is known'
+          : 'no reading whose time is known'
+        : age === null
+          ? `${sensor === '' ? 'Not' : 'not'} scanned lately`
+          : sensor === ''
+            ? `Not scanned for ${age}`
+            : `no reading for ${age}`;
+      return `${sensor === '' ? '' : `${sensor}: `}${since}${holds === null ? '' : ` (readings hold ${holds})`}`;
+    },
+    outOfRange: 'out of its range',
+    changed: (reading: string): string =>
+      `${reading}, changed against its own past and its neighbours`,
+    silent: 'The twin is silent: what was heard last says nothing about now',
+    stopped: 'No tag is being scanned: the robot has stopped, or is not heard',
+    other: (kind: string, sensor: string): string => (sensor === '' ? kind : `${sensor}: ${kind}`),
+  },
+  reasonsLabel: 'Why',
+  healthHeading: 'House health',
+  healthDriver: (tag: string, reason: string): string => `Tag ${tag}: ${reason}`,
+  healthMostUnknown: 'More than half of the tags are unknown',
+  healthSomeUnknown: (count: number): string => `${counted(count, 'tag', 'tags')} cannot be judged`,
+  healthDay: (isDay: boolean, source: string): string =>
+    `Judged by the ranges for the ${isDay ? 'day' : 'night'}: ${source}`,
+  healthDaySource: {
+    light: 'so the light in the house says',
+    clock: 'so the clock says, for no light is measured',
+    assumed: 'assumed, for neither light nor clock tell',
+  },
+  /** "any": by day and by night it is the same. */
+  idealParts: { any: 'ideal', day: 'ideal by day', night: 'ideal by night' },
+  healthIdeal: (ideal: string, low: string, high: string, unit: string): string =>
+    `${ideal} ${low} to ${high} ${unit}`.trim(),
+  healthAllWell: 'Every judged reading lies within its ideal range',
+  healthNothing: 'No reading to judge yet',
+  healthFilter: ', show only these tags',
+  houseRhythm: (interval: string): string => `a scan every ${interval}`,
+  houseLast: (age: string): string => `last scan ${age} ago`,
+  houseNever: 'no scan yet',
+  houseOverdue: (count: number): string =>
+    count === 0 ? 'no tag overdue' : counted(count, 'tag overdue', 'tags overdue'),
+  /** Told to screen readers. */
+  tagChosen: (tag: string, health: string, row: number, rows: number): string =>
+    `Tag ${tag}, ${health}, ${row} of ${rows}`,
+  attention: 'Needs attention',
+  attentionNone: 'Nothing needs attention',
+  attentionNoneKnown: (unknown: number): string =>
+    `Nothing known needs attention; of ${counted(unknown, 'tag', 'tags')} nothing is known`,
+  attentionMore: (count: number): string => `+ ${count} more`,
+
+  tooLow: (by: string | null): string => (by === null ? 'too low' : `too low by ${by}`),
+  tooHigh: (by: string | null): string => (by === null ? 'too high' : `too high by ${by}`),
+  below: 'below ideal',
+  above: 'above ideal',
+} as const;

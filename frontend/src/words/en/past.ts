@@ -1,0 +1,70 @@
+/** Another moment than now, and the bar of time. */
+import { counted } from './counted';
+
+export const PAST = {
+  past: 'Past',
+  pastTitle: (moment: string): string => `${moment} (past) · Lupin twin`,
+  pastFetching: (moment: string): string => `Fetching ${moment}`,
+  pastFetchingHint: 'Nothing is shown until it is here.',
+  pastFailed: (moment: string): string => `${moment} cannot be shown`,
+  pastNothing: (moment: string): string => `Nothing is known of ${moment}`,
+  pastReach: (from: string): string => `What is remembered begins at ${from}.`,
+  pastReachNothing: 'Nothing is remembered yet.',
+  pastFault: (wanted: string): string => `${wanted} could not be fetched.`,
+  pastFaultShown: (shown: string, why: string): string =>
+    `Shown is ${shown}; it is tried again. ${why}`,
+  phasePast: {
+    connecting: 'Past · connecting',
+    live: 'Past',
+    stale: 'Past · no signal',
+    offline: 'Past · twin offline',
+    reconnecting: 'Past · reconnecting',
+  },
+  backToLive: 'Back to live',
+  backToRecording: 'Back to the recording',
+  frozenBehindPast: (clock: string): string => `Live data have stopped. The last came at ${clock}`,
+  frozenPastStays: 'What is shown is past, and stays.',
+  meanwhileShow: (tag: string): string => `Back to live, to tag ${tag}`,
+
+  timebar: 'Time bar',
+  timebarSlider: 'Time shown',
+  timebarLive: 'Live',
+  timebarPeriod: 'Period',
+  timebarPeriods: {
+    hour: 'Last hour',
+    day: 'Last day',
+    week: 'Last week',
+    month: 'Last month',
+    all: 'All',
+    own: 'Own period',
+  },
+  timebarFrom: 'From',
+  timebarTo: 'To',
+  timebarOwnHint: 'The beginning lies before the end',
+  timebarOwnSimHint: 'hh:mm:ss since the simulation began',
+  timebarPlay: 'Play',
+  timebarPause: 'Pause',
+  timebarSpeed: 'Playback speed',
+  timebarSpeeds: (speed: number): string => `${speed}×`,
+  timebarMarks: 'What the marks mean',
+  timebarMark: {
+    scans: 'bar upwards: scans',
+    failures: 'bar downwards: tries that failed',
+    pest: 'full triangle: a pest was seen',
+    cleared: 'empty ring: a pest was gone',
+    silence: 'slanted lines: nothing was tried',
+    before: 'slanted the other way: not remembered',
+    run: 'dashed line: the clock began anew',
+  },
+  timebarCounts: (scans: number, failures: number, seen: number, cleared: number): string =>
+    [
+      counted(scans, 'scan', 'scans'),
+      ...(failures > 0 ? [`${failures} failed`] : []),
+      ...(seen > 0 ? [counted(seen, 'pest seen', 'pests seen')] : []),
+      ...(cleared > 0 ? [counted(cleared, 'pest gone', 'pests gone')] : []),
+    ].join(', '),
+  timebarOff: 'No look back: this twin remembers nothing.',
+  timebarOffHint:
+    'Nothing is being recorded here, so there is no past to look back at. Whoever runs the twin can turn the recording on.',
+  timebarFailed: (reason: string): string => `What is remembered could not be fetched: ${reason}`,
+} as const;

@@ -1,0 +1,56 @@
+/** Las gráficas y sus tablas. */
+import type { CHARTS as ENGLISH } from '../en/charts';
+import type { In } from '../shape';
+import { counted } from './counted';
+
+export const CHARTS: In<typeof ENGLISH> = {
+  charts: 'Gráficas',
+  chartOf: (sensor) => `Gráfica: ${sensor}`,
+  chartsBy: { tag: 'Un punto', sensor: 'Varios puntos' },
+  chartsByLegend: 'Qué se muestra',
+  chartSpan: (from, to) => `${from} a ${to}`,
+  chartSummary: (count, latest, at, low, high, gaps) =>
+    `${counted(count, 'lectura', 'lecturas')}, la última ${latest} a las ${at}, ` +
+    `entre ${low} y ${high}, ${gaps === 0 ? 'sin huecos' : counted(gaps, 'hueco', 'huecos')}.`,
+  chartEmpty: 'No hay lecturas en este periodo.',
+  chartNothing: '–',
+  chartLoading: 'El pasado está en camino',
+  chartFailed: (reason) => `No se pudo obtener el pasado: ${reason}`,
+  chartMissing: 'Este gemelo no guarda el pasado.',
+  chartMissingHint:
+    'Las gráficas necesitan un registro. Hasta entonces la ficha muestra solo las últimas mediciones.',
+  chartMissingMore:
+    'Inicie el gemelo sin «journal:=off» o indique un archivo en el parámetro «journal».',
+  chartMissingShort: 'Sin gráfica: este gemelo no registra nada.',
+  chartNoTime: 'El gemelo aún no sabe la hora y, por tanto, no tiene pasado.',
+  chartNoSensors: 'Este punto no tiene sensores.',
+  chartNoTags: 'Ningún punto tiene este sensor.',
+  chartTable: 'Mostrar como tabla',
+  chartPlots: 'Mostrar como gráfica',
+  chartZoomIn: 'Acercar',
+  chartZoomOut: 'Alejar',
+  chartWhole: 'Todo el periodo',
+  chartCsvShown: 'CSV de lo mostrado',
+  chartCsvAll: 'CSV de todas las lecturas',
+  chartAddTag: 'Añadir un punto',
+  chartRemoveTag: (tag) => `Quitar el punto ${tag} de la gráfica`,
+  chartWhich: 'Tabla de',
+  chartKeys: { ideal: 'ideal', range: 'de mínimo a máximo', gap: 'no llegó nada' },
+  chartFailure: 'intento fallido',
+  chartLook: 'revisión de flores',
+  chartHint: 'Arrastrar: acercar. Clic: el invernadero en ese momento.',
+  chartTableCaption: (label, sensor, span) => `${label}, ${sensor}, ${span}`,
+  chartColumns: {
+    time: 'Hora',
+    until: 'Hasta',
+    value: 'Valor',
+    count: 'Lecturas',
+    mean: 'Media',
+    min: 'Mínimo',
+    max: 'Máximo',
+    event: 'Suceso',
+  },
+  chartGap: (length) => `no llegó nada durante ${length}`,
+  chartFailures: (count) => counted(count, 'intento fallido', 'intentos fallidos'),
+  chartLooks: (count) => counted(count, 'revisión de flores', 'revisiones de flores'),
+};

@@ -1,0 +1,204 @@
+/** La página misma: conexión, averías, menú, ayuda, lo que uno se lleva. */
+import type { PAGE as ENGLISH } from '../en/page';
+import type { In } from '../shape';
+import { counted } from './counted';
+
+export const PAGE: In<typeof ENGLISH> = {
+  product: 'Lupin twin',
+  subtitle: 'Invernadero',
+  skipToTable: 'Ir a la tabla de puntos de medida',
+  more: 'Más detalles',
+
+  language: 'Idioma',
+  languageUnknown: (asked) => `Esta página no habla «${asked}»: se muestra en inglés.`,
+  languageMissing: (name) => `No se pudo cargar ${name}: la página se muestra en inglés.`,
+  partsLate: 'Una parte de la página no ha llegado.',
+  partsLateHint:
+    'Las fichas, las listas y la barra de tiempo aparecerán en cuanto el servidor responda; se le pregunta una y otra vez.',
+
+  phase: {
+    connecting: 'Conectando',
+    live: 'En directo',
+    stale: 'Sin señal',
+    offline: 'Sin gemelo',
+    reconnecting: 'Reconectando',
+  },
+  phaseLabel: 'Conexión',
+  retryNow: 'Probar ahora',
+  nextTry: (seconds) => (seconds > 0 ? `próximo intento en ${seconds} s` : 'intentándolo ahora'),
+  frozenSince: (clock) => `Las lecturas están congeladas. Últimos datos a las ${clock}`,
+  agoSuffix: (age) => `hace ${age}`,
+  frozenWhy: {
+    stale: 'La conexión está abierta, pero ya no llega nada por ella.',
+    reconnecting: 'Se ha perdido la conexión con el servidor; la página continuará por sí sola.',
+    connecting: 'Esperando la respuesta del servidor.',
+    live: '',
+    offline: 'El servidor responde, pero el gemelo que hay detrás no.',
+  },
+  offlineWhy: {
+    live: '',
+    paused: '',
+    no_clock: 'El gemelo aún no sabe la hora y, por tanto, tampoco la antigüedad de las lecturas.',
+    clock_stopped: 'El reloj del gemelo se ha parado. No se sabe la antigüedad de las lecturas.',
+    never_seen: 'El servidor aún no sabe de ningún gemelo. ¿Está encendido?',
+    stale: 'El gemelo ya no da señales. Compruebe que sigue en marcha.',
+    thread_dead: 'El servidor ha perdido el contacto con el gemelo y hay que reiniciarlo.',
+    shutting_down: 'El servidor se está apagando.',
+  },
+  offlineMore: {
+    live: '',
+    paused: '',
+    no_clock: 'El gemelo funciona con tiempo simulado y no llega nada por /clock.',
+    clock_stopped: 'El gemelo funciona con tiempo simulado y ya no llega nada por /clock.',
+    never_seen:
+      'El gemelo y el puente («bridge») deben estar en el mismo dominio de ROS (ROS_DOMAIN_ID).',
+    stale: 'El puente («bridge») funciona, pero ya no se publica nada en /twin/state.',
+    thread_dead: 'El hilo de ROS del puente («bridge») ha terminado; su registro dice por qué.',
+    shutting_down: '',
+  },
+
+  unread: (count) =>
+    count === 1
+      ? 'Un mensaje del servidor no se pudo leer y se descartó.'
+      : `${count} mensajes del servidor no se pudieron leer y se descartaron.`,
+  unreadLast: (why) => `El último: ${why}`,
+  paused: 'El tiempo está en pausa.',
+  pausedHint: 'La simulación o la grabación está parada, y nada envejece.',
+  drops: (count) =>
+    `El gemelo ha descartado ${counted(count, 'mensaje', 'mensajes')} en los últimos minutos.`,
+  dropsLast: (message) => `El último: ${message}`,
+  journal: {
+    off: {
+      title: 'No se guarda ningún registro.',
+      hint: 'Tras un reinicio, el gemelo no sabrá nada de lo anterior.',
+    },
+    slow: {
+      title: 'El registro va con retraso.',
+      hint: 'Lo pendiente se escribirá cuando el disco dé abasto; un corte de luz lo perdería.',
+    },
+    failing: {
+      title: 'El registro está fallando.',
+      hint: 'El gemelo sigue, lo intenta una y otra vez y escribirá lo pendiente en cuanto pueda: haga sitio o revise el disco.',
+    },
+    in_use: {
+      title: 'Este gemelo no registra: ya lo hace otro.',
+      hint: 'Detenga uno de los dos o dé a este un archivo propio.',
+    },
+    foreign: {
+      title: 'Este gemelo no registra: su archivo es de otro programa.',
+      hint: 'No se ha cambiado nada en él. Dé al gemelo otro archivo o mueva este.',
+    },
+  },
+  outward: {
+    mqtt: 'La domótica (MQTT) no recibe nada.',
+    webhook: 'Las alarmas no se transmiten (webhook).',
+  },
+  outwardOther: (channel) => `${channel} no recibe nada.`,
+  outwardHint: 'Se sigue intentando; esta página no está afectada.',
+  journalMore:
+    'El archivo lo indica el parámetro «journal» del gemelo; con «off» no se registra nada.',
+  origin: { simulated: 'Simulado', recorded: 'Grabación', sim_time: 'Tiempo simulado' },
+  originHint: {
+    simulated: 'Aquí no trabaja ningún robot: invernadero, plantas y lecturas son inventados.',
+    recorded: 'Se está reproduciendo una grabación: nada de esto es de ahora.',
+    sim_time:
+      'La hora no es la del reloj de pared: lo que se ve viene de una simulación o de una grabación que se reproduce.',
+  },
+  recordedIs: { playing: 'En marcha', paused: 'Parada' },
+  recordedPaused: 'La grabación está parada.',
+  recordedPausedHint: 'Está en pausa o ha llegado a su fin, y nada envejece.',
+  simulated: 'Simulado.',
+  simulatedHint: (until) =>
+    `Ningún robot ha observado esto: la demostración empezó con días inventados hasta ${until}.`,
+  setAside: 'Se ha apartado un registro dañado.',
+  setAsideHint: (name) =>
+    `Se ha conservado lo que se pudo leer y el registro continúa. El archivo antiguo es ${name}.`,
+  failedTitle: 'La página ha fallado',
+  failedHint: 'No se fíe de lo que muestra. Ni el gemelo ni el servidor están afectados.',
+  failedAgain: 'Se vuelve a cargar por sí sola.',
+  reload: 'Volver a cargar',
+
+  menu: 'Menú',
+  unit: 'Temperatura',
+  theme: 'Aspecto',
+  themes: { system: 'Sistema', light: 'Claro', dark: 'Oscuro' },
+  copyLink: 'Copiar el enlace a esta vista',
+  linkCopied: 'Enlace copiado',
+  linkInBar: 'La barra de direcciones contiene el enlace a esta vista',
+  savePng: 'Guardar el mapa como PNG',
+  saveCsv: 'Guardar la tabla como CSV',
+  saveCsvShort: 'CSV',
+  print: 'Imprimir',
+  kiosk: 'Pantalla mural',
+  kioskLeave: 'Salir',
+  cycleNext: (sensor, time) => `después: ${sensor} en ${time}`,
+  cycleRefused: (asked, least, most) =>
+    `cycle=${asked} no se usa: vale de ${least} a ${most} segundos.`,
+  help: 'Atajos de teclado',
+  signOut: 'Cerrar sesión',
+  signOutFailed: (reason) => `La sesión sigue abierta: ${reason}`,
+  exportFailed: (reason) => `No se ha guardado nada: ${reason}`,
+
+  emptyConnecting: 'Conectando con el servidor',
+  emptyConnectingHint: 'El invernadero aparecerá en cuanto responda.',
+  emptyUnreachable: 'El servidor no responde',
+  emptyUnreachableHint: 'Compruebe que está encendido. La página lo sigue intentando por sí sola.',
+  emptyUnreachableMore:
+    'El servidor es el puente («bridge»): «lupin-twin serve» en el robot, o «make run» para la demostración.',
+  emptyNoTwin: 'Aún no hay gemelo',
+  emptyNoTags: 'Aún no hay puntos de medida',
+  emptyNoTagsHint:
+    'El gemelo está en marcha y espera. Los puntos aparecen cuando el robot encuentra o lee uno: ' +
+    'mándelo a hacer su ronda.',
+  emptyNoTagsMore: '«lupin-twin demo» muestra una ronda simulada.',
+  emptyNoPins: 'Ningún punto tiene posición todavía',
+  emptyNoPinsHint:
+    'Todos los puntos están en la tabla; con la primera medición lograda aparecen en el mapa.',
+  emptyNoReading: (sensor) => `Ningún punto del mapa tiene aún una lectura: ${sensor}`,
+  emptyNoReadingHint: 'Elija otro sensor o espere a que el robot lea más puntos.',
+  emptyNoMap: 'Aún no hay plano: el robot no ha enviado su mapa.',
+  emptyNoMapMore: 'El plano es el mapa SLAM del robot, que llega por /map.',
+
+  helpTitle: 'Atajos de teclado',
+  helpGlobal: 'En cualquier parte',
+  helpMap: 'En el mapa',
+  helpTime: 'En la barra de tiempo',
+  helpToggle: 'Atajos de una sola tecla',
+  keys: {
+    global: [
+      ['1 – 9', 'Elegir un sensor'],
+      ['/', 'Filtrar la tabla'],
+      ['F', 'Mostrar todo en el mapa'],
+      ['N, P', 'Punto siguiente y anterior'],
+      ['S', 'Suavizar el mapa de color'],
+      ['Y', 'Capas'],
+      ['A', 'Alarmas'],
+      ['C', 'Gráficas del punto elegido'],
+      ['L', 'Volver al directo'],
+      ['Espacio', 'Reproducir el pasado o pausar'],
+      ['U', '°C o °F'],
+      ['T', 'Claro u oscuro'],
+      ['Esc', 'Cerrar; después, volver al directo'],
+      ['?', 'Esta lista'],
+    ],
+    time: [
+      ['← →', 'Un paso atrás o adelante; con Mayús, diez'],
+      ['Pág ↑ ↓', 'Una décima parte de la barra'],
+      ['Inicio', 'Al principio'],
+      ['Fin', 'En directo'],
+    ],
+    map: [
+      ['← ↑ ↓ →', 'Mover; con Mayús, más deprisa'],
+      ['+  −', 'Acercar y alejar'],
+      ['0', 'Mostrar todo'],
+      ['Intro', 'Abrir el punto más cercano'],
+    ],
+  },
+
+  paper: (taken, printed) => `Estado a ${taken}, impreso ${printed}`,
+  paperRest: (printed, all) =>
+    `Se imprimen los primeros ${printed} de ${all} puntos. La tabla en CSV los contiene todos.`,
+  paperRange: (sensor, range) => `${sensor} ${range}`,
+  fileName: (kind, stamp) => `lupin-twin-${kind}-${stamp}`,
+  asOf: (moment) => `estado a ${moment}`,
+};

@@ -1,0 +1,33 @@
+import { expect, test } from 'vitest';
+
+import { chosenLanguage, inLanguage, LANGUAGE_NAMES, LANGUAGES } from './languages';
+
+test.each([
+  ['', ['de-AT', 'en'], { language: 'de', locale: 'de-AT', unknown: null }],
+  ['', ['nl'], { language: 'nl', locale: 'nl-NL', unknown: null }],
+  // The first that the page speaks, not the first.
+  ['', ['fr-FR', 'es-MX', 'de'], { language: 'es', locale: 'es-MX', unknown: null }],
+  ['', ['fr', 'pl'], { language: 'en', locale: 'en-GB', unknown: null }],
+  ['', [], { language: 'en', locale: 'en-GB', unknown: null }],
+  ['?lang=nl', ['de-DE'], { language: 'nl', locale: 'nl-NL', unknown: null }],
+  ['?lang=DE-ch', ['en-US'], { language: 'de', locale: 'de-CH', unknown: null }],
+  ['?kiosk=1&lang=de', ['fr', 'de-CH'], { language: 'de', locale: 'de-CH', unknown: null }],
+  // No region writes English dates the other way round.
+  ['?lang=en-US', ['de'], { language: 'en', locale: 'en-GB', unknown: null }],
+  // What is not spoken is said, and the browser's own language is not what was asked for either.
+  ['?lang=xx', ['de'], { language: 'en', locale: 'en-GB', unknown: 'xx' }],
+  ['?lang=', ['de'], { language: 'en', locale: 'en-GB', unknown: '' }],
+  ['?lang=de-!', [], { language: 'de', locale: 'de-DE', unknown: null }],
+])('“%s” and a browser that prefers %j: %j', (search, preferred, choice) => {
+  expect(chosenLanguage(search, preferred)).toEqual(choice);
+});
+
+test('another language keeps all else of the link', () => {
+  const here = { pathname: '/twin/', search: '?kiosk=1&lang=nl', hash: '#tag=12&at=5' };
+  expect(inLanguage(here, 'es')).toBe('/twin/?kiosk=1&lang=es#tag=12&at=5');
+  expect(inLanguage({ pathname: '/', search: '', hash: '' }, 'en')).toBe('/?lang=en');
+});
+
+test('each language has its own name', () => {
+  expect(new Set(Object.values(LANGUAGE_NAMES)).size).toBe(LANGUAGES.length);
+});

@@ -1,0 +1,56 @@
+/** De grafieken en hun tabellen. */
+import type { CHARTS as ENGLISH } from '../en/charts';
+import type { In } from '../shape';
+import { counted } from './counted';
+
+export const CHARTS: In<typeof ENGLISH> = {
+  charts: 'Grafieken',
+  chartOf: (sensor) => `Grafiek: ${sensor}`,
+  chartsBy: { tag: 'Eén meetpunt', sensor: 'Meerdere' },
+  chartsByLegend: 'Wat er getoond wordt',
+  chartSpan: (from, to) => `${from} tot ${to}`,
+  chartSummary: (count, latest, at, low, high, gaps) =>
+    `${counted(count, 'meetwaarde', 'meetwaarden')}, de laatste ${latest} om ${at}, ` +
+    `tussen ${low} en ${high}, ${gaps === 0 ? 'geen gat' : counted(gaps, 'gat', 'gaten')}.`,
+  chartEmpty: 'Geen meetwaarde in deze periode.',
+  chartNothing: '–',
+  chartLoading: 'Het verleden komt eraan',
+  chartFailed: (reason) => `Het verleden kon niet worden opgehaald: ${reason}`,
+  chartMissing: 'Deze tweeling bewaart geen verleden.',
+  chartMissingHint:
+    'Grafieken hebben vastgelegde gegevens nodig. Tot die er zijn, staan hier alleen de laatste metingen.',
+  chartMissingMore:
+    'Start de tweeling zonder “journal:=off”, of noem een bestand in de parameter “journal”.',
+  chartMissingShort: 'Geen grafiek: deze tweeling legt niets vast.',
+  chartNoTime: 'De tweeling weet nog geen tijd, en heeft dus geen verleden.',
+  chartNoSensors: 'Dit meetpunt heeft geen sensor.',
+  chartNoTags: 'Geen meetpunt heeft deze sensor.',
+  chartTable: 'Als tabel tonen',
+  chartPlots: 'Als grafiek tonen',
+  chartZoomIn: 'Inzoomen',
+  chartZoomOut: 'Uitzoomen',
+  chartWhole: 'Hele periode',
+  chartCsvShown: 'CSV van wat er staat',
+  chartCsvAll: 'CSV van alle meetwaarden',
+  chartAddTag: 'Meetpunt toevoegen',
+  chartRemoveTag: (tag) => `Meetpunt ${tag} uit de grafiek halen`,
+  chartWhich: 'Tabel van',
+  chartKeys: { ideal: 'ideaal', range: 'laagste tot hoogste', gap: 'er kwam niets' },
+  chartFailure: 'mislukte poging',
+  chartLook: 'bloemcontrole',
+  chartHint: 'Slepen: inzoomen. Klikken: de kas op dat moment.',
+  chartTableCaption: (label, sensor, span) => `${label}, ${sensor}, ${span}`,
+  chartColumns: {
+    time: 'Tijd',
+    until: 'Tot',
+    value: 'Waarde',
+    count: 'Meetwaarden',
+    mean: 'Gemiddelde',
+    min: 'Laagste',
+    max: 'Hoogste',
+    event: 'Gebeurtenis',
+  },
+  chartGap: (length) => `${length} lang kwam er niets`,
+  chartFailures: (count) => counted(count, 'mislukte poging', 'mislukte pogingen'),
+  chartLooks: (count) => counted(count, 'bloemcontrole', 'bloemcontroles'),
+};

@@ -1,0 +1,79 @@
+/** Oordelen en hun redenen. */
+import type { HEALTH as ENGLISH } from '../en/health';
+import type { In } from '../shape';
+import { counted } from './counted';
+
+export const HEALTH: In<typeof ENGLISH> = {
+  health: {
+    healthy: 'Gezond',
+    stressed: 'Gestrest',
+    critical: 'Kritiek',
+    unknown: 'Onbekend',
+  },
+  reasons: {
+    sides: { below: 'onder', above: 'boven' },
+    range: (reading, side, limit, isCritical) =>
+      `${reading}, ${side} ${limit}${isCritical ? ' (kritiek)' : ''}`,
+    readingFailed: (sensor) => `${sensor}: de sensor geeft geen waarde`,
+    scanFailed: (outcome, age) =>
+      `Laatste meting mislukt: ${outcome}${age === null ? '' : `, ${age} geleden`}`,
+    pest: (count) =>
+      count > 0 ? `${counted(count, 'plaaginsect', 'plaaginsecten')} gezien` : 'Plaag gezien',
+    old: (sensor, age, holds, isDated) => {
+      const since = !isDated
+        ? sensor === ''
+          ? 'Geen meting met bekende tijd'
+          : 'geen meetwaarde met bekende tijd'
+        : age === null
+          ? sensor === ''
+            ? 'Al een tijd niet gemeten'
+            : 'al een tijd niet gemeten'
+          : sensor === ''
+            ? `Al ${age} niet gemeten`
+            : `al ${age} geen meetwaarde`;
+      return `${sensor === '' ? '' : `${sensor}: `}${since}${holds === null ? '' : ` (meetwaarden gelden ${holds})`}`;
+    },
+    outOfRange: 'buiten het bereik',
+    changed: (reading) => `${reading}, veranderd ten opzichte van het eigen verleden en de buren`,
+    silent: 'De tweeling zwijgt: wat het laatst is gehoord, zegt niets over nu',
+    stopped:
+      'Er wordt geen meetpunt meer gemeten: de robot staat stil, of er is niets van hem te horen',
+    other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
+  },
+  reasonsLabel: 'Waarom',
+  healthHeading: 'Toestand van de kas',
+  healthDriver: (tag, reason) => `Meetpunt ${tag}: ${reason}`,
+  healthMostUnknown: 'Van meer dan de helft van de meetpunten is niets bekend',
+  healthSomeUnknown: (count) =>
+    `${counted(count, 'meetpunt is', 'meetpunten zijn')} niet te beoordelen`,
+  healthDay: (isDay, source) =>
+    `Beoordeeld naar het bereik voor ${isDay ? 'de dag' : 'de nacht'}: ${source}`,
+  healthDaySource: {
+    light: 'dat zegt het licht in de kas',
+    clock: 'dat zegt de klok, want licht wordt niet gemeten',
+    assumed: 'aangenomen, want licht noch klok geeft uitsluitsel',
+  },
+  idealParts: { any: 'ideaal', day: 'ideaal overdag', night: 'ideaal ’s nachts' },
+  healthIdeal: (ideal, low, high, unit) => `${ideal} ${low} tot ${high} ${unit}`.trim(),
+  healthAllWell: 'Elke beoordeelde meetwaarde ligt binnen het ideale bereik',
+  healthNothing: 'Nog geen meetwaarde om te beoordelen',
+  healthFilter: ', alleen deze meetpunten tonen',
+  houseRhythm: (interval) => `elke ${interval} een scan`,
+  houseLast: (age) => `laatste scan ${age} geleden`,
+  houseNever: 'nog geen scan',
+  houseOverdue: (count) =>
+    count === 0
+      ? 'geen meetpunt te laat'
+      : counted(count, 'meetpunt te laat', 'meetpunten te laat'),
+  tagChosen: (tag, health, row, rows) => `Meetpunt ${tag}, ${health}, ${row} van ${rows}`,
+  attention: 'Vraagt aandacht',
+  attentionNone: 'Niets vraagt aandacht',
+  attentionNoneKnown: (unknown) =>
+    `Voor zover bekend vraagt niets aandacht; van ${counted(unknown, 'meetpunt', 'meetpunten')} is niets bekend`,
+  attentionMore: (count) => `+ nog ${count}`,
+
+  tooLow: (by) => (by === null ? 'te laag' : `te laag met ${by}`),
+  tooHigh: (by) => (by === null ? 'te hoog' : `te hoog met ${by}`),
+  below: 'onder ideaal',
+  above: 'boven ideaal',
+};

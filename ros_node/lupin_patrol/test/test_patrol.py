@@ -1,0 +1,35 @@
+"""The patrol as it was built and installed: its geometry, and that its messages can be made."""
+
+from __future__ import annotations
+
+from builtin_interfaces.msg import Time
+from lupin_msgs.msg import Observation
+
+from lupin_patrol.events import ScanStatus, TagScanned
+from lupin_patrol.geometry import Rect
+from lupin_patrol.messages import tag_reading
+
+
+def test_a_rectangle_does_not_contain_its_edge() -> None:
+    rect = Rect(0.0, 0.0, 2.0, 1.0)
+    assert rect.contains((1.0, 0.5))
+    assert not rect.contains((2.0, 0.5))
+
+
+def test_a_failed_scan_is_an_observation_without_readings() -> None:
+    scan = TagScanned(
+        at_s=3.0,
+        pass_index=0,
+        tag_id="7",
+        status=ScanStatus.UNREACHABLE,
+        status_detail="blocked",
+        time_of_day_s=0.0,
+        readings=(),
+        pose=None,
+    )
+    message = tag_reading(scan, Time(sec=12), "map")
+    assert (message.kind, message.status) == (
+        Observation.KIND_TAG_READING,
+        Observation.STATUS_UNREACHABLE,
+    )
+    assert (message.tag_reading.tag_id, list(message.tag_reading.readings)) == ("7", [])

@@ -1,0 +1,392 @@
+"""The services of the estimate: questions in, answers made off the node's thread.
+
+Models are kept fitted, and each new scan is held against what was foretold for it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, Final
+
+import numpy as np
+from lupin_msgs.srv import GetEstimate, GetEstimateReport
+
+from lupin_twin import convert_estimate
+from lupin_twin.deferred import Later, allow_later
+from lupin_twin.diagnostics import Estimates
+from lupin_twin.estimate import MAX_PER_TAG, NOTHING, FitFailed, Model, Place
+from lupin_twin.estimate_report import ADVICE_S, REPORT_SERVICE, Report, ReportRequest, advice
+from lupin_twin.estimate_rounds import MAX_GRADED, Done, Loaded, Watch
+from lupin_twin.estimates import (
+    ESTIMATE_SERVICE,
+    FIRST_FITTED,
+    MAX_TAGS,
+    Estimate,
+    EstimateJob,
+    EstimateRequest,
+    Models,
+    TagPast,
+    cost_s,
+    fitted,
+    gains_of_longer_days,
+    is_usable,
+    past_of,
+    readings_of,
+)
+from lupin_twin.explored import OccupancyMap
+from lupin_twin.fields import FieldRefused
+from lupin_twin.habits import Habits
+from lupin_twin.history import History, TagHistory
+from lupin_twin.idw import never
+from lupin_twin.journal.asof import STATE_S_PER_TAG
+from lupin_twin.journal.lately import lately
+from lupin_twin.journal.series import SERIES_S
+from lupin_twin.past import NotRemembered, PastRefused, message_of
+from lupin_twin.past_desk import PastDesk, Question
+from lupin_twin.recall import Recall
+from lupin_twin.state import NANOSECONDS_PER_SECOND, Scan, TwinStore
+from lupin_twin.workers import ShouldStop, Workers, in_turns
+
+# A fit, and a round, s of one core at worst: everything small passes it.
+_FIT_S: Final = 2.0
+# What gathering a tag's scans takes, roughly and at worst.
+_GATHER_TAG_S: Final = 50e-6
+# Places for other tags that are kept, each until its sensor's next round.
+_MAX_ADVISED: Final = 64
+
+Gather = Callable[[str], Sequence[TagPast]]
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What estimates are made of: the newest, the last scans, and what the journal remembers.
+
+    `occupancy` tells the newest map: where another tag could stand.
+    """
+
+    store: TwinStore
+    history: History
+    recall: Recall
+    occupancy: Callable[[], OccupancyMap | None]
+
+
+@dataclass(frozen=True, slots=True)
+class EstimateRules:
+    """How long a day takes, s of ROS time, and how many cells an estimate may have."""
+
+    day_length_s: float
+    max_grid_cells: int
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """An estimate that was asked for, and about what making it takes, `cost_s` s of one core.
+
+    `look_up()`, on the node's thread, begins the search for what `make`, on any, makes it of.
+    """
+
+    job: EstimateJob
+    now_ns: int
+    cost_s: float
+    look_up: Callable[[], Future[Sequence[TagPast]]]
+
+    def make(self, found: Sequence[TagPast], should_stop: ShouldStop = never) -> Estimate:
+        """See `EstimateJob.compute`."""
+        return self.job.compute(found, self.now_ns, should_stop)
+
+
+class EstimateService:
+    """The service of one node, and its models; belongs to the node's thread.
+
+    Its threads are its own: no field waits for a fit. `wake()` is called in one of them when
+    `deliver` has something to do.
+    """
+
+    def __init__(
+        self,
+        habits: Habits,
+        known: Known,
+        rules: EstimateRules,
+        now_ns: Callable[[], int],
+        wake: Callable[[], None],
+    ) -> None:
+        self.models = Models()
+        self.watch = Watch(rules.day_length_s)
+        self._habits = habits
+        self._known = known
+        self._rules = rules
+        self._now_ns = now_ns
+        self._workers = Workers("estimate")
+        # Fits are asked for at a desk of their own: no estimate waits behind one.
+        self._desk, self._fits = (
+            PastDesk(self._workers, wake, lambda: habits.is_behind) for _ in range(2)
+        )
+        self._gathered: Gather | None = None
+        # Of these the log has said so, and nothing has been better since.
+        self._told_distrusted: set[str] = set()
+        self._advised: dict[
+            tuple[str, int], tuple[Loaded, OccupancyMap | None, tuple[Place, ...]]
+        ] = {}
+
+    def offer(self, node: Any, group: Any) -> None:
+        """Have `node` offer the services, by names relative to its namespace."""
+        for kind, name, callback in (
+            (GetEstimate, ESTIMATE_SERVICE, self._on_get_estimate),
+            (GetEstimateReport, REPORT_SERVICE, self._on_get_report),
+        ):
+            allow_later(node.create_service(kind, name, callback, callback_group=group))
+
+    def restore(self) -> None:
+        """What the journal holds is known again: models can be fitted before a scan comes."""
+        self._gathered = None
+        for past in self._known.history.all_later()().values():
+            for scan in past.scans:
+                self.models.hear(scan.readings)
+        self.go_on()
+
+    def hear(self, write: object) -> None:
+        """Something was observed and accepted."""
+        self._gathered = None
+        if isinstance(write, Scan):
+            is_enough = self.models.hear(write.readings)
+            self.watch.hear(write)
+            if is_enough:
+                self.go_on()
+
+    def go_on(self) -> None:
+        """Begin the fit or the round whose turn it is, on a worker; to be called once a second.
+
+        While a first model is awaited, no round comes in between.
+        """
+        self._desk.go_on()
+        self._fits.go_on()
+        now_s = time.monotonic()
+        sensor = self.models.due(now_s)
+        if sensor is not None:
+            self._fit(sensor, now_s)
+        elif not self.models.fits_first():
+            self._go_round(now_s)
+
+    def _fit(self, sensor: str, now_s: float) -> None:
+        gather, now_ns, day_s = self._gather(), self._now_ns(), self._rules.day_length_s
+        most = self.models.begin(sensor, now_s)
+
+        def work(should_stop: ShouldStop) -> tuple[Model, tuple[float, ...]]:
+            pasts = gather(sensor)
+            model = fitted(readings_of(pasts, now_ns, day_s), day_s, should_stop, most)
+            if most == FIRST_FITTED:  # which somebody waits for
+                return model, NOTHING
+            return model, gains_of_longer_days(pasts, now_ns, day_s, should_stop)
+
+        self._begin(work, partial(self._fitted, sensor, now_ns))
+
+    def _fitted(
+        self, sensor: str, now_ns: int, outcome: tuple[Model, tuple[float, ...]] | Exception
+    ) -> None:
+        if isinstance(outcome, Exception):
+            self.models.end(sensor, outcome, now_ns)
+        else:
+            model, gains = outcome
+            self.models.weigh(sensor, gains)
+            self.models.end(sensor, model, now_ns)
+            if self.models.day_problem:
+                self._habits.warn(("day length", 0), self.models.day_problem)
+        if isinstance(outcome, FitFailed):
+            self._habits.warn(("estimate", sensor), f"no new model of {sensor}: {outcome}")
+        elif isinstance(outcome, Exception) and not isinstance(outcome, FieldRefused):
+            self._habits.report("the estimate's fit", outcome)
+        self.go_on()
+
+    def _go_round(self, now_s: float) -> None:
+        due = self.watch.due(self.models.serving(), now_s)
+        if due is None:
+            return
+        gather, now_ns = self._gather(), self._now_ns()
+        self._begin(
+            lambda stop: due.run(gather(due.sensor), now_ns, stop),
+            partial(self._rounded, due.sensor),
+        )
+        left = self.watch.begin(due, now_s)
+        if left:
+            self._habits.warn(
+                ("grading", due.sensor),
+                f"{left} scans of {due.sensor} came too fast to be held against what was foretold "
+                f"for them: of each lot, {MAX_GRADED} are",
+            )
+
+    def _rounded(self, sensor: str, outcome: Done | Exception) -> None:
+        now_ns = self._now_ns()
+        self.watch.end(outcome, time.monotonic(), now_ns)
+        if isinstance(outcome, Exception):
+            if not isinstance(outcome, FieldRefused | np.linalg.LinAlgError):
+                self._habits.report("the estimate's round", outcome)
+            return
+        record = self.watch.record(sensor, now_ns)
+        if record.is_trusted:
+            self._told_distrusted.discard(sensor)
+        elif sensor not in self._told_distrusted:
+            # Once: for as long as it lasts, /diagnostics and the page say so.
+            self._told_distrusted.add(sensor)
+            self._habits.warn(
+                ("trust", sensor),
+                f"the estimate of {sensor} is not to be trusted: of {record.week.scans} scans, "
+                f"{record.week.inside} came to lie where 9 of 10 were foretold; is day_length_s, "
+                f"{self._rules.day_length_s:g} s, how long a day takes?",
+            )
+        self.go_on()
+
+    def _begin(self, work: Callable[[ShouldStop], Any], reply: Callable[[Any], None]) -> None:
+        self._fits.ask(
+            Question(lambda: self._workers.submit(work, _FIT_S), lambda made: made, _FIT_S, reply)
+        )
+
+    def _gather(self) -> Gather:
+        """What memory holds now, for any thread to gather the past of a sensor from.
+
+        As long as nothing is heard it is gathered once: who asks often has nothing copied.
+        """
+        if self._gathered is None:
+            tags = self._known.store.snapshot(self._now_ns(), "").tags
+            kept = self._known.history.all_later()
+            known: dict[str, list[TagPast]] = {}
+
+            def gather(sensor: str) -> list[TagPast]:
+                if sensor not in known:
+                    histories = kept()
+                    found = (
+                        past_of(tag, histories.get(tag.tag_id, TagHistory()).scans, sensor)
+                        for tag in in_turns(tags)
+                    )
+                    pasts = [past for past in found if past is not None]
+                    if not pasts:
+                        return pasts
+                    known[sensor] = pasts
+                return known[sensor]
+
+            self._gathered = gather
+        return self._gathered
+
+    def prepare(self, asked: EstimateRequest) -> Task:
+        """What is to be done for an estimate.
+
+        Raises:
+            FieldRefused: a bad request.
+
+        """
+        now_ns = self._now_ns()
+        asked.check(now_ns, self._rules.max_grid_cells)
+        sensor = asked.box.sensor_type
+        loaded = self.watch.loaded(sensor)
+        changed = {} if loaded is None else loaded.changed
+        job = EstimateJob(asked, self.models.of(sensor).model, self._rules.day_length_s, changed)
+        tags = min(MAX_TAGS, self._known.store.size[0])
+        cost = cost_s(asked, tags, self._rules.max_grid_cells)
+        return Task(job, now_ns, cost, self._look_up(asked))
+
+    def report(self, asked: ReportRequest) -> Callable[[], Report]:
+        """What makes the report, on a worker: working out places for other tags takes a while."""
+        sensor, now_ns = asked.sensor_type, self._now_ns()
+        fit, loaded = self.models.of(sensor), self.watch.loaded(sensor)
+        record = self.watch.record(sensor, now_ns)
+        if loaded is None:
+            bare = Report(now_ns, fit.at_ns, fit.problem, record)
+            return lambda: bare
+        known = Report(loaded.at_ns, fit.at_ns, fit.problem, record, loaded.checks)
+        occupancy = self._known.occupancy()
+        key = (sensor, asked.max_places)
+
+        def with_places() -> Report:
+            kept = self._advised.get(key)
+            if kept is None or kept[0] is not loaded or kept[1] is not occupancy:
+                kept = loaded, occupancy, advice(loaded, occupancy, asked.max_places)
+                if len(self._advised) >= _MAX_ADVISED:
+                    self._advised.clear()
+                self._advised[key] = kept
+            return replace(known, places=kept[2])
+
+        return with_places
+
+    def state(self) -> Estimates:
+        """How they do, for the twin's diagnostics."""
+        return Estimates(
+            self.models.problems(),
+            tuple(self.watch.distrusted(self._now_ns())),
+            self.models.failed,
+            self.watch.skipped,
+        )
+
+    def deliver(self) -> None:
+        """Hand out what was made."""
+        self._desk.deliver()
+        self._fits.deliver()
+
+    def close(self) -> None:
+        """End the threads; what they make is for nobody then."""
+        self._workers.close()
+
+    def _on_get_estimate(self, request: Any, response: Any) -> Any:
+        later = Later()
+        try:
+            task = self.prepare(convert_estimate.request_of(request))
+            self._desk.ask(
+                Question(
+                    task.look_up,
+                    lambda found: convert_estimate.response_of(task.make(found)),
+                    task.cost_s,
+                    lambda answer: later.answer(self._answer(response, answer)),
+                )
+            )
+        except Exception as error:  # noqa: BLE001  # the caller must not wait for ever
+            return self._answer(response, error)
+        return later
+
+    def _on_get_report(self, request: Any, response: Any) -> Any:
+        later = Later()
+        try:
+            with_places = self.report(convert_estimate.report_request_of(request))
+            self._desk.ask(
+                Question(
+                    lambda: self._workers.submit(lambda _: with_places(), ADVICE_S),
+                    convert_estimate.report_response,
+                    ADVICE_S,
+                    lambda answer: later.answer(self._answer(response, answer)),
+                )
+            )
+        except Exception as error:  # noqa: BLE001  # the caller must not wait for ever
+            return self._answer(response, error)
+        return later
+
+    def _look_up(self, asked: EstimateRequest) -> Callable[[], Future[Sequence[TagPast]]]:
+        sensor, at_ns = asked.box.sensor_type, asked.at_ns
+        tags = self._known.store.size[0]
+        if not at_ns:
+
+            def from_memory() -> Future[Sequence[TagPast]]:
+                gather = self._gather()
+                return self._workers.submit(lambda _: gather(sensor), tags * _GATHER_TAG_S)
+
+            return from_memory
+        reach_ns = int(self._rules.day_length_s * NANOSECONDS_PER_SECOND)
+        return lambda: self._known.recall.ask(
+            lambda connection, _: [
+                TagPast(tag_id, x, y, tuple(one for one in found if is_usable(one[1])))
+                for tag_id, x, y, found in lately(connection, sensor, at_ns, reach_ns, MAX_PER_TAG)
+            ],
+            tags * (STATE_S_PER_TAG + SERIES_S),
+        )
+
+    def _answer(self, response: Any, answer: Any) -> Any:
+        if not isinstance(answer, Exception):
+            return answer
+        if isinstance(answer, FieldRefused):
+            response.error_message = str(answer)
+        elif isinstance(answer, PastRefused | NotRemembered):
+            response.error_message = message_of(answer)
+        else:
+            self._habits.report("the estimate", answer)
+            response.error_message = f"the twin failed to estimate: {answer}"
+        return response

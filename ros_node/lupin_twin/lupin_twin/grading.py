@@ -1,0 +1,105 @@
+"""Whether an estimate keeps its word: of what it foretold, how much came to lie in its intervals.
+
+Pure. Counted by the hour, a 24th of a day of the house's own length, over the last day and week.
+Times are ns of ROS time.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Final
+
+from lupin_twin.state import NANOSECONDS_PER_SECOND
+
+# The interval foretold: 9 of 10 are to lie within mean +- so many sds.
+HALF_WIDTH_SDS: Final = 1.645
+HOURS_A_DAY: Final = 24
+HOURS_A_WEEK: Final = 7 * HOURS_A_DAY
+# What may be of a share that is to be 0.9; a model that is wrong is soon farther off.
+LEAST_SHARE: Final = 0.8
+MOST_SHARE: Final = 0.98
+# Scans of one hour hang together: of fewer nothing is said.
+LEAST_SCANS: Final = 20
+# 95 % of a normal distribution lie within so many sds.
+_Z: Final = 1.96
+
+
+@dataclass(frozen=True, slots=True)
+class Tally:
+    """Scans that were foretold, and those of them that came to lie inside."""
+
+    scans: int = 0
+    inside: int = 0
+
+    @property
+    def share(self) -> float | None:
+        """Inside; None: nothing was foretold."""
+        return self.inside / self.scans if self.scans else None
+
+    @property
+    def is_credible(self) -> bool:
+        """Whether the share may be as it should; false: it is too small, or too large, for chance.
+
+        By Wilson's interval (Journal of the American Statistical Association 22, 1927, 209), once
+        there are `LEAST_SCANS`.
+        """
+        if self.scans < LEAST_SCANS:
+            return True
+        low, high = _wilson(self)
+        return high >= LEAST_SHARE and low <= MOST_SHARE
+
+
+def _wilson(tally: Tally) -> tuple[float, float]:
+    n = tally.scans
+    share, square = tally.inside / n, _Z**2
+    middle = (share + square / (2 * n)) / (1 + square / n)
+    half = _Z / (1 + square / n) * math.sqrt(share * (1 - share) / n + square / (4 * n**2))
+    return middle - half, middle + half
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """How a sensor's estimates have done; `since_ns` is when the first was held to its word."""
+
+    since_ns: int | None
+    day: Tally
+    week: Tally
+
+    @property
+    def is_trusted(self) -> bool:
+        """Whether neither the day nor the week says that the model is wrong."""
+        return self.day.is_credible and self.week.is_credible
+
+
+@dataclass(slots=True)
+class Grades:
+    """One sensor's, by the hour; `day_length_s` is a day of the house, s of ROS time."""
+
+    day_length_s: float
+    _since_ns: int | None = None
+    _hours: dict[int, Tally] = field(default_factory=dict)
+
+    def add(self, graded: Tally, now_ns: int) -> None:
+        """So many were held to their word now; nothing is later, whatever a clock said before."""
+        if not graded.scans:
+            return
+        hour = self._hour(now_ns)
+        self._hours = {
+            when: tally for when, tally in self._hours.items() if hour - HOURS_A_WEEK < when <= hour
+        }
+        was = self._hours.get(hour, Tally())
+        self._hours[hour] = Tally(was.scans + graded.scans, was.inside + graded.inside)
+        self._since_ns = now_ns if self._since_ns is None else min(self._since_ns, now_ns)
+
+    def record(self, now_ns: int) -> Record:
+        """As of now."""
+        hour = self._hour(now_ns)
+        return Record(self._since_ns, self._sum(hour, HOURS_A_DAY), self._sum(hour, HOURS_A_WEEK))
+
+    def _sum(self, hour: int, hours: int) -> Tally:
+        those = [one for when, one in self._hours.items() if hour - hours < when <= hour]
+        return Tally(sum(one.scans for one in those), sum(one.inside for one in those))
+
+    def _hour(self, now_ns: int) -> int:
+        return int(now_ns / (self.day_length_s / HOURS_A_DAY * NANOSECONDS_PER_SECOND))

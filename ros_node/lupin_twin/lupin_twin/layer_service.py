@@ -1,0 +1,301 @@
+"""What viewers such as RViz are shown: fields as points, tags and planters as markers; on topics.
+
+Nothing is computed or published while nobody subscribes. What is computed is made on a thread of
+its own, one after the other, and not while the node is behind with what it hears: nothing that
+is asked of the twin waits for a picture.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Final
+
+from sensor_msgs.msg import PointCloud2
+from visualization_msgs.msg import MarkerArray
+
+from lupin_twin.convert_layers import MarkerArrays, cloud, planter_markers, tag_markers
+from lupin_twin.diagnostics import Layers
+from lupin_twin.estimate_service import EstimateService, Task
+from lupin_twin.estimates import MINUTES_A_DAY, EstimateRequest, TagPast
+from lupin_twin.explored import OccupancyMap
+from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused, FieldRequest
+from lupin_twin.grid import FieldGrid
+from lupin_twin.habits import Habits, latched
+from lupin_twin.idw import Abandoned
+from lupin_twin.layers import layer_request, points, topics_of
+from lupin_twin.marks import PLANTERS_TOPIC, TAGS_TOPIC, planter_marks, tag_marks
+from lupin_twin.past_desk import PastDesk, Question
+from lupin_twin.ros_parameters import naming
+from lupin_twin.state import NANOSECONDS_PER_SECOND, Snapshot, TwinStore
+from lupin_twin.workers import ShouldStop, Workers
+
+# How often it is looked at whether somebody subscribes, and whether something has changed, s.
+LAYER_LOOK_S: Final = 0.2
+# All of it is taken to be large, s of one core: then one is made after the other.
+_COST_S: Final = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What is shown: the twin's own parts, on its thread.
+
+    `now_ns` tells ROS time, `rate_hz` how often each topic may be published; `day_length_s` is the
+    estimate's.
+    """
+
+    store: TwinStore
+    fields: FieldEngine
+    estimates: EstimateService
+    occupancy: Callable[[], OccupancyMap | None]
+    snapshot: Callable[[], Snapshot]
+    now_ns: Callable[[], int]
+    rate_hz: Callable[[], float]
+    day_length_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Made:
+    """A message, None where it is the one before; and a field that others may ask for too."""
+
+    data: bytes | None
+    job: FieldJob | None = None
+    grid: FieldGrid | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """What is looked up on the node's thread, and what is made of it on a worker."""
+
+    look_up: Callable[[], Future[Any]]
+    make: Callable[[Any, ShouldStop], _Made]
+
+
+@dataclass(slots=True)
+class _Topic:
+    """While `key_of()` is the same, what would be made is the same; None: that has to be seen."""
+
+    publisher: Any
+    key_of: Callable[[], object]
+    plan: Callable[[], _Plan]
+    forget: Callable[[], None] = lambda: None
+    key: object = None
+    begun_s: float = -math.inf
+    is_wanted: bool = False
+    is_under_way: bool = False
+    published: int = 0
+    problem: str = ""
+
+
+@dataclass(slots=True)
+class _Marked:
+    """Markers of one kind: belongs to the thread that makes them."""
+
+    marks: Callable[[Snapshot], Sequence[Any]]
+    arrays: MarkerArrays
+    before: Sequence[Any] | None = None
+
+    def make(self, snapshot: Snapshot) -> _Made:
+        """The array, if it is another than the one before."""
+        marks = self.marks(snapshot)
+        if marks == self.before:
+            return _Made(None)
+        self.before = marks
+        return _Made(self.arrays.build(marks))
+
+
+@dataclass(slots=True)
+class LayerService:
+    """The topics of one node; belongs to the node's thread.
+
+    `wake()` is called in another one when `deliver` has something to do.
+    """
+
+    habits: Habits
+    shown: Shown
+    wake: Callable[[], None]
+    _workers: Workers = field(
+        default_factory=lambda: Workers("layers", large_threads=1, small_threads=0)
+    )
+    _topics: list[_Topic] = field(default_factory=list)
+    _desk: PastDesk = field(init=False)
+    _whole: tuple[object, FieldRequest] | None = None
+
+    def __post_init__(self) -> None:
+        self._desk = PastDesk(self._workers, self.wake, lambda: self.habits.is_behind)
+
+    def offer(self, node: Any, sensors: Sequence[str], frame_id: str) -> None:
+        """Have `node` offer the topics, by names relative to its namespace.
+
+        Raises:
+            ParameterError: sensors that make no topics, or two that make the same.
+
+        """
+        for topic, sensor in topics_of(sensors).items():
+            with naming("layers", sensor):
+                publisher = node.create_publisher(PointCloud2, topic, latched(1))
+            self._topics.append(
+                _Topic(
+                    publisher,
+                    partial(self._key_of_layer, sensor),
+                    partial(self._plan_layer, sensor, frame_id),
+                )
+            )
+        for topic, marks, make in (
+            (TAGS_TOPIC, tag_marks, tag_markers),
+            (PLANTERS_TOPIC, planter_marks, planter_markers),
+        ):
+            marked = _Marked(marks, MarkerArrays(make, frame_id))
+            publisher = node.create_publisher(MarkerArray, topic, latched(1))
+            # They age: whether they look the same is found where they are made.
+            self._topics.append(
+                _Topic(
+                    publisher,
+                    lambda: None,
+                    partial(self._plan_marks, marked),
+                    marked.arrays.forget,
+                )
+            )
+
+    def look(self) -> None:
+        """Begin what is wanted and may have changed; to be called every `LAYER_LOOK_S`."""
+        self._desk.go_on()
+        now_s = time.monotonic()
+        for topic in self._topics:
+            topic.is_wanted = topic.publisher.get_subscription_count() > 0
+            if topic.is_under_way:
+                continue
+            if not topic.is_wanted:
+                topic.forget()
+            elif now_s - topic.begun_s >= 1.0 / self.shown.rate_hz():
+                self._begin(topic, now_s)
+
+    def _begin(self, topic: _Topic, now_s: float) -> None:
+        key = topic.key_of()
+        if self.habits.is_behind or (key is not None and key == topic.key):
+            return
+        topic.key, topic.begun_s = key, now_s
+        try:
+            plan = topic.plan()
+        except ValueError as error:  # tags too far apart, or a field that is refused
+            self._refuse(topic, error)
+            return
+        topic.is_under_way = True
+        self._desk.ask(
+            Question(
+                plan.look_up,
+                lambda found: plan.make(found, lambda: not topic.is_wanted),
+                _COST_S,
+                partial(self._publish, topic),
+            )
+        )
+
+    def _publish(self, topic: _Topic, made: _Made | Exception) -> None:
+        topic.is_under_way = False
+        if isinstance(made, Abandoned):
+            topic.key = None
+        elif isinstance(made, FieldRefused):
+            self._refuse(topic, made)
+        elif isinstance(made, Exception):
+            self.habits.report(topic.publisher.topic_name, made)
+        else:
+            if made.job is not None and made.grid is not None:
+                self.shown.fields.keep(made.job, made.grid)
+            topic.problem = ""
+            if made.data is not None:
+                self.habits.drain()  # a large one keeps this thread for a while
+                topic.publisher.publish(made.data)
+                topic.published += 1
+
+    def _refuse(self, topic: _Topic, error: ValueError) -> None:
+        topic.problem = str(error)
+        self.habits.warn(
+            ("layers", topic.publisher.topic_name),
+            f"nothing on {topic.publisher.topic_name}: {error}",
+        )
+
+    # --- what is made -----------------------------------------------------------------------
+
+    def _key_of_layer(self, sensor: str) -> object:
+        shown = self.shown
+        rules, occupancy = shown.fields.rules, shown.occupancy()
+        revision = occupancy.revision if occupancy is not None and rules.clip_to_explored else None
+        fit = shown.estimates.models.of(sensor)
+        if fit.model is None:
+            return shown.store.observation_count, rules, revision
+        # An estimate goes on from minute to minute, with nothing heard: its error grows.
+        minute_ns = int(shown.day_length_s / MINUTES_A_DAY * NANOSECONDS_PER_SECOND)
+        minute = shown.now_ns() // minute_ns
+        return shown.store.observation_count, rules, revision, fit.at_ns, minute
+
+    def _plan_layer(self, sensor: str, frame_id: str) -> _Plan:
+        shown, snapshot = self.shown, self.shown.snapshot()
+        request = self._request(sensor, snapshot)
+        answer = shown.fields.lookup(request, shown.store, shown.occupancy())
+        task: Task | None = None
+        if shown.estimates.models.of(sensor).model is not None:
+            task = shown.estimates.prepare(EstimateRequest(request))
+
+        def make(found: Sequence[TagPast], should_stop: ShouldStop) -> _Made:
+            job = answer if isinstance(answer, FieldJob) else None
+            grid = answer if isinstance(answer, FieldGrid) else answer.compute(should_stop)
+            estimate = None
+            if task is not None:
+                with suppress(FieldRefused):  # no reading of a day: nothing is known of the error
+                    estimate = task.make(found, should_stop).grid
+            data = cloud(points(grid, estimate), snapshot.stamp_ns, frame_id)
+            return _Made(data, job, grid)
+
+        return _Plan(self._nothing if task is None else task.look_up, make)
+
+    def _request(self, sensor: str, snapshot: Snapshot) -> FieldRequest:
+        """The same for all sensors: the box is that of all tags with a place."""
+        rules = self.shown.fields.rules
+        key = self.shown.store.observation_count, rules
+        if self._whole is None or self._whole[0] != key:
+            places = ((tag.pose.x, tag.pose.y) for tag in snapshot.tags if tag.pose is not None)
+            self._whole = (
+                key,
+                layer_request(sensor, places, rules.max_distance_m, rules.max_grid_cells),
+            )
+        whole = self._whole[1]
+        return FieldRequest(
+            sensor,
+            whole.resolution,
+            whole.bbox_min_x,
+            whole.bbox_min_y,
+            whole.bbox_max_x,
+            whole.bbox_max_y,
+        )
+
+    def _plan_marks(self, marked: _Marked) -> _Plan:
+        snapshot = self.shown.snapshot()
+        return _Plan(self._nothing, lambda _, __: marked.make(snapshot))
+
+    def _nothing(self) -> Future[Any]:
+        return self._workers.submit(lambda _: None)
+
+    # --- the node's -------------------------------------------------------------------------
+
+    def deliver(self) -> None:
+        """Publish what was made."""
+        self._desk.deliver()
+
+    def state(self) -> Layers:
+        """What is published, for the twin's diagnostics."""
+        return Layers(
+            published={topic.publisher.topic_name: topic.published for topic in self._topics},
+            watched=sum(topic.is_wanted for topic in self._topics),
+            problems={t.publisher.topic_name: t.problem for t in self._topics if t.problem},
+        )
+
+    def close(self) -> None:
+        """End the thread; what it makes is for nobody then."""
+        for topic in self._topics:
+            topic.is_wanted = False
+        self._workers.close()

@@ -1,0 +1,89 @@
+"""What was heard, write by write, in the order of hearing: for who follows a journal. Pure.
+
+Whoever asks again with the number of the last write gets what has come since, late observations
+too, and nothing twice. Times are nanoseconds of ROS time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from lupin_twin.past import PastRefused
+
+DEFAULT_WRITES: Final = 1_000
+MAX_WRITES: Final = 2_000
+# The service's name, relative to the node's namespace.
+WRITES_SERVICE: Final = "twin/get_writes"
+
+
+@dataclass(frozen=True, slots=True)
+class WritesRequest:
+    """Writes with a number above `after`, at most `max_count`; 0: from the beginning.
+
+    From the beginning, what was heard more than `reach_s` before now is left out, and all but the
+    newest `reach_count` writes; 0: nothing is.
+
+    Raises:
+        PastRefused: a number that cannot be, or more than is given.
+
+    """
+
+    after: int = 0
+    reach_s: float = 0.0
+    reach_count: int = 0
+    max_count: int = DEFAULT_WRITES
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be answered."""
+        if self.after < 0 or self.reach_count < 0:
+            raise PastRefused(f"after or reach_count is {min(self.after, self.reach_count)}, not 0")
+        if not 0.0 <= self.reach_s <= 1e9:
+            raise PastRefused(f"reach_s is {self.reach_s}, the limits are 0 and 1e9 s")
+        if not 1 <= self.max_count <= MAX_WRITES:
+            raise PastRefused(f"max_count is {self.max_count}, the limits are 1 and {MAX_WRITES}")
+
+
+@dataclass(frozen=True, slots=True)
+class PastWrite:
+    """One scan or look, or the try of one; `kind` and `status` as in lupin_msgs/Observation.
+
+    `sensors` and `values` have one length. `has_seen`: a look that saw the flowers; the last three
+    are what it saw.
+    """
+
+    number: int
+    run: int
+    tag_id: str
+    stamp_ns: int
+    kind: int
+    status: int
+    sensors: tuple[str, ...] = ()
+    values: tuple[float, ...] = ()
+    has_seen: bool = False
+    species: str = ""
+    anomaly: bool = False
+    bug_count: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class RunSpan:
+    """A stretch of the axis of time, `start_ns <= stamp < end_ns`, and the run that has it."""
+
+    run: int
+    start_ns: int
+    end_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class PastWrites:
+    """Some writes, in the order of their numbers; ask on after `last`, until `is_all`.
+
+    `journal` tells one file from another: numbers of two are not comparable.
+    """
+
+    journal: str
+    spans: tuple[RunSpan, ...]
+    writes: tuple[PastWrite, ...]
+    last: int
+    is_all: bool

@@ -1,0 +1,201 @@
+"""Verdicts and alarms of a large house: the start over its past, one change, nothing new.
+
+What runs on the event loop is marked so; the rest is a worker's.
+
+Processor time, so that what else runs does not count. Beside that, what the simulator's ordinary
+days raise.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+
+from lupin_bridge.alarms.board import AlarmBoard
+from lupin_bridge.alarms.feed import LOT, REACH_COUNT
+from lupin_bridge.alarms.ledger import Ledger
+from lupin_bridge.judge.choosing import own_sensors
+from lupin_bridge.judge.daylight import Day, Light
+from lupin_bridge.judge.following import Follower, Found
+from lupin_bridge.judge.judging import Judge
+from lupin_bridge.outward.mirror import Mirror
+from lupin_bridge.outward.names import Topics
+from lupin_bridge.outward.payloads import Seen
+from lupin_twin.past_writes import PastWrite, RunSpan
+from lupin_twin.state import Reading, Snapshot, TagState
+from tests.support.ordinary_day import DAY_NS, S, ordinary_days
+from tests.support.seen import alarm
+
+DAYS = 7
+SIZES = (1_000, 10_000)
+SPANS = (RunSpan(1, 0, 2**63 - 1),)
+MIDDLE = {
+    "temperature": 22.0,
+    "humidity": 62.0,
+    "co2": 600.0,
+    "light": 900.0,
+    "soil_moisture": 40.0,
+}
+CHANGES = 40
+ALARMS = 100_000
+
+
+def past_of(tags: int) -> Iterator[PastWrite]:
+    """Rounds of all tags, as many as are read at a start; one reading in a hundred is far out."""
+    chance = Random(11)
+    rounds = REACH_COUNT // tags
+    step_ns = DAYS * DAY_NS // (rounds * tags)
+    for number in range(rounds * tags):
+        values = [middle * chance.uniform(0.95, 1.05) for middle in MIDDLE.values()]
+        values[0] += 20.0 * (chance.random() < 0.01)
+        yield write(number + 1, str(number % tags), number * step_ns, values)
+
+
+def write(number: int, tag_id: str, at_ns: int, values: list[float]) -> PastWrite:
+    return PastWrite(number, 1, tag_id, at_ns, 0, 0, tuple(MIDDLE), tuple(values))
+
+
+def resident_mb() -> float:
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("VmRSS:"):
+            return int(line.split()[1]) / 1e3
+    return 0.0
+
+
+def ms_since(start: float) -> float:
+    return (time.thread_time() - start) * 1e3
+
+
+def alarms_of(tags: int) -> None:
+    heard = list(past_of(tags))
+    before_mb = resident_mb()
+    follower = Follower(own_sensors(), lambda light, _: bool(light), SPANS)
+    lots = []
+    for first in range(0, len(heard), LOT):
+        start = time.thread_time()
+        follower.take(heard[first : first + LOT])
+        lots.append(ms_since(start))
+    now_ns = heard[-1].stamp_ns
+    start = time.thread_time()
+    found = follower.found(now_ns)
+    row(tags, f"start: {len(heard):,} scans", sum(lots) + ms_since(start), max(lots))
+    row(tags, f"start: all {len(found.changed):,} alarms told", ms_since(start))
+    print(f"{'':>7}  memory of that, without the scans heard: {resident_mb() - before_mb:.0f} MB")
+    took = []
+    for change in range(CHANGES):
+        now_ns += S
+        one = write(len(heard) + change + 1, str(change), now_ns, [*MIDDLE.values()])
+        start = time.thread_time()
+        follower.take([one])
+        follower.found(now_ns)
+        took.append(ms_since(start))
+    row(tags, "alarms: one scan", statistics.median(took), max(took))
+
+
+def verdicts_of(tags: int) -> None:
+    def tag(index: int, at_ns: int) -> TagState:
+        readings = tuple(Reading(name, value, at_ns) for name, value in MIDDLE.items())
+        return TagState(tag_id=str(index), readings=readings, last_observed_ns=at_ns)
+
+    def judge_day(_: Light) -> Day:
+        return Day(True, "light")
+
+    now_ns = DAY_NS
+    house = [tag(index, now_ns) for index in range(tags)]
+    judge = Judge(own_sensors(), recent_s=3_600.0)
+    snapshot = Snapshot(now_ns, "map", tuple(house))
+    for _ in range(tags // 500 + 2):  # so many at once
+        judge.see(snapshot, judge_day)
+    for name, changes in (("verdicts: nothing new", 0), ("verdicts: one scan", 1)):
+        took = []
+        for turn in range(CHANGES):
+            now_ns += S
+            for index in range(changes):
+                house[(turn + index) % tags] = tag((turn + index) % tags, now_ns)
+            states = tuple(house) if changes else snapshot.tags
+            snapshot = Snapshot(now_ns, "map", states)
+            start = time.thread_time()
+            judge.see(snapshot, judge_day)
+            took.append(ms_since(start))
+        row(tags, name, statistics.median(took), max(took))
+
+
+def loop_of(tags: int) -> None:
+    """What a hundred thousand alarms, and a second in which nothing happens, cost the loop."""
+    many = [
+        replace(alarm(str(number % tags), raised_ns=number), id=f"{number:06x}")
+        for number in range(ALARMS)
+    ]
+    ledger, board = Ledger(), AlarmBoard()
+    start = time.thread_time()
+    page, change = ledger.take(Found(tuple(many)))
+    row(tags, f"{ALARMS:,} alarms: put in order", ms_since(start))
+    start = time.thread_time()
+    board.put(page, change, "journal", 1)
+    row(tags, "loop: to take them over", ms_since(start))
+    ordered, taken = [], []
+    for number in range(CHANGES):
+        worse = Found((replace(many[number], worst=99.0 + number),), is_whole=False)
+        start = time.thread_time()
+        page, change = ledger.take(worse)
+        ordered.append(ms_since(start))
+        start = time.thread_time()
+        board.put(page, change, "journal", 1)
+        taken.append(ms_since(start))
+    row(tags, "one of them worse: put in its place", statistics.median(ordered), max(ordered))
+    row(tags, "loop: one of them worse", statistics.median(taken), max(taken))
+
+    judge, mirror = Judge(own_sensors(), recent_s=3_600.0), Mirror(Topics("lt", ""), own_sensors())
+    now_ns, day = DAY_NS, Day(True, "light")
+    readings = tuple(Reading(name, value, now_ns) for name, value in MIDDLE.items())
+    house = tuple(TagState(str(n), readings=readings, last_observed_ns=now_ns) for n in range(tags))
+    took = []
+    for second in range(CHANGES):
+        snapshot = Snapshot(now_ns + second * S, "map", house)
+        start = time.process_time()
+        judged = judge.see(snapshot, lambda _: day)
+        seen = Seen(snapshot, judged, board.now, judge.holds_ns(), snapshot.stamp_ns, is_live=True)
+        mirror.see(seen)
+        for _ in mirror.messages():
+            pass
+        took.append((time.process_time() - start) * 1e3)
+    quiet = took[tags // 500 + 5 :]
+    row(tags, "loop: a quiet second, MQTT included", statistics.median(quiet), max(quiet))
+
+
+def row(tags: int, name: str, took_ms: float, most_ms: float | None = None) -> None:
+    most = "" if most_ms is None else f"{most_ms:>12.2f}"
+    print(f"{tags:>7}  {name:<44}{took_ms:>12.2f}{most}")
+
+
+def ordinary() -> None:
+    heard = ordinary_days()
+    follower = Follower(own_sensors(), lambda light, _: bool(light), SPANS)
+    follower.take(heard)
+    raised = follower.found(heard[-1].stamp_ns).changed
+    spells = (heard[-1].stamp_ns - heard[0].stamp_ns) / (600 * S)
+    kinds = Counter(alarm.reason.kind.value for alarm in raised)
+    told = ", ".join(f"{kind} {count}" for kind, count in kinds.most_common())
+    print(
+        f"\nThe simulator's ordinary days: {len(raised)} alarms in {spells / 144:.1f} days, "
+        f"{len(raised) / spells:.2f} in ten minutes ({told})"
+    )
+
+
+def main() -> None:
+    """Print all of it."""
+    print(f"\n{'tags':>7}  {'five sensors each':<44}{'ms':>12}{'at most':>12}")
+    for tags in SIZES:
+        verdicts_of(tags)
+        alarms_of(tags)
+        loop_of(tags)
+    ordinary()
+
+
+if __name__ == "__main__":
+    main()

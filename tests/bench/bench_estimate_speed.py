@@ -1,0 +1,83 @@
+"""What an estimate costs beside IDW on the same grid: ms of one core, the best of several."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import TypeVar
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np  # its threads are counted when it is loaded
+
+from lupin_twin.estimate import Posterior, TiledPosterior
+from lupin_twin.estimates import fitted
+from lupin_twin.idw import FieldSample, compute_idw_field
+from tests.support.estimates import DAY_S, many_tags
+
+Made = TypeVar("Made")
+# Tags, readings of each, m of the house's side, cells of a side.
+HOUSES = (
+    (10, 32, 8.0, 200),
+    (30, 20, 8.0, 200),
+    (1_000, 8, 20.0, 1_000),
+    (1_000, 8, 50.0, 1_000),
+    (10_000, 8, 100.0, 2_000),
+)
+
+
+def best(make: Callable[[], Made], times: int = 7) -> tuple[float, Made]:
+    """Milliseconds of processor time, and what was made."""
+    spent = []
+    for _ in range(times):
+        began = time.process_time()
+        made = make()
+        spent.append((time.process_time() - began) * 1000.0)
+    return min(spent), made
+
+
+def costs(tags: int, each: int, metres: float, side: int) -> list[float]:
+    """IDW; a fit; a posterior, until it tells something; a grid; a reading foretold."""
+    readings = many_tags(tags, each, metres)
+    at_s = float(readings.time_s.max())
+    resolution = metres / side
+    box = {"bbox_min_x": 0.0, "bbox_min_y": 0.0, "bbox_max_x": metres, "bbox_max_y": metres}
+    newest = [FieldSample(x, y, 20.0) for x, y in readings.xy.tolist()]
+    idw = partial(
+        compute_idw_field,
+        newest,
+        bbox_min_x=0.0,
+        bbox_min_y=0.0,
+        bbox_max_x=metres,
+        bbox_max_y=metres,
+        resolution=resolution,
+        falloff_radius_m=1.5,
+        max_distance_m=1.5,
+        power=2.0,
+    )
+    idw_ms, _ = best(idw, 3)
+    fit_ms, model = best(partial(fitted, readings, DAY_S), 2)
+
+    def load() -> Posterior | TiledPosterior:
+        posterior = model.posterior(readings, at_s)
+        posterior.points(readings.xy[:1])  # of many tags, the work begins when it is asked
+        return posterior
+
+    load_ms, posterior = best(load)
+    grid_ms, _ = best(partial(posterior.grid, **box, resolution=resolution))
+    foretell_ms, _ = best(partial(posterior.foretell, readings.xy[:1], np.array([at_s])))
+    return [idw_ms, fit_ms, load_ms, grid_ms, foretell_ms]
+
+
+def main() -> None:
+    columns = ("IDW", "fit", "load", "grid", "foretell")
+    print(f"{'tags x readings, cells':<34}" + "".join(f"{name:>10}" for name in columns))
+    for tags, each, metres, side in HOUSES:
+        label = f"{tags} x {each}, {side} x {side} in {metres:g} m"
+        print(f"{label:<34}" + "".join(f"{one:>10.1f}" for one in costs(tags, each, metres, side)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,187 @@
+"""Journals of a long time, made fast: through the real Appender, its rollups folded.
+
+Each tag is scanned in its turn, every `every_s`, so that all tags have been by then. Every
+tag has its place.
+"""
+
+from __future__ import annotations
+
+import atexit
+import math
+import shutil
+import sqlite3
+import tempfile
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+from lupin_twin.journal.appending import Appender
+from lupin_twin.journal.file import JournalFile
+from lupin_twin.journal.retention import Limits
+from lupin_twin.journal.rollups import Folding
+from lupin_twin.journal.rows import LookRow, PinRow, Row, ScanRow
+from lupin_twin.journal.runs import Clock
+from lupin_twin.journal.schema import transaction
+from lupin_twin.journal.tallying import tally_step
+from lupin_twin.state import Bloom, Flower, Pose, Reading
+
+SECOND: Final = 1_000_000_000
+DAY_S: Final = 86_400.0
+BEGUN_NS: Final = 1_763_700_000 * SECOND
+LIMITS: Final = Limits(days=36_500, max_bytes=10**12)
+SENSORS: Final = ("temperature", "humidity", "co2", "light", "soil_moisture")
+_BATCH: Final = 20_000
+
+
+@dataclass(frozen=True)
+class House:
+    """What is heard of a house.
+
+    `sets` is in how many messages a scan comes, each with its sensors; `look_days` how often
+    somebody looks at a tag's flowers, 0 for never; `failing` every so many tries fail, 0: none.
+    """
+
+    tags: int
+    days: float
+    every_s: float
+    sets: int = 1
+    look_days: float = 1.0
+    failing: int = 50
+
+    @property
+    def end_ns(self) -> int:
+        """The end of the last day."""
+        return BEGUN_NS + int(self.days * DAY_S) * SECOND
+
+    @property
+    def scans(self) -> int:
+        """How often a tag is tried."""
+        return int(self.days * DAY_S / self.every_s)
+
+    def rows(self) -> Iterator[Row]:
+        """All that is heard, by time."""
+        step_ns = int(self.every_s * SECOND / self.tags)
+        sets = [SENSORS[part :: self.sets] for part in range(self.sets)]
+        ids = [str(number + 1) for number in range(self.tags)]
+        looks_every = max(1, int(self.look_days * DAY_S / self.every_s))
+        for turn in range(self.scans):
+            by_day = math.sin(turn * self.every_s / DAY_S * 2.0 * math.pi)
+            for tag, tag_id in enumerate(ids):
+                at_ns = BEGUN_NS + int(turn * self.every_s) * SECOND + tag * step_ns
+                arrival_ns = at_ns + 50_000_000
+                if turn == 0:
+                    yield PinRow(tag_id, at_ns, arrival_ns, _place(tag))
+                if self.failing and (turn * 7 + tag) % self.failing == 0:
+                    yield ScanRow(
+                        tag_id, at_ns, arrival_ns, status=2, detail="no answer", source="robot"
+                    )
+                    continue
+                base = round(20.0 + 4.0 * by_day + (tag * 37 + turn) % 16 / 8.0, 1)
+                for names in sets:
+                    readings = tuple(
+                        Reading(name, base + 10.0 * index) for index, name in enumerate(names)
+                    )
+                    yield ScanRow(
+                        tag_id, at_ns, arrival_ns, readings, source="robot", mission="patrol"
+                    )
+                if self.look_days and turn % looks_every == tag % looks_every:
+                    yield _look(tag, at_ns, has_pest=(turn + tag) % 97 == 0)
+
+
+# What the benchmarks of the past ask of: a usual house for long, and the largest, which a robot
+# needs twelve hours to drive through.
+YEAR: Final = House(tags=30, days=365.0, every_s=1800.0)
+MONTH: Final = House(tags=10_000, days=30.0, every_s=43_200.0, look_days=10.0)
+QUICK_YEAR: Final = House(tags=30, days=20.0, every_s=1800.0)
+QUICK_MONTH: Final = House(tags=10_000, days=1.0, every_s=43_200.0)
+
+
+def _place(tag: int) -> Pose:
+    return Pose(tag % 100 * 0.5, tag // 100 * 0.5, 0.3, 0.0, 0.0, 0.0, 1.0)
+
+
+def _look(tag: int, at_ns: int, *, has_pest: bool) -> LookRow:
+    place = _place(tag)
+    blooms = tuple(
+        Bloom(place.x + n / 10, place.y + 0.1, 0.4, 0.25, "lupin", 0.9, anomaly=False)
+        for n in range(2)
+    )
+    flower = Flower("lupin", 0.9, has_pest, 2, int(has_pest), blooms)
+    return LookRow(str(tag + 1), at_ns + 1, at_ns + 60_000_000, flower, "robot", "patrol")
+
+
+@dataclass(frozen=True)
+class Filled:
+    """A journal, and what is in it."""
+
+    path: Path
+    house: House
+    readings: int
+    rows: int
+
+    @property
+    def bytes(self) -> int:
+        """The file's size, its log included."""
+        log = self.path.with_name(self.path.name + "-wal")
+        return self.path.stat().st_size + (log.stat().st_size if log.exists() else 0)
+
+
+@cache
+def filled(house: House) -> Filled:
+    """The journal of a house, made once a process; it goes with the process."""
+    return fill(
+        _folder() / f"{house.tags}-{house.days:g}-{house.every_s:g}-{house.sets}.sqlite", house
+    )
+
+
+@cache
+def _folder() -> Path:
+    folder = Path(tempfile.mkdtemp(prefix="lupin-twin-bench-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def fill(path: Path, house: House) -> Filled:
+    """Write all that is heard of a house, as a twin would that lived through it."""
+    readings = rows = 0
+    file = JournalFile(path, LIMITS, is_sound=True)
+    with closing(file):
+        run = file.first_run(Clock(BEGUN_NS, BEGUN_NS, is_simulated=False))
+        connection = file._connection
+        appender = Appender(connection)
+        heard = house.rows()
+        while True:
+            with transaction(connection):
+                before = appender.last_id
+                for row in heard:
+                    appender.append(run, (row,))
+                    readings += len(row.readings) if isinstance(row, ScanRow) else 0
+                    if appender.last_id - before >= _BATCH:
+                        break
+            if appender.last_id == before:
+                break
+            rows += appender.last_id - before
+            connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
+            tally(connection)
+        _fold(connection, appender.last_id)
+    return Filled(path, house, readings, rows)
+
+
+def tally(connection: sqlite3.Connection) -> None:
+    """Count what is not counted yet."""
+    has_more = True
+    while has_more:
+        with transaction(connection):
+            has_more = tally_step(connection)
+
+
+def _fold(connection: sqlite3.Connection, last_id: int) -> None:
+    folding = Folding(connection, last_id)
+    has_more = True
+    while has_more:
+        with transaction(connection):
+            has_more = folding.step()
+        connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()

@@ -1,0 +1,153 @@
+"""The parts of a bench with live clients: a server with its robot, clients, and what they saw."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Any, Self
+from urllib.parse import urlsplit
+
+from tests.support.domains import own_domain, ros_env
+from tests.support.proc_stat import cpu_s
+from tests.support.processes import Process, lupin_twin, url_of
+
+CLIENTS_A_PROCESS = 1_250
+# Python starts and imports; then all clients connect at once.
+HEAD_START_S = 1.5
+# 20,000 messages, one batch after the other.
+FILL_PATIENCE_S = 300.0
+# The bridge may send a little more often than the robot causes it to: at exactly the robot's rate,
+# a change would wait up to a period for its turn, and that is what one would measure.
+HEADROOM = 1.2
+# The tests let ROS check every field of every message, which costs time; nobody else does.
+AS_IN_USE = {"ROS_PYTHON_CHECK_FIELDS": "0"}
+
+
+@dataclass(slots=True)
+class Seen:
+    """What the clients saw in one measurement; `delays_s` is sorted."""
+
+    delays_s: list[float]
+    received: Counter[int]
+    frame_bytes: float
+
+    def delivered(self, clients: int) -> float:
+        """The share of all frames made, times clients, that arrived."""
+        made = max(self.received) - min(self.received) + 1
+        return self.received.total() / (made * clients)
+
+    def delay_ms(self, share: float) -> float:
+        """A quantile of the delays, ms."""
+        return 1e3 * self.delays_s[min(len(self.delays_s) - 1, int(share * len(self.delays_s)))]
+
+    def delays(self) -> str:
+        """The delays, for a person."""
+        return f"median {self.delay_ms(0.5):.1f} ms, p99 {self.delay_ms(0.99):.1f} ms"
+
+
+class Clients:
+    """The client processes of one load."""
+
+    def __init__(self, port: int, count: int, path: str = "/ws/state", *, deaf: bool = False):
+        self.count = count
+        self._processes = []
+        number = -(-count // CLIENTS_A_PROCESS)
+        connect_at = time.monotonic() + HEAD_START_S
+        for index in range(number):
+            share = count // number + (index < count % number)
+            arguments = [
+                *("--port", port, "--path", path),
+                *("--clients", share, "--connect-at", connect_at),
+                *(["--deaf"] if deaf else []),
+            ]
+            self._processes.append(
+                subprocess.Popen(
+                    [sys.executable, "-m", "tests.bench.live_clients", *map(str, arguments)],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    text=True,
+                )
+            )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for process in self._processes:
+            process.kill()
+            process.communicate()
+
+    def joined_s(self) -> float:
+        """Wait for every client's first state; the time that the last one took, s."""
+        return max(max(map(float, told["joined_s"])) for told in self._told())
+
+    def measure(self, start_s: float, end_s: float) -> Seen:
+        """Measure changes published in a stretch of the monotonic clock."""
+        self._command(f"measure {start_s} {end_s}")
+        seen = Seen([], Counter(), 0.0)
+        for told in self._told():
+            seen.delays_s += told["delays_s"]
+            seen.received.update({int(seq): n for seq, n in told["received"].items()})
+            seen.frame_bytes = max(seen.frame_bytes, told["frame_bytes"])
+        seen.delays_s.sort()
+        return seen
+
+    def closed_s(self) -> list[float]:
+        """When the server closed clients, s after they connected."""
+        self._command("closed")
+        return sorted(at for told in self._told() for at in told["closed_s"])
+
+    def _command(self, text: str) -> None:
+        for process in self._processes:
+            assert process.stdin is not None
+            process.stdin.write(text + "\n")
+            process.stdin.flush()
+
+    def _told(self) -> Iterator[dict[str, Any]]:
+        for process in self._processes:
+            assert process.stdout is not None
+            line = process.stdout.readline()
+            if not line:
+                raise RuntimeError(f"a client process ended with {process.wait()}")
+            yield json.loads(line)
+
+
+@dataclass(slots=True)
+class Server:
+    """A `lupin-twin serve` with a robot that keeps it changing."""
+
+    process: Process
+    port: int
+
+    def cores_since(self, start_s: float, cpu_before_s: float) -> float:
+        """Processor time per time since a moment, in cores."""
+        return (cpu_s(self.process.pid) - cpu_before_s) / (time.monotonic() - start_s)
+
+
+@contextmanager
+def serving(tags: int, rate_hz: float, *options: str) -> Iterator[Server]:
+    """A server and its robot, once the twin has all tags."""
+    with ExitStack() as stack:
+        domain = stack.enter_context(own_domain())
+        pace = ("--max-rate-hz", str(rate_hz * HEADROOM))
+        server = stack.enter_context(
+            lupin_twin(domain, "serve", *pace, *options, afresh=True, **AS_IN_USE)
+        )
+        url = url_of(server)
+        port = urlsplit(url).port
+        assert port is not None
+        arguments = ("--domain", domain, "--url", url, "--tags", tags, "--rate-hz", rate_hz)
+        robot = stack.enter_context(
+            Process(
+                [sys.executable, "-m", "tests.bench.live_robot", *map(str, arguments)],
+                ros_env(domain, **AS_IN_USE),
+            )
+        )
+        robot.wait_for_output("filled", timeout_s=FILL_PATIENCE_S)
+        yield Server(server, port)

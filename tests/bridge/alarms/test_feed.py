@@ -1,0 +1,244 @@
+"""The feed by itself: with journals and replicas it is in test_live_alarms."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from lupin_bridge.alarms import feed as feed_module
+from lupin_bridge.alarms.board import AlarmBoard
+from lupin_bridge.alarms.feed import LOT, AlarmFeed
+from lupin_bridge.alarms.ledger import Change
+from lupin_bridge.judge import following
+from lupin_bridge.judge.choosing import Criteria
+from lupin_bridge.settings import Settings
+from lupin_bridge.twin.source import Told, TwinUnavailableError
+from lupin_twin.journal.condition import OFF, Condition, JournalState
+from lupin_twin.past_writes import PastWrite, PastWrites, RunSpan, WritesRequest
+from lupin_twin.state import Flower, Look, Snapshot, TwinStore
+from lupin_twin.workers import Workers
+from tests.support.waiting import PATIENCE_S, until
+
+NOW = 10**15
+
+
+class Journal:
+    """As much of a source as the feed asks: writes that a test makes up."""
+
+    def __init__(self) -> None:
+        self.workers = Workers("test")
+        self.writes_now: list[PastWrite] = []
+        self.name, self.asked = "a", 0
+        self.is_gone = False
+
+    async def writes(self, request: WritesRequest) -> PastWrites:
+        """The next of them."""
+        self.asked += 1
+        if self.is_gone:
+            raise TwinUnavailableError("no twin offers /twin/get_writes")
+        found = [write for write in self.writes_now if write.number > request.after]
+        part = tuple(found[: request.max_count])
+        last = part[-1].number if part else request.after
+        span = RunSpan(1, 0, 2**63 - 1)
+        return PastWrites(self.name, (span,), part, last, len(part) == len(found))
+
+
+def pest(number: int, bugs: int) -> PastWrite:
+    seen = (True, "", bugs > 0, bugs)
+    return PastWrite(number, 1, "a", NOW - 100 + number, 1, 0, (), (), *seen)
+
+
+def told(number: int, **over: object) -> Told:
+    store = TwinStore()
+    store.record_look(Look("a", NOW - 100 + number, Flower(bug_count=number, anomaly=True)))
+    snapshot: Snapshot = store.snapshot(NOW + number, "map")
+    return Told(snapshot, str(number), **over)  # type: ignore[arg-type]
+
+
+def follow(test: Callable[[AlarmFeed, AlarmBoard, Journal], object]) -> None:
+    async def run() -> None:
+        source, board = Journal(), AlarmBoard()
+        criteria = Criteria.of(Settings())
+        feed = AlarmFeed(source, criteria, board, lambda: NOW, 7.0)  # type: ignore[arg-type]
+        feed.start()
+        try:
+            await test(feed, board, source)  # type: ignore[misc]
+        finally:
+            await feed.stop()
+            source.workers.close()
+
+    asyncio.run(run())
+
+
+async def changed(board: AlarmBoard) -> None:
+    """The next change of the board."""
+    told_of = asyncio.Event()
+    end = board.subscribe(lambda _: told_of.set())
+    async with asyncio.timeout(PATIENCE_S):
+        await told_of.wait()
+    end()
+
+
+def test_it_reads_the_past_once_then_what_is_new_and_another_journal_from_its_beginning() -> None:
+    async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
+        source.writes_now = [pest(number, number % 2) for number in range(1, 1_200)]
+        heard: list[Change] = []
+        board.subscribe(heard.append)
+        feed.on_state(told(1))
+        await changed(board)
+        assert (board.now.source, board.now.since_ns, heard[0].is_past) == (
+            "journal",
+            NOW - 99,
+            True,
+        )
+        assert len(board.now.active) == 1
+        source.writes_now.append(pest(1_200, 0))
+        feed.on_state(told(2))
+        await changed(board)
+        assert [alarm.is_active for alarm in board.now.alarms[:1]] == [False]
+        assert not heard[-1].is_past
+        asked = source.asked
+        for _ in range(5):
+            feed.on_state(told(2))
+        assert source.asked == asked
+        source.name, source.writes_now = "b", [pest(1, 4)]
+        feed.on_state(told(3))
+        await changed(board)
+        assert [alarm.worst for alarm in board.now.alarms] == [4.0]
+
+    follow(test)
+
+
+def test_what_is_written_is_read_also_where_the_state_stays_as_it_is() -> None:
+    async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
+        def wrote(count: int) -> Told:
+            return told(1, journal=Condition(JournalState.RECORDING, written=count))
+
+        source.writes_now = [pest(1, 2)]
+        feed.on_state(wrote(1))
+        await changed(board)
+        # Once more it asks by itself, for a disk that is slow; then it has to be woken.
+        feed._ask_again(asyncio.get_running_loop(), 1_000_000.0)
+        source.writes_now.append(pest(2, 0))
+        feed.on_state(wrote(2))
+        await changed(board)
+        assert board.now.active == ()
+
+    follow(test)
+
+
+def test_what_comes_later_than_what_is_kept_has_its_tags_past_read_again(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Hundreds of looks later, one comes that saw the pest earlier; then one of another tag."""
+    for name in ("OVER_AGAIN_S", "AGAIN_S", "JOURNAL_S"):
+        monkeypatch.setattr(feed_module, name, 0.01)
+
+    def look(number: int, tag_id: str, at: int, bugs: int) -> PastWrite:
+        return replace(pest(number, bugs), tag_id=tag_id, stamp_ns=NOW - 10_000 + at)
+
+    async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
+        source.writes_now = [
+            look(2 * number + which, tag_id, 10 * number, bugs=int(number > 300))
+            for number in range(1, 800)
+            for which, tag_id in enumerate("ab")
+        ]
+        feed.on_state(told(1))
+        await changed(board)
+        for number, tag_id, at in ((5_000, "a", 2_005), (5_001, "b", 1_005), (5_002, "a", 505)):
+            source.writes_now.append(look(number, tag_id, at, 3))
+            feed.on_state(told(number))
+            late_ns = NOW - 10_000 + at
+
+            def is_told(tag_id: str = tag_id, late_ns: int = late_ns) -> bool:
+                raised = [it.raised_at_ns for it in board.now.alarms if it.tag_id == tag_id]
+                return late_ns in raised and len(board.now.active) == 2
+
+            await until(is_told, f"the alarm that {tag_id} had then")
+        assert feed.missed == 0
+
+    follow(test)
+    assert "so late" not in caplog.text
+
+
+def test_what_comes_later_still_is_counted_and_told(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(feed_module, "OVER_AGAIN_S", 0.0)
+    monkeypatch.setattr(following, "WIDE_OF_TAG", 1)
+
+    async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
+        source.writes_now = [
+            replace(pest(number, 1), stamp_ns=NOW - 1_000 + number) for number in range(1, LOT + 70)
+        ]
+        feed.on_state(told(1))
+        await changed(board)
+        source.writes_now.append(replace(pest(LOT + 99, 1), stamp_ns=NOW - 1_000))
+        feed.on_state(told(2))
+        await until(lambda: feed.missed == 1, "that it was missed")
+        assert len(board.now.active) == 1
+
+    follow(test)
+    assert "alarms are told as if it had not been" in caplog.text
+
+
+def test_a_twin_that_is_gone_answers_nothing_and_is_an_alarm_beside_those_of_before() -> None:
+    async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
+        source.writes_now = [pest(1, 2)]
+        feed.on_state(told(1))
+        await changed(board)
+        source.is_gone = True
+        feed.on_silence(is_silent=True, last_ns=NOW - 5)
+        await changed(board)
+        assert [alarm.reason.kind for alarm in board.now.active] == ["silent", "pest"]
+        assert board.now.source == "journal"
+        source.is_gone = False
+        feed.on_silence(is_silent=False, last_ns=NOW)
+        await changed(board)
+        assert [alarm.reason.kind for alarm in board.now.active] == ["pest"]
+
+    follow(test)
+
+
+def test_alarms_that_a_journal_has_not_confirmed_for_long_are_not_told_as_all_there_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("lupin_bridge.alarms.feed.UNANSWERED_S", 0.0)
+
+    async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
+        source.writes_now = [pest(1, 2)]
+        feed.on_state(told(1))
+        await changed(board)
+        source.is_gone = True
+        feed.on_state(told(2))
+        await changed(board)
+        assert [alarm.reason.kind for alarm in board.now.active] == ["pest"]
+        assert (board.now.source, len(board.now.alarms)) == ("starting", 1)
+        source.is_gone = False
+        feed.on_state(told(3))
+        await changed(board)
+        assert (board.now.source, len(board.now.alarms)) == ("journal", 1)
+
+    follow(test)
+
+
+def test_without_a_journal_states_tell_and_a_silent_twin_is_one_alarm_of_the_house() -> None:
+    async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
+        feed.on_state(told(3, journal=OFF))
+        await changed(board)
+        assert (board.now.source, source.asked) == ("heard", 0)
+        assert [alarm.worst for alarm in board.now.active] == [3.0]
+        feed.on_silence(is_silent=True, last_ns=NOW - 5)
+        await changed(board)
+        silent = next(alarm for alarm in board.now.active if not alarm.tag_id)
+        assert (silent.reason.kind, silent.raised_at_ns) == ("silent", NOW - 5)
+        feed.on_silence(is_silent=True, last_ns=NOW - 5)
+        feed.on_silence(is_silent=False, last_ns=NOW)
+        await changed(board)
+        over = next(alarm for alarm in board.now.alarms if not alarm.tag_id)
+        assert (over.id, over.cleared_at_ns) == (silent.id, NOW)
+
+    follow(test)

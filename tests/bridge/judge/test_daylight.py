@@ -1,0 +1,73 @@
+from __future__ import annotations
+
+from datetime import UTC, datetime, time, timedelta, timezone
+
+import pytest
+
+from lupin_bridge.judge.daylight import DAY_FROM_LX, ClockDay, Day, Light, judge_day
+
+NOON_S = datetime(2026, 6, 1, 12, tzinfo=UTC).timestamp()
+MIDNIGHT_S = datetime(2026, 6, 1, tzinfo=UTC).timestamp()
+CLOCK = ClockDay(UTC)
+
+
+def light_of(*readings_lx: float) -> Light:
+    light = Light()
+    for number, reading in enumerate(readings_lx):
+        light.put(f"tag_{number}", reading)
+    return light
+
+
+def test_light_goes_before_the_clock() -> None:
+    assert judge_day(light_of(900.0, 800.0), CLOCK, MIDNIGHT_S) == Day(True, "light")
+    assert judge_day(light_of(0.0, 0.0), CLOCK, NOON_S) == Day(False, "light")
+
+
+def test_most_of_the_sensors_decide() -> None:
+    assert judge_day(light_of(0.0, 900.0, 900.0), None, None).is_day
+    assert not judge_day(light_of(0.0, 0.0, 900.0), None, None).is_day
+
+
+def test_a_broken_sensor_does_not_decide() -> None:
+    assert judge_day(light_of(float("nan"), float("inf"), 900.0), None, None) == Day(True, "light")
+    assert judge_day(light_of(float("nan")), CLOCK, MIDNIGHT_S) == Day(False, "clock")
+
+
+def test_the_limit_itself_is_day() -> None:
+    assert judge_day(light_of(DAY_FROM_LX), None, None).is_day
+    assert not judge_day(light_of(DAY_FROM_LX - 0.1), None, None).is_day
+
+
+def test_with_nothing_to_go_by_it_is_day_and_that_is_said() -> None:
+    assert judge_day(light_of(), None, NOON_S) == Day(True, "assumed")
+    assert judge_day(light_of(), CLOCK, None) == Day(True, "assumed")
+
+
+@pytest.mark.parametrize(
+    ("hour", "is_day"), [(5, False), (6, True), (19, True), (20, False), (23, False)]
+)
+def test_by_the_clock_a_day_begins_and_ends(hour: int, is_day: bool) -> None:
+    at_s = datetime(2026, 6, 1, hour, tzinfo=UTC).timestamp()
+    assert judge_day(light_of(), CLOCK, at_s) == Day(is_day, "clock")
+
+
+def test_the_clock_is_that_of_the_house() -> None:
+    east = ClockDay(timezone(timedelta(hours=9)))
+    assert judge_day(light_of(), east, MIDNIGHT_S).is_day
+    assert not judge_day(light_of(), east, NOON_S).is_day
+
+
+def test_a_day_may_end_after_midnight() -> None:
+    late = ClockDay(UTC, time(14), time(2))
+    assert late.is_day(MIDNIGHT_S)
+    assert not late.is_day(MIDNIGHT_S + 3 * 3600)
+    assert late.is_day(MIDNIGHT_S + 14 * 3600)
+
+
+def test_a_tag_has_one_say_its_last() -> None:
+    light = light_of(0.0, 900.0, 0.0)
+    told = [light.is_day]
+    for tag_id, reading in (("tag_0", 900.0), ("tag_0", None), ("tag_1", None), ("tag_2", None)):
+        light.put(tag_id, reading)
+        told.append(light.is_day)
+    assert told == [False, True, True, False, None]

@@ -1,0 +1,200 @@
+"""The table of `states.json`: a house as the bridge sees it, and what an expert says of it.
+
+Each state goes the bridge's own way: scans and looks into a store, its snapshots to the judge, and
+the same as a journal tells them to the alarms. The page's tests render the same table. Its form is
+told in `tests/README.md`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+from collections.abc import Iterator
+from datetime import UTC, datetime, time
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lupin_bridge.alarms import feed as feed_module
+from lupin_bridge.alarms.board import AlarmBoard
+from lupin_bridge.alarms.feed import AlarmFeed
+from lupin_bridge.judge.choosing import Criteria, own_sensors
+from lupin_bridge.judge.daylight import ClockDay
+from lupin_bridge.judge.judging import Judge, Judged, silenced
+from lupin_bridge.judge.verdict import Health, Kind
+from lupin_bridge.twin.source import Told
+from lupin_twin.past_writes import PastWrite
+from lupin_twin.state import Flower, Look, Pose, Reading, Scan, TwinStore
+from tests.bridge.alarms.test_feed import Journal, changed
+
+TABLE = json.loads(Path(__file__).with_name("states.json").read_text(encoding="utf-8"))
+STATES = TABLE["states"]
+SENSORS = own_sensors()
+S = 1_000_000_000
+EVERY_S, ROUNDS = 120, 5
+SCAN, LOOK = 0, 1
+
+Write = tuple[int, str, Scan | Look]
+
+
+def now_ns(state: dict[str, Any]) -> int:
+    """The 21st of June by the state's clock, which is that of the greenhouse."""
+    hour = time.fromisoformat(state.get("clock", "12:00"))
+    day = datetime(2026, 6, 21, hour.hour, hour.minute, tzinfo=UTC)
+    return int(day.timestamp()) * S
+
+
+def tags_of(state: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Each tag as it is written, those that are as another state's included."""
+    return {
+        tag_id: TABLE["alike"][tag] if isinstance(tag, str) else tag
+        for tag_id, tag in state["tags"].items()
+    }
+
+
+def writes_of(state: dict[str, Any]) -> list[Write]:
+    """All that was heard, in the order of time."""
+    heard = [
+        write for tag_id, tag in tags_of(state).items() for write in of_tag(state, tag_id, tag)
+    ]
+    return sorted(heard, key=lambda write: write[0])
+
+
+def of_tag(state: dict[str, Any], tag_id: str, tag: dict[str, Any]) -> Iterator[Write]:
+    now, every_s = now_ns(state), state.get("every_s", EVERY_S)
+    rounds, was = state.get("rounds", ROUNDS), tag.get("was", {})
+    scans: dict[int, list[Reading]] = {}
+    for name, (value, age_s) in tag["readings"].items():
+        for back in range(rounds):
+            found = was.get(name, value) if back else value
+            at_ns = now - (age_s + back * every_s) * S
+            reading = Reading(name, math.nan if found is None else found)
+            scans.setdefault(at_ns, []).append(reading)
+    for at_ns, readings in scans.items():
+        yield at_ns, tag_id, Scan(tag_id, at_ns, tuple(readings))
+    for status, age_s in tag.get("failed", ()):
+        at_ns = now - age_s * S
+        yield at_ns, tag_id, Scan(tag_id, at_ns, (), status=status)
+    if "species" in tag or "pest" in tag:
+        at_ns, bugs = now - tag.get("looked_s", 90) * S, tag.get("pest", 0)
+        flower = Flower(species=tag.get("species", ""), anomaly=bugs > 0, bug_count=bugs)
+        yield at_ns, tag_id, Look(tag_id, at_ns, flower)
+
+
+def heard_by_the_journal(writes: list[Write]) -> list[PastWrite]:
+    return [
+        PastWrite(
+            number,
+            1,
+            tag_id,
+            at_ns,
+            SCAN,
+            write.status,
+            tuple(reading.name for reading in write.readings),
+            tuple(reading.value for reading in write.readings),
+        )
+        if isinstance(write, Scan)
+        else PastWrite(number, 1, tag_id, at_ns, LOOK, 0, (), (), *seen(write))
+        for number, (at_ns, tag_id, write) in zip(count(1), writes, strict=False)
+    ]
+
+
+def seen(look: Look) -> tuple[bool, str, bool, int]:
+    assert look.flower is not None
+    return True, look.flower.species, look.flower.anomaly, look.flower.bug_count
+
+
+def criteria() -> Criteria:
+    return Criteria(SENSORS, None, ClockDay(UTC))
+
+
+def judged(state: dict[str, Any]) -> Judged:
+    store, judge, by = TwinStore(), Judge(SENSORS), criteria()
+    for at_ns, _, write in writes_of(state):
+        if isinstance(write, Scan):
+            store.record(write)
+        else:
+            store.record_look(write)
+        judge.see(store.snapshot(at_ns, "map"), by.judge_day(at_ns))
+    for tag_id, tag in tags_of(state).items():
+        if not tag["readings"]:
+            store.pin(tag_id, Pose(1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0))
+    moment_ns = now_ns(state)
+    said = judge.see(store.snapshot(moment_ns, "map"), by.judge_day(moment_ns))
+    return silenced(said) if state.get("twin", "live") != "live" else said
+
+
+async def alarms(state: dict[str, Any]) -> list[list[str]]:
+    """What is active then, as `/api/alarms` has it; a feed hears what the bridge's would."""
+    source, board, moment_ns = Journal(), AlarmBoard(), now_ns(state)
+    feed = AlarmFeed(source, criteria(), board, lambda: moment_ns, 7.0)  # type: ignore[arg-type]
+    feed.start()
+    try:
+        source.writes_now = heard_by_the_journal(writes_of(state))
+        is_silent = state.get("twin") == "silent"
+        feed.on_silence(is_silent=is_silent, last_ns=moment_ns - 60 * S)
+        if state.get("twin") != "never_seen":
+            feed.on_state(Told(TwinStore().snapshot(moment_ns, "map"), "1"))
+            await changed(board)
+    finally:
+        await feed.stop()
+        source.workers.close()
+    return sorted(
+        [it.tag_id, str(it.reason.kind), it.reason.sensor, str(it.reason.verdict)]
+        for it in board.now.active
+    )
+
+
+def told(health: Health) -> list[list[Any]]:
+    return [[r.kind, r.verdict, r.sensor, r.value, r.limit] for r in health.reasons]
+
+
+def expected(reasons: list[list[Any]]) -> list[list[Any]]:
+    return [
+        [*names, None if value is None else pytest.approx(value, rel=1e-3), limit]
+        for *names, value, limit in reasons
+    ]
+
+
+@pytest.mark.parametrize("state", STATES, ids=[state["name"] for state in STATES])
+def test_a_house_is_judged_as_an_expert_would(
+    state: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(feed_module, "JOURNAL_S", 0.0)
+    said, house = judged(state), state["house"]
+    assert said.house.verdict == house["verdict"]
+    assert [reason.kind for reason in said.house.reasons] == house["reasons"]
+    assert [said.day.is_day, said.day.source] == house["day"]
+    assert said.patrol.overdue == house["overdue"]
+    of_tags = tags_of(state)
+    assert {tag_id: health.verdict for tag_id, health in said.tags.items()} == {
+        tag_id: tag["verdict"] for tag_id, tag in of_tags.items()
+    }
+    for tag_id, tag in of_tags.items():
+        assert told(said.tags[tag_id]) == expected(tag["reasons"])
+    assert asyncio.run(alarms(state)) == state["alarms"]
+
+
+def test_the_table_has_every_sensor_every_kind_and_every_verdict() -> None:
+    reasons = [
+        reason for state in STATES for tag in tags_of(state).values() for reason in tag["reasons"]
+    ]
+    of_house = {kind for state in STATES for kind in state["house"]["reasons"]}
+    alarmed = {kind for state in STATES for _, kind, _, _ in state["alarms"]}
+    assert {kind for kind, *_ in reasons} | of_house | {"stopped"} == set(Kind) - {Kind.CHANGED}
+    assert alarmed == set(Kind) - {Kind.CHANGED}
+    measured = ("temperature", "humidity", "co2", "light", "soil_moisture")
+    for sensor in measured:
+        of_sensor = [reason for reason in reasons if reason[2] == sensor]
+        sides = {value < limit for kind, _, _, value, limit in of_sensor if kind == "range"}
+        assert sides == {True, False}, f"{sensor} low and high"
+        assert {kind for kind, *_ in of_sensor} >= {"range", "reading_failed", "old"}
+    assert {state["house"]["verdict"] for state in STATES} == {
+        "critical",
+        "stressed",
+        "unknown",
+        "healthy",
+    }

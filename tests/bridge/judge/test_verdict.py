@@ -1,0 +1,112 @@
+"""The table of `verdicts.json`: value and age (s) of each reading, and what an expert says."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lupin_bridge.judge.ranges import parse
+from lupin_bridge.judge.verdict import Health, Kind, Verdict, judge_house, judge_tag, worst
+from lupin_twin.state import NO_FLOWER, Flower, Reading, TagState, Try
+
+CASES = json.loads(Path(__file__).with_name("verdicts.json").read_text(encoding="utf-8"))
+SENSORS = parse(files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8"))
+NOW_NS = 1_000_000_000_000_000
+HOLDS_NS = 600_000_000_000
+
+
+def ago(seconds: float | None) -> int | None:
+    return None if seconds is None else NOW_NS - int(seconds * 1e9)
+
+
+def tag_of(case: dict[str, Any]) -> TagState:
+    status, tried_s = case.get("last_try", (0, 60))
+    flower = NO_FLOWER
+    if "pest" in case or "species" in case:
+        flower = Flower(
+            case.get("species", "rose"), 0.9, "pest" in case, bug_count=case.get("pest", 0)
+        )
+    return TagState(
+        "tag_7",
+        readings=tuple(
+            Reading(name, math.nan if value is None else value, ago(age_s))
+            for name, (value, age_s) in case["readings"].items()
+        ),
+        flower=flower,
+        looked_at_ns=ago(90),
+        last_try=Try(NOW_NS - int(tried_s * 1e9), status),
+    )
+
+
+def judge(case: dict[str, Any], now_ns: int = NOW_NS) -> Health:
+    return judge_tag(
+        tag_of(case), now_ns, SENSORS, holds_ns=HOLDS_NS, is_day=case.get("is_day", True)
+    )
+
+
+@pytest.mark.parametrize("case", CASES, ids=[case["name"] for case in CASES])
+def test_a_tag_is_judged_as_an_expert_would(case: dict[str, Any]) -> None:
+    health = judge(case)
+    assert health.verdict == case["verdict"]
+    told = [(r.kind, r.verdict, r.sensor, r.value, r.limit) for r in health.reasons]
+    assert told == [
+        (*names, value if value is None else pytest.approx(value, rel=1e-3), limit)
+        for *names, value, limit in case["reasons"]
+    ]
+
+
+def test_every_kind_of_reason_is_in_the_table_but_those_of_the_house_and_the_estimate() -> None:
+    told = {kind for case in CASES for kind, *_ in case["reasons"]}
+    assert told == set(Kind) - {Kind.SILENT, Kind.STOPPED, Kind.CHANGED}
+
+
+def test_a_reason_says_which_observation_it_comes_from() -> None:
+    by_name = {case["name"]: case for case in CASES}
+    (cold,) = judge(by_name["a lethal cold"]).reasons
+    assert cold.since_ns == ago(60)
+    (pest,) = judge(by_name["a pest among good readings"]).reasons
+    assert pest.since_ns == ago(90)
+    (failed,) = judge(by_name["the last try failed"]).reasons
+    assert failed.since_ns == ago(30)
+    (never,) = judge(by_name["never scanned"]).reasons
+    assert never.since_ns is None
+
+
+def test_what_was_observed_after_now_is_as_old_as_now() -> None:
+    assert judge(CASES[0], NOW_NS - 10**12).verdict is Verdict.HEALTHY
+
+
+@pytest.mark.parametrize(
+    ("tags", "house"),
+    [
+        (["healthy", "healthy"], "healthy"),
+        (["healthy", "stressed"], "stressed"),
+        (["stressed", "critical", "healthy"], "critical"),
+        (["unknown", "healthy"], "unknown"),
+        (["unknown", "stressed", "healthy"], "stressed"),
+        (["unknown", "unknown", "critical"], "unknown"),
+        ([], "unknown"),
+    ],
+)
+def test_a_house_is_its_worst_tag_and_unknown_where_most_tags_are(
+    tags: list[str], house: str
+) -> None:
+    assert judge_house(Counter(map(Verdict, tags)), is_silent=False).verdict == house
+
+
+def test_of_a_silent_twin_nothing_is_known() -> None:
+    judged = judge_house({Verdict.HEALTHY: 1}, is_silent=True)
+    assert judged.verdict is Verdict.UNKNOWN
+    assert [reason.kind for reason in judged.reasons] == [Kind.SILENT]
+
+
+def test_critical_is_the_worst_and_healthy_the_best() -> None:
+    assert worst(Verdict) is Verdict.CRITICAL
+    assert worst([Verdict.HEALTHY, Verdict.UNKNOWN]) is Verdict.UNKNOWN
+    assert worst([]) is None

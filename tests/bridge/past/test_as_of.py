@@ -1,0 +1,280 @@
+"""Answers as of a moment: what they say, and ETags that stand for exactly that."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lupin_bridge.field.formats import FORMATS, JSON, PNG, FieldFormat
+from lupin_bridge.field.query import parse
+from lupin_bridge.judge.choosing import Criteria, own_sensors
+from lupin_bridge.judge.daylight import ClockDay
+from lupin_bridge.judge.derived import vapour_pressure_deficit_kpa
+from lupin_bridge.past import as_of
+from lupin_bridge.past.as_of import FieldAsked, Plan
+from lupin_bridge.stream import schema
+from lupin_twin.explored import OccupancyMap, occupancy_map
+from lupin_twin.fields import FieldRefused, FieldRules
+from lupin_twin.state import Pose, Reading, Snapshot, TagState
+from lupin_twin.workers import SMALL_S
+
+NS = 10**9
+RULES = FieldRules(2.0, 1.5, 1.5, clip_to_explored=False, max_grid_cells=10_000)
+
+
+def tag(tag_id: str, x: float, value: float, at_ns: int = NS) -> TagState:
+    pose = Pose(x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    return TagState(tag_id, pose, (Reading("co2", value, at_ns),), at_ns)
+
+
+HOUSE = Snapshot(5 * NS, "map", (tag("a", 0.0, 400.0), tag("b", 1.0, 500.0)))
+
+
+def a_map(revision: int, free: int = 0) -> OccupancyMap:
+    return occupancy_map(
+        frame_id="map",
+        stamp_ns=revision,
+        width=2,
+        height=1,
+        resolution=0.5,
+        origin_x=0.0,
+        origin_y=0.0,
+        origin_yaw=0.0,
+        data=np.array([free, -1], dtype=np.int8),
+        revision=revision,
+    )
+
+
+def asked(
+    rules: FieldRules = RULES, occupancy: OccupancyMap | None = None, **parameters: Any
+) -> FieldAsked:
+    values = {"sensor_type": "co2", **parameters}
+    query = parse([(name, str(value)) for name, value in values.items()])
+    return FieldAsked(query, rules, occupancy, own_sensors())
+
+
+def body(plan: Plan) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(bytes(plan.write(lambda: False).body))
+    return found
+
+
+def test_a_state_has_its_moment_and_the_ages_of_then() -> None:
+    found = body(as_of.state(HOUSE))
+    schema.TwinState.model_validate(found)
+    assert found["header"] == {"stamp": {"sec": 5, "nanosec": 0}, "frame_id": "map"}
+    assert [t["stale_seconds"] for t in found["tags"]] == [4.0, 4.0]
+    assert found["tags"][0]["readings"][0]["stale_seconds"] == 4.0
+
+
+def test_a_tag_is_the_one_in_the_state() -> None:
+    plan = as_of.tag(HOUSE, "b")
+    assert plan is not None
+    assert body(plan) == body(as_of.state(HOUSE))["tags"][1]
+    assert as_of.tag(HOUSE, "c") is None
+
+
+def test_a_field_is_that_of_the_tags_of_then_over_the_box_of_then() -> None:
+    found = body(as_of.field(HOUSE, asked(), JSON))
+    schema.GetFieldResponse.model_validate(found)
+    assert (found["origin_x"], found["origin_y"]) == (-1.5, -1.5)
+    assert (found["width"], found["height"], found["sample_count"]) == (40, 30, 2)
+    assert 400.0 <= found["value_min"] < found["value_max"] <= 500.0
+    found = body(as_of.quality(HOUSE, asked()))
+    schema.FieldQuality.model_validate(found)
+    assert (found["sample_count"], found["rmse"]) == (2, 100.0)
+
+
+def test_what_is_derived_is_made_of_the_readings_of_one_scan() -> None:
+    def air(tag_id: str, x: float, humidity_at_ns: int) -> TagState:
+        dry = tag(tag_id, x, 0.0)
+        humidity = Reading("humidity", 60.0, humidity_at_ns)
+        return replace(dry, readings=(Reading("temperature", 25.0, NS), humidity))
+
+    house = Snapshot(5 * NS, "map", (air("a", 0.25, NS), air("b", 9.0, 2 * NS)))
+    box = {"bbox_min_x": 0, "bbox_min_y": 0, "bbox_max_x": 0.5, "bbox_max_y": 0.5}
+    query: dict[str, Any] = {"sensor_type": "vpd", "resolution": 0.5, **box}
+    found = body(as_of.field(house, asked(**query), JSON))
+    assert found["values"] == [pytest.approx(vapour_pressure_deficit_kpa(25.0, 60.0), rel=1e-6)]
+    assert found["sample_count"] == 1
+    quality = body(as_of.quality(house, asked(**query)))
+    assert (quality["sensor_type"], quality["unit"], quality["sample_count"]) == ("vpd", "kPa", 1)
+
+
+def test_before_there_was_anything_there_is_an_empty_state_and_an_empty_field() -> None:
+    nothing = Snapshot(1, "map", ())
+    assert body(as_of.state(nothing))["tags"] == []
+    found = body(as_of.field(nothing, asked(), JSON))
+    assert (found["sample_count"], set(found["values"])) == (0, {None})
+
+
+def test_a_field_is_clipped_to_the_map_of_now() -> None:
+    rules = replace(RULES, clip_to_explored=True)
+    box = {"bbox_min_x": 0, "bbox_min_y": 0, "bbox_max_x": 1, "bbox_max_y": 0.5, "resolution": 0.5}
+    found = body(as_of.field(HOUSE, asked(rules, a_map(1), **box), JSON))
+    assert [value is None for value in found["values"]] == [False, True]
+    assert set(body(as_of.field(HOUSE, asked(rules, None, **box), JSON))["values"]) == {None}
+
+
+def judged_at(at_s: float, *tags: TagState, holds: dict[str, int] | None = None) -> Plan:
+    criteria = Criteria(own_sensors(), None, ClockDay(UTC))
+    at_ns = int(at_s * NS)
+    judge_day = criteria.judge_day(at_ns)
+    return as_of.health(Snapshot(at_ns, "map", tags), criteria.sensors, holds or {}, judge_day)
+
+
+def verdict_of(plan: Plan) -> tuple[str, str]:
+    found = body(plan)
+    schema.Judgement.model_validate(found)
+    return found["house"]["verdict"], found["house"]["day"]["source"]
+
+
+def test_a_moment_is_judged_by_the_light_of_then_else_by_its_clock() -> None:
+    def cool_at(at_s: float, *more: Reading) -> Plan:
+        at_ns = int(at_s * NS)
+        cool = Reading("temperature", 16.0, at_ns)
+        return judged_at(at_s, TagState("a", readings=(cool, *more)))
+
+    noon = 1_795_262_400.0
+    assert verdict_of(cool_at(noon)) == ("stressed", "clock")
+    assert verdict_of(cool_at(noon + 12 * 3600)) == ("healthy", "clock")
+    dark = Reading("light", 0.0, int(noon * NS))
+    assert verdict_of(cool_at(noon, dark)) == ("healthy", "light")
+    assert verdict_of(cool_at(100.0)) == ("stressed", "assumed"), "a simulation has no hours"
+
+
+def test_readings_held_as_long_as_those_of_the_tag_do_now() -> None:
+    old = TagState("a", readings=(Reading("temperature", 22.0, NS),))
+    assert verdict_of(judged_at(601, old))[0] == "healthy"
+    assert verdict_of(judged_at(602, old))[0] == "unknown"
+    assert verdict_of(judged_at(602, old, holds={"a": 700 * NS}))[0] == "healthy"
+
+
+def test_the_etag_of_a_judgement_is_that_of_what_is_said() -> None:
+    old = TagState("a", readings=(Reading("temperature", 22.0, NS),))
+    first = judged_at(602, old, holds={"a": 700 * NS}).etag
+    assert judged_at(602, old, holds={"a": 800 * NS}).etag == first
+    assert judged_at(602, old).etag != first
+    assert judged_at(601, old).etag != first
+
+
+# --- refusals -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"sensor_type": ""}, "sensor_type is empty"),
+        ({"resolution": 0}, "resolution"),
+        ({"scale": 2}, "only a PNG"),
+    ],
+)
+def test_what_is_wrong_by_itself_is_refused_before_anything_is_known(
+    parameters: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(FieldRefused, match=message):
+        asked(**parameters).check(JSON)
+    asked().check(JSON)
+
+
+def test_what_is_too_large_by_the_tags_of_then_is_refused() -> None:
+    limit = replace(RULES, max_grid_cells=40 * 30)
+    as_of.field(HOUSE, asked(limit), JSON)
+    with pytest.raises(FieldRefused, match="the limit is 1199"):
+        as_of.field(HOUSE, asked(replace(RULES, max_grid_cells=1_199)), JSON)
+    as_of.field(HOUSE, asked(replace(RULES, max_grid_cells=4_800), scale=2), PNG)
+    with pytest.raises(FieldRefused, match="4800 pixels, the limit is 4799"):
+        as_of.field(HOUSE, asked(replace(RULES, max_grid_cells=4_799), scale=2), PNG)
+
+
+# --- ETags ----------------------------------------------------------------------------------------
+
+
+def plans(house: Snapshot, field: FieldAsked) -> list[str]:
+    """The ETags of every kind of answer."""
+    tags = [as_of.tag(house, "a"), as_of.tag(house, "b")]
+    return [
+        as_of.state(house).etag,
+        *(plan.etag for plan in tags if plan is not None),
+        *(as_of.field(house, field, field_format).etag for field_format in FORMATS),
+        as_of.quality(house, field).etag,
+    ]
+
+
+def test_the_same_content_has_the_same_etags_whoever_made_it() -> None:
+    again = Snapshot(5 * NS, "map", (tag("a", 0.0, 400.0), tag("b", 1.0, 500.0)))
+    clipped = replace(RULES, clip_to_explored=True)
+    for one, other in ((asked(), asked()), (asked(clipped, a_map(1)), asked(clipped, a_map(7)))):
+        assert plans(again, other) == plans(HOUSE, one)
+        assert len(set(plans(HOUSE, one))) == 7
+
+
+def later(house: Snapshot) -> Snapshot:
+    return replace(house, stamp_ns=6 * NS)
+
+
+def changed(**changes: Any) -> Callable[[Snapshot], Snapshot]:
+    return lambda house: replace(house, tags=(replace(house.tags[0], **changes), house.tags[1]))
+
+
+@pytest.mark.parametrize(
+    ("change", "field_changes"),
+    [
+        (later, False),  # the same field, whenever it is looked at
+        (changed(readings=(Reading("co2", 401.0, NS),)), True),
+        (changed(readings=(Reading("co2", math.nan, NS),)), True),
+        (changed(readings=(Reading("co2", 400.0, 2 * NS),)), False),
+        (changed(pose=None), True),
+        (changed(looked_at_ns=1), False),
+    ],
+)
+def test_what_changes_an_answer_changes_its_etag(
+    change: Callable[[Snapshot], Snapshot], field_changes: bool
+) -> None:
+    house = change(HOUSE)
+    assert as_of.state(house).etag != as_of.state(HOUSE).etag
+    for field_format in FORMATS:
+        one, other = (as_of.field(h, asked(), field_format) for h in (HOUSE, house))
+        assert (one.etag != other.etag) is field_changes
+        is_same = one.write(lambda: False) == other.write(lambda: False)
+        assert is_same is not field_changes
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        asked(sensor_type="light"),
+        asked(resolution=0.2),
+        asked(bbox_min_x=0, bbox_min_y=0, bbox_max_x=1, bbox_max_y=1),
+        asked(replace(RULES, idw_power=3.0)),
+        asked(replace(RULES, clip_to_explored=True)),
+        asked(replace(RULES, clip_to_explored=True), a_map(1)),
+        asked(replace(RULES, clip_to_explored=True), a_map(1, free=-1)),
+    ],
+)
+def test_another_field_has_another_etag(other: FieldAsked) -> None:
+    assert not set(plans(HOUSE, other)[3:]) & set(plans(HOUSE, asked())[3:])
+
+
+def test_a_scaled_picture_is_another_one() -> None:
+    etags = {as_of.field(HOUSE, asked(scale=scale), PNG).etag for scale in (1, 2)}
+    assert len(etags) == 2
+
+
+# --- cost -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("field_format", [JSON, PNG])
+def test_what_takes_long_says_so(field_format: FieldFormat) -> None:
+    large = replace(RULES, max_grid_cells=1_000_000)
+    assert as_of.field(HOUSE, asked(), field_format).cost_s < SMALL_S
+    assert as_of.field(HOUSE, asked(large, resolution=0.004), field_format).cost_s > SMALL_S
+    many = Snapshot(NS, "map", tuple(tag(str(n), n, 1.0) for n in range(2_000)))
+    assert as_of.state(many).cost_s > SMALL_S > as_of.state(HOUSE).cost_s
+    assert as_of.quality(many, asked(large, resolution=1)).cost_s > SMALL_S

@@ -1,0 +1,109 @@
+"""What is asked of the past: it crosses, it says what it costs, who has the answer gets none."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import pickle
+from typing import Any
+
+import pytest
+
+from lupin_bridge.field.formats import PNG
+from lupin_bridge.judge.choosing import Criteria, own_sensors
+from lupin_bridge.past.as_of import Written
+from lupin_bridge.past.asked import (
+    Answered,
+    Answering,
+    Asked,
+    AsOf,
+    Field,
+    Health,
+    History,
+    NoSuchTag,
+    OneTag,
+    Timeline,
+    WholeState,
+)
+from lupin_bridge.past.query import TimelineQuery
+from lupin_bridge.settings import Settings
+from lupin_twin.idw import never
+from lupin_twin.past import Event, SeriesPast, SeriesRequest
+from lupin_twin.workers import SMALL_S
+from tests.bridge.past.test_as_of import HOUSE, NS, asked
+
+CRITERIA = Criteria.of(Settings(time_zone="Europe/Amsterdam"))
+QUESTIONS: tuple[Asked, ...] = (
+    AsOf(5 * NS, WholeState()),
+    AsOf(5 * NS, OneTag("b")),
+    AsOf(5 * NS, Health(CRITERIA, {"a": NS})),
+    AsOf(5 * NS, Field(asked(), PNG)),
+    AsOf(5 * NS, Field(asked(), None)),
+    History(SeriesRequest("a", "co2"), 9 * NS, own_sensors()),
+    Timeline(TimelineQuery(0, 9 * NS, 5, None)),
+)
+
+
+def answer(question: Asked, has: str = "") -> Answered:
+    """What is made of the house, and of series without an entry."""
+    looking = Answering(question, has).look()
+    found: Any = None
+    try:
+        while True:
+            need = looking.send(found)
+            found = SeriesPast(0, 9 * NS) if isinstance(need, SeriesRequest) else HOUSE
+    except StopIteration as end:
+        answered: Answered = end.value.do(never)
+        return answered
+
+
+@pytest.mark.parametrize("question", QUESTIONS, ids=lambda q: type(getattr(q, "of", q)).__name__)
+def test_it_crosses_and_its_answer_is_the_same_there(question: Asked) -> None:
+    there: Asked = pickle.loads(pickle.dumps(question, 5))
+    assert there == question
+    assert hash(there) == hash(question)
+    told = answer(there)
+    assert told == answer(question)
+    assert pickle.loads(pickle.dumps(told, 5)) == told
+    # Who has it is told so: the ETag is the same, and nothing is written.
+    assert answer(there, f'"other", W/{told.etag}') == Answered(told.etag, None)
+
+
+def test_a_timeline_asks_for_its_parts_one_by_one() -> None:
+    looking = Timeline(TimelineQuery(0, 9 * NS, 5, None)).look()
+    needs = [next(looking)]
+    with contextlib.suppress(StopIteration):
+        while True:
+            needs.append(looking.send(SeriesPast(0, 9 * NS)))
+    assert {need.sensor_type for need in needs if isinstance(need, SeriesRequest)} == set(Event)
+
+
+def test_a_large_body_goes_beside_the_rest() -> None:
+    for length, beside in ((65_536, 0), (65_537, 1)):
+        answered = Answered("x", Written(b"7" * length, "text/plain", {"a": "b"}))
+        buffers: list[pickle.PickleBuffer] = []
+        text = pickle.dumps(answered, 5, buffer_callback=buffers.append)
+        assert (len(buffers), len(text) > length) == (beside, not beside)
+        found = pickle.loads(text, buffers=[buffer.raw() for buffer in buffers])
+        assert found.written is not None
+        assert bytes(found.written.body) == b"7" * length
+
+
+def test_a_tag_that_was_not_known_is_told_with_how_many_were() -> None:
+    with pytest.raises(NoSuchTag) as caught:
+        answer(AsOf(5 * NS, OneTag("c")))
+    there = pickle.loads(pickle.dumps(caught.value))
+    assert (there.tag_id, there.known) == ("c", 2)
+
+
+def test_a_large_house_and_a_large_field_cost_more_than_small_ones() -> None:
+    def cost_s(question: Asked, tags: int) -> float:
+        return question.look_s(tags) + question.write_s(tags)
+
+    for question in QUESTIONS:
+        assert cost_s(question, 10_000) >= cost_s(question, 30)
+    assert cost_s(QUESTIONS[0], 30) < SMALL_S < cost_s(QUESTIONS[0], 10_000)
+    fine = AsOf(0, Field(asked(resolution=0.001), PNG))
+    assert cost_s(fine, 30) > SMALL_S, "one that will be refused is no small one"
+    for question in QUESTIONS[:5]:
+        assert json.dumps(cost_s(question, 0))

@@ -1,0 +1,132 @@
+"""What a query string asks of the past: what it says, and nothing that nobody said."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from lupin_bridge.past import query
+from lupin_bridge.past.query import ExportQuery, TimelineQuery
+from lupin_twin.bounds import MAX_TEXT_LENGTH
+from lupin_twin.past import DEFAULT_POINTS, MAX_POINTS, PastRefused, SeriesRequest
+
+NS = 10**9
+NOW_NS = 1_000 * NS
+Parse = Callable[[list[tuple[str, str]], int | None], Any]
+ALL: dict[Parse, tuple[str, ...]] = {
+    query.at: ("at",),
+    query.history: query.HISTORY_NAMES,
+    query.timeline: query.TIMELINE_NAMES,
+    query.export: query.EXPORT_NAMES,
+}
+NEEDED: dict[Parse, dict[str, str]] = {query.history: {"tag_id": "7", "sensor_type": "co2"}}
+
+
+def ask(parse: Parse, **given: str) -> Any:
+    values = NEEDED.get(parse, {}) | {name.rstrip("_"): value for name, value in given.items()}
+    return parse(list(values.items()), NOW_NS)
+
+
+def test_what_is_left_out_is_all_that_is_kept() -> None:
+    assert query.at([], NOW_NS) is None
+    assert ask(query.history) == SeriesRequest("7", "co2", 0, 0, DEFAULT_POINTS)
+    assert ask(query.timeline) == TimelineQuery(0, 0, DEFAULT_POINTS, None)
+    assert ask(query.export) == ExportQuery(0, 0, None, None)
+
+
+def test_what_is_given_is_what_is_asked() -> None:
+    period = {"from_": "1.5", "to": "1970-01-01T00:00:09Z"}
+    start_ns, end_ns = 3 * NS // 2, 9 * NS
+    assert query.at([("at", "8.000000001")], NOW_NS) == 8 * NS + 1
+    assert ask(query.history, **period, points="7") == SeriesRequest(
+        "7", "co2", start_ns, end_ns, 7
+    )
+    assert ask(query.timeline, **period, points="5000", tag_id="a/b") == TimelineQuery(
+        start_ns, end_ns, 5000, "a/b"
+    )
+    assert ask(query.export, **period, tag_id="7", sensor_type="co2") == ExportQuery(
+        start_ns, end_ns, "7", "co2"
+    )
+
+
+@pytest.mark.parametrize("parse", ALL)
+def test_an_unknown_parameter_is_refused_and_the_known_ones_are_named(parse: Parse) -> None:
+    for name in ("fron", "FROM", "", "at " * 2_000, "resolution"):
+        with pytest.raises(PastRefused) as refused:
+            parse([(name, "1")], NOW_NS)
+        assert repr(name[:64]) in str(refused.value)
+        assert ", ".join(ALL[parse]) in str(refused.value)
+        assert len(str(refused.value)) < 200
+
+
+@pytest.mark.parametrize("parse", ALL)
+def test_a_repeated_parameter_is_refused_even_with_the_same_value(parse: Parse) -> None:
+    for name in ALL[parse]:
+        with pytest.raises(PastRefused, match=f"^{name} is given more than once"):
+            parse([(name, "1"), (name, "1")], NOW_NS)
+
+
+# --- moments and periods --------------------------------------------------------------------------
+
+
+def test_now_can_be_asked_for_and_what_has_not_come_is_refused() -> None:
+    assert query.at([("at", "1000")], NOW_NS) == NOW_NS
+    assert ask(query.history, from_="1000").start_ns == NOW_NS
+    later = "1000.000000001"
+    with pytest.raises(PastRefused) as refused:
+        query.at([("at", later)], NOW_NS)
+    assert str(refused.value) == f"at is {later} s, later than now, 1000.000000000 s"
+    with pytest.raises(PastRefused, match=r"^from is 1000\.000000001 s, later than now"):
+        ask(query.history, from_=later)
+
+
+def test_where_nobody_knows_when_now_is_nothing_is_later() -> None:
+    assert query.at([("at", "2000000000")], None) == 2 * 10**9 * NS
+
+
+def test_a_period_may_end_after_now_and_be_empty_but_not_be_inverted() -> None:
+    assert ask(query.export, from_="2000", to="2001").start_ns == 2_000 * NS
+    assert ask(query.export, from_="5", to="5").end_ns == 5 * NS
+    with pytest.raises(PastRefused, match=r"^to is 4\.999999999 s, before from, 5\.000000000 s"):
+        ask(query.export, from_="5", to="4.999999999")
+
+
+@pytest.mark.parametrize("parse", [query.history, query.timeline, query.export])
+def test_an_end_at_0_is_not_taken_for_now(parse: Parse) -> None:
+    with pytest.raises(PastRefused, match=r"^to is 0 s"):
+        ask(parse, to="0")
+
+
+# --- the rest -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("text", ["0", "5001", "-1", "1.5", "", "²", "٣", "1e2", "9" * 5_000, "x"])
+def test_points_out_of_their_range_are_refused(text: str) -> None:
+    for parse in (query.history, query.timeline):
+        with pytest.raises(PastRefused, match=f"^points is .* from 1 to {MAX_POINTS}$"):
+            ask(parse, points=text)
+
+
+@pytest.mark.parametrize("points", [1, MAX_POINTS])
+def test_both_ends_of_points_belong_to_them(points: int) -> None:
+    assert ask(query.history, points=str(points)).max_points == points
+    assert ask(query.timeline, points=str(points)).points == points
+
+
+@pytest.mark.parametrize("parse", [query.history, query.timeline, query.export])
+def test_an_empty_name_is_refused_and_so_is_one_that_nothing_can_have(parse: Parse) -> None:
+    with pytest.raises(PastRefused, match=r"^tag_id is empty"):
+        ask(parse, tag_id="")
+    assert ask(parse, tag_id="x" * MAX_TEXT_LENGTH).tag_id == "x" * MAX_TEXT_LENGTH
+    with pytest.raises(PastRefused, match=f"257 characters, the limit is {MAX_TEXT_LENGTH}"):
+        ask(parse, tag_id="x" * (MAX_TEXT_LENGTH + 1))
+
+
+def test_a_history_is_of_one_sensor_or_of_an_event() -> None:
+    with pytest.raises(PastRefused, match="sensor_type is empty"):
+        query.history([("tag_id", "7")], NOW_NS)
+    with pytest.raises(PastRefused, match="'~dances' is none of ~scans"):
+        ask(query.history, sensor_type="~dances")
+    assert ask(query.history, sensor_type="~looks").event == "~looks"

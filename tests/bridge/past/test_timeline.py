@@ -1,0 +1,186 @@
+"""What happened when, in buckets: the same whichever way a source tells of it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import orjson
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lupin_bridge.past import schema, timeline
+from lupin_bridge.past.query import TimelineQuery
+from lupin_bridge.past.timeline import COUNTED, Parts, period
+from lupin_twin.past import HOUR_NS, Event, Grid, SeriesPast, grid
+
+NS = 10**9
+
+
+def one_by_one(stamps_ns: list[int], start_ns: int, end_ns: int) -> SeriesPast:
+    """Events as they were."""
+    ones = (1.0,) * len(stamps_ns)
+    stamps = tuple(sorted(stamps_ns))
+    return SeriesPast(start_ns, end_ns, None, stamps, (1,) * len(stamps), ones, ones, ones)
+
+
+def in_buckets(stamps_ns: list[int], told: Grid) -> SeriesPast:
+    """The same in buckets, those without any absent."""
+    found = Counter((stamp - told.start_ns) // told.bucket_ns for stamp in stamps_ns)
+    starts = tuple(told.start_ns + number * told.bucket_ns for number in sorted(found))
+    counts = tuple(found[number] for number in sorted(found))
+    ones = (1.0,) * len(counts)
+    return SeriesPast(told.start_ns, told.end_ns, told.bucket_ns, starts, counts, ones, ones, ones)
+
+
+def parts(
+    start_ns: int = 0,
+    end_ns: int = 100 * NS,
+    silences: SeriesPast | None = None,
+    runs: SeriesPast | None = None,
+    points: int = 10,
+    **counted: SeriesPast,
+) -> Parts:
+    """What a source says; nothing of what is not given."""
+    nothing = SeriesPast(start_ns, end_ns)
+    return Parts(
+        runs or nothing,
+        grid(start_ns, end_ns, points),
+        {event: counted.get(name, nothing) for name, event in COUNTED.items()},
+        silences or nothing,
+    )
+
+
+def written(given_: Parts) -> dict[str, Any]:
+    """The body as a client reads it, which has to be what the contract says."""
+    text = orjson.dumps(timeline.body(given_))
+    schema.Timeline.model_validate_json(text)
+    found: dict[str, Any] = orjson.loads(text)
+    return found
+
+
+def at(seconds: int) -> dict[str, int]:
+    return {"sec": seconds, "nanosec": 0}
+
+
+def test_every_kind_of_event_is_counted_under_its_name() -> None:
+    end_ns = 100 * NS
+    found = written(
+        parts(
+            scans=one_by_one([NS, 2 * NS, 55 * NS], 0, end_ns),
+            failures=one_by_one([3 * NS], 0, end_ns),
+            looks=one_by_one([55 * NS], 0, end_ns),
+            pests_seen=one_by_one([55 * NS], 0, end_ns),
+            pests_cleared=one_by_one([99 * NS], 0, end_ns),
+        )
+    )
+    none = dict.fromkeys(COUNTED, 0)
+    assert (found["from"], found["to"], found["bucket_s"]) == (at(0), at(100), 10.0)
+    assert found["buckets"] == [
+        {**none, "start": at(0), "scans": 2, "failures": 1},
+        {**none, "start": at(50), "scans": 1, "looks": 1, "pests_seen": 1},
+        {**none, "start": at(90), "pests_cleared": 1},
+    ]
+
+
+def test_nothing_at_all_is_told_as_that() -> None:
+    found = written(parts(5 * NS, 5 * NS))
+    assert (found["from"], found["to"], found["reach"]) == (at(5), at(5), None)
+    assert (found["buckets"], found["silences"], found["runs"]) == ([], [], [])
+
+
+def test_silences_are_stretches() -> None:
+    silences = SeriesPast(0, 100 * NS, None, (NS,), (1,), (2.5,), (2.5,), (2.5,))
+    assert written(parts(silences=silences))["silences"] == [
+        {"from": at(1), "to": {"sec": 3, "nanosec": 500_000_000}}
+    ]
+
+
+def test_of_too_many_silences_the_longest_of_each_bucket_is_told() -> None:
+    silences = SeriesPast(0, 100 * NS, 10 * NS, (20 * NS,), (7,), (1.0,), (0.5,), (4.0,))
+    assert written(parts(silences=silences))["silences"] == [{"from": at(20), "to": at(24)}]
+
+
+def test_the_runs_that_meet_the_period_are_told_and_how_far_all_of_them_reach() -> None:
+    runs = SeriesPast(
+        2 * NS,
+        500 * NS,
+        None,
+        (2 * NS, 10 * NS, 80 * NS, 200 * NS),
+        (1, 1, 1, 1),
+        (3.0, 40.0, 100.0, 300.0),
+        (0.0, 1.0, 0.0, 0.0),
+        (0.0, 1.0, 0.0, 0.0),
+    )
+    found = written(parts(50 * NS, 100 * NS, runs=runs))
+    assert found["reach"] == {"from": at(2), "to": at(500)}
+    assert found["runs"] == [
+        {"from": at(10), "to": at(50), "is_simulated": True},
+        {"from": at(80), "to": at(180), "is_simulated": False},
+    ]
+
+
+def test_the_period_is_what_is_asked_for_or_all_that_there_is() -> None:
+    runs = SeriesPast(7 * NS, 107 * NS)
+    assert period(TimelineQuery(0, 0, 100, None), runs) == Grid(7 * NS, 107 * NS, NS)
+    assert period(TimelineQuery(57 * NS, 0, 100, None), runs) == Grid(57 * NS, 107 * NS, NS // 2)
+    assert period(TimelineQuery(0, 57 * NS, 100, None), runs) == Grid(7 * NS, 57 * NS, NS // 2)
+    # Nobody knew when now is, and it was not later than the beginning.
+    assert period(TimelineQuery(200 * NS, 0, 100, None), runs).end_ns == 200 * NS
+    # Buckets that were counted before begin on whole slots.
+    month = period(TimelineQuery(NS, 30 * 86_400 * NS, 500, None), runs)
+    assert (month.start_ns, month.bucket_ns % HOUR_NS) == (0, 0)
+
+
+@given(st.integers(0, 2 * 10**18), st.integers(0, 10**18), st.integers(1, 5_000))
+def test_what_is_asked_over_the_period_comes_in_its_buckets(
+    start_ns: int, length_ns: int, points: int
+) -> None:
+    told = grid(start_ns, start_ns + length_ns, points)
+    assert grid(told.start_ns, told.end_ns, points) == told
+
+
+STAMPS = st.lists(st.integers(0, 999), max_size=30)
+
+
+@given(STAMPS, STAMPS, st.integers(0, 10**12), st.integers(1, 50))
+def test_each_event_is_in_the_one_bucket_that_holds_it(
+    scans: list[int], looks: list[int], start_ns: int, points: int
+) -> None:
+    end_ns = start_ns + 1_000
+    given_ = parts(
+        start_ns,
+        end_ns,
+        points=points,
+        scans=one_by_one([start_ns + stamp for stamp in scans], start_ns, end_ns),
+        looks=one_by_one([start_ns + stamp for stamp in looks], start_ns, end_ns),
+    )
+    found = timeline.body(given_)
+    width_ns = -(-1_000 // points)
+    assert found["bucket_s"] == width_ns / NS
+    for name, stamps in (("scans", scans), ("looks", looks)):
+        plain = [0] * points
+        for stamp in stamps:
+            plain[stamp // width_ns] += 1
+        told = {
+            (b["start"]["sec"] * NS + b["start"]["nanosec"] - start_ns) // width_ns: b[name]
+            for b in found["buckets"]
+        }
+        assert [told.get(number, 0) for number in range(points)] == plain
+    assert all(bucket["scans"] or bucket["looks"] for bucket in found["buckets"])
+
+
+@given(STAMPS, STAMPS, st.integers(1, 50))
+def test_bucketed_or_not_the_counts_are_the_same(
+    scans: list[int], looks: list[int], points: int
+) -> None:
+    plain = parts(
+        0,
+        1_000,
+        points=points,
+        scans=one_by_one(scans, 0, 1_000),
+        looks=one_by_one(looks, 0, 1_000),
+    )
+    bucketed = {**plain.counted, Event.SCANS: in_buckets(scans, plain.period)}
+    mixed = Parts(plain.runs, plain.period, bucketed, plain.silences)
+    assert timeline.body(mixed) == timeline.body(plain)

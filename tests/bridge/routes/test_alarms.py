@@ -1,0 +1,84 @@
+"""What `/api/alarms` takes and refuses; what it tells is held in test_live_alarms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from lupin_bridge.judge.alarm import Alarm
+from lupin_bridge.judge.verdict import Kind, Reason, Verdict
+from lupin_bridge.past.query import AlarmsQuery
+from lupin_bridge.routes.alarms import _of
+from lupin_bridge.stream import schema
+from tests.support.messages import look
+from tests.support.rosbridge import ros_at
+from tests.support.waiting import wait_for
+from tests.support.web import Bridge, bridge
+
+
+@pytest.fixture(scope="module")
+def live() -> Iterator[Bridge]:
+    """Without a journal."""
+    with bridge("--ros-args", "-p", "journal:=off") as running:
+        running.peer.wait_for_twin()
+        running.peer.observe(look("a", anomaly=True, bug_count=2))
+        wait_for(lambda: alarms(running), "the alarm")
+        yield running
+
+
+def alarms(live: Bridge, **query: Any) -> list[schema.Alarm]:
+    body = schema.Alarms.model_validate(live.json("/api/alarms", **query))
+    return body.alarms
+
+
+def test_without_a_journal_it_tells_what_it_heard_and_says_so(live: Bridge) -> None:
+    body = schema.Alarms.model_validate(live.json("/api/alarms"))
+    [pest] = body.alarms
+    assert (pest.tag_id, pest.reason.kind, pest.worst, pest.cleared_at) == ("a", "pest", 2.0, None)
+    assert (body.source, body.since) == ("heard", pest.raised_at)
+    with ros_at(live.url) as ros:
+        ros.subscribe()
+        live.peer.observe(look("b"))
+        live.peer.observe(look("a"))
+        wait_for(lambda: not alarms(live, active=1), "it to be cleared")
+        # What roslib hears is the ROS message, and no word of alarms.
+        ros.send(op="call_service", service="/rosapi/topics", id="the end")
+        while (message := ros.next()).get("id") != "the end":
+            assert message["op"] == "publish"
+    [over] = alarms(live, active=0)
+    assert (over.id, over.cleared_at is not None) == (pest.id, True)
+    assert over.cleared_at is not None
+    until = over.cleared_at.sec + over.cleared_at.nanosec / 1e9
+    assert alarms(live, to=pest.raised_at.sec) == []
+    assert len(alarms(live, **{"from": until - 1.0})) == 1
+    assert "lupin_alarms_active 0" in live.get("/metrics").text
+
+
+@pytest.mark.parametrize(
+    ("query", "says"),
+    [
+        ({"active": "yes"}, "active is 'yes', not 0 or 1"),
+        ({"from": "x"}, "from"),
+        ({"from": 2, "to": 1}, "from"),
+        ({"tag_id": "a"}, "tag_id"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(live: Bridge, query: dict[str, Any], says: str) -> None:
+    answer = live.get("/api/alarms", **query)
+    assert (answer.status_code, says in answer.json()["detail"]) == (400, True)
+
+
+def test_a_period_has_what_was_active_at_any_time_of_it() -> None:
+    reason = Reason(Kind.PEST, Verdict.CRITICAL)
+    over, still = Alarm("1", reason, "a", 20, 30), Alarm("2", reason, "a", 40)
+
+    def found(start: int, end: int, active: bool | None = None) -> list[str]:
+        is_asked = _of(AlarmsQuery(start, end, active))
+        return [alarm.id for alarm in (over, still) if is_asked(alarm)]
+
+    assert found(0, 0) == found(30, 41) == ["1", "2"]
+    assert found(31, 41) == found(31, 0) == found(0, 0, active=True) == ["2"]
+    assert found(21, 40) == found(0, 21) == found(0, 0, active=False) == ["1"]
+    assert found(0, 20) == found(31, 40) == []

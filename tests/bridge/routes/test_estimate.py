@@ -1,0 +1,119 @@
+"""The estimate over HTTP, beside the same over the ROS service of the same twin."""
+
+from __future__ import annotations
+
+import io
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Time
+from lupin_msgs.srv import GetEstimate
+from PIL import Image
+
+from lupin_bridge.stream.estimate_schema import GetEstimateResponse
+from tests.support.messages import scan
+from tests.support.waiting import wait_for
+from tests.support.web import Bridge, bridge
+
+NOW_S = int(time.time())
+PLACES = {"a": (0.25, 0.25), "b": (1.75, 2.75), "c": (0.5, 2.0)}
+BOX = {"bbox_min_x": 0.0, "bbox_min_y": 0.0, "bbox_max_x": 2.0, "bbox_max_y": 3.0}
+QUERY: dict[str, Any] = {"sensor_type": "temperature", "resolution": 0.5, **BOX}
+
+
+@pytest.fixture(scope="module")
+def live() -> Iterator[Bridge]:
+    """A bridge whose twin has read three tags for six hours."""
+    with bridge("--field-rate-hz", "10000") as running:
+        for hour in range(6, 0, -1):
+            for number, (tag_id, at) in enumerate(PLACES.items()):
+                stamp_s = NOW_S - 3600 * hour + 60 * number
+                readings = {"temperature": 20.0 + 3.0 * at[0] + 0.1 * hour}
+                running.peer.observe(scan(tag_id, readings, stamp_s=stamp_s, at=at))
+        running.peer.observe(scan("last", {"co2": 1.0}))
+        running.tag("last")
+        yield running
+
+
+def test_the_service_and_the_formats_give_the_same_numbers(live: Bridge) -> None:
+    at: dict[str, Any] = {"at": NOW_S - 1800}
+
+    def all_of_one_model() -> Any:
+        service = live.peer.ask(
+            GetEstimate, "/twin/get_estimate", **QUERY, at=Time(sec=NOW_S - 1800)
+        )
+        body = live.get("/api/estimate.json", **QUERY, **at)
+        npy = live.get("/api/estimate.npy", **QUERY, **at)
+        if not service.ok or {body.status_code, npy.status_code} != {200}:
+            return None  # what was just heard is not yet in a model
+        means = np.array(service.mean, np.float32), np.array(body.json()["mean"], np.float32)
+        return (service, body.json(), npy) if np.array_equal(*means) else None
+
+    service, body, npy = wait_for(all_of_one_model, "one model")
+    GetEstimateResponse.model_validate(body)
+    assert service.ok, service.error_message
+    for name, value in body.items():
+        told = getattr(service, name)
+        if isinstance(value, list):
+            np.testing.assert_array_equal(np.array(value, np.float32), np.array(told, np.float32))
+        else:
+            assert (np.float32(value) if isinstance(value, float) else value) == told, name
+    assert (body["sample_count"], body["reading_count"]) == (3, 18)
+    array = np.load(io.BytesIO(npy.content), allow_pickle=False)
+    assert array.shape == (2, 6, 4)
+    np.testing.assert_array_equal(array.reshape(2, -1), np.array([service.mean, service.sd]))
+    assert npy.headers["x-estimate-reading-count"] == "18"
+    assert np.float32(npy.headers["x-estimate-sd-known"]) == np.float32(service.sd_known)
+    assert (npy.headers["x-estimate-origin-x"], npy.headers["cache-control"]) == ("0.0", "no-cache")
+
+
+def test_a_picture_has_two_layers(live: Bridge) -> None:
+    pictures = [live.get("/api/estimate.png", **QUERY, layer=name) for name in ("mean", "sd")]
+    assert [Image.open(io.BytesIO(each.content)).size for each in pictures] == [(4, 6)] * 2
+    assert pictures[0].content != pictures[1].content
+    accepted = live.get("/api/estimate", headers={"Accept": "image/png"}, **QUERY)
+    assert (accepted.headers["content-type"], accepted.headers["vary"]) == ("image/png", "Accept")
+
+
+def test_who_has_the_answer_gets_none_until_something_is_heard(live: Bridge) -> None:
+    def same_again() -> Any:
+        first = live.get("/api/estimate", **QUERY)
+        known = {"If-None-Match": first.headers["etag"]}
+        again = live.get("/api/estimate", headers=known, **QUERY)
+        return first if again.status_code == 304 else None
+
+    first = wait_for(same_again, "no fit and no minute in between")
+    assert live.get("/api/estimate.npy", **QUERY).headers["etag"] != first.headers["etag"]
+    live.peer.observe(scan("a", {"temperature": 30.0}, at=PLACES["a"], stamp_s=NOW_S))
+    live.tag("a", lambda tag: tag["readings"][0]["value"] == 30.0)
+    other = live.get("/api/estimate", headers={"If-None-Match": first.headers["etag"]}, **QUERY)
+    assert other.status_code == 200
+    assert other.json()["reading_count"] == 19
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"sensor_type": ""}, "sensor_type is empty"),
+        ({"resolution": 0}, "resolution is 0.0"),
+        ({"resolution": 0.0001}, "limit is 1000000 in all"),
+        ({"sensor_type": "ph"}, "no tag has a reading of the 86400 s before that moment"),
+        ({"at": 2**31 - 1}, "at is 2147483647.000000000 s, later than now"),
+        ({"layer": "median"}, "layer is 'median', expected one of mean, sd"),
+        ({"layer": "sd"}, "layer is 'sd', but only a PNG has one"),
+        ({"scale": 2}, "only a PNG can be scaled"),
+        ({"lair": "sd"}, "parameter 'lair' is unknown, expected sensor_type, "),
+    ],
+)
+def test_a_refusal_is_the_service_s_and_says_why(
+    live: Bridge, changes: dict[str, Any], complaint: str
+) -> None:
+    response = live.get("/api/estimate", **{**QUERY, **changes})
+    body = response.json()
+    assert response.status_code == 400
+    assert complaint in body["error_message"]
+    assert set(body) == set(GetEstimateResponse.model_fields)
+    assert live.get("/api/estimate", headers={"Accept": "text/css"}, **QUERY).status_code == 406

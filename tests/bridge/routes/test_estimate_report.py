@@ -1,0 +1,124 @@
+"""What estimates are worth over HTTP, and what becomes of a sensor that has changed."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from lupin_bridge.stream.estimate_schema import Advice, EstimateQualities, ExpectedTags
+from tests.support.messages import scan
+from tests.support.waiting import wait_for
+from tests.support.web import Bridge, bridge
+
+NOW_S = int(time.time())
+PLACES = {"a": (0.5, 0.5), "b": (1.75, 2.75), "c": (0.5, 2.0), "d": (2.5, 1.0)}
+SENSOR = {"sensor_type": "temperature"}
+
+
+@pytest.fixture(scope="module")
+def live() -> Iterator[Bridge]:
+    """A bridge whose twin has read four tags for ten hours; one has read 9 K too much since two."""
+    with bridge("--field-rate-hz", "10000") as running:
+        running.peer.wait_for_twin()
+        for hour in range(20, 0, -1):
+            for number, (tag_id, at) in enumerate(PLACES.items()):
+                stamp_s = NOW_S - 1800 * hour + 60 * number
+                value = 20.0 + 0.3 * at[0] + 0.1 * math.sin(hour + number)
+                value += 9.0 if tag_id == "d" and hour <= 4 else 0.0
+                running.peer.observe(scan(tag_id, {"temperature": value}, stamp_s=stamp_s, at=at))
+            if hour == 11:  # a topic holds 50
+                running.peer.observe(scan("half", {"co2": 1.0}))
+                running.tag("half")
+        running.peer.observe(scan("last", {"co2": 1.0}))
+        running.tag("last")
+        yield running
+
+
+def answered(live: Bridge, path: str, accept: Any, **query: Any) -> Any:
+    def look() -> Any:
+        body = live.json(path, **query)
+        return body if accept(body) else None
+
+    return wait_for(look, path)
+
+
+def test_a_tag_that_has_changed_is_told_left_out_and_judged(live: Bridge) -> None:
+    body = answered(
+        live,
+        "/api/estimate/tags",
+        lambda body: body["tags"].get("d", {}).get("left_out"),
+        **SENSOR,
+    )
+    ExpectedTags.model_validate(body)
+    assert {tag_id: tag["left_out"] for tag_id, tag in body["tags"].items()} == {
+        **dict.fromkeys("abc", False),
+        "d": True,
+    }
+    odd = body["tags"]["d"]
+    assert odd["offset"] == pytest.approx(9.0, abs=2.0)
+    assert odd["measured"] - odd["expected"] > 6.0
+    estimate = live.json("/api/estimate", **SENSOR, resolution=0.5)
+    assert estimate["sample_count"] == 3
+    reasons = answered(
+        live, "/api/health", lambda body: "changed" in str(body["tags"]["d"]["reasons"])
+    )["tags"]["d"]["reasons"]
+    [reason] = [one for one in reasons if one["kind"] == "changed"]
+    assert (reason["verdict"], reason["sensor"], reason["limit"]) == (
+        "stressed",
+        "temperature",
+        None,
+    )
+    assert reason["value"] == odd["measured"]
+    assert NOW_S - 4 * 1800 <= reason["since"]["sec"] < NOW_S
+    metrics = live.get("/metrics").text
+    assert 'lupin_estimate_trusted{sensor="temperature"} 1.0' in metrics
+    assert 'lupin_estimate_fit_failing{sensor="temperature"} 0.0' in metrics
+
+
+def test_how_often_it_was_right_is_told_of_every_sensor_or_of_one(live: Bridge) -> None:
+    both = live.json("/api/estimate/quality")
+    EstimateQualities.model_validate(both)
+    assert list(both["sensors"]) == ["temperature"], "co2 has no place"
+    one = live.json("/api/estimate/quality", sensor_type="co2")["sensors"]["co2"]
+    assert (one["fitted_at"], one["is_trusted"]) == (None, True)
+    etag = live.get("/api/estimate/quality").headers["etag"]
+    assert wait_for(
+        lambda: (
+            live.get("/api/estimate/quality", headers={"If-None-Match": etag}).status_code == 304
+        ),
+        "no fit in between",
+    )
+
+
+def test_where_another_tag_helps_is_told_with_by_how_much(live: Bridge) -> None:
+    body = answered(live, "/api/estimate/advice", lambda body: body["places"], **SENSOR, places=3)
+    Advice.model_validate(body)
+    ratios = [place["error_ratio"] for place in body["places"]]
+    assert len(ratios) == 3
+    assert ratios == sorted(ratios, reverse=True)
+    for place in body["places"]:
+        apart = [math.dist((place["x"], place["y"]), at) for at in PLACES.values()]
+        assert min(apart) >= 0.5
+
+
+@pytest.mark.parametrize(
+    ("path", "query", "complaint"),
+    [
+        ("advice", {**SENSOR, "places": 21}, "places is 21, the limits are 1 and 20"),
+        ("advice", {**SENSOR, "places": "x"}, "places is 'x', expected a whole number"),
+        ("advice", {}, "sensor_type is empty"),
+        ("tags", {}, "sensor_type is empty"),
+        ("tags", {**SENSOR, "at": 1}, "parameter 'at' is unknown"),
+        ("quality", {"sensor_type": ""}, "sensor_type is empty"),
+    ],
+)
+def test_a_refusal_names_what_is_wrong(
+    live: Bridge, path: str, query: dict[str, Any], complaint: str
+) -> None:
+    response = live.get(f"/api/estimate/{path}", **query)
+    assert response.status_code == 400
+    assert complaint in response.json()["detail"]

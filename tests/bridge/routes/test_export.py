@@ -1,0 +1,196 @@
+"""The export: as fast as its reader takes it, within its limits, and never whole when it is not."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections import deque
+from collections.abc import AsyncIterator
+
+import httpx
+import pytest
+
+from lupin_bridge.judge.choosing import own_sensors
+from lupin_bridge.past import table
+from lupin_bridge.settings import Settings
+from lupin_twin.past import PastRow
+from tests.bridge.routes.test_past import remembering
+from tests.support.inprocess import run
+from tests.support.past import NS, MadeUp
+from tests.support.waiting import until
+from tests.support.web import deaf_client
+
+PATH = "/api/export.csv"
+# So many that no socket holds them: 25 MB.
+MANY = 300
+# What a reader that does not read may cost: one socket's buffers on both sides, and what waits
+# behind it.
+MOST_TAKEN_BYTES = 8_000_000
+
+
+def rows(count: int, stamp_s: int = 1) -> list[PastRow]:
+    return [PastRow(stamp_s * NS, "7", 1.0, 2.0, "co2", math.pi, 0, "robot")] * count
+
+
+def test_all_rows_come_under_one_header(domain: int) -> None:
+    past = MadeUp(lots=[rows(3), [], rows(2, 5)])
+
+    async def test() -> None:
+        async with remembering(past) as it:
+            query = "from=1&to=9&tag_id=a/b&sensor_type=co2"
+            answer = await it.http.get(f"{PATH}?{query}")
+            assert answer.content == table.HEADER + table.lines(
+                [*rows(3), *rows(2, 5)], own_sensors()
+            )
+            assert answer.headers["content-type"] == table.MEDIA_TYPE
+            assert answer.headers["cache-control"] == "no-store"
+            assert answer.headers["content-disposition"] == (
+                'attachment; filename="lupin-twin_a_b_co2_'
+                'from_19700101T000001Z_to_19700101T000009Z.csv"'
+            )
+            assert past.asked == [(NS, 9 * NS, "a/b", "co2")]
+
+    run(domain, test())
+
+
+def test_a_period_without_rows_is_a_header(domain: int) -> None:
+    async def test() -> None:
+        async with remembering(MadeUp()) as it:
+            assert (await it.http.get(PATH)).content == table.HEADER
+
+    run(domain, test())
+
+
+def test_head_asks_for_no_row(domain: int) -> None:
+    past = MadeUp(lots=[rows(1)])
+
+    async def test() -> None:
+        async with remembering(past) as it:
+            answer = await it.http.head(f"{PATH}?to=9")
+            assert (answer.status_code, answer.content) == (200, b"")
+            assert "19700101T000009Z" in answer.headers["content-disposition"]
+            assert past.asked == []
+            assert (await it.http.head(f"{PATH}?to=now")).status_code == 400
+
+    run(domain, test())
+
+
+def test_a_reader_that_does_not_read_stops_it_and_is_cut_off(domain: int) -> None:
+    lot = rows(1_000)
+    past = MadeUp(lots=[lot] * MANY)
+
+    async def test() -> None:
+        async with remembering(past, Settings(client_timeout_s=1.0)) as it:
+            with deaf_client(it.url, PATH) as client:
+                await until(lambda: it.bridge.admission.exporting == 1, "the export")
+                server = it.server.server_state.connections
+                await until(
+                    lambda: sum(c.transport.get_write_buffer_size() > 0 for c in server) == 1,
+                    "a socket that is full",
+                )
+                await until(lambda: it.bridge.admission.exporting == 0, "its end")
+                assert past.lots_taken * len(table.lines(lot, own_sensors())) < MOST_TAKEN_BYTES
+                assert past.is_closed
+                with pytest.raises(ConnectionResetError):
+                    deque(iter(lambda: client.recv(65_536), b""))
+
+    run(domain, test())
+
+
+def test_a_slow_reader_gets_all_of_it_and_no_more_is_read_than_he_takes(domain: int) -> None:
+    lot = rows(1_000)
+    past = MadeUp(lots=[lot] * MANY)
+    size = len(table.lines(lot, own_sensors()))
+
+    async def test() -> None:
+        async with remembering(past) as it, it.http.stream("GET", PATH) as answer:
+            taken = 0
+            async for piece in answer.aiter_raw(65_536):
+                taken += len(piece)
+                assert past.lots_taken * size - taken < MOST_TAKEN_BYTES
+            assert taken == len(table.HEADER) + MANY * size
+
+    run(domain, test())
+
+
+def test_a_client_has_one_export_and_who_leaves_frees_its_place(domain: int) -> None:
+    past = MadeUp(lots=[rows(1_000)] * MANY)
+
+    async def test() -> None:
+        async with remembering(past) as it:
+            async with it.http.stream("GET", PATH) as answer:
+                assert answer.status_code == 200
+                refused = await it.http.get(PATH)
+                assert (refused.status_code, refused.headers["retry-after"]) == (429, "5")
+                assert refused.json() == {"detail": "127.0.0.1 has 1 export under way, the limit"}
+                assert (await it.http.get("/metrics")).text.count("lupin_exports_running 1.0") == 1
+                # It computes nothing while its reader takes its time.
+                assert it.bridge.admission.being_computed == 0
+            await until(lambda: it.bridge.admission.exporting == 0, "its place")
+            assert past.is_closed
+
+    run(domain, test())
+
+
+def test_who_leaves_while_a_lot_is_being_read_ends_the_reading(
+    domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The lots are closed when nobody is at them any more, and not before."""
+    is_reading, is_closed = asyncio.Event(), asyncio.Event()
+
+    async def lots(*_: object) -> AsyncIterator[bytes]:
+        try:
+            yield b"a lot\r\n"
+            is_reading.set()
+            await asyncio.Event().wait()
+        finally:
+            await asyncio.sleep(0)  # whoever reads has something to give back
+            is_closed.set()
+
+    async def test() -> None:
+        async with remembering(MadeUp()) as it:
+            it.twin.rows = lots  # type: ignore[assignment]
+            async with it.http.stream("GET", PATH):
+                await until(is_reading.is_set, "the second lot being read")
+            await until(is_closed.is_set, "its end")
+            await until(lambda: it.bridge.admission.exporting == 0, "its place")
+
+    run(domain, test())
+    assert [record for record in caplog.records if record.levelname == "ERROR"] == []
+
+
+def test_a_bridge_that_ends_breaks_it_off(domain: int) -> None:
+    past = MadeUp(lots=[rows(1_000)] * 1_000 * MANY)  # more than can be read before it is over
+
+    async def test() -> None:
+        async with remembering(past) as it, it.http.stream("GET", PATH) as answer:
+            it.server.should_exit = True
+            await until(lambda: it.bridge.goodbye.is_said, "the good-bye")
+            with pytest.raises(httpx.TransportError):
+                async for _ in answer.aiter_raw():
+                    pass
+            await until(lambda: it.bridge.admission.exporting == 0, "its place")
+
+    run(domain, test())
+
+
+def test_an_error_in_the_middle_is_never_taken_for_the_end(domain: int) -> None:
+    past = MadeUp(lots=[rows(3)], error=OSError("the disk is away"))
+
+    async def test() -> None:
+        async with remembering(past) as it:
+            with pytest.raises(httpx.TransportError):
+                await it.http.get(PATH)
+            await until(lambda: it.bridge.admission.exporting == 0, "its place")
+            # Nor by who knows no chunks: a connection that is reset is no end.
+            reader, writer = await asyncio.open_connection(
+                *it.url.removeprefix("http://").split(":")
+            )
+            writer.write(f"GET {PATH} HTTP/1.0\r\nHost: localhost\r\n\r\n".encode())
+            try:
+                with pytest.raises(ConnectionResetError):
+                    await reader.read()
+            finally:
+                writer.close()
+
+    run(domain, test())

@@ -1,0 +1,189 @@
+"""`/foxglove` of a real `lupin-twin serve`: Foxglove's own client from npm, and by hand."""
+
+from __future__ import annotations
+
+import base64
+import json
+import shutil
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from lupin_bridge.serving.client_pace import MAX_BURST
+from tests.support import messages
+from tests.support.domains import ros_env
+from tests.support.foxglove import SDK, WEBSOCKET, Viewer, reader_of, viewer
+from tests.support.processes import Process
+from tests.support.web import Bridge, bridge
+
+SCRIPT = Path(__file__).parents[2] / "foxglove_client.mjs"
+INPUT, STATE, DIAGNOSTICS = "/floranova/observations", "/twin/state", "/diagnostics"
+
+LAYERS = ("/twin/field/temperature", "/twin/tags")
+
+
+def play(url: str, scenario: str, *topics: str) -> Any:
+    """What a scenario of `foxglove_client.mjs` has told at its end."""
+    node = shutil.which("node")
+    assert node is not None, "node is not installed"
+    address = url.replace("http", "ws", 1) + "/foxglove"
+    with Process([node, str(SCRIPT), address, scenario, *topics], ros_env(0)) as process:
+        assert process.wait() == 0, process.output
+        told = json.loads(process.output.splitlines()[-1])
+    assert told["errors"] == []
+    return told
+
+
+@pytest.fixture(scope="module")
+def house() -> Iterator[Bridge]:
+    """A twin with one tag, a map and a layer."""
+    with bridge("--ros-args", "-p", "layers:=[temperature]") as running:
+        running.peer.wait_for_twin()
+        running.peer.observe(messages.scan("1", {"temperature": 20.5}, at=(1.0, 2.0), stamp_s=9.0))
+        running.peer.publish_map(messages.occupancy_grid([[0, 100], [-1, 0]]))
+        running.peer.tag("1")  # told over ROS, which is later than over HTTP
+        yield running
+
+
+@pytest.fixture
+def client(house: Bridge) -> Iterator[Viewer]:
+    with viewer(house.url) as opened:
+        yield opened
+
+
+# --- Foxglove's own client ----------------------------------------------------------------------
+
+
+def test_foxgloves_client_finds_the_channels_and_reads_what_was_published(house: Bridge) -> None:
+    told = play(house.url, "look", STATE, INPUT, "/map", DIAGNOSTICS, *LAYERS)
+    assert told["chosen"] == [WEBSOCKET, SDK]
+    info = told["info"]
+    assert (info["name"], info["capabilities"], info["supportedEncodings"]) == (
+        "lupin-twin",
+        [],
+        [],
+    )
+    channels = {channel["topic"]: channel for channel in told["channels"]}
+    others = {"/perception/discovered_tags", "/twin/planters"}
+    assert set(channels) == {STATE, INPUT, "/map", DIAGNOSTICS, *LAYERS, *others}
+    assert {channel["encoding"] for channel in channels.values()} == {"cdr"}
+    # By nothing but the schema that was advertised.
+    read = {
+        topic: reader_of(channels[topic])(base64.b64decode(message["data"]))
+        for topic, message in told["first"].items()
+    }
+    [tag] = read[STATE].tags
+    served = house.json("/api/state")["tags"][0]
+    assert (tag.tag_id, tag.pose.position.x, tag.pose.position.y) == ("1", 1.0, 2.0)
+    assert [(r.name, r.value) for r in tag.readings] == [("temperature", 20.5)]
+    assert tag.tag_id == served["tag_id"]
+    seen = read[INPUT]
+    assert (seen.tag_reading.tag_id, seen.header.stamp.sec, seen.source) == ("1", 9, "test")
+    assert list(read["/map"].data) == [0, 100, -1, 0]
+    assert "lupin_twin" in str(read[DIAGNOSTICS].status[0].name)
+    points = read["/twin/field/temperature"]
+    assert [field.name for field in points.fields] == ["x", "y", "z", "value", "error"]
+    assert points.width * points.height > 0
+    assert [marker.text for marker in read["/twin/tags"].markers if marker.text] == ["1"]
+    stamps = [int(message["timestamp"]) for message in told["first"].values()]
+    stamp = read[STATE].header.stamp
+    assert all(abs(ns - stamp.sec * 10**9) < 120e9 for ns in stamps)
+
+
+def test_foxgloves_client_hears_the_latched_one_again_and_nothing_after_its_end(
+    house: Bridge,
+) -> None:
+    told = play(house.url, "again", "/map")
+    assert told["before"]["data"] == told["after"]["data"]
+    assert (told["late"], told["statuses"]) == (0, [])
+
+
+def test_whatever_foxgloves_client_would_change_is_refused(house: Bridge) -> None:
+    statuses = play(house.url, "write")["statuses"]
+    assert {status["level"] for status in statuses} == {2}
+    assert [status["message"].partition(":")[0] for status in statuses] == [
+        "advertise is refused",
+        "a published message is refused",
+        "unadvertise is refused",
+        "getParameters is refused",
+        "setParameters is refused",
+        "subscribeParameterUpdates is refused",
+        "unsubscribeParameterUpdates is refused",
+        "a call of a service is refused",
+        "subscribeConnectionGraph is refused",
+        "unsubscribeConnectionGraph is refused",
+        "fetchAsset is refused",
+        "there is no channel 4000000",
+    ]
+    assert house.peer.node.count_publishers("/cmd_vel") == 0
+
+
+# --- by hand ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("offered", [(), ("foxglove.sdk.v2",), ("cbor", "ros")])
+def test_who_offers_none_of_the_subprotocols_is_refused(
+    house: Bridge, offered: tuple[str, ...]
+) -> None:
+    with pytest.raises(InvalidStatus) as refused, viewer(house.url, offered):
+        pass
+    assert refused.value.response.status_code == 400
+    assert b"must offer one of foxglove.sdk.v1" in (refused.value.response.body or b"")
+
+
+@pytest.mark.parametrize(
+    ("offered", "chosen"),
+    [((SDK,), SDK), ((WEBSOCKET, SDK), WEBSOCKET), (("other", SDK, WEBSOCKET), SDK)],
+)
+def test_the_first_that_is_spoken_is_chosen(
+    house: Bridge, offered: tuple[str, ...], chosen: str
+) -> None:
+    with viewer(house.url, offered) as client:
+        assert client.connection.subprotocol == chosen
+
+
+def test_nonsense_is_answered_and_the_connection_stays(client: Viewer) -> None:
+    for message, said in (
+        ("{", "the message is not JSON"),
+        ("[]", "the message is an array"),
+        ('{"op":"subscribe"}', "subscriptions is None, expected an array"),
+        ('{"op":"dance"}', "op is 'dance', expected subscribe or unsubscribe"),
+        (b"", "an empty binary message is refused"),
+        (b"\x01\xff", "a published message is refused"),
+        (b"\x07", "a binary message of opcode 7 is refused"),
+    ):
+        client.connection.send(message)
+        assert client.status().startswith(said)
+    client.subscribe(STATE)
+    assert client.data(1)
+
+
+def test_a_flood_ends_its_sender_alone_and_makes_no_subscriptions(
+    house: Bridge, client: Viewer
+) -> None:
+    def topics() -> float:
+        [line] = [
+            line
+            for line in house.get("/metrics").text.splitlines()
+            if line.startswith("lupin_topics_relayed ")
+        ]
+        return float(line.split()[1])
+
+    with viewer(house.url) as loud:
+        channel = loud.channels["/perception/discovered_tags"]["id"]
+        with suppress(ConnectionClosed):  # it may hear the answer before it has said all
+            for _ in range(20 * MAX_BURST):
+                loud.send(op="subscribe", subscriptions=[{"id": 1, "channelId": channel}])
+                loud.send(op="unsubscribe", subscriptionIds=[1])
+        with pytest.raises(ConnectionClosed) as closed:
+            loud.told("never")
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1008
+        assert closed.value.rcvd.reason == "more than 100 messages a second after 500 at once"
+    assert topics() <= 8.0, "as many as there are"
+    client.subscribe(STATE)
+    assert client.data(1)

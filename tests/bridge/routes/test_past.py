@@ -1,0 +1,222 @@
+"""History and timeline over HTTP, over a past that is made up."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+
+from lupin_bridge.past import schema
+from lupin_bridge.settings import Settings
+from lupin_bridge.twin.looking import Question, look_up
+from lupin_bridge.twin.source import TwinTimeoutError, TwinUnavailableError
+from lupin_twin.past import (
+    Event,
+    NotRemembered,
+    PastRefused,
+    SeriesPast,
+    SeriesRequest,
+    grid,
+)
+from tests.support.inprocess import Running, run, running
+from tests.support.past import NS, MadeUp
+from tests.support.waiting import until
+
+HISTORY = "/api/history?tag_id=7&sensor_type=co2"
+
+
+@asynccontextmanager
+async def remembering(past: MadeUp, settings: Settings | None = None) -> AsyncIterator[Running]:
+    """A bridge whose twin has this past."""
+    async with running(settings) as it:
+        twin = it.twin
+        twin.state_at, twin.series = past.state_at, past.series  # type: ignore[method-assign]
+        twin.rows = past.rows  # type: ignore[method-assign]
+
+        async def ask(question: Question[Any], cost_s: float) -> Any:  # all alike
+            return await look_up(question, twin, twin.workers)
+
+        twin.ask = ask  # type: ignore[method-assign]
+        await until(lambda: it.bridge.latest is not None, "the first state")
+        yield it
+
+
+def test_a_history_is_readings_and_buckets_where_there_are_too_many(domain: int) -> None:
+    points = [(number * NS, float(number)) for number in range(100)]
+
+    async def test() -> None:
+        async with remembering(MadeUp(points={("7", "co2"): points})) as it:
+            answer = await it.http.get(f"{HISTORY}&from=10&to=1970-01-01T00:00:20Z")
+            found = schema.History.model_validate_json(answer.content)
+            assert [reading.value for reading in found.readings] == list(map(float, range(10, 20)))
+            assert (found.unit, found.from_.sec, found.to.sec) == ("ppm", 10, 20)
+            answer = await it.http.get(f"{HISTORY}&from=10&to=20&points=5")
+            found = schema.History.model_validate_json(answer.content)
+            assert (found.is_bucketed, found.bucket_s, len(found.buckets)) == (True, 2.0, 5)
+            assert found.buckets[0].model_dump() == {
+                "start": {"sec": 10, "nanosec": 0},
+                "n": 2,
+                "mean": 10.5,
+                "min": 10.0,
+                "max": 11.0,
+            }
+
+    run(domain, test())
+
+
+def test_a_timeline_asks_for_every_event_of_one_period(domain: int) -> None:
+    past = MadeUp(points={("*", "~scans"): [(NS, 5.0), (2 * NS, 5.0)], ("*", "~runs"): [(0, 9.0)]})
+    past.points["7", "~scans"] = [(NS, 5.0)]
+
+    async def test() -> None:
+        async with remembering(past) as it:
+            answer = await it.http.get("/api/timeline?points=10")
+            found = schema.Timeline.model_validate_json(answer.content)
+            assert [(b.start.sec, b.scans) for b in found.buckets] == [(0, 2)]
+            assert (found.bucket_s, found.reach is None, len(found.runs)) == (100.0, False, 1)
+            asked = [request for request in past.asked if isinstance(request, SeriesRequest)]
+            assert {request.sensor_type for request in asked} == set(Event)
+            assert {request.tag_id for request in asked} == {"*"}
+            # The first one says when now is; that holds for all others.
+            assert [request.end_ns for request in asked] == [0, *[past.now_ns] * 6]
+            answer = await it.http.get("/api/timeline?points=10&tag_id=7")
+            found = schema.Timeline.model_validate_json(answer.content)
+            assert [b.scans for b in found.buckets] == [1]
+
+    run(domain, test())
+
+
+def test_events_that_come_in_five_minutes_share_one_grid_with_those_that_come_one_by_one(
+    domain: int,
+) -> None:
+    """Scans too many to be read one by one, beside few failures, in buckets of seconds."""
+    slot_ns = 300 * NS
+    failures = ("*", Event.FAILURES)
+    # One is of the first five minutes, and before what was asked for.
+    past = MadeUp(points={failures: [(310 * NS, 1.0), (420 * NS, 1.0), (899 * NS, 1.0)]})
+
+    async def series(request: SeriesRequest) -> SeriesPast:
+        if request.event is not Event.SCANS:
+            return await past.series(request)
+        told = grid(request.start_ns, request.end_ns, request.max_points, slot_ns)
+        found = (20_000.0,) * 2
+        stamps = (slot_ns, 2 * slot_ns)
+        edges = told.start_ns, told.end_ns, told.bucket_ns
+        return SeriesPast(*edges, stamps, (20_000,) * 2, found, found, found)
+
+    async def test() -> None:
+        async with remembering(past) as it:
+            it.twin.series = series  # type: ignore[method-assign]
+            answer = await it.http.get("/api/timeline?from=400&to=700&points=100")
+            found = schema.Timeline.model_validate_json(answer.content)
+            assert (found.from_.sec, found.to.sec, found.bucket_s) == (300, 900, 300.0)
+            assert [(b.start.sec, b.scans, b.failures) for b in found.buckets] == [
+                (300, 20_000, 2),
+                (600, 20_000, 1),
+            ]
+
+    run(domain, test())
+
+
+def test_who_has_the_answer_is_not_sent_it_again(domain: int) -> None:
+    past = MadeUp(points={("7", "co2"): [(NS, 1.0)]})
+
+    async def test() -> None:
+        async with remembering(past) as it:
+            for path in (f"{HISTORY}&to=9", "/api/timeline?to=9"):
+                first = await it.http.get(path)
+                assert first.headers["cache-control"] == "no-cache"
+                has = {"If-None-Match": first.headers["etag"]}
+                again = await it.http.get(path, headers=has)
+                assert (again.status_code, again.content) == (304, b"")
+                assert again.headers["etag"] == first.headers["etag"]
+            path = f"{HISTORY}&to=9"
+            has = {"If-None-Match": (await it.http.get(path)).headers["etag"]}
+            past.points["7", "co2"].append((2 * NS, 2.0))  # heard late
+            assert (await it.http.get(path, headers=has)).status_code == 200
+
+    run(domain, test())
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "retry_after"),
+    [
+        (PastRefused("points is 7, the limit is 6"), 400, None),
+        (NotRemembered("no journal is kept", is_lasting=True), 404, None),
+        (NotRemembered("the disk is away", is_lasting=False), 503, "3"),
+        (TwinTimeoutError("it took too long"), 504, None),
+        (TwinUnavailableError("nobody is there"), 503, "3"),
+    ],
+)
+def test_what_the_source_cannot_answer_is_told(
+    domain: int, error: Exception, status: int, retry_after: str | None
+) -> None:
+    async def test() -> None:
+        async with remembering(MadeUp(error=error)) as it:
+            for path in (HISTORY, "/api/timeline", "/api/export.csv"):
+                answer = await it.http.get(path)
+                assert (answer.status_code, answer.json()) == (status, {"detail": str(error)})
+                assert answer.headers.get("retry-after") == retry_after
+            assert it.bridge.admission.being_computed == it.bridge.admission.exporting == 0
+
+    run(domain, test())
+
+
+def test_what_cannot_be_asked_is_refused_before_anybody_is_asked(domain: int) -> None:
+    past = MadeUp()
+
+    async def test() -> None:
+        async with remembering(past) as it:
+            for path, part in (
+                ("/api/history", "tag_id is empty"),
+                (f"{HISTORY}&points=0", "points is '0'"),
+                (f"{HISTORY}&from=2000-01-01T00:00:00", "from is '2000-01-01T00:00:00', expected"),
+                (f"{HISTORY}&from=2147483647", "later than now"),
+                ("/api/timeline?at=1", "parameter 'at' is unknown"),
+                ("/api/export.csv?to=1&to=1", "to is given more than once"),
+            ):
+                answer = await it.http.get(path)
+                assert answer.status_code == 400
+                assert part in answer.json()["detail"]
+            assert past.asked == []
+
+    run(domain, test())
+
+
+def test_a_client_that_leaves_takes_its_question_along(domain: int) -> None:
+    past = MadeUp()
+    ended = asyncio.Event()
+
+    async def for_ever(request: SeriesRequest) -> SeriesPast:
+        try:
+            await asyncio.Event().wait()
+        finally:
+            ended.set()
+        raise AssertionError(request)
+
+    async def test() -> None:
+        async with remembering(past) as it:
+            it.twin.series = for_ever  # type: ignore[method-assign]
+            asking = asyncio.create_task(it.http.get(HISTORY))
+            await until(lambda: it.bridge.admission.being_computed == 1, "the question")
+            asking.cancel()
+            await until(ended.is_set, "its end")
+            await until(lambda: it.bridge.admission.being_computed == 0, "its place")
+
+    run(domain, test())
+
+
+def test_questions_are_timed_by_their_kind(domain: int) -> None:
+    async def test() -> None:
+        async with remembering(MadeUp()) as it:
+            for path in (HISTORY, "/api/timeline", "/api/timeline?to=5"):
+                assert (await it.http.get(path)).status_code == 200
+            text = (await it.http.get("/metrics")).text
+            assert 'lupin_past_seconds_count{question="history"} 1.0' in text
+            assert 'lupin_past_seconds_count{question="timeline"} 2.0' in text
+            assert "lupin_exports_running 0.0" in text
+
+    run(domain, test())

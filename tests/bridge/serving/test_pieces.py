@@ -1,0 +1,60 @@
+"""Large messages in pieces, by the reader of another library."""
+
+from __future__ import annotations
+
+import pytest
+from websockets.frames import Frame, Opcode
+from websockets.protocol import CLIENT, State
+from websockets.protocol import Protocol as Reader
+
+from lupin_bridge.serving.pieces import PIECE_BYTES, pieces
+from lupin_bridge.stream.frames import binary_frame, binary_head, text_frame
+
+
+def read(wire: bytes) -> list[Frame]:
+    """The frames, by a client that refuses what breaks the protocol."""
+    reader = Reader(CLIENT, state=State.OPEN, max_size=None)
+    reader.receive_data(wire)
+    assert reader.parser_exc is None
+    return [event for event in reader.events_received() if isinstance(event, Frame)]
+
+
+def wire(frame: bytes, rest: bytes = b"") -> bytes:
+    return b"".join(bytes(block) for piece in pieces(frame, rest) for block in piece)
+
+
+@pytest.mark.parametrize("more", [-1, 0, 1, 2 * PIECE_BYTES, 2 * PIECE_BYTES + 1])
+def test_a_message_stays_the_same_and_no_piece_is_larger_than_the_limit(more: int) -> None:
+    message = bytes(n % 251 for n in range(PIECE_BYTES + more))
+    for given, rest, opcode in (
+        (text_frame(message), b"", Opcode.TEXT),
+        (binary_frame(message), b"", Opcode.BINARY),
+        (binary_head(len(message)) + message[:13], message[13:], Opcode.BINARY),
+    ):
+        frames = read(wire(given, rest))
+        assert b"".join(frame.data for frame in frames) == message
+        assert max(len(frame.data) for frame in frames) <= PIECE_BYTES
+        assert [frame.opcode for frame in frames] == [opcode, *[Opcode.CONT] * (len(frames) - 1)]
+        assert [frame.fin for frame in frames] == [*[False] * (len(frames) - 1), True]
+
+
+def test_a_small_message_stays_one_frame() -> None:
+    for size in (0, 125, 126, PIECE_BYTES - 10):
+        assert wire(text_frame(b"x" * size)) == text_frame(b"x" * size)
+
+
+def test_between_two_pieces_there_is_room_for_a_ping() -> None:
+    row = pieces(binary_frame(bytes(200_000)))
+    first, *others = (head + bytes(payload) for head, payload in row)
+    ping = Frame(Opcode.PING, b"?").serialize(mask=False)
+    assert [frame.opcode for frame in read(first + ping + b"".join(others))] == [
+        Opcode.BINARY,
+        Opcode.PING,
+        Opcode.CONT,
+    ]
+
+
+def test_nothing_is_copied() -> None:
+    message = bytes(300_000)
+    views = [payload for _, payload in pieces(binary_head(len(message)), message)]
+    assert {payload.obj for payload in views if isinstance(payload, memoryview)} == {message}

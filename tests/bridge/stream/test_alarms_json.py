@@ -1,0 +1,49 @@
+from __future__ import annotations
+
+import json
+
+from lupin_bridge.judge.alarm import Alarm
+from lupin_bridge.judge.verdict import Kind, Reason, Verdict
+from lupin_bridge.stream import schema
+from lupin_bridge.stream.alarms_json import alarms_body, alarms_frame
+
+NIGHT_NS = 1_000_000_000_000
+COLD = Alarm(
+    id="1f",
+    reason=Reason(Kind.RANGE, Verdict.CRITICAL, "temperature", 6.5, 10.0, NIGHT_NS),
+    tag_id="7",
+    raised_at_ns=NIGHT_NS + 5,
+    cleared_at_ns=None,
+    worst=6.25,
+)
+
+
+def test_a_frame_is_of_the_contracts_type_to_the_last_field_and_in_its_order() -> None:
+    text = alarms_frame([COLD], "journal", NIGHT_NS)
+    schema.AlarmsFrame.model_validate_json(text, strict=True)
+    frame = json.loads(text)
+    assert list(frame) == ["type", "alarms", "source", "since"]
+    assert list(frame["alarms"][0].items()) == [
+        ("id", "1f"),
+        (
+            "reason",
+            {
+                "kind": "range",
+                "verdict": "critical",
+                "sensor": "temperature",
+                "value": 6.5,
+                "limit": 10.0,
+                "since": {"sec": 1000, "nanosec": 0},
+            },
+        ),
+        ("tag_id", "7"),
+        ("raised_at", {"sec": 1000, "nanosec": 5}),
+        ("cleared_at", None),
+        ("worst", 6.25),
+    ]
+
+
+def test_an_answer_without_alarms_says_how_far_it_knows() -> None:
+    body = alarms_body([], "starting", None)
+    assert body == {"alarms": [], "source": "starting", "since": None}
+    schema.Alarms.model_validate(body)

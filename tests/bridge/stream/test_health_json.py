@@ -1,0 +1,103 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lupin_bridge.judge.choosing import own_sensors
+from lupin_bridge.judge.daylight import judge_day
+from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced
+from lupin_bridge.stream import schema
+from lupin_bridge.stream.health_json import HealthJson
+from lupin_twin.state import Reading, Snapshot, TagState
+
+SENSORS = own_sensors()
+START = 1_000_000_000_000
+
+
+def see(judge: Judge, at_ns: int, tags: Sequence[TagState]) -> Judged:
+    return judge.see(
+        Snapshot(at_ns, "map", tuple(tags)), lambda light: judge_day(light, None, None)
+    )
+
+
+def tag(tag_id: str, value: float, at_ns: int = START) -> TagState:
+    return TagState(tag_id, readings=(Reading("temperature", value, at_ns),))
+
+
+def test_it_is_of_the_contracts_type_to_the_last_field() -> None:
+    judged = see(Judge(SENSORS), START, [tag("a", 6.0), tag('"b"', 22.0)])
+    text = HealthJson().whole(judged)
+    body = schema.Judgement.model_validate_json(text, strict=True)
+    assert (body.house.verdict, body.house.day.source) == ("critical", "assumed")
+    assert body.tags['"b"'].verdict == "healthy"
+    (reason,) = body.tags["a"].reasons
+    assert json.loads(text)["tags"]["a"]["reasons"] == [
+        {
+            "kind": "range",
+            "verdict": "critical",
+            "sensor": "temperature",
+            "value": 6.0,
+            "limit": 10.0,
+            "since": {"sec": 1000, "nanosec": 0},
+        }
+    ]
+    assert reason.limit == 10.0
+    assert json.loads(text)["house"]["patrol"] == {
+        "interval_s": None,
+        "last_scan": {"sec": 1000, "nanosec": 0},
+        "overdue": 0,
+    }
+
+
+def test_of_a_silent_house_it_says_so() -> None:
+    judged = silenced(see(Judge(SENSORS), START, [tag("a", 22.0)]))
+    body = schema.Judgement.model_validate_json(HealthJson().whole(judged), strict=True)
+    assert (body.house.verdict, body.house.reasons[0].kind) == ("unknown", "silent")
+    assert body.tags["a"].verdict == "healthy"
+
+
+def test_nothing_judged_yet_is_said_too() -> None:
+    body = schema.Judgement.model_validate_json(HealthJson().whole(NOTHING_JUDGED), strict=True)
+    assert (body.house.verdict, body.tags) == ("unknown", {})
+
+
+STEPS = st.lists(st.dictionaries(st.sampled_from("abc"), st.sampled_from([6.0, 16.0, 22.0])))
+
+
+@given(STEPS, st.sets(st.integers(0, 20)))
+def test_whole_and_deltas_together_are_always_what_was_judged(
+    steps: list[dict[str, float]], skipped: set[int]
+) -> None:
+    writer, judge = HealthJson(), Judge(SENSORS)
+    told, shown = NOTHING_JUDGED, json.loads(writer.whole(NOTHING_JUDGED))["tags"]
+    kept: dict[str, TagState] = {}
+    for number, values in enumerate(steps):
+        kept = {
+            tag_id: kept[tag_id]
+            if tag_id in kept and kept[tag_id].readings[0].value == value
+            else tag(tag_id, value, START + number)
+            for tag_id, value in values.items()
+        }
+        now = see(judge, START + number, list(kept.values()))
+        if number in skipped:
+            continue
+        delta: dict[str, Any] = json.loads(writer.delta(told, now))
+        shown = {**{key: one for key, one in shown.items() if key in kept}, **delta["tags"]}
+        assert {"house": delta["house"], "tags": shown} == json.loads(writer.whole(now))
+        if now is told:
+            assert delta["tags"] == {}
+        told = now
+
+
+def test_a_delta_holds_only_what_is_another() -> None:
+    writer, judge = HealthJson(), Judge(SENSORS)
+    calm = tag("a", 22.0)
+    before = see(judge, START, [calm, tag("b", 22.0)])
+    now = see(judge, START + 1, [calm, tag("b", 6.0, START + 1)])
+    assert list(json.loads(writer.delta(before, now))["tags"]) == ["b"]
+    assert list(json.loads(writer.delta(before, replace(now, number=9)))["tags"]) == ["b"]

@@ -1,0 +1,66 @@
+"""What estimates are worth, as the contract has it."""
+
+from __future__ import annotations
+
+import json
+
+from lupin_bridge.stream import report_json
+from lupin_bridge.stream.estimate_schema import Advice, EstimateQualities, ExpectedTags
+from lupin_twin.estimate import Place
+from lupin_twin.estimate_report import Report
+from lupin_twin.estimate_rounds import TagCheck
+from lupin_twin.grading import Record, Tally
+
+S = 1_000_000_000
+REPORT = Report(
+    5 * S,
+    4 * S,
+    "why",
+    Record(3 * S + 7, Tally(10, 9), Tally(70, 30)),
+    (
+        TagCheck("a", 20.0, 2 * S, 21.0, 0.5, -2.0, -1.0, None),
+        TagCheck("b", 30.0, S, 21.0, 0.5, 9.0, 9.0, S),
+    ),
+    (Place(1.0, 2.0, 0.75),),
+)
+BARE = Report(S, None, "", Record(None, Tally(), Tally()))
+
+
+def test_how_often_they_were_right() -> None:
+    body = json.loads(report_json.qualities({"co2": REPORT, "ph": BARE}))
+    EstimateQualities.model_validate(body)
+    assert body["sensors"]["co2"] == {
+        "fitted_at": {"sec": 4, "nanosec": 0},
+        "fit_problem": "why",
+        "graded_since": {"sec": 3, "nanosec": 7},
+        "day": {"scans": 10, "inside": 9},
+        "week": {"scans": 70, "inside": 30},
+        "share_day": 0.9,
+        "share_week": 30 / 70,
+        "is_trusted": False,
+    }
+    bare = body["sensors"]["ph"]
+    assert (bare["fitted_at"], bare["graded_since"], bare["share_day"]) == (None, None, None)
+    assert bare["is_trusted"] is True
+
+
+def test_what_was_expected_of_each_tag() -> None:
+    body = json.loads(report_json.tags("co2", REPORT))
+    ExpectedTags.model_validate(body)
+    assert (body["sensor_type"], body["at"]) == ("co2", {"sec": 5, "nanosec": 0})
+    assert body["tags"]["b"] == {
+        "measured": 30.0,
+        "observed_at": {"sec": 1, "nanosec": 0},
+        "expected": 21.0,
+        "expected_sd": 0.5,
+        "z": 9.0,
+        "offset": 9.0,
+        "left_out": True,
+    }
+    assert body["tags"]["a"]["left_out"] is False
+
+
+def test_where_another_tag_helps() -> None:
+    body = json.loads(report_json.advice("co2", REPORT))
+    Advice.model_validate(body)
+    assert body == {"sensor_type": "co2", "places": [{"x": 1.0, "y": 2.0, "error_ratio": 0.75}]}

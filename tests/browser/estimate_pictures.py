@@ -1,0 +1,183 @@
+"""The estimate in pictures, for the README: early, steady, with the robot dead, one sensor changed.
+
+The journal is the demo's simulated past, of which six hours of the house's day are left out: three
+of the pictures look back at it. Its last minutes are not in the journal: they come to pass while
+the pictures are taken, scan by scan, so that what was foretold is graded by readings that the house
+really had then. For the last picture a tag is scanned whose sensor has gone wrong.
+"""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterable
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+from greenhouse_sim.simulator import GreenhouseSimulator
+from PIL import Image
+from playwright.sync_api import Browser, expect
+
+from lupin_bridge.demo import rows
+from lupin_patrol.exploration import FREE, OCCUPIED, RESOLUTION_M
+from lupin_patrol.house import read_house
+from lupin_twin.journal.rows import Row, ScanRow
+from lupin_twin.journal.runs import Clock
+from tests.support.journal import SECOND, kept
+from tests.support.messages import occupancy_grid, pose, scan
+from tests.support.waiting import wait_for
+from tests.support.web import Bridge, bridge
+
+# The patrol's day, s; its past is three of them.
+DAY_S: Final = 1_440
+# As many scans at once as the twin's queue surely holds.
+LOT: Final = 25
+# So much before now the journal ends: time for some fifty scans of temperature to be graded.
+GRADED_S: Final = 180
+HOUR_S: Final = DAY_S / 24
+# So much of the past is to come: longer than the pictures take.
+AHEAD_S: Final = 600
+# Seconds before now: the patrol begins, stands still in the afternoon, goes on at night.
+BEGUN_S: Final = 3 * DAY_S - AHEAD_S
+STOPPED_S: Final = 42 * HOUR_S - AHEAD_S
+RESUMED_S: Final = STOPPED_S - 6 * HOUR_S
+CHANGED_TAG: Final = "5"
+CHANGED_BY: Final = 6.0
+# How often it is scanned then, s apart.
+CHANGED_SCANS: Final = 5
+APART_S: Final = 2
+READY_S: Final = 120.0
+# Of each picture how long before now, s.
+PAST: Final = {
+    "estimate-early": BEGUN_S - 16,
+    "estimate-steady": STOPPED_S + 1,
+    "estimate-dead": RESUMED_S + 1,
+}
+
+
+def taken(browser: Browser, folder: Path) -> None:
+    """Write the four pictures."""
+    with tempfile.TemporaryDirectory() as home:
+        journal = Path(home) / "journal.sqlite"
+        now_ns = time.time_ns()
+        told, end_ns = past(now_ns), now_ns - GRADED_S * SECOND
+        known = [row for row in told if row.stamp_ns <= end_ns]
+        robot = Robot(row for row in told if isinstance(row, ScanRow) and row.stamp_ns > end_ns)
+        kept(journal, known, Clock(now_ns, now_ns, is_simulated=False))
+        options = [f"journal:={journal}", f"day_length_s:={DAY_S}.0", "clip_to_explored:=true"]
+        with bridge("--ros-args", *(word for each in options for word in ("-p", each))) as running:
+            running.peer.publish_map(house_map())
+            wait_for(lambda: is_fitted(running), "a model, and the map", READY_S)
+            for name, before_s in PAST.items():
+                robot.go_on(running)
+                at_s = now_ns / SECOND - before_s
+                picture(browser, running.url, folder / f"{name}.png", f"&at={at_s:.0f}")
+            robot.go_on(running)
+            scan_wrongly(running)
+            wait_for(lambda: has_changed(running), "the sensor that has changed", READY_S)
+            picture(browser, running.url, folder / "estimate-changed.png", f"&tag={CHANGED_TAG}")
+
+
+class Robot:
+    """It scans what the simulated past says that it does, when its time has come."""
+
+    def __init__(self, scans: Iterable[ScanRow]) -> None:
+        self._scans = sorted(scans, key=lambda each: each.stamp_ns)
+
+    def go_on(self, running: Bridge) -> None:
+        """Tell the twin of every scan that is due."""
+        now_ns = time.time_ns()
+        due = [each for each in self._scans if each.stamp_ns <= now_ns]
+        self._scans = self._scans[len(due) :]
+        for start in range(0, len(due), LOT):
+            lot = due[start : start + LOT]
+            running.peer.observe(*map(message_of, lot))
+            running.tag(lot[-1].tag_id, partial(is_told, lot[-1]))
+
+
+def message_of(row: ScanRow) -> Any:
+    """The observation that the robot tells."""
+    readings = {each.name: each.value for each in row.readings}
+    return scan(row.tag_id, readings, status=row.status, stamp_s=row.stamp_ns / SECOND)
+
+
+def is_told(row: ScanRow, tag: dict[str, Any]) -> bool:
+    """Whether the twin knows the scan."""
+    tried = tag["last_try"]
+    return tried is not None and tried["sec"] >= row.stamp_ns // SECOND
+
+
+def past(now_ns: int) -> list[Row]:
+    """What the twin is to remember, and what is to come until `AHEAD_S` from now."""
+    made = subprocess.run(
+        [sys.executable, "-m", "lupin_patrol.past"], capture_output=True, text=True, check=True
+    )
+    return [
+        row
+        for row in rows(made.stdout.splitlines(), now_ns + AHEAD_S * SECOND)
+        if not RESUMED_S < (now_ns - row.stamp_ns) / SECOND < STOPPED_S
+    ]
+
+
+def scan_wrongly(running: Bridge) -> None:
+    """Let the robot scan the tag whose sensor has gone wrong, again and again."""
+    now_s = time.time()
+    tags = {each["tag_id"]: each for each in running.json("/api/state")["tags"]}
+    readings = {each["name"]: each["value"] for each in tags[CHANGED_TAG]["readings"]}
+    wrong = {**readings, "temperature": readings["temperature"] + CHANGED_BY}
+    for number in range(CHANGED_SCANS, 0, -1):
+        running.peer.observe(scan(CHANGED_TAG, wrong, stamp_s=now_s - number * APART_S))
+
+
+def house_map() -> object:
+    """The house's floor within its walls."""
+    inside = read_house(GreenhouseSimulator()).interior
+    columns, lines = (
+        2 + round(extent / RESOLUTION_M)
+        for extent in (inside.x1 - inside.x0, inside.y1 - inside.y0)
+    )
+    wall = [OCCUPIED] * columns
+    floor = [[OCCUPIED, *[FREE] * (columns - 2), OCCUPIED] for _ in range(lines - 2)]
+    corner = pose(inside.x0 - RESOLUTION_M, inside.y0 - RESOLUTION_M)
+    return occupancy_grid([wall, *floor, wall], RESOLUTION_M, corner)
+
+
+def is_fitted(running: Bridge) -> bool:
+    """Whether there are the map and a model."""
+    if running.get("/api/map").status_code != 200:
+        return False
+    sensors = running.json("/api/estimate/quality")["sensors"]
+    return sensors.get("temperature", {}).get("fitted_at") is not None
+
+
+def has_changed(running: Bridge) -> bool:
+    """Whether the estimate leaves the tag out, and everybody is told."""
+    tags = running.json("/api/estimate/tags", sensor_type="temperature")["tags"]
+    told = running.json("/api/health")["tags"][CHANGED_TAG]["reasons"]
+    return tags[CHANGED_TAG]["left_out"] and any(each["kind"] == "changed" for each in told)
+
+
+def picture(browser: Browser, url: str, path: Path, link: str) -> None:
+    """The map with the estimate, once it is there; of a chosen tag the whole page."""
+    has_card = "tag=" in link
+    context = browser.new_context(
+        viewport={"width": 1280, "height": 800 if has_card else 1000},
+        color_scheme="light",
+        reduced_motion="reduce",
+    )
+    page = context.new_page()
+    advice = ",advice" if has_card else ""
+    page.goto(f"{url}/#heat=estimate&layers=map,field,unknown,grid,boxes,pins,labels{advice}{link}")
+    expect(page.get_by_test_id("estimate-key")).to_be_visible()
+    if has_card:
+        expect(page.locator("[data-left-out]")).to_be_visible()
+        expect(page.get_by_test_id("advice")).to_be_visible()
+    page.wait_for_load_state("networkidle")
+    page.evaluate("document.fonts.ready.then(() => new Promise(requestAnimationFrame))")
+    shown = page.screenshot() if has_card else page.locator(".map-panel").screenshot()
+    Image.open(io.BytesIO(shown)).convert("RGB").save(path, optimize=True)
+    context.close()

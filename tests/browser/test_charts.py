@@ -1,0 +1,326 @@
+"""Charts and the difference layer, held against what the API says of the same past."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Any, Final
+from urllib.parse import parse_qsl, urlsplit
+
+import numpy as np
+import pytest
+from lupin_msgs.msg import Observation
+from numpy.typing import NDArray
+from PIL import Image
+from playwright.sync_api import Locator, expect
+
+from tests.browser.hmi import PHONE, Hmi, OpenPage
+from tests.support.messages import look, scan, set_stamp
+from tests.support.waiting import wait_for
+from tests.support.web import Bridge, bridge
+
+STEP_S: Final = 60.0
+MANY: Final = 420
+# Of the 50 that the latch holds.
+LOT: Final = 40
+# The first line's colour in the style sheet, light.
+LINE: Final = (0, 103, 177)
+
+
+class Garden:
+    """Two hours of tag 1 with twenty minutes of nothing; of tag 2 more than a chart has points."""
+
+    def __init__(self, running: Bridge) -> None:
+        self.bridge = running
+        self.now_s = time.time()
+        self.from_s = round(self.now_s - 7200, 3)
+        self.gap_s = (self.now_s - 3600, self.now_s - 2400)
+        running.peer.wait_for_twin()
+        first = [
+            scan("1", {"temperature": 22 + 3 * math.sin(index / 12), "co2": 600.0}, at=(1, 1))
+            for index in range(118)
+        ]
+        for index, message in enumerate(first):
+            set_stamp(message.header, self.now_s - 7100 + index * STEP_S)
+        self.far = [
+            message
+            for message in first
+            if not self.gap_s[0] < message.header.stamp.sec < self.gap_s[1]
+        ]
+        self._observe("1", self.far)
+        self._observe(
+            "2",
+            [
+                scan(
+                    "2",
+                    {"temperature": 20 + 4 * math.sin(index / 9)},
+                    at=(3, 1),
+                    stamp_s=self.now_s - 7000 + index * 16,
+                )
+                for index in range(MANY)
+            ],
+        )
+        running.peer.observe(
+            scan("1", status=Observation.STATUS_SCAN_FAILED, at=(1, 1), stamp_s=self.now_s - 5000),
+            look("1", "lupin", stamp_s=self.now_s - 4500),
+        )
+        running.tag("1", lambda tag: tag["species"] == "lupin")
+
+    def _observe(self, tag_id: str, messages: Sequence[Any]) -> None:
+        """As many at once as the latch holds, each lot once the one before is remembered."""
+        for start in range(0, len(messages), LOT):
+            lot = messages[start : start + LOT]
+            self.bridge.peer.observe(*lot)
+            until = start + len(lot)
+            wait_for(partial(self._remembers, tag_id, until), f"{until} readings of tag {tag_id}")
+
+    def _remembers(self, tag_id: str, count: int) -> bool:
+        body = self.history(tag_id=tag_id, sensor_type="temperature", points="5000")
+        return len(body["readings"]) == count
+
+    def history(self, **query: str) -> Any:
+        return self.bridge.json("/api/history", **query)
+
+    @property
+    def period(self) -> str:
+        return f"period={self.from_s},{round(self.now_s, 3)}"
+
+
+@pytest.fixture(scope="module")
+def garden() -> Iterator[Garden]:
+    """A bridge that remembers two hours."""
+    with bridge() as running:
+        yield Garden(running)
+
+
+def questions(hmi: Hmi) -> list[dict[str, str]]:
+    """What the page has asked about the past of sensors."""
+    return [dict(parse_qsl(urlsplit(url).query)) for url in hmi.requests if "/api/history?" in url]
+
+
+def asked(hmi: Hmi, sensor: str = "temperature") -> dict[str, str]:
+    """The last question about a sensor's past that the page has asked."""
+    return [question for question in questions(hmi) if question["sensor_type"] == sensor][-1]
+
+
+def plot(hmi: Hmi, sensor: str = "Temperature") -> Locator:
+    return hmi.page.get_by_role("region", name=f"Chart of {sensor}").get_by_test_id("plot")
+
+
+def plotted(hmi: Hmi) -> Image.Image:
+    """The inside of the first chart, once it has come."""
+    inside = plot(hmi).locator(".u-over")
+    expect(inside).to_be_visible()
+    hmi.expect(lambda: bool(columns(inside)), "a line in the chart")
+    return Image.open(io.BytesIO(inside.screenshot())).convert("RGB")
+
+
+def columns(inside: Locator) -> list[int]:
+    return line_columns(Image.open(io.BytesIO(inside.screenshot())).convert("RGB"))
+
+
+def line_columns(picture: Image.Image) -> list[int]:
+    """The columns that have something of the line's own colour."""
+    pixels = np.asarray(picture, dtype=int)
+    near = np.abs(pixels - np.array(LINE)).sum(axis=2) < 90
+    return [int(column) for column in np.flatnonzero(near.any(axis=0))]
+
+
+def rows(hmi: Hmi) -> list[dict[str, str]]:
+    """The table's rows: their kind, their time and their cells."""
+    found = (
+        hmi.page.get_by_test_id("series-table")
+        .locator("tbody tr")
+        .evaluate_all(
+            """rows => rows.map(row => ({
+          kind: row.dataset.kind, at: row.dataset.at,
+          text: [...row.cells].map(cell => cell.textContent).join('|'),
+        }))"""
+        )
+    )
+    assert isinstance(found, list)
+    return found
+
+
+def seconds(stamp: dict[str, int]) -> float:
+    return stamp["sec"] + stamp["nanosec"] / 1e9
+
+
+def test_a_gap_stays_open_and_the_rest_is_a_line(garden: Garden, open_page: OpenPage) -> None:
+    hmi = open_page(garden.bridge.url, f"chart.tag=1&{garden.period}")
+    picture = plotted(hmi)
+    share = picture.width / (garden.now_s - garden.from_s)
+    drawn = line_columns(picture)
+    # A marker is six pixels wide.
+    left, right = ((at - garden.from_s) * share for at in garden.gap_s)
+    assert [column for column in drawn if left + 6 < column < right - 6] == []
+    inside = [column for column in drawn if 20 < column < left - 10]
+    assert len(inside) > 0.9 * (left - 30)
+
+
+def test_the_table_says_what_the_api_says(garden: Garden, open_page: OpenPage) -> None:
+    hmi = open_page(garden.bridge.url, f"chart.tag=1&{garden.period}")
+    plotted(hmi)
+    told = garden.history(**asked(hmi))
+    assert not told["is_bucketed"]
+    assert len(told["gaps"]) == 1
+    summary = plot(hmi).get_attribute("aria-label") or ""
+    assert f"{len(told['readings'])} readings" in summary
+    assert "1 gap" in summary
+    hmi.page.get_by_role("button", name="Show as table").click()
+    found = rows(hmi)
+    readings = [row for row in reversed(found) if row["kind"] == "reading"]
+    assert [float(row["at"]) for row in readings] == [
+        pytest.approx(seconds(each["stamp"])) for each in told["readings"]
+    ]
+    for row, each in zip(readings, told["readings"], strict=True):
+        assert f"|{each['value']:.1f}\u00a0°C|" in row["text"]
+    kinds = [row["kind"] for row in found]
+    assert (kinds.count("gap"), kinds.count("failure"), kinds.count("look")) == (1, 1, 1)
+    assert any("nothing came for" in row["text"] for row in found if row["kind"] == "gap")
+
+
+def test_many_are_buckets_and_a_drag_brings_readings(garden: Garden, open_page: OpenPage) -> None:
+    hmi = open_page(garden.bridge.url, f"chart.tag=2&{garden.period}")
+    picture = plotted(hmi)
+    told = garden.history(**asked(hmi))
+    assert told["is_bucketed"]
+    whole = plot(hmi).get_attribute("aria-label") or ""
+    inside = plot(hmi).locator(".u-over")
+    box = inside.bounding_box()
+    assert box is not None
+    y = box["y"] + 40
+    hmi.page.mouse.move(box["x"] + 0.6 * picture.width, y)
+    hmi.page.mouse.down()
+    hmi.page.mouse.move(box["x"] + 0.75 * picture.width, y, steps=5)
+    hmi.page.mouse.up()
+    hmi.expect(lambda: float(asked(hmi)["from"]) > garden.from_s + 60, "a finer question")
+    finer = garden.history(**asked(hmi))
+    assert not finer["is_bucketed"]
+    span_s = garden.now_s - garden.from_s
+    assert float(asked(hmi)["from"]) == pytest.approx(
+        garden.from_s + 0.6 * span_s, abs=0.02 * span_s
+    )
+    hmi.expect(lambda: "period=" in hmi.address(), "the link to follow")
+    expect(plot(hmi)).not_to_have_attribute("aria-label", whole)
+    hmi.page.get_by_role("button", name="Whole period").click()
+    # What is shown, not what was asked: the answer before stays until the next has come.
+    expect(plot(hmi)).to_have_attribute("aria-label", whole)
+    with hmi.page.expect_download() as download:
+        hmi.page.get_by_role("button", name="CSV of what is shown").click()
+    text = download.value.path().read_text(encoding="utf-8-sig")
+    table = list(csv.DictReader(io.StringIO(text)))
+    buckets = [row for row in table if row["kind"] == "bucket"]
+    assert [int(row["n"]) for row in buckets] == [bucket["n"] for bucket in told["buckets"]]
+    assert [float(row["value"]) for row in buckets] == [
+        pytest.approx(bucket["mean"]) for bucket in told["buckets"]
+    ]
+    link = hmi.test_id("export-link").get_attribute("href") or ""
+    exported = garden.bridge.http.get(link).text.splitlines()
+    assert len(exported) == 1 + MANY
+
+
+def test_hover_tells_the_time_and_a_click_goes_there(garden: Garden, open_page: OpenPage) -> None:
+    hmi = open_page(garden.bridge.url, f"tag=1&{garden.period}")
+    hmi.page.keyboard.press("c")
+    picture = plotted(hmi)
+    inside = plot(hmi).locator(".u-over")
+    inside.hover(position={"x": picture.width * 0.25, "y": 30})
+    expect(hmi.page.locator(".plot-time").first).to_have_text(re.compile(r"\d\d:\d\d:\d\d"))
+    inside.click(position={"x": picture.width * 0.25, "y": 30})
+    hmi.expect(lambda: "at=" in hmi.address(), "a moment in the link")
+    at = float(dict(parse_qsl(urlsplit(hmi.address()).fragment))["at"])
+    quarter = garden.from_s + 0.25 * (garden.now_s - garden.from_s)
+    assert at == pytest.approx(quarter, abs=60)
+    hmi.page.keyboard.press("Escape")
+    expect(hmi.test_id("chart-view")).to_have_count(0)
+
+
+def test_on_a_phone_the_card_makes_room_for_its_charts(garden: Garden, open_page: OpenPage) -> None:
+    hmi = open_page(garden.bridge.url, f"tag=1&{garden.period}", viewport=PHONE)
+    card = hmi.test_id("tag-card")
+    card.get_by_role("button", name="Charts", exact=True).click()
+    expect(hmi.test_id("chart-view")).to_be_visible()
+    expect(card).to_be_hidden()
+    hmi.page.keyboard.press("Escape")
+    expect(card).to_be_visible()
+
+
+def test_what_is_observed_flows_in_and_a_gap_in_the_hearing_is_refilled(
+    garden: Garden, open_page: OpenPage
+) -> None:
+    hmi = open_page(garden.bridge.url, "chart.tag=3&tag=3&period=hour")
+    hmi.expect_phase("live")
+    garden.bridge.peer.observe(scan("3", {"temperature": 19.5}, at=(2, 2)))
+    region = hmi.page.get_by_role("region", name="Chart of Temperature")
+    expect(region.locator("strong").first).to_have_text("19.5\u00a0°C")
+    garden.bridge.peer.observe(scan("3", {"temperature": 20.5}, at=(2, 2)))
+    expect(region.locator("strong").first).to_have_text("20.5\u00a0°C")
+    # Not for a reading, which came by itself: each chart asks once in half a minute, and anew on
+    # each connection, of which a busy machine may lose one.
+    turns = Counter((each["points"], float(each["to"]) // 30) for each in questions(hmi))
+    assert max(turns.values(), default=0) <= sum(url.startswith("ws:") for url in hmi.requests)
+    hmi.allow_noise("ERR_INTERNET_DISCONNECTED")
+    hmi.allow_noise("WebSocket")
+    hmi.page.context.set_offline(True)
+    expect(hmi.app).not_to_have_attribute("data-connection-state", "live")
+    garden.bridge.peer.observe(scan("3", {"temperature": 21.5}, at=(2, 2)))
+    garden.bridge.peer.observe(scan("3", {"temperature": 22.5}, at=(2, 2)))
+    hmi.page.context.set_offline(False)
+    hmi.expect_phase("live")
+    hmi.page.get_by_role("button", name="Show as table").click()
+    hmi.expect(
+        lambda: (
+            [row["text"].split("|")[1] for row in rows(hmi) if row["kind"] == "reading"]
+            == [f"{value}\u00a0°C" for value in (22.5, 21.5, 20.5, 19.5)]
+        ),
+        "what was missed",
+    )
+
+
+def test_the_difference_layer_is_one_field_less_the_other(
+    garden: Garden, open_page: OpenPage
+) -> None:
+    then = round(garden.now_s - 6000, 3)
+    hmi = open_page(garden.bridge.url, f"compare={then}")
+    expect(hmi.test_id("difference-high")).to_be_visible()
+    asked_for = [
+        dict(parse_qsl(urlsplit(url).query))
+        for url in hmi.requests
+        if "/api/field.npy?" in url and "bbox_min_x" in url
+    ]
+    before_query = next(query for query in asked_for if "at" in query)
+    assert float(before_query.pop("at")) == then
+    moments: list[dict[str, Any]] = [{}, {"at": str(then)}]
+    question: dict[str, Any] = {**before_query}
+    shown, before = (
+        np.load(io.BytesIO(garden.bridge.get("/api/field.npy", **question, **at).content))
+        for at in moments
+    )
+    between: NDArray[np.float64] = shown - before
+    most = float(np.nanmax(np.abs(between)))
+    text = hmi.test_id("difference-high").inner_text().split("\u00a0")[0]
+    assert float(text) == pytest.approx(most, abs=0.06)
+    expect(hmi.test_id("difference-legend")).to_contain_text("less")
+    # Right on a tag: its own two values.
+    hmi.point_at(1.0, 1.0)
+    values = [
+        next(
+            reading["value"]
+            for tag in garden.bridge.json("/api/state", **at)["tags"]
+            if tag["tag_id"] == "1"
+            for reading in tag["readings"]
+            if reading["name"] == "temperature"
+        )
+        for at in moments
+    ]
+    sign = "+" if values[0] > values[1] else "\u2212"
+    expect(hmi.test_id("readout").locator("strong")).to_have_text(
+        re.compile(rf"^\{sign}{abs(values[0] - values[1]):.1f}")
+    )

@@ -1,0 +1,432 @@
+"""The page looks back: what it shows is what the journal has, and nobody can take it for now."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+from urllib.parse import parse_qsl, urlsplit
+
+import pytest
+from playwright.sync_api import Locator, Route, expect
+
+from lupin_twin.journal.asof import state_at
+from lupin_twin.journal.rows import Row
+from lupin_twin.journal.runs import Clock
+from lupin_twin.journal.schema import open_reader
+from tests.browser.hmi import PHONE, Hmi, OpenPage
+from tests.browser.test_accessibility import violations
+from tests.support.journal import SECOND, kept, look, pin, scan
+from tests.support.messages import scan as observed
+from tests.support.web import Bridge, bridge
+
+TAGS: Final = ("a", "b", "c")
+PLACES: Final = {"a": 1.0, "b": 3.0, "c": 5.0}
+EVERY_S: Final = 30
+SCANS: Final = 90
+# No scan of the past reads this, so that now cannot be taken for then.
+NOW_READS: Final = 25.5
+STATE: Final = re.compile(r"/api/state\?at=")
+
+# What the page says that it shows, and what it shows, whenever one of them changes.
+WATCH: Final = """
+window.seen = [];
+(function watch() {
+  const app = document.querySelector('[data-testid=app]');
+  const cell = document.querySelector('tr[data-tag-id=a] td[data-sensor=temperature] .reading');
+  const told = app?.dataset.moment;
+  const now = JSON.stringify([told, cell ? cell.textContent : null, document.title]);
+  if (told && window.seen.at(-1) !== now) window.seen.push(now);
+  requestAnimationFrame(watch);
+})();
+"""
+
+
+@dataclass(frozen=True)
+class Hour:
+    """A twin that remembers its last 45 minutes, and goes on."""
+
+    bridge: Bridge
+    journal: Path
+    begun_s: int
+
+    def read_then(self, at_s: float) -> dict[str, str]:
+        """The temperatures that the journal has as of a moment, as the table writes them."""
+        with closing(open_reader(self.journal)) as connection:
+            tags = state_at(connection, round(at_s * 1000) * 1_000_000, "map").tags
+        return {tag.tag_id: f"{tag.readings[0].value:.1f}" for tag in tags if tag.readings}
+
+
+@pytest.fixture(scope="module")
+def hour(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hour]:
+    journal = tmp_path_factory.mktemp("hour") / "journal.sqlite"
+    begun_s = int(time.time()) - EVERY_S * SCANS
+    begun_ns = begun_s * SECOND
+    rows: list[Row] = [pin(tag, begun_ns, x=PLACES[tag]) for tag in TAGS]
+    rows += [look("b", begun_ns + 600 * SECOND, anomaly=True), look("b", begun_ns + 900 * SECOND)]
+    rows += [
+        scan(tag, begun_ns + number * EVERY_S * SECOND, temperature=18.0 + number % 40 / 10)
+        for number in range(SCANS)
+        for tag in TAGS
+    ]
+    kept(journal, rows, Clock(begun_ns, begun_ns, is_simulated=False))
+    with bridge("--ros-args", "-p", f"journal:={journal}") as running:
+        running.peer.observe(*(observed(tag, {"temperature": NOW_READS}) for tag in TAGS))
+        for tag in TAGS:
+            running.tag(tag, lambda tag: tag["readings"][0]["value"] == NOW_READS)
+        yield Hour(running, journal, begun_s)
+
+
+@pytest.fixture
+def page(hour: Hour, open_page: OpenPage) -> Hmi:
+    """A page with the last hour below its map."""
+    hmi = open_page(hour.bridge.url, go=False)
+    hmi.page.add_init_script(WATCH)
+    hmi.go("period=hour")
+    hmi.expect_rows(*TAGS)
+    hmi.expect_samples(3)
+    expect(hmi.test_id("timebar")).to_have_attribute("data-state", "ready")
+    return hmi
+
+
+def slider(hmi: Hmi) -> Locator:
+    return hmi.page.get_by_role("slider", name="Time shown")
+
+
+def point(hmi: Hmi, share: float) -> tuple[float, float]:
+    """The point of the page where so much of the bar is to its left."""
+    box = slider(hmi).bounding_box()
+    assert box is not None
+    return box["x"] + share * box["width"], box["y"] + box["height"] / 2
+
+
+def press_at(hmi: Hmi, share: float) -> None:
+    hmi.page.mouse.click(*point(hmi, share))
+
+
+def moment(hmi: Hmi) -> float | None:
+    """The moment that the page says it shows; None: now."""
+    told = hmi.app.get_attribute("data-moment")
+    assert told is not None
+    return None if told == "now" else float(told)
+
+
+def settled(hmi: Hmi) -> float | None:
+    """The moment that is shown once it is the one that is wanted."""
+    expect(hmi.page.locator(".timebar-cursor")).to_have_attribute("data-awaited", "false")
+    return moment(hmi)
+
+
+def expect_past(hmi: Hmi) -> float:
+    """Wait until another moment than now is shown, said in every place; that moment."""
+    expect(hmi.app).to_have_attribute("data-past", "true")
+    at = settled(hmi)
+    assert at is not None
+    expect(hmi.test_id("past-header")).to_contain_text("Past")
+    when = hmi.test_id("past-header").locator("strong").inner_text()
+    expect(hmi.test_id("past-frame")).to_contain_text(when)
+    # The alarms that nobody has seen are those of now, and stand before it.
+    title = re.escape(f"{when} (past) · Lupin twin")
+    expect(hmi.page).to_have_title(re.compile(rf"^(\([1-9]\d*\) )?{title}$"))
+    expect(hmi.test_id("connection")).not_to_contain_text("Live")
+    return at
+
+
+def expect_now(hmi: Hmi) -> None:
+    expect(hmi.app).to_have_attribute("data-moment", "now")
+    expect(hmi.test_id("past-header")).to_have_count(0)
+    expect(hmi.test_id("past-frame")).to_have_count(0)
+    expect(hmi.page).to_have_title("Lupin twin")
+    expect(hmi.cell("a", "temperature")).to_have_text("25.5")
+
+
+def check_seen(hmi: Hmi, hour: Hour) -> set[float]:
+    """Hold all that the page has shown to the journal; the moments that it showed."""
+    moments = set()
+    for line in hmi.page.evaluate("window.seen.map((each) => JSON.parse(each))"):
+        told, cell, title = line
+        if told == "now":
+            assert cell in (None, "25.5"), line
+            assert title == "Lupin twin", line
+        else:
+            assert cell in (None, hour.read_then(float(told)).get("a")), line
+            moments.add(float(told))
+    return moments
+
+
+def test_dragging_shows_each_moment_as_the_journal_has_it(page: Hmi, hour: Hour) -> None:
+    mouse = page.page.mouse
+    mouse.move(*point(page, 0.95))
+    mouse.down()
+    for share in (0.9, 0.7, 0.5, 0.4):
+        mouse.move(*point(page, share), steps=5)
+        at = expect_past(page)
+        then = hour.read_then(at)
+        for tag in TAGS:
+            expect(page.cell(tag, "temperature")).to_have_text(then[tag])
+        # Everything follows: the field, the ages as of then.
+        expect(page.test_id("sample-count")).to_have_text("3 tags contribute")
+        age = int(at - hour.begun_s) % EVERY_S
+        expect(page.row("a").locator(".cell-age")).to_have_text(f"{age}\u00a0s")
+    mouse.up()
+    assert len(check_seen(page, hour)) > 4
+
+
+def test_the_end_of_the_bar_is_now_and_before_memory_there_is_nothing(
+    page: Hmi, hour: Hour
+) -> None:
+    press_at(page, 0.6)
+    expect_past(page)
+    press_at(page, 0.999)
+    expect_now(page)
+    press_at(page, 0.01)
+    notice = page.test_id("notice")
+    expect(notice).to_have_attribute("data-notice", "past-nothing")
+    expect(notice).to_contain_text("What is remembered begins at")
+    assert page.rows() == []
+    page.page.get_by_role("button", name="Back to live").click()
+    expect_now(page)
+    check_seen(page, hour)
+
+
+def test_pests_and_cards_are_those_of_the_moment(page: Hmi, hour: Hour) -> None:
+    page.go(f"tag=b&at={hour.begun_s + 700}&period=hour")
+    expect_past(page)
+    expect(page.card("b")).to_contain_text(re.compile("pests? seen", re.IGNORECASE))
+    expect(page.card("b").locator("[data-sensor=temperature] strong")).to_have_text("20.3\u00a0°C")
+    page.go(f"tag=b&at={hour.begun_s + 1000}&period=hour")
+    expect_past(page)
+    expect(page.card("b")).not_to_contain_text(re.compile("pests? seen", re.IGNORECASE))
+
+
+def test_with_keys_alone(page: Hmi, hour: Hour) -> None:
+    keys = page.page.keyboard
+    slider(page).focus()
+    expect(slider(page)).to_have_attribute("aria-valuetext", re.compile("^Live"))
+    keys.press("PageDown")
+    first = expect_past(page)
+    expect(slider(page)).to_have_attribute("aria-valuetext", re.compile(r"^\d+ \w+ \d{4}, "))
+    keys.press("ArrowLeft")
+    second = expect_past(page)
+    keys.press("Shift+ArrowRight")
+    third = expect_past(page)
+    assert third - second == pytest.approx(10 * (first - second), rel=0.01)
+    keys.press("End")
+    expect_now(page)
+    keys.press("Home")
+    expect_past(page)
+    keys.press("Escape")
+    expect_now(page)
+    keys.press("PageDown")
+    expect_past(page)
+    keys.press("l")
+    expect_now(page)
+    check_seen(page, hour)
+
+
+def test_playing_goes_through_the_past_and_ends_in_now(page: Hmi, hour: Hour) -> None:
+    speed, body = page.page.get_by_label("Playback speed"), page.page.locator("body")
+    play = page.page.get_by_role("button", name="Play")
+    # So slow that it goes on for half a minute, however late the answers come.
+    speed.select_option("60×")
+    press_at(page, 0.4)
+    start = expect_past(page)
+    body.press("Space")
+    expect(page.page.get_by_role("button", name="Pause")).to_have_attribute("aria-pressed", "true")
+    page.expect(lambda: len(check_seen(page, hour)) > 4, "the past to go on")
+    body.press("Space")
+    paused = expect_past(page)
+    assert paused > start
+    expect(play).to_have_attribute("aria-pressed", "false")
+    speed.select_option("3600×")
+    play.click()
+    expect_now(page)
+    expect(play).to_have_attribute("aria-pressed", "false")
+    assert {start, paused} <= check_seen(page, hour)
+
+
+def test_a_link_shows_the_same_moment_to_somebody_else_and_back_leads_to_now(
+    page: Hmi, hour: Hour, open_page: OpenPage
+) -> None:
+    press_at(page, 0.5)
+    at = expect_past(page)
+    told = page.app.get_attribute("data-moment")
+    page.expect(lambda: f"at={told}&" in page.address(), "the link")
+    theirs = open_page(hour.bridge.url, page.address().partition("#")[2], viewport=PHONE)
+    # Also where there is hardly room, the header says that it is the past.
+    expect(theirs.page.locator(".past-header .past-word")).to_be_visible()
+    assert theirs.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+    assert expect_past(theirs) == at
+    theirs.page.get_by_role("navigation").get_by_role("button", name="Tags").click()
+    for tag, text in hour.read_then(at).items():
+        expect(theirs.cell(tag, "temperature")).to_have_text(text)
+    page.page.go_back()
+    expect_now(page)
+    page.page.go_forward()
+    assert expect_past(page) == at
+
+
+def test_a_wall_screen_always_shows_now(hour: Hour, open_page: OpenPage) -> None:
+    wall = open_page(hour.bridge.url, f"at={hour.begun_s + 600}", "?kiosk=1")
+    expect(wall.app).to_have_attribute("data-moment", "now")
+    expect(wall.test_id("timebar")).to_have_count(0)
+    expect(wall.test_id("connection")).to_contain_text("Live")
+
+
+def test_a_slow_answer_never_leaves_now_under_another_moment(page: Hmi, hour: Hour) -> None:
+    # By moment: who waits long for its field, or connects anew, asks for the same one again.
+    asked: dict[str, list[Route]] = {}
+    answered: list[str] = []
+
+    def hold(route: Route) -> None:
+        at = dict(parse_qsl(urlsplit(route.request.url).query))["at"]
+        asked.setdefault(at, []).append(route)
+        if at in answered:
+            route.continue_()
+
+    page.page.route(STATE, hold)
+    press_at(page, 0.5)
+    page.expect(lambda: bool(asked), "the question")
+    notice = page.test_id("notice")
+    expect(notice).to_have_attribute("data-notice", "past-fetching")
+    assert page.rows() == []
+    answered.extend(asked)
+    for route in list(asked[answered[0]]):
+        route.continue_()
+    first = expect_past(page)
+    press_at(page, 0.6)
+    page.expect(lambda: len(asked) > 1, "the next question")
+    # What came last stays, with its own time.
+    assert moment(page) == first
+    expect(page.page.locator(".timebar-cursor")).to_have_attribute("data-awaited", "true")
+    page.page.keyboard.press("l")
+    expect_now(page)
+    page.page.unroute(STATE)
+    check_seen(page, hour)
+
+
+def test_an_answer_that_fails_is_told_and_nothing_stands_for_it(page: Hmi, hour: Hour) -> None:
+    press_at(page, 0.5)
+    first = expect_past(page)
+    page.allow_noise(r"503 .*/api/state")
+    page.page.route(STATE, lambda route: route.fulfill(status=503, json={"detail": "too busy"}))
+    press_at(page, 0.6)
+    trouble = page.test_id("troubles").locator("[data-trouble=past]")
+    expect(trouble).to_contain_text("could not be fetched")
+    expect(trouble).to_contain_text("too busy")
+    assert moment(page) == first
+    page.page.unroute(STATE)
+    expect(trouble).to_have_count(0)
+    assert expect_past(page) > first
+    check_seen(page, hour)
+
+
+def test_a_twin_without_a_memory_says_so_and_how_to_have_one(
+    hour: Hour, open_page: OpenPage
+) -> None:
+    hmi = open_page(hour.bridge.url, go=False)
+    hmi.allow_noise(r"404 .*/api/(timeline|state|field)")
+    hmi.page.route(
+        re.compile(r"/api/(timeline|state\?at=|field.*at=)"),
+        lambda route: route.fulfill(status=404, json={"detail": "no journal is kept"}),
+    )
+    hmi.go()
+    bar = hmi.test_id("timebar")
+    expect(bar).to_have_attribute("data-state", "off")
+    expect(bar).to_contain_text("this twin remembers nothing")
+    expect(bar).to_contain_text("Whoever runs the twin can turn the recording on")
+    expect(bar).not_to_contain_text("journal")  # plain words
+    expect(hmi.cell("a", "temperature")).to_have_text("25.5")
+    hmi.go(f"at={hour.begun_s + 600}")
+    expect(hmi.test_id("notice")).to_have_attribute("data-notice", "past-failed")
+    expect(hmi.test_id("notice")).to_contain_text("no journal is kept")
+    assert hmi.rows() == []
+    hmi.page.get_by_role("button", name="Back to live").click()
+    expect(hmi.cell("a", "temperature")).to_have_text("25.5")
+
+
+def test_a_lost_connection_is_told_and_the_past_stays(page: Hmi, hour: Hour) -> None:
+    page.allow_noise("ERR_INTERNET_DISCONNECTED|closed before the connection is established")
+    page.page.clock.install()
+    page.go("period=hour")
+    press_at(page, 0.5)
+    at = expect_past(page)
+    then = hour.read_then(at)["a"]
+    # It is here: what is only asked for would be lost.
+    expect(page.cell("a", "temperature")).to_have_text(then)
+    page.page.context.set_offline(True)
+    page.page.clock.fast_forward(20_000)
+    page.expect_phase("reconnecting")
+    banner = page.test_id("frozen")
+    expect(banner).to_contain_text("Live data have stopped")
+    expect(banner).to_contain_text("What is shown is past, and stays")
+    expect(page.cell("a", "temperature")).to_have_text(then)
+    expect(page.page.locator("canvas[data-layer=pins]")).to_have_css("opacity", "1")
+    page.page.context.set_offline(False)
+    page.page.clock.run_for(20_000)
+    page.expect_phase("live")
+    assert expect_past(page) == at
+    expect(page.cell("a", "temperature")).to_have_text(then)
+    check_seen(page, hour)
+
+
+def test_what_becomes_critical_meanwhile_is_told_and_leads_to_now(page: Hmi, hour: Hour) -> None:
+    robot = hour.bridge.peer
+    press_at(page, 0.5)
+    expect_past(page)
+    expect(page.test_id("meanwhile")).to_have_count(0)
+    robot.observe(*[observed("c", {"temperature": 60.0})] * 2)
+    expect(page.test_id("meanwhile")).to_contain_text("Now: Tag c: Temperature 60.0")
+    # The list is that of now, and says so.
+    expect(page.page).to_have_title(re.compile(r"^\(1\) .* \(past\) · Lupin twin$"))
+    page.page.keyboard.press("a")
+    expect(page.page.locator("[data-note=now]")).to_contain_text("These are the alarms of now")
+    expect(page.page.locator("[data-group=active] li")).to_contain_text("Tag c")
+    page.page.locator(".list-choice label").first.click()
+    assert moment(page) is not None
+    page.page.get_by_role("button", name="Back to live, to tag c").click()
+    expect_now(page)
+    expect(page.card("c")).to_contain_text("60.0")
+    expect(page.test_id("meanwhile")).to_have_count(0)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_has_no_objection_to_the_past(hour: Hour, open_page: OpenPage, scheme: str) -> None:
+    past = f"at={hour.begun_s + 700}&tag=b&period=hour"
+    hmi = open_page(hour.bridge.url, past, color_scheme=scheme, bypass_csp=True)
+    expect_past(hmi)
+    hmi.page.get_by_role("button", name="What the marks mean").click()
+    assert violations(hmi) == []
+    hmi.page.set_viewport_size({"width": PHONE["width"], "height": PHONE["height"]})
+    hmi.page.get_by_label("Period", exact=True).select_option("own")
+    assert violations(hmi) == []
+
+
+def test_the_estimate_says_plus_or_minus_what_now_and_then_and_in_its_link(
+    hour: Hour, open_page: OpenPage
+) -> None:
+    hmi = open_page(hour.bridge.url, "period=hour", color_scheme="dark", bypass_csp=True)
+    hmi.expect_samples(3)
+    hmi.test_id("heat-legend").select_option("estimate")
+    expect(hmi.test_id("estimate-key")).to_contain_text("Hatched where it may be off by more")
+    expect(hmi.test_id("foretold")).to_be_visible()
+    hmi.point_at(3.3, 2.3)
+    read = hmi.test_id("readout")
+    expect(read).to_contain_text(re.compile(r"\d\d\.\d\s±\s\d\.\d\s°C"))
+    # One of the three may be held to have changed: all have just said something else.
+    expect(read).to_contain_text(re.compile("[23] tags near, oldest reading"))
+    assert violations(hmi) == []
+    press_at(hmi, 0.5)
+    at = expect_past(hmi)
+    hmi.point_at(3.3, 2.3)
+    expect(read).to_contain_text(re.compile(r"\d\d\.\d\s±\s\d\.\d\s°C"))
+    hmi.expect(lambda: "heat=estimate" in hmi.address(), "the link")
+    theirs = open_page(hour.bridge.url, hmi.address().partition("#")[2])
+    assert expect_past(theirs) == at
+    expect(theirs.test_id("estimate-key")).to_have_text(hmi.test_id("estimate-key").inner_text())
+    theirs.test_id("heat-legend").select_option("error")
+    expect(theirs.test_id("error-scale")).to_be_visible()

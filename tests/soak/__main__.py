@@ -1,0 +1,25 @@
+"""`make soak`: what takes too long for every test run: many kills, and eight hours of writing."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+from lupin_twin.leaving import leave_after
+from tests.support.state_home import use_own
+
+SOAKS = ("kills", "hours")
+
+
+def main() -> int:
+    """Run the soaks named on the command line, or all; 1 if one did not hold."""
+    use_own()
+    code = 0
+    for name in sys.argv[1:] or SOAKS:
+        print(f"\n=== {name}", flush=True)
+        code |= 0 if importlib.import_module(f"tests.soak.{name}").main() else 1
+    return code
+
+
+if __name__ == "__main__":
+    leave_after(main)

@@ -1,0 +1,103 @@
+"""Eight hours of a large house in a minute or two: does memory stay, is the file as computed?
+
+10,000 tags of five sensors, each scanned every ten minutes, through what a twin does without ROS:
+store, history, journal and its upkeep. Time is the rows' own, as fast as the disk takes them.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import random
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from lupin_twin.history import History
+from lupin_twin.journal.retention import Limits
+from lupin_twin.journal.runs import Clock
+from lupin_twin.journal.writer import Journal
+from lupin_twin.memory import Memory
+from lupin_twin.state import Pose, Reading, Scan, TwinStore
+from tests.support.journal import NOW, SECOND, is_whole, select
+from tests.support.proc_stat import resident_mb
+from tests.support.waiting import wait_for
+
+TAGS, EVERY_S, HOURS = 10_000, 600, 8
+SENSORS = ("temperature", "humidity", "co2", "light", "soil_moisture")
+LIMITS = Limits(days=36_500, max_bytes=10**11)
+# An hour of scans, so that the history is as large as it gets when the first hour is over.
+BUFFER_LEN = 3600 // EVERY_S
+# What waits at most: observations must not be lost to a clock that runs 500 times too fast.
+MOST_WAITING = 2_000
+
+# Bytes of a scan: record (header 9, series 3, stamp 8, lag 1, mission 1, five float64, check 2),
+# length, number and pointer; in the index series, stamp and number, length and pointer. Pages of a
+# table that only grows are full, those of an index that grows everywhere seven tenths.
+SCAN, ENTRY = 64 + 7, 22
+FULL, SPREAD = 0.97, 0.7
+# And of an hour of a tag's five sensors: key, length, n, mean, least and largest of each.
+ROLLUP = 12 + 5 * 26
+
+
+def scans(hour: int, chance: random.Random) -> Iterator[Scan]:
+    """All scans of an hour, one tag after the other."""
+    rounds = 3600 // EVERY_S
+    step_ns = EVERY_S * SECOND // TAGS
+    for at in range(hour * rounds, (hour + 1) * rounds):
+        for tag in range(TAGS):
+            values = (Reading(name, 20 + chance.random()) for name in SENSORS)
+            pose = Pose(tag / 100, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+            stamp_ns = NOW + (at * TAGS + tag) * step_ns
+            yield Scan(
+                str(tag), stamp_ns, tuple(values), pose, source="robot", own_stamp_ns=stamp_ns
+            )
+
+
+def computed_bytes(count: int, hours: int) -> float:
+    """What a file of so many scans is, by the sizes of their rows."""
+    return count * (SCAN / FULL + ENTRY / SPREAD) + hours * TAGS * ROLLUP / SPREAD
+
+
+def main(hours: int = HOURS) -> bool:
+    """Write; whether memory stays within a twentieth, and the file is as computed.
+
+    Counted from the third hour on: by then all is full that is bounded, of which SQLite's cache of
+    16 MB and the 50,000 rows that are folded into rollups at a time are filled last.
+    """
+    chance, begun_s = random.Random(1), time.monotonic()
+    resident: list[float] = []
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "j.sqlite"
+        journal = Journal(path, "/soak", LIMITS)
+        memory = Memory(TwinStore(), History(BUFFER_LEN), journal, BUFFER_LEN)
+        memory.follow(Clock(NOW, NOW, is_simulated=False))
+        for hour in range(hours):
+            for scan in scans(hour, chance):
+                assert memory.apply(scan, scan.stamp_ns) is None
+                wait_for(lambda: journal.condition.waiting <= MOST_WAITING, "room for more", 60.0)
+            wait_for(lambda: not journal.condition.waiting, "all of it written", 60.0)
+            gc.collect()
+            resident.append(resident_mb(os.getpid()))
+            told = journal.condition
+            count = (hour + 1) * TAGS * 3600 // EVERY_S
+            print(
+                f"hour {hour + 1}: {count:,} scans, {told.file_bytes / 1e6:.0f} MB with the log,"
+                f" {resident[-1]:.0f} MB resident, lost {told.lost},"
+                f" {time.monotonic() - begun_s:.0f} s",
+                flush=True,
+            )
+        journal.close(60.0)  # the last fold of its upkeep may take longer than a twin would wait
+        memory.close()
+        size, whole = path.stat().st_size, is_whole(path)
+        ((kept,),) = select(path, "SELECT count(*) FROM scan")
+    computed = computed_bytes(count, hours)
+    readings = count * len(SENSORS)
+    print(
+        f"{kept} scans of {count} in the file, whole: {whole}; {size / 1e6:.1f} MB, computed"
+        f" {computed / 1e6:.1f} MB; {size / readings:.1f} bytes a reading; resident up to the"
+        f" third hour {max(resident[:3]):.0f} MB, up to the end {max(resident):.0f} MB"
+    )
+    is_flat = max(resident) < 1.05 * max(resident[:3])
+    return is_flat and whole and kept == count and 0.85 < size / computed < 1.15

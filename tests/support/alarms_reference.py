@@ -1,0 +1,317 @@
+"""The alarms of what was heard, in the plainest way: all of it is read again for every question."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby, pairwise
+from statistics import median
+
+from lupin_bridge.judge.derived import dew_point_c, vapour_pressure_deficit_kpa
+from lupin_bridge.judge.ranges import Sensors
+from lupin_twin.past_writes import PastWrite, RunSpan
+
+S = 1_000_000_000
+SHORTEST, LONGEST = 600 * S, 86_400 * S
+FLOWER = 1
+# Dawn and dusk are over by then.
+DIM = 2 * 3600 * S
+# A light that its tag's scans have left out for longer says nothing.
+LEFT_OUT = 2 * 3600 * S
+
+
+@dataclass(frozen=True)
+class Plain:
+    """An alarm, as far as its rules go: everything but its id."""
+
+    tag_id: str
+    kind: str
+    sensor: str
+    verdict: str
+    value: float | None
+    limit: float | None
+    since_ns: int
+    raised_ns: int
+    cleared_ns: int | None
+    worst: float | None
+
+
+@dataclass(frozen=True)
+class _Said:
+    """What one occasion says of one matter."""
+
+    at_ns: int
+    is_so: bool
+    is_nearly_so: bool
+    verdict: str = ""
+    value: float | None = None
+    limit: float | None = None
+    # Of a try: the tag's scans up to then.
+    scans: tuple[int, ...] = ()
+    # Where that is not the occasion itself: what says so.
+    since_ns: int | None = None
+
+
+def alarms(
+    heard: Iterable[PastWrite],
+    spans: Sequence[RunSpan],
+    now_ns: int,
+    sensors: Sensors,
+    day_of: Callable[[bool | None, int], bool],
+) -> set[Plain]:
+    once = {write.number: write for write in heard}.values()
+    told = [
+        write
+        for write in once
+        if any(s.run == write.run and s.start_ns <= write.stamp_ns < s.end_ns for s in spans)
+    ]
+    found: set[Plain] = set()
+    for run in {write.run for write in told}:
+        of_run = sorted(
+            (write for write in told if write.run == run), key=lambda w: (w.stamp_ns, w.number)
+        )
+        is_on = run == spans[-1].run
+        found |= set(_of_house(of_run, now_ns if is_on else None))
+        for tag_id in {write.tag_id for write in of_run}:
+            found |= set(_of_tag(tag_id, of_run, sensors, day_of, is_on=is_on))
+    return found
+
+
+def _mine(tag_id: str, of_run: list[PastWrite]) -> list[list[PastWrite]]:
+    mine = [write for write in of_run if write.tag_id == tag_id]
+    return [list(group) for _, group in groupby(mine, key=lambda write: write.stamp_ns)]
+
+
+def _readings(occasion: list[PastWrite]) -> dict[str, float]:
+    return {
+        name: value
+        for write in occasion
+        for name, value in zip(write.sensors, write.values, strict=True)
+    }
+
+
+def _light(of_run: list[PastWrite], at_ns: int) -> bool | None:
+    newest: dict[str, tuple[int, float]] = {}
+    scanned: dict[str, int] = {}
+    for write in of_run:
+        if write.stamp_ns <= at_ns:
+            for name, value in zip(write.sensors, write.values, strict=True):
+                scanned[write.tag_id] = write.stamp_ns
+                if name == "light":
+                    newest[write.tag_id] = write.stamp_ns, value
+    lights = [
+        value
+        for tag_id, (told_ns, value) in newest.items()
+        if math.isfinite(value) and scanned[tag_id] - told_ns <= LEFT_OUT
+    ]
+    bright = sum(value >= 50.0 for value in lights)
+    return bright >= len(lights) / 2 if lights else None
+
+
+def _of_tag(
+    tag_id: str,
+    of_run: list[PastWrite],
+    sensors: Sensors,
+    day_of: Callable[[bool | None, int], bool],
+    *,
+    is_on: bool,
+) -> Iterator[Plain]:
+    occasions = _mine(tag_id, of_run)
+    last_ns = occasions[-1][0].stamp_ns
+    matters: dict[_Key, list[_Said]] = {}
+    scans = _scans(tag_id, of_run)
+    species = ""
+    for occasion in occasions:
+        at = occasion[0].stamp_ns
+        species = next((w.species for w in reversed(occasion) if w.has_seen), species)
+        is_day = day_of(_light(of_run, at), at)
+        for key, said in (
+            *_of_readings(occasion),
+            *_of_ranges(occasion, sensors, species, is_day=is_day),
+            *_of_tries(occasion, [one for one in scans if one <= at]),
+            *_of_silent_sensors(at, occasions, [one for one in scans if one <= at]),
+        ):
+            matters.setdefault(key, []).append(said)
+    ended_ns = None if is_on else last_ns
+    for key, every in matters.items():
+        for plain in _episodes(key, every, ended_ns):
+            yield replace(plain, tag_id=tag_id)
+    yield from _overdue(tag_id, of_run, is_on=is_on)
+
+
+_Key = tuple[str, str, str]
+
+
+def _of_readings(occasion: list[PastWrite]) -> Iterator[tuple[_Key, _Said]]:
+    for name, value in _readings(occasion).items():
+        if name not in ("vpd", "dew_point"):
+            bad = not math.isfinite(value)
+            yield ("reading_failed", name, ""), _Said(occasion[0].stamp_ns, bad, bad, "stressed")
+
+
+def _of_ranges(
+    occasion: list[PastWrite], sensors: Sensors, species: str, *, is_day: bool
+) -> Iterator[tuple[_Key, _Said]]:
+    at = occasion[0].stamp_ns
+    readings = _readings(occasion)
+    air = readings.get("temperature"), readings.get("humidity")
+    if air[0] is not None and air[1] is not None:
+        readings.setdefault("vpd", vapour_pressure_deficit_kpa(air[0], air[1]))
+        readings.setdefault("dew_point", dew_point_c(air[0], air[1]))
+    for name, value in readings.items():
+        ranges = sensors.named(name).ranges(is_day=is_day, species=species)
+        if not math.isfinite(value):
+            continue
+        for side, sign in (("low", -1.0), ("high", 1.0)):
+            key = ("range", name, side)
+            if ranges.ideal is None:
+                yield key, _Said(at, is_so=False, is_nearly_so=False)
+                continue
+            ideal = ranges.ideal.low if sign < 0 else ranges.ideal.high
+            verdict, limit = "stressed", ideal
+            if ranges.critical is not None:
+                edge = ranges.critical.low if sign < 0 else ranges.critical.high
+                if (value - edge) * sign > 0:
+                    verdict, limit = "critical", edge
+            band = ideal - sign * 0.05 * (ranges.ideal.high - ranges.ideal.low)
+            is_so, near = (value - ideal) * sign > 0, (value - band) * sign > 0
+            yield key, _Said(at, is_so, near, verdict, value, limit)
+
+
+def _of_silent_sensors(
+    at: int, occasions: list[list[PastWrite]], scans: list[int]
+) -> Iterator[tuple[_Key, _Said]]:
+    told: dict[str, list[int]] = {}
+    for occasion in occasions:
+        for name in _readings(occasion):
+            if occasion[0].stamp_ns <= at:
+                told.setdefault(name, []).append(occasion[0].stamp_ns)
+    if not scans or scans[-1] != at:
+        return
+    for name, every in told.items():
+        limit = max(_holds(scans), _may_last(every[-2:]))
+        is_so = at - every[-1] > limit
+        said = _Said(at, is_so, is_so, "unknown", None, limit / 1e9, since_ns=every[-1])
+        yield ("old", name, ""), said
+
+
+def _of_tries(occasion: list[PastWrite], scans: list[int]) -> Iterator[tuple[_Key, _Said]]:
+    at = occasion[0].stamp_ns
+    for kind, status in {w.kind: w.status for w in occasion}.items():
+        bad = status != 0
+        said = _Said(at, bad, bad, "stressed", float(status), scans=tuple(scans[-9:]))
+        yield ("scan_failed", "", str(kind)), said
+    looks = [w for w in occasion if w.kind == FLOWER and w.has_seen]
+    if looks:
+        seen, bugs = looks[-1].anomaly, float(looks[-1].bug_count)
+        yield ("pest", "", ""), _Said(at, seen, seen, "critical", bugs)
+
+
+def _episodes(key: _Key, said: list[_Said], ended_ns: int | None) -> Iterator[Plain]:
+    """Walk from episode to episode: where does one begin, where does it end, what lies between."""
+    kind, sensor, which = key
+    hold = 1 if kind == "pest" else 2
+    at = 0
+    while at + hold <= len(said):
+        raised = next(
+            (
+                index
+                for index in range(at + hold - 1, len(said))
+                if all(one.is_so for one in said[at : index + 1])
+                and said[index].at_ns - said[at].at_ns
+                >= (
+                    DIM
+                    if key == ("range", "light", "low")
+                    else _usual(said[index].scans, said[at].at_ns)
+                )
+            ),
+            None,
+        )
+        if raised is None:
+            at += 1
+            continue
+        end = raised + 1
+        while end < len(said) and (
+            said[end].is_nearly_so or any(one.is_nearly_so for one in said[end - hold + 1 : end])
+        ):
+            end += 1
+        over = said[at:end]
+        out = [one for one in over if one.is_so]
+        values = [one.value for one in out if one.value is not None]
+        worst = (min if which == "low" else max)(values) if kind in ("range", "pest") else None
+        yield Plain(
+            "",
+            kind,
+            sensor,
+            "critical" if any(one.verdict == "critical" for one in out) else out[0].verdict,
+            said[raised].value,
+            said[raised].limit,
+            since if (since := said[raised].since_ns) is not None else said[at].at_ns,
+            said[raised].at_ns,
+            said[end].at_ns if end < len(said) else ended_ns,
+            worst,
+        )
+        at = end + 1
+
+
+def _usual(scans: tuple[int, ...], began: int) -> int:
+    if len(scans) < 2:
+        return began - scans[0] if scans else 0
+    return int(median(after - before for before, after in pairwise(scans)))
+
+
+def _holds(scans: list[int]) -> int:
+    intervals = [after - before for before, after in pairwise(scans[-9:])]
+    if not intervals:
+        return SHORTEST
+    return min(LONGEST, max(SHORTEST, 3 * int(median(intervals))))
+
+
+def _may_last(scans: list[int]) -> int:
+    """Nobody knows yet when what has been scanned once should be scanned again."""
+    return _holds(scans) if len(scans) > 1 else LONGEST
+
+
+def _scans(tag_id: str, of_run: list[PastWrite]) -> list[int]:
+    return [group[0].stamp_ns for group in _mine(tag_id, of_run) if _readings(group)]
+
+
+def _pauses(of_run: list[PastWrite]) -> list[tuple[int, int]]:
+    stamps = sorted({write.stamp_ns for write in of_run})
+    return [(one, other) for one, other in pairwise(stamps) if other - one > SHORTEST]
+
+
+def _overdue(tag_id: str, of_run: list[PastWrite], *, is_on: bool) -> Iterator[Plain]:
+    scans, last_ns = _scans(tag_id, of_run), of_run[-1].stamp_ns
+    for index, start in enumerate(scans):
+        end = scans[index + 1] if index + 1 < len(scans) else None
+        holds = _may_last(scans[: index + 1])
+        # So long as anybody is at work, time passes; in a pause it stands.
+        due = start + holds
+        for first, last in _pauses(of_run):
+            if last > start and first < due:
+                due += last - max(first, start)
+        due += 1
+        if due <= last_ns and (end is None or due < end):
+            cleared = end if end is not None or is_on else last_ns
+            yield Plain(tag_id, "old", "", "unknown", None, holds / 1e9, start, due, cleared, None)
+
+
+def _of_house(of_run: list[PastWrite], now_ns: int | None) -> Iterator[Plain]:
+    pauses: list[tuple[int, int | None]] = [*_pauses(of_run)]
+    last_ns = of_run[-1].stamp_ns
+    if now_ns is not None and now_ns - last_ns > SHORTEST:
+        pauses.append((last_ns, None))
+    for start, end in pauses:
+        holds = []
+        for tag_id in {write.tag_id for write in of_run}:
+            before = [at for at in _scans(tag_id, of_run) if at <= start]
+            if before:
+                holds.append(_may_last(before))
+        limit = int(median(holds)) if holds else LONGEST
+        raised = start + limit + 1
+        until = now_ns if end is None else end
+        assert until is not None
+        if raised <= until:
+            yield Plain("", "stopped", "", "unknown", None, limit / 1e9, start, raised, end, None)

@@ -1,0 +1,85 @@
+"""A client of Foxglove's protocol that hides nothing, and how its messages are read by others."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from mcap.records import Schema
+from mcap_ros2.decoder import DecoderFactory
+from websockets.sync.client import ClientConnection
+
+from tests.support.waiting import PATIENCE_S
+from tests.support.ws_client import open_websocket
+
+SDK, WEBSOCKET = "foxglove.sdk.v1", "foxglove.websocket.v1"
+
+Told = dict[str, Any]
+
+
+class Viewer:
+    """A client that sees every message."""
+
+    def __init__(self, connection: ClientConnection) -> None:
+        self.connection = connection
+        self.channels: dict[str, Told] = {}
+
+    def send(self, **members: Any) -> None:
+        self.connection.send(json.dumps(members))
+
+    def next(self) -> Told | tuple[int, int, bytes]:
+        """The next message: JSON, or (subscription or -1 for a time, ns, payload)."""
+        message = self.connection.recv(timeout=PATIENCE_S)
+        if isinstance(message, str):
+            told: Told = json.loads(message)
+            if told["op"] == "advertise":
+                self.channels |= {channel["topic"]: channel for channel in told["channels"]}
+            return told
+        if message[0] == 2:
+            return -1, struct.unpack_from("<Q", message, 1)[0], b""
+        key, stamp_ns = struct.unpack_from("<IQ", message, 1)
+        return key, stamp_ns, message[13:]
+
+    def told(self, op: str) -> Told:
+        """Read on to the first JSON message of a kind."""
+        while not isinstance(message := self.next(), dict) or message["op"] != op:
+            pass
+        return message
+
+    def status(self) -> str:
+        """The text of the next error."""
+        status = self.told("status")
+        assert status["level"] == 2, status
+        return str(status["message"])
+
+    def data(self, key: int) -> bytes:
+        """The payload of the next message of a subscription."""
+        while isinstance(message := self.next(), dict) or message[0] != key:
+            pass
+        return message[2]
+
+    def subscribe(self, topic: str, key: int = 1) -> None:
+        """Subscribe to a topic by its channel."""
+        channel_id = self.channels[topic]["id"]
+        self.send(op="subscribe", subscriptions=[{"id": key, "channelId": channel_id}])
+
+
+@contextmanager
+def viewer(url: str, subprotocols: Sequence[str] = (SDK,), **options: Any) -> Iterator[Viewer]:
+    """A client that has been told who serves, and what."""
+    address = f"{url.replace('http', 'ws', 1)}/foxglove"
+    with open_websocket(address, subprotocols, **options) as connection:
+        client = Viewer(connection)
+        client.told("advertise")
+        yield client
+
+
+def reader_of(channel: Told) -> Callable[[bytes], Any]:
+    """What makes a message of a channel's payload, by the schema that was advertised alone."""
+    schema = Schema(1, channel["schema"].encode(), channel["schemaEncoding"], channel["schemaName"])
+    decode = DecoderFactory().decoder_for(channel["encoding"], schema)
+    assert decode is not None
+    return decode

@@ -1,0 +1,142 @@
+"""Questions that a test asks of the process that looks back: they cross to it by their names."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import time
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import Any
+
+from lupin_bridge.past.as_of import Written
+from lupin_bridge.past.asked import Answered
+from lupin_bridge.twin.looking import Found, Need, Work
+from lupin_bridge.twin.past_child import Child
+from lupin_twin.explored import OccupancyMap
+from lupin_twin.past import PastRefused
+from lupin_twin.state import Snapshot
+from lupin_twin.workers import SMALL_S, ShouldStop
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """How many tags there were."""
+
+    at_ns: int
+
+    def look(self) -> Generator[Need, Found, Work[int]]:
+        """See `Question`."""
+        snapshot: Snapshot = yield self.at_ns
+        return Work(0.0, lambda _: len(snapshot.tags))
+
+
+@dataclass(frozen=True, slots=True)
+class Endless:
+    """Work that ends when nobody waits for it any more, and not before."""
+
+    def look(self) -> Generator[Need, Found, Work[None]]:
+        """See `Question`."""
+        yield from ()
+        return Work(10 * SMALL_S, _until_told)
+
+
+def _until_told(should_stop: ShouldStop) -> None:
+    while not should_stop():
+        time.sleep(0.001)
+
+
+@dataclass(frozen=True, slots=True)
+class Running:
+    """How many are at work for `Endless` in that process, and how nice it is."""
+
+    def look(self) -> Generator[Need, Found, Work[tuple[int, int]]]:
+        """See `Question`."""
+        yield from ()
+        return Work(0.0, lambda _: (_endless(), os.getpriority(os.PRIO_PROCESS, 0)))
+
+
+@dataclass(frozen=True, slots=True)
+class Knows:
+    """Of what that process keeps the places and names, whoever asked for it."""
+
+    def look(self) -> Generator[Need, Found, Work[list[str]]]:
+        """See `Question`."""
+        yield from ()
+        return Work(0.0, lambda _: sorted(map(str, _child()._recall._kept[1])))
+
+
+def _child() -> Child:
+    frame = sys._current_frames()[threading.main_thread().ident or 0]
+    while not isinstance(child := frame.f_locals.get("self"), Child):
+        assert frame.f_back is not None
+        frame = frame.f_back
+    return child
+
+
+def _endless() -> int:
+    frames = [sys._current_frames().get(thread.ident or 0) for thread in threading.enumerate()]
+    return sum(frame is not None and frame.f_code is _until_told.__code__ for frame in frames)
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """An answer with so many bytes."""
+
+    count: int
+
+    def look(self) -> Generator[Need, Found, Work[Answered]]:
+        """See `Question`."""
+        yield from ()
+        return Work(0.0, lambda _: Answered("x", Written(b"7" * self.count, "text/plain", {})))
+
+
+@dataclass(frozen=True, slots=True)
+class MapCells:
+    """How many cells the map has that comes with it, and which map it is over there."""
+
+    occupancy: OccupancyMap
+
+    def look(self) -> Generator[Need, Found, Work[tuple[int, int]]]:
+        """See `Question`."""
+        yield from ()
+        return Work(0.0, lambda _: (self.occupancy.cells.size, id(self.occupancy)))
+
+
+@dataclass(frozen=True, slots=True)
+class Failing:
+    """One that meets an error: refused, of its own fault, or one that cannot cross."""
+
+    how: str
+
+    def look(self) -> Generator[Need, Found, Work[Any]]:
+        """See `Question`."""
+        yield from ()
+        return Work(0.0, self._fail)
+
+    def _fail(self, _: ShouldStop) -> Any:
+        if self.how == "refused":
+            raise PastRefused("x is 7, the limit is 6")
+        if self.how == "fault":
+            raise ZeroDivisionError("a fault")
+        if self.how == "local":
+            raise _local_error()
+        return lambda: None
+
+
+def _local_error() -> Exception:
+    class LocalError(Exception):
+        pass
+
+    return LocalError("of nobody's knowledge")
+
+
+@dataclass(frozen=True, slots=True)
+class Dying:
+    """The process that is asked this dies of it."""
+
+    def look(self) -> Generator[Need, Found, Work[None]]:
+        """See `Question`."""
+        yield from ()
+        return Work(0.0, lambda _: os.abort())

@@ -1,0 +1,116 @@
+"""A real mosquitto on a port of the test's own, and what it has been told."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from paho.mqtt.client import Client, MQTTMessage
+from paho.mqtt.enums import CallbackAPIVersion
+
+from tests.support.processes import Process
+from tests.support.programs import program
+from tests.support.tls import Certificate
+from tests.support.waiting import wait_for
+
+USER, PASSWORD = "twin", "a password: with spaces"
+
+
+def free_port() -> int:
+    """A port of loopback that nobody listens on."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
+
+
+@dataclass
+class Broker:
+    """Where a broker is, or will be."""
+
+    folder: Path
+    port: int = field(default_factory=free_port)
+    certificate: Certificate | None = None
+    wants_password: bool = False
+
+    @property
+    def url(self) -> str:
+        scheme = "mqtt" if self.certificate is None else "mqtts"
+        return f"{scheme}://127.0.0.1:{self.port}"
+
+    @contextmanager
+    def running(self) -> Iterator[Process]:
+        """The broker's process; it remembers nothing from one start to the next."""
+        lines = [f"listener {self.port} 127.0.0.1", "persistence false", "user root"]
+        if self.certificate is not None:
+            lines += [f"certfile {self.certificate.cert}", f"keyfile {self.certificate.key}"]
+        if self.wants_password:
+            users = self.folder / "users"
+            given = ["-b", "-c", str(users), USER, PASSWORD]
+            subprocess.run([program("mosquitto_passwd"), *given], check=True, capture_output=True)
+            lines.append(f"password_file {users}")
+        else:
+            lines.append("allow_anonymous true")
+        file = self.folder / "mosquitto.conf"
+        file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        with Process([program("mosquitto"), "-c", str(file)], os.environ) as process:
+
+            def listens() -> bool:
+                assert process.exit_code is None, process.output
+                with socket.socket() as client:
+                    return client.connect_ex(("127.0.0.1", self.port)) == 0
+
+            wait_for(listens, "mosquitto to listen")
+            yield process
+
+
+class Subscriber:
+    """Hears all that is published at a broker, in a thread of its own."""
+
+    def __init__(self, broker: Broker, topics: str = "#") -> None:
+        self.heard: list[MQTTMessage] = []
+        self._is_there = False
+        self._client = Client(CallbackAPIVersion.VERSION2)
+        self._client.on_connect = lambda client, *_: client.subscribe(topics, 1)
+        self._client.on_subscribe = self._subscribed
+        self._client.on_message = lambda _client, _data, message: self.heard.append(message)
+        if broker.wants_password:
+            self._client.username_pw_set(USER, PASSWORD)
+        self._client.connect("127.0.0.1", broker.port)
+
+    def _subscribed(self, *_: Any) -> None:
+        self._is_there = True
+
+    def __enter__(self) -> Self:
+        self._client.loop_start()
+        wait_for(lambda: self._is_there, "the subscription")
+        return self
+
+    def __exit__(
+        self,
+        _type: type[BaseException] | None,
+        _error: BaseException | None,
+        _trace: TracebackType | None,
+    ) -> None:
+        self._client.disconnect()
+        self._client.loop_stop()
+
+    def say(self, topic: str, payload: str, *, retain: bool = False) -> None:
+        """Publish something."""
+        self._client.publish(topic, payload, 1, retain).wait_for_publish(60.0)
+
+    def of(self, topic: str) -> list[bytes]:
+        """All payloads of a topic so far."""
+        return [bytes(message.payload) for message in self.heard if message.topic == topic]
+
+    def last(self, topic: str) -> Any:
+        """The newest payload of a topic as JSON; None: there is none."""
+        found = self.of(topic)
+        return json.loads(found[-1]) if found else None

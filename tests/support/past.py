@@ -1,0 +1,88 @@
+"""A past that a test makes up, for routes over any source: plain lists, searched plainly."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncGenerator, Callable, Sequence
+from dataclasses import dataclass, field, replace
+from statistics import fmean
+from typing import Any
+
+from lupin_twin.past import Event, PastRow, SeriesPast, SeriesRequest
+from lupin_twin.state import Snapshot
+
+NS = 10**9
+
+
+@dataclass(slots=True)
+class MadeUp:
+    """The three questions that a source answers about the past, and what was asked of it.
+
+    `points` are (stamp, value) by (tag, sensor or event); `lots` are the rows of an export.
+    """
+
+    now_ns: int = 1_000 * NS
+    points: dict[tuple[str, str], list[tuple[int, float]]] = field(default_factory=dict)
+    lots: list[list[PastRow]] = field(default_factory=list)
+    snapshot: Snapshot = field(default_factory=lambda: Snapshot(0, "map", ()))
+    error: Exception | None = None
+    asked: list[object] = field(default_factory=list)
+    lots_taken: int = 0
+    is_closed: bool = False
+
+    async def state_at(self, at_ns: int) -> Snapshot:
+        """The one state, as if it were of any moment."""
+        self._note(at_ns)
+        return replace(self.snapshot, stamp_ns=at_ns)
+
+    async def series(self, request: SeriesRequest) -> SeriesPast:
+        """The points of a period, or as many buckets as are asked for."""
+        self._note(request)
+        end_ns = request.end_ns or self.now_ns
+        all_points = self.points.get((request.tag_id, request.sensor_type), [])
+        points = [p for p in all_points if request.start_ns <= p[0] < end_ns]
+        if len(points) <= request.max_points or request.event is Event.RUNS:
+            stamps, values = zip(*points, strict=True) if points else ((), ())
+            ones = (1,) * len(points)
+            return SeriesPast(request.start_ns, end_ns, None, stamps, ones, values, values, values)
+        width_ns = -(-(end_ns - request.start_ns) // request.max_points)
+        found: dict[int, list[float]] = {}
+        for stamp_ns, value in points:
+            start_ns = stamp_ns - (stamp_ns - request.start_ns) % width_ns
+            found.setdefault(start_ns, []).append(value)
+        groups = tuple(found.values())
+        return SeriesPast(
+            request.start_ns,
+            end_ns,
+            width_ns,
+            tuple(found),
+            tuple(map(len, groups)),
+            tuple(map(fmean, groups)),
+            tuple(map(min, groups)),
+            tuple(map(max, groups)),
+        )
+
+    async def rows(
+        self,
+        start_ns: int,
+        end_ns: int,
+        tag_id: str | None,
+        sensor_type: str | None,
+        write: Callable[[Sequence[PastRow]], Any],
+    ) -> AsyncGenerator[Any]:
+        """The lots, one by one; the error, if there is one, behind the last."""
+        self.asked.append((start_ns, end_ns, tag_id, sensor_type))
+        try:
+            for lot in self.lots:
+                await asyncio.sleep(0)  # as it is wherever lots come from
+                self.lots_taken += 1
+                yield write(lot)
+            if self.error is not None:
+                raise self.error
+        finally:
+            self.is_closed = True
+
+    def _note(self, asked: object) -> None:
+        self.asked.append(asked)
+        if self.error is not None:
+            raise self.error

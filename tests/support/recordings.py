@@ -1,0 +1,75 @@
+"""Recordings as somebody else would write them."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from mcap.writer import CompressionType, Writer
+from rclpy.serialization import serialize_message
+
+from lupin_bridge.bags import replay_command
+
+OBSERVATIONS = "/floranova/observations"
+TAGS = "/perception/discovered_tags"
+STATE = "/twin/state"
+# What `ros2 bag record` (Jazzy) writes of a topic with one publisher, shortened by its durations.
+LATCHED = """\
+- history: unknown
+  depth: 0
+  reliability: reliable
+  durability: transient_local
+  liveliness: automatic
+  avoid_ros_namespace_conventions: false
+"""
+
+
+class Sent(NamedTuple):
+    """A message, and when it was recorded, s."""
+
+    topic: str
+    at_s: float
+    message: Any
+
+
+def type_of(message: Any) -> str:
+    """What a message's type is called in recordings."""
+    kind = type(message)
+    return f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}"
+
+
+def write_bag(
+    path: Path,
+    sent: Iterable[Sent],
+    *,
+    qos: str | None = LATCHED,
+    encoding: str = "cdr",
+    chunk_size: int = 1024,
+    compression: CompressionType = CompressionType.ZSTD,
+    is_chunked: bool = True,
+    is_finished: bool = True,
+) -> Path:
+    """Write a file of these messages, in this order; returns its path."""
+    with path.open("wb") as file:
+        writer = Writer(
+            file, chunk_size=chunk_size, compression=compression, use_chunking=is_chunked
+        )
+        writer.start("ros2", "test")
+        channels: dict[str, int] = {}
+        for topic, at_s, message in sent:
+            if topic not in channels:
+                schema = writer.register_schema(type_of(message), "ros2msg", b"")
+                metadata = {} if qos is None else {"offered_qos_profiles": qos}
+                channels[topic] = writer.register_channel(topic, encoding, schema, metadata)
+            at_ns = round(at_s * 1e9)
+            writer.add_message(channels[topic], at_ns, serialize_message(message), at_ns)
+        if is_finished:
+            writer.finish()  # type: ignore[no-untyped-call]
+    return path
+
+
+def replay_options(*words: object) -> argparse.Namespace:
+    """The options of `lupin-twin replay` with these arguments."""
+    return replay_command.parsed([*map(str, words)])

@@ -1,0 +1,88 @@
+"""A house as the channels see it, made by a test."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, Board
+from lupin_bridge.alarms.ledger import Ledger, Page
+from lupin_bridge.judge.alarm import Alarm, alarm_id
+from lupin_bridge.judge.choosing import own_sensors
+from lupin_bridge.judge.daylight import Day
+from lupin_bridge.judge.following import Found
+from lupin_bridge.judge.judging import judge_once
+from lupin_bridge.judge.verdict import Kind, Reason, Verdict
+from lupin_bridge.outward.payloads import Seen
+from lupin_twin.diagnostics import Origin
+from lupin_twin.state import Reading, Snapshot, TagState
+
+SENSORS = own_sensors()
+S = 1_000_000_000
+# 2026-11-21T14:15:00Z.
+NOW_NS = 1_795_270_500 * S
+HOLDS_NS = 600 * S
+
+
+def tag(tag_id: str, at_ns: int = NOW_NS, **values: float) -> TagState:
+    """A tag whose readings are of one scan."""
+    readings = tuple(Reading(name, value, at_ns) for name, value in values.items())
+    return TagState(tag_id, readings=readings, last_observed_ns=at_ns)
+
+
+def seen(
+    *tags: TagState,
+    alarms: tuple[Alarm, ...] = (),
+    now_ns: int | None = NOW_NS,
+    is_live: bool = True,
+    holds_ns: Mapping[str, int] | None = None,
+    origin: Origin = "robot",
+) -> Seen:
+    """What a bridge would say of these tags."""
+    snapshot = Snapshot(
+        now_ns or NOW_NS, "map", tags, clock="running" if now_ns is not None else "stopped"
+    )
+    holds = dict.fromkeys((it.tag_id for it in tags), HOLDS_NS) | dict(holds_ns or {})
+    return Seen(
+        snapshot=snapshot,
+        judged=judge_once(snapshot, SENSORS, holds, lambda _: Day(True, "assumed")),
+        board=Board(Page.of(alarms), "heard", NOW_NS, 1),
+        holds_ns=holds,
+        now_ns=now_ns,
+        is_live=is_live,
+        twin="live" if is_live else "stale",
+        message="The twin is live." if is_live else "The twin has fallen silent.",
+        origin=origin,
+    )
+
+
+def alarm(
+    tag_id: str = "a",
+    verdict: Verdict = Verdict.CRITICAL,
+    raised_ns: int = NOW_NS,
+    cleared_ns: int | None = None,
+) -> Alarm:
+    """That a tag's temperature is, or was, too low."""
+    reason = Reason(Kind.RANGE, verdict, "temperature", 6.6, 10.0, raised_ns)
+    name = alarm_id(tag_id, "range", "temperature", 0, raised_ns)
+    return Alarm(name, reason, tag_id, raised_ns, cleared_ns, 6.6)
+
+
+class Alarms(AlarmBoard):
+    """A board that a test writes on: all alarms at once, as a feed would find them."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._ledger = Ledger()
+
+    def show(
+        self,
+        alarms: Iterable[Alarm],
+        source: AlarmSource = "journal",
+        since_ns: int | None = 1,
+        *,
+        is_past: bool = False,
+    ) -> bool:
+        """Take these for the alarms as they stand."""
+        page, change = self._ledger.take(Found(tuple(alarms)))
+        return self.put(page, replace(change, is_past=is_past), source, since_ns)

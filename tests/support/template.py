@@ -1,0 +1,202 @@
+"""A process that has imported the programs already, and forks for each start that a test asks for.
+
+Starting `serve` takes 1.6 s of a core, of which importing takes 1.3 s: the same modules, hundreds
+of times. Each pytest worker has one template, from the first start on. It has imported and done
+nothing else: no thread of ours, no ROS context. Who asks gets a process as by `Popen`: a session,
+an environment, arguments and an output of its own, and a pid that is its own until it was waited
+for. It ends with the template, and that with the worker, however they end.
+"""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+import gc
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import IO, Any, Final
+
+# The programs that it can be, by the module that `python -m` would run.
+PROGRAMS: Final = ("lupin_bridge.cli", "lupin_twin.cli")
+# What they import once they run.
+IMPORTED: Final = (
+    "lupin_bridge.roles",
+    "lupin_twin.node",
+    "lupin_twin.ros_parameters",
+    "lupin_twin.spinning",
+)
+# Variables that are read where a program runs, by us or by rcl. Of all others some are read as
+# something is imported: with one that differs a process has to start anew.
+_READ_LATE: Final = ("LUPIN_", "PYTEST_", "ROS_DOMAIN_ID", "XDG_STATE_HOME")
+_MOST_BYTES: Final = 200_000  # what one message on a socket may hold, Linux's wmem_default
+_PR_SET_PDEATHSIG: Final = 1
+
+
+class Template:
+    """The worker's end: starts processes, and tells how they ended."""
+
+    def __init__(self, imported: Sequence[str] = IMPORTED) -> None:
+        self._env = dict(os.environ)
+        self._folder = Path.cwd()
+        self._said = tempfile.TemporaryFile("w+")  # noqa: SIM115  # as long as the worker
+        self._lock = threading.Lock()
+        self._link, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", __name__, str(theirs.fileno()), *imported],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=self._said,
+                pass_fds=[theirs.fileno()],
+                start_new_session=True,
+            )
+        atexit.register(self.end)
+
+    def can_be(self, command: Sequence[str], env: Mapping[str, str]) -> bool:
+        """Whether a process of it is what this command would be in this environment."""
+        if list(command[:2]) != [sys.executable, "-m"] or command[2] not in PROGRAMS:
+            return False
+        differing = {name for name, _ in self._env.items() ^ env.items()}
+        late = all(name.startswith(_READ_LATE) for name in differing)
+        return late and Path.cwd() == self._folder
+
+    def start(self, command: Sequence[str], env: Mapping[str, str], output: IO[str]) -> Forked:
+        """A process that runs this command."""
+        program, *arguments = command[2:]
+        request = {"program": program, "arguments": arguments, "env": dict(env)}
+        return Forked(command, self._ask(request, [output.fileno()]), self._ask)
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    def end(self) -> None:
+        """End it, and all that it has started."""
+        self._link.close()
+        self._process.wait()
+
+    def _ask(self, request: Mapping[str, Any], files: Sequence[int] = ()) -> int:
+        with self._lock:
+            try:
+                socket.send_fds(self._link, [json.dumps(request).encode()], files)
+                answer = self._link.recv(_MOST_BYTES)
+            except OSError as error:
+                answer, why = b"", str(error)
+            else:
+                why = "it says no more"
+        if not answer:
+            self._said.seek(0)
+            raise RuntimeError(f"the process that is forked has died: {why}\n{self._said.read()}")
+        return int(answer)
+
+
+class Forked:
+    """What `subprocess.Popen` is of a process that was started, as far as tests need it."""
+
+    def __init__(self, args: Sequence[str], pid: int, ask: Callable[[Mapping[str, Any]], int]):
+        self.args, self.pid, self._ask = args, pid, ask
+        self._lock = threading.Lock()
+        self._ended: int | None = None
+        self._handle = os.pidfd_open(pid)  # it is there until `_ask` was asked for its end
+
+    def poll(self) -> int | None:
+        """Its exit code, as `Popen` tells it, once it has ended."""
+        return self._look(0.0)
+
+    def wait(self, timeout_s: float | None = None) -> int:
+        """Wait for its end; returns the exit code."""
+        code = self._look(timeout_s)
+        if code is None:
+            raise subprocess.TimeoutExpired(self.args, timeout_s or 0.0)
+        return code
+
+    def send_signal(self, number: signal.Signals) -> None:
+        """Send it a signal, unless it has ended."""
+        if self.poll() is None:
+            signal.pidfd_send_signal(self._handle, number)
+
+    def _look(self, timeout_s: float | None) -> int | None:
+        if self._ended is None:
+            poll = select.poll()
+            poll.register(self._handle, select.POLLIN)
+            if poll.poll(None if timeout_s is None else timeout_s * 1_000):
+                with self._lock:  # who asks twice for one end would end the template
+                    if self._ended is None:
+                        self._ended = self._ask({"ended": self.pid})
+                        os.close(self._handle)
+        return self._ended
+
+
+def _serve(link: socket.socket) -> Mapping[str, Any] | None:
+    """Answer the worker until it has gone; in a process that was forked: what that has to be."""
+    while True:
+        message, files, _, _ = socket.recv_fds(link, _MOST_BYTES, 1)
+        if not message:
+            return None
+        request = json.loads(message)
+        if "ended" in request:
+            link.send(b"%d" % os.waitstatus_to_exitcode(os.waitpid(request["ended"], 0)[1]))
+        elif os.fork() == 0:
+            os.setsid()
+            for stream in (sys.stdout, sys.stderr):
+                os.dup2(files[0], stream.fileno())
+            link.send(b"%d" % os.getpid())
+            link.close()
+            os.close(files[0])
+            return dict(request)
+        else:
+            os.close(files[0])
+
+
+def _know_of_forks() -> None:
+    """Tell LTTng, whose threads trace ROS: without them in a child it would crash at its end.
+
+    As its own liblttng-ust-fork does; the names are those up to LTTng 2.12, and from 2.13 on.
+    """
+    mask = ctypes.create_string_buffer(128)  # a sigset_t, glibc
+    maps = Path("/proc/self/maps").read_text(encoding="utf-8").splitlines()
+    paths = {line.split()[-1] for line in maps if "/liblttng-ust" in line}
+    for library in map(ctypes.CDLL, paths):
+        for name in ("ust_{}_fork{}", "lttng_ust_{}_fork{}"):
+            if hasattr(library, name.format("before", "")):
+                calls = [("before", ""), ("after", "_parent"), ("after", "_child")]
+                before, parent, child = (
+                    partial(getattr(library, name.format(*call)), mask) for call in calls
+                )
+                os.register_at_fork(before=before, after_in_parent=parent, after_in_child=child)
+
+
+def main() -> None:
+    """Import all there is to import, and fork."""
+    for name in (*PROGRAMS, *sys.argv[2:]):
+        import_module(name)
+    _know_of_forks()
+    gc.collect()
+    gc.freeze()
+    template = os.getpid()
+    request = _serve(socket.socket(fileno=int(sys.argv[1])))
+    if request is None:
+        return
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != template:  # it has died before
+        return
+    os.environ.clear()
+    os.environ.update(request["env"])
+    program = import_module(request["program"])
+    sys.argv = [str(program.__file__), *request["arguments"]]
+    program.command()
+
+
+if __name__ == "__main__":
+    main()

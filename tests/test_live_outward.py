@@ -1,0 +1,80 @@
+"""`lupin-twin serve` and a real broker: what it is told, its will, and an end in time."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from typing import Any
+
+from tests.support.access import refused_start
+from tests.support.messages import look, scan
+from tests.support.mosquitto import PASSWORD, USER, Broker, Subscriber
+from tests.support.receiver import receiver, status
+from tests.support.waiting import wait_for
+from tests.support.web import bridge
+
+READING = "farm/gh1/tags/a_2Fb/readings/temperature"
+
+
+def test_an_observation_comes_out_at_the_broker_and_a_killed_bridge_is_offline(
+    tmp_path: Path,
+) -> None:
+    broker = Broker(tmp_path, wants_password=True)
+    options = ("--mqtt-url", broker.url, "--mqtt-user", USER, "--mqtt-prefix", "farm/gh1")
+    secrets: Any = {"LUPIN_MQTT_PASSWORD": PASSWORD, "LUPIN_WEBHOOK_SECRET": "s" * 16}
+    with (
+        broker.running(),
+        Subscriber(broker) as heard,
+        receiver(status(200)) as hook,
+        bridge(*options, "--webhook-url", f"http://127.0.0.1:{hook.port}/", **secrets) as live,
+    ):
+        live.peer.observe(scan("a/b", {"temperature": 6.5}, at=(1, 1)))
+        reading = wait_for(lambda: heard.last(READING), "the reading")
+        told = live.tag("a/b")["readings"][0]
+        assert (reading["value"], reading["stamp"]) == (6.5, told["observed_at"])
+        health = wait_for(lambda: heard.last("farm/gh1/tags/a_2Fb/health"), "the verdict")
+        assert health["verdict"] == "critical"
+        # A pest is an alarm at once.
+        live.peer.observe(look("a/b", anomaly=True))
+        wait_for(lambda: hook.posted, "the alarm")
+        posted = hook.posted[0].json
+        assert (posted["change"], posted["alarm"]["tag_id"]) == ("raised", "a/b")
+        assert posted["origin"] == reading["origin"] == "robot"
+        (alarm,) = live.json("/api/alarms")["alarms"]
+        assert posted["alarm"] == alarm
+        topic = "farm/gh1/tags/a_2Fb/alarms"
+        wait_for(lambda: (heard.last(topic) or {}).get("state") == "ON", "the same at the broker")
+        assert heard.last(topic)["alarms"] == [alarm]
+        assert live.json("/readyz")["outward"] == [
+            {"channel": channel, "is_failing": False, "detail": ""}
+            for channel in ("mqtt", "webhook")
+        ]
+        assert 'lupin_outward_connected{channel="mqtt"} 1.0' in live.get("/metrics").text
+        assert heard.of("farm/gh1/status") == [b"online"]
+        assert "--mqtt-url is without TLS" in live.process.output
+        assert PASSWORD not in live.process.output
+        live.process.send(signal.SIGKILL)
+        wait_for(lambda: heard.of("farm/gh1/status") == [b"online", b"offline"], "the will")
+
+
+def test_frames_flow_and_it_ends_while_a_broker_hangs(tmp_path: Path) -> None:
+    broker = Broker(tmp_path)
+    with broker.running() as process:
+        process.freeze()
+        with bridge("--mqtt-url", broker.url) as live, live.listen() as page:
+            for tag_id in ("1", "2"):
+                live.peer.observe(scan(tag_id, {"co2": 500.0}))
+                page.until_tag(tag_id)
+            assert live.process.stop(signal.SIGINT) == 0
+            assert "Traceback" not in live.process.output
+            assert " ERROR " not in live.process.output
+
+
+def test_what_is_wrong_with_a_channel_is_told_at_the_start(tmp_path: Path) -> None:
+    secret = tmp_path / "secret"
+    secret.write_text("short\n", encoding="ascii")
+    secret.chmod(0o600)
+    line = refused_start(
+        "--webhook-url", "https://hook.example/", LUPIN_WEBHOOK_SECRET_FILE=str(secret)
+    )
+    assert line.startswith("lupin-twin: the webhook's secret has 5 characters, must have at least")

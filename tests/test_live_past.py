@@ -1,0 +1,263 @@
+"""The past of a twin with a journal, over ROS: states of then, series and events, and no delay."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+from builtin_interfaces.msg import Time
+from lupin_msgs.srv import GetHistory, GetStateAt
+
+from tests.support.domains import own_domain
+from tests.support.journal import select
+from tests.support.messages import discovered, look, pose, scan
+from tests.support.proc_stat import waited_s
+from tests.support.processes import OFTEN, twin_node
+from tests.support.ros import Peer
+from tests.support.waiting import wait_for
+
+STATE_AT, HISTORY = "/twin/get_state_at", "/twin/get_history"
+# Observations of an afternoon long ago, s.
+T = 1_700_000_000
+
+
+@pytest.fixture(scope="module")
+def peer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Peer]:
+    """A twin at the root, and one in a namespace that has heard nothing."""
+    with ExitStack() as stack:
+        domain = stack.enter_context(own_domain())
+        folder = tmp_path_factory.mktemp("journals")
+        for name, namespace in (("root", "/"), ("other", "/gh2")):
+            path = folder / f"{name}.sqlite"
+            ros_args = (*OFTEN, "-p", f"journal:={path}", "-r", f"__ns:={namespace}")
+            stack.enter_context(twin_node(domain, *ros_args))
+        peer = stack.enter_context(Peer(domain))
+        peer.wait_for_twin()
+        peer.discover(discovered({"pinned": pose(5.0, 6.0)}))
+        peer.observe(
+            scan("a", {"co2": 400.0, "light": 9.0}, (1.0, 2.0), stamp_s=T),
+            look("a", "lupin", anomaly=True, bug_count=3, blooms=[(1.0, 2.0)], stamp_s=T + 10.0),
+            scan("a", {"co2": 500.0}, stamp_s=T + 100.5),
+            scan("a", status=2, stamp_s=T + 110.0),
+            scan("b", {"co2": 700.0}, stamp_s=T + 200.0),
+            look("a", "lupin", stamp_s=T + 300.0),
+            scan("late", {"co2": 1.0}, stamp_s=T + 10_000.0),
+        )
+        peer.tag("late")
+        wait_for(
+            lambda: select(folder / "root.sqlite", "SELECT count(*) FROM scan") == [(5,)],
+            "all of it in the journal",
+        )
+        yield peer
+
+
+def state_at(peer: Peer, at_s: float) -> Any:
+    response = peer.ask(GetStateAt, STATE_AT, at=stamp(at_s))
+    assert response.ok, response.error_message
+    assert response.error_message == ""
+    assert response.state.header == response.times.header
+    assert response.state.header.stamp == stamp(at_s)
+    assert [tag.tag_id for tag in response.state.tags] == [t.tag_id for t in response.times.tags]
+    return response
+
+
+def stamp(at_s: float) -> Time:
+    return Time(sec=int(at_s), nanosec=round(at_s % 1 * 1e9))
+
+
+def stamp_ns(at_s: float) -> int:
+    return int(stamp(at_s).sec) * 10**9 + int(stamp(at_s).nanosec)
+
+
+def series(peer: Peer, tag_id: str, sensor_type: str, **more: Any) -> Any:
+    response = peer.ask(GetHistory, HISTORY, tag_id=tag_id, sensor_type=sensor_type, **more)
+    assert response.ok, response.error_message
+    return response
+
+
+def told(response: Any) -> list[tuple[float, float]]:
+    """(seconds after T, value) of each entry."""
+    return [
+        (at.sec - T + at.nanosec / 1e9, mean)
+        for at, mean in zip(response.stamps, response.means, strict=True)
+    ]
+
+
+def test_a_state_is_what_was_known_then_with_the_ages_of_then(peer: Peer) -> None:
+    response = state_at(peer, T + 50.0)
+    tags = {tag.tag_id: tag for tag in response.state.tags}
+    assert "b" not in tags
+    a = tags["a"]
+    assert {r.name: r.value for r in a.readings} == {"co2": 400.0, "light": 9.0}
+    assert (a.species, a.anomaly, a.bug_count, len(a.flowers)) == ("lupin", True, 3, 1)
+    assert a.stale_seconds == pytest.approx(40.0)
+    [times] = [times for times in response.times.tags if times.tag_id == "a"]
+    assert list(times.observed_at) == [stamp(T), stamp(T)]
+    assert times.looked_at == times.last_try == stamp(T + 10.0)
+
+
+def test_a_later_moment_has_the_later_readings_the_failed_try_and_the_pest_gone(peer: Peer) -> None:
+    response = state_at(peer, T + 300.0)  # a moment holds what was observed at it
+    a = next(tag for tag in response.state.tags if tag.tag_id == "a")
+    assert {r.name: r.value for r in a.readings} == {"co2": 500.0, "light": 9.0}
+    assert (a.anomaly, a.stale_seconds) == (False, 0.0)
+    before = state_at(peer, T + 299.5)
+    times = next(times for times in before.times.tags if times.tag_id == "a")
+    assert (times.last_try, times.last_try_status) == (stamp(T + 110.0), 2)
+    assert next(tag for tag in before.state.tags if tag.tag_id == "a").anomaly
+
+
+def test_as_of_now_it_is_the_state_of_now(peer: Peer) -> None:
+    newest = peer.state(lambda _: True, "a state")
+    response = peer.ask(GetStateAt, STATE_AT, at=newest.header.stamp)
+    for tag in [*response.state.tags, *newest.tags]:
+        tag.stale_seconds = 0.0
+    by_id = {tag.tag_id: tag for tag in response.state.tags}
+    assert by_id == {tag.tag_id: tag for tag in newest.tags}
+    assert by_id["a"].pose.position.x == 1.0
+    assert by_id["pinned"].pose.orientation.w == 1.0
+
+
+def test_before_everything_known_there_is_nothing(peer: Peer) -> None:
+    assert [tag.readings for tag in state_at(peer, T - 1.0).state.tags if tag.readings] == []
+
+
+def test_readings_are_told_one_by_one_or_in_buckets(peer: Peer) -> None:
+    assert told(series(peer, "a", "co2")) == [(0.0, 400.0), (100.5, 500.0)]
+    half = series(peer, "a", "co2", start=stamp(T + 0.0), end=stamp(T + 100.5))
+    assert told(half) == [(0.0, 400.0)]
+    bucketed = series(peer, "a", "co2", start=stamp(T), end=stamp(T + 200), max_points=1)
+    assert bucketed.is_bucketed
+    assert (list(bucketed.counts), list(bucketed.means)) == ([2], [450.0])
+    assert (list(bucketed.minima), list(bucketed.maxima)) == ([400.0], [500.0])
+    assert told(series(peer, "a", "ph")) == []
+
+
+@pytest.mark.parametrize(
+    ("tag_id", "event", "entries"),
+    [
+        ("a", "~scans", [(0.0, 2.0), (100.5, 1.0)]),
+        ("*", "~failures", [(110.0, 2.0)]),
+        ("*", "~looks", [(10.0, 3.0), (300.0, 0.0)]),
+        ("a", "~pests_seen", [(10.0, 3.0)]),
+        ("a", "~pests_cleared", [(300.0, 0.0)]),
+    ],
+)
+def test_events_are_told_in_the_same_way(
+    peer: Peer, tag_id: str, event: str, entries: list[tuple[float, float]]
+) -> None:
+    assert told(series(peer, tag_id, event)) == entries
+
+
+def test_runs_of_the_clock_are_told_with_their_lengths(peer: Peer) -> None:
+    runs = series(peer, "*", "~runs")
+    assert list(runs.minima) == list(runs.maxima) == [0.0]
+    assert runs.means[0] > time.time() - T - 3_600.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "service", "request_", "says"),
+    [
+        (GetStateAt, STATE_AT, {"at": Time(sec=2**31 - 1)}, "later than now, 1"),
+        (GetStateAt, STATE_AT, {"at": Time(sec=-5)}, "at is -5.000000000 s, before 0"),
+        (GetHistory, HISTORY, {"tag_id": "a"}, "sensor_type is empty"),
+        (GetHistory, HISTORY, {"sensor_type": "co2"}, "tag_id is empty"),
+        (GetHistory, HISTORY, {"tag_id": "a", "sensor_type": "~x"}, "is none of ~scans"),
+        (GetHistory, HISTORY, {"tag_id": "a", "sensor_type": "~runs"}, "are those of '*'"),
+        (GetHistory, HISTORY, {"tag_id": "a", "sensor_type": "x" * 999}, "999 characters, the lim"),
+        (
+            GetHistory,
+            HISTORY,
+            {"tag_id": "a", "sensor_type": "co2", "max_points": 5_001},
+            "max_points is 5001, the limits are 1 and 5000",
+        ),
+        (
+            GetHistory,
+            HISTORY,
+            {"tag_id": "a", "sensor_type": "co2", "start": Time(sec=9), "end": Time(sec=8)},
+            "before start",
+        ),
+    ],
+)
+def test_every_refusal_says_why_and_has_nothing_else(
+    peer: Peer, kind: Any, service: str, request_: dict[str, Any], says: str
+) -> None:
+    response = peer.ask(kind, service, **request_)
+    assert says in response.error_message
+    response.error_message = ""
+    assert response == kind.Response()
+
+
+def test_a_namespace_has_services_and_a_past_of_its_own(peer: Peer) -> None:
+    response = peer.ask(GetStateAt, "/gh2/twin/get_state_at", at=stamp(T + 50.0))
+    assert response.ok
+    assert len(response.state.tags) == 0
+    response = peer.ask(GetHistory, "/gh2/twin/get_history", tag_id="a", sensor_type="co2")
+    assert (response.ok, list(response.stamps)) == (True, [])
+
+
+HOUSE, OBSERVED, RATE, AT_ONCE = 300, 400, 200, 8
+
+
+def pieces(pid: int) -> Iterator[range]:
+    """The numbers of `OBSERVED` observations, when they are due.
+
+    `RATE` a second of what the machine leaves to a process: of the time in which its threads wait
+    for a core, a tenth. And what is late comes in pieces that a topic has room for twice.
+    """
+    sent, due, before_s, waited_before_s = 0, 0.0, time.monotonic(), waited_s(pid)
+    while sent < OBSERVED:
+        now_s, now_waited_s = time.monotonic(), waited_s(pid)
+        passed_s = now_s - before_s
+        due += RATE * max(0.1 * passed_s, passed_s - (now_waited_s - waited_before_s))
+        before_s, waited_before_s = now_s, now_waited_s
+        piece = range(sent, min(int(due), sent + 20, OBSERVED))
+        sent, due = piece.stop, min(due, piece.stop + 1.0)
+        yield piece
+
+
+def test_a_flood_of_the_dearest_question_loses_no_observation(domain: int, tmp_path: Path) -> None:
+    """A topic holds 50, so that one quarter of a second without a look at it would lose some."""
+    journal = tmp_path / "j.sqlite"
+    with (
+        twin_node(domain, "--ros-args", "-p", f"journal:={journal}") as twin,
+        Peer(domain, "robot") as robot,
+        Peer(domain, "curious") as curious,
+    ):
+        robot.wait_for_twin()
+        for number in range(HOUSE):
+            robot.observe(scan(f"t{number}", {"co2": 400.0, "light": 5.0}, stamp_s=T))
+            if not number:
+                robot.tag("t0")  # and the journal is there
+            if number % 25 == 24:
+                count = [(number + 1,)]
+                wait_for(lambda c=count: select(journal, "SELECT count(*) FROM scan") == c, "25")  # type: ignore[misc]
+        client = curious.node.create_client(GetStateAt, STATE_AT)
+        curious.until(client.service_is_ready, "the service")
+        asked: list[Any] = []
+        answers: list[Any] = []
+
+        def ask() -> None:
+            answers.extend(future.result() for future in asked if future.done())
+            asked[:] = [future for future in asked if not future.done()]
+            while len(asked) < AT_ONCE:
+                asked.append(client.call_async(GetStateAt.Request(at=stamp(T + 1))))
+            curious.spin_briefly()
+
+        wait_for(lambda: answers, "the first answer", meanwhile=ask)
+        before = len(answers)
+        for piece in pieces(twin.pid):
+            for number in piece:
+                robot.observe(scan("beside", {"co2": number}, stamp_s=T + 2.0 + number / RATE))
+            ask()
+        last = f"SELECT 1 FROM scans WHERE stamp_ns = {stamp_ns(T + 2.0 + (OBSERVED - 1) / RATE)}"
+        wait_for(lambda: select(journal, last), "the last of them in the journal", meanwhile=ask)
+        assert select(journal, "SELECT count(*) FROM scan") == [(HOUSE + OBSERVED,)]
+        assert "they came too fast" not in twin.output
+        assert len(answers) > before + 2, "asked all the while"
+        assert {len(answer.state.tags) for answer in answers if answer.ok} <= {HOUSE, HOUSE + 1}
+        assert all(answer.ok for answer in answers)

@@ -1,0 +1,71 @@
+"""Where another tag helps most: the same as trying each, by the textbook."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from lupin_twin.estimate import Model, Readings, fit
+from lupin_twin.estimate.kernel import Hyper
+from lupin_twin.estimate.readings import Scale
+from tests.support import textbook_gp
+from tests.support.estimates import DAY_S, a_day, hypers, some_readings, spot_at, spots_of
+
+CANDIDATES = np.array([(0.0, 0.0), (1.3, -2.0), (-4.0, 4.5), (9.0, 9.0)])
+TARGETS = np.array([(0.5, 0.5), (-3.0, 2.0), (8.0, 8.0)])
+
+
+def error_by_the_textbook(readings: Readings, h: Hyper, more: list[int]) -> float:
+    """The root of the mean variance at the targets, with readings now at some candidates."""
+    at_h = float(readings.time_s.max()) / 3600.0
+    spots = spots_of(readings) + [spot_at(CANDIDATES[one], at_h) for one in more]
+    nothing = np.zeros(len(spots))
+    each = [textbook_gp.foretold(spots, nothing, spot_at(place, at_h), h)[1] for place in TARGETS]
+    return sqrt(sum(each) / len(each))
+
+
+@settings(max_examples=40)
+@given(some_readings(), hypers)
+def test_each_place_is_the_best_of_those_left_and_its_error_the_textbook_s(
+    readings: Readings, h: Hyper
+) -> None:
+    model = Model(Scale(20.0, 2.0), 2.0, DAY_S, h, (h,))
+    posterior = model.posterior(readings, float(readings.time_s.max()))
+    advice = posterior.advice(CANDIDATES, 3, over=TARGETS)
+    at_first = error_by_the_textbook(readings, h, [])
+    taken: list[int] = []
+    for place in advice:
+        left = [one for one in range(len(CANDIDATES)) if one not in taken]
+        best = min(error_by_the_textbook(readings, h, [*taken, one]) for one in left)
+        chosen = CANDIDATES.tolist().index([place.x, place.y])
+        assert chosen in left
+        taken.append(chosen)
+        error = error_by_the_textbook(readings, h, taken)
+        assert error == pytest.approx(best, rel=1e-6)
+        assert place.error_ratio == pytest.approx(error / at_first, rel=1e-6)
+
+
+def test_it_is_far_from_the_tags_there_are_and_each_more_helps() -> None:
+    day = a_day(tags=4)
+    beside = Readings(day.time_s, day.tag, day.value, day.xy * (1.0, 0.25))  # all at y < 2
+    posterior = fit(beside, ideal=(18.0, 26.0)).posterior(beside, DAY_S)
+    places = np.array([(x, y) for x in (0.5, 2.0, 3.5) for y in (1.0, 3.0, 5.0, 7.0)])
+    advice = posterior.advice(places, 20, over=places)
+    assert len(advice) == len(places), "no more than there are, and each once"
+    assert len({(place.x, place.y) for place in advice}) == len(places)
+    assert advice[0].y > 4.0
+    ratios = [place.error_ratio for place in advice]
+    assert ratios == sorted(ratios, reverse=True)
+    assert 0.0 < ratios[-1] < ratios[0] < 1.0
+
+
+def test_who_is_to_be_helped_nowhere_is_refused_and_who_asks_for_none_gets_none() -> None:
+    day = a_day(tags=3, passes=2)
+    posterior = fit(day).posterior(day, DAY_S)
+    assert posterior.advice(TARGETS, 0, over=TARGETS) == []
+    assert posterior.advice(np.empty((0, 2)), 5, over=TARGETS) == []
+    with pytest.raises(ValueError, match="nowhere"):
+        posterior.advice(TARGETS, 1, over=np.empty((0, 2)))

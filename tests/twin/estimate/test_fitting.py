@@ -1,0 +1,100 @@
+"""The most probable parameters: the density and its gradient, what is found, and the draws."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from lupin_twin.estimate import Readings
+from lupin_twin.estimate.fitting import DRAWS, FitFailed, draws, hyper_of, minimise, surprise
+from lupin_twin.estimate.kernel import PRIOR_LOG_SD, PRIOR_MEDIAN, Hyper, pairs_of
+from lupin_twin.estimate.readings import scale_of
+from tests.support import textbook_gp
+from tests.support.estimates import DAY_S, a_day, some_readings, spots_of
+
+START = np.zeros(len(PRIOR_MEDIAN))
+
+
+def objective_of(readings: Readings) -> Any:
+    y = scale_of(readings.value, (18.0, 26.0)).standardised(readings.value)
+    return surprise(pairs_of(readings, DAY_S), y)
+
+
+@given(some_readings())
+def test_the_surprise_is_minus_the_log_of_likelihood_and_prior(readings: Readings) -> None:
+    y = scale_of(readings.value, (18.0, 26.0)).standardised(readings.value)
+    there = np.linspace(-0.5, 0.5, len(START))
+
+    def plainly(coordinates: Any) -> float:
+        h = hyper_of(coordinates)
+        likelihood = textbook_gp.log_likelihood(spots_of(readings), y, h)
+        return -likelihood - textbook_gp.log_prior(h, PRIOR_MEDIAN, PRIOR_LOG_SD)
+
+    objective = objective_of(readings)
+    found = objective(there)[0] - objective(START)[0]
+    assert found == pytest.approx(plainly(there) - plainly(START), rel=1e-6, abs=1e-6)
+
+
+@settings(max_examples=30)
+@given(some_readings())
+def test_its_gradient_is_that_of_finite_differences(readings: Readings) -> None:
+    objective = objective_of(readings)
+    there = np.linspace(0.4, -0.4, len(START))
+    step = 1e-5
+    expected = [
+        (objective(there + step * axis)[0] - objective(there - step * axis)[0]) / (2.0 * step)
+        for axis in np.eye(len(there))
+    ]
+    scale = 1.0 + np.abs(expected).max()
+    assert objective(there)[1] == pytest.approx(expected, rel=1e-4, abs=1e-5 * scale)
+
+
+def test_the_prior_s_median_is_the_start() -> None:
+    assert hyper_of(START) == pytest.approx(PRIOR_MEDIAN)
+    one = START.copy()
+    one[0] = 1.0
+    assert hyper_of(one).sg == pytest.approx(PRIOR_MEDIAN.sg * np.exp(PRIOR_LOG_SD.sg))
+
+
+def test_a_minimum_is_found_where_the_gradient_vanishes() -> None:
+    objective = objective_of(a_day())
+    best = minimise(objective, START)
+    value, slope = objective(best)
+    assert value < objective(START)[0] - 1.0
+    assert np.abs(slope).max() < 0.1
+    for axis in np.eye(len(best)):
+        assert objective(best + 0.2 * axis)[0] > value
+        assert objective(best - 0.2 * axis)[0] > value
+
+
+def test_what_cannot_be_factorised_has_no_density_and_ends_no_search() -> None:
+    def steep(at: Any) -> tuple[float, Any]:
+        if at[0] > 0.5:
+            return np.inf, at
+        return float((at[0] - 2.0) ** 2), np.array([2.0 * (at[0] - 2.0)])
+
+    assert minimise(steep, np.zeros(1))[0] == pytest.approx(0.5, abs=0.1)
+    with pytest.raises(FitFailed, match="singular at the prior's own median"):
+        minimise(lambda at: (np.inf, at), START)
+
+
+def test_the_draws_are_antithetic_the_same_every_time_and_no_wider_than_the_prior() -> None:
+    flat = draws(lambda at: (0.0, np.zeros_like(at)), START)
+    assert len(flat) == DRAWS
+    assert np.sum(flat, axis=0) == pytest.approx(START)
+    prior = draws(lambda at: (0.5 * float(at @ at), at), START)
+    assert np.abs(flat) == pytest.approx(np.abs(prior)), "a curvature of 0 is no wider than 1"
+    sharp = draws(lambda at: (8.0 * float(at @ at), 16.0 * at), START)
+    assert np.abs(sharp) == pytest.approx(np.abs(prior) / 4.0)
+    assert np.array(draws(lambda at: (np.inf, at), START)) == pytest.approx(np.array(prior))
+
+
+def test_readings_without_noise_of_their_own_are_fitted_too() -> None:
+    still = a_day()
+    same = Readings(still.time_s, still.tag, np.full(len(still), 22.0), still.xy)
+    best = hyper_of(minimise(objective_of(same), START))
+    assert isinstance(best, Hyper)
+    assert best.tau < PRIOR_MEDIAN.tau

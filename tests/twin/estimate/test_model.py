@@ -1,0 +1,133 @@
+"""A model: fitted to readings, immutable, and its estimate equal to a textbook's."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lupin_twin.estimate import FitFailed, Model, Readings, fit
+from lupin_twin.estimate.kernel import Hyper
+from lupin_twin.estimate.readings import Scale
+from tests.support import textbook_gp
+from tests.support.estimates import DAY_S, a_day, hypers, readings_of, some_readings, spots_of
+from tests.support.textbook_gp import Spot
+
+PLACES = [(0.0, 0.0), (1.3, -2.0), (-4.0, 4.5)]
+
+
+def model_of(*drawn: Hyper) -> Model:
+    return Model(Scale(20.0, 2.0), 2.0, DAY_S, drawn[0], drawn)
+
+
+@given(some_readings(), st.lists(hypers, min_size=1, max_size=3), st.floats(0.0, 12.0))
+def test_the_estimate_is_the_textbook_s(
+    readings: Readings, drawn: list[Hyper], later_h: float
+) -> None:
+    model = model_of(*drawn)
+    at_hour = float(readings.time_s.max()) / 3600.0 + later_h
+    mean, sd = model.posterior(readings, at_hour * 3600.0).points(np.array(PLACES))
+    y = (readings.value - 20.0) / 2.0
+    for index, place in enumerate(PLACES):
+        spot = Spot(*place, at_hour)
+        each = [textbook_gp.foretold(spots_of(readings), y, spot, h) for h in drawn]
+        middle = sum(one for one, _ in each) / len(each)
+        variance = sum((one - middle) ** 2 + var for one, var in each) / len(each)
+        assert mean[index] == pytest.approx(20.0 + 2.0 * middle, abs=1e-6 * (1 + abs(middle)))
+        assert sd[index] ** 2 == pytest.approx(4.0 * variance, rel=1e-6, abs=1e-8)
+
+
+@settings(max_examples=25)
+@given(some_readings(), st.randoms(use_true_random=False))
+def test_the_order_of_readings_does_not_matter(readings: Readings, chance: object) -> None:
+    order = np.arange(len(readings))
+    chance.shuffle(order)  # type: ignore[attr-defined]
+    mixed = readings.take(order)
+    one, other = (fit(each, ideal=(18.0, 26.0)) for each in (readings, mixed))
+    places = np.array(PLACES)
+    mean, sd = one.posterior(readings, DAY_S).points(places)
+    mean_mixed, sd_mixed = other.posterior(mixed, DAY_S).points(places)
+    assert mean_mixed == pytest.approx(mean, abs=1e-3)
+    assert sd_mixed == pytest.approx(sd, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [(1.0, 0, 22.0)],
+        [(1.0, 0, 22.0)] * 5,
+        [(1.0, 0, 22.0), (1.0, 1, 25.0), (1.0, 0, 19.0)],
+        [(hour / 2.0, hour % 2, 22.0) for hour in range(20)],
+    ],
+)
+@pytest.mark.parametrize("ideal", [None, (18.0, 26.0)])
+def test_one_reading_duplicates_and_equal_values_make_a_model(
+    rows: list[tuple[float, int, float]], ideal: tuple[float, float] | None
+) -> None:
+    readings = readings_of(rows, [(0.0, 0.0), (1.0, 1.0)])
+    posterior = fit(readings, ideal=ideal).posterior(readings, DAY_S / 2)
+    mean, sd = posterior.points(np.array(PLACES))
+    assert np.isfinite(mean).all()
+    assert (sd > 0.0).all()
+
+
+def test_a_model_is_immutable_and_serves_other_readings() -> None:
+    day = a_day()
+    model = fit(day, ideal=(18.0, 26.0))
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        model.limit = 1.0  # type: ignore[misc]
+    assert hash(model) == hash(dataclasses.replace(model))
+    fewer = day.take(np.arange(10))
+    mean, _ = model.posterior(fewer, DAY_S).points(np.array(PLACES))
+    assert np.isfinite(mean).all()
+
+
+def test_what_is_known_has_a_limit_in_the_model_and_one_in_the_ideal_range() -> None:
+    h = Hyper(1.0, 5.0, 1.0, 0.3, 0.0001, 8.0, 0.4, 2.5, 0.15)
+    assert model_of(h).sd_known == pytest.approx(0.6 * 0.5 * 2.0, rel=1e-6)
+    wild = h._replace(sa=100.0)
+    assert model_of(wild).sd_known == 2.0
+    assert fit(a_day(), ideal=(18.0, 26.0)).limit == 2.0
+
+
+def test_the_day_s_course_bridges_an_outage_only_where_the_day_is_as_long_as_told() -> None:
+    day = a_day(passes=24)
+    true = 21.0 + 4.0 * np.sin(2.0 * np.pi * 1.25) + 0.4 * day.xy[:, 1]
+    told = fit(day, ideal=(18.0, 26.0)).posterior(day, 1.25 * DAY_S).points(day.xy)
+    wrong = fit(day, ideal=(18.0, 26.0), day_length_s=60 * DAY_S)
+    off = wrong.posterior(day, 1.25 * DAY_S).points(day.xy)
+    assert np.abs(told[0] - true).mean() < 0.3
+    assert np.abs(off[0] - true).mean() > 1.0
+
+
+def test_what_cannot_be_is_refused() -> None:
+    day = a_day()
+    none = day.take(np.array([], dtype=np.int64))
+    with pytest.raises(ValueError, match="there are no readings"):
+        fit(none)
+    with pytest.raises(ValueError, match="there are no readings"):
+        model_of(Hyper(*[1.0] * 9)).posterior(none, 0.0)
+    newest_s = float(day.time_s.max())
+    model_of(Hyper(*[1.0] * 9)).posterior(day, newest_s)
+    with pytest.raises(ValueError, match=r"at_s is .*, the newest reading is of"):
+        model_of(Hyper(*[1.0] * 9)).posterior(day, newest_s - 1.0)
+    with pytest.raises(ValueError, match=r"day_length_s is 0.0, must be greater than 0"):
+        fit(day, day_length_s=0.0)
+
+
+@pytest.mark.parametrize("value", [3e38, -3e38, 1e-300])
+@pytest.mark.parametrize("metres", [0.0, 1e300])
+def test_numbers_at_the_end_of_what_there_is_make_an_estimate_or_say_so(
+    value: float, metres: float
+) -> None:
+    rows = [(hour / 2.0, hour % 2, value * (1 + hour % 3)) for hour in range(12)]
+    readings = readings_of(rows, [(metres, -metres), (-metres, metres)])
+    try:
+        mean, sd = fit(readings).posterior(readings, DAY_S / 2).points(np.array(PLACES))
+    except FitFailed:
+        return
+    assert np.isfinite(mean).all()
+    assert np.isfinite(sd).all()

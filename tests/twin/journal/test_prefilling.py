@@ -1,0 +1,127 @@
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from lupin_twin.journal.condition import JournalState
+from lupin_twin.journal.lock import InUse, Lock
+from lupin_twin.journal.prefilling import Stretch, is_empty, prefill, simulated
+from lupin_twin.journal.rows import Row
+from lupin_twin.journal.runs import Clock
+from lupin_twin.journal.salvage import set_aside
+from lupin_twin.journal.schema import open_reader, open_writer
+from tests.support.journal import (
+    CLOCK,
+    NOW,
+    SECOND,
+    is_whole,
+    kept,
+    known,
+    look,
+    opened,
+    pin,
+    recording,
+    restored,
+    scan,
+    select,
+    wait_state,
+)
+
+DAY = 86_400 * SECOND
+START = NOW - 3 * DAY
+PAST: list[Row] = [
+    pin(at_ns=START),
+    scan(at_ns=START),
+    look(at_ns=NOW - DAY),
+    scan(at_ns=NOW - SECOND),
+]
+
+
+def filled(path: Path) -> bool:
+    return prefill(path, "a test", PAST, NOW)
+
+
+def mark(path: Path) -> Stretch | None:
+    with closing(open_reader(path)) as connection:
+        return simulated(connection)
+
+
+def test_a_journal_that_is_not_there_gets_a_past_that_goes_on(tmp_path: Path) -> None:
+    path = tmp_path / "state" / "j.sqlite"
+    assert filled(path)
+    assert is_whole(path)
+    assert mark(path) == (START, NOW)
+    assert {type(row).__name__ for row in known(path, CLOCK)} == {"PinRow", "ScanRow", "LookRow"}
+    # Past and present are one run of the clock.
+    kept(path, [scan(at_ns=NOW + SECOND)], CLOCK)
+    assert select(path, "SELECT id, begun_stamp_ns FROM run") == [(1, START)]
+    assert restored(path, CLOCK).count == 5
+
+
+def test_it_is_filled_once(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    assert filled(path)
+    assert not prefill(path, "a test", [scan("other")], NOW + SECOND)
+    assert mark(path) == (START, NOW)
+    assert select(path, "SELECT count(*) FROM scan") == [(2,)]
+
+
+def test_a_twin_that_heard_nothing_leaves_it_empty(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    kept(path, [], CLOCK)
+    assert filled(path)
+    assert select(path, "SELECT id, begun_stamp_ns FROM run") == [(1, START)]
+
+
+@pytest.mark.parametrize("row", [scan(), look(), pin()])
+def test_into_what_anybody_has_recorded_nothing_is_written(tmp_path: Path, row: Row) -> None:
+    path = tmp_path / "j.sqlite"
+    kept(path, [row], CLOCK)
+    assert not filled(path)
+    assert mark(path) is None
+
+
+def test_nor_into_one_that_has_given_all_of_it_up(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    kept(path, [scan()], CLOCK)
+    with closing(open_writer(path)) as connection:
+        connection.execute("DELETE FROM scan")
+        connection.execute("INSERT INTO meta VALUES ('purged_id', 1)")
+        assert not is_empty(connection)
+    assert not filled(path)
+
+
+def test_nor_into_one_that_a_twin_has(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    with Lock(path, "/lupin_twin"), pytest.raises(InUse, match="/lupin_twin"):
+        filled(path)
+
+
+def test_of_a_filling_that_fails_nothing_is_there(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    with pytest.raises(AttributeError):
+        prefill(path, "a test", [*PAST, None], NOW)  # type: ignore[list-item]
+    assert mark(path) is None
+    assert filled(path)
+
+
+def test_a_journal_at_work_says_what_of_it_is_simulated(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    filled(path)
+    for at_ns, is_simulated in ((NOW + SECOND, False), (5 * SECOND, True)):
+        with recording(path, Clock(at_ns, NOW + SECOND, is_simulated)) as journal:
+            assert wait_state(journal, JournalState.RECORDING).simulated_ns == (START, NOW)
+
+
+def test_what_was_salvaged_is_no_less_simulated(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    filled(path)
+    aside = set_aside(path, "20261121T141500Z")
+    with closing(open_writer(path)) as connection:
+        connection.execute("INSERT INTO meta VALUES ('salvage', ?)", (aside.name,))
+    with opened(path) as file:
+        while file.look_after():
+            pass
+    assert mark(path) == (START, NOW)

@@ -1,0 +1,103 @@
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from lupin_twin.journal.lock import InUse, Lock
+from lupin_twin.journal.schema import open_reader, open_writer
+from lupin_twin.journal.vacuuming import NotPossible, vacuum
+from tests.support.journal import NOW, SECOND, is_whole, kept, known, pin, scan
+
+
+class Usage(NamedTuple):
+    total: int
+    used: int
+    free: int
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A journal nine tenths of which are free."""
+    made = tmp_path / "j.sqlite"
+    kept(made, [pin(), *(scan(at_ns=NOW + n * SECOND, a=n / 3) for n in range(5000))])
+    with closing(open_writer(made)) as connection:
+        connection.execute("DELETE FROM scan WHERE id < 4500")
+    return made
+
+
+def small(path: Path) -> tuple[int, int]:
+    return vacuum(path, "a test", lambda share: None)
+
+
+def test_the_file_shrinks_and_holds_what_it_held(path: Path) -> None:
+    size, rows = path.stat().st_size, known(path)
+    path.chmod(0o640)
+    before, after = small(path)
+    assert (before, after) == (size, path.stat().st_size)
+    assert after < size / 5
+    assert path.stat().st_mode & 0o777 == 0o640
+    assert known(path) == rows
+    assert is_whole(path)
+    assert small(path) == (after, after)
+    # And it can be written as before, numbers going on.
+    assert kept(path, [scan("new")]) == (1, 0)
+
+
+def test_while_a_twin_has_it_it_is_refused_by_name(path: Path) -> None:
+    whole = path.read_bytes()
+    with Lock(path, "/gh1/lupin_twin"), pytest.raises(InUse, match="in use by /gh1/lupin_twin"):
+        small(path)
+    assert path.read_bytes() == whole
+
+
+def test_while_somebody_reads_it_it_is_refused(path: Path) -> None:
+    with closing(open_reader(path)) as reader:
+        reader.execute("SELECT count(*) FROM scan").fetchone()
+        with pytest.raises(NotPossible, match=r"somebody reads .*j\.sqlite"):
+            small(path)
+    assert small(path)[1] < path.stat().st_size * 5
+
+
+def test_without_room_for_a_copy_it_is_refused_with_both_sizes(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = known(path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(10**9, 10**9, 10_000))
+    with pytest.raises(NotPossible, match=r"has 0\.0 MB free, and a copy .* takes 0\.\d MB"):
+        small(path)
+    assert not path.with_name("j.sqlite.vacuum").exists()
+    assert known(path) == rows
+
+
+def test_what_an_interrupted_one_left_is_no_hindrance(path: Path) -> None:
+    path.with_name("j.sqlite.vacuum").write_bytes(b"half of it")
+    before, after = small(path)
+    assert after < before
+    assert not path.with_name("j.sqlite.vacuum").exists()
+
+
+def test_a_disk_that_fills_meanwhile_leaves_the_file_as_it_was(path: Path) -> None:
+    kept(path, [scan(at_ns=NOW + n * SECOND, a=n / 3) for n in range(5000, 9000)])
+    rows = known(path)
+    # A file that may not grow fails as one on a full disk does.
+    program = (
+        "import resource, sys; from pathlib import Path;"
+        "from lupin_twin.journal.vacuuming import vacuum;"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000));"
+        "vacuum(Path(sys.argv[1]), 'a test', print)"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program, str(path)], check=False, capture_output=True, text=True
+    )
+    assert ended.returncode == 1
+    assert ended.stderr.splitlines()[-1].startswith("sqlite3.OperationalError: ")
+    assert not path.with_name("j.sqlite.vacuum").exists()
+    assert is_whole(path)
+    assert known(path) == rows
+    assert small(path)[1] < path.stat().st_size * 2

@@ -1,0 +1,245 @@
+"""GetEstimate over DDS: of a twin that has heard a day, of a moment before, and what is refused."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Time
+from lupin_msgs.srv import GetEstimate, GetEstimateReport
+
+from lupin_twin.diagnostics import Estimates
+from lupin_twin.estimate import STRONG_NATS, FitFailed
+from lupin_twin.estimate_rounds import Done, Loaded
+from lupin_twin.estimate_service import EstimateRules, EstimateService
+from lupin_twin.estimates import FIRST_FIT, TagPast, readings_of
+from lupin_twin.grading import Tally
+from lupin_twin.past_desk import MAX_QUESTIONS
+from lupin_twin.state import NANOSECONDS_PER_SECOND, Reading
+from tests.support import messages
+from tests.support.domains import own_domain
+from tests.support.journal import select
+from tests.support.processes import OFTEN, twin_node
+from tests.support.ros import Peer
+from tests.support.waiting import wait_for
+
+SERVICE = "/twin/get_estimate"
+REPORT_SERVICE = "/twin/get_estimate_report"
+BOX: dict[str, Any] = {
+    "sensor_type": "temperature",
+    "resolution": 0.5,
+    "bbox_min_x": 0.0,
+    "bbox_min_y": 0.0,
+    "bbox_max_x": 2.0,
+    "bbox_max_y": 3.0,
+}
+PLACES = {"a": (0.25, 0.25), "b": (1.75, 2.75)}
+NOW_S = int(time.time())
+# So late, by the steady clock, that what is begun then is not begun again.
+NEVER_DUE_S = 1e12
+# Seven each, an hour apart; the last half an hour ago.
+TIMES = {"a": [NOW_S - 1800 - 3600 * n for n in range(7)]}
+TIMES["b"] = [second - 600 for second in TIMES["a"]]
+
+
+@pytest.fixture(scope="module")
+def peer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Peer]:
+    journal = tmp_path_factory.mktemp("journal") / "j.sqlite"
+    arguments = (*OFTEN, "-p", f"journal:={journal}")
+    with own_domain() as domain, twin_node(domain, *arguments), Peer(domain) as peer:
+        peer.wait_for_twin()
+        for tag_id, stamps in TIMES.items():
+            for stamp_s in sorted(stamps):
+                readings = {"temperature": 20.0 + 3.0 * PLACES[tag_id][0]}
+                peer.observe(messages.scan(tag_id, readings, stamp_s=stamp_s, at=PLACES[tag_id]))
+        peer.observe(messages.scan("last", {"co2": 1.0}))
+        peer.tag("last")
+        rows = "SELECT count(*) FROM scan"
+        wait_for(lambda: select(journal, rows) == [(15,)], "all of it in the journal")
+        yield peer
+
+
+def ask(peer: Peer, **changes: Any) -> Any:
+    return peer.ask(GetEstimate, SERVICE, **{**BOX, **changes})
+
+
+def test_the_estimate_is_near_the_readings_at_the_tags_and_less_sure_between(peer: Peer) -> None:
+    answer = ask(peer)
+    assert answer.ok, answer.error_message
+    assert (answer.width, answer.height, answer.resolution_used) == (4, 6, 0.5)
+    assert (answer.sample_count, answer.reading_count) == (2, 14)
+    mean, sd = (np.array(one).reshape(6, 4) for one in (answer.mean, answer.sd))
+    assert mean[0, 0] == pytest.approx(20.75, abs=0.5)
+    assert mean[5, 3] == pytest.approx(25.25, abs=0.5)
+    assert sd[0, 0] < sd[3, 1]
+    assert (sd > 0.0).all()
+    assert answer.sd_known > 0.0
+
+
+def test_what_an_estimate_is_worth_is_told_and_new_scans_count(peer: Peer) -> None:
+    def report(accept: Any) -> Any:
+        def look() -> Any:
+            answer = peer.ask(GetEstimateReport, REPORT_SERVICE, sensor_type="temperature")
+            assert answer.ok, answer.error_message
+            return answer if accept(answer) else None
+
+        return wait_for(look, "the report")
+
+    loaded = report(lambda answer: answer.tag_ids)
+    assert list(loaded.tag_ids) == ["a", "b"]
+    assert loaded.fitted_at.sec >= NOW_S
+    assert loaded.fit_problem == ""
+    assert [one.sec for one in loaded.observed_at] == [max(TIMES["a"]), max(TIMES["b"])]
+    assert list(loaded.measured) == [20.75, 25.25]
+    assert list(loaded.left_out) == [False, False]
+    assert 1 <= len(loaded.place_x) <= 5
+    assert all(0.0 < ratio <= 1.0 for ratio in loaded.error_ratio)
+    assert (loaded.week_scans, loaded.graded_since) == (0, Time())
+
+    stamp_s = int(time.time())
+    peer.observe(messages.scan("a", {"temperature": 20.8}, stamp_s=stamp_s, at=PLACES["a"]))
+    graded = report(lambda answer: answer.week_scans)
+    assert (graded.day_scans, graded.day_inside, graded.week_inside) == (1, 1, 1)
+    assert graded.graded_since.sec >= NOW_S
+    refused = peer.ask(GetEstimateReport, REPORT_SERVICE, sensor_type="co2", max_places=21)
+    assert refused == GetEstimateReport.Response(
+        error_message="max_places is 21, the limits are 1 and 20"
+    )
+    unknown = peer.ask(GetEstimateReport, REPORT_SERVICE, sensor_type="ph")
+    assert (unknown.ok, unknown.fitted_at, list(unknown.tag_ids)) == (True, Time(), [])
+
+
+def test_as_of_a_moment_only_what_was_observed_until_then_counts(peer: Peer) -> None:
+    at_s = TIMES["a"][3]
+    answer = ask(peer, at=Time(sec=at_s))
+    assert answer.ok, answer.error_message
+    tags = [
+        TagPast(
+            tag_id,
+            *PLACES[tag_id],
+            tuple((stamp_s * NANOSECONDS_PER_SECOND, 0.0) for stamp_s in stamps),
+        )
+        for tag_id, stamps in TIMES.items()
+    ]
+    expected = readings_of(tags, at_s * NANOSECONDS_PER_SECOND, 86_400.0)
+    assert answer.reading_count == len(expected) == 8
+    assert answer.sample_count == 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"sensor_type": ""}, "sensor_type is empty"),
+        ({"resolution": 0.0}, "resolution is 0.0"),
+        ({"resolution": 0.0001}, "cells"),
+        ({"sensor_type": "ph"}, "no tag has a reading of the 86400 s before that moment"),
+        ({"at": Time(sec=2**31 - 1)}, "at is 2147483647.0 s, the limits are 0 and now"),
+    ],
+)
+def test_what_cannot_be_estimated_is_refused_by_name(
+    peer: Peer, changes: dict[str, Any], complaint: str
+) -> None:
+    answer = ask(peer, **changes)
+    assert complaint in answer.error_message
+    assert answer == GetEstimate.Response(error_message=answer.error_message)
+
+
+def test_a_flood_of_the_dearest_holds_up_no_observation_and_no_field(peer: Peer) -> None:
+    dearest = {**BOX, "resolution": 0.003}
+    clients = [
+        peer.node.create_client(kind, name)
+        for kind, name in ((GetEstimate, SERVICE), (GetEstimateReport, REPORT_SERVICE))
+    ]
+    for client in clients:
+        peer.until(client.service_is_ready, "the service")
+    asked = []
+    for number in range(MAX_QUESTIONS + 8):
+        place = {**dearest, "bbox_max_x": 2.0 + number / 1000.0}
+        asked.append(clients[0].call_async(GetEstimate.Request(**place)))
+        asked.append(clients[1].call_async(GetEstimateReport.Request(sensor_type="temperature")))
+        peer.spin_briefly()
+    peer.observe(messages.scan("in the flood", {"co2": 400.0}, at=(1.0, 1.0)))
+    peer.tag("in the flood")
+    assert peer.get_field(**{**BOX, "sensor_type": "co2"}).sample_count == 1
+
+    def answers(ok: bool) -> list[Any]:
+        # A service holds ten requests: of such a flood, DDS loses some.
+        return [one.result() for one in asked if one.done() and one.result().ok is ok]
+
+    peer.until(lambda: answers(True) and answers(False), "an answer and a refusal")
+    assert all(one.error_message.endswith("ask again later") for one in answers(False))
+    for client in clients:
+        peer.node.destroy_client(client)
+
+
+def test_after_a_restart_models_are_made_of_what_the_journal_holds(tmp_path: Path) -> None:
+    journal = tmp_path / "j.sqlite"
+    arguments = (*OFTEN, "-p", f"journal:={journal}")
+    with own_domain() as domain, twin_node(domain, *arguments), Peer(domain) as peer:
+        peer.wait_for_twin()
+        for stamp_s in sorted(TIMES["a"] + TIMES["b"]):
+            tag_id = "a" if stamp_s in TIMES["a"] else "b"
+            peer.observe(messages.scan(tag_id, {"co2": 400.0}, stamp_s=stamp_s, at=PLACES[tag_id]))
+        rows = "SELECT count(*) FROM scan"
+        wait_for(lambda: select(journal, rows) == [(14,)], "all of it in the journal")
+    # Where the one that has ended is not found any more.
+    with own_domain() as domain, twin_node(domain, *arguments), Peer(domain) as peer:
+        peer.wait_for_twin()
+
+        def report() -> Any:
+            found = peer.ask(GetEstimateReport, REPORT_SERVICE, sensor_type="co2")
+            return found if found.tag_ids else None
+
+        found = wait_for(report, "a model")
+    assert sorted(found.tag_ids) == ["a", "b"]
+    assert found.fitted_at.sec > 0
+    assert (found.week_scans, found.graded_since) == (0, Time())
+
+
+def test_what_is_wrong_with_models_is_said_in_the_log_and_for_diagnostics() -> None:
+    """A fit that fails keeps the last; a share, or a day of another length, denies the model."""
+    told: list[str] = []
+    habits: Any = SimpleNamespace(is_behind=False, warn=lambda _, text: told.append(text))
+    nothing: Any = None
+    rules = EstimateRules(1_440.0, 100)
+    service = EstimateService(habits, nothing, rules, lambda: NOW_S, lambda: None)
+    for _ in range(FIRST_FIT):
+        service.models.hear([Reading("co2", 400.0)])
+    service.models.begin("co2", NEVER_DUE_S)
+    service._fitted("co2", 1, (nothing, (0.0, 0.0, STRONG_NATS)))
+    service.models.begin("co2", NEVER_DUE_S)
+    service._fitted("co2", 2, FitFailed("singular"))
+    assert (service.models.of("co2").at_ns, service.models.failed) == (1, 1)
+
+    due = service.watch.due({"co2": nothing}, 0.0)
+    assert due is not None
+    service.watch.begin(due, 0.0)
+    loaded = Loaded(0, nothing, nothing, ())
+    service._rounded("co2", Done(Tally(90, 10), loaded, loaded))
+    assert service.state() == Estimates({"co2": "singular"}, ("co2",), 1, 0)
+    assert [one.partition(":")[0] for one in told] == [
+        "by its readings, a day takes some 64 times as long as day_length_s",
+        "no new model of co2",
+        "the estimate of co2 is not to be trusted",
+    ]
+    assert "of 90 scans, 10 came to lie where 9 of 10 were foretold" in told[-1]
+
+    def grade(tally: Tally) -> None:
+        model: Any = object()
+        due = service.watch.due({"co2": model}, 1e9)
+        assert due is not None
+        service.watch.begin(due, 1e9)
+        service._rounded("co2", Done(tally, loaded, loaded))
+
+    grade(Tally(1, 0))
+    assert len(told) == 3, "once, for as long as it lasts"
+    grade(Tally(10_000, 9_000))
+    assert service.state().distrusted == ()
+    grade(Tally(100_000, 0))
+    assert len(told) == 4, "and again where it was trusted in between"
+    service.close()

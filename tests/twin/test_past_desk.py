@@ -1,0 +1,196 @@
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from concurrent.futures import Future
+from typing import Any
+
+import pytest
+
+from lupin_twin.past import NotRemembered, PastRefused, error_of, message_of
+from lupin_twin.past_desk import (
+    LARGE_AT_ONCE,
+    MAX_QUESTIONS,
+    PACE_S,
+    SMALL_AT_ONCE,
+    PastDesk,
+    Question,
+)
+from lupin_twin.workers import SMALL_S, Workers
+from tests.support.waiting import wait_for
+
+LARGE_S = 2 * SMALL_S
+
+
+class Desk:
+    """A desk, and searches that end when a test says so."""
+
+    def __init__(self) -> None:
+        self.workers = Workers("test")
+        self.woken = threading.Semaphore(0)
+        self.is_behind = False
+        self.now_s = 100.0
+        self.desk = PastDesk(
+            self.workers, self.woken.release, lambda: self.is_behind, lambda: self.now_s
+        )
+        self.begun: list[Future[int]] = []
+        self.answers: list[Any] = []
+
+    def ask(self, make: Any = str, cost_s: float = 0.0) -> Future[int]:
+        search: Future[int] = Future()
+
+        def look_up() -> Future[int]:
+            self.begun.append(search)
+            return search
+
+        self.desk.ask(Question(look_up, make, cost_s, self.answers.append))
+        return search
+
+    def delivered(self) -> Any:
+        """The next answer; a wake-up brings one at most, and may find nothing left to bring."""
+        before = len(self.answers)
+        while len(self.answers) == before:
+            wait_for(lambda: self.woken.acquire(blocking=False), "the desk to be woken")
+            self.desk.deliver()
+        assert len(self.answers) == before + 1
+        return self.answers[-1]
+
+
+@pytest.fixture
+def made() -> Iterator[Desk]:
+    desk = Desk()
+    yield desk
+    desk.workers.close()
+
+
+def test_what_is_found_is_made_an_answer_elsewhere_and_handed_out_here(made: Desk) -> None:
+    threads: list[str] = []
+
+    def make(number: int) -> str:
+        threads.append(threading.current_thread().name)
+        return f"made of {number}"
+
+    search = made.ask(make)
+    assert made.desk.waiting == 1
+    made.desk.deliver()
+    assert made.answers == [], "nothing is there yet"
+    search.set_result(7)  # found in this very thread, and still not made in it
+    assert made.delivered() == "made of 7"
+    assert threads[0].startswith("test_")
+    assert (made.desk.waiting, made.desk.answered) == (0, 1)
+    assert made.desk.slowest_s > 0.0
+
+
+def test_one_wake_up_brings_one_answer_and_the_others_are_not_forgotten(made: Desk) -> None:
+    searches = [made.ask() for _ in range(SMALL_AT_ONCE)]
+    for number, search in enumerate(searches):
+        search.set_result(number)
+    assert {made.delivered() for _ in searches} == set("0123")
+
+
+@pytest.mark.parametrize("error", [PastRefused("at is 3 s"), OSError("no such file")])
+def test_an_error_of_the_search_is_the_answer(made: Desk, error: Exception) -> None:
+    made.ask().set_exception(error)
+    assert made.delivered() is error
+    assert made.desk.answered == 0
+    assert made.desk.waiting == 0
+
+
+def test_an_error_in_the_making_is_the_answer(made: Desk) -> None:
+    made.ask(lambda number: 1 // number).set_result(0)
+    assert isinstance(made.delivered(), ZeroDivisionError)
+
+
+def test_what_cannot_be_looked_up_is_answered_and_holds_up_nobody(made: Desk) -> None:
+    error = NotRemembered("no journal", is_lasting=True)
+
+    def look_up() -> Future[int]:
+        raise error
+
+    for _ in range(2):
+        made.desk.ask(Question(look_up, str, LARGE_S, made.answers.append))
+    assert made.delivered() is error
+    assert made.delivered() is error
+    assert made.desk.waiting == 0
+
+
+def test_an_answer_that_cannot_be_sent_holds_up_nobody(made: Desk) -> None:
+    def reply(answer: str) -> None:
+        raise RuntimeError(answer)
+
+    done: Future[int] = Future()
+    done.set_result(1)
+    made.desk.ask(Question(lambda: done, str, LARGE_S, reply))
+    after = made.ask(cost_s=LARGE_S)
+    wait_for(lambda: made.woken.acquire(blocking=False), "the desk to be woken")
+    with pytest.raises(RuntimeError):
+        made.desk.deliver()
+    after.set_result(2)
+    assert made.delivered() == "2"
+
+
+def test_a_search_that_was_given_up_is_answered_too(made: Desk) -> None:
+    search = made.ask()
+    search.cancel()
+    search.set_running_or_notify_cancel()
+    assert isinstance(made.delivered(), Exception)
+
+
+def test_closed_workers_end_no_question_in_silence(made: Desk) -> None:
+    search = made.ask()
+    made.workers.close()
+    search.set_result(1)
+    assert "closed" in str(made.delivered())
+
+
+def test_large_ones_are_taken_one_by_one_when_the_last_is_out_and_small_ones_do_not_wait(
+    made: Desk,
+) -> None:
+    large = [made.ask(cost_s=LARGE_S) for _ in range(LARGE_AT_ONCE + 2)]
+    small = [made.ask(cost_s=SMALL_S) for _ in range(SMALL_AT_ONCE + 1)]
+    assert made.begun == [*large[:LARGE_AT_ONCE], *small[:SMALL_AT_ONCE]]
+    large[0].set_result(0)
+    wait_for(lambda: made.woken.acquire(blocking=False), "the answer")
+    assert len(made.begun) == LARGE_AT_ONCE + SMALL_AT_ONCE, "before the last is handed out"
+    made.desk.deliver()
+    assert made.begun[-1] is large[LARGE_AT_ONCE]
+    small[0].set_result(1)
+    assert made.delivered() == "1"
+    assert made.begun[-1] is small[-1]
+
+
+@pytest.mark.parametrize("cost_s", [SMALL_S, LARGE_S])
+def test_who_asks_waits_while_observations_do_but_for_one_a_second(
+    made: Desk, cost_s: float
+) -> None:
+    made.is_behind = True
+    asked = [made.ask(cost_s=cost_s) for _ in range(4)]
+    assert made.begun == asked[:1]
+    asked[0].set_result(0)
+    assert made.delivered() == "0"
+    made.now_s += PACE_S - 0.01
+    made.desk.go_on()
+    assert made.begun == asked[:1], "one answer is no leave for the next"
+    made.now_s += 0.02
+    made.desk.go_on()
+    assert made.begun == asked[:2]
+    assert made.desk.waiting == 3
+    made.is_behind = False
+    asked[1].set_result(1)
+    assert made.delivered() == "1"
+    assert made.begun[:3] == asked[:3], "at once"
+
+
+@pytest.mark.parametrize("cost_s", [SMALL_S, LARGE_S])
+def test_so_many_questions_wait_and_one_more_is_told_to_come_again(
+    made: Desk, cost_s: float
+) -> None:
+    searches = [made.ask(cost_s=cost_s) for _ in range(MAX_QUESTIONS)]
+    with pytest.raises(NotRemembered, match=rf"{MAX_QUESTIONS} questions .* the limit") as refused:
+        made.ask()
+    told = error_of(message_of(refused.value))
+    assert isinstance(told, NotRemembered)
+    assert not told.is_lasting
+    searches[0].set_result(0)
+    made.delivered()
+    made.ask()

@@ -1,0 +1,278 @@
+"""The two services of the past: over stand-ins, and over DDS of a twin without a journal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+from builtin_interfaces.msg import Time
+from lupin_msgs.srv import GetHistory, GetStateAt
+
+from lupin_twin import recent
+from lupin_twin.history import History
+from lupin_twin.past import (
+    HISTORY_SERVICE,
+    MAX_POINTS,
+    STATE_AT_SERVICE,
+    NotRemembered,
+    PastRefused,
+    SeriesPast,
+    SeriesRequest,
+)
+from lupin_twin.past_desk import MAX_QUESTIONS, PastDesk
+from lupin_twin.past_service import PastService, RecentPast
+from lupin_twin.past_writes import PastWrites, WritesRequest
+from lupin_twin.state import NANOSECONDS_PER_SECOND, Snapshot, TwinStore
+from lupin_twin.workers import Workers
+from tests.support import messages, store
+from tests.support.domains import own_domain
+from tests.support.processes import OFTEN, twin_node
+from tests.support.ros import Peer
+from tests.support.waiting import PATIENCE_S, wait_for
+
+S = NANOSECONDS_PER_SECOND
+NOW_NS = 100 * S
+FAR = Time(sec=2**31 - 1)
+
+
+# --- with stand-ins: no ROS runs ----------------------------------------------------------------
+
+
+class Remembered:
+    """A memory that finds what it is told to find."""
+
+    def __init__(self) -> None:
+        self.found: Future[Any] = Future()
+        self.asked: list[Any] = []
+
+    def state_at(self, at_ns: int) -> Future[Snapshot]:
+        self.asked.append(at_ns)
+        return self.found
+
+    def series(self, request: SeriesRequest, now_ns: int) -> Future[SeriesPast]:
+        self.asked.append((request, now_ns))
+        return self.found
+
+    def writes(self, request: WritesRequest) -> Future[PastWrites]:
+        self.asked.append(request)
+        return self.found
+
+
+@dataclass
+class Says:
+    """What a node reports."""
+
+    reported: list[Exception] = field(default_factory=list)
+
+    def report(self, _what: str, error: Exception) -> None:
+        self.reported.append(error)
+
+
+class Node:
+    """As much of a node as the services need: it is asked by the services' names."""
+
+    def __init__(self) -> None:
+        self.memory, self.habits = Remembered(), Says()
+        self.workers = Workers("test")
+        self.desk = PastDesk(self.workers, lambda: None, lambda: False)
+        self.callbacks: dict[str, Callable[..., Any]] = {}
+        habits: Any = self.habits
+        service = PastService(habits, self.desk, self.memory, TwinStore(), lambda: NOW_NS)
+        service.offer(self, None)
+
+    def create_service(self, kind: Any, name: str, callback: Any, callback_group: Any) -> Any:
+        assert callback_group is None
+        self.callbacks[name] = lambda **request: callback(kind.Request(**request), kind.Response())
+        return Remembered()
+
+    def answer(self, name: str, **request: Any) -> Any:
+        """The response, now or as soon as the desk has it."""
+        answer = self.callbacks[name](**request)
+        if hasattr(answer, "ok"):
+            return answer
+        sent: list[Any] = []
+        answer.goes_to(sent.append)
+
+        def look() -> bool:
+            self.desk.deliver()
+            return bool(sent)
+
+        wait_for(look, "the answer")
+        return sent[0]
+
+
+@pytest.fixture
+def node(monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
+    monkeypatch.setattr("lupin_twin.past_service.allow_later", lambda _: None)
+    node = Node()
+    yield node
+    node.workers.close()
+
+
+def test_a_state_is_asked_for_by_its_moment(node: Node) -> None:
+    node.memory.found.set_result(Snapshot(5 * S + 3, "map", ()))
+    response = node.answer(STATE_AT_SERVICE, at=Time(sec=5, nanosec=3))
+    assert response.ok
+    assert response.state.header == response.times.header
+    assert node.memory.asked == [5 * S + 3]
+
+
+@pytest.mark.parametrize("at", [Time(sec=100), Time()])
+def test_now_and_zero_can_be_asked_for(node: Node, at: Time) -> None:
+    node.memory.found.set_result(Snapshot(at.sec * S, "map", ()))
+    assert node.answer(STATE_AT_SERVICE, at=at).ok
+
+
+@pytest.mark.parametrize(
+    ("at", "says"),
+    [
+        (Time(sec=100, nanosec=1), "at is 100.000000001 s, later than now, 100.000000000 s"),
+        (Time(sec=-1), "at is -1.000000000 s, before 0"),
+    ],
+)
+def test_a_moment_that_has_not_passed_is_refused_and_nothing_is_looked_up(
+    node: Node, at: Time, says: str
+) -> None:
+    response = node.answer(STATE_AT_SERVICE, at=at)
+    assert response == GetStateAt.Response(error_message=says)
+    assert node.memory.asked == []
+    assert node.habits.reported == []
+
+
+def test_a_series_is_asked_for_as_it_stands_in_the_request(node: Node) -> None:
+    node.memory.found.set_result(SeriesPast(S, 9 * S, None, (S,), (1,), (2.5,), (2.5,), (2.5,)))
+    response = node.answer(
+        HISTORY_SERVICE,
+        tag_id="1",
+        sensor_type="co2",
+        start=Time(sec=1),
+        end=Time(sec=9),
+        max_points=3,
+    )
+    assert response.ok
+    assert response.stamps == [Time(sec=1)]
+    assert list(response.means) == [2.5]
+    assert node.memory.asked == [(SeriesRequest("1", "co2", S, 9 * S, 3), NOW_NS)]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ({"tag_id": ""}, "tag_id is empty"),
+        ({"sensor_type": ""}, "sensor_type is empty"),
+        ({"sensor_type": "~moods"}, "sensor_type '~moods' is none of"),
+        ({"start": Time(sec=3), "end": Time(sec=2)}, "is before start"),
+        ({"max_points": MAX_POINTS + 1}, "max_points is 5001, the limits are 1 and 5000"),
+        ({"tag_id": "1" * 257}, "has 257 characters, the limit is 256"),
+    ],
+)
+def test_a_bad_question_is_refused_with_everything_else_empty(
+    node: Node, wrong: dict[str, Any], says: str
+) -> None:
+    response = node.answer(HISTORY_SERVICE, **({"tag_id": "1", "sensor_type": "co2"} | wrong))
+    assert says in response.error_message
+    response.error_message = ""
+    assert response == GetHistory.Response()
+    assert node.memory.asked == []
+
+
+@pytest.mark.parametrize(
+    ("error", "says", "is_reported"),
+    [
+        (PastRefused("at is too far back"), "at is too far back", False),
+        (NotRemembered("no journal", is_lasting=True), "not remembered: no journal", False),
+        (NotRemembered("busy", is_lasting=False), "busy: ask again later", False),
+        (OSError("disk"), "the twin failed to look back: disk: ask again later", True),
+    ],
+)
+def test_what_the_memory_meets_is_told_and_what_it_should_not_is_reported(
+    node: Node, error: Exception, says: str, is_reported: bool
+) -> None:
+    node.memory.found.set_exception(error)
+    response = node.answer(STATE_AT_SERVICE, at=Time(sec=5))
+    assert response == GetStateAt.Response(error_message=says)
+    assert bool(node.habits.reported) is is_reported
+
+
+def test_one_question_too_many_is_told_to_come_again(node: Node) -> None:
+    for _ in range(MAX_QUESTIONS):
+        node.callbacks[STATE_AT_SERVICE](at=Time(sec=5))
+    response = node.answer(STATE_AT_SERVICE, at=Time(sec=5))
+    assert response == GetStateAt.Response(
+        error_message=f"{MAX_QUESTIONS} questions about the past wait, which is the limit: "
+        "ask again later"
+    )
+
+
+def test_without_a_journal_the_history_is_looked_through_elsewhere() -> None:
+    history, workers = History(), Workers("test")
+    for second in (10, 20):
+        history.add(store.scan("a", second, co2=400.0 + second))
+    past = RecentPast(history, workers)
+    try:
+        asked = SeriesRequest("a", "co2")
+        search = past.series(asked, NOW_NS)
+        history.add(store.scan("a", 30, co2=0.0))
+        assert search.result(PATIENCE_S).means == (410.0, 420.0)
+        everywhere = SeriesRequest("*", "~scans")
+        search = past.series(everywhere, NOW_NS)
+        history.add(store.scan("b", 5, co2=0.0))
+        assert search.result(PATIENCE_S) == recent.series(
+            everywhere, {"a": history.of("a")}, NOW_NS
+        )
+        with pytest.raises(NotRemembered, match="parameter journal"):
+            past.state_at(5)
+        with pytest.raises(NotRemembered, match="~runs"):
+            past.series(SeriesRequest("*", "~runs"), NOW_NS)
+    finally:
+        workers.close()
+
+
+# --- over DDS, without a journal ----------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def peer() -> Iterator[Peer]:
+    with (
+        own_domain() as domain,
+        twin_node(domain, *OFTEN, "-p", "journal:=off"),
+        Peer(domain) as peer,
+    ):
+        peer.wait_for_twin()
+        for second in (10.0, 20.5, 30.0):
+            peer.observe(messages.scan("a", {"co2": 400.0 + second}, stamp_s=second))
+        peer.observe(messages.scan("a", status=2, stamp_s=40.0))
+        peer.observe(messages.scan("last", {"co2": 1.0}))
+        peer.tag("last")
+        yield peer
+
+
+def test_the_last_scans_of_a_twin_without_a_journal_can_be_asked_for(peer: Peer) -> None:
+    response = peer.ask(GetHistory, "/twin/get_history", tag_id="a", sensor_type="co2")
+    assert response.ok, response.error_message
+    assert [(stamp.sec, stamp.nanosec) for stamp in response.stamps] == [
+        (10, 0),
+        (20, 500_000_000),
+        (30, 0),
+    ]
+    assert list(response.means) == [410.0, 420.5, 430.0]
+    assert list(response.counts) == [1, 1, 1]
+    events = peer.ask(GetHistory, "/twin/get_history", tag_id="*", sensor_type="~failures")
+    assert [stamp.sec for stamp in events.stamps] == [40]
+    assert list(events.means) == [2.0]
+
+
+def test_a_state_of_then_is_not_remembered_without_a_journal(peer: Peer) -> None:
+    response = peer.ask(GetStateAt, "/twin/get_state_at", at=Time(sec=15))
+    assert response == GetStateAt.Response(
+        error_message="not remembered: the twin keeps no journal (parameter journal)"
+    )
+
+
+def test_a_moment_to_come_is_refused_by_the_nodes_own_clock(peer: Peer) -> None:
+    response = peer.ask(GetStateAt, "/twin/get_state_at", at=FAR)
+    assert "at is 2147483647.000000000 s, later than now, 1" in response.error_message
+    assert not response.ok

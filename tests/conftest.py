@@ -20,7 +20,7 @@ from tests.support.state_home import use_own
 STATE = use_own()
 
 # Whatever the hour is: of servers that measure no light, by their clock.
-os.environ["LUPIN_DAY_HOURS"] = "00:00-23:59"
+os.environ["LUPIN_DAY_HOURS"] = "00:00-00:00"
 # Before anything imports rclpy: ROS would swallow a field of the wrong type, and leave the machine.
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
 # Before numpy: threads of its own that wait for a busy core take ten times the time.

@@ -89,7 +89,7 @@ class Settings:
         "", "such as Europe/Amsterdam: for the hours of the day; empty: this machine's"
     )
     day_hours: str = _setting(
-        "06:00-20:00", "from when to when it is day where no light is measured"
+        "06:00-20:00", "from when to when it is day where no light is measured; 00:00-00:00: always"
     )
     alarm_days: float = _setting(7.0, "how far back alarms are worked out, in days", 0.01, 3_652.0)
     mqtt_url: str = _setting(

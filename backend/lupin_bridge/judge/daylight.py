@@ -30,7 +30,10 @@ class Day:
 
 @dataclass(frozen=True, slots=True)
 class ClockDay:
-    """From when to when it is day by the clock on the wall; the zone None is this machine's."""
+    """From when to when it is day by the clock on the wall; the zone None is this machine's.
+
+    From an hour to the same hour it is always day.
+    """
 
     zone: tzinfo | None
     begins: time = time(6)
@@ -39,7 +42,7 @@ class ClockDay:
     def is_day(self, now_s: float) -> bool:
         """`now_s` is Unix time; a day may end after midnight."""
         wall = datetime.fromtimestamp(now_s, self.zone).time()
-        if self.begins <= self.ends:
+        if self.begins < self.ends:
             return self.begins <= wall < self.ends
         return wall >= self.begins or wall < self.ends
 

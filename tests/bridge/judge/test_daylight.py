@@ -64,6 +64,12 @@ def test_a_day_may_end_after_midnight() -> None:
     assert late.is_day(MIDNIGHT_S + 14 * 3600)
 
 
+@pytest.mark.parametrize("hour", [time(), time(6), time(23, 59)])
+def test_from_an_hour_to_the_same_it_is_always_day(hour: time) -> None:
+    always = ClockDay(UTC, hour, hour)
+    assert all(always.is_day(MIDNIGHT_S + minute * 60) for minute in range(24 * 60))
+
+
 def test_a_tag_has_one_say_its_last() -> None:
     light = light_of(0.0, 900.0, 0.0)
     told = [light.is_day]

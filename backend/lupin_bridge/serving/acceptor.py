@@ -122,13 +122,13 @@ class Acceptor:
         self._retry = self._loop.call_later(RETRY_S, self._resume)
 
     def _take(self) -> None:
-        """Take who waits outside."""
+        """Take who waits outside: somebody does, or the socket would not be ready."""
+        if self._is_full():
+            # Whoever is turned out has left by the next turn of the event loop.
+            if not self._make_room():
+                self._pause()
+            return
         for _ in range(AT_ONCE):
-            if len(self._guests) + len(self._arrivals) >= self._room:
-                # Whoever is turned out has left by the next turn of the event loop.
-                if not self._make_room():
-                    self._pause()
-                return
             try:
                 connection, _ = self._listener.accept()
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
@@ -142,6 +142,11 @@ class Acceptor:
                 return
             connection.setblocking(False)
             self._let_in(connection)
+            if self._is_full():
+                return  # nobody goes before somebody else is known to wait
+
+    def _is_full(self) -> bool:
+        return len(self._guests) + len(self._arrivals) >= self._room
 
     def _let_in(self, connection: socket.socket) -> None:
         arrival = _Arrival(_address_of(connection), self._loop.time())

@@ -50,6 +50,10 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
     ) -> None:
         super().__init__(config, server_state, {**app_state, CONNECTION_KEY: self}, _loop)
         self.address = ""
+        # uvicorn's own, which is for the client's answer to a close: ten seconds.
+        self.close_timeout = CLOSE_GRACE_S
+        # Since when it is told to go, and stays for as long as one takes to read why, s.
+        self._leaving_since_s: float | None = None
         self.on_writable: Callable[[], None] | None = None
         self._handshake_deadline: asyncio.TimerHandle | None = None
         # When all frames heard would be through at the allowed rate (ITU-T I.371).
@@ -87,8 +91,8 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
 
     @property
     def waiting_since_s(self) -> float | None:
-        """None: whoever has got as far as this is not turned out for others."""
-        return None
+        """Since when it was told to go; None: a client is not turned out for others."""
+        return self._leaving_since_s
 
     def abort(self) -> None:
         """Tear the connection down and forget what was still to be sent."""
@@ -148,6 +152,8 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         await super().send(message)
         if self.handshake_complete:
             self._end_handshake()
+        if self.close_sent:
+            self._note_the_end()
         if message["type"] == "websocket.http.response.body" and self.close_sent:
             self.handshake_complete = True
 
@@ -212,7 +218,12 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
             self.conn.send_close(code, reason)
             self._say_last_words()
         else:
+            self._note_the_end()
             self.loop.call_later(CLOSE_GRACE_S, tear_down, self.transport)
+
+    def _note_the_end(self) -> None:
+        if self._leaving_since_s is None:
+            self._leaving_since_s = self.loop.time()
 
     def _end_handshake(self) -> None:
         if self._handshake_deadline is not None:
@@ -228,6 +239,7 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         self._pieces.clear()
         self.transport.write(b"".join(self.conn.data_to_send()))
         self.close_sent = True
+        self._note_the_end()
         # uvicorn's own: with it, the end of the application is not yet that of the connection.
         self.close_timer = self.loop.call_later(CLOSE_GRACE_S, tear_down, self.transport)
 

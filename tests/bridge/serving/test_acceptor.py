@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import resource
 import socket
 import sys
@@ -11,13 +12,19 @@ from contextlib import ExitStack, contextmanager, suppress
 
 import pytest
 
-from lupin_bridge.serving.acceptor import KEPT_FILES, MIN_CONNECTIONS, room_for_connections
+from lupin_bridge.serving.acceptor import (
+    KEPT_FILES,
+    MIN_CONNECTIONS,
+    Acceptor,
+    room_for_connections,
+)
+from lupin_bridge.serving.server import address_of, listen
 from tests.support import raw_http
 from tests.support.access import Served
 from tests.support.domains import own_domain, ros_env
 from tests.support.proc_stat import open_files
 from tests.support.processes import Process, url_of
-from tests.support.waiting import wait_for
+from tests.support.waiting import PATIENCE_S, until, wait_for
 from tests.support.web import deaf_client
 
 FILES = 256
@@ -79,16 +86,9 @@ def test_websockets_leave_room_for_requests_and_stay() -> None:
         line = live.process.wait_for_output("--max-clients is 5000")
         listeners = [stack.enter_context(deaf_client(live.url)) for _ in range(FILES)]
 
-        def is_there_room() -> bool:
-            with suppress(ConnectionError):
-                return all(
-                    raw_http.status(raw_http.answer(live.url, GET)) == 200 for _ in range(20)
-                )
-            return False
-
-        # Those for whom there is none are told so, and stay as long as one takes to read why: in
-        # that second a request may be the only one who waits, and be turned out itself.
-        wait_for(is_there_room, "room for requests")
+        # Those for whom there is no place are told so, and stay as long as one takes to read why,
+        # unless others come.
+        assert all(raw_http.status(raw_http.answer(live.url, GET)) == 200 for _ in range(20))
         served_clients = int(line.rpartition("serving ")[2].split()[0])
         assert FILES // 8 < served_clients < FILES // 2
 
@@ -117,6 +117,44 @@ def test_out_of_files_it_waits_says_so_once_and_recovers() -> None:
         resource.prlimit(pid, resource.RLIMIT_NOFILE, (FILES, FILES))
         assert all(raw_http.status(raw_http.heard(client)) == 200 for client in waiting)
         assert live.process.output.count("no new connections") == 1
+
+
+def test_nobody_is_turned_out_before_somebody_else_comes() -> None:
+    room = 3
+
+    class Waiting(asyncio.Protocol):
+        address = ""
+        waiting_since_s = 0.0
+
+        def connection_made(self, transport: asyncio.BaseTransport) -> None:
+            assert isinstance(transport, asyncio.Transport)
+            self.abort = transport.abort
+            guests.append(self)
+
+        def connection_lost(self, _: Exception | None) -> None:
+            guests.remove(self)
+            lost.append(self)
+
+    guests: list[Waiting] = []
+    lost: list[Waiting] = []
+
+    async def test() -> None:
+        with listen("127.0.0.1", 0) as listener, ExitStack() as stack:
+            for _ in range(room):
+                stack.enter_context(raw_http.connect(address_of(listener)))
+            door = Acceptor(listener, Waiting, guests, room=room, tls=None, timeout_s=PATIENCE_S)
+            await until(lambda: guests and not door._arrivals, "all who wait outside")
+            assert len(guests) == room
+            first = guests[0]
+            stack.enter_context(raw_http.connect(address_of(listener)))
+            await until(lambda: lost and not door._arrivals, "one more")
+            assert (lost, len(guests)) == ([first], room)
+            door.close()
+            await door.wait_closed()
+            stack.close()
+            await until(lambda: not guests, "their end")
+
+    asyncio.run(test())
 
 
 def test_room_is_what_the_limit_leaves(monkeypatch: pytest.MonkeyPatch) -> None:

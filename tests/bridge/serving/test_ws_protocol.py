@@ -13,12 +13,14 @@ import pytest
 from websockets.frames import CloseCode, Frame, Opcode
 from websockets.streams import StreamReader
 
+from lupin_bridge.serving import ws_protocol
 from lupin_bridge.serving.server import MAX_INBOUND_BYTES
 from lupin_bridge.serving.ws_protocol import Connection
+from lupin_bridge.settings import Settings
 from tests.support.inprocess import Running, run, running
 from tests.support.messages import scan
 from tests.support.raw_ws import BINARY, CLOSE, PING, TEXT, RawClient, frames_of, masked
-from tests.support.waiting import until, wait_for
+from tests.support.waiting import PATIENCE_S, until, wait_for
 from tests.support.web import bridge, deaf_client, overfill
 
 # Silent by itself: every frame is one that the test has caused, or a heartbeat of the bridge.
@@ -173,6 +175,43 @@ def test_a_client_that_takes_nothing_is_closed_and_told_why_and_the_others_are_n
         live.peer.observe(scan("after", {"co2": 1.0}))
         healthy.until_tag("after")
         assert "Traceback" not in live.process.output
+
+
+def test_who_is_told_to_go_waits_from_then_on_and_a_client_does_not(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ws_protocol, "CLOSE_GRACE_S", PATIENCE_S)
+
+    async def test() -> None:
+        async with running(Settings(max_clients=1), SILENT) as served:
+            with deaf_client(served.url), deaf_client(served.url):
+
+                def both() -> list[Connection] | None:
+                    found = [
+                        connection
+                        for connection in served.server.server_state.connections
+                        if isinstance(connection, Connection) and connection.handshake_complete
+                    ]
+                    return found if [c.close_sent for c in found].count(True) == 1 else None
+
+                found = await until(both, "one client, and one for whom there is no place")
+                assert found is not None
+                client, refused = sorted(found, key=lambda connection: connection.close_sent)
+                now_s = asyncio.get_running_loop().time()
+                refused_s = refused.waiting_since_s
+                assert refused_s is not None
+                assert (client.waiting_since_s, refused_s <= now_s) == (None, True)
+                client.dismiss(CloseCode.POLICY_VIOLATION, "enough")
+                dismissed_s = client.waiting_since_s
+                assert dismissed_s is not None
+                assert dismissed_s >= now_s
+                for connection in (client, refused):
+                    connection.dismiss(CloseCode.POLICY_VIOLATION, "once more")
+                assert (client.waiting_since_s, refused.waiting_since_s) == (dismissed_s, refused_s)
+                refused.abort()
+                client.abort()
+
+    run(domain, test())
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -39,12 +40,21 @@ BOX: dict[str, Any] = {
     "bbox_max_y": 3.0,
 }
 PLACES = {"a": (0.25, 0.25), "b": (1.75, 2.75)}
-NOW_S = int(time.time())
 # So late, by the steady clock, that what is begun then is not begun again.
 NEVER_DUE_S = 1e12
-# Seven each, an hour apart; the last half an hour ago.
-TIMES = {"a": [NOW_S - 1800 - 3600 * n for n in range(7)]}
-TIMES["b"] = [second - 600 for second in TIMES["a"]]
+
+
+@cache
+def now_s() -> int:
+    """When the first test here asks: all files are read long before the last one is run."""
+    return int(time.time())
+
+
+@cache
+def times() -> dict[str, list[int]]:
+    """Seven each, an hour apart; the last half an hour ago."""
+    seconds = [now_s() - 1800 - 3600 * n for n in range(7)]
+    return {"a": seconds, "b": [second - 600 for second in seconds]}
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +63,7 @@ def peer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Peer]:
     arguments = (*OFTEN, "-p", f"journal:={journal}")
     with own_domain() as domain, twin_node(domain, *arguments), Peer(domain) as peer:
         peer.wait_for_twin()
-        for tag_id, stamps in TIMES.items():
+        for tag_id, stamps in times().items():
             for stamp_s in sorted(stamps):
                 readings = {"temperature": 20.0 + 3.0 * PLACES[tag_id][0]}
                 peer.observe(messages.scan(tag_id, readings, stamp_s=stamp_s, at=PLACES[tag_id]))
@@ -92,9 +102,9 @@ def test_what_an_estimate_is_worth_is_told_and_new_scans_count(peer: Peer) -> No
 
     loaded = report(lambda answer: answer.tag_ids)
     assert list(loaded.tag_ids) == ["a", "b"]
-    assert loaded.fitted_at.sec >= NOW_S
+    assert loaded.fitted_at.sec >= now_s()
     assert loaded.fit_problem == ""
-    assert [one.sec for one in loaded.observed_at] == [max(TIMES["a"]), max(TIMES["b"])]
+    assert [one.sec for one in loaded.observed_at] == [max(times()["a"]), max(times()["b"])]
     assert list(loaded.measured) == [20.75, 25.25]
     assert list(loaded.left_out) == [False, False]
     assert 1 <= len(loaded.place_x) <= 5
@@ -105,7 +115,7 @@ def test_what_an_estimate_is_worth_is_told_and_new_scans_count(peer: Peer) -> No
     peer.observe(messages.scan("a", {"temperature": 20.8}, stamp_s=stamp_s, at=PLACES["a"]))
     graded = report(lambda answer: answer.week_scans)
     assert (graded.day_scans, graded.day_inside, graded.week_inside) == (1, 1, 1)
-    assert graded.graded_since.sec >= NOW_S
+    assert graded.graded_since.sec >= now_s()
     refused = peer.ask(GetEstimateReport, REPORT_SERVICE, sensor_type="co2", max_places=21)
     assert refused == GetEstimateReport.Response(
         error_message="max_places is 21, the limits are 1 and 20"
@@ -115,7 +125,7 @@ def test_what_an_estimate_is_worth_is_told_and_new_scans_count(peer: Peer) -> No
 
 
 def test_as_of_a_moment_only_what_was_observed_until_then_counts(peer: Peer) -> None:
-    at_s = TIMES["a"][3]
+    at_s = times()["a"][3]
     answer = ask(peer, at=Time(sec=at_s))
     assert answer.ok, answer.error_message
     tags = [
@@ -124,7 +134,7 @@ def test_as_of_a_moment_only_what_was_observed_until_then_counts(peer: Peer) -> 
             *PLACES[tag_id],
             tuple((stamp_s * NANOSECONDS_PER_SECOND, 0.0) for stamp_s in stamps),
         )
-        for tag_id, stamps in TIMES.items()
+        for tag_id, stamps in times().items()
     ]
     expected = readings_of(tags, at_s * NANOSECONDS_PER_SECOND, 86_400.0)
     assert answer.reading_count == len(expected) == 8
@@ -182,8 +192,8 @@ def test_after_a_restart_models_are_made_of_what_the_journal_holds(tmp_path: Pat
     arguments = (*OFTEN, "-p", f"journal:={journal}")
     with own_domain() as domain, twin_node(domain, *arguments), Peer(domain) as peer:
         peer.wait_for_twin()
-        for stamp_s in sorted(TIMES["a"] + TIMES["b"]):
-            tag_id = "a" if stamp_s in TIMES["a"] else "b"
+        for stamp_s in sorted(times()["a"] + times()["b"]):
+            tag_id = "a" if stamp_s in times()["a"] else "b"
             peer.observe(messages.scan(tag_id, {"co2": 400.0}, stamp_s=stamp_s, at=PLACES[tag_id]))
         rows = "SELECT count(*) FROM scan"
         wait_for(lambda: select(journal, rows) == [(14,)], "all of it in the journal")
@@ -207,7 +217,7 @@ def test_what_is_wrong_with_models_is_said_in_the_log_and_for_diagnostics() -> N
     habits: Any = SimpleNamespace(is_behind=False, warn=lambda _, text: told.append(text))
     nothing: Any = None
     rules = EstimateRules(1_440.0, 100)
-    service = EstimateService(habits, nothing, rules, lambda: NOW_S, lambda: None)
+    service = EstimateService(habits, nothing, rules, now_s, lambda: None)
     for _ in range(FIRST_FIT):
         service.models.hear([Reading("co2", 400.0)])
     service.models.begin("co2", NEVER_DUE_S)

@@ -237,9 +237,9 @@ def test_signing_out_closes_what_the_session_has_open_and_nothing_else(
 @pytest.mark.parametrize("path", ["/ws/state", "/rosbridge"])
 def test_a_session_that_ends_by_itself_closes_what_it_has_open(closed: Served, path: str) -> None:
     start_s = time.time()
-    with listening(closed, ending_in(3.0), path) as connection:
+    with listening(closed, ending_in(6.0), path) as connection:
         assert last_word(connection) == SIGNED_OUT
-    assert time.time() - start_s >= 2.0, "and not before: its end is in whole seconds"
+    assert time.time() - start_s >= 5.0, "and not before: its end is in whole seconds"
 
 
 @pytest.mark.parametrize(

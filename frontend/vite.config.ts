@@ -73,6 +73,8 @@ export default defineConfig({
   },
   test: {
     restoreMocks: true,
+    // See src/testing/asFound.ts.
+    isolate: false,
     // Else it is loaded as it is, and not with what stands in for its parts.
     server: { deps: { inline: ['d3-zoom'] } },
     // A machine that builds and tests at once is slow; a test that hangs still fails.
@@ -82,7 +84,12 @@ export default defineConfig({
       // Rules that need no page run without one: a jsdom takes longer than all their tests.
       {
         extends: true,
-        test: { name: 'rules', environment: 'node', include: RULES },
+        test: {
+          name: 'rules',
+          environment: 'node',
+          include: RULES,
+          setupFiles: ['src/testing/rules.ts'],
+        },
       },
       {
         extends: true,

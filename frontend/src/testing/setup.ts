@@ -2,7 +2,10 @@
 import { cleanup, configure } from '@testing-library/react';
 import { afterEach } from 'vitest';
 
+import { leaveAsFound } from './asFound';
 import { FakeContext } from './canvas';
+
+leaveAsFound();
 
 // How long a busy machine takes is no matter.
 configure({ asyncUtilTimeout: 20_000 });

@@ -1,0 +1,45 @@
+import { expect, test, vi } from 'vitest';
+
+import { asFound } from './asFound';
+
+const counts = globalThis as unknown as { counted?: number };
+
+test('what a file sets, replaces, adds and starts is gone with it', async () => {
+  const before = Object.entries(window);
+  const putBack = asFound();
+  const heard = vi.fn();
+  const rung = vi.fn();
+  counts.counted = 1;
+  window.matchMedia = vi.fn();
+  Object.defineProperty(document, 'hidden', { value: true, configurable: true });
+  window.addEventListener('online', heard);
+  document.addEventListener('keydown', heard);
+  setInterval(rung, 1);
+  setTimeout(rung, 1);
+  document.body.append('text');
+  document.head.append(document.createElement('style'));
+  document.documentElement.dataset['theme'] = 'dark';
+  localStorage.setItem('key', 'value');
+  history.replaceState(null, '', '/#tag=1');
+  process.env['TZ'] = 'Asia/Kolkata';
+  putBack();
+  window.dispatchEvent(new Event('online'));
+  document.dispatchEvent(new Event('keydown'));
+  expect(counts.counted).toBeUndefined();
+  expect(Object.entries(window)).toEqual(before);
+  expect(document.hidden).toBe(false);
+  expect(document.documentElement.outerHTML).toBe('<html><head></head><body></body></html>');
+  expect(localStorage).toHaveLength(0);
+  expect(location.hash).toBe('');
+  expect(process.env['TZ']).not.toBe('Asia/Kolkata');
+  // One that rings later than those would have.
+  await new Promise((rings) => setTimeout(rings, 5));
+  expect(rung).not.toHaveBeenCalled();
+  expect(heard).not.toHaveBeenCalled();
+});
+
+test('modules of one file are not those of the next', async () => {
+  const one = await import('../store/app');
+  asFound()();
+  expect((await import('../store/app')).store).not.toBe(one.store);
+});

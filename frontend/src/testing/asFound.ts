@@ -1,0 +1,124 @@
+/**
+ * Test files share one process, and those of the page one window: to make these for each takes
+ * longer than most files' tests. So each file leaves everything as it found it.
+ */
+import { afterAll, vi } from 'vitest';
+
+/** What is set, replaced or removed on `thing` itself is put back by what this returns. */
+function ownAsFound(thing: object): () => void {
+  const before = Reflect.ownKeys(thing).map(
+    (key) => [key, Reflect.getOwnPropertyDescriptor(thing, key) ?? {}] as const,
+  );
+  const known = new Set<PropertyKey>(before.map(([key]) => key));
+  return () => {
+    for (const key of Reflect.ownKeys(thing)) {
+      if (!known.has(key)) Reflect.deleteProperty(thing, key);
+    }
+    for (const [key, was] of before) {
+      const is = Reflect.getOwnPropertyDescriptor(thing, key);
+      if (is?.value !== was.value || is?.get !== was.get) Reflect.defineProperty(thing, key, was);
+    }
+  };
+}
+
+/** The window's own things are behind accessors here, which keep what is put in their place. */
+function replacedAsFound(): () => void {
+  const found = Object.entries(Object.getOwnPropertyDescriptors(globalThis))
+    .filter(([, its]) => 'get' in its && 'set' in its)
+    .map(([name]) => [name, Reflect.get(globalThis, name) as unknown] as const);
+  return () => {
+    for (const [name, was] of found) {
+      if (Reflect.get(globalThis, name) !== was) Reflect.set(globalThis, name, was);
+    }
+  };
+}
+
+/** Timers that still run when the file ends would call into the next one's window. */
+function timersEnd(): () => void {
+  const stops: (() => void)[] = [];
+  const { setTimeout, setInterval, clearTimeout, clearInterval } = globalThis;
+  globalThis.setTimeout = ((...given: Parameters<typeof setTimeout>) => {
+    const timer = setTimeout(...given);
+    stops.push(() => {
+      clearTimeout(timer);
+    });
+    return timer;
+  }) as typeof setTimeout;
+  globalThis.setInterval = ((...given: Parameters<typeof setInterval>) => {
+    const timer = setInterval(...given);
+    stops.push(() => {
+      clearInterval(timer);
+    });
+    return timer;
+  }) as typeof setInterval;
+  return () => {
+    for (const stop of stops) stop();
+  };
+}
+
+/** Listeners on what outlives a file: no module of the last one hears the next one's events. */
+function listenersEnd(target: EventTarget): () => void {
+  const stops: (() => void)[] = [];
+  const add = target.addEventListener.bind(target);
+  target.addEventListener = (...given: Parameters<EventTarget['addEventListener']>) => {
+    add(...given);
+    stops.push(() => {
+      target.removeEventListener(given[0], given[1], given[2]);
+    });
+  };
+  return () => {
+    for (const stop of stops) stop();
+  };
+}
+
+function emptied(element: Element): void {
+  element.replaceChildren();
+  for (const name of element.getAttributeNames()) element.removeAttribute(name);
+}
+
+function pageAsFound(): () => void {
+  const ends = [
+    listenersEnd(window),
+    listenersEnd(document),
+    replacedAsFound(),
+    ownAsFound(document),
+    ownAsFound(navigator),
+  ];
+  return () => {
+    for (const end of ends) end();
+    emptied(document.head);
+    emptied(document.body);
+    for (const name of document.documentElement.getAttributeNames()) {
+      document.documentElement.removeAttribute(name);
+    }
+    localStorage.clear();
+    sessionStorage.clear();
+    history.replaceState(null, '', '/');
+  };
+}
+
+/** Looks round; what it returns puts everything back as it was. */
+export function asFound(): () => void {
+  const environment = { ...process.env };
+  const globals = ownAsFound(globalThis);
+  const page = typeof document === 'undefined' ? () => undefined : pageAsFound();
+  const timers = timersEnd();
+  return () => {
+    vi.useRealTimers();
+    vi.unstubAllGlobals();
+    // The page's modules keep state; each file has its own.
+    vi.resetModules();
+    timers();
+    page();
+    globals();
+    for (const name of Object.keys(process.env)) {
+      if (!(name in environment)) Reflect.deleteProperty(process.env, name);
+    }
+    Object.assign(process.env, environment);
+  };
+}
+
+/** For each file's set-up. */
+export function leaveAsFound(): void {
+  afterAll(asFound());
+}

@@ -1,0 +1,3 @@
+import { leaveAsFound } from './asFound';
+
+leaveAsFound();

@@ -80,7 +80,7 @@ $(DONE)/tools: .ci/tools | $(DONE)/checked
 
 # Two at a time, for none of them keeps two cores busy all along.
 check: setup ## the quick checks: lint, types, and every test that needs neither ROS nor a browser
-	@$(MAKE) --no-print-directory -j 2 --output-sync=target LINT=lint:changed lint types hmi-test quick
+	@$(MAKE) --no-print-directory -j 2 --output-sync=target lint types hmi-test quick LINT=lint:changed
 	$(say) 'quick checks passed; `make test` is the whole'
 
 quick: setup ## Python tests that need neither ROS nor a browser

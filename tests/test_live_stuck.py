@@ -12,6 +12,7 @@ import socket
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from typing import Any
 
 import httpx
 import pytest
@@ -33,6 +34,7 @@ SELDOM_HZ = 10.0
 # the twin itself does meanwhile, fitting models, takes some 15 MB of it.
 MEMORY_MB = 25.0
 
+PATIENT: dict[str, Any] = {"timeout": PATIENCE_S, "trust_env": False}
 PING = b"\x89\x80abcd"
 EMPTY_TEXT = b"\x81\x80abcd"
 
@@ -58,7 +60,7 @@ def url(server: Server) -> str:
 
 def metric(server: Server, name: str) -> float:
     """A metric without labels."""
-    answer = httpx.get(f"{url(server)}/metrics", timeout=PATIENCE_S, trust_env=False)
+    answer = httpx.get(f"{url(server)}/metrics", **PATIENT)
     for line in answer.text.splitlines():
         if line.startswith(f"{name} "):
             return float(line.rpartition(" ")[2])
@@ -193,10 +195,12 @@ def test_gone_after_the_timeout_is_a_request_that_comes_byte_by_byte(
 def test_gone_after_the_timeout_is_who_asks_again_and_again_and_does_not_read(
     server: Server, healthy: Listener
 ) -> None:
-    # A socket and its buffers hold one answer of 60 kB, and not twenty. It is kept: what has to be
-    # computed twenty times would be refused, and a refusal is short.
+    # A socket and its buffers hold one answer of 60 kB, and not twenty. It is kept: who asks while
+    # it is made is refused, and twenty refusals fit.
+    document = "/openapi.json"
+    wait_for(lambda: httpx.get(url(server) + document, **PATIENT).is_success, "the document")
     with gone_in_the_end(server, healthy) as stack:
-        paths = ["/openapi.json"] * 20
+        paths = [document] * 20
         deaf = [stack.enter_context(deaf_client(url(server), *paths)) for _ in range(CLIENTS)]
         wait_reading(healthy, lambda: all(map(is_over, deaf)), "the end of their connections")
 

@@ -362,10 +362,15 @@ def test_a_stop_does_not_wait_for_ever_for_a_callback(
     domain: int, caplog: pytest.LogCaptureFixture
 ) -> None:
     async def test() -> None:
-        stage, gate = Stage(), threading.Event()
+        stage, gate, busy = Stage(), threading.Event(), threading.Event()
+
+        def hold(_: Probe) -> bool:
+            busy.set()
+            return gate.wait(20.0)
+
         await stage.ros.start()
-        held = asyncio.create_task(stage.ros.call(lambda _: gate.wait(20.0)))
-        await until(lambda: stage.ros.calls_waiting == 1, "the call to be waiting")
+        held = asyncio.create_task(stage.ros.call(hold))
+        await until(busy.is_set, "a busy thread")
         await stage.ros.stop()
         assert f"did not end within {STOP_TIMEOUT_S} s" in caplog.text
         gate.set()

@@ -260,8 +260,14 @@ def test_what_takes_too_long_ends_by_the_setting_that_says_so(
         async with stage_of(timeout_s=0.2) as stage:
             stage.held.add(REQUEST)
             if what == "ROS thread":
-                held = asyncio.create_task(stage.twin._thread.call(lambda _: stage.gate.wait(20.0)))
-                await until(lambda: stage.twin.calls_waiting == 1, "the thread to be held")
+                busy = threading.Event()
+
+                def hold(_: TwinNode) -> bool:
+                    busy.set()
+                    return stage.gate.wait(20.0)
+
+                held = asyncio.create_task(stage.twin._thread.call(hold))
+                await until(busy.is_set, "the thread to be held")
                 with pytest.raises(TwinTimeoutError):
                     await stage.twin.history("1")
             with pytest.raises(TwinTimeoutError, match=r"within 0\.2 s \(field_timeout_s\)"):

@@ -27,7 +27,7 @@ from tests.support.hostile import (
     damaged,
     long_lies,
 )
-from tests.support.live import attached, wait_until_ready
+from tests.support.live import attached, field_of, wait_until_ready
 from tests.support.messages import discovered, look, pose, scan
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
 from tests.support.processes import lupin_twin
@@ -62,6 +62,7 @@ def both() -> Iterator[tuple[Bridge, Bridge]]:
         for live in (twin, apart):
             wait_until_ready(live)
             live.tag("first")
+            field_of(live, sensor_type="co2")
         memory = resident_mb(twin.process.pid)
         yield twin, apart
         assert resident_mb(twin.process.pid) - memory < KEPT_MB

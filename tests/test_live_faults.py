@@ -18,7 +18,7 @@ from lupin_bridge.twin.web_twin import MAX_REQUESTS, WebTwin
 from lupin_twin.fields import FieldRequest
 from tests.support.domains import own_domain
 from tests.support.inprocess import run
-from tests.support.live import attached, wait_until_ready
+from tests.support.live import attached, field_of, wait_until_ready
 from tests.support.messages import discovered, look, occupancy_grid, pose, scan
 from tests.support.processes import OFTEN, lupin_twin, twin_node, url_of
 from tests.support.ros import Peer
@@ -69,7 +69,7 @@ def test_a_twin_is_killed_and_its_successor_knows_fewer_tags(domain: int) -> Non
         with live.listen() as client, listener(live.url, delta=1) as delta:
             client.until_tag("b")
             known = apply([], delta.until("state"))
-            old = live.get("/api/field", **FIELD).headers["etag"]
+            old = field_of(live, **FIELD).headers["etag"]
 
             twin.kill()
             said = reason(client, "stale")
@@ -87,9 +87,9 @@ def test_a_twin_is_killed_and_its_successor_knows_fewer_tags(domain: int) -> Non
                 while known != ["c"]:
                     known = apply(known, delta.next())
                 assert live.get("/readyz").status_code == 200
+                assert field_of(live, **FIELD).json()["sample_count"] == 1
                 field = live.get("/api/field", headers={"If-None-Match": old}, **FIELD)
                 assert field.status_code == 200
-                assert field.json()["sample_count"] == 1
                 assert live.get("/api/tags/a").status_code == 404
 
 
@@ -103,14 +103,14 @@ def test_a_twin_is_stopped_and_goes_on(domain: int) -> None:
     ):
         robot.observe(scan("a", {"co2": 1.0}, (0, 0)))
         client.until_tag("a")
-        wait_for(lambda: live.get("/api/field", **FIELD).status_code == 200, "the service")
+        field_of(live, **FIELD)
 
         def told_in_time() -> bool:
             twin.freeze()
             told_s = reason(client, "stale")["state_age_seconds"]
             twin.thaw()
             reason(client, "live")
-            wait_for(lambda: live.get("/api/field", **FIELD).status_code == 200, "the service")
+            field_of(live, **FIELD)
             return bool(told_s <= 3.5)
 
         # As the client is told; a busy machine may be late once.
@@ -281,7 +281,7 @@ def etag_before_its_end(live: Bridge) -> str:
     """The ETag of a field with tag "a"; the bridge is killed after it, and its clients see that."""
     with live.listen() as client:
         client.until_tag("a")
-        etag = live.get("/api/field", **FIELD).headers["etag"]
+        etag = field_of(live, **FIELD).headers["etag"]
         live.process.kill()
         with pytest.raises(ConnectionClosed):
             client.until("never", lambda _: False)
@@ -321,7 +321,7 @@ def test_a_bridge_for_a_twin_elsewhere_is_killed_and_its_successor_knows_what_th
             assert url_of(successor) == first.url
             with listener(first.url) as client:
                 client.until_tag("a")
-                wait_for(lambda: first.get("/api/field", **FIELD).status_code == 200, "a field")
+                field_of(first, **FIELD)
                 again = first.get("/api/field", headers={"If-None-Match": old}, **FIELD)
                 assert again.status_code == 304, "the same twin, and nothing has changed"
                 robot.observe(scan("b", {"co2": 2.0}, (1, 0)))

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import yaml
 
-from tests.support.live import attached, wait_until_ready
+from tests.support.live import attached, field_of, wait_until_ready
 from tests.support.messages import occupancy_grid, scan
 from tests.support.processes import lupin_twin, twin_node
 from tests.support.ros import Peer
@@ -59,7 +59,7 @@ def test_the_same_file_means_the_same_to_both(
 
         asked: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.25}
         # The box is web's, the values are the twin's.
-        field = web.get("/api/field", **asked).json()
+        field = field_of(web, **asked).json()
         assert (field["origin_x"], field["origin_y"]) == (-REACH_M, -REACH_M)
         assert (field["width"], field["height"]) == (12, 6)
         assert field["values"][0] is None

@@ -11,7 +11,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 from tests.support.domains import own_domain
-from tests.support.live import attached, wait_until_ready
+from tests.support.live import attached, field_of, wait_until_ready
 from tests.support.messages import look, occupancy_grid, scan
 from tests.support.processes import OFTEN, lupin_twin, twin_node
 from tests.support.ros import Peer
@@ -73,7 +73,12 @@ def test_both_serve_the_same_and_the_end_of_one_is_not_the_others(
     for running in replicas:
         # The twin says how its journal does once a second, in /diagnostics.
         wait_for(partial(is_recording, running), "the journal's state")
-    assert without_ages(first.json("/api/state")) == without_ages(second.json("/api/state"))
+        field_of(running, **FIELD)
+    # A state's times come behind it.
+    wait_for(
+        lambda: without_ages(first.json("/api/state")) == without_ages(second.json("/api/state")),
+        "the same state of both",
+    )
     assert first.json("/api/map") == second.json("/api/map")
     for path in CACHED:
         ours, theirs = first.get(path, **FIELD), second.get(path, **FIELD)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import httpx
 
@@ -23,3 +24,18 @@ def attached(process: Process, peer: Peer) -> Iterator[Bridge]:
 def wait_until_ready(live: Bridge) -> None:
     """Wait until the bridge has heard a twin."""
     wait_for(lambda: live.get("/readyz").status_code == 200, f"a live twin behind {live.url}")
+
+
+def field_of(live: Bridge, **request: Any) -> httpx.Response:
+    """The answer with a field, once the bridge has found the twin's service.
+
+    It hears a twin's states before that, and who has just died may still seem to offer its own.
+    """
+
+    def look() -> httpx.Response | None:
+        answer = live.get("/api/field", **request)
+        return answer if answer.status_code == 200 else None
+
+    found = wait_for(look, f"a field at {live.url}")
+    assert found is not None
+    return found

@@ -222,17 +222,30 @@ def test_who_is_told_to_go_waits_from_then_on_and_a_client_does_not(
         (masked(TEXT, b"", rsv=1), CloseCode.PROTOCOL_ERROR),
     ],
 )
-def test_who_is_cut_short_can_read_why(said: bytes, code: CloseCode) -> None:
-    with bridge(*SILENT) as live, RawClient(live.url, "/ws/state") as client:
-        client.socket.sendall(said + masked(BINARY, bytes(1_000)) * 200)
-        heard = client.received
-        # No reset: the system would throw away what was not read by then.
-        while block := client.socket.recv(BLOCK):
-            heard += block
-        frames = list(frames_of(heard))
-        assert frames[-1][0] == CLOSE
-        assert int.from_bytes(frames[-1][1][:2]) == code
-        assert "Traceback" not in live.process.output
+def test_who_is_cut_short_can_read_why(
+    domain: int, monkeypatch: pytest.MonkeyPatch, said: bytes, code: CloseCode
+) -> None:
+    # However long a busy machine takes to say and to hear it all.
+    monkeypatch.setattr(ws_protocol, "CLOSE_GRACE_S", PATIENCE_S)
+
+    def say_and_hear(url: str) -> None:
+        with RawClient(url, "/ws/state") as client:
+            client.socket.sendall(said + masked(BINARY, bytes(1_000)) * 200)
+            heard = client.received
+            while not (frames := list(frames_of(heard))) or frames[-1][0] != CLOSE:
+                block = client.socket.recv(BLOCK)
+                assert block, "it ended without a reason"
+                heard += block
+            assert int.from_bytes(frames[-1][1][:2]) == code
+            # No reset: the system would throw away what was not read by then.
+            client.socket.shutdown(socket.SHUT_WR)
+            assert client.socket.recv(BLOCK) == b""
+
+    async def test() -> None:
+        async with running(ros_args=SILENT) as served:
+            await asyncio.to_thread(say_and_hear, served.url)
+
+    run(domain, test())
 
 
 def test_the_listener_of_this_file_reads_what_is_sent() -> None:

@@ -264,7 +264,7 @@ def test_what_takes_too_long_ends_by_the_setting_that_says_so(
 
                 def hold(_: TwinNode) -> bool:
                     busy.set()
-                    return stage.gate.wait(20.0)
+                    return bool(stage.gate.wait(20.0))
 
                 held = asyncio.create_task(stage.twin._thread.call(hold))
                 await until(busy.is_set, "the thread to be held")

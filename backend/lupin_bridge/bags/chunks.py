@@ -28,6 +28,10 @@ DAMAGE: Final = (
 )  # fmt: skip
 
 
+class TooLarge(ValueError):
+    """It may be whole, but takes more memory than anybody shall be made to give."""
+
+
 class Found(NamedTuple):
     """A message by its channel's number; when it was received and when sent, ns; serialised."""
 
@@ -41,13 +45,13 @@ def unpacked(chunk: Chunk) -> bytes:
     """What is in a chunk, checked.
 
     Raises:
-        ValueError, and the rest of `DAMAGE`: it is damaged, or larger than it says, or than
-            `MAX_CHUNK`.
+        TooLarge: it has more than `MAX_CHUNK` bytes.
+        ValueError, and the rest of `DAMAGE`: it is damaged, or larger than it says.
 
     """
     size = chunk.uncompressed_size
     if size > MAX_CHUNK:
-        raise ValueError(f"a chunk has {size:,} bytes, must be at most {MAX_CHUNK:,}")
+        raise TooLarge(f"a chunk has {size:,} bytes, must be at most {MAX_CHUNK:,}")
     data = begin_of(chunk.compression, chunk.data, size + 1)
     if len(data) != size:
         which = "more" if len(data) > size else "fewer"

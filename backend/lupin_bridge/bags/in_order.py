@@ -17,7 +17,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Chunk, ChunkIndex
 
-from lupin_bridge.bags.chunks import MAX_CHUNK, RECORD, Found, messages_in, unpacked
+from lupin_bridge.bags.chunks import MAX_CHUNK, RECORD, Found, TooLarge, messages_in, unpacked
 
 # What may be open at once, bytes.
 MAX_OPEN: Final = 1024 * 1024 * 1024
@@ -62,8 +62,8 @@ def in_order(
     """Each message that is asked for.
 
     Raises:
-        OSError: it cannot be read. ValueError, and the rest of `chunks.DAMAGE`: it is damaged, or
-            needs more memory at once.
+        OSError: it cannot be read. ValueError, and the rest of `chunks.DAMAGE`: it is damaged.
+        TooLarge: a chunk is, or it takes more than `max_open` bytes at once.
 
     """
     # Time, place and number, all negative where the newest comes first; then what is there.
@@ -88,7 +88,7 @@ def in_order(
                 continue
             is_open += len(message.data) + _OVERHEAD
             if is_open > max_open:
-                raise ValueError(
+                raise TooLarge(
                     f"to be in the order of time, more than {max_open:,} bytes of it would have to "
                     "be in memory"
                 )

@@ -31,7 +31,7 @@ from mcap.records import (
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 
-from lupin_bridge.bags.chunks import DAMAGE, MAX_CHUNK, Found, messages_in, unpacked
+from lupin_bridge.bags.chunks import DAMAGE, MAX_CHUNK, Found, TooLarge, messages_in, unpacked
 from lupin_bridge.bags.in_order import Asked, in_order
 from lupin_bridge.bags.topics import MESSAGE_ENCODING, QOS_KEY
 
@@ -120,7 +120,7 @@ class Recording:
         Of a file without chunks, in the order in which they were written.
 
         Raises:
-            RecordingError: from there on the file is broken.
+            RecordingError: from there on the file is broken, or takes too much memory.
 
         """
         return self._read(topics, from_ns=from_ns, before_ns=before_ns)
@@ -220,6 +220,12 @@ class Recording:
             if error.errno == errno.EINVAL:
                 raise self._broken("it is cut off") from error
             raise RecordingError(f"cannot read {self.path}: {error.strerror}") from error
+        except TooLarge as error:
+            # Nothing is broken, and `recover` would be of no help.
+            raise RecordingError(
+                f"cannot read {self.path}: {error}; written anew in smaller chunks it can be read, "
+                "for example by mcap compress --chunk-size 4194304"
+            ) from error
         except DAMAGE as error:
             raise self._broken(str(error) or type(error).__name__) from error
 

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import os
 import random
+import re
+from functools import partial
 from pathlib import Path
 
 import pytest
 from mcap.writer import CompressionType, Writer
 
+from lupin_bridge.bags import chunks
 from lupin_bridge.bags import recording as module
+from lupin_bridge.bags.in_order import in_order
 from lupin_bridge.bags.recording import Recording, RecordingError, Topic, clock_ns
 from lupin_bridge.bags.recordings import Recordings
 from tests.support.messages import discovered, pose, scan
@@ -112,6 +116,24 @@ def test_what_is_longer_than_any_message_is_not_read(
     path = write_bag(tmp_path / "a.mcap", SENT, is_chunked=is_chunked)
     monkeypatch.setattr(module, "MAX_CHUNK", 100)
     assert "is broken (" in refused(path)
+
+
+def test_what_is_too_large_is_not_called_broken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_bag(tmp_path / "a.mcap", SENT)
+
+    def assert_says(why: str) -> None:
+        said = refused(path)
+        assert re.match(f"cannot read {path}: {why}; .* mcap compress --chunk-size", said), said
+
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "in_order", partial(in_order, max_open=100))
+        assert_says(
+            "to be in the order of time, more than 100 bytes of it would have to be in memory"
+        )
+    monkeypatch.setattr(chunks, "MAX_CHUNK", 100)
+    assert_says(r"a chunk has [\d,]+ bytes, must be at most 100")
 
 
 def test_what_is_no_recording_is_said_to_be_none(tmp_path: Path) -> None:

@@ -157,6 +157,12 @@ class Hmi:
         """Wait for the SLAM map, which is part of what a view of everything shows."""
         expect(self.page.locator(".map-panel")).to_have_attribute("data-map-state", "ready")
 
+    def expect_parts(self) -> None:
+        """Wait for what comes behind the first view, and takes room from it."""
+        expect(self.page.locator("#help-dialog")).to_be_attached()
+        # Higher or lower once it is known whether anything is remembered.
+        expect(self.page.locator(".timebar[data-state=waiting]")).to_have_count(0)
+
     def choose_sensor(self, label: str) -> None:
         self.page.locator(".sensors label", has_text=label).click()
 
@@ -197,8 +203,7 @@ class Hmi:
         The heat map may come later still: see `expect_samples`.
         """
         self.expect_map()
-        # What comes behind the first view takes room from the map.
-        expect(self.page.locator("#help-dialog")).to_be_attached()
+        self.expect_parts()
         self.view()  # with its font
         looks: list[tuple[Image.Image, str | None]] = []
 

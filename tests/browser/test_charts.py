@@ -174,6 +174,7 @@ def test_the_table_says_what_the_api_says(garden: Garden, open_page: OpenPage) -
     assert f"{len(told['readings'])} readings" in summary
     assert "1 gap" in summary
     hmi.page.get_by_role("button", name="Show as table").click()
+    expect(hmi.test_id("series-table")).to_be_visible()
     found = rows(hmi)
     readings = [row for row in reversed(found) if row["kind"] == "reading"]
     assert [float(row["at"]) for row in readings] == [

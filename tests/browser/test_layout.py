@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import partial
 from urllib.parse import parse_qs, urlsplit
 
@@ -43,6 +44,11 @@ _OUT_OF_REACH = """(selector) => [...document.querySelectorAll(selector)]
   })
   .map((e) => e.ariaLabel || e.textContent || e.outerHTML)"""
 
+_PLACES = """(selectors) => selectors.map((selector) => {
+  const box = document.querySelector(selector).getBoundingClientRect();
+  return [box.left, box.top, box.right, box.bottom];
+})"""
+
 
 def place(thing: Locator) -> Box:
     """Where it is in the window, pixels."""
@@ -52,10 +58,30 @@ def place(thing: Locator) -> Box:
     return Box(left, top, left + round(box["width"]), top + round(box["height"]))
 
 
+def places(hmi: Hmi, *selectors: str) -> list[Box]:
+    """Where the first of each is in the window, pixels; all of one moment."""
+    found = hmi.page.evaluate(_PLACES, selectors)
+    return [Box(*(round(each) for each in box)) for box in found]
+
+
 def out_of_reach(hmi: Hmi, selector: str) -> list[str]:
     found = hmi.page.evaluate(_OUT_OF_REACH, selector)
     assert isinstance(found, list)
     return found
+
+
+def expect_in_reach(hmi: Hmi, selector: str) -> None:
+    """Wait until all that matches can be hit: the page lays itself out anew in more than one go."""
+    expect(hmi.page.locator(selector).first).to_be_attached()
+    missed: list[str] = []
+
+    def is_in_reach() -> bool:
+        missed[:] = out_of_reach(hmi, selector)
+        return not missed
+
+    with suppress(AssertionError):
+        hmi.expect(is_in_reach, "all in reach")
+    assert missed == []
 
 
 @pytest.fixture
@@ -82,6 +108,7 @@ def running(domain: int) -> Iterator[Bridge]:
 
 def show_tags(hmi: Hmi) -> None:
     """Go to the table, where the window shows one of the two."""
+    expect(hmi.row("1")).to_be_attached()
     tabs = hmi.page.locator(".pane-tabs")
     if tabs.is_visible():
         tabs.get_by_role("button", name="Tags").click()
@@ -94,21 +121,14 @@ def test_everything_can_be_hit(open_at: Callable[..., Hmi], size: Size) -> None:
     for mode in ("Ideal", "Value", "Fixed"):
         hmi.page.get_by_role("radio", name=mode).check()
         # A house of ten metres is not told from a stamp.
-        assert hmi.map.evaluate("map => map.clientHeight") >= 200
-        assert out_of_reach(hmi, CONTROLS) == []
+        hmi.expect(lambda: hmi.map.evaluate("map => map.clientHeight") >= 200, "a map of a size")
+        expect_in_reach(hmi, CONTROLS)
     hmi.page.get_by_role("button", name="Layers").click()
-    assert out_of_reach(hmi, ".layers .check") == []
-    assert len(hmi.page.locator(".layers .check").all()) == 10
+    expect(hmi.page.locator(".layers .check")).to_have_count(10)
+    expect_in_reach(hmi, ".layers .check")
     hmi.page.keyboard.press("Escape")
     show_tags(hmi)
-    assert out_of_reach(hmi, "tbody tr, .filter-bar *:not(.unseen), .health button") == []
-
-
-# Where they begin and end, px from the window's upper edge; all of one moment.
-_FROM_TOP_TO_FOOT = """(selectors) => selectors.flatMap((selector) => {
-  const box = document.querySelector(selector).getBoundingClientRect();
-  return [box.top, box.bottom];
-})"""
+    expect_in_reach(hmi, "tbody tr, .filter-bar *:not(.unseen), .health button")
 
 
 def test_an_open_card_lies_over_nothing_in_an_upright_window(open_at: Callable[..., Hmi]) -> None:
@@ -120,17 +140,21 @@ def test_an_open_card_lies_over_nothing_in_an_upright_window(open_at: Callable[.
         hmi.page.wait_for_function(
             "([w, h]) => innerWidth === w && innerHeight === h", arg=[width, height]
         )
-        edges = hmi.page.evaluate(_FROM_TOP_TO_FOOT, parts)
-        assert edges == sorted(edges), (width, height)
-        assert edges[-1] <= height
-        assert edges[1] - edges[0] >= 200
+
+        def from_top_to_foot(height: int = height) -> bool:
+            boxes = places(hmi, *parts)
+            edges = [edge for box in boxes for edge in (box.top, box.bottom)]
+            return edges == sorted(edges) and edges[-1] <= height and edges[1] - edges[0] >= 200
+
+        hmi.expect(from_top_to_foot, f"one below the other at {width} x {height}")
         hit = ".map-controls button, .timebar :is(button, select), .health button, .card button"
-        assert out_of_reach(hmi, hit) == [], (width, height)
+        expect_in_reach(hmi, hit)
 
 
 def test_each_layer_is_switched_by_touch_on_a_phone(open_at: Callable[..., Hmi]) -> None:
     hmi = open_at((PHONE["width"], PHONE["height"]), has_touch=True, is_mobile=True)
     hmi.page.get_by_role("button", name="Layers").tap()
+    expect(hmi.page.get_by_role("checkbox")).to_have_count(10)
     for box in hmi.page.get_by_role("checkbox").all():
         was_on = box.is_checked()
         box.locator("..").tap()
@@ -159,6 +183,10 @@ def test_a_fixed_range_leaves_the_title_alone_on_a_phone(open_at: Callable[..., 
     assert title.bottom <= control.top
 
 
+def stays(hmi: Hmi, filter_bar: list[Box]) -> bool:
+    return places(hmi, ".filter-bar") == filter_bar
+
+
 def test_a_longer_word_about_the_house_does_not_move_the_table(
     running: Bridge, open_page: OpenPage
 ) -> None:
@@ -170,14 +198,18 @@ def test_a_longer_word_about_the_house_does_not_move_the_table(
         expect(hmi.test_id("health-driver")).to_have_text(
             "Every judged reading lies within its ideal range"
         )
+        # Late ones take room from the table, and so does a word about a server that is late.
+        hmi.expect_parts()
+        hmi.expect_phase("live")
         hmi.page.evaluate("document.fonts.ready")
-        before[width, height] = hmi, place(hmi.page.locator(".filter-bar"))
+        before[width, height] = hmi, places(hmi, ".filter-bar")
     long = "a-tag-with-no-short-name"
     running.peer.observe(scan(long, {"temperature": 99.0}, at=(2, 1)))
     for size, (hmi, table) in before.items():
         driver = hmi.test_id("health-driver")
         expect(driver).to_contain_text(long)
-        assert place(hmi.page.locator(".filter-bar")) == table, size
+        hmi.expect_phase("live")
+        hmi.expect(partial(stays, hmi, table), f"the table in its place at {size}")
         # The rest is to be had by pointing at it, and to be heard anyway.
         expect(driver).to_have_attribute(
             "title", f"Tag {long}: Temperature 99.0\u00a0°C, above 35.0 (critical)"
@@ -229,13 +261,12 @@ def test_an_empty_house_says_what_to_do_beside_the_controls_and_in_the_table(
         hmi = open_page(running.url, viewport={"width": width, "height": height})
         pages.append(hmi)
         expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-tags")
-        assert out_of_reach(hmi, ".map-controls button") == [], width
-        notice, controls = (
-            place(hmi.test_id("notice")),
-            place(hmi.page.locator(".map-controls")),
+        hmi.expect_parts()
+        expect_in_reach(hmi, ".map-controls button")
+        notice, controls, frame = places(
+            hmi, "[data-testid=notice]", ".map-controls", "[data-testid=map]"
         )
         assert notice.right <= controls.left or notice.top >= controls.bottom, width
-        frame = place(hmi.map)
         assert frame.top <= notice.top
         assert notice.bottom <= frame.bottom
         tabs = hmi.page.locator(".pane-tabs")
@@ -252,7 +283,7 @@ def test_a_missing_reading_is_told_at_the_edge_of_the_map(open_at: Callable[...,
     hmi = open_at((PHONE["width"], PHONE["height"]))
     hmi.go("sensor=radiation")
     expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-reading")
-    notice, frame = place(hmi.test_id("notice")), place(hmi.map)
+    notice, frame = places(hmi, "[data-testid=notice]", "[data-testid=map]")
     assert notice.bottom == pytest.approx(frame.bottom, abs=1)
     assert notice.top > frame.bottom - (frame.bottom - frame.top) / 4
 
@@ -271,16 +302,16 @@ def test_all_text_grows_with_the_text_of_the_browser(open_at: Callable[..., Hmi]
           return [usual, texts()];
         }}""")
         assert grown == pytest.approx([2 * each for each in usual])
-        assert out_of_reach(hmi, CONTROLS) == []
+        expect_in_reach(hmi, CONTROLS)
         show_tags(hmi)
-        assert out_of_reach(hmi, ".row-button, .filter-bar *:not(.unseen), .health button") == []
+        expect_in_reach(hmi, ".row-button, .filter-bar *:not(.unseen), .health button")
 
 
 def test_the_words_of_the_ideal_range_stand_below_its_bracket(open_at: Callable[..., Hmi]) -> None:
     hmi = open_at((1440, 900), "sensor=humidity&colour=value")
-    words, bracket = place(hmi.page.locator(".ramp-note")), place(hmi.page.locator(".ramp-ideal"))
+    expect(hmi.page.locator(".ramp-note")).to_be_visible()
     # Measured from the middle of the ramp, where they would stand without a bracket.
-    ramp = place(hmi.page.locator(".ramp-bar"))
+    words, bracket, ramp = places(hmi, ".ramp-note", ".ramp-ideal", ".ramp-bar")
     aside = (bracket.left + bracket.right - ramp.left - ramp.right) / 2
     assert abs(aside) > 30
     assert (words.left + words.right - ramp.left - ramp.right) / 2 == pytest.approx(aside, abs=20)
@@ -342,6 +373,7 @@ def test_no_pin_lies_below_what_stands_on_the_map(domain: int, browser: Browser)
             viewport = {"width": width, "height": height}
             with open_hmi(browser, running.url, viewport=viewport) as hmi:
                 hmi.expect_samples(len(PINS))
+                hmi.expect_parts()
                 hmi.expect(partial(no_pin_hidden, hmi), f"all pins in sight at {viewport}")
                 drag_below_buttons(hmi, "6-6")
                 assert "6-6" in hidden_pins(hmi)
@@ -408,6 +440,7 @@ def test_every_language_has_room_on_a_phone(
     expect(hmi.test_id("sample-count")).to_contain_text(contribute)
     expect(hmi.page.locator("html")).to_have_attribute("lang", language)
     assert hmi.page.evaluate(_TOO_LONG) == []
+    hmi.expect_parts()
     word, period = hmi.test_id("timebar-when"), hmi.page.locator(".timebar-period")
     assert word.evaluate(_WORDS_END) <= place(period).left
     hmi.page.locator(".menu > button").click()

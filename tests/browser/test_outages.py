@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from urllib.parse import urlsplit
 
+from playwright.sync_api import Error as PlaywrightError
 from playwright.sync_api import expect
 
 from tests.browser.hmi import SERVER_GONE, Hmi, OpenPage
@@ -36,6 +38,17 @@ def expect_live(hmi: Hmi) -> None:
 def seqs(hmi: Hmi) -> list[int]:
     """The numbers of the state frames so far."""
     return [frame["seq"] for frame in hmi.frames if "seq" in frame]
+
+
+def pauses(hmi: Hmi) -> bool:
+    """Pause the page's clock a second on; not where a busy machine took longer to say so."""
+    try:
+        hmi.page.clock.pause_at(hmi.page.evaluate("Date.now() / 1000 + 1"))
+    except PlaywrightError as error:
+        if "Cannot fast-forward to the past" not in error.message:
+            raise
+        return False
+    return True
 
 
 def stay(hmi: Hmi) -> None:
@@ -117,8 +130,7 @@ def test_a_server_that_is_killed_and_starts_anew_with_other_tags(
         expect(hmi.cell("a", "humidity")).to_have_text("61.0")
         # No heat map of a house that is no more, and not its map either.
         expect(hmi.test_id("sample-count")).to_have_text("No tag contributes")
-        colour = hmi.pixel(*ground)
-        hmi.expect_pixels(lambda pixel: pixel == colour, hot, floor, what="bare ground")
+        hmi.expect(lambda: len(set(hmi.pixels([ground, hot, floor]))) == 1, "bare ground")
     assert min(seqs(hmi)[len(old_seqs) :]) < old_seqs[-1]
 
 
@@ -166,7 +178,7 @@ def test_a_server_that_hangs_is_noticed_although_the_connection_stays_open(
         hmi.expect_rows("a")
         hmi.expect_phase("live")
         # 3 s of silence, however long this test takes: after 8 s the connection is lost.
-        hmi.page.clock.pause_at(hmi.page.evaluate("Date.now() / 1000 + 1"))
+        hmi.expect(partial(pauses, hmi), "a clock that stands still")
         heard = len(hmi.frames)
         hmi.expect(lambda: len(hmi.frames) > heard, "a frame at that very moment")
         running.process.freeze()

@@ -112,5 +112,5 @@ def test_what_a_finger_has_to_hit_is_large_enough(phone: Hmi) -> None:
     box = phone.row("2").bounding_box()
     assert box is not None
     assert box["height"] >= 40
-    phone.page.touchscreen.tap(box["x"] + 200, box["y"] + box["height"] / 2)
+    phone.row("2").tap(position={"x": 200, "y": box["height"] / 2})
     expect(phone.row("2")).to_have_attribute("data-selected", "true")

@@ -1,0 +1,60 @@
+"""Where things are in the window, and whether somebody can hit them."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+from playwright.sync_api import Locator, expect
+
+from tests.browser.hmi import Box, Hmi
+
+# What somebody could not hit of all that matches: it lies below something else, or out of sight.
+_OUT_OF_REACH = """(selector) => [...document.querySelectorAll(selector)]
+  .filter((e) => e.checkVisibility())
+  .filter((e) => {
+    e.scrollIntoView({ block: 'nearest', inline: 'nearest' });
+    const box = e.getBoundingClientRect();
+    const hit = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+    const thing = 'label, button, a, li, tr';
+    return !(hit && (e.contains(hit) || e.closest(thing) === (hit.closest(thing) ?? hit)));
+  })
+  .map((e) => e.ariaLabel || e.textContent || e.outerHTML)"""
+
+_PLACES = """(selectors) => selectors.map((selector) => {
+  const box = document.querySelector(selector).getBoundingClientRect();
+  return [box.left, box.top, box.right, box.bottom];
+})"""
+
+
+def place(thing: Locator) -> Box:
+    """Where it is in the window, pixels."""
+    box = thing.bounding_box()
+    assert box is not None
+    left, top = round(box["x"]), round(box["y"])
+    return Box(left, top, left + round(box["width"]), top + round(box["height"]))
+
+
+def places(hmi: Hmi, *selectors: str) -> list[Box]:
+    """Where the first of each is in the window, pixels; all of one moment."""
+    found = hmi.page.evaluate(_PLACES, selectors)
+    return [Box(*(round(each) for each in box)) for box in found]
+
+
+def out_of_reach(hmi: Hmi, selector: str) -> list[str]:
+    found = hmi.page.evaluate(_OUT_OF_REACH, selector)
+    assert isinstance(found, list)
+    return found
+
+
+def expect_in_reach(hmi: Hmi, selector: str) -> None:
+    """Wait until all that matches can be hit: the page lays itself out anew in more than one go."""
+    expect(hmi.page.locator(selector).first).to_be_attached()
+    missed: list[str] = []
+
+    def is_in_reach() -> bool:
+        missed[:] = out_of_reach(hmi, selector)
+        return not missed
+
+    with suppress(AssertionError):
+        hmi.expect(is_in_reach, "all in reach")
+    assert missed == []

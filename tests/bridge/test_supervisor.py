@@ -129,7 +129,7 @@ def listening(tmp_path: Path) -> Iterator[Manager]:
 def test_the_bridge_is_ready_when_it_serves_and_says_when_it_stops(
     domain: int, listening: Manager
 ) -> None:
-    env = {"NOTIFY_SOCKET": listening.address, "WATCHDOG_USEC": "300000"}
+    env = {"NOTIFY_SOCKET": listening.address, "WATCHDOG_USEC": "1000000"}
     with lupin_twin(domain, "demo", afresh=False, **env) as process:
         said = listening.next()
         assert said["READY"] == "1"
@@ -141,6 +141,7 @@ def test_the_bridge_is_ready_when_it_serves_and_says_when_it_stops(
         (patrol,) = wait_for(lambda: patrols_of(process.pid), "the patrol")
         inherited = Path(f"/proc/{patrol}/environ").read_bytes()
         assert b"NOTIFY_SOCKET" not in inherited
+        listening.rest()  # of words that nobody takes, the socket holds ten, and no more
         process.send(signal.SIGTERM)
         wait_for(lambda: {"STOPPING": "1"} in listening.rest(), "the word that it stops")
         assert process.wait() == 0

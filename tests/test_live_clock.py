@@ -15,8 +15,11 @@ from tests.support.domains import own_domain
 from tests.support.live import attached
 from tests.support.messages import scan
 from tests.support.processes import lupin_twin
+from tests.support.waiting import PATIENCE_S
 from tests.support.web import Bridge, bridge
 
+# No machine is too busy for an answer: the process that looks back gives way to all others.
+PATIENT = ("--field-timeout-s", str(PATIENCE_S))
 SIM_TIME = ("--ros-args", "-p", "use_sim_time:=true", "-p", "state_publish_rate_hz:=10.0")
 
 
@@ -24,8 +27,8 @@ SIM_TIME = ("--ros-args", "-p", "use_sim_time:=true", "-p", "state_publish_rate_
 def both() -> Iterator[tuple[Bridge, Bridge]]:
     with (
         own_domain() as domain,
-        bridge(*SIM_TIME, domain=domain) as twin,
-        lupin_twin(domain, "web") as process,
+        bridge(*PATIENT, *SIM_TIME, domain=domain) as twin,
+        lupin_twin(domain, "web", *PATIENT) as process,
         attached(process, twin.peer) as apart,
     ):
         yield twin, apart

@@ -74,8 +74,8 @@ class Running:
 async def running(
     settings: Settings | None = None, ros_args: Sequence[str] = ()
 ) -> AsyncIterator[Running]:
-    """Serve on a free port, as `lupin-twin serve` does."""
-    settings = settings or Settings()
+    """Serve on a free port, as `lupin-twin serve` does; no machine is too busy for an answer."""
+    settings = settings or Settings(field_timeout_s=PATIENCE_S)
     twin = LocalTwin(ros_args=ros_args, timeout_s=settings.field_timeout_s)
     bridge = Bridge(twin, settings)
     server = BridgeServer(create_app(bridge), bridge.settings, bridge.say_goodbye)

@@ -69,7 +69,7 @@ def stage_of(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     """Stages whose field jobs are counted, and held and failed as the test likes."""
 
     @asynccontextmanager
-    async def make(*ros_args: str, timeout_s: float = 20.0) -> AsyncIterator[Stage]:
+    async def make(*ros_args: str, timeout_s: float = PATIENCE_S) -> AsyncIterator[Stage]:
         twin = LocalTwin(ros_args=ros_args, timeout_s=timeout_s)
         stage = Stage(twin)
         compute = FieldJob.compute

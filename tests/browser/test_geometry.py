@@ -255,6 +255,7 @@ def test_without_a_chosen_view_all_of_it_is_in_sight(domain: int, open_page: Ope
         running.tag("b")
         hmi = open_page(running.url)
         expect(hmi.row("b")).to_be_visible()
+        hmi.expect_parts()
         box = hmi.map.bounding_box()
         assert box is not None
 

@@ -7,6 +7,7 @@ import io
 import math
 import re
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
@@ -210,6 +211,16 @@ def longest_dark_run(picture: Image.Image) -> int:
     return longest
 
 
+def is_on_the_screen(hmi: Hmi, part: Image.Image, at: tuple[int, int], ratio: int) -> bool:
+    """Whether that part of the map is there, `at` in pixels of the map view."""
+    box = hmi.map.bounding_box()
+    assert box is not None
+    left, top = round(box["x"] * ratio) + at[0] * ratio, round(box["y"] * ratio) + at[1] * ratio
+    screen = Image.open(io.BytesIO(hmi.page.screenshot())).convert("RGB")
+    shown = screen.crop((left, top, left + part.width, top + part.height))
+    return changed_box(shown, part) is None
+
+
 def test_the_map_as_png_is_what_is_on_the_screen(house: Bridge, open_page: OpenPage) -> None:
     for options, ratio in (({}, 1), ({"device_scale_factor": 2, "viewport": PHONE}, 2)):
         hmi = open_page(house.url, "colour=value&layers=map,field,boxes", **options)
@@ -227,13 +238,10 @@ def test_the_map_as_png_is_what_is_on_the_screen(house: Bridge, open_page: OpenP
         hmi.page.mouse.move(0, 0)
         hmi.settled_picture()
         view = hmi.view()
-        left, top = (round(box[side] * ratio) for side in ("x", "y"))
-        screen = Image.open(io.BytesIO(hmi.page.screenshot())).convert("RGB")
         (x0, y0), (x1, y1) = view.pixel(0.2, 4.2), view.pixel(3.8, 1.0)
-        part = (x0 * ratio, y0 * ratio, x1 * ratio, y1 * ratio)
-        shown = screen.crop((left + part[0], top + part[1], left + part[2], top + part[3]))
-        assert changed_box(shown, picture.crop(part)) is None
-        assert len(shown.getcolors(1 << 20) or []) > 50
+        saved = picture.crop((x0 * ratio, y0 * ratio, x1 * ratio, y1 * ratio))
+        hmi.expect(partial(is_on_the_screen, hmi, saved, (x0, y0), ratio), "what was saved")
+        assert len(saved.getcolors(1 << 20) or []) > 50
         footer = picture.crop((0, picture.height - FOOTER_PX * ratio, *picture.size))
         # The ramp's upper half ends in temperature's full red, a legend of what is above.
         reds = [rgb for _, rgb in footer.getcolors(1 << 20) or [] if is_red(rgb)]

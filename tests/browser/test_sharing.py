@@ -115,7 +115,8 @@ def test_a_link_of_nonsense_is_the_whole_house(house: Bridge, open_page: OpenPag
 
 
 def save(hmi: Hmi, name: str) -> Download:
-    """Choose an entry of the menu that saves a file."""
+    """Choose an entry of the menu that saves a file, once the sensors' own names have come."""
+    expect(hmi.test_id("legend")).to_contain_text("Temperature °C")
     hmi.page.get_by_role("button", name="Menu").click()
     with hmi.page.expect_download() as download:
         hmi.page.get_by_role("button", name=name).click()
@@ -160,6 +161,7 @@ def test_the_csv_is_the_table_as_it_is_filtered_and_sorted(
 ) -> None:
     hmi = open_page(house.url)
     hmi.expect_rows(*TAGS)
+    expect(hmi.test_id("legend")).to_contain_text("Temperature °C")
     hmi.page.keyboard.press("u")
     hmi.page.get_by_role("searchbox").fill("temperature")
     header = hmi.page.locator("th[data-column=temperature]").get_by_role("button")

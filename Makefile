@@ -121,7 +121,7 @@ collect: setup
 
 unit: setup $(DONE)/tools ## Python tests, real ROS and real browser included
 	$(say) 'Python tests: units, ROS over DDS, browser'
-	@$(TEST_ENV) $(BIN)/pytest -q -n 4 --dist worksteal tests
+	@$(TEST_ENV) $(BIN)/pytest -q -n 3 --dist worksteal tests
 
 $(DONE)/bench: pyproject.toml $(DONE)/python
 	@env -u PYTHONPATH $(BIN)/pip install --quiet -e '.[bench]'

@@ -21,8 +21,11 @@ test('what a file sets, replaces, adds and starts is gone with it', async () => 
   document.documentElement.dataset['theme'] = 'dark';
   localStorage.setItem('key', 'value');
   history.replaceState(null, '', '/#tag=1');
+  vi.spyOn(window, 'localStorage', 'get').mockImplementation(() => {
+    throw new Error('SecurityError');
+  });
   process.env['TZ'] = 'Asia/Kolkata';
-  putBack();
+  await putBack();
   window.dispatchEvent(new Event('online'));
   document.dispatchEvent(new Event('keydown'));
   expect(counts.counted).toBeUndefined();
@@ -40,6 +43,6 @@ test('what a file sets, replaces, adds and starts is gone with it', async () => 
 
 test('modules of one file are not those of the next', async () => {
   const one = await import('../store/app');
-  asFound()();
+  await asFound()();
   expect((await import('../store/app')).store).not.toBe(one.store);
 });

@@ -93,22 +93,27 @@ function pageAsFound(): () => void {
     }
     localStorage.clear();
     sessionStorage.clear();
-    history.replaceState(null, '', '/');
+    // A new step, so that there is nothing to go forward to.
+    history.pushState(null, '', '/');
   };
 }
 
 /** Looks round; what it returns puts everything back as it was. */
-export function asFound(): () => void {
+export function asFound(): () => Promise<void> {
   const environment = { ...process.env };
   const globals = ownAsFound(globalThis);
   const page = typeof document === 'undefined' ? () => undefined : pageAsFound();
   const timers = timersEnd();
-  return () => {
+  return async () => {
     vi.useRealTimers();
+    vi.restoreAllMocks();
     vi.unstubAllGlobals();
+    timers();
+    // One that is half loaded when the modules are forgotten never comes in the next file either.
+    await vi.dynamicImportSettled();
+    timers();
     // The page's modules keep state; each file has its own.
     vi.resetModules();
-    timers();
     page();
     globals();
     for (const name of Object.keys(process.env)) {

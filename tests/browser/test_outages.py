@@ -78,8 +78,8 @@ def test_a_twin_that_comes_is_killed_and_comes_back(domain: int, open_page: Open
             expect(hmi.cell("a", "temperature")).to_have_text("20.0")
         told = next(frame for frame in hmi.frames if frame.get("reason") == "stale")
         assert told["type"] == "status"
-        # The page turns with the frame that says so; a busy machine may be late with it.
-        assert 3.0 <= told["state_age_seconds"] < 10.0
+        # Three publications were missed; how soon that is told is held by `test_live_faults.py`.
+        assert told["state_age_seconds"] >= 3.0
 
         with twin_node(domain):
             peer.observe(scan("b", {"temperature": 30.0}, at=(2, 1)))

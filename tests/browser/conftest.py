@@ -89,20 +89,29 @@ def ticking(peer: Peer, started_s: float) -> Iterator[None]:
         thread.join()
 
 
-@pytest.fixture(scope="package")
-def house() -> Iterator[Bridge]:
-    """A server with the greenhouse of `house.py`, for tests that change nothing in it.
+@contextmanager
+def bridge_of_a_moment() -> Iterator[tuple[Bridge, float]]:
+    """A server whose clock all but stands still, and what it says, s.
 
-    Its clock all but stands still, so that no pin fades between two pictures: it goes on by a
-    millisecond a tick, or it would be told as paused.
+    It goes on by a millisecond a tick, or it would be told as paused.
     """
     simulated = ("--ros-args", "-p", "use_sim_time:=true")
     with own_domain() as domain, bridge(*simulated, domain=domain) as running:
         started_s = time.time()
         running.peer.set_clock(started_s)
         with ticking(running.peer, started_s):
-            furnish(running)
-            yield running
+            yield running, started_s
+
+
+@pytest.fixture(scope="package")
+def house() -> Iterator[Bridge]:
+    """A server with the greenhouse of `house.py`, for tests that change nothing in it.
+
+    No pin fades between two pictures.
+    """
+    with bridge_of_a_moment() as (running, _):
+        furnish(running)
+        yield running
 
 
 @pytest.fixture

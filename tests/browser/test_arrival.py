@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Iterator
 
 import pytest
 from lupin_msgs.msg import Observation
 from playwright.sync_api import expect
 
+from tests.browser.conftest import bridge_of_a_moment
 from tests.browser.hmi import OpenPage
 from tests.support.domains import own_domain
 from tests.support.messages import discovered, look, occupancy_grid, pose, scan
@@ -106,7 +106,8 @@ def test_a_failed_scan_is_listed_and_says_so_until_it_succeeds(
     expect(row).to_have_attribute("data-health", "stressed")
     expect(row.locator(".cell-age")).to_have_text("never")
     tried = row.locator(".tried")
-    expect(tried).to_have_text(re.compile(r"^tried \d+\ss ago, not decoded$"))
+    # Minutes, where a busy machine takes so long.
+    expect(tried).to_have_text(re.compile(r"^tried \d+\s(s|min) ago, not decoded$"))
     shared.peer.observe(scan("tried", {"temperature": 21.0}, at=(2, 2)))
     expect(row).to_have_attribute("data-pinned", "true")
     expect(hmi.cell("tried", "temperature")).to_have_text("21.0")
@@ -117,23 +118,25 @@ def test_a_failed_scan_is_listed_and_says_so_until_it_succeeds(
     expect(hmi.cell("tried", "temperature")).to_have_text("21.0")
 
 
-def test_a_look_at_the_flowers_makes_no_reading_young(shared: Bridge, open_page: OpenPage) -> None:
-    hmi = open_page(shared.url, "tag=looked")
-    now_s = time.time()
-    shared.peer.observe(
-        scan("looked", {"temperature": 20.0, "co2": 600.0}, at=(1, 4), stamp_s=now_s - 7_262),
-        scan("looked", {"co2": 610.0}, stamp_s=now_s - 600),
-        look("looked", "rose", stamp_s=now_s),
-    )
-    row, card = hmi.row("looked"), hmi.card("looked")
-    expect(row.locator(".cell-age")).to_have_text(re.compile(r"^10\smin$"))
-    # Older than the row's newest reading: it says its own age.
-    expect(hmi.cell("looked", "temperature")).to_have_text(re.compile(r"^20\.0 2\sh$"))
-    expect(hmi.cell("looked", "co2")).to_have_text("610")
-    expect(card.locator("[data-sensor=temperature] .age")).to_have_text(re.compile(r"^2\sh 1\smin"))
-    expect(card.locator("[data-sensor=co2] .age")).to_have_text(re.compile(r"^10\smin$"))
-    expect(card).to_contain_text(re.compile(r"Flowers seen\s?\d+\ss"))
-    expect(card.get_by_role("region", name="Last tries").locator("li")).to_have_count(3)
+def test_a_look_at_the_flowers_makes_no_reading_young(open_page: OpenPage) -> None:
+    # Ages are shown by the minute: they are the same however long this takes.
+    with bridge_of_a_moment() as (running, now_s):
+        hmi = open_page(running.url, "tag=looked")
+        running.peer.observe(
+            scan("looked", {"temperature": 20.0, "co2": 600.0}, at=(1, 4), stamp_s=now_s - 7_262),
+            scan("looked", {"co2": 610.0}, stamp_s=now_s - 602),
+            look("looked", "rose", stamp_s=now_s - 2),
+        )
+        row, card = hmi.row("looked"), hmi.card("looked")
+        expect(row.locator(".cell-age")).to_have_text(re.compile(r"^10\smin$"))
+        # Older than the row's newest reading: it says its own age.
+        expect(hmi.cell("looked", "temperature")).to_have_text(re.compile(r"^20\.0 2\sh$"))
+        expect(hmi.cell("looked", "co2")).to_have_text("610")
+        age = card.locator("[data-sensor=temperature] .age")
+        expect(age).to_have_text(re.compile(r"^2\sh 1\smin"))
+        expect(card.locator("[data-sensor=co2] .age")).to_have_text(re.compile(r"^10\smin$"))
+        expect(card).to_contain_text(re.compile(r"Flowers seen\s?2\ss"))
+        expect(card.get_by_role("region", name="Last tries").locator("li")).to_have_count(3)
 
 
 def test_a_discovered_tag_has_a_pin_and_was_never_observed(

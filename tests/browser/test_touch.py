@@ -41,6 +41,13 @@ def drag(hmi: Hmi, *paths: Sequence[tuple[float, float]]) -> None:
     session.detach()
 
 
+def show(phone: Hmi, pane: str) -> None:
+    """Tap on the name of a half, and wait for it."""
+    phone.page.get_by_role("navigation").get_by_role("button", name=pane).tap()
+    expect(phone.map).to_be_visible(visible=pane == "Map")
+    expect(phone.row("1")).to_be_visible(visible=pane == "Tags")
+
+
 def test_a_tap_on_a_pin_opens_its_card_and_one_beside_closes_it(phone: Hmi) -> None:
     x, y = phone.view().pixel(1, 3)
     # A finger is broad: it need not hit the middle.
@@ -83,12 +90,10 @@ def test_two_fingers_zoom_about_their_middle(phone: Hmi) -> None:
 def test_a_narrow_screen_shows_one_half_at_a_time_and_nothing_sticks_out(phone: Hmi) -> None:
     expect(phone.map).to_be_visible()
     expect(phone.row("1")).to_be_hidden()
-    phone.page.get_by_role("navigation").get_by_role("button", name="Tags").tap()
-    expect(phone.row("1")).to_be_visible()
-    expect(phone.map).to_be_hidden()
+    show(phone, "Tags")
     phone.expect_rows(*TAGS)
     for pane in ("Tags", "Map"):
-        phone.page.get_by_role("navigation").get_by_role("button", name=pane).tap()
+        show(phone, pane)
         assert phone.page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
 
 
@@ -96,7 +101,7 @@ def test_what_a_finger_has_to_hit_is_large_enough(phone: Hmi) -> None:
     phone.colour_by_value()
     phone.page.get_by_role("radio", name="Fixed").check()
     for pane in ("Map", "Tags"):
-        phone.page.get_by_role("navigation").get_by_role("button", name=pane).tap()
+        show(phone, pane)
         # WCAG 2.2, 2.5.5, and what phones ask for; text that is a link among them is as high.
         small = phone.page.evaluate(
             """() => [...document.querySelectorAll('button, a, label, select, input')]
@@ -108,7 +113,6 @@ def test_what_a_finger_has_to_hit_is_large_enough(phone: Hmi) -> None:
         )
         assert small == []
     # A row is hit anywhere, not only on the few letters of its id.
-    phone.page.get_by_role("navigation").get_by_role("button", name="Tags").tap()
     box = phone.row("2").bounding_box()
     assert box is not None
     assert box["height"] >= 40

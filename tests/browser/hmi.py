@@ -308,10 +308,12 @@ LATE_ANSWERS: Final = """const ask = fetch; fetch = async (...question) => {
   return answer; };"""
 
 
-def slow_down(page: Page, times: float) -> None:
-    """Let the page's scripts take so many times as long, and its answers come late."""
-    page.context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": times})
-    page.add_init_script(LATE_ANSWERS)
+def slow_down(page: Page) -> None:
+    """Let the page's scripts take `SLOW_PAGES` times as long, and its answers come late."""
+    if times := os.environ.get("SLOW_PAGES"):
+        throttled = {"rate": float(times)}
+        page.context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", throttled)
+        page.add_init_script(LATE_ANSWERS)
 
 
 @contextmanager
@@ -332,8 +334,7 @@ def open_hmi(
     with browser.new_context(**options) as own:
         page = own.new_page()
         page.set_default_timeout(PATIENCE_S * 1000)
-        if times := os.environ.get("SLOW_PAGES"):
-            slow_down(page, float(times))
+        slow_down(page)
         hmi = Hmi(page, url)
         if go:
             hmi.go(fragment, query)

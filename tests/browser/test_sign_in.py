@@ -9,6 +9,7 @@ from urllib.parse import urlsplit
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
+from tests.browser.hmi import slow_down
 from tests.support.access import TOKEN, Served, served
 from tests.support.tls import Certificate, certificate
 from tests.support.waiting import PATIENCE_S
@@ -30,7 +31,14 @@ def context(browser: Browser) -> Iterator[BrowserContext]:
 
 @pytest.fixture
 def page(context: BrowserContext) -> Page:
-    return context.new_page()
+    return new_page(context)
+
+
+def new_page(context: BrowserContext) -> Page:
+    """A page that is slow where `SLOW_PAGES` says so."""
+    page = context.new_page()
+    slow_down(page)
+    return page
 
 
 def sign_in(page: Page, token: str) -> None:
@@ -88,7 +96,7 @@ def test_a_session_outlives_the_page(closed: Served, context: BrowserContext, pa
     sign_in(page, TOKEN)
     expect_live(page)
     page.close()
-    another = context.new_page()
+    another = new_page(context)
     another.goto(closed.url)
     expect_live(another)
 
@@ -116,7 +124,7 @@ def test_over_tls_the_cookie_is_secure(
 ) -> None:
     ours: Certificate = certificate(tmp_path_factory.mktemp("tls"))
     with served(*ours.options, trust=ours.trust, LUPIN_TOKEN=TOKEN) as secure:
-        page = context.new_page()
+        page = new_page(context)
         page.goto(secure.url)
         sign_in(page, TOKEN)
         expect_live(page)

@@ -204,17 +204,18 @@ def test_a_body_that_turns_out_to_be_none_before_the_answer_is_answered_once(pla
 def test_a_websocket_behind_an_answer_that_nobody_reads_keeps_nothing(plain: Served) -> None:
     pid = plain.process.pid
     files, memory = open_files(pid), resident_mb(pid)
+    reset_peak(pid)
     field = (
         b"GET /api/field.npy?sensor_type=co2&resolution=0.01&bbox_min_x=0&bbox_min_y=0"
         b"&bbox_max_x=%d&bbox_max_y=1 HTTP/1.1\r\n" + HOST
     )
     with ExitStack() as stack:
         # As many large answers as one address may have made at once; each is longer than a socket.
-        for width in range(16, 20):
-            client = stack.enter_context(raw_http.connect(plain.url, room=4_096))
+        clients = [stack.enter_context(raw_http.connect(plain.url, room=4_096)) for _ in range(4)]
+        for width, client in enumerate(clients, 16):
             client.sendall(field % width + asked())
-        wait_for(lambda: open_files(pid) > files, "their begin")
-        wait_for(lambda: open_files(pid) <= files, "their end")
+        wait_for(lambda: all(map(raw_http.is_over, clients)), "their end")
+        wait_for(lambda: open_files(pid) <= files, "the end of their files")
         assert peak_mb(pid) - memory < 2 * MEMORY_MB
 
 

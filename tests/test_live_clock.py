@@ -45,6 +45,11 @@ def reason(live: Bridge) -> tuple[int, str]:
     return answer.status_code, answer.json()["reason"]
 
 
+def age(live: Bridge) -> float | None:
+    known: float | None = live.tag("1")["stale_seconds"]
+    return known
+
+
 def test_the_clock_never_starts_runs_is_paused_stops_and_runs_again(
     both: tuple[Bridge, Bridge],
 ) -> None:
@@ -53,34 +58,42 @@ def test_the_clock_never_starts_runs_is_paused_stops_and_runs_again(
     twin.peer.observe(scan("1", {"co2": 1.0}, stamp_s=1_000.0))
     for live in both:
         until(lambda live=live: reason(live) == (503, "no_clock"), "no clock")  # type: ignore[misc]
-        assert live.tag("1")["stale_seconds"] is None
+        assert age(live) is None
 
     seconds = 4_600
 
-    def runs(live: Bridge) -> bool:
+    def ages(live: Bridge, is_so: str) -> list[float]:
+        """Two ages, one after the other; none if the clock was not so before, between and after.
+
+        On a busy machine 3 s pass between two questions, and without a tick it counts as stopped.
+        """
+        before, *found, after = reason(live), age(live), age(live), reason(live)
+        known = [it for it in found if it is not None]
+        return known if before == after == (200, is_so) and len(known) == 2 else []
+
+    def runs(live: Bridge) -> list[float]:
         nonlocal seconds
         seconds += 1
         tick(twin, seconds)
-        return reason(live) == (200, "live")
+        return ages(live, "live")
 
     for live in both:
-        until(lambda live=live: runs(live), "a clock that runs")  # type: ignore[misc]
-        assert live.tag("1")["stale_seconds"] >= 3_600.0
+        known = until(lambda live=live: runs(live), "ages by a clock that runs")  # type: ignore[misc]
+        assert min(known) >= 3_600.0
 
-    def stands(live: Bridge) -> bool:
+    def stands(live: Bridge) -> list[float]:
         tick(twin, seconds)
-        return reason(live) == (200, "paused")
+        return ages(live, "paused")
 
     for live in both:
-        until(lambda live=live: stands(live), "a clock that is paused")  # type: ignore[misc]
-        age = live.tag("1")["stale_seconds"]
-        assert age == live.tag("1")["stale_seconds"] >= 3_600.0
+        first, second = until(lambda live=live: stands(live), "ages by a clock that is paused")  # type: ignore[misc]
+        assert first == second >= 3_600.0
 
     for live in both:
         # Observations go on; the newest of them is no younger for that.
         twin.peer.observe(scan("1", {"co2": 2.0}, stamp_s=float(seconds)))
         until(lambda live=live: reason(live) == (503, "clock_stopped"), "a clock that stopped")  # type: ignore[misc]
-        until(lambda live=live: live.tag("1")["stale_seconds"] is None, "no age")  # type: ignore[misc]
+        until(lambda live=live: age(live) is None, "no age")  # type: ignore[misc]
 
     for live in both:
         until(lambda live=live: runs(live), "a clock that runs again")  # type: ignore[misc]

@@ -78,9 +78,9 @@ $(DONE)/tools: .ci/tools | $(DONE)/checked
 
 # --- checks ------------------------------------------------------------------------------------
 
-# Two at a time, for none of them keeps two cores busy all along.
+# Two at a time, for none of them keeps two cores busy all along; the longest first.
 check: setup ## the quick checks: lint, types, and every test that needs neither ROS nor a browser
-	@$(MAKE) --no-print-directory -j 2 --output-sync=target lint types hmi-test quick LINT=lint:changed
+	@$(MAKE) --no-print-directory -j 2 --output-sync=target quick lint types hmi-test LINT=lint:changed
 	$(say) 'quick checks passed; `make test` is the whole'
 
 quick: setup ## Python tests that need neither ROS nor a browser

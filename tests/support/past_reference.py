@@ -120,7 +120,7 @@ class Reference:
         return [
             (max(a, start_ns), (min(b, end_ns) - max(a, start_ns)) / 1e9)
             for a, b in pairwise(tries)
-            if b - a > max(SILENCE_NS, 3 * usual_ns) and a < end_ns and b > start_ns
+            if b - a > max(SILENCE_NS, 3 * usual_ns) and max(a, start_ns) < min(b, end_ns)
         ]
 
     def export(self, start_ns: int, end_ns: int, tag_id: str | None) -> list[PastRow]:

@@ -24,6 +24,8 @@ test('what a file sets, replaces, adds and starts is gone with it', async () => 
   vi.spyOn(window, 'localStorage', 'get').mockImplementation(() => {
     throw new Error('SecurityError');
   });
+  const { HOME } = process.env;
+  process.env['HOME'] = '/elsewhere';
   process.env['TZ'] = 'Asia/Kolkata';
   await putBack();
   window.dispatchEvent(new Event('online'));
@@ -34,6 +36,7 @@ test('what a file sets, replaces, adds and starts is gone with it', async () => 
   expect(document.documentElement.outerHTML).toBe('<html><head></head><body></body></html>');
   expect(localStorage).toHaveLength(0);
   expect(location.hash).toBe('');
+  expect(process.env['HOME']).toBe(HOME);
   expect(process.env['TZ']).not.toBe('Asia/Kolkata');
   // One that rings later than those would have.
   await new Promise((rings) => setTimeout(rings, 5));

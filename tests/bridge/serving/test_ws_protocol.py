@@ -201,6 +201,9 @@ def test_who_is_told_to_go_waits_from_then_on_and_a_client_does_not(
                 refused_s = refused.waiting_since_s
                 assert refused_s is not None
                 assert (client.waiting_since_s, refused_s <= now_s) == (None, True)
+                # No longer than any other, however long uvicorn waits for an answer to a close.
+                assert refused.close_timer is not None
+                assert refused.close_timer.when() - refused_s > PATIENCE_S / 2
                 client.dismiss(CloseCode.POLICY_VIOLATION, "enough")
                 dismissed_s = client.waiting_since_s
                 assert dismissed_s is not None

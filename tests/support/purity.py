@@ -51,6 +51,7 @@ PURE_EXCEPT: Mapping[str, set[str]] = {
         "queue",
         "time",
     },  # where the workers' results come back
+    "lupin_twin.resending": {"time", "warnings"},  # rclpy says it in a warning
     "lupin_twin.past_desk": {"concurrent.futures", "queue", "time"},
     "lupin_twin.leaving": {"logging", "os", "sys", "threading", "time"},  # the end of a process
     "lupin_twin.one_core": {"os"},  # what a process is told at its start

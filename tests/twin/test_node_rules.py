@@ -196,7 +196,7 @@ def test_one_callback_group_keeps_all_callbacks_apart(stage: Stage) -> None:
         ),
         *node.timers,
     ]
-    assert len(ours) == 3 + 1 + 6
+    assert len(ours) == 3 + 1 + 7
     assert isinstance(node._group, MutuallyExclusiveCallbackGroup)
     assert {id(each.callback_group) for each in ours} == {id(node._group)}
 

@@ -105,8 +105,7 @@ class Node:
 
 
 @pytest.fixture
-def node(monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
-    monkeypatch.setattr("lupin_twin.past_service.allow_later", lambda _: None)
+def node() -> Iterator[Node]:
     node = Node()
     yield node
     node.workers.close()

@@ -16,7 +16,7 @@ import numpy as np
 from lupin_msgs.srv import GetEstimate, GetEstimateReport
 
 from lupin_twin import convert_estimate
-from lupin_twin.deferred import Later, allow_later
+from lupin_twin.deferred import Later
 from lupin_twin.diagnostics import Estimates
 from lupin_twin.estimate import MAX_PER_TAG, NOTHING, FitFailed, Model, Place
 from lupin_twin.estimate_report import ADVICE_S, REPORT_SERVICE, Report, ReportRequest, advice
@@ -133,12 +133,12 @@ class EstimateService:
         ] = {}
 
     def offer(self, node: Any, group: Any) -> None:
-        """Have `node` offer the services, by names relative to its namespace."""
+        """Have `node` offer the services, by names relative to its namespace; some answer later."""
         for kind, name, callback in (
             (GetEstimate, ESTIMATE_SERVICE, self._on_get_estimate),
             (GetEstimateReport, REPORT_SERVICE, self._on_get_report),
         ):
-            allow_later(node.create_service(kind, name, callback, callback_group=group))
+            node.create_service(kind, name, callback, callback_group=group)
 
     def restore(self) -> None:
         """What the journal holds is known again: models can be fitted before a scan comes."""

@@ -44,6 +44,7 @@ from lupin_twin.other_twins import OtherTwins
 from lupin_twin.parameters import ParameterError, TwinParameters
 from lupin_twin.past_desk import PastDesk
 from lupin_twin.past_service import JournalPast, PastService, RecentPast
+from lupin_twin.resending import TRY_EVERY_S, Resending
 from lupin_twin.ros_parameters import AdjustableNode, declare, naming, naming_own_parameters
 from lupin_twin.state import ClockState, Look, Scan, Snapshot, TwinStore
 from lupin_twin.twin_count import TwinCount
@@ -177,6 +178,7 @@ class TwinNode(AdjustableNode):
     def _connect(self) -> None:
         p = self.parameters
         group = self._group
+        resending = Resending(self.habits.warn)
         for parameter, shape, depth, callback in (
             ("observations_topic", shapes.OBSERVATION, 50, self._on_observation),
             ("discovered_tags_topic", shapes.DISCOVERED_TAGS, 50, self._on_discovered_tags),
@@ -190,10 +192,9 @@ class TwinNode(AdjustableNode):
         with naming("times_topic", p.times_topic):
             self._times_publisher = self.create_publisher(TwinTimes, p.times_topic, latched(1))
         with naming("field_service_name", p.field_service_name):
-            service = self.create_service(
+            self.create_service(
                 GetField, p.field_service_name, self._on_get_field, callback_group=group
             )
-        allow_later(service)
         past = (
             RecentPast(self.history, self._workers)
             if self.memory.condition.state is JournalState.OFF
@@ -202,12 +203,15 @@ class TwinNode(AdjustableNode):
         PastService(self.habits, self._past_desk, past, self.store, self._now_ns).offer(self, group)
         self.estimates.offer(self, group)
         self.layers.offer(self, p.layers, p.frame_id)
+        for service in self.services:  # those of its parameters too
+            allow_later(resending.watch(service))
         self._others = OtherTwins(self, self.habits, self.twins, p.state_topic, group)
         self._diagnostics = self.create_publisher(DiagnosticArray, TOPIC, 10)
         self._every(DIAGNOSTICS_PERIOD_S, "diagnostics timer", self._publish_diagnostics)
         self._every(CLOCK_LOOK_S, "clock timer", self._look_at_clock)
         self._every(FIT_LOOK_S, "estimate timer", self.estimates.go_on)
         self._every(LAYER_LOOK_S, "layers timer", self.layers.look)
+        self._every(TRY_EVERY_S, "answers timer", resending.go_on)
         self._state_timer = self._publish_at(p.state_publish_rate_hz)
         self.adjust_by(self._adjust)
 

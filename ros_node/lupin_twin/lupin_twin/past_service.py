@@ -9,7 +9,7 @@ from typing import Any, Final, Protocol
 from lupin_msgs.srv import GetHistory, GetStateAt, GetWrites
 
 from lupin_twin import convert, convert_past, convert_writes, recent
-from lupin_twin.deferred import Later, allow_later
+from lupin_twin.deferred import Later
 from lupin_twin.habits import Habits
 from lupin_twin.history import History
 from lupin_twin.journal.asof import STATE_S_PER_TAG, state_at
@@ -74,13 +74,13 @@ class PastService:
         self._now_ns = now_ns
 
     def offer(self, node: Any, group: Any) -> None:
-        """Have `node` offer the services, by names relative to its namespace."""
+        """Have `node` offer the services, by names relative to its namespace; some answer later."""
         for kind, name, callback in (
             (GetStateAt, STATE_AT_SERVICE, self._on_get_state_at),
             (GetHistory, HISTORY_SERVICE, self._on_get_history),
             (GetWrites, WRITES_SERVICE, self._on_get_writes),
         ):
-            allow_later(node.create_service(kind, name, callback, callback_group=group))
+            node.create_service(kind, name, callback, callback_group=group)
 
     def _on_get_state_at(self, request: Any, response: Any) -> Any:
         def look_up() -> Callable[[], Future[Snapshot]]:

@@ -1,0 +1,140 @@
+"""Answers that DDS cannot deliver yet: over a stand-in, and of a real twin to a real client."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from lupin_msgs.srv import GetField
+from rcl_interfaces.srv import GetParameters
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+from lupin_twin import resending as module
+from lupin_twin.resending import MAX_UNSENT, PATIENCE_S, UNSENT, Resending
+from tests.support.domains import own_domain
+from tests.support.processes import twin_node
+from tests.support.ros import Peer
+from tests.support.waiting import wait_for
+
+
+class Stage:
+    """A service whose answers reach those whom DDS has found, in place of rclpy's; and a clock."""
+
+    service_name = "/ask"
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+        self.found: set[Any] = set()
+        self.tried: list[Any] = []
+        self.sent: list[tuple[Any, Any]] = []
+        self.warned: list[str] = []
+        self.resending = Resending(lambda _, text: self.warned.append(text))
+        self.resending.watch(self)
+
+    def send_response(self, response: Any, header: Any) -> None:
+        self.tried.append(header)
+        if header in self.found:
+            self.sent.append((response, header))
+        else:
+            warnings.warn(f"{UNSENT}: client will not receive", RuntimeWarning, stacklevel=1)
+
+    def go_on(self) -> list[Any]:
+        """Who was tried."""
+        del self.tried[:]
+        self.resending.go_on()
+        return self.tried
+
+
+@pytest.fixture
+def stage(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stage]:
+    with warnings.catch_warnings():  # as they are without pytest's own rule: none is an error
+        warnings.resetwarnings()
+        made = Stage()
+        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: made.now_s))
+        yield made
+
+
+def test_what_could_be_sent_is_sent_once(stage: Stage) -> None:
+    stage.found = {"a"}
+    stage.send_response("response", "a")
+    assert stage.sent == [("response", "a")]
+    assert len(stage.resending) == 0
+    assert stage.go_on() == []
+
+
+def test_an_answer_is_sent_as_soon_as_its_reader_is_found_and_once(stage: Stage) -> None:
+    stage.send_response("response", "a")
+    assert stage.go_on() == ["a"]
+    stage.now_s += PATIENCE_S - 0.1
+    assert stage.go_on() == ["a"]
+    stage.found = {"a"}
+    assert stage.go_on() == ["a"]
+    assert stage.sent == [("response", "a")]
+    assert stage.go_on() == []
+    assert stage.warned == []
+
+
+def test_a_round_ends_with_the_first_failure_and_each_has_its_turn(stage: Stage) -> None:
+    for who in ("a", "b", "c", "d"):
+        stage.send_response("response", who)
+    stage.found = {"b", "d"}
+    assert stage.go_on() == ["a"]
+    assert stage.go_on() == ["b", "c"]
+    assert stage.go_on() == ["d", "a"]
+    assert stage.go_on() == ["c"]
+    assert [who for _, who in stage.sent] == ["b", "d"]
+
+
+def test_it_is_given_up_aloud_where_nobody_reads(stage: Stage) -> None:
+    stage.send_response("response", "a")
+    stage.now_s += PATIENCE_S
+    assert stage.go_on() == ["a"]
+    assert stage.go_on() == []
+    [said] = stage.warned
+    assert said == (
+        "gave up an answer of /ask: for 30 s DDS has found no reader for it; is the QoS of a "
+        "client another than the default of services?"
+    )
+
+
+def test_only_so_many_are_kept(stage: Stage) -> None:
+    for who in range(MAX_UNSENT + 1):
+        stage.send_response("response", who)
+    assert len(stage.resending) == MAX_UNSENT
+    [said] = stage.warned
+    assert said.startswith("gave up an answer of /ask: 16 others wait for theirs; ")
+    assert stage.go_on() == [1], "the oldest was given up"
+
+
+@pytest.mark.parametrize("error", [RuntimeWarning("other"), SystemError("other"), ValueError()])
+def test_another_error_is_that_of_who_sends(stage: Stage, error: Exception) -> None:
+    def fail(*_: Any) -> None:
+        raise error
+
+    service: Any = SimpleNamespace(send_response=fail, service_name="/ask")
+    stage.resending.watch(service)
+    with pytest.raises(type(error)):
+        service.send_response("response", "a")
+    assert len(stage.resending) == 0
+
+
+def test_a_client_that_dds_never_finds_is_told_of_and_holds_nobody_up() -> None:
+    # Its reader wants what the service's writer does not offer: they never match, and rclpy meets
+    # what it meets with a reader that is found too late.
+    never = QoSProfile(depth=50, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    ask, parameters = "/twin/get_field", "/lupin_twin/get_parameters"
+    with own_domain() as domain, twin_node(domain) as twin, Peer(domain, "robot") as robot:
+        futures = []
+        for kind, name, count in ((GetField, ask, 1), (GetParameters, parameters, MAX_UNSENT + 1)):
+            client = robot.node.create_client(kind, name, qos_profile=never)
+            robot.until(lambda n=name: robot.node.count_services(n), f"the service {name}")  # type: ignore[misc]
+            futures += [client.call_async(kind.Request()) for _ in range(count)]
+        said = f"gave up an answer of {parameters}: {MAX_UNSENT} others wait for theirs"
+        wait_for(lambda: said in twin.output, "that it is said")
+        assert robot.get_field(sensor_type="co2").sample_count == 0
+        assert not any(future.done() for future in futures)
+        assert "Error" not in twin.output
+        assert "RuntimeWarning" not in twin.output

@@ -2,7 +2,7 @@ import { beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { onMapCommand } from '../map/commands';
 import { snapshotOf } from '../domain/twin';
-import { act, prefer, receive } from '../store/app';
+import { act, prefer, receive, store } from '../store/app';
 import { NO_HOUSE } from '../store/twin';
 import { FakeContext } from '../testing/canvas';
 import { showTags } from '../testing/page';
@@ -57,6 +57,21 @@ describe('table as a file', () => {
     // 5 s old when the state was taken.
     expect((await lines())[1]).toMatch(/,5,1970-01-01T00:01:40\.000Z,/);
   });
+
+  test.each(['ready', 'failed'] as const)(
+    'waits in the first moments until the sensors’ own names are %s, and comes once',
+    async (state) => {
+      const { sensors } = store.get().twin;
+      receive({ type: 'sensors', sensors: { value: null, state: 'waiting', message: '' } });
+      saveTable();
+      act({ type: 'filter', text: '10' });
+      expect(names).toEqual([]);
+      receive({ type: 'sensors', sensors: { ...sensors, state } });
+      act({ type: 'filter', text: '' });
+      expect(names).toHaveLength(1);
+      expect((await lines())[0]).toContain('Temperature [°C]');
+    },
+  );
 
   test('is sorted as the table is', async () => {
     act({ type: 'sort', column: 'temperature' });

@@ -25,8 +25,24 @@ import { selectHasOwnTime, selectOrigin } from '../store/origin';
 import { S } from '../strings';
 import { fileName, pastFileName, save } from './save';
 
-/** The table as the operator sees it, filtered and sorted; ages are those of the state's time. */
+/**
+ * The table as the operator sees it, filtered and sorted; ages are those of the state's time. Asked
+ * for in the page's first moments, it comes once the sensors' own names and units are there.
+ */
 export function saveTable(): void {
+  const isKnown = (): boolean => store.get().twin.sensors.state !== 'waiting';
+  if (isKnown()) {
+    writeTable();
+    return;
+  }
+  const stop = store.subscribe(() => {
+    if (!isKnown()) return;
+    stop();
+    writeTable();
+  });
+}
+
+function writeTable(): void {
   const state = store.get();
   const { snapshot, moment } = selectShown(state);
   if (!snapshot) return;

@@ -62,8 +62,9 @@ class Service(Enum):
     REPORT = GetEstimateReport
 
 
-# DDS finds a twin's publisher and its service each on its own, one at times a little later.
-NEW_TWIN_S: Final = 2.0
+# DDS finds a twin's publisher and its services each on its own, one at times a little later: of
+# what is lost on the way it tells again after 3 s.
+NEW_TWIN_S: Final = 5.0
 
 # How long a state waits for the times that a twin publishes right behind it. Without them it is
 # shown all the same, and when what was observed is not known.
@@ -247,9 +248,15 @@ class WebNode(AdjustableNode):
         """Whether a twin offers it now."""
         return bool(self.clients_of_twin[service].service_is_ready())
 
-    def name_of(self, service: Service) -> str:
-        """What it is called, from the root on and after remapping."""
-        return str(self.clients_of_twin[service].service_name)
+    def why_not(self, service: Service) -> str:
+        """What is to be said where no twin offers it: its name, and where to look."""
+        if self.offers(Service.FIELD):
+            guess = "is it an older one?"
+        elif self.count_publishers(self._topics["state_topic"]):
+            guess = "its state is heard, so ask again; or does it have another name there?"
+        else:
+            guess = "is it running?"
+        return f"no twin offers {self.clients_of_twin[service].service_name}: {guess}"
 
     def ask(self, service: Service, request: Any) -> Any:
         """Ask the twin; returns the rclpy Future of its response."""

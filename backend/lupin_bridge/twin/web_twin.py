@@ -270,11 +270,9 @@ class WebTwin:
     async def _find(self, service: Service) -> None:
         while not await self._thread.call(lambda node: node.offers(service)):
             if not await self._thread.call(lambda node: node.has_new_twin):
-                name, has_twin = await self._thread.call(
-                    lambda node: (node.name_of(service), node.offers(Service.FIELD))
+                raise TwinUnavailableError(
+                    await self._thread.call(lambda node: node.why_not(service))
                 )
-                what = "is it an older one?" if has_twin else "is it running?"
-                raise TwinUnavailableError(f"no twin offers {name}: {what}")
             await asyncio.sleep(SERVICE_LOOK_S)
 
     async def _ask(self, service: Service, request: Any, cost_s: float) -> Any:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lupin_bridge.twin import web_node
 from lupin_bridge.twin.local_twin import LocalTwin
 from lupin_bridge.twin.looking import Itself
 from lupin_bridge.twin.source import (
@@ -33,7 +34,7 @@ from tests.support.messages import discovered, occupancy_grid, pose, scan
 from tests.support.processes import OFTEN, twin_node
 from tests.support.ros import Peer
 from tests.support.store import S
-from tests.support.waiting import until, until_answered
+from tests.support.waiting import PATIENCE_S, until, until_answered
 
 SOURCES = [LocalTwin, WebTwin]
 MEMBERS = [name for name in vars(TwinSource) if not name.startswith("_")]
@@ -88,8 +89,9 @@ class Stage:
 async def stage_of(source_type: type, domain: int, *ros_args: str) -> AsyncIterator[Stage]:
     """A started source; for `WebTwin`, with a twin in a process of its own."""
     arguments = (*OFTEN, "-p", "max_grid_cells:=1000", *ros_args)
-    with Peer(domain) as peer:
+    with Peer(domain) as peer, pytest.MonkeyPatch.context() as patch:
         if source_type is WebTwin:
+            patch.setattr(web_node, "NEW_TWIN_S", PATIENCE_S)  # a busy machine finds it late
             with twin_node(domain, *arguments):
                 async with started(WebTwin, arguments, peer) as stage:
                     yield stage

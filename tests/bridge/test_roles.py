@@ -13,7 +13,7 @@ from lupin_bridge.serving.server import listen
 from tests.support.journal import select
 from tests.support.messages import scan
 from tests.support.processes import Process, children_of, lupin_twin, patrols_of, url_of
-from tests.support.recordings import Sent, write_bag
+from tests.support.recordings import OBSERVATIONS, Sent, write_bag
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
 from tests.support.web import bridge, listener, tag_ids
@@ -182,6 +182,17 @@ def test_the_patrol_ends_although_the_demo_is_killed(domain: int) -> None:
         demo.send(signal.SIGKILL)
         demo.wait()
         wait_for(lambda: not is_running(patrol), "the end of the patrol")
+
+
+def test_the_replay_ends_although_the_demo_is_killed(domain: int, tmp_path: Path) -> None:
+    """Or a twin that is started later would hear it, and might keep it."""
+    path = write_bag(tmp_path / "run.mcap", [Sent(OBSERVATIONS, 5_000.0, scan("1"))])
+    with lupin_twin(domain, "demo", "--from", str(path), TMPDIR=str(tmp_path)) as demo:
+        demo.wait_for_output("the end: 1 messages were published")
+        (replay,) = children_of(demo.pid, b"replay")
+        demo.send(signal.SIGKILL)
+        demo.wait()
+        wait_for(lambda: not is_running(replay), "the end of the replay")
 
 
 def test_ipv6_is_served_too(domain: int) -> None:

@@ -108,7 +108,7 @@ def _stop_asked() -> Callable[[], bool]:
     """Whether a stop signal has come, once or often; from the first on the process has to end.
 
     By handlers that only note it: threads of numpy's, from before anything could be blocked, may
-    be those that get it.
+    be those that get it. A demo holds both signals back, and who it starts inherits that.
     """
     asked: list[int] = []
 
@@ -119,6 +119,7 @@ def _stop_asked() -> Callable[[], bool]:
 
     for number in stop_signals.STOP_SIGNALS:
         signal.signal(number, note)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, stop_signals.STOP_SIGNALS)
     return lambda: bool(asked)
 
 

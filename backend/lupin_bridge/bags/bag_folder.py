@@ -25,15 +25,23 @@ def files_in(named: Sequence[Path]) -> list[Path]:
     Of a folder those that its metadata.yaml lists, without one all that end in .mcap.
 
     Raises:
-        RecordingError: one of them is named twice, or a folder has none or cannot be read.
+        RecordingError: one of them is named twice or cannot be looked at, or a folder has none or
+            cannot be read.
 
     """
     found: dict[str, Path] = {}
     for path in named:
-        for file in _inside(path) if path.is_dir() else [path]:
+        for file in _inside(path) if _is_folder(path) else [path]:
             if found.setdefault(os.path.realpath(file), file) is not file:
                 raise RecordingError(f"{file} is named twice")
     return list(found.values())
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except OSError as error:  # of a folder that is closed to us, a name that is too long
+        raise RecordingError(f"cannot read {path}: {error.strerror}") from error
 
 
 def _inside(folder: Path) -> list[Path]:

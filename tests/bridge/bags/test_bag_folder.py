@@ -57,3 +57,12 @@ def test_no_file_is_named_twice(tmp_path: Path) -> None:
     file = tmp_path / "a.mcap"
     file.touch()
     assert refused(file, tmp_path) == f"{tmp_path}/a.mcap is named twice"
+
+
+def test_a_name_that_cannot_be_looked_at_is_told(tmp_path: Path) -> None:
+    """As of a file in a folder that is closed to us, which is none for who is root."""
+    path = tmp_path / f"{'a' * 300}.mcap"
+    assert refused(path) == f"cannot read {path}: File name too long"
+    listed = tmp_path / "metadata.yaml"
+    listed.write_text(f"relative_file_paths:\n- {'a' * 300}.mcap\n")
+    assert names(tmp_path) == [path.name], "what reads it tells"

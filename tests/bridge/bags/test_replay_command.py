@@ -50,6 +50,7 @@ def test_an_option_out_of_its_limits_is_named(
         (["demo", "--from", "a.mcap", "--seed", "3"], "--seed is the patrol's"),
         (["demo", "--from", "a.mcap", "--speed", "500"], "--speed: '500' must be a number from"),
         (["demo", "--from", "/no/such.mcap", "--port", "0"], "cannot read /no/such.mcap: No such"),
+        (["demo", "--from", "a" * 300, "--port", "0"], f"cannot read {'a' * 300}: File name too"),
         (["demo", "--from", "/no/a.mcap", "/no/b.mcap", "--loop"], "cannot read /no/a.mcap: No"),
     ],
 )

@@ -48,6 +48,7 @@ def add_parser(roles: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
     )
     parser.add_argument(
         "--state-as",
+        type=_topic,
         metavar="TOPIC",
         help="publish the recorded states too, under this name, to be held against the twin's",
     )
@@ -121,6 +122,12 @@ def _stop_asked() -> Callable[[], bool]:
         signal.signal(number, note)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, stop_signals.STOP_SIGNALS)
     return lambda: bool(asked)
+
+
+def _topic(text: str) -> str:
+    if not text:  # what is no name otherwise, ROS says
+        raise argparse.ArgumentTypeError("'' must be the name of a topic")
+    return text
 
 
 def _speed(text: str) -> float:

@@ -13,6 +13,7 @@ from lupin_msgs.msg import DiscoveredTags, Observation, TwinState
 from nav_msgs.msg import OccupancyGrid
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.duration import Duration
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -51,11 +52,23 @@ _NOT_KNOWN_YET: Final = "_NODE_NAME_UNKNOWN_"
 LOOK_S: Final = 0.25
 
 
+class NotPublishable(Exception):
+    """A topic, by its `name`, that ROS does not let us publish; the message says why."""
+
+    def __init__(self, name: str, why: str) -> None:
+        super().__init__(f"{name!r}: {why}")
+        self.name = name
+
+
 class ReplayNode(Node):  # type: ignore[misc]  # rclpy is not typed
     """`Outlet` over ROS. `topics` are by their names in the recording: type and QoS.
 
     `names` has those that are published under another one. A remapping of ROS's holds behind that.
     `twins` is what those that hear it have said.
+
+    Raises:
+        NotPublishable: the name of a topic is none, or that of one of another type.
+
     """
 
     def __init__(
@@ -178,11 +191,20 @@ class ReplayNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _advertise(self) -> None:
         self._by_topic = {
-            topic: self.create_publisher(
-                TYPES[type_name], self._names.get(topic, topic), _profile(offered)
-            )
+            topic: self._published(self._names.get(topic, topic), type_name, _profile(offered))
             for topic, (type_name, offered) in self._wanted.items()
         }
+
+    def _published(self, name: str, type_name: str, profile: QoSProfile) -> Any:
+        try:
+            return self.create_publisher(TYPES[type_name], name, profile)
+        except InvalidTopicNameException as error:
+            raise NotPublishable(name, str(error)) from error
+        except RuntimeError as error:  # rcl's; what comes behind the comma is its own source
+            why = str(error).partition(", at ")[0]
+            raise NotPublishable(
+                name, f"no {type_name} can be published there, name another topic: {why}"
+            ) from error
 
     def _look(self) -> None:
         nodes = {

@@ -12,7 +12,6 @@ from contextlib import contextmanager
 from typing import Final
 
 import rclpy
-from rclpy.exceptions import InvalidTopicNameException
 from rclpy.signals import SignalHandlerOptions
 
 from lupin_bridge.bags.choosing import INPUTS, inputs_of, state_of
@@ -28,6 +27,7 @@ from lupin_bridge.bags.replay_node import (
     LOOK_S,
     NODE_NAME,
     SAYS_WITHIN_S,
+    NotPublishable,
     ReplayNode,
 )
 from lupin_twin.half_made import remove_half_made
@@ -53,7 +53,7 @@ def replay(options: Namespace, ros_args: Sequence[str], stop_asked: Callable[[],
     with Recordings(options.files) as recording:
         topics = inputs_of(recording.topics, recording.name)
         names: dict[str, str] = {}
-        if options.state_as:
+        if options.state_as is not None:
             topics.append(state_of(recording.topics, recording.name))
             names[topics[-1].name] = options.state_as
         start_s = options.start or 0.0
@@ -190,7 +190,10 @@ def _node(
         remove_half_made(rclpy.get_default_context().get_domain_id())
         try:
             node = ReplayNode(wanted, twins, names)
-        except (InvalidTopicNameException, ParameterError) as error:
+        except NotPublishable as error:
+            option = "--state-as " if error.name in names.values() else ""
+            raise Refused(f"{option}{error}") from error
+        except (ParameterError, RuntimeError) as error:  # the second is rcl's
             raise Refused(str(error)) from error
         try:
             yield node

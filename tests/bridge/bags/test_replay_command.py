@@ -30,6 +30,7 @@ def test_its_options_are_within_their_limits() -> None:
         (["--speed", "nan"], "--speed: 'nan' must be"),
         (["--start", "-1"], "--start: '-1' must be a number from 0 to 1000000000"),
         (["--start", "noon"], "--start: 'noon' must be"),
+        (["--state-as", ""], "--state-as: '' must be the name of a topic"),
     ],
 )
 def test_an_option_out_of_its_limits_is_named(

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
-from lupin_msgs.msg import Observation
+from lupin_msgs.msg import Observation, TwinState
 from rclpy.serialization import serialize_message
 from rosbags.interfaces import (
     Qos,
@@ -206,6 +206,28 @@ def test_a_twin_with_a_journal_is_not_fed_unless_one_insists(twins: Twins, tmp_p
     assert named in str(refused.value)
     assert "--into-live" in str(refused.value)
     twins.live.replay(lambda it: "not yours" in ids(it), path, "--into-live", "--hold")
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("/clock", "no lupin_msgs/msg/TwinState can be published there, name another topic"),
+        (OBSERVATIONS, "no lupin_msgs/msg/TwinState can be published there, name another topic"),
+        ("/a/", "Invalid topic name"),
+    ],
+)
+def test_a_topic_that_states_cannot_be_published_on_is_named(
+    domain: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, why: str
+) -> None:
+    """ROS has one type a topic and process."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+    sent = [Sent(OBSERVATIONS, 1.0, scan("1")), Sent(STATE, 2.0, TwinState())]
+    path = write_bag(tmp_path / "a.mcap", sent)
+    with pytest.raises(Refused, match=f"^--state-as '{name}': {why}"):
+        replay(replay_options(path, "--state-as", name), [], lambda: True)
+    remapped = ["--ros-args", "-r", f"{OBSERVATIONS}:=/clock"]
+    with pytest.raises(Refused, match=f"^'{OBSERVATIONS}': no lupin_msgs/msg/Observation can"):
+        replay(replay_options(path, "--state-as", "/recorded"), remapped, lambda: True)
 
 
 class Nobody:

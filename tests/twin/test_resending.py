@@ -13,7 +13,13 @@ from rcl_interfaces.srv import GetParameters
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from lupin_twin import resending as module
-from lupin_twin.resending import MAX_UNSENT, PATIENCE_S, UNSENT, Resending
+from lupin_twin.resending import (
+    MAX_UNSENT,
+    PATIENCE_S,
+    TRY_EVERY_S,
+    UNSENT,
+    Resending,
+)
 from tests.support.domains import own_domain
 from tests.support.processes import twin_node
 from tests.support.ros import Peer
@@ -27,6 +33,7 @@ class Stage:
     def __init__(self) -> None:
         self.now_s = 100.0
         self.found: set[Any] = set()
+        self.takes_s = 0.125
         self.tried: list[Any] = []
         self.sent: list[tuple[Any, Any]] = []
         self.warned: list[str] = []
@@ -35,6 +42,7 @@ class Stage:
 
     def send_response(self, response: Any, header: Any) -> None:
         self.tried.append(header)
+        self.now_s += 0.0 if header in self.found else self.takes_s
         if header in self.found:
             self.sent.append((response, header))
         else:
@@ -43,6 +51,7 @@ class Stage:
     def go_on(self) -> list[Any]:
         """Who was tried."""
         del self.tried[:]
+        self.now_s += TRY_EVERY_S
         self.resending.go_on()
         return self.tried
 
@@ -67,8 +76,6 @@ def test_what_could_be_sent_is_sent_once(stage: Stage) -> None:
 def test_an_answer_is_sent_as_soon_as_its_reader_is_found_and_once(stage: Stage) -> None:
     stage.send_response("response", "a")
     assert stage.go_on() == ["a"]
-    stage.now_s += PATIENCE_S - 0.1
-    assert stage.go_on() == ["a"]
     stage.found = {"a"}
     assert stage.go_on() == ["a"]
     assert stage.sent == [("response", "a")]
@@ -80,18 +87,56 @@ def test_a_round_ends_with_the_first_failure_and_each_has_its_turn(stage: Stage)
     for who in ("a", "b", "c", "d"):
         stage.send_response("response", who)
     stage.found = {"b", "d"}
-    assert stage.go_on() == ["a"]
-    assert stage.go_on() == ["b", "c"]
-    assert stage.go_on() == ["d", "a"]
+    assert stage.go_on() == ["d", "c"]
+    assert stage.go_on() == ["b", "a"]
     assert stage.go_on() == ["c"]
-    assert [who for _, who in stage.sent] == ["b", "d"]
+    assert stage.go_on() == ["a"]
+    assert [who for _, who in stage.sent] == ["d", "b"]
+
+
+def test_one_that_can_be_sent_does_not_wait_behind_many_that_never_will_be(stage: Stage) -> None:
+    for who in range(MAX_UNSENT - 1):
+        stage.send_response("response", who)
+    for _ in range(3):
+        stage.go_on()
+    stage.send_response("response", "late")
+    stage.found = {"late"}
+    assert stage.go_on()[0] == "late"
+    assert stage.sent == [("response", "late")]
+    assert stage.warned == []
+
+
+def test_what_takes_long_to_try_is_tried_a_fifth_of_the_time(stage: Stage) -> None:
+    stage.takes_s = 2.0
+    stage.send_response("response", "a")
+    assert stage.go_on() == ["a"]
+    at_s = stage.now_s
+    while not stage.go_on():
+        pass
+    assert stage.now_s - stage.takes_s - at_s == 4 * stage.takes_s
+
+
+def test_of_large_answers_few_are_kept_and_one_always(stage: Stage) -> None:
+    stage.takes_s = 0.75
+    for who in ("a", "b"):
+        stage.send_response("response", who)
+    assert len(stage.resending) == 2
+    stage.send_response("response", "c")
+    assert len(stage.resending) == 2
+    assert len(stage.warned) == 1
+    stage.takes_s = 5.0
+    stage.send_response("response", "d")
+    assert len(stage.resending) == 1
+    stage.found = {"d"}
+    assert stage.go_on() == ["d"]
 
 
 def test_it_is_given_up_aloud_where_nobody_reads(stage: Stage) -> None:
     stage.send_response("response", "a")
-    stage.now_s += PATIENCE_S
+    stage.now_s += PATIENCE_S - 2 * TRY_EVERY_S
     assert stage.go_on() == ["a"]
     assert stage.go_on() == []
+    assert len(stage.resending) == 0
     [said] = stage.warned
     assert said == (
         "gave up an answer of /ask: for 30 s DDS has found no reader for it; is the QoS of a "
@@ -104,8 +149,9 @@ def test_only_so_many_are_kept(stage: Stage) -> None:
         stage.send_response("response", who)
     assert len(stage.resending) == MAX_UNSENT
     [said] = stage.warned
-    assert said.startswith("gave up an answer of /ask: 16 others wait for theirs; ")
-    assert stage.go_on() == [1], "the oldest was given up"
+    assert said.startswith("gave up an answer of /ask: too much else waits to be sent again; ")
+    stage.found = set(range(MAX_UNSENT + 1))
+    assert stage.go_on() == [*range(MAX_UNSENT, 0, -1)], "the oldest was given up"
 
 
 @pytest.mark.parametrize("error", [RuntimeWarning("other"), SystemError("other"), ValueError()])
@@ -129,7 +175,7 @@ def test_a_client_that_dds_never_finds_is_told_of_and_holds_nobody_up() -> None:
         futures = []
         for kind, name in ((GetField, ask), (GetParameters, parameters)):
             client = robot.node.create_client(kind, name, qos_profile=never)
-            said = f"gave up an answer of {name}: {MAX_UNSENT} others wait for theirs"
+            said = f"gave up an answer of {name}: too much else waits to be sent again"
 
             def is_said(client: Any = client, kind: Any = kind, said: str = said) -> bool:
                 # A service holds ten requests: more would be lost where they came at once.

@@ -12,30 +12,36 @@ from __future__ import annotations
 import re
 import time
 import warnings
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
 # How rclpy's warning begins (7.1.6), that the middleware has dropped an answer.
 UNSENT: Final = "failed to send response (timeout)"
-# Each try that fails keeps the node's thread for 0.1 s: a fifth of its time, at most.
+# How often it is looked at whether something is to be tried again, s.
 TRY_EVERY_S: Final = 0.5
+# A try that fails keeps the node's thread: for the 0.1 s, and for what it takes to make a large
+# answer a message of C. So many times as long nothing is tried then: a fifth of its time, at most.
+_REST: Final = 4.0
 # Discovery that lost a message makes up for it within some 3 s, more on a busy machine.
 PATIENCE_S: Final = 30.0
-# Answers kept; one may be a field of 16 MB.
+# Answers kept, and what a try of each took, s, all together: that grows with the memory they need
+# (60 MB took 0.5 s, 300 MB 2.6 s). One is kept however long it took.
 MAX_UNSENT: Final = 16
+MAX_UNSENT_S: Final = 2.0
 
 Send = Callable[[Any, Any], None]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class _Unsent:
     name: str
     send: Send
     response: Any
     header: Any
     since_s: float
+    took_s: float
+    tries: int = 0
 
 
 class Resending:
@@ -46,7 +52,8 @@ class Resending:
 
     def __init__(self, warn: Callable[[tuple[str, object], str], None]) -> None:
         self._warn = warn
-        self._unsent: deque[_Unsent] = deque()
+        self._unsent: list[_Unsent] = []  # the oldest first
+        self._rests_until_s = 0.0
         warnings.filterwarnings("error", re.escape(UNSENT), RuntimeWarning)
 
     def __len__(self) -> int:
@@ -58,31 +65,45 @@ class Resending:
         send: Send = service.send_response
 
         def send_response(response: Any, header: Any) -> None:
-            if _was_sent(send, response, header):
-                return
-            if len(self._unsent) == MAX_UNSENT:
-                self._give_up(self._unsent.popleft(), f"{MAX_UNSENT} others wait for theirs")
-            self._unsent.append(
-                _Unsent(service.service_name, send, response, header, time.monotonic())
-            )
+            began_s = time.monotonic()
+            if not _was_sent(send, response, header):
+                now_s = time.monotonic()
+                name = str(service.service_name)
+                self._keep(_Unsent(name, send, response, header, now_s, now_s - began_s))
 
         service.send_response = send_response
         return service
 
     def go_on(self) -> None:
-        """Try again, every `TRY_EVERY_S`, until one fails: that one comes last the next time."""
-        for _ in range(len(self._unsent)):
-            first = self._unsent.popleft()
-            if _was_sent(first.send, first.response, first.header):
-                continue
-            waited_s = time.monotonic() - first.since_s
-            if waited_s < PATIENCE_S:
-                self._unsent.append(first)
-            else:
-                self._give_up(first, f"for {PATIENCE_S:g} s DDS has found no reader for it")
+        """Try again until one fails; to be called every `TRY_EVERY_S`.
+
+        Those first that were tried least, and of them the newest: one that can be sent does not
+        wait behind many that never will be.
+        """
+        began_s = time.monotonic()
+        for late in [one for one in self._unsent if began_s - one.since_s >= PATIENCE_S]:
+            self._give_up(late, f"for {PATIENCE_S:g} s DDS has found no reader for it")
+        if began_s < self._rests_until_s:
             return
+        for one in sorted(self._unsent, key=lambda one: (one.tries, -one.since_s)):
+            one.tries += 1
+            began_s = time.monotonic()
+            if not _was_sent(one.send, one.response, one.header):
+                now_s = time.monotonic()
+                self._rests_until_s = now_s + _REST * (now_s - began_s)
+                return
+            self._unsent.remove(one)
+
+    def _keep(self, new: _Unsent) -> None:
+        self._unsent.append(new)
+        while len(self._unsent) > 1 and (
+            len(self._unsent) > MAX_UNSENT
+            or sum(one.took_s for one in self._unsent) > max(MAX_UNSENT_S, new.took_s)
+        ):
+            self._give_up(self._unsent[0], "too much else waits to be sent again")
 
     def _give_up(self, unsent: _Unsent, why: str) -> None:
+        self._unsent.remove(unsent)
         self._warn(
             ("unsent", unsent.name),
             f"gave up an answer of {unsent.name}: {why}; is the QoS of a client another than the "

@@ -13,10 +13,11 @@ from typing import Any
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lupin_msgs.msg import DiscoveredTag, DiscoveredTags
-from lupin_msgs.srv import GetField
+from lupin_msgs.srv import GetEstimate, GetField, GetHistory
 from rclpy.serialization import serialize_message
 
 from lupin_twin.field_desk import MAX_FIELDS
+from lupin_twin.habits import SERVICE_QOS
 from tests.support.domains import own_domain
 from tests.support.messages import discovered, occupancy_grid, scan
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb, waited_s
@@ -174,7 +175,7 @@ def test_more_fields_than_can_wait_are_refused_with_the_reason(wide: Strained) -
     for number in range(MAX_FIELDS + 20):
         request = {**HEAVY, **shifted(number)}
         asked.append(client.call_async(GetField.Request(sensor_type="co2", **request)))
-        if number % 5 == 4:  # a service holds ten requests: one behind them tells they were taken
+        if number % 5 == 4:  # a service holds fifty requests: one behind them tells they were taken
             wide.peer.until(client.call_async(GetField.Request()).done, "five to be taken")
 
     def refusal() -> Any:
@@ -183,6 +184,25 @@ def test_more_fields_than_can_wait_are_refused_with_the_reason(wide: Strained) -
 
     refused = wide.peer.until(refusal, "a refusal")
     assert "fields are being computed, which is the limit" in refused.error_message
+
+
+def test_all_are_answered_that_ask_while_the_twin_stands_still(strained: Strained) -> None:
+    node = strained.peer.node
+    clients = [
+        node.create_client(kind, name, qos_profile=SERVICE_QOS)
+        for kind, name in (
+            (GetField, "/twin/get_field"),
+            (GetHistory, "/twin/get_history"),
+            (GetEstimate, "/twin/get_estimate"),
+        )
+    ]
+    for client in clients:
+        strained.peer.until(client.service_is_ready, client.service_name)
+    strained.process.freeze()
+    # An empty request is refused, and that is an answer.
+    asked = [client.call_async(client.srv_type.Request()) for client in clients * SERVICE_QOS.depth]
+    strained.process.thaw()
+    strained.peer.until(lambda: all(future.done() for future in asked), "all answers")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

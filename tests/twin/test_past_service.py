@@ -12,6 +12,7 @@ from builtin_interfaces.msg import Time
 from lupin_msgs.srv import GetHistory, GetStateAt
 
 from lupin_twin import recent
+from lupin_twin.habits import SERVICE_QOS
 from lupin_twin.history import History
 from lupin_twin.past import (
     HISTORY_SERVICE,
@@ -83,8 +84,10 @@ class Node:
         service = PastService(habits, self.desk, self.memory, TwinStore(), lambda: NOW_NS)
         service.offer(self, None)
 
-    def create_service(self, kind: Any, name: str, callback: Any, callback_group: Any) -> Any:
-        assert callback_group is None
+    def create_service(
+        self, kind: Any, name: str, callback: Any, qos_profile: Any, callback_group: Any
+    ) -> Any:
+        assert (callback_group, qos_profile) == (None, SERVICE_QOS)
         self.callbacks[name] = lambda **request: callback(kind.Request(**request), kind.Response())
         return Remembered()
 

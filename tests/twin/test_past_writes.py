@@ -8,7 +8,7 @@ from lupin_twin.past_writes import MAX_WRITES, WritesRequest
 
 def test_limits_are_allowed() -> None:
     WritesRequest(after=0, reach_s=1e9, reach_count=0, max_count=MAX_WRITES)
-    WritesRequest(max_count=1)
+    WritesRequest(max_count=1, after=2**63 - 1)
 
 
 @pytest.mark.parametrize(
@@ -19,6 +19,7 @@ def test_limits_are_allowed() -> None:
         ({"reach_s": -0.1}, "reach_s is -0.1"),
         ({"reach_s": 1.1e9}, "reach_s is 1100000000"),
         ({"reach_s": float("nan")}, "reach_s is nan"),
+        ({"after": 2**63}, "after is 9223372036854775808, the limit is 9223372036854775807"),
         ({"max_count": 0}, "max_count is 0"),
         ({"max_count": MAX_WRITES + 1}, f"max_count is {MAX_WRITES + 1}"),
     ],

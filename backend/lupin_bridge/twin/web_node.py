@@ -33,7 +33,7 @@ from lupin_twin.estimate_report import REPORT_SERVICE
 from lupin_twin.estimates import ESTIMATE_SERVICE
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.field_rules import field_rules
-from lupin_twin.habits import Habits
+from lupin_twin.habits import SERVICE_QOS, Habits
 from lupin_twin.history import History, TagHistory
 from lupin_twin.journal.condition import Condition
 from lupin_twin.parameters import TwinParameters
@@ -188,7 +188,9 @@ class WebNode(AdjustableNode):
         )
         with naming("field_service_name", p.field_service_name):
             self.clients_of_twin = {
-                service: self.create_client(service.value, name, callback_group=group)
+                service: self.create_client(
+                    service.value, name, qos_profile=SERVICE_QOS, callback_group=group
+                )
                 for service, name in (
                     (Service.FIELD, p.field_service_name),
                     (Service.STATE_AT, STATE_AT_SERVICE),

@@ -39,7 +39,7 @@ from lupin_twin.estimates import (
 )
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRefused
-from lupin_twin.habits import Habits
+from lupin_twin.habits import SERVICE_QOS, Habits
 from lupin_twin.history import History, TagHistory
 from lupin_twin.idw import never
 from lupin_twin.journal.asof import STATE_S_PER_TAG
@@ -138,7 +138,7 @@ class EstimateService:
             (GetEstimate, ESTIMATE_SERVICE, self._on_get_estimate),
             (GetEstimateReport, REPORT_SERVICE, self._on_get_report),
         ):
-            node.create_service(kind, name, callback, callback_group=group)
+            node.create_service(kind, name, callback, qos_profile=SERVICE_QOS, callback_group=group)
 
     def restore(self) -> None:
         """What the journal holds is known again: models can be fitted before a scan comes."""

@@ -33,6 +33,10 @@ DRAIN_S: Final = 0.02
 # at 200 a second, ten of the fifty that may wait. It is believed for as long as says the other.
 BEHIND_S: Final = 0.05
 BELIEVED_S: Final = 0.25
+# Requests that may wait for a service, of all clients together, and answers that may wait in a
+# client, where those to all other clients come along: of more, DDS loses the oldest without a word.
+# ROS's default is 10. The rest is as that has it: reliable, volatile.
+SERVICE_QOS: Final = QoSProfile(depth=50)
 
 
 def waker(condition: Any) -> Callable[[], None]:

@@ -33,7 +33,7 @@ from lupin_twin.field_desk import FieldDesk
 from lupin_twin.field_rules import field_rules
 from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused
 from lupin_twin.grid import FieldGrid
-from lupin_twin.habits import Habits, latched, waker
+from lupin_twin.habits import SERVICE_QOS, Habits, latched, waker
 from lupin_twin.history import History, TagHistory, kind_of
 from lupin_twin.journal.condition import JournalState
 from lupin_twin.journal.runs import Clock as RunClock
@@ -191,10 +191,9 @@ class TwinNode(AdjustableNode):
             self._state_publisher = self.create_publisher(TwinState, p.state_topic, latched(1))
         with naming("times_topic", p.times_topic):
             self._times_publisher = self.create_publisher(TwinTimes, p.times_topic, latched(1))
-        with naming("field_service_name", p.field_service_name):
-            self.create_service(
-                GetField, p.field_service_name, self._on_get_field, callback_group=group
-            )
+        kind, name, answer = GetField, p.field_service_name, self._on_get_field
+        with naming("field_service_name", name):
+            self.create_service(kind, name, answer, qos_profile=SERVICE_QOS, callback_group=group)
         past = (
             RecentPast(self.history, self._workers)
             if self.memory.condition.state is JournalState.OFF

@@ -10,7 +10,7 @@ from lupin_msgs.srv import GetHistory, GetStateAt, GetWrites
 
 from lupin_twin import convert, convert_past, convert_writes, recent
 from lupin_twin.deferred import Later
-from lupin_twin.habits import Habits
+from lupin_twin.habits import SERVICE_QOS, Habits
 from lupin_twin.history import History
 from lupin_twin.journal.asof import STATE_S_PER_TAG, state_at
 from lupin_twin.journal.series import SERIES_S, SERIES_S_PER_TAG, series
@@ -80,7 +80,7 @@ class PastService:
             (GetHistory, HISTORY_SERVICE, self._on_get_history),
             (GetWrites, WRITES_SERVICE, self._on_get_writes),
         ):
-            node.create_service(kind, name, callback, callback_group=group)
+            node.create_service(kind, name, callback, qos_profile=SERVICE_QOS, callback_group=group)
 
     def _on_get_state_at(self, request: Any, response: Any) -> Any:
         def look_up() -> Callable[[], Future[Snapshot]]:

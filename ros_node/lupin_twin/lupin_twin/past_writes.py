@@ -13,6 +13,8 @@ from lupin_twin.past import PastRefused
 
 DEFAULT_WRITES: Final = 1_000
 MAX_WRITES: Final = 2_000
+# The largest that SQLite counts to.
+MAX_NUMBER: Final = 2**63 - 1
 # The service's name, relative to the node's namespace.
 WRITES_SERVICE: Final = "twin/get_writes"
 
@@ -38,6 +40,8 @@ class WritesRequest:
         """Refuse what cannot be answered."""
         if self.after < 0 or self.reach_count < 0:
             raise PastRefused(f"after or reach_count is {min(self.after, self.reach_count)}, not 0")
+        if self.after > MAX_NUMBER:
+            raise PastRefused(f"after is {self.after}, the limit is {MAX_NUMBER}")
         if not 0.0 <= self.reach_s <= 1e9:
             raise PastRefused(f"reach_s is {self.reach_s}, the limits are 0 and 1e9 s")
         if not 1 <= self.max_count <= MAX_WRITES:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import io
+import threading
 import time
 from collections.abc import AsyncIterator, Iterator, Sized
 from contextlib import asynccontextmanager, contextmanager
@@ -141,6 +142,36 @@ def test_a_field_of_a_twin_that_came_long_ago_waits_for_no_service(
                 monkeypatch.setattr(web_node, "NEW_TWIN_S", 0.0)
                 with pytest.raises(TwinUnavailableError, match=r"field: its state is heard"):
                     await twin.field(REQUEST)
+
+    run(domain, test())
+
+
+def test_an_answer_is_not_lost_among_those_to_all_others(domain: int) -> None:
+    """The answers of a service go to all its clients, and a client holds so many of them."""
+    held, may_go_on = threading.Event(), threading.Event()
+
+    def hold(_: Any) -> None:
+        held.set()
+        may_go_on.wait(PATIENCE_S)
+
+    async def test() -> None:
+        with service_in(domain) as service, Peer(domain, "other") as other:
+            async with started() as (twin, _):
+                await found(twin)
+                early = asyncio.create_task(twin.field(REQUEST))
+                await until(lambda: pending(twin), "the question")
+                holding = asyncio.create_task(twin._thread.call(hold))
+                await until(held.is_set, "a thread that is busy")
+                async with service.answering():
+                    await until(lambda: service.asked, "its answer")
+                    for _ in range(5):
+                        requests = [GetField.Request()] * 5
+                        await asyncio.to_thread(
+                            other.ask_all, GetField, "/twin/get_field", requests
+                        )
+                may_go_on.set()
+                await holding
+                assert (await early).grid.width == 2
 
     run(domain, test())
 

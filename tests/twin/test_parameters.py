@@ -159,6 +159,16 @@ def test_what_is_fixed_cannot_and_says_why(name: str) -> None:
     assert len(describe(name).fixed) > 20
 
 
+@pytest.mark.parametrize("wrong", [{"idw_power": "x" * 10**6}, {"layers": {"x": "y" * 10**6}}])
+def test_a_complaint_repeats_no_more_than_the_beginning_of_what_is_long(wrong: Any) -> None:
+    with pytest.raises(ParameterError) as caught:
+        TwinParameters(**wrong)
+    assert len(str(caught.value)) < 200
+    with pytest.raises(ParameterError) as caught:
+        changed(TwinParameters(), {"frame_id": "x" * 10**6})
+    assert len(str(caught.value)) < 400
+
+
 def test_a_plain_off_which_yaml_reads_as_false_is_the_journals_off() -> None:
     assert TwinParameters(journal=False).journal == "off"  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match="parameter journal is True"):

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from hashlib import blake2b
 from typing import Any, Final, TypeVar
 
+from lupin_bridge.twin import web_node
 from lupin_bridge.twin.looking import WRITE_ROW_S, Question, look_up
 from lupin_bridge.twin.names import TwinNames
 from lupin_bridge.twin.relay import Relay
@@ -268,8 +269,11 @@ class WebTwin:
         return snapshot.stamp_ns + int(since_s * NANOSECONDS_PER_SECOND)
 
     async def _find(self, service: Service) -> None:
+        # From here on too: a twin that comes and goes would be a new one for ever.
+        until_s = time.monotonic() + web_node.NEW_TWIN_S
         while not await self._thread.call(lambda node: node.offers(service)):
-            if not await self._thread.call(lambda node: node.has_new_twin):
+            is_new = await self._thread.call(lambda node: node.has_new_twin)
+            if not is_new or time.monotonic() > until_s:
                 raise TwinUnavailableError(
                     await self._thread.call(lambda node: node.why_not(service))
                 )

@@ -11,6 +11,8 @@ from typing import Any, Final
 ORIGINS: Final = ("robot", "simulated", "recorded")
 # Of a parameter that is a list.
 MAX_NAMES: Final = 16
+# Characters of a value that a complaint repeats.
+MAX_SHOWN: Final = 80
 
 
 class ParameterError(ValueError):
@@ -154,13 +156,14 @@ def _checked(name: str, value: object, default: object, metadata: Any) -> object
         value = float(value)
     if type(value) is not expected:
         raise ParameterError(
-            f"parameter {name} is {value!r} ({type(value).__name__}), expected {expected.__name__}"
+            f"parameter {name} is {_shown(value)} ({type(value).__name__}), "
+            f"expected {expected.__name__}"
         )
     if isinstance(value, str) and not value and not metadata["may_be_empty"]:
         raise ParameterError(f"parameter {name} is empty, expected a name")
     if metadata["choices"] and value not in metadata["choices"]:
         raise ParameterError(
-            f"parameter {name} is {value!r}, expected {_one_of(metadata['choices'])}"
+            f"parameter {name} is {_shown(value)}, expected {_one_of(metadata['choices'])}"
         )
     if isinstance(value, int | float) and not isinstance(value, bool):
         low, high = metadata["low"], metadata["high"]
@@ -173,13 +176,19 @@ def _names(name: str, value: object) -> tuple[str, ...]:
     if value is None or isinstance(value, str):
         value = [value or ""]
     if not isinstance(value, list | tuple) or not all(isinstance(one, str) for one in value):
-        raise ParameterError(f"parameter {name} is {value!r}, expected a list of names")
+        raise ParameterError(f"parameter {name} is {_shown(value)}, expected a list of names")
     names = tuple(filter(None, value))
     if len(names) > MAX_NAMES:
         raise ParameterError(
             f"parameter {name} is {len(names)} names, expected {MAX_NAMES} at most"
         )
     return names
+
+
+def _shown(value: object) -> str:
+    """What was given, and of what is long its beginning: a reason goes back to who set it."""
+    text = repr(value)
+    return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}…"
 
 
 def _one_of(choices: tuple[str, ...]) -> str:
@@ -224,7 +233,7 @@ def changed(now: TwinParameters, wanted: Mapping[str, object]) -> TwinParameters
     for name, value in wanted.items():
         if why := describe(name).fixed:
             raise ParameterError(
-                f"parameter {name} is {getattr(now, name)!r} and cannot become {value!r} while "
-                f"the twin runs: {why}"
+                f"parameter {name} is {getattr(now, name)!r} and cannot become {_shown(value)} "
+                f"while the twin runs: {why}"
             )
     return replace(now, **wanted)  # type: ignore[arg-type]  # checked there

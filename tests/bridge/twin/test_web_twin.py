@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import io
-import threading
 import time
 from collections.abc import AsyncIterator, Iterator, Sized
 from contextlib import asynccontextmanager, contextmanager
@@ -18,7 +17,7 @@ import pytest
 from lupin_msgs.msg import SensorReading, TwinState, TwinTagState
 from lupin_msgs.srv import GetField
 
-from lupin_bridge.twin import trust, web_node
+from lupin_bridge.twin import trust
 from lupin_bridge.twin.source import Told, TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.twin.trust import TRUST_S
 from lupin_bridge.twin.web_node import Service as Asked
@@ -29,7 +28,7 @@ from tests.support.live import attached, wait_until_ready
 from tests.support.messages import occupancy_grid, scan
 from tests.support.processes import lupin_twin, twin_node
 from tests.support.ros import Peer
-from tests.support.waiting import PATIENCE_S, until, wait_for
+from tests.support.waiting import until, wait_for
 
 # A state every 3 s.
 SLOW = ("--ros-args", "-p", "state_publish_rate_hz:=0.33")
@@ -106,72 +105,6 @@ def test_without_a_twin_a_field_is_refused_at_once_by_the_services_name(domain: 
         async with started() as (twin, _):
             with pytest.raises(TwinUnavailableError, match="/twin/get_field: is it running"):
                 await twin.field(REQUEST)
-
-    run(domain, test())
-
-
-def test_a_field_of_a_twin_that_has_just_come_waits_for_its_service(
-    domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(web_node, "NEW_TWIN_S", PATIENCE_S)
-
-    async def test() -> None:
-        with Peer(domain) as peer:
-            async with started() as (twin, told):
-                peer.publish("/twin/state", TwinState(), depth=1)
-                await until(lambda: told, "a state of the twin")
-                early = asyncio.create_task(twin.field(REQUEST))
-                # Refused, it would have been by then.
-                for _ in range(3):
-                    await twin._thread.call(lambda _: None)
-                assert not early.done()
-                async with Service(peer).answering():
-                    assert (await early).grid.width == 2
-
-    run(domain, test())
-
-
-def test_a_field_of_a_twin_that_came_long_ago_waits_for_no_service(
-    domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    async def test() -> None:
-        with Peer(domain) as peer:
-            async with started() as (twin, told):
-                peer.publish("/twin/state", TwinState(), depth=1)
-                await until(lambda: told, "a state of the twin")
-                monkeypatch.setattr(web_node, "NEW_TWIN_S", 0.0)
-                with pytest.raises(TwinUnavailableError, match=r"field: its state is heard"):
-                    await twin.field(REQUEST)
-
-    run(domain, test())
-
-
-def test_an_answer_is_not_lost_among_those_to_all_others(domain: int) -> None:
-    """The answers of a service go to all its clients, and a client holds so many of them."""
-    held, may_go_on = threading.Event(), threading.Event()
-
-    def hold(_: Any) -> None:
-        held.set()
-        may_go_on.wait(PATIENCE_S)
-
-    async def test() -> None:
-        with service_in(domain) as service, Peer(domain, "other") as other:
-            async with started() as (twin, _):
-                await found(twin)
-                early = asyncio.create_task(twin.field(REQUEST))
-                await until(lambda: pending(twin), "the question")
-                holding = asyncio.create_task(twin._thread.call(hold))
-                await until(held.is_set, "a thread that is busy")
-                async with service.answering():
-                    await until(lambda: service.asked, "its answer")
-                    for _ in range(5):
-                        requests = [GetField.Request()] * 5
-                        await asyncio.to_thread(
-                            other.ask_all, GetField, "/twin/get_field", requests
-                        )
-                may_go_on.set()
-                await holding
-                assert (await early).grid.width == 2
 
     run(domain, test())
 

@@ -367,7 +367,8 @@ ROOMS: Mapping[str, set[str]] = {
     "metrics": set(),
     "supervisor": set(),
     "message_schemas": set(),
-    "bags": {"message_schemas"},
+    "telling": set(),
+    "bags": {"message_schemas", "telling"},
     "settings": {"logs"},
     "configuration": {"settings"},
     "query_string": set(),
@@ -430,7 +431,7 @@ ROOMS: Mapping[str, set[str]] = {
         "supervisor",
         "twin",
     },
-    "journal_command": {"bags", "judge", "past"},
+    "journal_command": {"bags", "judge", "past", "telling"},
     "cli": {"bags", "configuration", "journal_command", "logs", "roles", "settings"},
     "openapi": {"app"},
 }

@@ -39,7 +39,7 @@ class Heard:
 
 
 class BagWriter:
-    """Writes a recording in a thread of its own; `say(line)` is called there.
+    """Writes a recording in a thread of its own; `say(line)` is called there, and must not raise.
 
     `lost` counts what there was no room for; `is_whole`: all else is in the files, which are
     finished once it has ended. `on_failure()` is called where the thread ends by itself: nothing is
@@ -122,8 +122,10 @@ class BagWriter:
             self._finish()
         except Exception as error:  # noqa: BLE001  # no thread dies unseen
             self.is_whole = False
-            self._say(f"recording has failed: {error!r}")
-            self._on_failure()
+            try:
+                self._say(f"recording has failed: {error!r}")
+            finally:
+                self._on_failure()
 
     def _finish(self) -> None:
         try:

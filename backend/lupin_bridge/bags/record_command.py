@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import signal
-import sys
 import threading
 import time
 from collections.abc import Sequence
@@ -14,6 +13,7 @@ from typing import Final
 from lupin_bridge.bags.bag_writer import BagWriter
 from lupin_bridge.bags.rotation import Limits, Recording
 from lupin_bridge.bags.topics import SUFFIX, Topic
+from lupin_bridge.telling import hold_streams, say, tell
 from lupin_twin import stop_signals
 from lupin_twin.half_made import remove_half_made
 from lupin_twin.parameters import ParameterError
@@ -64,6 +64,7 @@ def _positive(text: str) -> float:
 
 def run(options: argparse.Namespace, ros_args: Sequence[str]) -> int:
     """Record until a signal ends it; returns the process's exit code."""
+    hold_streams()
     path: Path = options.file
     if path.suffix != SUFFIX:
         say(f"{path} does not end in {SUFFIX}: that is how its form is known")
@@ -136,7 +137,7 @@ def _record(path: Path, limits: Limits) -> int:
         node.destroy_node()
     files = ", ".join(map(str, recording.paths))
     what = "recorded" if writer.is_whole else "heard, but not all of it recorded:"
-    sys.stdout.write(f"{what} {writer.summary()} in {files}\n")
+    tell(f"{what} {writer.summary()} in {files}")
     return 0 if is_well and writer.is_whole and not writer.lost else FAILED
 
 
@@ -145,9 +146,3 @@ def _begin(path: Path, topics: Sequence[Topic], limits: Limits) -> Recording:
         return Recording(path, topics, limits, time.monotonic())
     except OSError as error:
         raise RecordError(f"cannot make {path}: {error.strerror}") from error
-
-
-def say(text: str) -> None:
-    """A line for people, beside the output."""
-    sys.stderr.write(f"lupin-twin: {' '.join(text.split())}\n")
-    sys.stderr.flush()

@@ -3,6 +3,8 @@ from __future__ import annotations
 import errno
 import math
 import os
+import sys
+import threading
 import time
 from pathlib import Path
 
@@ -11,6 +13,7 @@ import pytest
 from lupin_bridge.bags import bag_writer
 from lupin_bridge.bags.bag_writer import BagWriter, Heard
 from lupin_bridge.bags.rotation import Limits, Recording
+from lupin_bridge.telling import say
 from tests.support.bags import CLOCK, OBSERVATIONS, TOPICS, no_file_above, read, read_unfinished
 from tests.support.waiting import wait_for
 
@@ -143,6 +146,50 @@ def test_a_thread_that_fails_says_so_and_is_not_waited_for(tmp_path: Path) -> No
     writer.end()
     assert not writer.is_whole
     assert said == ["recording has failed: RuntimeError('a fault')"]
+
+
+def test_a_thread_that_fails_where_nothing_can_be_said_is_not_waited_for(tmp_path: Path) -> None:
+    class Broken(Recording):
+        def write(self, *_: object) -> None:
+            raise RuntimeError("a fault")
+
+    class Unheard(Exception):
+        pass
+
+    def say(_: str) -> None:
+        raise Unheard
+
+    ended = threading.Event()
+    recording = Broken(tmp_path / "a.mcap", TOPICS, NEVER, 0.0)
+    writer = BagWriter(recording, NAMES, say, ended.set)
+    writer.put(Heard(CLOCK, 1, 1, b"x"))
+    with pytest.raises(Unheard):  # as it would in its thread
+        writer._run()
+    assert ended.is_set()
+    assert not writer.is_whole
+
+
+def test_what_is_heard_is_written_when_nobody_can_be_told_any_more(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As by `2>&1 | tee log` whose tee was killed."""
+    monkeypatch.setattr(bag_writer, "TELL_S", 0.0)
+    path, failures = tmp_path / "a.mcap", list[bool]()
+    reader, pipe = os.pipe()
+    with os.fdopen(pipe, "w") as stderr:
+        monkeypatch.setattr(sys, "stderr", stderr)
+        recording = Recording(path, TOPICS, NEVER, time.monotonic())
+        writer = BagWriter(recording, NAMES, say, lambda: failures.append(True))
+        writer.start()
+        writer.put(Heard(CLOCK, 0, 0, b"0"))
+        wait_for(lambda: b"1 messages" in os.read(reader, 1000), "its first line")
+        os.close(reader)
+        for number in range(1, 4):
+            writer.put(Heard(CLOCK, number, number, b"%d" % number))
+            wait_for(lambda: len(read_unfinished(path)) > number, "it in the file")  # noqa: B023
+        writer.end()
+    assert [data for *_, data in read(path)] == [b"0", b"1", b"2", b"3"]
+    assert (writer.is_whole, failures) == (True, [])
 
 
 def test_the_next_file_is_told(tmp_path: Path) -> None:

@@ -27,9 +27,11 @@ from tests.support.ros import Peer, clock_at
 from tests.support.waiting import wait_for
 
 
-def recorder(domain: int, *args: str | Path) -> Process:
-    """`lupin-twin record`."""
+def recorder(domain: int, *args: str | Path, streams: str = "") -> Process:
+    """`lupin-twin record`; its `streams` may be led elsewhere by a shell."""
     command = [sys.executable, "-m", "lupin_bridge.cli", "record", *map(str, args)]
+    if streams:
+        command = ["bash", "-c", f'exec "$@" {streams}', "bash", *command]
     return Process(command, ros_env(domain))
 
 
@@ -86,6 +88,20 @@ def test_what_is_recorded_is_what_was_sent(domain: int, tmp_path: Path) -> None:
         }
     assert durabilities.pop("/clock") == "VOLATILE"
     assert set(durabilities.values()) == {"TRANSIENT_LOCAL"}
+
+
+@pytest.mark.parametrize("streams", ["2>/dev/full", ">/dev/full", "<&- >&- 2>&-", "> >(:) 2>&1"])
+def test_whoever_can_be_told_nothing_is_recorded_for(
+    domain: int, tmp_path: Path, streams: str
+) -> None:
+    path = tmp_path / "a.mcap"
+    with Peer(domain) as peer, recorder(domain, path, streams=streams) as process:
+        peer.observe(scan("a", {"temperature": 21.5}))
+        peer.until(lambda: path.exists() and read_unfinished(path), "it in the file")
+        assert process.stop() == 0
+        assert "Traceback" not in process.output
+        assert "Error" not in process.output
+    assert len(read(path)) == 1
 
 
 @pytest.mark.parametrize(

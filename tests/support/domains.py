@@ -17,7 +17,7 @@ DOMAINS = range(1, 102)
 
 @contextmanager
 def own_domain() -> Iterator[int]:
-    """Lease a ROS_DOMAIN_ID that no other test on this machine has now."""
+    """Lease a ROS_DOMAIN_ID that no other test on this machine has now, nor anybody else."""
     folder = Path(tempfile.gettempdir()) / "lupin-twin-test-domains"
     folder.mkdir(exist_ok=True)
     # Where to begin differs by process, so that a domain is not reused right after its last user.
@@ -29,15 +29,31 @@ def own_domain() -> Iterator[int]:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 continue
+            if _is_lived_in(domain):
+                continue
             _remove_ports_of(domain)
             yield domain
             return
-    raise RuntimeError("all ROS domains are in use by other tests")
+    raise RuntimeError("all ROS domains are in use")
+
+
+def _is_lived_in(domain: int, table: Path = Path("/proc/net/udp")) -> bool:
+    """Whether a process is there that no test has started, a twin at work, say.
+
+    It would hear what tests publish, and they what it does. By the ports on which DDS listens.
+    """
+    addresses = (line.split()[1] for line in table.read_text(encoding="ascii").splitlines()[1:])
+    return any(int(address.rpartition(":")[2], 16) in _ports_of(domain) for address in addresses)
+
+
+def _ports_of(domain: int) -> range:
+    """Those that RTPS 2.3, section 9.6.2.3, gives a domain."""
+    return range(7400 + 250 * domain, 7400 + 250 * (domain + 1))
 
 
 def _remove_ports_of(domain: int, folder: Path = SHARED_MEMORY) -> None:
     """Remove what killed processes left of a domain's ports: half-made, they stop whoever comes."""
-    for port in range(7400 + 250 * domain, 7400 + 250 * (domain + 1)):
+    for port in _ports_of(domain):
         for name in (f"fastrtps_port{port}", f"fastrtps_port{port}_el"):
             (folder / name).unlink(missing_ok=True)
         (folder / f"sem.fastrtps_port{port}_mutex").unlink(missing_ok=True)

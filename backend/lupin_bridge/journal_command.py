@@ -14,9 +14,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import IO, Final
+from typing import Final
 
 from lupin_bridge.bags.topics import SUFFIX
+from lupin_bridge.journal_output import CannotWrite, Write, writing
 from lupin_bridge.judge.choosing import own_sensors
 from lupin_bridge.past import table
 from lupin_bridge.past.moments import MAX_SECONDS, moment
@@ -47,6 +48,19 @@ _TELL_EVERY_S: Final = 0.5
 
 class JournalError(Exception):
     """What is asked for cannot be done; the message is the one line that says why."""
+
+
+# What is told as it stands.
+_TOLD: Final = (
+    JournalError,
+    CannotWrite,
+    PastRefused,
+    NotRemembered,
+    InUse,
+    Empty,
+    Foreign,
+    NotPossible,
+)
 
 
 def add_parser(roles: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -83,7 +97,11 @@ def add_parser(roles: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
             own.add_argument("--to", dest="end", metavar="TIME", help=f"until before then: {when}")
             own.add_argument("--tag", metavar="ID", help="one tag alone")
             own.add_argument("--sensor", metavar="NAME", help="one sensor alone")
-            own.add_argument("--output", metavar="FILE", help="not to the standard output")
+            own.add_argument(
+                "--output",
+                metavar="FILE",
+                help="not to the standard output but to this file, which must not be there yet",
+            )
 
 
 def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
@@ -101,7 +119,7 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
         return FAILED
     except KeyboardInterrupt:
         return INTERRUPTED
-    except (JournalError, PastRefused, NotRemembered, InUse, Empty, Foreign, NotPossible) as error:
+    except _TOLD as error:
         return _fail(str(error))
     except (*FILE_ERRORS, OSError) as error:
         if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_INTERRUPT:
@@ -256,18 +274,25 @@ def _export(path: Path, options: argparse.Namespace) -> int:
         raise JournalError(f"--to is {seconds(end_ns)}, before --from, {seconds(start_ns)}")
     if options.recording is not None:
         return _record(path, options, start_ns, end_ns)
+    _check_output(options.output)
     with closing(_reader(path)) as connection:
         lots = rows(connection, start_ns, end_ns, options.tag, options.sensor)
         if options.output is None:
-            _write_csv(lots, sys.stdout.buffer)
-            return 0
-        try:
-            # Unbuffered: what could not be written is told here, and not as the file is closed.
-            with Path(options.output).open("wb", buffering=0) as output:
-                _write_csv(lots, output)
-        except OSError as error:
-            raise JournalError(f"cannot write {options.output}: {error.strerror}") from error
+            _write_csv(lots, sys.stdout.buffer.write)
+        else:
+            with writing(options.output, path) as write:
+                _write_csv(lots, write)
     return 0
+
+
+def _check_output(output: str | None) -> None:
+    if output == "":
+        raise JournalError("--output is '', must name a file")
+    if output is not None and output.lower().endswith(SUFFIX):
+        raise JournalError(
+            f"--output {output} would be CSV: for a recording name it without --output,"
+            f" lupin-twin journal export {output}"
+        )
 
 
 def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int) -> int:
@@ -298,17 +323,11 @@ def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int)
     return 0
 
 
-def _write_csv(lots: Iterable[Sequence[PastRow]], output: IO[bytes]) -> None:
+def _write_csv(lots: Iterable[Sequence[PastRow]], write: Write) -> None:
     sensors = own_sensors()
-    _write(output, table.HEADER)
+    write(table.HEADER)
     for lot in lots:
-        _write(output, table.lines(lot, sensors))
-
-
-def _write(output: IO[bytes], text: bytes) -> None:
-    rest = memoryview(text)
-    while rest:
-        rest = rest[output.write(rest) :]
+        write(table.lines(lot, sensors))
 
 
 # --- vacuum --------------------------------------------------------------------------------------

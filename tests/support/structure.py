@@ -431,7 +431,8 @@ ROOMS: Mapping[str, set[str]] = {
         "supervisor",
         "twin",
     },
-    "journal_command": {"bags", "judge", "past", "telling"},
+    "journal_output": set(),
+    "journal_command": {"bags", "journal_output", "judge", "past", "telling"},
     "cli": {"bags", "configuration", "journal_command", "logs", "roles", "settings"},
     "openapi": {"app"},
 }

@@ -1,0 +1,99 @@
+"""Where `lupin-twin journal` writes its rows to: a file that is new, or a special one."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Final
+
+Write = Callable[[bytes], object]
+
+# What the shell has opened already: for its name the system would open the file behind it anew.
+_DESCRIPTOR: Final = re.compile(r"/dev/(stdout|stderr)|(?:/dev|/proc/self)/fd/([0-9]{1,6})")
+_NUMBERS: Final = {"stdout": 1, "stderr": 2}
+# What SQLite, the lock and vacuum keep beside a journal, be it there now or not.
+_BESIDE: Final = ("", "-wal", "-shm", "-journal", ".lock", ".vacuum")
+
+
+class CannotWrite(Exception):
+    """What was asked for has nowhere to go; the message is the one line that says why."""
+
+
+@contextmanager
+def writing(target: str, journal: Path) -> Iterator[Write]:
+    """Write bytes to a file that was not there, and is not there where anything goes wrong.
+
+    A device, a FIFO and what the shell has opened (`/dev/stdout`) are written as they are.
+
+    Raises:
+        CannotWrite: there is such a file, it is one of the journal's own, or the disk is full.
+        BrokenPipeError: who read it has gone.
+
+    """
+    if os.path.realpath(target) in _own_files(journal):
+        raise CannotWrite(f"{target} is a file of the journal itself, and nothing is overwritten")
+    with _told(target):
+        descriptor, is_new = _open(target)
+
+    def write(data: bytes) -> None:
+        rest = memoryview(data)
+        while rest:
+            with _told(target):
+                rest = rest[os.write(descriptor, rest) :]
+
+    try:
+        try:
+            yield write
+        finally:
+            with _told(target):
+                os.close(descriptor)
+    except BaseException:
+        # Half of an export looks like all of it.
+        if is_new:
+            with suppress(OSError):
+                Path(target).unlink()
+        raise
+
+
+def _open(target: str) -> tuple[int, bool]:
+    """Its descriptor, and whether the file was made here."""
+    opened = _DESCRIPTOR.fullmatch(target)
+    if opened:
+        name, number = opened.groups()
+        return os.dup(_NUMBERS[name] if name else int(number)), False
+    try:
+        new = os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
+    except FileExistsError:
+        if not _is_special(target):
+            raise
+        return os.open(target, os.O_WRONLY | os.O_CLOEXEC), False
+    return new, True
+
+
+def _is_special(target: str) -> bool:
+    """Whether it is neither a regular file nor a link to nothing."""
+    try:
+        return not stat.S_ISREG(Path(target).stat().st_mode)
+    except FileNotFoundError:
+        return False
+
+
+def _own_files(journal: Path) -> set[str]:
+    names = {str(journal), os.path.realpath(journal)}
+    return {os.path.realpath(name + end) for name in names for end in _BESIDE}
+
+
+@contextmanager
+def _told(target: str) -> Iterator[None]:
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except FileExistsError as error:
+        raise CannotWrite(f"{target} is there already, and nothing is overwritten") from error
+    except OSError as error:
+        raise CannotWrite(f"cannot write {target}: {error.strerror}") from error

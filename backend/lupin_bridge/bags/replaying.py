@@ -8,7 +8,7 @@ import time
 from argparse import Namespace
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Final
 
 import rclpy
@@ -241,21 +241,20 @@ class Progress:
         """Say where the player is, twice a second, and at once what it waits for, and news."""
         for text in (*(gap.told(self._speed) for gap in player.take_gaps()), *news):
             if self._is_seen:
-                sys.stderr.write("\r\x1b[K")
+                _write("\r\x1b[K")
             _say(text)
         if self._is_seen and time.monotonic() - self._told_s >= _TELL_EVERY_S:
             self._told_s = time.monotonic()
             paused = ", paused" if player.is_paused else ""
-            sys.stderr.write(
+            _write(
                 f"\r\x1b[K{player.position_s:.1f}{self._end}{player.published:,} messages{paused}"
             )
-            sys.stderr.flush()
 
     def end(self) -> None:
         """Leave the line as it is."""
         if self._is_seen:
             self._is_seen = False
-            sys.stderr.write("\n")
+            _write("\n")
 
     def __enter__(self) -> None:
         pass
@@ -265,4 +264,11 @@ class Progress:
 
 
 def _say(text: str) -> None:
-    sys.stderr.write(f"lupin-twin: {text}\n")
+    _write(f"lupin-twin: {text}\n")
+
+
+def _write(text: str) -> None:
+    # Who reads it may be gone, or the disk full: what is replayed is for others.
+    with suppress(OSError):
+        sys.stderr.write(text)
+        sys.stderr.flush()

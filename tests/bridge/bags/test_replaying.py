@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import io
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -299,6 +302,27 @@ def test_at_its_end_everybody_gets_the_last_words_unless_it_is_held(played: Any)
 
     played(held, "--hold", stop_asked)
     assert (held.published, held.delivered_s) == (2, [])
+
+
+class Full(io.StringIO):
+    """A terminal that takes nothing any more."""
+
+    def isatty(self) -> bool:
+        return True
+
+    def write(self, text: str) -> int:
+        raise OSError(errno.ENOSPC, text)
+
+
+def test_it_goes_on_although_nothing_can_be_said(
+    played: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(replaying, "_TELL_EVERY_S", 0.0)
+    monkeypatch.setattr(sys, "stderr", Full())
+    node = Nobody()
+    node.others = ["/gazebo"]
+    played(node, "", lambda: False)
+    assert node.published == 2
 
 
 def test_who_else_tells_the_time_is_told_once_also_who_comes_later(

@@ -25,7 +25,7 @@ from lupin_twin.journal.checking import find_all_damage
 from lupin_twin.journal.export import rows
 from lupin_twin.journal.lock import InUse, holder_of
 from lupin_twin.journal.overview import Overview, RunExtent, overview
-from lupin_twin.journal.schema import FILE_ERRORS, Empty, Foreign, open_reader, says_damaged
+from lupin_twin.journal.schema import FILE_ERRORS, Empty, Foreign, open_named, says_damaged
 from lupin_twin.journal.vacuuming import NotPossible, hear_interrupts, vacuum
 from lupin_twin.memory import demo_journal_path, journal_path
 from lupin_twin.past import NotRemembered, PastRefused, PastRow, seconds
@@ -34,7 +34,7 @@ ACTIONS: Final[Mapping[str, str]] = {
     "info": "what is in it: size, rows, tags, sensors, how far back, runs of the clock",
     "check": "read all of it for damage; exit code 1 if there is any",
     "export": "its readings and failed tries as CSV, or its observations as a recording",
-    "vacuum": "make the file as small as what is in it; its twin has to be stopped",
+    "vacuum": "make a whole file as small as what is in it; its twin has to be stopped",
 }
 FAILED: Final = 1
 INTERRUPTED: Final = 130
@@ -163,12 +163,12 @@ def _domain(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
 
 def _reader(path: Path) -> sqlite3.Connection:
     try:
-        connection = open_reader(path)
+        connection = open_named(path)
     except sqlite3.OperationalError:
         # SQLite wants to write beside a file that it reads. Where nobody can, nobody writes it.
         if path.with_name(path.name + "-wal").exists() or holder_of(path) is not None:
             raise
-        connection = open_reader(path, is_still=True)
+        connection = open_named(path, is_still=True)
     hear_interrupts(connection)
     return connection
 
@@ -335,7 +335,7 @@ def _write_csv(lots: Iterable[Sequence[PastRow]], write: Write) -> None:
 
 def _vacuum(path: Path) -> int:
     progress = _Progress()
-    before, after = vacuum(path, "lupin-twin journal vacuum", lambda s: progress.tell("copying", s))
+    before, after = vacuum(path, "lupin-twin journal vacuum", progress.tell)
     progress.clear()
     sys.stdout.write(f"{path}: {_mb(before)} before, {_mb(after)} after\n")
     return 0

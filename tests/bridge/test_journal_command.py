@@ -120,7 +120,7 @@ def test_a_journal_that_is_just_being_made_is_called_empty(
 ) -> None:
     path = tmp_path / "j.sqlite"
     path.touch()
-    for action in ("info", "check", "export"):
+    for action in ("info", "check", "export", "vacuum"):
         said = Said(capsys, action, "--journal", path)
         assert said.code == 1
         assert "j.sqlite is empty: a journal that is just being made, or none" in said.err
@@ -139,6 +139,13 @@ def test_somebody_else_s_file_is_left_and_named(
         assert said.code == 1
         assert "is a database, but not a journal of lupin-twin" in said.err
     assert foreign.read_bytes() == before
+    recorded = tmp_path / "rot.mcap"
+    recorded.write_bytes(b"\x89MCAP0\r\n" * 1000)
+    for action in ("info", "check", "export", "vacuum"):
+        said = Said(capsys, action, "--journal", recorded)
+        assert (said.code, said.out) == (1, "")
+        line = f"lupin-twin: {recorded} is no journal: it does not begin as SQLite's files do\n"
+        assert said.err == line
 
 
 # --- what it says --------------------------------------------------------------------------------
@@ -203,6 +210,11 @@ def test_check_says_what_is_damaged_and_ends_with_1(
     assert lines[0] == "scan 100 of tag '7' is not what was written"
     assert lines[-1] == f"{path} is damaged in 20 places"
     assert len(lines) == 21
+    content = path.read_bytes()
+    refused = Said(capsys, "vacuum", "--journal", path)
+    assert (refused.code, refused.out) == (1, "")
+    assert f"{path} is damaged and left as it is (scan 100 of tag '7'" in refused.err
+    assert path.read_bytes() == content
     path.write_bytes(path.read_bytes()[:9000])
     said = Said(capsys, "check", "--journal", path)
     assert said.code == 1

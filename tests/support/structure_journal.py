@@ -153,7 +153,12 @@ JOURNAL: Mapping[str, set[str]] = {
         "journal.schema",
         "past",
     },
-    "journal.vacuuming": {"journal.lock", "journal.retention", "journal.schema"},
+    "journal.vacuuming": {
+        "journal.checking",
+        "journal.lock",
+        "journal.retention",
+        "journal.schema",
+    },
     "journal.writer": {
         "journal.condition",
         "journal.file",

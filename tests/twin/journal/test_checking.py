@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import random
+import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
@@ -43,6 +44,18 @@ def changed(path: Path, sql: str) -> None:
 
 def test_a_whole_file_is_whole(path: Path) -> None:
     assert damage(path) == []
+
+
+@pytest.mark.parametrize("where", ["structure", "scan"])
+def test_to_be_interrupted_is_no_damage(where: str, path: Path) -> None:
+    with closing(open_reader(path)) as connection:
+
+        def tell(what: str, share: float) -> None:
+            if what == where:
+                connection.set_progress_handler(lambda: 1, 1)
+
+        with pytest.raises(sqlite3.OperationalError, match="interrupted"):
+            list(find_all_damage(connection, tell))
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from lupin_twin.journal.schema import (
     Empty,
     Foreign,
     find_damage,
+    open_named,
     open_reader,
     open_writer,
     says_damaged,
@@ -146,6 +147,24 @@ def test_a_file_that_is_no_database_is_damaged(tmp_path: Path) -> None:
         open_writer(text)
     assert says_damaged(caught.value)
     assert find_damage(text)
+
+
+@pytest.mark.parametrize("content", [b"x", b"\x89MCAP0\r\n" * 1000])
+def test_a_named_file_that_is_no_database_is_somebody_elses(content: bytes, path: Path) -> None:
+    path.write_bytes(content)
+    with pytest.raises(Foreign, match="is no journal: it does not begin as SQLite's files do"):
+        open_named(path)
+
+
+def test_a_named_journal_whose_header_is_damaged_is_damaged(path: Path) -> None:
+    with closing(open_named(path)) as connection:
+        assert connection.execute("SELECT count(*) FROM scan").fetchone() == (0,)
+    whole = bytearray(path.read_bytes())
+    whole[21] ^= 0x10  # what says how pages are divided
+    path.write_bytes(whole)
+    with pytest.raises(sqlite3.DatabaseError) as caught:
+        open_named(path)
+    assert says_damaged(caught.value)
 
 
 def test_a_journal_with_a_damaged_header_is_damaged_and_not_somebody_elses(path: Path) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import shutil
+import sqlite3
 import subprocess
 import sys
 from contextlib import closing
@@ -10,7 +11,7 @@ from typing import NamedTuple
 import pytest
 
 from lupin_twin.journal.lock import InUse, Lock
-from lupin_twin.journal.schema import open_reader, open_writer
+from lupin_twin.journal.schema import Empty, Foreign, open_reader, open_writer
 from lupin_twin.journal.vacuuming import NotPossible, vacuum
 from tests.support.journal import NOW, SECOND, is_whole, kept, known, pin, scan
 
@@ -32,7 +33,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def small(path: Path) -> tuple[int, int]:
-    return vacuum(path, "a test", lambda share: None)
+    return vacuum(path, "a test", lambda what, share: None)
 
 
 def test_the_file_shrinks_and_holds_what_it_held(path: Path) -> None:
@@ -47,6 +48,45 @@ def test_the_file_shrinks_and_holds_what_it_held(path: Path) -> None:
     assert small(path) == (after, after)
     # And it can be written as before, numbers going on.
     assert kept(path, [scan("new")]) == (1, 0)
+
+
+@pytest.mark.parametrize(
+    ("content", "refusal"), [(b"", Empty), (b"x", Foreign), (b"\x89MCAP0\r\n" * 1000, Foreign)]
+)
+def test_a_file_that_is_no_journal_is_left_and_nothing_made_beside_it(
+    content: bytes, refusal: type[Exception], tmp_path: Path
+) -> None:
+    theirs = tmp_path / "theirs"
+    theirs.write_bytes(content)
+    with pytest.raises(refusal):
+        small(theirs)
+    assert theirs.read_bytes() == content
+    assert list(tmp_path.iterdir()) == [theirs]
+
+
+def test_a_database_that_is_no_journal_is_left_and_nothing_made_beside_it(tmp_path: Path) -> None:
+    theirs = tmp_path / "theirs.sqlite"
+    with closing(sqlite3.connect(theirs)) as connection:
+        connection.execute("CREATE TABLE mine (a)")
+    content = theirs.read_bytes()
+    with pytest.raises(Foreign):
+        small(theirs)
+    assert theirs.read_bytes() == content
+    assert list(tmp_path.iterdir()) == [theirs]
+
+
+def test_a_damaged_journal_is_left_as_it_is(path: Path) -> None:
+    with closing(open_writer(path)) as connection:
+        connection.execute("UPDATE scan SET readings = x'00' WHERE id = 4700")
+        connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    content = path.read_bytes()
+    said = r"j\.sqlite is damaged and left as it is \(scan 4700 of tag '7' is not what was wri"
+    with pytest.raises(NotPossible, match=said):
+        small(path)
+    assert path.read_bytes() == content
+    assert not path.with_name("j.sqlite.vacuum").exists()
+    # Nobody keeps it: its twin can have it.
+    Lock(path, "a twin").release()
 
 
 def test_while_a_twin_has_it_it_is_refused_by_name(path: Path) -> None:

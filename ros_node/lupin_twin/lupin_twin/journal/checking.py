@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sqlite3
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from typing import Any, Final
 
 from lupin_twin.journal.packing import (
@@ -35,11 +35,15 @@ _MEAN_TOLERANCE: Final = 1e-9
 Progress = Callable[[str, float], None]
 
 
-def find_all_damage(connection: sqlite3.Connection, tell: Progress) -> Iterator[str]:
+def find_all_damage(connection: sqlite3.Connection, tell: Progress) -> Generator[str, None, None]:
     """Everything that is wrong with a journal, a sentence each, as it is found.
 
     `tell(what, share)` is called as the work goes on, with the share of it that is done. What lies
     on pages that cannot be read is told once, with the table that it ends the reading of.
+
+    Raises:
+        sqlite3.OperationalError: somebody interrupts it; that is no damage.
+
     """
     tell("structure", 0.0)
     try:
@@ -56,13 +60,20 @@ def find_all_damage(connection: sqlite3.Connection, tell: Progress) -> Iterator[
                 if pin is None:
                     yield f"pin {number} is not what was written"
     except FILE_ERRORS as error:
+        _raise_interrupt(error)
         yield f"what rows have in common cannot be read: {error}"
         return
     for table in _EVERY_TABLE:
         try:
             yield from _rows(connection, table, every, tell)
         except sqlite3.Error as error:
+            _raise_interrupt(error)
             yield f"{table}: cannot be read on: {error}"
+
+
+def _raise_interrupt(error: Exception) -> None:
+    if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_INTERRUPT:
+        raise error
 
 
 def _lost_series(connection: sqlite3.Connection, every: dict[int, Series]) -> Iterator[str]:

@@ -92,6 +92,7 @@ CREATE VIEW scans AS
         JOIN name AS mission ON mission.id = scan.mission;
 """  # noqa: S608  # of constants
 
+_MAGIC: Final = b"SQLite format 3\0"
 # Errors that say that the file itself is no longer what was written.
 _DAMAGE: Final = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB})
 _BAD_TEXT: Final = ("Could not decode to UTF-8", "malformed JSON")
@@ -228,6 +229,31 @@ def open_reader(path: Path, *, is_still: bool = False, kept: Kept | None = None)
         connection.close()
         raise
     return connection
+
+
+def open_named(path: Path, *, is_still: bool = False) -> Reader:
+    """As `open_reader`, of a file that somebody names: what is no database is not called damaged.
+
+    Raises:
+        Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_reader`.
+
+    """
+    try:
+        return open_reader(path, is_still=is_still)
+    except (sqlite3.DatabaseError, Empty) as error:
+        # Looked at only now: to close a file that SQLite has open takes its locks away. To SQLite
+        # a file of a few bytes is empty.
+        code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_NOTADB)
+        if code == sqlite3.SQLITE_NOTADB and _starts_as_something_else(path):
+            raise Foreign(
+                f"{path} is no journal: it does not begin as SQLite's files do"
+            ) from error
+        raise
+
+
+def _starts_as_something_else(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(_MAGIC)) not in {b"", _MAGIC}
 
 
 def _check_identity(connection: sqlite3.Connection, path: Path) -> None:

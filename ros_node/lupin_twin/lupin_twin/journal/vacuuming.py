@@ -10,14 +10,14 @@ import os
 import shutil
 import sqlite3
 import threading
-from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 from typing import Final
 
+from lupin_twin.journal.checking import Progress, find_all_damage
 from lupin_twin.journal.lock import Lock
 from lupin_twin.journal.retention import used_bytes
-from lupin_twin.journal.schema import open_writer, sync_folder
+from lupin_twin.journal.schema import open_named, open_writer, sync_folder
 
 _TELL_EVERY_S: Final = 0.5
 _INSTRUCTIONS: Final = 100_000
@@ -29,19 +29,25 @@ class NotPossible(Exception):
     """It cannot be made smaller now; the message says why. The file is as it was."""
 
 
-def vacuum(path: Path, holder: str, tell: Callable[[float], None]) -> tuple[int, int]:
+def vacuum(path: Path, holder: str, tell: Progress) -> tuple[int, int]:
     """Make the file small; returns its bytes before and after.
 
-    `tell(share)` is called twice a second in a thread of its own.
+    All of it is read for damage first: a copy without gaps would have lost what is still to be
+    saved of a damaged one. `tell(what, share)` is called as the work goes on, of the copying twice
+    a second in a thread of its own.
 
     Raises:
         InUse: a twin has it.
-        NotPossible: no room on its disk, or somebody reads it.
-        Foreign, sqlite3.Error, OSError: as `open_writer`.
+        NotPossible: it is damaged, no room on its disk, or somebody reads it.
+        Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_named`.
 
     """
+    # Not a thing is made beside a file that is no journal.
+    with closing(open_named(path)):
+        pass
     copy = path.with_name(path.name + ".vacuum")
     with Lock(path, holder):
+        _refuse_damaged(path, tell)
         before = path.stat().st_size
         try:
             _copy(path, copy, tell)
@@ -62,7 +68,19 @@ def hear_interrupts(connection: sqlite3.Connection) -> None:
     connection.set_progress_handler(lambda: 0, _INSTRUCTIONS)
 
 
-def _copy(path: Path, copy: Path, tell: Callable[[float], None]) -> None:
+def _refuse_damaged(path: Path, tell: Progress) -> None:
+    with closing(open_named(path)) as connection:
+        hear_interrupts(connection)
+        with closing(find_all_damage(connection, tell)) as found:
+            first = next(found, None)
+    if first is not None:
+        raise NotPossible(
+            f"{path} is damaged and left as it is ({first});"
+            " lupin-twin journal check tells all that is"
+        )
+
+
+def _copy(path: Path, copy: Path, tell: Progress) -> None:
     with closing(open_writer(path)) as connection:
         hear_interrupts(connection)
         # Without a log nobody who comes later finds one that is not of the new file. SQLite does
@@ -87,7 +105,7 @@ def _copy(path: Path, copy: Path, tell: Callable[[float], None]) -> None:
         def watch() -> None:
             while not done.wait(_TELL_EVERY_S):
                 if copy.exists():
-                    tell(min(1.0, copy.stat().st_size / needed))
+                    tell("copying", min(1.0, copy.stat().st_size / needed))
 
         watching = threading.Thread(target=watch, name="vacuum", daemon=True)
         watching.start()

@@ -36,6 +36,8 @@ from lupin_twin.parameters import ParameterError
 _TELL_EVERY_S: Final = 0.5
 # How long it is waited for at the end for what twins say of it, s: they do so once a second.
 LAST_SAID_S: Final = 2.5
+# What a publisher keeps for who comes late, unless another depth was recorded (`INPUTS`).
+_LATE: Final = "the newest 50 observations"
 
 
 class Refused(Exception):
@@ -90,10 +92,9 @@ def play(
     _say(f"{recording.name}, {count}{recording.duration_s:.1f} s: looking who would hear it")
     if not _has_looked(node, options, stop_asked):
         return
-    whom = ", ".join(sorted(node.twin_names)) or "nobody so far"
     _say(
         f"replaying from second {playing.start_s:g}{', paused' if playing.is_paused else ''}, "
-        f"to {whom}"
+        f"to {_whom(node, options)}"
     )
     player = Player(recording, node, playing)
     progress = Progress(recording.duration_s, playing.speed, is_seen=not options.own_journal)
@@ -148,6 +149,15 @@ def _has_looked(node: ReplayNode, options: Namespace, stop_asked: Callable[[], b
             "its ages count from now"
         )
     return True
+
+
+def _whom(node: ReplayNode, options: Namespace) -> str:
+    if node.twin_names:
+        return ", ".join(sorted(node.twin_names))
+    if options.into_live:
+        return "nobody so far"
+    # DDS hands them over before the twin can say that it does, which would end the replay.
+    return f"nobody so far; a twin that is started now and keeps a journal would keep {_LATE}"
 
 
 def _tell_lost(twins: LiveTwins) -> None:

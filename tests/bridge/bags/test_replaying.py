@@ -304,6 +304,17 @@ def test_at_its_end_everybody_gets_the_last_words_unless_it_is_held(played: Any)
     assert (held.published, held.delivered_s) == (2, [])
 
 
+@pytest.mark.parametrize("option", ["", "--into-live"])
+def test_where_nobody_hears_it_a_twin_that_comes_later_is_warned_of(
+    played: Any, capsys: pytest.CaptureFixture[str], option: str
+) -> None:
+    played(Nobody(), option, lambda: False)
+    warning = "; a twin that is started now and keeps a journal would keep the newest 50 observ"
+    (line,) = [it for it in capsys.readouterr().err.splitlines() if "replaying from" in it]
+    assert line.startswith("lupin-twin: replaying from second 0, to nobody so far")
+    assert (warning in line) == (option == ""), "who insists knows"
+
+
 class Full(io.StringIO):
     """A terminal that takes nothing any more."""
 

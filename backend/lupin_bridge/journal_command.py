@@ -40,6 +40,8 @@ FAILED: Final = 1
 INTERRUPTED: Final = 130
 _MAX_TOLD: Final = 20
 _RUNS_TOLD: Final = 10
+# ROS has ports for no more.
+_MAX_DOMAIN: Final = 232
 # Past every stamp.
 _END_NS: Final = (MAX_SECONDS + 1) * 10**9
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
@@ -82,7 +84,8 @@ def add_parser(roles: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
             "--domain",
             type=int,
             metavar="ID",
-            help="that of the twin in this ROS domain (default: ROS_DOMAIN_ID, or 0)",
+            help=f"that of the twin in this ROS domain, 0 to {_MAX_DOMAIN}"
+            " (default: ROS_DOMAIN_ID, or 0)",
         )
         if action == "export":
             own.add_argument(
@@ -133,32 +136,42 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
 
 
 def _path(options: argparse.Namespace, environ: Mapping[str, str]) -> Path:
+    named = f"--demo {options.demo}" if options.demo is not None else options.journal
+    if named and options.domain is not None:
+        raise JournalError(f"--domain {options.domain} is for a twin's own file, not with {named}")
     path: Path | None
     try:
         if options.demo is not None:
             path = demo_journal_path(environ, options.demo)
         else:
-            path = journal_path(
-                options.journal or "", environ, _domain(options, environ), options.namespace
-            )
+            domain = 0 if named else _domain(options, environ)
+            path = journal_path(options.journal or "", environ, domain, options.namespace)
     except RuntimeError as error:
         raise JournalError(f"there is no home to look for a journal in: {error}") from error
     if path is None:
         raise JournalError("--journal is 'off', must be a file")
-    if path.is_file():
-        return path
-    others = sorted(file.name for file in path.parent.glob("*.sqlite"))
+    try:
+        if path.is_file():
+            return path
+        others = sorted(file.name for file in path.parent.glob("*.sqlite"))
+    except OSError as error:
+        raise JournalError(f"cannot look for the journal {path}: {error.strerror}") from error
     there = f"; in its folder there are {', '.join(others[:9])}" if others else ""
     raise JournalError(f"there is no journal {path}{there}")
 
 
 def _domain(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
-    if options.domain is not None:
-        return int(options.domain)
     given = environ.get("ROS_DOMAIN_ID") or "0"
-    if not given.isdecimal():
+    what, domain = "ROS_DOMAIN_ID", options.domain
+    if domain is not None:
+        what = "--domain"
+    elif given.isdecimal():
+        domain = int(given)
+    else:
         raise JournalError(f"ROS_DOMAIN_ID is {given!r}, must be a whole number")
-    return int(given)
+    if not 0 <= domain <= _MAX_DOMAIN:
+        raise JournalError(f"{what} is {domain}, must be from 0 to {_MAX_DOMAIN}")
+    return int(domain)
 
 
 def _reader(path: Path) -> sqlite3.Connection:

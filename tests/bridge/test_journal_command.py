@@ -115,6 +115,43 @@ def test_a_domain_or_a_journal_that_is_none_is_named(
     assert said.err == "lupin-twin: ROS_DOMAIN_ID is 'x', must be a whole number\n"
 
 
+@pytest.mark.parametrize("domain", ["-1", "233"])
+def test_a_domain_that_ros_has_not_is_named_with_its_limits(
+    domain: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = Said(capsys, "info", "--domain", domain)
+    line = f"lupin-twin: --domain is {domain}, must be from 0 to 232\n"
+    assert (said.code, said.out, said.err) == (1, "", line)
+    monkeypatch.setenv("ROS_DOMAIN_ID", "233")
+    said = Said(capsys, "info")
+    assert said.err == "lupin-twin: ROS_DOMAIN_ID is 233, must be from 0 to 232\n"
+    for within in ("0", "232"):
+        assert f"domain-{within}.sqlite" in Said(capsys, "info", "--domain", within).err
+
+
+def test_a_domain_is_not_for_a_file_that_is_named(
+    capsys: pytest.CaptureFixture[str], path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for words, named in ((["--demo", "0"], "--demo 0"), (["--journal", str(path)], str(path))):
+        said = Said(capsys, "info", *words, "--domain", 5)
+        line = f"lupin-twin: --domain 5 is for a twin's own file, not with {named}\n"
+        assert (said.code, said.out, said.err) == (1, "", line)
+    monkeypatch.setenv("ROS_DOMAIN_ID", "x")
+    assert Said(capsys, "info", "--journal", path).code == 0
+
+
+@pytest.mark.parametrize("action", ["info", "check", "export", "vacuum"])
+@pytest.mark.parametrize("option", ["--journal", "--namespace"])
+def test_a_place_that_cannot_be_looked_at_is_named(
+    option: str, action: str, capsys: pytest.CaptureFixture[str], home: Path
+) -> None:
+    home.mkdir(parents=True)
+    said = Said(capsys, action, option, "x" * 300)
+    assert (said.code, said.out) == (1, "")
+    assert said.err.startswith("lupin-twin: cannot look for the journal /")
+    assert said.err.endswith(": File name too long\n")
+
+
 def test_a_journal_that_is_just_being_made_is_called_empty(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -69,8 +69,13 @@ class BagFile:
 
     @property
     def is_gone(self) -> bool:
-        """Whether somebody has removed it."""
-        return os.fstat(self._file).st_nlink == 0 and not self.path.exists()
+        """Whether somebody has removed it, or has given its name to another file."""
+        mine = os.fstat(self._file)
+        try:
+            there = self.path.stat()
+        except OSError:
+            return mine.st_nlink == 0  # else it was moved, and is written on where it is
+        return not os.path.samestat(mine, there)
 
     def write(self, topic: int, log_ns: int, publish_ns: int, data: bytes) -> None:
         """Take a message of the topic with this index; nothing reaches the disk before a flush."""

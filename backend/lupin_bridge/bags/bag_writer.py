@@ -7,6 +7,7 @@ for on some disks that takes longer.
 
 from __future__ import annotations
 
+import shlex
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -135,7 +136,7 @@ class BagWriter:
             path = self._recording.paths[-1]
             self._say(
                 f"{path} is not finished: {error.strerror}; what is in it comes out by "
-                f"lupin-twin mcap recover {path}"
+                f"lupin-twin mcap recover {shlex.quote(str(path))}"
             )
 
     def _take(self) -> None:
@@ -170,7 +171,12 @@ class BagWriter:
         path = self._recording.paths[-1]
         if self._recording.is_gone and path != self._gone:
             self._gone, self.is_whole = path, False
-            self._say(f"{path} was removed, and what was in it is lost")
+            self._say(
+                f"{path} is another file now: what was recorded into it is lost, unless that has "
+                "another name"
+                if path.exists()
+                else f"{path} was removed, and what was in it is lost"
+            )
         if (failed := self._syncing.error) is not None:
             self._syncing.error, self.is_whole = None, False
             self._complain("sync", f"the disk has not kept what it took: {failed.strerror}")

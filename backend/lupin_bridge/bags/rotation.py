@@ -47,7 +47,7 @@ class Recording:
         self._begun_s = now_s
         self._try_s = now_s
         self._has_messages = False
-        # The file that is being written was removed: what is in it is lost.
+        # The file that is being written was removed, or its name is another's.
         self.is_gone = False
         # Finished, and not yet whole on the disk.
         self._behind: list[BagFile] = []

@@ -66,6 +66,24 @@ def test_a_disk_that_has_not_kept_it_is_told_and_the_file_is_closed(
     assert not is_open(file.path)
 
 
+def test_it_is_gone_once_it_is_removed_or_its_name_another_s(tmp_path: Path) -> None:
+    path, moved, other = (tmp_path / name for name in ("a.mcap", "b.mcap", "other"))
+    other.write_bytes(b"somebody else's")
+    file = BagFile(path, TOPICS)
+    gone = [file.is_gone]
+    path.rename(moved)  # it is written on there
+    gone.append(file.is_gone)
+    path.symlink_to(moved)
+    gone.append(file.is_gone)
+    path.unlink()
+    moved.unlink()
+    gone.append(file.is_gone)
+    os.link(other, path)
+    gone.append(file.is_gone)
+    file.close()
+    assert gone == [False, False, False, True, True]
+
+
 def test_nothing_is_overwritten(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     path.write_bytes(b"mine")

@@ -98,7 +98,7 @@ def test_a_disk_that_has_room_again_gets_all_of_it(tmp_path: Path) -> None:
 
 
 def test_a_disk_that_stays_full_hangs_nothing_and_says_how_it_is_mended(tmp_path: Path) -> None:
-    path, said = tmp_path / "a.mcap", list[str]()
+    path, said = tmp_path / "a run.mcap", list[str]()
     writer = writer_of(path, said)
     with no_file_above(1_000_000):
         writer.start()
@@ -109,7 +109,7 @@ def test_a_disk_that_stays_full_hangs_nothing_and_says_how_it_is_mended(tmp_path
         writer.end()
     assert not writer.is_whole
     assert said[-1].startswith(f"{path} is not finished: File too large")
-    assert said[-1].endswith(f"lupin-twin mcap recover {path}")
+    assert said[-1].endswith(f"lupin-twin mcap recover '{path}'")
     assert read_unfinished(path)[0][3] == b"whole"
 
 
@@ -219,6 +219,30 @@ def test_a_file_that_was_removed_is_told_and_followed_by_another(tmp_path: Path)
     ]
     # What is latched comes once more.
     assert [data for *_, data in read(tmp_path / "a_1.mcap")] == [b"gone", b"here"]
+    assert not writer.is_whole
+
+
+def test_a_file_that_another_has_replaced_is_told_and_followed_by_another(tmp_path: Path) -> None:
+    """As by `mcap recover a.mcap && mv a_recovered.mcap a.mcap` while it is written."""
+    path, other, said = tmp_path / "a.mcap", tmp_path / "other", list[str]()
+    other.write_bytes(b"somebody else's")
+    writer = writer_of(path, said)
+    writer.start()
+    writer.put(Heard(CLOCK, 1, 1, b"before"))
+    wait_for(lambda: len(read_unfinished(path)) == 1, "it in the file")
+    other.rename(path)
+    wait_for(lambda: bool(said), "the loss told")
+    writer.put(Heard(CLOCK, 2, 2, b"behind"))
+    writer.end()
+    assert said == [
+        (
+            f"{path} is another file now: what was recorded into it is lost, unless that has "
+            "another name"
+        ),
+        f"recording goes on in {tmp_path}/a_1.mcap",
+    ]
+    assert [data for *_, data in read(tmp_path / "a_1.mcap")] == [b"behind"]
+    assert path.read_bytes() == b"somebody else's"
     assert not writer.is_whole
 
 

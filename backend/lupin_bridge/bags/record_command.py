@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import threading
 import time
 from collections.abc import Sequence
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -20,6 +23,10 @@ from lupin_twin.parameters import ParameterError
 
 FAILED: Final = 1
 USAGE_ERROR: Final = 2
+# In less, MB, there would be little beside the definitions that each file has; and sooner, s, no
+# next file is begun (`rotation`).
+MIN_MB: Final = 0.1
+MIN_SECONDS: Final = 1.0
 # What is kept of a file's index while it is written is some 80 MB a day.
 MAX_SECONDS: Final = 86_400.0
 
@@ -39,26 +46,25 @@ def add_parser(roles: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
     parser.add_argument(
         "--max-size",
         metavar="MB",
-        type=_positive,
+        type=partial(_number, at_least=MIN_MB),
         default=0.0,
         help="begin the next file, FILE_1.mcap, when this one has so many MB (default: never)",
     )
     parser.add_argument(
         "--max-seconds",
         metavar="S",
-        type=_positive,
+        type=partial(_number, at_least=MIN_SECONDS),
         default=MAX_SECONDS,
         help="begin the next file when this one is so old (default: %(default)g)",
     )
 
 
-def _positive(text: str) -> float:
-    try:
+def _number(text: str, *, at_least: float) -> float:
+    value = float("nan")
+    with suppress(ValueError):
         value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value <= 1e9:
-        raise argparse.ArgumentTypeError(f"{text!r}, must be a number above 0, at most 1e9")
+    if not at_least <= value <= 1e9:
+        raise argparse.ArgumentTypeError(f"{text!r} must be a number from {at_least:g} to 1e9")
     return value
 
 
@@ -69,11 +75,8 @@ def run(options: argparse.Namespace, ros_args: Sequence[str]) -> int:
     if path.suffix != SUFFIX:
         say(f"{path} does not end in {SUFFIX}: that is how its form is known")
         return USAGE_ERROR
-    if path.exists():
-        say(f"{path} is there already, and nothing is overwritten")
-        return USAGE_ERROR
-    if not path.parent.is_dir():
-        say(f"cannot make {path}: there is no folder {path.parent}")
+    if why := _taken(path):
+        say(why)
         return USAGE_ERROR
     stop_signals.block()  # before ROS, whose threads inherit it
     import rclpy  # noqa: PLC0415  # see above
@@ -92,6 +95,21 @@ def run(options: argparse.Namespace, ros_args: Sequence[str]) -> int:
         return USAGE_ERROR
     finally:
         rclpy.try_shutdown()
+
+
+def _taken(path: Path) -> str:
+    """Why no file can be made here, as far as that can be seen before; empty: it may be."""
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        if path.parent.is_dir():
+            return ""
+        return f"cannot make {path}: there is no folder {path.parent}"
+    except OSError as error:
+        return f"cannot make {path}: {error.strerror}"
+    if path.is_symlink() and not os.path.exists(path):  # noqa: PTH110  # which raises nothing
+        return f"{path} is a link that leads nowhere, and nothing is overwritten"
+    return f"{path} is there already, and nothing is overwritten"
 
 
 def _record(path: Path, limits: Limits) -> int:

@@ -110,6 +110,10 @@ def test_whoever_can_be_told_nothing_is_recorded_for(
         (["a.db3"], "a.db3 does not end in .mcap"),
         (["nowhere/a.mcap"], "cannot make nowhere/a.mcap: there is no folder nowhere"),
         (["there.mcap"], "there.mcap is there already, and nothing is overwritten"),
+        (["there.mcap/a.mcap"], "there.mcap/a.mcap: there is no folder there.mcap"),
+        (["link.mcap"], "link.mcap is a link that leads nowhere, and nothing is overwritten"),
+        (["loop.mcap/a.mcap"], "loop.mcap/a.mcap: Too many levels of symbolic links"),
+        ([f"{'a' * 300}.mcap"], "a.mcap: File name too long"),
     ],
 )
 def test_what_cannot_be_a_recording_is_refused(
@@ -121,20 +125,25 @@ def test_what_cannot_be_a_recording_is_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "there.mcap").write_bytes(b"mine")
+    (tmp_path / "link.mcap").symlink_to("nowhere")
+    (tmp_path / "loop.mcap").symlink_to("loop.mcap")
     assert cli.main(["record", *args]) == 2
     assert said in capsys.readouterr().err
     assert (tmp_path / "there.mcap").read_bytes() == b"mine"
 
 
-@pytest.mark.parametrize("option", ["--max-size", "--max-seconds"])
-@pytest.mark.parametrize("value", ["0", "-1", "nan", "much", "1e10"])
+@pytest.mark.parametrize(
+    ("option", "at_least", "below"), [("--max-size", "0.1", "0.09"), ("--max-seconds", "1", "0.9")]
+)
+@pytest.mark.parametrize("value", ["0", "below", "-1", "nan", "much", "1e10"])
 def test_a_limit_that_is_none_is_refused(
-    option: str, value: str, capsys: pytest.CaptureFixture[str]
+    option: str, at_least: str, below: str, value: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    value = below if value == "below" else value
     with pytest.raises(SystemExit) as refused:
         cli.main(["record", "a.mcap", option, value])
     assert refused.value.code == 2
-    assert "must be a number above 0, at most 1e9" in capsys.readouterr().err
+    assert f"must be a number from {at_least} to 1e9" in capsys.readouterr().err
 
 
 def test_a_size_is_given_in_megabytes_and_an_age_in_seconds(
@@ -149,11 +158,15 @@ def test_a_size_is_given_in_megabytes_and_an_age_in_seconds(
     monkeypatch.setattr(record_command, "_record", record)
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [])
     try:
-        for options in (["--max-size", "1.5", "--max-seconds", "60"], []):
+        for options in (
+            ["--max-size", "1.5", "--max-seconds", "60"],
+            ["--max-size", "0.1", "--max-seconds", "1"],
+            [],
+        ):
             assert cli.main(["record", str(tmp_path / "a.mcap"), *options]) == 0
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-    assert limits == [Limits(1_500_000, 60.0), Limits(0, 86_400.0)]
+    assert limits == [Limits(1_500_000, 60.0), Limits(100_000, 1.0), Limits(0, 86_400.0)]
 
 
 def test_a_kill_at_any_moment_costs_a_second_at_most(domain: int, tmp_path: Path) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import sys
+import stat
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Final
 
 from lupin_bridge.bags.recover import Saved, recover
+from lupin_bridge.telling import hold_streams, say, tell
 
 FAILED: Final = 1
 USAGE_ERROR: Final = 2
@@ -36,32 +37,54 @@ def add_parser(roles: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
 
 def run(options: argparse.Namespace) -> int:
     """Recover; returns the process's exit code: 1 where not a single message was saved."""
+    hold_streams()
     source: Path = options.file
-    target: Path = options.output or source.with_name(f"{source.stem}_recovered.mcap")
-    if source.exists() and not source.is_file():
-        return _fail(f"{source} is no file", USAGE_ERROR)
+    try:
+        if not stat.S_ISREG(source.stat().st_mode):  # a pipe would be waited for
+            return _fail(f"{source} is no file", USAGE_ERROR)
+        target = options.output or source.with_name(f"{source.stem}_recovered.mcap")
+    except OSError as error:
+        return _unread(error, source)
     try:
         saved = recover(source, target)
     except KeyboardInterrupt:
         return INTERRUPTED
     except OSError as error:
-        return _refused(error, source, target)
-    for line in saved.lost[:_MAX_TOLD]:
-        sys.stdout.write(f"lost: {line}\n")
+        if error.filename == str(source):
+            return _unread(error, source)
+        return _unmade(error, target)
+    return _report(saved, source, target)
+
+
+def _report(saved: Saved, source: Path, target: Path) -> int:
+    lines = [f"lost: {line}" for line in saved.lost[:_MAX_TOLD]]
     if len(saved.lost) > _MAX_TOLD:
-        sys.stdout.write(f"lost: and {len(saved.lost) - _MAX_TOLD:,} more\n")
+        lines.append(f"lost: and {len(saved.lost) - _MAX_TOLD:,} more")
+    if saved.messages:
+        lines.append(f"{_told(saved)} are saved in {target}")
+    tell(*lines)
     if not saved.messages:
         return _fail(f"{source} holds no message that can be saved", FAILED)
-    sys.stdout.write(f"{_told(saved)} are saved in {target}\n")
     return 0
 
 
-def _refused(error: OSError, source: Path, target: Path) -> int:
+def _unread(error: OSError, source: Path) -> int:
+    if isinstance(error, FileNotFoundError):
+        return _fail(f"there is no {source}", USAGE_ERROR)
+    return _fail(f"cannot read {source}: {error.strerror}", FAILED)
+
+
+def _unmade(error: OSError, target: Path) -> int:
+    if isinstance(error, FileExistsError) and target.is_symlink() and not target.exists():
+        return _fail(
+            f"{target} is a link that leads nowhere, and nothing is overwritten", USAGE_ERROR
+        )
     if isinstance(error, FileExistsError):
         return _fail(f"{target} is there already, and nothing is overwritten", USAGE_ERROR)
-    if isinstance(error, FileNotFoundError):
-        return _fail(f"there is no {error.filename}", USAGE_ERROR)
-    return _fail(f"cannot read {source} or write {target}: {error.strerror}", FAILED)
+    if isinstance(error, FileNotFoundError | NotADirectoryError):
+        return _fail(f"cannot make {target}: there is no folder {target.parent}", USAGE_ERROR)
+    what = "make" if error.filename == str(target) else "write"
+    return _fail(f"cannot {what} {target}: {error.strerror}", FAILED)
 
 
 def _told(saved: Saved) -> str:
@@ -79,5 +102,5 @@ def _iso(stamp_ns: int) -> str:
 
 
 def _fail(message: str, code: int) -> int:
-    sys.stderr.write(f"lupin-twin: {message}\n")
+    say(message)
     return code

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import errno
 import io
+import shlex
 import stat
 import struct
 from collections import deque
@@ -88,6 +89,8 @@ class Recording:
         self._file: IO[bytes] = _opened(path)
         with ExitStack() as otherwise, self._named():
             otherwise.callback(self._file.close)
+            if not self._has_end():
+                raise self._unfinished()
             statistics = self._overview()
             otherwise.pop_all()
         self.start_ns = int(statistics.message_start_time)
@@ -142,7 +145,7 @@ class Recording:
         self._file.seek(-_END_BYTES, io.SEEK_END)
         footer = next(self._records(), None)
         if not isinstance(footer, Footer) or not footer.summary_start:
-            raise self._broken("it was not finished")
+            raise self._broken("it has no index")
         self._file.seek(footer.summary_start)
         types: dict[int, str] = {}
         self._channels: dict[int, Channel] = {}
@@ -158,13 +161,17 @@ class Recording:
             elif isinstance(record, Statistics):
                 statistics = record
         if statistics is None:
-            raise self._broken("it was not finished")
+            raise self._broken("its index does not count the messages")
         if not statistics.message_count:
             raise Empty(f"{self.path} has no messages")
         if statistics.message_end_time < statistics.message_start_time:
             raise self._broken("by its index it ends before it begins")
         self.topics = _topics(self._channels, types, statistics)
         return statistics
+
+    def _has_end(self) -> bool:
+        begin = len(MCAP0_MAGIC)
+        return self._file.seek(-begin, io.SEEK_END) >= begin and self._file.read() == MCAP0_MAGIC
 
     def _records(self, *, from_begin: bool = False) -> Iterator[McapRecord]:
         """The records from where the file is read; chunks as they are."""
@@ -229,10 +236,16 @@ class Recording:
         except DAMAGE as error:
             raise self._broken(str(error) or type(error).__name__) from error
 
+    def _unfinished(self) -> RecordingError:
+        return self._mendable("was not finished (its recorder was killed, or is still at work)")
+
     def _broken(self, why: str) -> RecordingError:
+        return self._mendable(f"is broken ({why})")
+
+    def _mendable(self, what: str) -> RecordingError:
         return RecordingError(
-            f"{self.path} is broken ({why}): what is whole of it is written anew by "
-            f"lupin-twin mcap recover {self.path}"
+            f"{self.path} {what}: what is whole of it is written anew by "
+            f"lupin-twin mcap recover {shlex.quote(str(self.path))}"
         )
 
 

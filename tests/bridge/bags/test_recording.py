@@ -152,13 +152,27 @@ def test_what_is_no_recording_is_said_to_be_none(tmp_path: Path) -> None:
 
 
 def test_a_broken_one_is_sent_to_be_mended(tmp_path: Path) -> None:
-    path = write_bag(tmp_path / "a.mcap", SENT, is_finished=False)
-    assert "is broken" in refused(path)
-    assert f"lupin-twin mcap recover {path}" in refused(path)
+    path = tmp_path / "a run.mcap"
     whole = write_bag(path, SENT).read_bytes()
-    for cut in (10, 100, len(whole) // 2, len(whole) - 4):
+    footer = len(whole) - 8 - 20
+    path.write_bytes(whole[:footer] + bytes(8) + whole[footer + 8 :])
+    assert refused(path) == (
+        f"{path} is broken (it has no index): what is whole of it is written anew by "
+        f"lupin-twin mcap recover '{path}'"
+    )
+
+
+def test_one_that_was_not_finished_is_said_to_be_no_more_than_that(tmp_path: Path) -> None:
+    path = write_bag(tmp_path / "a run.mcap", SENT, is_finished=False)
+    said = (
+        f"{path} was not finished (its recorder was killed, or is still at work): what is whole "
+        f"of it is written anew by lupin-twin mcap recover '{path}'"
+    )
+    assert refused(path) == said
+    whole = write_bag(path, SENT).read_bytes()
+    for cut in (8, 10, 15, 16, 100, len(whole) // 2, len(whole) - 4, len(whole) - 1):
         path.write_bytes(whole[:cut])
-        assert "mcap recover" in refused(path)
+        assert refused(path) == said
 
 
 def test_whatever_is_flipped_is_a_refusal_or_a_recording(tmp_path: Path) -> None:

@@ -125,7 +125,7 @@ def test_the_file_that_is_wrong_is_named(tmp_path: Path) -> None:
     files = [tmp_path / f"{name}.mcap" for name in "abc"]
     for number, file in enumerate(files):
         write_bag(file, [Sent(SCANS, 1.0 + number, scan("1"))], is_finished=number != 1)
-    with pytest.raises(RecordingError, match=r"b\.mcap is broken"):
+    with pytest.raises(RecordingError, match=r"b\.mcap was not finished"):
         Recordings([tmp_path])
     write_bag(files[1], [Sent(SCANS, 2.0, discovered({}))])
     with pytest.raises(RecordingError, match=r"b\.mcap has /floranova/observations as lupin_msgs/"):

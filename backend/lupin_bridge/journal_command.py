@@ -6,7 +6,6 @@ Everything but `vacuum` reads, also while a twin writes.
 from __future__ import annotations
 
 import argparse
-import os
 import sqlite3
 import sys
 import time
@@ -17,10 +16,11 @@ from pathlib import Path
 from typing import Final
 
 from lupin_bridge.bags.topics import SUFFIX
-from lupin_bridge.journal_output import CannotWrite, Write, writing
+from lupin_bridge.journal_output import CannotWrite, Write, forget, standard, writing
 from lupin_bridge.judge.choosing import own_sensors
 from lupin_bridge.past import table
 from lupin_bridge.past.moments import MAX_SECONDS, moment
+from lupin_bridge.telling import say
 from lupin_twin.journal.checking import find_all_damage
 from lupin_twin.journal.export import rows
 from lupin_twin.journal.lock import InUse, holder_of
@@ -115,10 +115,8 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
             code = _export(path, options)
         else:
             code = {"info": _info, "check": _check, "vacuum": _vacuum}[options.action](path)
-        sys.stdout.flush()
     except BrokenPipeError:
-        # Who reads has heard enough. Python would complain of it once more as it ends.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # Who reads has heard enough.
         return FAILED
     except KeyboardInterrupt:
         return INTERRUPTED
@@ -194,8 +192,7 @@ def _info(path: Path) -> int:
         found = overview(connection, path)
     lines = [("file", f"{path}"), *_lines(found, holder_of(path))]
     width = max(len(what) for what, _ in lines)
-    for what, text in lines:
-        sys.stdout.write(f"{what:<{width}}  {text}\n")
+    _say(*(f"{what:<{width}}  {text}" for what, text in lines))
     return 0
 
 
@@ -269,11 +266,11 @@ def _check(path: Path) -> int:
             found += 1
             if found <= _MAX_TOLD:
                 progress.clear()
-                sys.stdout.write(f"{wrong}\n")
+                _say(wrong)
     progress.clear()
     if found > _MAX_TOLD:
-        sys.stdout.write(f"and {found - _MAX_TOLD:,} more\n")
-    sys.stdout.write(f"{path} is {f'damaged in {found:,} places' if found else 'whole'}\n")
+        _say(f"and {found - _MAX_TOLD:,} more")
+    _say(f"{path} is {f'damaged in {found:,} places' if found else 'whole'}")
     return FAILED if found else 0
 
 
@@ -291,7 +288,7 @@ def _export(path: Path, options: argparse.Namespace) -> int:
     with closing(_reader(path)) as connection:
         lots = rows(connection, start_ns, end_ns, options.tag, options.sensor)
         if options.output is None:
-            _write_csv(lots, sys.stdout.buffer.write)
+            _write_csv(lots, standard)
         else:
             with writing(options.output, path) as write:
                 _write_csv(lots, write)
@@ -329,9 +326,9 @@ def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int)
     if not made.observations + made.tags:
         raise JournalError(f"the journal {path} holds nothing of that period")
     damaged = f"; {made.damaged:,} rows are damaged and left out" if made.damaged else ""
-    sys.stdout.write(
+    _say(
         f"{made.observations:,} observations and {made.tags:,} messages of discovered tags are in"
-        f" {target}{damaged}\n"
+        f" {target}{damaged}"
     )
     return 0
 
@@ -350,7 +347,7 @@ def _vacuum(path: Path) -> int:
     progress = _Progress()
     before, after = vacuum(path, "lupin-twin journal vacuum", progress.tell)
     progress.clear()
-    sys.stdout.write(f"{path}: {_mb(before)} before, {_mb(after)} after\n")
+    _say(f"{path}: {_mb(before)} before, {_mb(after)} after")
     return 0
 
 
@@ -369,17 +366,27 @@ class _Progress:
         is_new, self._what = what != self._what, what
         if not self._is_seen:
             if is_new:
-                sys.stderr.write(f"{what}\n")
+                self._put(f"{what}\n")
             return
         if is_new or time.monotonic() - self._told_s >= _TELL_EVERY_S:
             self._told_s = time.monotonic()
-            sys.stderr.write(f"\r\x1b[K{what} {share:.0%}")
-            sys.stderr.flush()
+            self._put(f"\r\x1b[K{what} {share:.0%}")
 
     def clear(self) -> None:
         if self._is_seen:
-            sys.stderr.write("\r\x1b[K")
+            self._put("\r\x1b[K")
+
+    def _put(self, text: str) -> None:
+        try:
+            sys.stderr.write(text)
             sys.stderr.flush()
+        except OSError:
+            forget(sys.stderr)
+
+
+def _say(*lines: str) -> None:
+    # A name of a file need not be UTF-8.
+    standard("".join(f"{line}\n" for line in lines).encode(errors="surrogateescape"))
 
 
 def _mb(count: int) -> str:
@@ -395,5 +402,5 @@ def _iso(stamp_ns: int) -> str:
 
 
 def _fail(message: str) -> int:
-    sys.stderr.write(f"lupin-twin: {' '.join(message.split())}\n")
+    say(message)
     return FAILED

@@ -1,14 +1,15 @@
-"""Where `lupin-twin journal` writes its rows to: a file that is new, or a special one."""
+"""Where `lupin-twin journal` writes to: the standard output, a file that is new, a special one."""
 
 from __future__ import annotations
 
 import os
 import re
 import stat
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Final
+from typing import Final, TextIO
 
 Write = Callable[[bytes], object]
 
@@ -21,6 +22,31 @@ _BESIDE: Final = ("", "-wal", "-shm", "-journal", ".lock", ".vacuum")
 
 class CannotWrite(Exception):
     """What was asked for has nowhere to go; the message is the one line that says why."""
+
+
+def standard(data: bytes) -> None:
+    """Write to the standard output, at once.
+
+    Raises:
+        CannotWrite: it does not take it.
+        BrokenPipeError: who read it has gone.
+
+    """
+    try:
+        sys.stdout.buffer.write(data)
+        sys.stdout.buffer.flush()
+    except OSError as error:
+        forget(sys.stdout)
+        if isinstance(error, BrokenPipeError):
+            raise
+        raise CannotWrite(f"cannot write to the standard output: {error.strerror}") from error
+
+
+def forget(stream: TextIO) -> None:
+    """Have a stream lead nowhere: Python would write what waits in it once more as it ends."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
 
 
 @contextmanager

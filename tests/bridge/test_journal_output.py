@@ -175,3 +175,55 @@ def test_what_the_shell_has_opened_goes_on_where_it_is(
         )
     assert (ended.returncode, ended.stderr) == (0, b"")
     assert target.read_bytes() == b"before\n" + table.HEADER
+
+
+def ended(
+    words: str, path: Path, redirected: str, *, stdout: int = subprocess.PIPE
+) -> tuple[int, bytes, bytes]:
+    """Exit code, output and errors of the command as a shell runs it."""
+    line = f'exec "$1" -m lupin_bridge.cli journal {words} --journal "$2" {redirected}'
+    done = subprocess.run(
+        ["/bin/bash", "-c", line, "bash", sys.executable, str(path)],
+        check=False,
+        stdout=stdout,
+        stderr=subprocess.PIPE,
+        timeout=PATIENCE_S,
+    )
+    return (
+        done.returncode,
+        done.stdout,
+        done.stderr.removeprefix(b"structure\nscan\nlook\nrollup\n"),
+    )
+
+
+@pytest.mark.parametrize("action", ["info", "check", "export", "vacuum"])
+def test_a_standard_output_that_is_full_is_named_and_a_closed_one_is_none(
+    action: str, path: Path
+) -> None:
+    full = b"lupin-twin: cannot write to the standard output: No space left on device\n"
+    assert ended(action, path, ">/dev/full") == (1, b"", full)
+    # As after >/dev/null: who closes it wants to hear nothing.
+    assert ended(action, path, ">&-") == (0, b"", b"")
+
+
+def test_without_a_standard_output_a_file_is_written_all_the_same(path: Path) -> None:
+    target = path.with_name("out.csv")
+    for redirected in (">&-", "2>&-", ">&- 2>&-"):
+        words = f'export --output "{target}" --to 1'
+        assert ended(words, path, redirected) == (0, b"", b"")
+        assert target.read_bytes() == table.HEADER
+        target.unlink()
+
+
+@pytest.mark.parametrize("redirected", ["2>&-", "2>/dev/full"])
+def test_without_a_standard_error_all_is_said_that_can_be(redirected: str, path: Path) -> None:
+    assert ended("check", path, redirected) == (0, f"{path} is whole\n".encode(), b"")
+    missing = path.with_name("missing.sqlite")
+    assert ended("check", missing, redirected) == (1, b"", b"")
+
+
+def test_a_name_that_is_no_text_is_told_as_it_is(path: Path) -> None:
+    strange = path.with_name("j\udcff.sqlite")
+    path.rename(strange)
+    code, out, err = ended("check", strange, "")
+    assert (code, out, err) == (0, os.fsencode(strange) + b" is whole\n", b"")

@@ -212,7 +212,7 @@ def open_reader(path: Path, *, is_still: bool = False, kept: Kept | None = None)
 
     """
     connection = sqlite3.connect(
-        f"file:{quote(str(path))}?mode=ro{'&immutable=1' if is_still else ''}",
+        f"file:{quote(os.fsencode(path))}?mode=ro{'&immutable=1' if is_still else ''}",
         uri=True,
         isolation_level=None,
         timeout=5.0,

@@ -78,7 +78,7 @@ def run(options: argparse.Namespace, ros_args: Sequence[str]) -> int:
     if why := _taken(path):
         say(why)
         return USAGE_ERROR
-    stop_signals.block()  # before ROS, whose threads inherit it
+    stop_signals.block(stop_signals.with_hang_up())  # before ROS, whose threads inherit it
     import rclpy  # noqa: PLC0415  # see above
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
 
@@ -146,7 +146,7 @@ def _record(path: Path, limits: Limits) -> int:
         say(f"recording {', '.join(names)} in ROS domain {domain} into {path}; Ctrl-C ends it")
         writer.start()
         thread.start()
-        stop_signals.wait()
+        stop_signals.wait(signals=stop_signals.with_hang_up())
         is_well = not has_died.is_set()
         end_spinning(executor)
         thread.join()

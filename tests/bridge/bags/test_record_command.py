@@ -27,11 +27,11 @@ from tests.support.ros import Peer, clock_at
 from tests.support.waiting import wait_for
 
 
-def recorder(domain: int, *args: str | Path, streams: str = "") -> Process:
-    """`lupin-twin record`; its `streams` may be led elsewhere by a shell."""
+def recorder(domain: int, *args: str | Path, shell: str = "exec", streams: str = "") -> Process:
+    """`lupin-twin record`; a shell may lead its `streams` elsewhere, and do more before."""
     command = [sys.executable, "-m", "lupin_bridge.cli", "record", *map(str, args)]
-    if streams:
-        command = ["bash", "-c", f'exec "$@" {streams}', "bash", *command]
+    if streams or shell != "exec":
+        command = ["bash", "-c", f'{shell} "$@" {streams}', "bash", *command]
     return Process(command, ros_env(domain))
 
 
@@ -88,6 +88,29 @@ def test_what_is_recorded_is_what_was_sent(domain: int, tmp_path: Path) -> None:
         }
     assert durabilities.pop("/clock") == "VOLATILE"
     assert set(durabilities.values()) == {"TRANSIENT_LOCAL"}
+
+
+def test_a_terminal_that_is_closed_ends_it_as_ctrl_c_does(domain: int, tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    with Peer(domain) as peer, recorder(domain, path) as process:
+        peer.observe(scan("a", {"temperature": 21.5}))
+        peer.until(lambda: path.exists() and read_unfinished(path), "it in the file")
+        assert process.stop(signal.SIGHUP) == 0
+    assert len(read(path)) == 1
+
+
+def test_under_nohup_it_goes_on_when_the_terminal_is_closed(domain: int, tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    ignoring = "trap '' HUP; exec"
+    with Peer(domain) as peer, recorder(domain, path, shell=ignoring) as process:
+        peer.observe(scan("a", {"temperature": 21.5}))
+        peer.until(lambda: path.exists() and read_unfinished(path), "it in the file")
+        process.send(signal.SIGHUP)
+        for count in (2, 3):
+            peer.observe(scan(f"{count}", {"temperature": 21.5}))
+            peer.until(lambda: len(read_unfinished(path)) == count, "what comes behind it")  # noqa: B023
+        assert process.stop() == 0
+    assert len(read(path)) == 3
 
 
 @pytest.mark.parametrize("streams", ["2>/dev/full", ">/dev/full", "<&- >&- 2>&-", "> >(:) 2>&1"])

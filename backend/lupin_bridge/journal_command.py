@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from lupin_bridge.bags.topics import SUFFIX
-from lupin_bridge.journal_output import CannotWrite, Write, forget, standard, writing
+from lupin_bridge.journal_output import CannotWrite, Write, standard, writing
 from lupin_bridge.judge.choosing import own_sensors
 from lupin_bridge.past import table
 from lupin_bridge.past.moments import MAX_SECONDS, moment
@@ -27,6 +27,7 @@ from lupin_twin.journal.lock import InUse, holder_of
 from lupin_twin.journal.overview import Overview, RunExtent, overview
 from lupin_twin.journal.schema import FILE_ERRORS, Empty, Foreign, open_named, says_damaged
 from lupin_twin.journal.vacuuming import NotPossible, hear_interrupts, vacuum
+from lupin_twin.leaving import lead_nowhere
 from lupin_twin.memory import demo_journal_path, journal_path
 from lupin_twin.past import NotRemembered, PastRefused, PastRow, seconds
 
@@ -381,7 +382,7 @@ class _Progress:
             sys.stderr.write(text)
             sys.stderr.flush()
         except OSError:
-            forget(sys.stderr)
+            lead_nowhere(sys.stderr)
 
 
 def _say(*lines: str) -> None:

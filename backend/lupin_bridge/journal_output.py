@@ -9,7 +9,9 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Final, TextIO
+from typing import Final
+
+from lupin_twin.leaving import lead_nowhere
 
 Write = Callable[[bytes], object]
 
@@ -36,17 +38,10 @@ def standard(data: bytes) -> None:
         sys.stdout.buffer.write(data)
         sys.stdout.buffer.flush()
     except OSError as error:
-        forget(sys.stdout)
+        lead_nowhere(sys.stdout)
         if isinstance(error, BrokenPipeError):
             raise
         raise CannotWrite(f"cannot write to the standard output: {error.strerror}") from error
-
-
-def forget(stream: TextIO) -> None:
-    """Have a stream lead nowhere: Python would write what waits in it once more as it ends."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, stream.fileno())
-    os.close(nowhere)
 
 
 @contextmanager

@@ -8,29 +8,7 @@ from __future__ import annotations
 import os
 import sys
 from contextlib import suppress
-from typing import Final, TextIO
-
-_STREAMS: Final = (0, 1, 2)
-
-
-def hold_streams() -> None:
-    """Have standard streams that nobody has opened lead nowhere; to be called before any file.
-
-    Else a file that is made next would be the standard output or error, and hold what ROS says.
-    """
-    for number in _STREAMS:
-        try:
-            os.fstat(number)
-        except OSError:
-            nowhere = os.open(os.devnull, os.O_RDWR)  # the lowest that is free: this one
-            os.set_inheritable(nowhere, True)
-            if nowhere != number:
-                os.dup2(nowhere, number)
-                os.close(nowhere)
-    if sys.stdout is None:
-        sys.stdout = _on(1)
-    if sys.stderr is None:
-        sys.stderr = _on(2)
+from typing import TextIO
 
 
 def say(text: str) -> None:
@@ -71,7 +49,3 @@ def _empty(stream: TextIO) -> None:
         os.dup2(there, number)
         os.close(there)
         os.close(nowhere)
-
-
-def _on(number: int) -> TextIO:
-    return open(number, "w", encoding="utf-8", errors="backslashreplace", closefd=False)

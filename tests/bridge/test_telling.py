@@ -13,8 +13,9 @@ from tests.support.waiting import PATIENCE_S
 # It says, tells and says again, and a file that it opens gets neither of the two.
 SCRIPT = """
 import os, sys
-from lupin_bridge.telling import hold_streams, say, tell
-hold_streams()
+from lupin_bridge.telling import say, tell
+from lupin_twin.leaving import open_standard_files
+open_standard_files()
 file = os.open(sys.argv[1], os.O_WRONLY | os.O_CREAT)
 say("one")
 tell("first", "second")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from lupin_bridge.bags.recover import Saved, recover
-from lupin_bridge.telling import hold_streams, say, tell
+from lupin_bridge.telling import say, tell
 
 FAILED: Final = 1
 USAGE_ERROR: Final = 2
@@ -37,7 +37,6 @@ def add_parser(roles: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
 
 def run(options: argparse.Namespace) -> int:
     """Recover; returns the process's exit code: 1 where not a single message was saved."""
-    hold_streams()
     source: Path = options.file
     try:
         if not stat.S_ISREG(source.stat().st_mode):  # a pipe would be waited for

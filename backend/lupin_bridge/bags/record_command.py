@@ -16,7 +16,7 @@ from typing import Final
 from lupin_bridge.bags.bag_writer import BagWriter
 from lupin_bridge.bags.rotation import Limits, Recording
 from lupin_bridge.bags.topics import SUFFIX, Topic
-from lupin_bridge.telling import hold_streams, say, tell
+from lupin_bridge.telling import say, tell
 from lupin_twin import stop_signals
 from lupin_twin.half_made import remove_half_made
 from lupin_twin.parameters import ParameterError
@@ -70,7 +70,6 @@ def _number(text: str, *, at_least: float) -> float:
 
 def run(options: argparse.Namespace, ros_args: Sequence[str]) -> int:
     """Record until a signal ends it; returns the process's exit code."""
-    hold_streams()
     path: Path = options.file
     if path.suffix != SUFFIX:
         say(f"{path} does not end in {SUFFIX}: that is how its form is known")

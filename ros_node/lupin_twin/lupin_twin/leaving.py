@@ -87,7 +87,7 @@ def _flushed(code: int) -> int:
     try:
         sys.stdout.flush()
     except OSError as error:
-        _write_nowhere(sys.stdout)
+        lead_nowhere(sys.stdout)
         if code == 0:
             code = NOT_WRITTEN
             with suppress(OSError):
@@ -95,11 +95,11 @@ def _flushed(code: int) -> int:
     try:
         sys.stderr.flush()
     except OSError:
-        _write_nowhere(sys.stderr)
+        lead_nowhere(sys.stderr)
     return code
 
 
-def _write_nowhere(stream: TextIO) -> None:
+def lead_nowhere(stream: TextIO) -> None:
     """Have /dev/null take what a stream could not write, and will try again."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())

@@ -92,7 +92,11 @@ def test_what_is_recorded_is_what_was_sent(domain: int, tmp_path: Path) -> None:
 
 def test_a_terminal_that_is_closed_ends_it_as_ctrl_c_does(domain: int, tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
-    with Peer(domain) as peer, recorder(domain, path) as process:
+    # Whoever runs the tests may ignore it, and what they start would inherit that.
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    process = recorder(domain, path, streams="2>&1")  # started by us, not by our template
+    signal.signal(signal.SIGHUP, before)
+    with Peer(domain) as peer, process:
         peer.observe(scan("a", {"temperature": 21.5}))
         peer.until(lambda: path.exists() and read_unfinished(path), "it in the file")
         assert process.stop(signal.SIGHUP) == 0

@@ -25,6 +25,12 @@ def now_s() -> int:
     return int(time.time())
 
 
+def temperature(tag_id: str, half_hours_ago: int) -> float:
+    value = 20.0 + 0.3 * PLACES[tag_id][0]
+    value += 0.1 * math.sin(half_hours_ago + list(PLACES).index(tag_id))
+    return value + (9.0 if tag_id == "d" and half_hours_ago <= 4 else 0.0)
+
+
 @pytest.fixture(scope="module")
 def live() -> Iterator[Bridge]:
     """A bridge whose twin has read four tags for ten hours; one has read 9 K too much since two."""
@@ -33,9 +39,8 @@ def live() -> Iterator[Bridge]:
         for hour in range(20, 0, -1):
             for number, (tag_id, at) in enumerate(PLACES.items()):
                 stamp_s = now_s() - 1800 * hour + 60 * number
-                value = 20.0 + 0.3 * at[0] + 0.1 * math.sin(hour + number)
-                value += 9.0 if tag_id == "d" and hour <= 4 else 0.0
-                running.peer.observe(scan(tag_id, {"temperature": value}, stamp_s=stamp_s, at=at))
+                read = {"temperature": temperature(tag_id, hour)}
+                running.peer.observe(scan(tag_id, read, stamp_s=stamp_s, at=at))
             if hour == 11:  # a topic holds 50
                 running.peer.observe(scan("half", {"co2": 1.0}))
                 running.tag("half")
@@ -53,12 +58,12 @@ def answered(live: Bridge, path: str, accept: Any, **query: Any) -> Any:
 
 
 def test_a_tag_that_has_changed_is_told_left_out_and_judged(live: Bridge) -> None:
-    body = answered(
-        live,
-        "/api/estimate/tags",
-        lambda body: body["tags"].get("d", {}).get("left_out"),
-        **SENSOR,
-    )
+    def is_of_the_last(body: Any) -> bool:
+        # What is foretold is made beside what is heard, and may be of the scan before it.
+        told = body["tags"].get("d")
+        return bool(told and told["left_out"] and told["measured"] == temperature("d", 1))
+
+    body = answered(live, "/api/estimate/tags", is_of_the_last, **SENSOR)
     ExpectedTags.model_validate(body)
     assert {tag_id: tag["left_out"] for tag_id, tag in body["tags"].items()} == {
         **dict.fromkeys("abc", False),

@@ -27,7 +27,7 @@ from lupin_twin.journal.lock import InUse, holder_of
 from lupin_twin.journal.overview import Overview, RunExtent, overview
 from lupin_twin.journal.schema import FILE_ERRORS, Empty, Foreign, open_named, says_damaged
 from lupin_twin.journal.vacuuming import NotPossible, hear_interrupts, vacuum
-from lupin_twin.leaving import lead_nowhere
+from lupin_twin.leaving import INTERRUPTED, lead_nowhere
 from lupin_twin.memory import demo_journal_path, journal_path
 from lupin_twin.past import NotRemembered, PastRefused, PastRow, seconds
 
@@ -38,7 +38,6 @@ ACTIONS: Final[Mapping[str, str]] = {
     "vacuum": "make a whole file as small as what is in it; its twin has to be stopped",
 }
 FAILED: Final = 1
-INTERRUPTED: Final = 130
 _MAX_TOLD: Final = 20
 _RUNS_TOLD: Final = 10
 # ROS has ports for no more.

@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import math
 import signal
-import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
+from lupin_bridge.telling import say
 from lupin_twin import stop_signals
 
 SPEEDS: Final = (0.1, 100.0)
@@ -95,12 +95,12 @@ def run(options: argparse.Namespace, ros_args: Sequence[str]) -> int:
     try:
         from lupin_bridge.bags.replaying import Refused, replay  # noqa: PLC0415
     except ImportError as error:
-        sys.stderr.write(f"lupin-twin: cannot publish what is recorded: {error}\n")
+        say(f"cannot publish what is recorded: {error}")
         return FAILED
     try:
         replay(options, ros_args, stop_asked)
     except (RecordingError, Refused) as error:
-        sys.stderr.write(f"lupin-twin: {' '.join(str(error).split())}\n")
+        say(str(error))
         return FAILED
     return 0
 

@@ -30,6 +30,7 @@ from lupin_bridge.bags.replay_node import (
     NotPublishable,
     ReplayNode,
 )
+from lupin_bridge.telling import say
 from lupin_twin.half_made import remove_half_made
 from lupin_twin.parameters import ParameterError
 
@@ -89,10 +90,10 @@ def play(
 
     """
     count = f"{recording.file_count} files, " if recording.file_count > 1 else ""
-    _say(f"{recording.name}, {count}{recording.duration_s:.1f} s: looking who would hear it")
+    say(f"{recording.name}, {count}{recording.duration_s:.1f} s: looking who would hear it")
     if not _has_looked(node, options, stop_asked):
         return
-    _say(
+    say(
         f"replaying from second {playing.start_s:g}{', paused' if playing.is_paused else ''}, "
         f"to {_whom(node, options)}"
     )
@@ -118,7 +119,7 @@ def play(
             ):
                 progress.end()
                 if not is_told:
-                    _say(f"the end: {player.published:,} messages were published")
+                    say(f"the end: {player.published:,} messages were published")
                     _tell_lost(node.twins)
                 if not options.hold:
                     return
@@ -144,7 +145,7 @@ def _has_looked(node: ReplayNode, options: Namespace, stop_asked: Callable[[], b
             break
     _refuse(node, options, is_patient=False)
     for name in node.without_sim_time():
-        _say(
+        say(
             f"{name} does not follow /clock: start it with --ros-args -p use_sim_time:=true, or "
             "its ages count from now"
         )
@@ -162,7 +163,7 @@ def _whom(node: ReplayNode, options: Namespace) -> str:
 
 def _tell_lost(twins: LiveTwins) -> None:
     for name, lost in sorted(twins.lost.items()):
-        _say(
+        say(
             f"{name} says that {lost:,} messages came too fast for it and are lost: what it shows "
             "is not all that was recorded; replay it slower (--speed), or on a machine less busy"
         )
@@ -178,7 +179,7 @@ def _qos(topic: Topic) -> Offered:
     otherwise = INPUTS.get(topic.type_name, Offered())
     qos = offered(topic.offered_qos, otherwise)
     if topic.type_name in INPUTS and not (qos.is_reliable and qos.is_latched):
-        _say(
+        say(
             f"{topic.name} was offered as volatile or best effort, and is so again: no twin hears "
             "it, for a twin asks for reliable and transient local"
         )
@@ -252,7 +253,7 @@ class Progress:
         for text in (*(gap.told(self._speed) for gap in player.take_gaps()), *news):
             if self._is_seen:
                 _write("\r\x1b[K")
-            _say(text)
+            say(text)
         if self._is_seen and time.monotonic() - self._told_s >= _TELL_EVERY_S:
             self._told_s = time.monotonic()
             paused = ", paused" if player.is_paused else ""
@@ -271,10 +272,6 @@ class Progress:
 
     def __exit__(self, *_: object) -> None:
         self.end()
-
-
-def _say(text: str) -> None:
-    _write(f"lupin-twin: {text}\n")
 
 
 def _write(text: str) -> None:

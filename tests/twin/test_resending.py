@@ -37,8 +37,12 @@ class Stage:
         self.tried: list[Any] = []
         self.sent: list[tuple[Any, Any]] = []
         self.warned: list[str] = []
-        self.resending = Resending(lambda _, text: self.warned.append(text))
+        self.drained = 0
+        self.resending = Resending(lambda _, text: self.warned.append(text), self.drain)
         self.resending.watch(self)
+
+    def drain(self) -> None:
+        self.drained += 1
 
     def send_response(self, response: Any, header: Any) -> None:
         self.tried.append(header)
@@ -75,7 +79,9 @@ def test_what_could_be_sent_is_sent_once(stage: Stage) -> None:
 
 def test_an_answer_is_sent_as_soon_as_its_reader_is_found_and_once(stage: Stage) -> None:
     stage.send_response("response", "a")
+    assert stage.drained == 1, "what came meanwhile"
     assert stage.go_on() == ["a"]
+    assert stage.drained == 2
     stage.found = {"a"}
     assert stage.go_on() == ["a"]
     assert stage.sent == [("response", "a")]

@@ -178,7 +178,7 @@ class TwinNode(AdjustableNode):
     def _connect(self) -> None:
         p = self.parameters
         group = self._group
-        resending = Resending(self.habits.warn)
+        resending = Resending(self.habits.warn, self.habits.drain)
         for parameter, shape, depth, callback in (
             ("observations_topic", shapes.OBSERVATION, 50, self._on_observation),
             ("discovered_tags_topic", shapes.DISCOVERED_TAGS, 50, self._on_discovered_tags),

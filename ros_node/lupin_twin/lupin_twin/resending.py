@@ -47,11 +47,15 @@ class _Unsent:
 class Resending:
     """Keeps what the middleware did not send; belongs to the node's thread.
 
-    `warn(key, text)` tells of an answer that was given up.
+    `warn(key, text)` tells of an answer that was given up; `drain()` takes what came meanwhile,
+    behind each try that failed: observations must not be lost for a client that is never found.
     """
 
-    def __init__(self, warn: Callable[[tuple[str, object], str], None]) -> None:
+    def __init__(
+        self, warn: Callable[[tuple[str, object], str], None], drain: Callable[[], None]
+    ) -> None:
         self._warn = warn
+        self._drain = drain
         self._unsent: list[_Unsent] = []  # the oldest first
         self._rests_until_s = 0.0
         warnings.filterwarnings("error", re.escape(UNSENT), RuntimeWarning)
@@ -70,6 +74,7 @@ class Resending:
                 now_s = time.monotonic()
                 name = str(service.service_name)
                 self._keep(_Unsent(name, send, response, header, now_s, now_s - began_s))
+                self._drain()
 
         service.send_response = send_response
         return service
@@ -91,6 +96,7 @@ class Resending:
             if not _was_sent(one.send, one.response, one.header):
                 now_s = time.monotonic()
                 self._rests_until_s = now_s + _REST * (now_s - began_s)
+                self._drain()
                 return
             self._unsent.remove(one)
 

@@ -26,7 +26,7 @@ BENCH_ENV := ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_LOG_DIR=$(CURDIR)/$(DON
 
 say = @printf '\033[1m==> %s\033[0m\n'
 
-.PHONY: help setup run check quick test lint types collect unit hmi-test bench bench-live soak clean
+.PHONY: help setup run check quick test lint types collect unit hmi-test dist bench bench-live soak clean
 
 help: ## what there is
 	@grep -E '^[a-z-]+:.*## ' Makefile | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -49,13 +49,15 @@ $(VENV)/pyvenv.cfg: | $(DONE)/checked
 	@$(PYTHON) -m venv $(VENV)
 
 MSGS_SOURCES := $(wildcard ros_node/lupin_msgs/*.* ros_node/lupin_msgs/*/*)
-$(DONE)/msgs: $(MSGS_SOURCES) $(VENV)/pyvenv.cfg
-	$(say) 'installing the ROS wheels and building lupin_msgs against them (about a minute)'
-	@env -u PYTHONPATH $(BIN)/pip install --quiet ./ros_node/lupin_msgs
+$(DONE)/wheels/built: $(MSGS_SOURCES) $(VENV)/pyvenv.cfg
+	$(say) 'building lupin_msgs against the ROS wheels (about a minute)'
+	@rm -rf $(@D)
+	@env -u PYTHONPATH $(BIN)/pip wheel --quiet --no-deps --wheel-dir $(@D) ./ros_node/lupin_msgs
+	@env -u PYTHONPATH $(BIN)/pip install --quiet --no-deps --force-reinstall $(@D)/*.whl
 	@touch $@
 
-$(DONE)/python: pyproject.toml requirements.txt $(wildcard ros_node/*/setup.py) $(DONE)/msgs
-	$(say) 'installing the Python packages'
+$(DONE)/python: pyproject.toml requirements.txt $(DONE)/wheels/built
+	$(say) 'installing ROS and the Python packages'
 	@grep -v '^\./ros_node/lupin_msgs' requirements.txt > $(DONE)/requirements.txt
 	@env -u PYTHONPATH $(BIN)/pip install --quiet -r $(DONE)/requirements.txt
 	@touch $@
@@ -75,6 +77,11 @@ $(DONE)/hmi: $(HMI_SOURCES) $(DONE)/node_modules
 $(DONE)/tools: .ci/tools | $(DONE)/checked
 	@.ci/tools
 	@touch $@
+
+dist: setup ## what a release holds, in dist/: wheels, sdist, and the context of a container image
+	$(say) 'building into dist/'
+	@.ci/dist dist
+	@ls dist
 
 # --- checks ------------------------------------------------------------------------------------
 
@@ -137,4 +144,4 @@ soak: setup ## 50 kills under load, and eight hours of writing in a few minutes:
 	@$(TEST_ENV) $(BIN)/python -m tests.soak $(ARGS)
 
 clean: ## remove everything that set-up and builds have made
-	rm -rf $(VENV) $(DONE) node_modules backend/lupin_bridge/static
+	rm -rf $(VENV) $(DONE) node_modules backend/lupin_bridge/static dist

@@ -74,26 +74,21 @@ const scenarios = {
     };
   },
 
-  /** Draws the map and follows the inputs, in JSON, in CBOR, and raw. */
+  /** Draws the map and follows the inputs, and asks for the map in forms that are not served. */
   async inputs() {
-    const heard = async (options) => {
-      const next = (name, messageType) => subscribe({ name, messageType, ...options }).next();
-      const [map, observation, tags, state] = await Promise.all([
-        next('/map', 'nav_msgs/msg/OccupancyGrid'),
-        next('/floranova/observations', 'lupin_msgs/msg/Observation'),
-        next('/perception/discovered_tags', 'lupin_msgs/msg/DiscoveredTags'),
-        next(STATE.name, STATE.messageType),
-      ]);
-      return { map, observation, tags, state, kind: map.data.constructor.name };
-    };
-    const json = await heard({});
-    const cbor = await heard({ compression: 'cbor' });
-    const raw = await subscribe({
-      name: '/map',
-      messageType: 'nav_msgs/msg/OccupancyGrid',
-      compression: 'cbor-raw',
-    }).next();
-    return { json, cbor, raw: raw.bytes.length };
+    const MAP = { name: '/map', messageType: 'nav_msgs/msg/OccupancyGrid' };
+    const next = (name, messageType) => subscribe({ name, messageType }).next();
+    const [map, observation, tags] = await Promise.all([
+      next(MAP.name, MAP.messageType),
+      next('/floranova/observations', 'lupin_msgs/msg/Observation'),
+      next('/perception/discovered_tags', 'lupin_msgs/msg/DiscoveredTags'),
+    ]);
+    const compressed = {};
+    for (const compression of ['cbor', 'cbor-raw', 'png']) {
+      const again = await subscribe({ ...MAP, compression }).next();
+      compressed[compression] = again.header.frame_id;
+    }
+    return { map, observation, tags, compressed, warnings: statuses.map(({ msg }) => msg) };
   },
 
   /** Tries whatever would change something. */
@@ -114,7 +109,7 @@ const scenarios = {
 
   /** Two components of a page on one topic, of which one stops listening. */
   async two() {
-    const first = subscribe({ throttle_rate: 3_600_000, queue_length: 10, compression: 'cbor' });
+    const first = subscribe({ throttle_rate: 3_600_000, queue_length: 10 });
     await first.next();
     const latchedForSecond = once(ros, STATE.name);
     const second = subscribe();

@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+import json
+import os
+import re
 import shlex
 import subprocess
+import sys
+import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
 
-from lupin_bridge.cli import USAGE_ERROR, _parser, split_ros_args
-from lupin_bridge.configuration import settings_from
+from lupin_bridge import journal_command
+from lupin_bridge.cli import USAGE_ERROR, _parser, main, split_ros_args
+from lupin_bridge.configuration import settings_from, strange_variables
 from lupin_bridge.settings import variable
 from lupin_bridge.twin.source import STUCK_AFTER_S
+from lupin_twin.memory import journal_path
+from tests.support.domains import ros_env
+from tests.support.processes import Process, lupin_twin, url_of
 from tests.support.programs import program
 
-DEPLOY = Path(__file__).parents[1] / "backend" / "deploy"
+ROOT = Path(__file__).parents[1]
+DEPLOY = ROOT / "backend" / "deploy"
 UNIT = DEPLOY / "lupin-twin.service"
 
 
@@ -43,6 +54,11 @@ def test_systemd_finds_nothing_wrong_with_the_unit(tmp_path: Path) -> None:
     assert (result.returncode, result.stderr) == (0, "")
 
 
+def test_it_starts_behind_a_clock_that_is_set() -> None:
+    for directive in ("Wants", "After"):
+        assert "time-sync.target" in unit()[directive][0].split()
+
+
 def test_bad_settings_are_not_tried_again_for_ever() -> None:
     assert unit()["Restart"] == ["always"]
     assert unit()["RestartPreventExitStatus"] == [str(USAGE_ERROR)]
@@ -54,12 +70,12 @@ def test_the_watchdog_waits_longer_than_a_callback_may_take() -> None:
     assert int(seconds) > STUCK_AFTER_S
 
 
-def test_it_has_a_place_to_write_in_and_shares_memory_with_other_nodes(
+def test_it_has_a_place_to_write_in_and_needs_no_memory_of_other_nodes(
     environment: dict[str, str],
 ) -> None:
     assert unit()["ProtectSystem"] == ["strict"]
     assert unit()["PrivateTmp"] == ["yes"], "/tmp would be read-only"
-    assert not {"PrivateDevices", "PrivateIPC", "DynamicUser"} & set(unit()), "/dev/shm"
+    assert environment["FASTDDS_BUILTIN_TRANSPORTS"] == "UDPv4", "it is another user"
     assert environment["ROS_LOG_DIR"] == f"/var/log/{unit()['LogsDirectory'][0]}"
 
 
@@ -69,13 +85,69 @@ def test_the_token_is_a_credential(environment: dict[str, str]) -> None:
     assert "EnvironmentFile" not in unit()
 
 
+def test_systemd_makes_the_user_and_the_folders() -> None:
+    assert unit()["DynamicUser"] == ["yes"]
+    assert unit()["StateDirectory"] == unit()["LogsDirectory"] == unit()["User"]
+
+
 def test_the_command_line_is_one_that_the_bridge_takes() -> None:
-    (start,) = unit()["ExecStart"]
-    script = shlex.split(start)[2]
-    own, ros = split_ros_args(shlex.split(script.rpartition("lupin-twin serve")[2]))
+    own, ros = split_ros_args(shlex.split(script().rpartition("lupin-twin serve")[2]))
     options = _parser().parse_args(["serve", *own])
     assert Path(options.config).name == "bridge.toml"
     assert ros[:2] == ["--ros-args", "--params-file"]
+
+
+def script() -> str:
+    """What the unit's shell runs."""
+    (start,) = unit()["ExecStart"]
+    return shlex.split(start)[2].replace("$$", "$")
+
+
+def test_the_service_serves_and_the_journal_command_finds_its_file(
+    environment: dict[str, str],
+    domain: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """All of it but systemd: its folders are elsewhere."""
+    settings = tmp_path / "etc" / "lupin-twin"
+    settings.mkdir(parents=True)
+    bare = (DEPLOY / "bridge.toml").read_text(encoding="utf-8").replace("8000", "0")
+    (settings / "bridge.toml").write_text(bare, encoding="utf-8")
+    parameters = ROOT / "ros_node" / "lupin_twin" / "config" / "twin.yaml"
+    (settings / "twin.yaml").write_bytes(parameters.read_bytes())
+    token = tmp_path / "token"
+    token.write_text("0123456789abcdef\n", encoding="ascii")
+    token.chmod(0o600)
+    ros = tmp_path / "opt" / "ros" / "jazzy"
+    ros.mkdir(parents=True)
+    (ros / "setup.bash").write_text("echo sourced\n", encoding="ascii")
+    elsewhere = (
+        ("/opt/lupin-twin/bin", str(Path(sys.executable).parent)),
+        ("/opt/", f"{tmp_path}/opt/"),
+        ("/etc/", f"{tmp_path}/etc/"),
+        ("/var/", f"{tmp_path}/var/"),
+        ("%d", str(tmp_path)),
+    )
+
+    def moved(text: str) -> str:
+        for here, there in elsewhere:
+            text = text.replace(here, there)
+        return text
+
+    env = {name: moved(value) for name, value in environment.items()}
+    assert env.pop("ROS_DOMAIN_ID") == "0"
+    command = ["/bin/bash", "-c", moved(script())]
+    with Process(command, ros_env(domain, **env), afresh=True) as process:
+        url_of(process)
+        assert process.output.startswith("sourced\n")
+        folder = Path(moved(str(journal_command.SERVICE_FOLDER)))
+        file = folder / f"domain-{domain}.sqlite"
+        assert file.is_file()
+        monkeypatch.setattr(journal_command, "SERVICE_FOLDER", folder)
+        assert main(["journal", "info", "--domain", str(domain)]) == 0
+        assert str(file) in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("is_bare", [True, False])
@@ -88,3 +160,70 @@ def test_the_settings_are_settings_those_that_are_commented_out_too(
     settings = settings_from({}, {}, str(file))
     assert settings.host == "0.0.0.0"
     assert bool(settings.tls_key) != is_bare
+
+
+# --- the container -------------------------------------------------------------------------------
+
+
+def image() -> dict[str, str]:
+    """The last of each instruction of the image's last stage; ENV is there by its variables."""
+    text = (DEPLOY / "Containerfile").read_text(encoding="utf-8").replace("\\\n", " ")
+    stage = re.split(r"^FROM .*$", text, flags=re.MULTILINE)[-1]
+    lines = [line for line in stage.splitlines() if line and not line.startswith("#")]
+    found = {name: rest for name, _, rest in (line.partition(" ") for line in lines)}
+    return found | dict(pair.split("=", 1) for pair in found["ENV"].split())
+
+
+def test_the_image_keeps_its_journal_in_the_volume_as_a_user_without_rights() -> None:
+    path = journal_path("", {"XDG_STATE_HOME": image()["XDG_STATE_HOME"]}, 0, "")
+    assert path is not None
+    assert image()["VOLUME"] == str(path.parent)
+    uid, home = re.search(r"--uid (\d+) --home-dir (\S+) --create-home", image()["RUN"]).groups()  # type: ignore[union-attr]
+    assert (uid, home) == (image()["USER"], image()["VOLUME"])
+    assert int(uid) > 0
+
+
+def test_the_image_needs_no_memory_of_the_host_and_starts_a_role() -> None:
+    assert image()["FASTDDS_BUILTIN_TRANSPORTS"] == "UDPv4"
+    assert json.loads(image()["ENTRYPOINT"]) == ["lupin-twin"]
+    assert _parser().parse_args(json.loads(image()["CMD"])).role == "serve"
+
+
+def test_the_health_check_says_whether_the_bridge_lives(domain: int) -> None:
+    python, *arguments = json.loads(image()["HEALTHCHECK"].partition(" CMD ")[2])
+    assert python == "python"
+
+    def check(port: str) -> int:
+        env = {**os.environ, variable("port"): port}
+        result = subprocess.run(
+            [sys.executable, *arguments], env=env, capture_output=True, check=False
+        )
+        return result.returncode
+
+    # As in the compose file: below a path.
+    with lupin_twin(domain, "web", "--path-prefix", "/gh1") as process:
+        port = re.search(r":(\d+)", url_of(process).removeprefix("http:"))[1]  # type: ignore[index]
+        assert check(port) == 0
+        process.stop()
+        assert check(port) != 0
+
+
+def test_compose_runs_what_the_image_has_as_nginx_expects_it() -> None:
+    compose = yaml.safe_load((DEPLOY / "compose.yaml").read_text(encoding="utf-8"))
+    services = compose["services"]
+    nginx = (DEPLOY / "nginx.conf").read_text(encoding="utf-8")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert services["twin"]["entrypoint"][0] in project["scripts"]
+    assert f"/{services['twin']['volumes'][0].partition('/')[2]}" == image()["VOLUME"]
+    bridges = {name: it for name, it in services.items() if name.startswith("bridge")}
+    ports = []
+    for bridge in bridges.values():
+        assert _parser().parse_args(bridge["command"]).role == "web"
+        assert strange_variables(bridge["environment"]) == []
+        settings = settings_from({}, bridge["environment"], None)
+        ports.append(settings.port)
+        assert f"location {settings.path_prefix}/ " in nginx
+        assert settings.allow_host == tuple(re.findall(r"server_name (\S+);", nginx))
+    assert ports == [int(port) for port in re.findall(r"server 127\.0\.0\.1:(\d+)", nginx)]
+    for service in ("twin", *bridges):
+        assert services[service]["network_mode"] == "host"

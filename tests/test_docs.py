@@ -122,7 +122,10 @@ def test_every_make_target_that_is_named_is_there() -> None:
     "page",
     [
         "README.md",
-        "backend/SECURITY.md",
+        "CHANGELOG.md",
+        "CONTRIBUTING.md",
+        "SECURITY.md",
+        "docs/compatibility.md",
         "backend/README.md",
         "ros_node/README.md",
         "tests/README.md",

@@ -87,7 +87,7 @@ def feeding(disk: Disk, log_bytes: int = 8_000_000) -> Iterator[Told]:
 
 
 def numbers(path: Path) -> list[int]:
-    rows = select(path, "SELECT stamp_ns FROM scan ORDER BY id")
+    rows = select(path, "SELECT stamp_ns FROM scan ORDER BY seq")
     return [stamp - NOW for (stamp,) in rows if isinstance(stamp, int)]
 
 

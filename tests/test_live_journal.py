@@ -17,6 +17,7 @@ from tests.support.journal import SECOND, is_whole, kept, scan, select
 from tests.support.messages import scan as observation
 from tests.support.ros import Peer
 from tests.support.waiting import until, until_answered
+from tests.support.web import filled
 
 # The latest that ROS time can say, in January 2038: one of 2099 has no message.
 LATEST_S = 2_147_483_647.0
@@ -105,7 +106,9 @@ def test_a_damaged_file_is_set_aside_read_as_far_as_it_goes_and_named(
         assert is_whole(path)
 
     run(domain, test())
-    kept_rows = select(path, "SELECT tag_id, count(*) FROM scans GROUP BY tag_id ORDER BY tag_id")
+    kept_rows = select(
+        path, "SELECT tag, count(*) FROM scan JOIN series USING (series) GROUP BY tag ORDER BY tag"
+    )
     rows = {str(tag_id): int(str(count)) for tag_id, count in kept_rows}
     assert rows["8"] == 1
     if damage is not no_database:
@@ -181,7 +184,7 @@ def test_a_stamp_of_years_ahead_counts_as_made_on_arrival_and_is_kept_so(
                     robot.observe(message)
                     await shows(live, "8", 1.0)
                     (tag,) = (await live.http.get("/api/state")).json()["tags"]
-                    stamps.append(tag["readings"][0]["observed_at"])
+                    stamps.append(filled(tag)["readings"][0]["observed_at"])
                     reach = None
                     # What was just heard is in the journal a moment later; before, the one that
                     # ended has to leave it.

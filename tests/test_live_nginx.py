@@ -16,7 +16,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.sync.client import connect
 
-from tests.support.access import BEARER, TOKEN
+from tests.support.access import BEARER, OWN, TOKEN
 from tests.support.domains import own_domain
 from tests.support.live import attached, wait_until_ready
 from tests.support.messages import scan
@@ -75,7 +75,7 @@ def test_the_page_and_all_that_it_asks_for_are_below_the_prefix(house: House) ->
         asked = browser.get("/gh1/", headers=page)
         assert (asked.status_code, asked.headers["location"]) == (303, "signin")
         assert browser.get("/gh1/signin", headers=page).status_code == 200
-        signed_in = browser.get("/gh1/api/signin", headers=BEARER)
+        signed_in = browser.post("/gh1/api/signin", headers={**BEARER, **OWN})
         (cookie,) = signed_in.headers.get_list("set-cookie")
         assert "Path=/gh1/" in cookie
         assert "Secure" not in cookie, "nginx serves http here, and says so"

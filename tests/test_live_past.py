@@ -254,7 +254,7 @@ def test_a_flood_of_the_dearest_question_loses_no_observation(domain: int, tmp_p
             for number in piece:
                 robot.observe(scan("beside", {"co2": number}, stamp_s=T + 2.0 + number / RATE))
             ask()
-        last = f"SELECT 1 FROM scans WHERE stamp_ns = {stamp_ns(T + 2.0 + (OBSERVED - 1) / RATE)}"
+        last = f"SELECT 1 FROM scan WHERE stamp_ns = {stamp_ns(T + 2.0 + (OBSERVED - 1) / RATE)}"
         wait_for(lambda: select(journal, last), "the last of them in the journal", meanwhile=ask)
         assert select(journal, "SELECT count(*) FROM scan") == [(HOUSE + OBSERVED,)]
         assert "they came too fast" not in twin.output

@@ -53,7 +53,7 @@ class House:
         return running
 
     def scans(self) -> int:
-        return len(select(self.journal, "SELECT id FROM scan"))
+        return len(select(self.journal, "SELECT seq FROM scan"))
 
 
 @pytest.fixture(scope="module")
@@ -155,3 +155,31 @@ def test_an_export_holds_every_reading_and_every_failed_try(house: House) -> Non
         assert {(r["x_m"], r["y_m"]) for r in rows if r["tag_id"] == "a"} == {("1.0", "1.0")}
         assert {r["source"] for r in rows} == {"test"}
         assert [r["stamp"] for r in rows] == sorted(r["stamp"] for r in rows)
+
+
+def test_what_is_derived_has_a_past_too_the_same_in_web(house: House) -> None:
+    with ExitStack() as stack:
+        live, before = house.serve(stack), house.scans()
+        house.peer.observe(
+            scan("v", {"temperature": 20.0, "humidity": 50.0}, stamp_s=T + 10.0),
+            scan("v", {"temperature": 30.0}, stamp_s=T + 20.0),
+            scan("v", {"temperature": 30.0, "humidity": 50.0}, stamp_s=T + 30.0),
+        )
+        wait_for(lambda: house.scans() == before + 3, "all of it in the journal")
+        web = house.serve(stack, "web")
+        path = f"/api/history?tag_id=v&sensor_type=vpd&from={T}&to={T + 60}"
+        told = live.json(path)
+        assert [(it["stamp"]["sec"] - T, round(it["value"], 3)) for it in told["readings"]] == [
+            (10, 1.169),
+            (30, 2.122),
+        ]
+        assert (told["unit"], told["buckets"]) == ("kPa", [])
+        (bucket,) = live.json(f"{path}&points=1")["buckets"]
+        assert (bucket["n"], round(bucket["mean"], 3)) == (2, 1.645)
+        for query in ("", "&points=1"):
+
+            def same(path: str = path + query) -> bool:
+                there = web.get(path)
+                return there.status_code == 200 and there.content == live.get(path).content
+
+            wait_for(same, "the same in web")

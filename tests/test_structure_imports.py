@@ -179,7 +179,7 @@ def test_one_module_crosses_between_the_ros_thread_and_the_loop() -> None:
     found = [
         f"{name} uses {word} (line {node.lineno})"
         for name, text in MODULES.items()
-        # A recorder is a process of its own, without a loop.
+        # A player is a process of its own, without a loop.
         if name.startswith("lupin_bridge.")
         and not name.startswith(("lupin_bridge.twin.ros_thread", "lupin_bridge.bags."))
         for node in ast.walk(ast.parse(text))

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import ast
+import json
 import os
 import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterable
+from importlib.metadata import packages_distributions
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -16,7 +19,11 @@ from xml.etree import ElementTree
 
 import pytest
 
-ROS_NODE = Path(__file__).parents[1] / "ros_node"
+from lupin_bridge import __version__
+from tests.support.structure import PACKAGES as OWN_PACKAGES
+from tests.support.structure import ROOT, ROS
+
+ROS_NODE = ROOT / "ros_node"
 PACKAGES = ("lupin_twin", "lupin_patrol")
 # How rosdep calls what Python calls otherwise; None: rosdep does not know it.
 ROSDEP_KEYS = {"numpy": "python3-numpy", "pytest": "python3-pytest", "greenhouse_sim": None}
@@ -26,8 +33,8 @@ ROSDEP_KEYS = {"numpy": "python3-numpy", "pytest": "python3-pytest", "greenhouse
 OF_CMAKE = {"ament_cmake", "ament_cmake_pytest", "rosidl_default_generators"}
 
 
-def imported(files: Iterable[Path], package: str) -> set[str]:
-    """The rosdep keys of the packages that these files of a ROS package import from."""
+def imported_names(files: Iterable[Path], package: str) -> set[str]:
+    """The packages that these files of a package import from, but itself and Python's own."""
     found = set()
     for file in files:
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
@@ -35,14 +42,85 @@ def imported(files: Iterable[Path], package: str) -> set[str]:
                 found |= {alias.name.partition(".")[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom):
                 found.add((node.module or "").partition(".")[0])
-    found -= set(sys.stdlib_module_names) | {package}
-    return {key for name in found if (key := ROSDEP_KEYS.get(name, name)) is not None}
+    return found - set(sys.stdlib_module_names) - {package}
+
+
+def imported(files: Iterable[Path], package: str) -> set[str]:
+    """The rosdep keys of the packages that these files of a ROS package import from."""
+    names = imported_names(files, package)
+    return {key for name in names if (key := ROSDEP_KEYS.get(name, name)) is not None}
 
 
 def told(package: str, *kinds: str) -> set[str]:
     """The dependencies of these kinds that package.xml names."""
     document = ElementTree.parse(ROS_NODE / package / "package.xml")
     return {str(element.text) for kind in kinds for element in document.iter(kind)}
+
+
+def test_pyproject_lists_what_its_packages_import() -> None:
+    """FastAPI brings starlette along, say; which one, is ours to know as well."""
+    listed = {re.split("[<>=]", text)[0].lower() for text in project()["dependencies"]}
+    foreign = set()
+    for package, folder in OWN_PACKAGES.items():
+        foreign |= imported_names(folder.rglob("*.py"), package)
+    foreign -= ROS | set(OWN_PACKAGES)
+    distributions = packages_distributions()
+    assert {distributions[name][0].lower().replace("_", "-") for name in foreign} == listed
+
+
+def project() -> dict[str, Any]:
+    """What pip reads of the whole."""
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    told: dict[str, Any] = tomllib.loads(text)["project"]
+    return told
+
+
+def test_one_version_is_that_of_every_part() -> None:
+    lock = json.loads((ROOT / "package-lock.json").read_text(encoding="utf-8"))
+    messages = ROS_NODE / "lupin_msgs"
+    of_pip = tomllib.loads((messages / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    versions = {
+        "package.json": json.loads((ROOT / "package.json").read_text(encoding="utf-8"))["version"],
+        "package-lock.json": lock["version"],
+        "package-lock.json, packages": lock["packages"][""]["version"],
+        "frontend/openapi.json": json.loads(
+            (ROOT / "frontend" / "openapi.json").read_text(encoding="utf-8")
+        )["info"]["version"],
+        "ros_node/lupin_msgs/pyproject.toml": of_pip["version"],
+        "pyproject.toml, [ros]": next(
+            text.partition("==")[2]
+            for text in project()["optional-dependencies"]["ros"]
+            if text.startswith("lupin-msgs==")
+        ),
+    }
+    for package in ("lupin_msgs", *PACKAGES):
+        document = ElementTree.parse(ROS_NODE / package / "package.xml")
+        versions[f"ros_node/{package}/package.xml"] = document.findtext("version")
+    assert {name: it for name, it in versions.items() if it != __version__} == {}
+
+
+def test_the_oldest_node_is_the_same_wherever_it_is_named() -> None:
+    manifest = json.loads((ROOT / "package.json").read_text(encoding="utf-8"))
+    lock = json.loads((ROOT / "package-lock.json").read_text(encoding="utf-8"))
+    floor = manifest["engines"]["node"].removeprefix(">=")
+    assert lock["packages"][""]["engines"] == manifest["engines"]
+    for name in (".ci/preflight", "README.md", "docs/compatibility.md", "package.json"):
+        text = (ROOT / name).read_text(encoding="utf-8")
+        named = set(re.findall(r"(?:Node|Node \|) (\d+(?:\.\d+)*)", text))
+        assert named == {floor}, name
+
+
+@pytest.mark.parametrize(
+    ("version", "is_taken"),
+    [("18.20.8", False), ("20.18.3", False), ("20.19.0", True), ("22.12.0", True)],
+)
+def test_set_up_begins_with_no_older_node(version: str, is_taken: bool, tmp_path: Path) -> None:
+    """The preflight's own question, put to a Node of another version."""
+    text = (ROOT / ".ci" / "preflight").read_text(encoding="utf-8")
+    asked = re.search(r"node -e '(.*?)'", text, re.DOTALL)[1]  # type: ignore[index]
+    made = f"Object.defineProperty(process, 'versions', {{value: {{node: '{version}'}}}});"
+    done = subprocess.run(["node", "-e", made + asked], cwd=tmp_path, check=False)
+    assert (done.returncode == 0) == is_taken
 
 
 @pytest.mark.parametrize("package", PACKAGES)

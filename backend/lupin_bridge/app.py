@@ -9,6 +9,7 @@ from fastapi import FastAPI, Response, WebSocket
 from starlette.requests import HTTPConnection
 from starlette.staticfiles import StaticFiles
 
+from lupin_bridge import __version__
 from lupin_bridge.access.entrance import ComesIn, Entrance
 from lupin_bridge.access.middleware import Access, AccessControl
 from lupin_bridge.access.security import ReadOnly
@@ -55,7 +56,7 @@ def create_app(
     access = access or Access()
     app = FastAPI(
         title="lupin-twin",
-        version="0.1.0",
+        version=__version__,
         summary="Digital twin of a greenhouse: every tag's state, and fields of every sensor.",
         description=_DESCRIPTION,
         docs_url=None,  # FastAPI's own page loads its scripts from the internet
@@ -101,11 +102,11 @@ def create_app(
 
 
 _DESCRIPTION = """
-Read-only: every route answers GET and HEAD alone. Positions are metres in the map frame, values
-are in the sensor's unit, what is not known is null. `/ws/state` is a WebSocket that sends
-`StateFrame`, `StatusFrame` and `AlarmsFrame` as JSON text: the current ones at once, then every
-change. A bridge with a token (`LUPIN_TOKEN`) wants it as `Authorization: Bearer` with every
-request, `/healthz` excepted; a browser signs in at `/signin`.
+Read-only: every route answers GET and HEAD alone (sign-in and sign-out of a browser: POST).
+Positions are metres in the map frame, values are in the sensor's unit, what is not known is null.
+`/ws/state` is a WebSocket that sends `StateFrame`, `StatusFrame` and `AlarmsFrame` as JSON text:
+the current ones at once, then every change. A bridge with a token (`LUPIN_TOKEN`) wants it as
+`Authorization: Bearer` with every request, `/healthz` excepted; a browser signs in at `/signin`.
 """
 
 

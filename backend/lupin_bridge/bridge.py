@@ -31,7 +31,7 @@ from lupin_bridge.serving.metering import route_class
 from lupin_bridge.serving.rate_limit import RateLimit
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.alarms_json import alarms_frame, told_of
-from lupin_bridge.stream.frames import CBOR, JSON, FrameWriter, encoded
+from lupin_bridge.stream.frames import FrameWriter, text_frame
 from lupin_bridge.stream.hub import Client, Hub
 from lupin_bridge.stream.status import Liveness, Status
 from lupin_bridge.twin.shared import Shared
@@ -303,6 +303,7 @@ class Bridge:
         self._liveness.drops = state.drops
         self._liveness.journal = state.journal
         self._liveness.origin = state.origin
+        self._liveness.input_problems = state.input_problems
         self._alarm_feed.on_state(state)
         if self._push_timer is not None:
             return  # it will take this state along
@@ -360,18 +361,18 @@ class Bridge:
             self._has_alarms.clear()
             now, now_ns = self.alarms.now, self.ros_time_ns
 
-            def write(_: object, now: Board = now, now_ns: int | None = now_ns) -> dict[str, bytes]:
-                text = alarms_frame(told_of(now.page, now_ns), now.source, now.since_ns)
-                return {encoding: encoded(text, encoding) for encoding in (JSON, CBOR)}
+            def write(_: object, now: Board = now, now_ns: int | None = now_ns) -> bytes:
+                told = told_of(now.page, now_ns)
+                return text_frame(alarms_frame(told, now.source, now.since_ns))
 
             try:
-                wires = await asyncio.wrap_future(self.source.workers.submit(write, ALARMS_S))
-                self.hub.tell_alarms(wires, self._clock())
+                wire = await asyncio.wrap_future(self.source.workers.submit(write, ALARMS_S))
+                self.hub.tell_alarms(wire, self._clock())
             except Exception:  # nobody waits for this task: the next alarms are told
                 log.exception("the newest alarms were told to nobody")
                 continue
             # Of many alarms that change all the time, no more is sent than a browser can take.
-            await asyncio.sleep(len(wires[JSON]) / ALARM_BYTES_PER_S)
+            await asyncio.sleep(len(wire) / ALARM_BYTES_PER_S)
 
     def _on_death(self) -> None:
         self._liveness.thread_dead = True

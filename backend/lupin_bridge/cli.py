@@ -13,8 +13,7 @@ from collections.abc import Sequence
 from dataclasses import Field
 from typing import Any, NoReturn
 
-from lupin_bridge import journal_command, logs
-from lupin_bridge.bags import mcap_command, record_command, replay_command
+from lupin_bridge import __version__, journal_command, logs
 from lupin_bridge.configuration import (
     CONFIG_VARIABLE,
     settings_from,
@@ -39,17 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if ros_args:
             _fail("journal takes no arguments of ROS: name its file with --journal or --namespace")
         return journal_command.run(options, os.environ)
-    if options.role == "record":
-        _prepare_process()
-        return record_command.run(options, ros_args)
-    if options.role == "mcap":
-        if ros_args:
-            _fail("mcap takes no arguments of ROS: it works on files")
-        return mcap_command.run(options)
-    if options.role == "replay":
-        _prepare_process()
-        return replay_command.run(options, ros_args)
-    replay_args = _replay_args(options)
+    play_args = _play_args(options)
     try:
         settings = _settings_from(options)
         # Before anything slow is imported, and before the first thread: Ctrl-C and SIGTERM wait
@@ -68,7 +57,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             secrets,
             ros_args,
             _patrol_args(options),
-            replay_args=replay_args,
+            recording=getattr(options, "recording", None) or [],
+            play_args=play_args,
         )
     except SettingError as error:
         _fail(str(error))
@@ -118,8 +108,12 @@ def _patrol_args(options: argparse.Namespace) -> list[str]:
     return [f"--{name}={value}" for name, value in given.items() if value is not None]
 
 
-def _replay_args(options: argparse.Namespace) -> list[str]:
-    """What `demo --from` hands on to `replay`, which has to take it; nothing without."""
+# Recorded seconds a second.
+PLAYER_SPEEDS = (0.1, 100.0)
+
+
+def _play_args(options: argparse.Namespace) -> list[str]:
+    """What `demo --from` hands on to the player; nothing without."""
     if options.role != "demo":
         return []
     asked = [f"--start={options.start}"] if options.start is not None else []
@@ -131,10 +125,12 @@ def _replay_args(options: argparse.Namespace) -> list[str]:
         return []
     if options.seed is not None:
         _fail("--seed is the patrol's, which --from FILE.mcap does without")
-    asked += [f"--speed={options.speed:.15g}"] if options.speed is not None else []
-    words = [*options.recording, *asked]
-    _parser().parse_args(["replay", *words])
-    return words
+    if options.speed is not None:
+        low, high = PLAYER_SPEEDS
+        if not low <= options.speed <= high:
+            _fail(f"--speed is {options.speed:g}, for a recording it must be {low:g} to {high:g}")
+        asked.append(f"--speed={options.speed!r}")
+    return asked
 
 
 def _settings_from(options: argparse.Namespace) -> Settings:
@@ -153,6 +149,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog="Everything from --ros-args on goes to ROS: --ros-args -p idw_power:=3.0. A setting "
         "may also stand in the environment (LUPIN_PORT for --port) or in the file of --config.",
     )
+    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     roles = parser.add_subparsers(dest="role", required=True, metavar="ROLE")
     common = argparse.ArgumentParser(add_help=False)
     common.add_argument(
@@ -190,12 +187,33 @@ def _parser() -> argparse.ArgumentParser:
                 "folder that they are in. It goes to a twin of its own, with the time of the "
                 "recording and a journal that ends with it",
             )
-            replay_command.add_options(own)
+            own.add_argument(
+                "--start",
+                type=_seconds,
+                metavar="SECONDS",
+                help="begin the recording so long after its first message; what came before is "
+                "published at once (default: 0)",
+            )
+            own.add_argument("--loop", action="store_true", help="begin it again at its end")
+            own.add_argument(
+                "--skip-gaps",
+                type=_seconds,
+                default=math.inf,
+                metavar="SECONDS",
+                help="jump over its silences of more than so many seconds (default: wait)",
+            )
     journal_command.add_parser(roles)
-    record_command.add_parser(roles)
-    mcap_command.add_parser(roles)
-    replay_command.add_parser(roles)
     return parser
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value <= 1e9:
+        raise argparse.ArgumentTypeError(f"{text!r} must be a number from 0 to 1e9")
+    return value
 
 
 def _described(spec: Field[Any]) -> str:

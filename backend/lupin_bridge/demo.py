@@ -14,9 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from lupin_bridge.bags import replay_command
-from lupin_bridge.bags.choosing import TWIN_PARAMETERS, inputs_of
-from lupin_bridge.bags.recordings import Recordings
+from lupin_bridge.bags.recording import INPUTS, MAP_TYPE, Recording
 from lupin_twin.journal.lock import InUse
 from lupin_twin.journal.prefilling import is_empty, prefill, simulated
 from lupin_twin.journal.rows import LookRow, PinRow, Row, ScanRow
@@ -59,32 +57,29 @@ def patrolled(
     )
 
 
-def replayed(replay_args: Sequence[str], ros_args: Sequence[str], folder: Path) -> Feed:
-    """Feed it by a recording, by the words behind `lupin-twin replay`.
+def recorded(
+    files: Sequence[str], play_args: Sequence[str], ros_args: Sequence[str], folder: Path
+) -> Feed:
+    """Feed it by a recording, which `lupin_bridge.bags.player` plays with these options.
 
-    Its journal is in `folder`, and of this recording alone. The twin hears the topics as they were
-    recorded, and at the end the time stands.
+    Its journal is in `folder`, and of this recording alone. The twin subscribes to the topics as
+    they were recorded, and at the end the time stands.
 
     Raises:
         lupin_bridge.bags.recording.RecordingError: it cannot be played.
 
     """
-    options = replay_command.parsed(replay_args)
+    with Recording([Path(file) for file in files]) as recording:
+        inputs = recording.inputs
     journal = folder / "journal.sqlite"
-    with Recordings(options.files) as recording:
-        inputs = inputs_of(recording.topics, recording.name)
-        recording.check_start(options.start or 0.0)
-    values = {TWIN_PARAMETERS[topic.type_name]: topic.name for topic in reversed(inputs)}
-    has_map = "map_topic" in values
-    values = {name: json.dumps(topic) for name, topic in values.items()}
+    values = {INPUTS[kind]: json.dumps(name) for name, kind in inputs.items()}
     values |= {"journal": json.dumps(str(journal)), "use_sim_time": "true", "origin": "recorded"}
-    if has_map:
+    if MAP_TYPE in inputs.values():
         # As with the patrol: no field is painted outside of the walls.
         values["clip_to_explored"] = "true"
-    own = ("--hold", "--end-with-parent", "--own-journal", str(journal))
     return Feed(
-        "replay",
-        ["lupin_bridge.cli", "replay", *own, *replay_args, *ros_args],
+        "player",
+        ["lupin_bridge.bags.player", *files, *play_args, *ros_args],
         [
             "--ros-args",
             *(word for name, value in values.items() for word in ("-p", f"{name}:={value}")),
@@ -163,7 +158,7 @@ def fill_past(path: Path, patrol_args: Sequence[str]) -> bool:
         if path.exists() and not _is_empty(path):
             return False
         made = subprocess.run(  # noqa: S603  # the operator's own words, no shell
-            [sys.executable, "-m", "lupin_patrol.past", *patrol_args],
+            [sys.executable, "-P", "-m", "lupin_patrol.past", *patrol_args],
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,

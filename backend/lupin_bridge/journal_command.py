@@ -1,33 +1,36 @@
-"""`lupin-twin journal`: what is in a journal, whether it is whole, its rows, the file made small.
+"""`lupin-twin journal`: what is in a journal, is it whole, its rows, a copy, less of it.
 
-Everything but `vacuum` reads, also while a twin writes.
+Everything but `forget` and `vacuum` reads, also while a twin writes.
 """
 
 from __future__ import annotations
 
 import argparse
+import getpass
+import os
 import sqlite3
-import sys
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from lupin_bridge.bags.topics import SUFFIX
+from lupin_bridge.journal_backup import backup
 from lupin_bridge.journal_output import CannotWrite, Write, standard, writing
 from lupin_bridge.judge.choosing import own_sensors
 from lupin_bridge.past import table
 from lupin_bridge.past.moments import MAX_SECONDS, moment
-from lupin_bridge.telling import say
+from lupin_bridge.telling import Progress, say
 from lupin_twin.journal.checking import find_all_damage
 from lupin_twin.journal.export import rows
+from lupin_twin.journal.forgetting import NotKnown, forget
 from lupin_twin.journal.lock import InUse, holder_of
 from lupin_twin.journal.overview import Overview, RunExtent, overview
 from lupin_twin.journal.schema import FILE_ERRORS, Empty, Foreign, open_named, says_damaged
 from lupin_twin.journal.vacuuming import NotPossible, hear_interrupts, vacuum
-from lupin_twin.leaving import INTERRUPTED, lead_nowhere
+from lupin_twin.leaving import INTERRUPTED
 from lupin_twin.memory import demo_journal_path, journal_path
 from lupin_twin.past import NotRemembered, PastRefused, PastRow, seconds
 
@@ -35,6 +38,8 @@ ACTIONS: Final[Mapping[str, str]] = {
     "info": "what is in it: size, rows, tags, sensors, how far back, runs of the clock",
     "check": "read all of it for damage; exit code 1 if there is any",
     "export": "its readings and failed tries as CSV, or its observations as a recording",
+    "backup": "copy it to a new file, also while its twin writes",
+    "forget": "forget a tag, or its place alone, so that it is pinned anew; stop its twin first",
     "vacuum": "make a whole file as small as what is in it; its twin has to be stopped",
 }
 FAILED: Final = 1
@@ -45,7 +50,8 @@ _MAX_DOMAIN: Final = 232
 # Past every stamp.
 _END_NS: Final = (MAX_SECONDS + 1) * 10**9
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
-_TELL_EVERY_S: Final = 0.5
+# Where a systemd service keeps it: backend/deploy/lupin-twin.service.
+SERVICE_FOLDER: Final = Path("/var/lib/lupin-twin")
 
 
 class JournalError(Exception):
@@ -61,13 +67,14 @@ _TOLD: Final = (
     InUse,
     Empty,
     Foreign,
+    NotKnown,
     NotPossible,
 )
 
 
 def add_parser(roles: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add `journal` and its actions to the command's options."""
-    text = "what a twin remembers: info, check, export, vacuum"
+    text = "what a twin remembers: info, check, export, backup, forget, vacuum"
     parser = roles.add_parser("journal", help=text, description=text, allow_abbrev=False)
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     for action, what in ACTIONS.items():
@@ -87,6 +94,11 @@ def add_parser(roles: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
             help=f"that of the twin in this ROS domain, 0 to {_MAX_DOMAIN}"
             " (default: ROS_DOMAIN_ID, or 0)",
         )
+        if action == "backup":
+            own.add_argument("target", metavar="FILE", type=Path, help="must not be there yet")
+        if action == "forget":
+            own.add_argument("tag", metavar="TAG", help="its id")
+            own.add_argument("--pose", action="store_true", help="its place alone")
         if action == "export":
             own.add_argument(
                 "recording",
@@ -113,6 +125,10 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
         path = _path(options, environ)
         if options.action == "export":
             code = _export(path, options)
+        elif options.action == "backup":
+            code = _backup(path, options.target)
+        elif options.action == "forget":
+            code = _forget(path, options)
         else:
             code = {"info": _info, "check": _check, "vacuum": _vacuum}[options.action](path)
     except BrokenPipeError:
@@ -148,12 +164,13 @@ def _path(options: argparse.Namespace, environ: Mapping[str, str]) -> Path:
         raise JournalError(f"there is no home to look for a journal in: {error}") from error
     if path is None:
         raise JournalError("--journal is 'off', must be a file")
-    try:
-        if path.is_file():
-            return path
-        others = sorted(file.name for file in path.parent.glob("*.sqlite"))
-    except OSError as error:
-        raise JournalError(f"cannot look for the journal {path}: {error.strerror}") from error
+    for file in (path,) if named else (path, SERVICE_FOLDER / path.name):
+        try:
+            if file.is_file():
+                return file
+        except OSError as error:
+            raise JournalError(f"cannot look for the journal {file}: {error.strerror}") from error
+    others = sorted(file.name for file in path.parent.glob("*.sqlite"))
     there = f"; in its folder there are {', '.join(others[:9])}" if others else ""
     raise JournalError(f"there is no journal {path}{there}")
 
@@ -206,18 +223,19 @@ def _lines(found: Overview, holder: str | None) -> list[tuple[str, str]]:
         ("recording", holder or "nobody"),
         ("scans", f"{rows['scan']:,}, of them {found.failures:,} failed"),
         ("looks", f"{rows['look']:,}"),
-        ("places", f"{rows['pin']:,}"),
+        ("places", f"{rows['place']:,}"),
         ("tags", f"{rows['tag']:,}"),
         ("sensors", ", ".join(found.sensors) or "none"),
         ("reach", _reach(extents)),
-        ("rollups", f"{rows['rollup']:,} hours of a tag{_rolled(found.rolled_ns)}"),
+        ("hours", f"{rows['hour']:,} of a tag's sensors{_hours(found.hours_ns)}"),
         ("retention", _retention(found)),
         (
             "runs",
             f"{len(found.runs):,} of the clock" + (f", the last {_RUNS_TOLD}" if hidden else ""),
         ),
         *(("", _run_line(extent)) for extent in found.runs[hidden:]),
-        *(("set aside", f"{name}, {_mb(size)}") for name, size in found.set_aside),
+        *(("quarantined", f"{name}, {_mb(size)}") for name, size in found.quarantined),
+        *(("forgotten", _forgotten_line(record)) for record in found.forgotten),
     ]
 
 
@@ -230,7 +248,7 @@ def _reach(extents: list[RunExtent]) -> str:
     return f"{_iso(first)} to {_iso(last)}"
 
 
-def _rolled(stretch_ns: tuple[int, int] | None) -> str:
+def _hours(stretch_ns: tuple[int, int] | None) -> str:
     return "" if stretch_ns is None else f", {_iso(stretch_ns[0])} to {_iso(stretch_ns[1])}"
 
 
@@ -239,7 +257,7 @@ def _retention(found: Overview) -> str:
         return "not told yet by its twin"
     return (
         f"{found.kept_ns / 86_400e9:g} days and {_mb(found.kept_bytes)} at most;"
-        " rollups for ten years"
+        " hours for ten years"
     )
 
 
@@ -255,12 +273,17 @@ def _run_line(extent: RunExtent) -> str:
     return f"{extent.run.id}: {clock}, begun {_iso(begun.arrival_ns)}: {stretch}"
 
 
+def _forgotten_line(record: Mapping[str, Any]) -> str:
+    what = "the pose of tag" if record["what"] == "pose" else "all of tag"
+    return f"{what} {record['tag']!r}, by {record['by']}, {_iso(record['at'])}"
+
+
 # --- check ---------------------------------------------------------------------------------------
 
 
 def _check(path: Path) -> int:
     found = 0
-    progress = _Progress()
+    progress = Progress()
     with closing(_reader(path)) as connection:
         for wrong in find_all_damage(connection, progress.tell):
             found += 1
@@ -325,10 +348,9 @@ def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int)
         raise JournalError(f"cannot make {target}: {why}") from error
     if not made.observations + made.tags:
         raise JournalError(f"the journal {path} holds nothing of that period")
-    damaged = f"; {made.damaged:,} rows are damaged and left out" if made.damaged else ""
     _say(
         f"{made.observations:,} observations and {made.tags:,} messages of discovered tags are in"
-        f" {target}{damaged}"
+        f" {target}"
     )
     return 0
 
@@ -340,11 +362,45 @@ def _write_csv(lots: Iterable[Sequence[PastRow]], write: Write) -> None:
         write(table.lines(lot, sensors))
 
 
+# --- backup --------------------------------------------------------------------------------------
+
+
+def _backup(path: Path, target: Path) -> int:
+    progress = Progress()
+    with closing(_reader(path)) as connection:
+        size = backup(connection, target, lambda share: progress.tell("copying", share))
+    progress.clear()
+    _say(f"{target}: {_mb(size)}, a copy of {path}")
+    return 0
+
+
+# --- forget --------------------------------------------------------------------------------------
+
+
+def _forget(path: Path, options: argparse.Namespace) -> int:
+    gone = forget(path, options.tag, pose_only=options.pose, by=_user(), at_ns=time.time_ns())
+    if options.pose:
+        _say(f"{path}: the pose of tag {options.tag!r} is forgotten; the next twin pins it anew")
+    else:
+        _say(
+            f"{path}: tag {options.tag!r} is forgotten: {gone.scans:,} scans, {gone.looks:,} looks,"
+            f" {gone.places:,} places; counts of the timeline still have them"
+        )
+    return 0
+
+
+def _user() -> str:
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):
+        return f"user {os.getuid()}"
+
+
 # --- vacuum --------------------------------------------------------------------------------------
 
 
 def _vacuum(path: Path) -> int:
-    progress = _Progress()
+    progress = Progress()
     before, after = vacuum(path, "lupin-twin journal vacuum", progress.tell)
     progress.clear()
     _say(f"{path}: {_mb(before)} before, {_mb(after)} after")
@@ -352,36 +408,6 @@ def _vacuum(path: Path) -> int:
 
 
 # --- telling -------------------------------------------------------------------------------------
-
-
-class _Progress:
-    """How far it is, on the standard error: one line that is written over, if a person looks."""
-
-    def __init__(self) -> None:
-        self._is_seen = sys.stderr.isatty()
-        self._what = ""
-        self._told_s = 0.0
-
-    def tell(self, what: str, share: float) -> None:
-        is_new, self._what = what != self._what, what
-        if not self._is_seen:
-            if is_new:
-                self._put(f"{what}\n")
-            return
-        if is_new or time.monotonic() - self._told_s >= _TELL_EVERY_S:
-            self._told_s = time.monotonic()
-            self._put(f"\r\x1b[K{what} {share:.0%}")
-
-    def clear(self) -> None:
-        if self._is_seen:
-            self._put("\r\x1b[K")
-
-    def _put(self, text: str) -> None:
-        try:
-            sys.stderr.write(text)
-            sys.stderr.flush()
-        except OSError:
-            lead_nowhere(sys.stderr)
 
 
 def _say(*lines: str) -> None:

@@ -31,6 +31,7 @@ from lupin_bridge.past.asked import Answering
 from lupin_bridge.routes import no_page
 from lupin_bridge.serving.server import BridgeServer, address_of, allow_connections, listen
 from lupin_bridge.settings import Secrets, SettingError, Settings
+from lupin_bridge.stream.status import STALE_AFTER_S
 from lupin_bridge.supervisor import Supervisor
 from lupin_bridge.twin.local_twin import LocalTwin
 from lupin_bridge.twin.ros_thread import RosStartError
@@ -50,13 +51,14 @@ def run(
     ros_args: Sequence[str],
     patrol_args: Sequence[str] = (),
     *,
-    replay_args: Sequence[str] = (),
+    recording: Sequence[str] = (),
+    play_args: Sequence[str] = (),
 ) -> None:
     """Run a role until a signal ends it.
 
     `patrol_args` are the options of the patrol, in the role `demo`; it gets `ros_args` too, so that
-    a namespace or a remapping holds for both. With `replay_args`, the options of `lupin-twin
-    replay` and its files in front, a recording takes the patrol's place.
+    a namespace or a remapping holds for both. With `recording`, its files, and
+    `play_args`, the player's options, that takes the patrol's place.
 
     Raises:
         SettingError: a setting, a parameter or an argument of ROS with which it cannot run.
@@ -71,9 +73,9 @@ def run(
     with ExitStack() as ending:
         try:
             feed = None
-            if replay_args:
+            if recording:
                 folder = ending.enter_context(tempfile.TemporaryDirectory(prefix="lupin-twin-"))
-                feed = demo.replayed(replay_args, ros_args, Path(folder))
+                feed = demo.recorded(recording, play_args, ros_args, Path(folder))
             elif role == "demo":
                 feed = demo.patrolled(os.environ, patrol_args, ros_args)
             asyncio.run(
@@ -124,7 +126,7 @@ async def _run(
     source: LocalTwin | WebTwin
     timeout_s = settings.field_timeout_s
     if role == "web":
-        source = WebTwin(ros_args=ros_args, timeout_s=timeout_s)
+        source = WebTwin(ros_args=ros_args, timeout_s=timeout_s, stale_after_s=STALE_AFTER_S)
     else:
         all_args = [*own_args, *ros_args]
         source = LocalTwin(ros_args=all_args, timeout_s=timeout_s, expects=Answering)
@@ -178,14 +180,14 @@ def _warn_of_exposure(listener: socket.socket, access: Access) -> None:
 
 
 class Feeder:
-    """The patrol, or a replay, in a process of its own so that its data crosses DDS."""
+    """The patrol, or a recording's player: a process of its own, so that its data crosses DDS."""
 
     def __init__(self, feed: demo.Feed, is_stopping: Callable[[], bool]) -> None:
         self._what = feed.what
         self._is_stopping = is_stopping
         # The environment goes along whole: the ROS wheels' own variables only work together.
         self._process = subprocess.Popen(  # noqa: S603  # the operator's own words, no shell
-            [sys.executable, "-m", *feed.command]
+            [sys.executable, "-P", "-m", *feed.command]
         )
         self._watch = asyncio.create_task(self._tell_the_end())
 

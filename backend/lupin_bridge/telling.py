@@ -7,8 +7,11 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from contextlib import suppress
-from typing import TextIO
+from typing import Final, TextIO
+
+_AGAIN_AFTER_S: Final = 0.5
 
 
 def say(text: str) -> None:
@@ -21,6 +24,31 @@ def tell(*lines: str) -> None:
     error = _written(sys.stdout, "".join(f"{line}\n" for line in lines))
     if error is not None and not isinstance(error, BrokenPipeError):  # `| head`: it has enough
         say(f"cannot write to the standard output: {getattr(error, 'strerror', error)}")
+
+
+class Progress:
+    """How far it is, on the standard error: one line that is written over, if a person looks."""
+
+    def __init__(self) -> None:
+        self._is_seen = sys.stderr.isatty()
+        self._what = ""
+        self._told_s = 0.0
+
+    def tell(self, what: str, share: float) -> None:
+        """Show what is done, and the share of it that is."""
+        is_new, self._what = what != self._what, what
+        if not self._is_seen:
+            if is_new:
+                _written(sys.stderr, f"{what}\n")
+            return
+        if is_new or time.monotonic() - self._told_s >= _AGAIN_AFTER_S:
+            self._told_s = time.monotonic()
+            _written(sys.stderr, f"\r\x1b[K{what} {share:.0%}")
+
+    def clear(self) -> None:
+        """Make place for other lines."""
+        if self._is_seen:
+            _written(sys.stderr, "\r\x1b[K")
 
 
 def _written(stream: TextIO | None, text: str) -> Exception | None:

@@ -1,9 +1,8 @@
 """The state as of a moment, and what a twin that starts takes to know all, out of the journal.
 
 Each state is of another moment, over one connection, as a twin keeps it. "cold" is the very first,
-which finds what never changes, places and names: `serve` has read that by itself before anybody
-asks. "first" is the first of a new connection that knows it. Beside that, what the demo takes to
-fill an empty journal before its start.
+"first" the first of a new connection. Beside that, what the demo takes to fill an empty journal
+before its start.
 """
 
 from __future__ import annotations
@@ -19,10 +18,10 @@ from tempfile import TemporaryDirectory
 
 from lupin_bridge.demo import fill_past
 from lupin_twin.history import History
-from lupin_twin.journal.asof import state_at
+from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.runs import Clock
-from lupin_twin.journal.schema import Kept, open_reader
+from lupin_twin.journal.schema import open_reader
 from lupin_twin.journal.writer import Journal
 from lupin_twin.memory import Memory
 from lupin_twin.state import TwinStore
@@ -55,13 +54,12 @@ def states(what: str, house: House, times: int) -> None:
     """Print what a state takes: cold, at the first, at the median, and of one core."""
     journal = filled(house)
     wall, core = [], []
-    kept: Kept = {}
     cold_ns, *others = moments(house, times + 1)
-    with closing(open_reader(journal.path, kept=kept)) as connection:
+    with closing(open_reader(journal.path)) as connection:
         start = time.perf_counter()
         state_at(connection, cold_ns, "map")
         cold_s = time.perf_counter() - start
-    with closing(open_reader(journal.path, kept=kept)) as connection:
+    with closing(open_reader(journal.path)) as connection:
         for at_ns in others:
             start, begun = time.perf_counter(), time.thread_time()
             tags = len(state_at(connection, at_ns, "map").tags)

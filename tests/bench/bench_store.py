@@ -19,13 +19,13 @@ from itertools import islice
 from pathlib import Path
 from typing import Final, TypeVar
 
-from lupin_twin.journal.asof import state_at
 from lupin_twin.journal.export import rows
 from lupin_twin.journal.file import JournalFile
+from lupin_twin.journal.fold import state_at
+from lupin_twin.journal.queries import series
 from lupin_twin.journal.rows import Row, ScanRow
-from lupin_twin.journal.runs import Clock, Run
+from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
-from lupin_twin.journal.series import series
 from lupin_twin.journal.writer import Journal
 from lupin_twin.past import EVERY_TAG, Event, SeriesRequest
 from tests.bench.journal_double import (
@@ -80,12 +80,12 @@ def writing(folder: Path, share: float) -> None:
     print(f"{'':14}  readings/s  at the end  % of a core  bytes each  written each, bytes")
     journal = JournalFile(folder / "journal.sqlite", LIMITS, is_sound=True)
     with closing(journal):
-        run = journal.first_run(Clock(BEGUN_NS, BEGUN_NS, is_simulated=False))
+        run = journal.start(Clock(BEGUN_NS, BEGUN_NS, is_simulated=False), 1, is_believed=True).run
 
         def write(lot: Sequence[Row]) -> None:
             journal.append([(run, row) for row in lot])
-            # All that comes with it: the log put into the file, tallies, rollups.
-            while journal.look_after():
+            # All that comes with it: the log put into the file.
+            while journal.look_after(may_purge=True):
                 pass
 
         def size() -> int:
@@ -270,8 +270,7 @@ def restored_s(path: Path, now_ns: int) -> float:
     begun_s = time.process_time()
     file = JournalFile(path, LIMITS, is_sound=True)
     with closing(file):
-        run: Run = file.first_run(Clock(now_ns, now_ns, is_simulated=False))
-        file.restore(run, 1)
+        file.start(Clock(now_ns, now_ns, is_simulated=False), 1, is_believed=True)
     return time.process_time() - begun_s
 
 

@@ -25,7 +25,7 @@ window.house = {};
     return {
       tag_id: String(index + 1),
       pose: { position: { x, y, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } },
-      readings: readings.map(([name, value]) => ({ name, value, observed_at, stale_seconds: 0 })),
+      readings: readings.map(([name, value]) => ({ name, value })),
       last_observed: observed_at, stale_seconds: 0,
       looked_at: observed_at, last_try: observed_at, last_try_status: 0, last_try_detail: '',
       species: ['lupin', 'tomato', 'basil'][index % 3], species_confidence: 0.9,
@@ -38,6 +38,7 @@ window.house = {};
   const tags = Array.from({ length: COUNT }, (_, index) => tag(index, 18 + index % 12));
   const status = { type: 'status', twin: 'live', reason: 'live', message: '',
                    state_age_seconds: 0, has_map: false, origin: 'robot', drops: [],
+                   input_problems: [],
                    journal: { state: "recording", detail: "", set_aside: "", simulated: null },
                    outward: [] };
   let socket;

@@ -1,4 +1,4 @@
-"""Journals of a long time, made fast: through the real Appender, its rollups folded.
+"""Journals of a long time, made fast: as a twin would write them.
 
 Each tag is scanned in its turn, every `every_s`, so that all tags have been by then. Every
 tag has its place.
@@ -9,23 +9,19 @@ from __future__ import annotations
 import atexit
 import math
 import shutil
-import sqlite3
 import tempfile
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from functools import cache
+from itertools import islice
 from pathlib import Path
 from typing import Final
 
-from lupin_twin.journal.appending import Appender
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
-from lupin_twin.journal.rollups import Folding
 from lupin_twin.journal.rows import LookRow, PinRow, Row, ScanRow
 from lupin_twin.journal.runs import Clock
-from lupin_twin.journal.schema import transaction
-from lupin_twin.journal.tallying import tally_step
 from lupin_twin.state import Bloom, Flower, Pose, Reading
 
 SECOND: Final = 1_000_000_000
@@ -149,39 +145,11 @@ def fill(path: Path, house: House) -> Filled:
     readings = rows = 0
     file = JournalFile(path, LIMITS, is_sound=True)
     with closing(file):
-        run = file.first_run(Clock(BEGUN_NS, BEGUN_NS, is_simulated=False))
-        connection = file._connection
-        appender = Appender(connection)
+        run = file.start(Clock(BEGUN_NS, BEGUN_NS, is_simulated=False), 1, is_believed=True).run
         heard = house.rows()
-        while True:
-            with transaction(connection):
-                before = appender.last_id
-                for row in heard:
-                    appender.append(run, (row,))
-                    readings += len(row.readings) if isinstance(row, ScanRow) else 0
-                    if appender.last_id - before >= _BATCH:
-                        break
-            if appender.last_id == before:
-                break
-            rows += appender.last_id - before
-            connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
-            tally(connection)
-        _fold(connection, appender.last_id)
+        while lot := list(islice(heard, _BATCH)):
+            file.append([(run, row) for row in lot])
+            rows += len(lot)
+            readings += sum(len(row.readings) for row in lot if isinstance(row, ScanRow))
+            file.look_after(may_purge=False)
     return Filled(path, house, readings, rows)
-
-
-def tally(connection: sqlite3.Connection) -> None:
-    """Count what is not counted yet."""
-    has_more = True
-    while has_more:
-        with transaction(connection):
-            has_more = tally_step(connection)
-
-
-def _fold(connection: sqlite3.Connection, last_id: int) -> None:
-    folding = Folding(connection, last_id)
-    has_more = True
-    while has_more:
-        with transaction(connection):
-            has_more = folding.step()
-        connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()

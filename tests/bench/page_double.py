@@ -31,9 +31,9 @@ window.network = { frames: 0, fetches: 0 };
       pose: { position: { x, y, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } },
       readings: [
         { name: 'temperature', value: n % 97 === 0 ? null : 20 + 8 * Math.sin(n / 50 + index),
-          observed_at: time(), stale_seconds: 0 },
+          observed_at: time() },
         { name: 'humidity', value: 60 + 10 * Math.cos(n / 70 + index),
-          observed_at: time(), stale_seconds: 0 },
+          observed_at: time() },
       ],
       last_observed: time(),
       stale_seconds: 0,
@@ -162,7 +162,7 @@ window.network = { frames: 0, fetches: 0 };
     });
     if (pathname.endsWith('/quality')) return Response.json({
       sensor_type: 'temperature', unit: '°C', sample_count: 29, judged_count: 29,
-      rmse: 1 + (observations % 10) / 10, worst: null, painted_share: 0.9,
+      rmse: 1 + (observations % 10) / 10, worst: null, painted_share: 0.9, far_off_tags: [],
     });
     return Response.json({ detail: 'not in this double' }, { status: 404 });
   };

@@ -26,7 +26,7 @@ from lupin_bridge.twin.relay import Relay
 from lupin_bridge.twin.source import CacheCounts, Told, TwinUnavailableError
 from lupin_twin.fields import FieldJob
 from lupin_twin.grid import FieldGrid
-from lupin_twin.journal.condition import OFF, Condition
+from lupin_twin.journal.condition import UNKNOWN, Condition
 from lupin_twin.past import NotRemembered, SeriesPast, SeriesRequest
 from lupin_twin.past_writes import PastWrites, WritesRequest
 from lupin_twin.state import Snapshot, TagState
@@ -64,7 +64,7 @@ class Script:
         raise NotRemembered(f"nothing after {request.after}", is_lasting=False)
 
     def journal(self) -> Condition:
-        return OFF
+        return UNKNOWN
 
     def cache_counts(self) -> CacheCounts:
         return CacheCounts()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -38,8 +39,10 @@ def test_neither_a_hanging_broker_nor_a_hanging_receiver_delays_a_frame(tmp_path
             await stage.bridge._alarm_feed.stop()
             page, change = Ledger().take(Found((alarm("a"),)))
             stage.bridge.alarms.put(page, change, "heard", 1)
+            # The post waits until it is known where observations come from.
+            stage.script.tell(replace(state(1), origin="robot"))
             await until(lambda: len(server.posted) == 1, "the post that hangs")
-            for number in range(1, STATES + 1):
+            for number in range(2, STATES + 1):
                 stage.script.tell(state(number))
                 await until(partial(has_frames, stage, number), f"frame {number}")
             channels = stage.bridge.outward

@@ -69,10 +69,10 @@ def test_an_empty_journal_is_filled_once(tmp_path: Path) -> None:
     path = tmp_path / "demo.sqlite"
     assert fill_past(path, SHORT)
     assert is_whole(path)
-    (count,) = select(path, "SELECT count(*) FROM scans")
+    (count,) = select(path, "SELECT count(*) FROM scan")
     assert count > (2500,)
     assert not fill_past(path, SHORT)
-    assert select(path, "SELECT count(*) FROM scans") == [count]
+    assert select(path, "SELECT count(*) FROM scan") == [count]
 
 
 def test_started_again_it_goes_on_with_the_day(tmp_path: Path) -> None:
@@ -107,7 +107,7 @@ def test_somebody_s_journal_is_left(tmp_path: Path, caplog: pytest.LogCaptureFix
     path = tmp_path / "demo.sqlite"
     kept(path, [scan()], CLOCK)
     assert not fill_past(path, SHORT)
-    assert select(path, "SELECT count(*) FROM scans") == [(1,)]
+    assert select(path, "SELECT count(*) FROM scan") == [(1,)]
     assert caplog.records == []
 
 

@@ -18,6 +18,8 @@ from lupin_twin.memory import demo_journal_path, journal_path
 from tests.support.journal import NOW, SECOND, is_whole, kept, look, pin, recording, scan
 from tests.support.waiting import PATIENCE_S, wait_for
 
+# Of a twin that starts when all of it is written.
+LATER = Clock(NOW + 3000 * SECOND, NOW + 3000 * SECOND, is_simulated=False)
 SIMULATED = Clock(5 * SECOND, NOW, is_simulated=True)
 
 
@@ -169,7 +171,7 @@ def test_somebody_else_s_file_is_left_and_named(
     foreign = tmp_path / "theirs.sqlite"
     with closing(open_writer(foreign)) as connection:
         connection.execute("PRAGMA application_id = 7")
-        connection.executescript("DROP VIEW scans; DROP TABLE scan;")
+        connection.execute("DROP TABLE scan")
     before = foreign.read_bytes()
     for action in ("info", "check", "vacuum"):
         said = Said(capsys, action, "--journal", foreign)
@@ -199,14 +201,14 @@ def test_info_tells_what_is_in_it(capsys: pytest.CaptureFixture[str], path: Path
     assert (told["looks"], told["places"], told["tags"]) == ("1", "1", "3")
     assert told["sensors"] == "a, temperature"
     assert told["reach"] == "2025-11-21T04:40:00Z to 2025-11-21T05:13:19Z"
-    assert told["set aside"] == "j.sqlite.damaged-20261121T141500Z, 2.0 MB"
+    assert told["quarantined"] == "j.sqlite.damaged-20261121T141500Z, 2.0 MB"
     assert "2: simulated clock, begun 2025-11-21T04:40:00Z: second 7.000 to 7.000\n" in said.out
 
 
 def test_while_a_twin_records_all_can_be_read_and_nothing_shrunk(
     capsys: pytest.CaptureFixture[str], path: Path
 ) -> None:
-    with recording(path) as journal:
+    with recording(path, LATER) as journal:
         for number in range(300):
             journal.write(scan("new", NOW + number, a=1.0))
         wait_for(lambda: journal.condition.written == 300, "all of it written")
@@ -238,19 +240,19 @@ def test_check_says_what_is_damaged_and_ends_with_1(
 ) -> None:
     whole = Said(capsys, "check", "--journal", path)
     assert (whole.code, whole.out) == (0, f"{path} is whole\n")
-    assert whole.err == "structure\nscan\nlook\nrollup\n"
+    assert whole.err == "structure\nscan\nlook\nplace\nhour\n"
     with closing(open_writer(path)) as connection:
-        connection.execute("UPDATE scan SET readings = x'00' WHERE id % 100 = 0")
+        connection.execute("UPDATE scan SET readings = '[' WHERE seq % 200 = 0")
     said = Said(capsys, "check", "--journal", path)
     assert said.code == 1
     lines = said.out.splitlines()
-    assert lines[0] == "scan 100 of tag '7' is not what was written"
-    assert lines[-1] == f"{path} is damaged in 20 places"
-    assert len(lines) == 21
+    assert lines[0] == "scan 200 of tag '7' is not what was written"
+    assert lines[-1] == f"{path} is damaged in 12 places"
+    assert len(lines) == 13
     content = path.read_bytes()
     refused = Said(capsys, "vacuum", "--journal", path)
     assert (refused.code, refused.out) == (1, "")
-    assert f"{path} is damaged and left as it is (scan 100 of tag '7'" in refused.err
+    assert f"{path} is damaged and left as it is (scan 200 of tag '7'" in refused.err
     assert path.read_bytes() == content
     path.write_bytes(path.read_bytes()[:9000])
     said = Said(capsys, "check", "--journal", path)
@@ -301,8 +303,9 @@ def test_an_export_that_cannot_be_made_is_one_clear_line(
 def test_vacuum_says_before_and_after(capsys: pytest.CaptureFixture[str], path: Path) -> None:
     with closing(open_writer(path)) as connection:
         connection.execute("DELETE FROM scan")
+        connection.execute("DELETE FROM hour")
     said = Said(capsys, "vacuum", "--journal", path)
-    assert (said.code, said.out) == (0, f"{path}: 0.1 MB before, 0.0 MB after\n")
+    assert (said.code, said.out) == (0, f"{path}: 0.2 MB before, 0.0 MB after\n")
     assert is_whole(path)
 
 

@@ -11,7 +11,7 @@ import pytest
 from lupin_bridge.journal_output import writing
 from lupin_bridge.past import table
 from lupin_twin.journal.schema import open_reader
-from tests.bridge.test_journal_command import Said
+from tests.bridge.test_journal_command import LATER, Said
 from tests.support.bags import no_file_above
 from tests.support.journal import NOW, SECOND, is_whole, kept, pin, recording, scan
 from tests.support.waiting import PATIENCE_S, wait_for
@@ -47,7 +47,7 @@ def test_no_file_of_a_journal_is_written(
     link.symlink_to(target)
     alias = path.with_name("alias.sqlite")
     alias.symlink_to(path)
-    with recording(path) as journal:
+    with recording(path, LATER) as journal:
         journal.write(scan("new", NOW + 3000 * SECOND))
         wait_for(lambda: journal.condition.written == 1, "it records")
         for journal_name, output in ((path, target), (path, link), (alias, target)):
@@ -192,7 +192,7 @@ def ended(
     return (
         done.returncode,
         done.stdout,
-        done.stderr.removeprefix(b"structure\nscan\nlook\nrollup\n"),
+        done.stderr.removeprefix(b"structure\nscan\nlook\nplace\nhour\n"),
     )
 
 

@@ -166,10 +166,10 @@ def test_a_demo_of_a_recording_shows_its_tags_at_their_time_and_leaves_nothing(
             "status", lambda frame: bool(frame["journal"]["state"] == "recording")
         )
         assert status["origin"] == "recorded"
-        (replay,) = children_of(demo.pid, b"replay")
+        (player,) = children_of(demo.pid, b"bags.player")
         assert len(list(tmp_path.glob("lupin-twin-*/journal.sqlite"))) == 1
         assert demo.stop(signal.SIGINT) == 0
-        assert not is_running(replay)
+        assert not is_running(player)
         assert list(tmp_path.glob("lupin-twin-*")) == []
         assert "Traceback" not in demo.output
 
@@ -184,15 +184,15 @@ def test_the_patrol_ends_although_the_demo_is_killed(domain: int) -> None:
         wait_for(lambda: not is_running(patrol), "the end of the patrol")
 
 
-def test_the_replay_ends_although_the_demo_is_killed(domain: int, tmp_path: Path) -> None:
+def test_the_player_ends_although_the_demo_is_killed(domain: int, tmp_path: Path) -> None:
     """Or a twin that is started later would hear it, and might keep it."""
     path = write_bag(tmp_path / "run.mcap", [Sent(OBSERVATIONS, 5_000.0, scan("1"))])
     with lupin_twin(domain, "demo", "--from", str(path), TMPDIR=str(tmp_path)) as demo:
         demo.wait_for_output("the end: 1 messages were published")
-        (replay,) = children_of(demo.pid, b"replay")
+        (player,) = children_of(demo.pid, b"bags.player")
         demo.send(signal.SIGKILL)
         demo.wait()
-        wait_for(lambda: not is_running(replay), "the end of the replay")
+        wait_for(lambda: not is_running(player), "the end of the player")
 
 
 def test_ipv6_is_served_too(domain: int) -> None:
@@ -225,8 +225,9 @@ def test_a_demo_has_a_past_from_its_first_moment_on(domain: int, tmp_path: Path)
             assert demo.stop(signal.SIGINT) == 0
     path = tmp_path / "lupin-twin" / "demo-seed-0.sqlite"
     (filled,) = select(path, "SELECT value FROM meta WHERE key = 'simulated_until_ns'")
-    past = select(path, "SELECT max(stamp_ns), count(*) FROM scans WHERE source LIKE '%past)'")
-    assert past[0][0] < filled[0]  # type: ignore[operator]
+    past = select(path, "SELECT max(stamp_ns), count(*) FROM scan WHERE source LIKE '%past)'")
+    until_ns = int(filled[0])  # type: ignore[call-overload]
+    assert past[0][0] < until_ns
     assert past[0][1] > 2500  # type: ignore[operator]
-    (after,) = select(path, "SELECT min(stamp_ns) FROM scans WHERE source = 'lupin_patrol'")
-    assert after[0] is None or after[0] > filled[0]  # type: ignore[operator]
+    (after,) = select(path, "SELECT min(stamp_ns) FROM scan WHERE source = 'lupin_patrol'")
+    assert after[0] is None or after[0] > until_ns

@@ -30,7 +30,7 @@ from lupin_twin.journal.runs import Clock
 from tests.support.journal import SECOND, kept
 from tests.support.messages import occupancy_grid, pose, scan
 from tests.support.waiting import wait_for
-from tests.support.web import Bridge, bridge
+from tests.support.web import Bridge, bridge, filled
 
 # The patrol's day, s; its past is three of them.
 DAY_S: Final = 1_440
@@ -107,7 +107,7 @@ def message_of(row: ScanRow) -> Any:
 
 def is_told(row: ScanRow, tag: dict[str, Any]) -> bool:
     """Whether the twin knows the scan."""
-    tried = tag["last_try"]
+    tried = filled(tag)["last_try"]
     return tried is not None and tried["sec"] >= row.stamp_ns // SECOND
 
 

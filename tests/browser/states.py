@@ -93,6 +93,7 @@ class State:
                 "simulated": None,
             },
             "outward": [],
+            "input_problems": [],
         }
         if self.twin == "never_seen":
             return [status]
@@ -137,7 +138,6 @@ class State:
                     "name": name,
                     "value": value,
                     "observed_at": time_of(self.now_s - age_s),
-                    "stale_seconds": age_s,
                 }
                 for name, (value, age_s) in tag["readings"].items()
             ],

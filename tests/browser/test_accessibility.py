@@ -99,8 +99,11 @@ def test_an_empty_house_and_a_frozen_one(domain: int, open_page: OpenPage, schem
         expect(hmi.page.locator("[data-note=none]")).to_be_visible()
         assert violations(hmi) == []
         running.peer.observe(*[scan("a", {"temperature": 99.0}, at=(1, 1))] * 2)
-        hmi.page.get_by_role("button", name="Put aside: Tag a").click()
-        hmi.page.get_by_role("button", name="Tell me of alarms").click()
+        hmi.page.get_by_role("button", name="Acknowledge: Tag a").click()
+        hmi.page.get_by_role("button", name="Shelve: Tag a").click()
+        expect(hmi.page.get_by_label("Reason")).to_be_visible()
+        assert violations(hmi) == []
+        hmi.page.get_by_role("button", name="Notify me of alarms").click()
         assert violations(hmi) == []
         hmi.page.keyboard.press("Escape")
         hmi.allow_noise(SERVER_GONE)

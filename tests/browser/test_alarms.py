@@ -1,13 +1,17 @@
-"""Alarms in the page: they come by themselves, lead there, and what was seen stays seen."""
+"""Alarms in the page: they come by themselves, as they are now; what is done can be undone."""
 
 from __future__ import annotations
 
 import re
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
+import pytest
 from playwright.sync_api import Locator, expect
 
-from tests.browser.hmi import Hmi, OpenPage
+from tests.browser.hmi import PHONE, SERVER_GONE, WIDE, Hmi, OpenPage
 from tests.support.messages import scan
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
@@ -37,10 +41,27 @@ def active(running: Bridge, count: int) -> list[dict[str, Any]]:
     return found
 
 
-def test_an_alarm_comes_is_followed_seen_and_put_aside(domain: int, open_page: OpenPage) -> None:
+def warm(tag_id: str, temperature: float, **options: Any) -> Any:
+    """A scan by day: at night other ranges hold."""
+    return scan(tag_id, {"temperature": temperature, "light": 900.0}, **options)
+
+
+def leave(hmi: Hmi) -> None:
+    """Move the pointer off the list: what was held while it was there applies."""
+    hmi.page.mouse.move(0, 0)
+
+
+def fact(row: Locator, name: str) -> Locator:
+    """One of a row's values: "now" or "worst"."""
+    return row.locator(f"[data-fact={name}]")
+
+
+def test_an_alarm_comes_is_acknowledged_shelved_and_resolved(
+    domain: int, open_page: OpenPage
+) -> None:
     with bridge(domain=domain) as running:
         robot = running.peer
-        robot.observe(scan("a", {"temperature": 22.0}, at=(1, 1)))
+        robot.observe(warm("a", 22.0, at=(1, 1)))
         hmi = open_page(running.url)
         hmi.expect_rows("a")
         hmi.page.keyboard.press("a")
@@ -48,56 +69,256 @@ def test_an_alarm_comes_is_followed_seen_and_put_aside(domain: int, open_page: O
         expect(hmi.page).to_have_title("Lupin twin")
         own_icon = icon(hmi)
 
-        robot.observe(*[scan("a", {"temperature": value}) for value in (41.0, 43.5)])
+        robot.observe(*[warm("a", value) for value in (41.0, 43.5)])
         row = rows(hmi, "active")
-        told = "Tag a: Temperature 43.5\u00a0°C, above 35.0 (critical)"
-        expect(row).to_contain_text(told)
-        # Not in the millisecond of the alarm, which is as fine as a link tells its moment.
-        robot.observe(scan("a", {"temperature": 42.0}))
-        running.tag("a", lambda tag: tag["readings"][0]["value"] == 42.0)
-        expect(row).to_contain_text(told)
+        expect(row).to_contain_text("Tag a: Temperature above 35.0\u00a0°C")
         expect(hmi.page).to_have_title("(1) Lupin twin")
         hmi.expect(lambda: icon(hmi).startswith("data:image/svg+xml"), "an icon that tells")
-        expect(hmi.test_id("said-critical")).to_contain_text("New: Tag a: Temperature")
-        expect(row).to_have_attribute("data-seen", "false")
+        expect(hmi.test_id("said-critical")).to_contain_text("New: Tag a: Temperature above")
+        expect(row).to_have_attribute("data-acknowledged", "false")
 
-        # To its place, its moment and its chart, by the keyboard alone; that is to have seen it.
+        # Acknowledged, and undone; then for good, in this browser, after a reload as well.
+        hmi.page.get_by_role("button", name="Acknowledge: Tag a").click()
+        expect(row).to_have_attribute("data-acknowledged", "true")
+        hmi.page.get_by_role("button", name="Undo").click()
+        expect(row).to_have_attribute("data-acknowledged", "false")
+        hmi.page.get_by_role("button", name="Acknowledge: Tag a").click()
+        hmi.page.reload()
+        hmi.page.keyboard.press("a")
+        expect(row).to_have_attribute("data-acknowledged", "true")
+        # Later, from the list.
+        hmi.page.get_by_role("button", name="Unacknowledge: Tag a").click()
+        expect(row).to_have_attribute("data-acknowledged", "false")
+
+        # Resolved it stays listed, with its end.
+        leave(hmi)
+        robot.observe(*[warm("a", 22.0)] * 2)
+        resolved = rows(hmi, "resolved")
+        expect(resolved).to_contain_text(re.compile(r"\d\d:\d\d:\d\d until \d\d:\d\d:\d\d"))
+        expect(row).to_have_count(0)
+        expect(hmi.page).to_have_title("Lupin twin")
+        hmi.expect(lambda: icon(hmi) == own_icon, "its own icon")
+
+
+def test_a_row_has_the_value_of_now_with_its_trend_beside_the_worst(
+    domain: int, open_page: OpenPage
+) -> None:
+    with bridge(domain=domain) as running:
+        robot = running.peer
+        robot.wait_for_twin()
+        robot.observe(warm("a", 22.0, at=(1, 1), stamp_s=time.time() - 3_700))
+        robot.observe(*[warm("a", value) for value in (41.0, 43.5)])
+        hmi = open_page(running.url)
+        hmi.page.keyboard.press("a")
+        row = rows(hmi, "active")
+        expect(row).to_contain_text("first 43.5")
+        robot.observe(warm("a", 47.0))
+        expect(fact(row, "now")).to_contain_text("now 47.0\u00a0°C")
+        robot.observe(warm("a", 33.1))
+        # Each as bad as it is: what was critical at worst is not so any more.
+        expect(fact(row, "now")).to_contain_text("now 33.1\u00a0°C")
+        expect(fact(row, "now")).to_have_attribute("data-status", "stressed")
+        expect(fact(row, "worst")).to_contain_text("worst 47.0\u00a0°C")
+        expect(fact(row, "worst")).to_have_attribute("data-status", "critical")
+        expect(row.locator("[data-trend=up]")).to_contain_text("+11.1\u00a0°C")
+        expect(row).to_contain_text(re.compile(r"since \d\d:\d\d:\d\d \(\d+\s\w+\), first 43.5"))
+        # Of a twin that is not heard nobody knows it.
+        hmi.allow_noise(SERVER_GONE)
+        running.process.kill()
+        hmi.expect_phase("reconnecting")
+        expect(fact(row, "now")).to_contain_text("now not known, last 33.1\u00a0°C")
+        expect(fact(row, "now")).to_have_attribute("data-status", "unknown")
+
+
+def test_a_value_that_is_too_old_is_not_that_of_now(domain: int, open_page: OpenPage) -> None:
+    with bridge("--recent-s", "2", domain=domain) as running:
+        running.peer.observe(*[warm("a", value, at=(1, 1)) for value in (41.0, 43.5)])
+        hmi = open_page(running.url)
+        hmi.page.keyboard.press("a")
+        row = hmi.page.locator("[data-alarm]", has_text="Temperature above")
+        expect(fact(row, "now")).to_contain_text("now not known, last 43.5\u00a0°C")
+
+
+def test_no_value_reads_like_the_limit_that_it_is_beyond(domain: int, open_page: OpenPage) -> None:
+    with bridge(domain=domain) as running:
+        dry = scan("a", {"humidity": 49.97, "light": 900.0}, at=(1, 1))
+        running.peer.observe(dry, dry)
+        hmi = open_page(running.url)
+        expect(hmi.test_id("health-driver")).to_have_text(
+            "Tag a: Humidity 49.97\u00a0%, below 50.00"
+        )
+        hmi.page.keyboard.press("a")
+        row = rows(hmi, "active")
+        expect(row).to_contain_text("Humidity below 50.00\u00a0%")
+        expect(fact(row, "now")).to_contain_text("now 49.97\u00a0%")
+
+
+def test_the_counts_agree_and_healthy_beside_an_alarm_says_why(
+    domain: int, open_page: OpenPage
+) -> None:
+    with bridge(domain=domain) as running:
+        tags = ("a", "b")
+        running.peer.observe(*[warm(tag, 43.5, at=(1, 1)) for tag in tags * 2])
+        hmi = open_page(running.url)
+        hmi.page.keyboard.press("a")
+        expect(rows(hmi, "active")).to_have_count(2)
+        hmi.page.get_by_role("button", name="Acknowledge: Tag a").click()
+        leave(hmi)
+        expect(hmi.page).to_have_title("(2) Lupin twin")
+        expect(hmi.page.locator(".list-choice [data-testid=alarm-count]")).to_have_text("2")
+        expect(hmi.page.locator("[data-group=active] h3")).to_have_text("Active (2)")
+        # Well again, but for too short a time to resolve anything.
+        running.peer.observe(*[warm(tag, 22.0) for tag in tags])
+        expect(hmi.test_id("house-health")).to_have_attribute("data-health", "healthy")
+        expect(hmi.test_id("health-driver")).to_have_text(
+            "2 alarms are still active: two good scans resolve each"
+        )
+        for now in fact(rows(hmi, "active"), "now").all():
+            expect(now).to_have_attribute("data-status", "healthy")
+
+
+@pytest.mark.parametrize("viewport", [WIDE, PHONE], ids=["wide", "phone"])
+def test_a_double_click_shelves_nothing_and_a_critical_alarm_takes_a_reason(
+    domain: int, open_page: OpenPage, viewport: dict[str, int]
+) -> None:
+    with bridge(domain=domain) as running:
+        running.peer.observe(*[warm("a", 43.5, at=(1, 1))] * 2, *[warm("b", 27.0, at=(2, 1))] * 2)
+        hmi = open_page(running.url, viewport=viewport)
+        hmi.page.keyboard.press("a")
+        expect(rows(hmi, "active")).to_have_count(2)
+        times = hmi.page.locator(".shelf-times button")
+        for tag in ("b", "a"):
+            hmi.page.keyboard.press("Escape")
+            button = hmi.page.get_by_role("button", name=f"Shelve: Tag {tag}")
+            button.dblclick()
+            expect(times.first).to_be_visible()
+            assert apart(button, hmi.page.locator(".disclosure-panel:not([hidden])"))
+            expect(hmi.page.get_by_role("button", name="Unshelve")).to_have_count(0)
+        # Of the critical one.
+        expect(times).to_have_text(["For 15 min", "For 1 h"])
+        for each in times.all():
+            expect(each).to_be_disabled()
+        hmi.page.get_by_label("Reason").fill("fan is being mended")
+        times.last.click()
+        leave(hmi)
+        shelved = rows(hmi, "shelved")
+        expect(shelved).to_contain_text(re.compile(r"shelved until [\d:]+: fan is being mended"))
+        expect(hmi.page).to_have_title("(1) Lupin twin")
+        hmi.page.get_by_role("button", name="Undo").click()
+        expect(shelved).to_have_count(0)
+        expect(rows(hmi, "active")).to_have_count(2)
+        # One that is not critical: for longer, and without a word. It can be taken back later.
+        hmi.page.get_by_role("button", name="Shelve: Tag b").click()
+        times.get_by_text("For 8 h").click()
+        hmi.page.reload()
+        hmi.page.keyboard.press("a")
+        expect(shelved).to_contain_text("shelved until")
+        hmi.page.get_by_role("button", name="Unshelve: Tag b").click()
+        leave(hmi)
+        expect(rows(hmi, "active")).to_have_count(2)
+
+
+def apart(one: Locator, other: Locator) -> bool:
+    """Whether no point of the screen is within both."""
+    a, b = one.bounding_box(), other.bounding_box()
+    assert a is not None
+    assert b is not None
+    return (
+        a["x"] + a["width"] <= b["x"]
+        or b["x"] + b["width"] <= a["x"]
+        or a["y"] + a["height"] <= b["y"]
+        or b["y"] + b["height"] <= a["y"]
+    )
+
+
+def test_a_row_leads_to_its_tag_as_it_is_now_and_a_button_to_its_start(
+    domain: int, open_page: OpenPage
+) -> None:
+    with bridge(domain=domain) as running:
+        robot = running.peer
+        robot.observe(*[warm("a", value, at=(1, 1)) for value in (41.0, 43.5)])
         [alarm] = active(running, 1)
+        # Not in the millisecond of the alarm, which is as fine as a link tells its moment.
+        robot.observe(warm("a", 42.0))
+        running.tag("a", lambda tag: 42.0 in [each["value"] for each in tag["readings"]])
+        hmi = open_page(running.url)
+        hmi.page.keyboard.press("a")
+        row = rows(hmi, "active")
         hmi.tab_to(row.locator(".alarm-go"))
+        hmi.page.keyboard.press("Enter")
+        expect(hmi.card("a")).to_contain_text("42.0")
+        expect(hmi.app).to_have_attribute("data-moment", "now")
+        assert "at=" not in hmi.address()
+        expect(row).to_have_attribute("data-acknowledged", "false")
+
+        hmi.tab_to(row.get_by_role("button", name="Go to start: Tag a"))
         hmi.page.keyboard.press("Enter")
         raised_s = alarm["raised_at"]["sec"] + alarm["raised_at"]["nanosec"] / 1e9
         shown = re.compile(rf"^{int(raised_s)}\.\d+$|^{int(raised_s)}$")
         expect(hmi.app).to_have_attribute("data-moment", shown)
         expect(hmi.card("a")).to_contain_text("43.5")
         expect(hmi.test_id("card-chart")).to_have_attribute("data-state", "ready")
-        expect(hmi.page).to_have_title(re.compile(r"^[^(]* \(past\) · Lupin twin$"))
-        hmi.expect(lambda: icon(hmi) == own_icon, "its own icon")
-        hmi.page.keyboard.press("l")
+        # The list is still that of now.
+        expect(fact(row, "now")).to_contain_text("now 42.0")
+        hmi.page.locator(".alarm-go").click()
         expect(hmi.app).to_have_attribute("data-moment", "now")
-        hmi.expect(lambda: "at=" not in hmi.address(), "an address of now")
 
-        # Seen and put aside: in this browser, after a reload as well.
-        hmi.page.get_by_role("button", name="Put aside: Tag a").click()
-        hmi.page.get_by_role("button", name="For 15 min").click()
-        expect(rows(hmi, "shelved")).to_contain_text("put aside until")
-        hmi.page.reload()
+
+@pytest.mark.parametrize("pointer", ["mouse", "finger"])
+def test_nothing_moves_while_a_pointer_rests_on_the_list(
+    domain: int, open_page: OpenPage, pointer: str
+) -> None:
+    with bridge(domain=domain) as running:
+        robot = running.peer
+        robot.observe(*[warm(tag, 27.0, at=(1, 1)) for tag in ("a", "b") * 2])
+        hmi = open_page(running.url, has_touch=pointer == "finger")
         hmi.page.keyboard.press("a")
-        expect(rows(hmi, "shelved")).to_contain_text("put aside until")
-        hmi.page.get_by_role("button", name="Take back: Tag a").click()
-        expect(row).to_have_attribute("data-seen", "true")
-        expect(hmi.page).to_have_title("Lupin twin")
+        expect(rows(hmi, "active")).to_have_count(2)
+        order = where(hmi)
+        button = rows(hmi, "active").last.get_by_role("button", name="Acknowledge")
+        box = button.bounding_box()
+        assert box is not None
+        with resting(hmi, pointer, box["x"] + 9, box["y"] + 9):
+            # Worse than both, so it would stand before them; one of them is resolved.
+            robot.observe(*[warm("c", 43.5, at=(2, 1))] * 2, *[warm(order[0], 22.0)] * 2)
+            expect(hmi.page).to_have_title("(2) Lupin twin")
+            expect(hmi.test_id("alarm-line")).to_have_text("1 new")
+            expect(rows(hmi, "active").first).to_contain_text("until")
+            assert where(hmi) == order
+            assert button.bounding_box() == box
 
-        # Cleared by itself it stays listed, with its end.
-        robot.observe(*[scan("a", {"temperature": 22.0})] * 2)
-        over = rows(hmi, "over")
-        expect(over).to_contain_text(re.compile(r"\d\d:\d\d:\d\d until \d\d:\d\d:\d\d"))
-        expect(row).to_have_count(0)
+        expect(rows(hmi, "active").first).to_have_attribute("data-where", "c")
+        expect(hmi.test_id("alarm-line")).to_have_text("")
+        assert where(hmi) == ["c", order[1]]
+        expect(rows(hmi, "resolved")).to_have_attribute("data-where", order[0])
+
+
+def where(hmi: Hmi) -> list[str]:
+    """The tags of the active alarms, from the top."""
+    tags = rows(hmi, "active").evaluate_all("rows => rows.map(row => row.dataset.where)")
+    assert isinstance(tags, list)
+    return tags
+
+
+@contextmanager
+def resting(hmi: Hmi, pointer: str, x: float, y: float) -> Iterator[None]:
+    """The mouse, or a finger, rests on a point of the page, pixels; at the end it is taken off."""
+    if pointer == "mouse":
+        hmi.page.mouse.move(x, y)
+        yield
+        leave(hmi)
+        return
+    session = hmi.page.context.new_cdp_session(hmi.page)
+    touch = "Input.dispatchTouchEvent"
+    session.send(touch, {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]})
+    yield
+    session.send(touch, {"type": "touchCancel", "touchPoints": []})
 
 
 def test_sound_and_notification_are_had_on_wish_alone(house: Bridge, open_page: OpenPage) -> None:
     hmi = open_page(house.url, permissions=["notifications"])
     hmi.page.keyboard.press("a")
-    hmi.page.get_by_role("button", name="Tell me of alarms").click()
+    hmi.page.get_by_role("button", name="Notify me of alarms").click()
     sound, notify = hmi.page.get_by_label("Sound"), hmi.page.get_by_label("Notification")
     expect(sound).not_to_be_checked()
     expect(notify).not_to_be_checked()
@@ -107,6 +328,6 @@ def test_sound_and_notification_are_had_on_wish_alone(house: Bridge, open_page: 
     expect(hmi.page.locator("[data-way=sound] p")).to_contain_text("at most one in 10 s")
     hmi.page.reload()
     hmi.page.keyboard.press("a")
-    hmi.page.get_by_role("button", name="Tell me of alarms").click()
+    hmi.page.get_by_role("button", name="Notify me of alarms").click()
     expect(sound).to_be_checked()
     expect(notify).to_be_checked()

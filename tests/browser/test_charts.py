@@ -67,7 +67,7 @@ class Garden:
             ],
         )
         running.peer.observe(
-            scan("1", status=Observation.STATUS_SCAN_FAILED, at=(1, 1), stamp_s=self.now_s - 5000),
+            scan("1", status=Observation.STATUS_SCAN_FAILED, at=(1, 1), stamp_s=self.now_s - 4990),
             look("1", "lupin", stamp_s=self.now_s - 4500),
         )
         running.tag("1", lambda tag: tag["species"] == "lupin")

@@ -8,20 +8,22 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
-from tests.support.access import BEARER, TOKEN, served
+from tests.support.access import BEARER, OWN, TOKEN, Served, served
 from tests.support.domains import own_domain
 from tests.support.messages import scan
-from tests.support.waiting import PATIENCE_S
+from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, bridge
 
 FIELD = "/api/field.png?sensor_type=co2&resolution=0.5"
+COUNT_OF_403 = 'lupin_http_answers_total{status="403"}'
 
 # Everything that a page can try, each answering with what it got out of the bridge.
 TRY = """
@@ -212,8 +214,49 @@ def test_an_open_session_is_of_no_use_to_a_foreign_page(page: Page) -> None:
     with served(LUPIN_TOKEN=TOKEN) as it, foreign_page("127.0.0.1") as origin:
         page.goto(f"{it.url}/signin")
         status = page.evaluate(
-            "async (headers) => (await fetch('api/signin', { headers })).status", BEARER
+            "async (headers) => (await fetch('api/signin', { method: 'POST', headers })).status",
+            {**BEARER, **OWN},
         )
         assert status == 204
         # On the same site, the browser sends the cookie along.
         assert try_all(page, origin, it.url, credentials="include") == NOTHING
+
+
+def has_refused(it: Served, number: int) -> bool:
+    """Whether so many requests have got a 403; of a refused image Chromium tells nothing."""
+    lines = it.get("/metrics", BEARER).text.splitlines()
+    return [line for line in lines if line.startswith(COUNT_OF_403)] == (
+        [f"{COUNT_OF_403} {number}.0"] if number else []
+    )
+
+
+def test_over_plain_http_a_page_of_the_same_host_computes_nothing_and_signs_nobody_out(
+    browser: Browser,
+) -> None:
+    """There, the browser sends no Sec-Fetch headers; and to another port, the cookie."""
+    rules = "--host-resolver-rules=MAP twin.example 127.0.0.1"
+    with (
+        served("--allow-host", "twin.example", LUPIN_TOKEN=TOKEN) as it,
+        foreign_page("twin.example") as origin,
+        browser.browser_type.launch(
+            executable_path=CHROMIUM, args=[*CHROMIUM_ARGS, rules], headless=True
+        ) as another,
+    ):
+        page = another.new_page()
+        url = f"http://twin.example:{it.url.rpartition(':')[2]}"
+        page.goto(f"{url}/signin")
+        page.locator("input").fill(TOKEN)
+        page.locator("button").click()
+        expect(page).to_have_url(f"{url}/")
+        page.goto(origin)
+        assert has_refused(it, 0)
+        for number, path in enumerate((FIELD, "/api/state", "/api/signout"), 1):
+            page.evaluate("(src) => { new Image().src = src }", url + path)
+            wait_for(partial(has_refused, it, number), "the refusal")
+        page.set_content(f"<form method=post action={url}/api/signout><button>Win</button></form>")
+        with page.expect_response(f"{url}/api/signout") as answer:
+            page.locator("button").click()
+        assert answer.value.status == 403
+        page.goto(f"{url}/")
+        expect(page).to_have_url(f"{url}/")
+        assert page.evaluate("async () => (await fetch('api/state')).status") == 200

@@ -67,7 +67,7 @@ def without(name: str) -> Callable[[Frame], Any]:
     return change
 
 
-READING: Final = {"name": "temperature", "value": 1.0, "observed_at": None, "stale_seconds": None}
+READING: Final = {"name": "temperature", "value": 1.0, "observed_at": None}
 DEEP: Final = "[" * 100_000 + "]" * 100_000
 HOSTILE: Final[dict[str, Callable[[Frame], Any]]] = {
     "null": lambda _: None,

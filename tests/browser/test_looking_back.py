@@ -14,7 +14,7 @@ from urllib.parse import parse_qsl, urlsplit
 import pytest
 from playwright.sync_api import Locator, Route, expect
 
-from lupin_twin.journal.asof import state_at
+from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.rows import Row
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
@@ -129,7 +129,7 @@ def expect_past(hmi: Hmi) -> float:
     expect(hmi.test_id("past-header")).to_contain_text("Past")
     when = hmi.test_id("past-header").locator("strong").inner_text()
     expect(hmi.test_id("past-frame")).to_contain_text(when)
-    # The alarms that nobody has seen are those of now, and stand before it.
+    # The number of active alarms is that of now, and stands before it.
     title = re.escape(f"{when} (past) · Lupin twin")
     expect(hmi.page).to_have_title(re.compile(rf"^(\([1-9]\d*\) )?{title}$"))
     expect(hmi.test_id("connection")).not_to_contain_text("Live")
@@ -140,7 +140,7 @@ def expect_now(hmi: Hmi) -> None:
     expect(hmi.app).to_have_attribute("data-moment", "now")
     expect(hmi.test_id("past-header")).to_have_count(0)
     expect(hmi.test_id("past-frame")).to_have_count(0)
-    expect(hmi.page).to_have_title("Lupin twin")
+    expect(hmi.page).to_have_title(re.compile(r"^(\([1-9]\d*\) )?Lupin twin$"))
     expect(hmi.cell("a", "temperature")).to_have_text("25.5")
 
 
@@ -381,7 +381,7 @@ def test_what_becomes_critical_meanwhile_is_told_and_leads_to_now(page: Hmi, hou
     expect_past(page)
     expect(page.test_id("meanwhile")).to_have_count(0)
     robot.observe(*[observed("c", {"temperature": 60.0})] * 2)
-    expect(page.test_id("meanwhile")).to_contain_text("Now: Tag c: Temperature 60.0")
+    expect(page.test_id("meanwhile")).to_contain_text("New alarm: Tag c: Temperature above")
     # The list is that of now, and says so.
     expect(page.page).to_have_title(re.compile(r"^\(1\) .* \(past\) · Lupin twin$"))
     page.page.keyboard.press("a")
@@ -393,6 +393,8 @@ def test_what_becomes_critical_meanwhile_is_told_and_leads_to_now(page: Hmi, hou
     expect_now(page)
     expect(page.card("c")).to_contain_text("60.0")
     expect(page.test_id("meanwhile")).to_have_count(0)
+    # To have gone there resolves nothing.
+    expect(page.page).to_have_title("(1) Lupin twin")
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -64,7 +64,7 @@ def main(hours: int = HOURS) -> bool:
     """Write; whether memory stays within a twentieth, and the file is as computed.
 
     Counted from the third hour on: by then all is full that is bounded, of which SQLite's cache of
-    16 MB and the 50,000 rows that are folded into rollups at a time are filled last.
+    16 MB are filled last.
     """
     chance, begun_s = random.Random(1), time.monotonic()
     resident: list[float] = []

@@ -12,7 +12,9 @@ from tests.support.journal import is_whole, select
 from tests.support.killing import RATE, SAFE_S, kill_and_look
 
 ROUNDS = 50
-_TWICE = "SELECT 1 FROM scans GROUP BY run, tag_id, kind, stamp_ns, source HAVING count(*) > 1"
+_TWICE = (
+    "SELECT 1 FROM scan WHERE is_copy = 0 GROUP BY series, stamp_ns, source HAVING count(*) > 1"
+)
 
 
 def main() -> bool:
@@ -36,7 +38,9 @@ def main() -> bool:
             if round_ % 10 == 0:
                 print(f"{round_} rounds", flush=True)
         twice = len(select(journal, _TWICE))
-        ((rows, runs),) = select(journal, "SELECT count(*), count(DISTINCT run) FROM scans")
+        ((rows, runs),) = select(
+            journal, "SELECT count(*), count(DISTINCT run) FROM scan JOIN series USING (series)"
+        )
     print(
         f"in {time.monotonic() - begun:.0f} s: {rows} observations in the journal, {runs} run(s) of"
         f" the clock; rounds in which anything shown {SAFE_S * 1000:.0f} ms before the kill was"

@@ -18,6 +18,7 @@ from tests.support.wss import wss
 
 TOKEN = "a-good-token/of.32~characters+==="
 BEARER = {"Authorization": f"Bearer {TOKEN}"}
+OWN = {"X-Lupin-Twin": "1"}
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,10 @@ class Served:
         """One request on a connection of its own."""
         with self.client() as client:
             return client.request(method, path, headers=headers)
+
+    def post(self, path: str, headers: dict[str, str] | None = None) -> httpx.Response:
+        """A POST as the bridge's own pages make it."""
+        return self.get(path, {**OWN, **(headers or {})}, "POST")
 
     def handshake(self, path: str = "/ws/state", headers: dict[str, str] | None = None) -> int:
         """The status of a WebSocket handshake; 101 once a first frame has come."""

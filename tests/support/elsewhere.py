@@ -12,8 +12,8 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 from lupin_bridge.twin.web_past import WebPast
 from lupin_twin import convert, convert_past, convert_writes
-from lupin_twin.journal.asof import state_at
-from lupin_twin.journal.series import series
+from lupin_twin.journal.fold import state_at
+from lupin_twin.journal.queries import series
 from lupin_twin.journal.writes import writes
 from lupin_twin.past import PastRefused, PastRow, check_moment
 from lupin_twin.workers import Workers

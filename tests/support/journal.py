@@ -9,11 +9,11 @@ from pathlib import Path
 
 from lupin_twin.journal.condition import Condition, JournalState
 from lupin_twin.journal.file import JournalFile
-from lupin_twin.journal.reading import ending
-from lupin_twin.journal.restoring import Restored
+from lupin_twin.journal.fold import Restored
+from lupin_twin.journal.pending import MAX_WEIGHT
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rows import LookRow, PinRow, Row, ScanRow
-from lupin_twin.journal.runs import Clock, Run
+from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import Empty, open_reader
 from lupin_twin.journal.writer import Journal
 from lupin_twin.state import Bloom, Flower, Pose, Reading
@@ -71,28 +71,34 @@ def opened(path: Path, limits: Limits = LIMITS) -> Iterator[JournalFile]:
         file.close()
 
 
-def _run(file: JournalFile, now: Clock | None) -> Run:
-    """The run that `now` belongs to; without it the last one, or one that begins at `NOW`."""
-    last = None if now else ending(file._connection, is_simulated=False)
-    return file.first_run(now or (CLOCK if last is None else last.last))
+def _now(file: JournalFile) -> Clock:
+    """When the last was heard in the last run; `NOW` where there is none."""
+    runs = [run for run in file._runs() if run.joins is None]
+    return file._last(runs[-1]) if runs else CLOCK
 
 
 def kept(path: Path, rows: Iterable[Row], now: Clock | None = None) -> tuple[int, int]:
     """Write rows, in one life of a twin; returns what `JournalFile.append` does."""
     with opened(path) as file:
-        run = _run(file, now)
+        run = file.start(now or _now(file), 32, is_believed=True).run
         return file.append([(run, row) for row in rows])
 
 
 def restored(path: Path, now: Clock | None = None, scans: int = 32) -> Restored:
     """What a twin that starts now gets to know."""
     with opened(path) as file:
-        return file.restore(_run(file, now), scans)
+        return file.start(now or _now(file), scans, is_believed=False)
 
 
 def known(path: Path, now: Clock | None = None) -> set[Row]:
-    """The rows of that."""
-    return set(restored(path, now).rows)
+    """That as the rows that it may be of."""
+    found = restored(path, now)
+    rows: set[Row] = set(found.rows)
+    for tag in found.known.tags:
+        if tag.pose is not None:
+            stamp_ns = found.known.placed_ns[tag.tag_id]
+            rows.add(PinRow(tag.tag_id, stamp_ns, stamp_ns + 1000, tag.pose))
+    return rows
 
 
 def select(path: Path, sql: str) -> list[tuple[object, ...]]:
@@ -120,10 +126,10 @@ def is_whole(path: Path) -> bool:
 
 @contextmanager
 def recording(
-    path: Path, now: Clock = CLOCK, *, limits: Limits = LIMITS, **options: int
+    path: Path, now: Clock = CLOCK, *, limits: Limits = LIMITS, max_weight: int = MAX_WEIGHT
 ) -> Iterator[Journal]:
     """A journal at work, its clock begun."""
-    journal = Journal(path, "/test/lupin_twin", limits, **options)
+    journal = Journal(path, "/test/lupin_twin", limits, max_weight)
     try:
         journal.begin(now, 32)
         yield journal

@@ -57,16 +57,6 @@ class Running:
         return Work(0.0, lambda _: (_endless(), os.getpriority(os.PRIO_PROCESS, 0)))
 
 
-@dataclass(frozen=True, slots=True)
-class Knows:
-    """Of what that process keeps the places and names, whoever asked for it."""
-
-    def look(self) -> Generator[Need, Found, Work[list[str]]]:
-        """See `Question`."""
-        yield from ()
-        return Work(0.0, lambda _: sorted(map(str, _child()._recall._kept[1])))
-
-
 def _child() -> Child:
     frame = sys._current_frames()[threading.main_thread().ident or 0]
     while not isinstance(child := frame.f_locals.get("self"), Child):

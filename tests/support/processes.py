@@ -137,10 +137,10 @@ class Process:
         self._process.wait()
 
 
-def twin_node(domain: int, *ros_args: str, afresh: bool = False) -> Process:
+def twin_node(domain: int, *ros_args: str, afresh: bool = False, **env: str) -> Process:
     """The twin alone, as the executable `twin_node`."""
     command = [sys.executable, "-m", "lupin_twin.cli", *ros_args]
-    return Process(command, ros_env(domain), afresh=afresh)
+    return Process(command, ros_env(domain, **env), afresh=afresh)
 
 
 def lupin_twin(domain: int, role: str, *args: str, afresh: bool = False, **env: str) -> Process:

@@ -40,7 +40,7 @@ PURE_STANDARD = frozenset(
     }
 )
 # And of libraries: what computes, and nothing that serves.
-PURE_LIBRARIES = frozenset({"PIL", "cbor2", "numpy", "orjson", "pydantic", "websockets.frames"})
+PURE_LIBRARIES = frozenset({"PIL", "numpy", "orjson", "pydantic", "websockets.frames"})
 # A pure module that needs one thing more.
 PURE_EXCEPT: Mapping[str, set[str]] = {
     "lupin_twin.idw": {"sys"},  # float_info
@@ -64,7 +64,6 @@ PURE_EXCEPT: Mapping[str, set[str]] = {
     },  # which is what it is about
     # Values and errors of modules that do more than that.
     "lupin_bridge.access.credentials": {"lupin_bridge.settings.SettingError"},
-    "lupin_bridge.bags.gaps": {"datetime"},  # the calendar
     "lupin_bridge.past.moments": {"datetime"},  # the calendar
     "lupin_bridge.judge.daylight": {"datetime"},  # the calendar, not the clock
     "lupin_bridge.outward.deliveries": {"base64", "lupin_bridge.alarms.board.Change"},

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from mcap.writer import CompressionType, Writer
 from rclpy.serialization import serialize_message
-
-from lupin_bridge.bags import replay_command
 
 OBSERVATIONS = "/floranova/observations"
 TAGS = "/perception/discovered_tags"
@@ -68,8 +65,3 @@ def write_bag(
         if is_finished:
             writer.finish()  # type: ignore[no-untyped-call]
     return path
-
-
-def replay_options(*words: object) -> argparse.Namespace:
-    """The options of `lupin-twin replay` with these arguments."""
-    return replay_command.parsed([*map(str, words)])

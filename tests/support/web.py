@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 import socket
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 from urllib.parse import urlencode
 
-import cbor2
 import httpx
 from websockets.sync.client import ClientConnection
 
@@ -71,7 +70,7 @@ class Listener:
     def next(self, timeout_s: float = PATIENCE_S) -> Frame:
         """The next frame, whatever its type."""
         message = self.connection.recv(timeout=timeout_s)
-        frame: Frame = json.loads(message) if isinstance(message, str) else cbor2.loads(message)
+        frame: Frame = json.loads(message)
         return frame
 
     def rest(self) -> list[Frame]:
@@ -111,19 +110,25 @@ def tag_ids(state: dict[str, Any]) -> list[str]:
     return [tag["tag_id"] for tag in state["tags"]]
 
 
+def filled(tag: dict[str, Any]) -> dict[str, Any]:
+    """A tag (`schema.TwinTagState` as JSON) with what is left out of it."""
+    usual, readings = tag["last_observed"], []
+    for reading in tag["readings"]:
+        usual = reading.get("observed_at", usual)
+        readings.append({**reading, "observed_at": usual})
+    tried = {"last_try": tag["last_observed"], "last_try_status": 0, "last_try_detail": ""}
+    return {"looked_at": None, **tried, **tag, "readings": readings}
+
+
 def without_ages(state: dict[str, Any]) -> list[dict[str, Any]]:
     """The tags of a state as they stay while nothing is observed."""
-    tags = []
-    for tag in state["tags"]:
-        readings = [{**reading, "stale_seconds": 0} for reading in tag["readings"]]
-        tags.append({**tag, "stale_seconds": 0, "readings": readings})
-    return tags
+    return [{**tag, "stale_seconds": 0} for tag in state["tags"]]
 
 
 @contextmanager
-def listener(url: str, subprotocols: Sequence[str] = (), **query: Any) -> Iterator[Listener]:
+def listener(url: str, **query: Any) -> Iterator[Listener]:
     """A WebSocket client of the bridge at `url`; keyword arguments are the query."""
-    with open_websocket(ws_url(url, **query), subprotocols) as connection:
+    with open_websocket(ws_url(url, **query)) as connection:
         yield Listener(connection)
 
 

@@ -105,4 +105,5 @@ def test_a_twin_that_says_how_its_clock_does_is_believed_as_long_as_its_states_a
     assert look(6, late_s - BIT, "running") == "running", "it was said before it stood so long"
     assert look(6, late_s, "running") == "stopped"
     assert look(6, late_s, "paused", known=False) == "stopped"
+    assert look(7, late_s, "doubted", known=False) == "doubted"
     assert look(0, late_s, "paused") == "none"

@@ -8,6 +8,7 @@ import pytest
 from lupin_twin.counts import Counts, Recent
 from lupin_twin.diagnostics import (
     ERROR,
+    MAX_PROBLEMS,
     MAX_SHOWN,
     OK,
     STALE,
@@ -21,7 +22,7 @@ from lupin_twin.diagnostics import (
     findings,
     self_report,
 )
-from lupin_twin.journal.condition import OFF, UNKNOWN, Condition, JournalState
+from lupin_twin.journal.condition import UNKNOWN, Condition, JournalState
 from lupin_twin.state import ClockState
 
 WELL = Health(
@@ -31,6 +32,7 @@ WELL = Health(
     observed_ago_s=2.0,
     late={},
     twins=1,
+    state_topic="/twin/state",
     fields_computing=0,
     fields_computed=3,
     slowest_field_s=0.25,
@@ -80,6 +82,7 @@ def test_a_twin_that_is_well_is_ok_in_all() -> None:
         ("clock", {"clock": "none"}, ERROR, "no ROS time"),
         ("inputs", {"observed_ago_s": None}, STALE, "no observation"),
         ("inputs", {"inputs": {"/map": 0}}, WARN, "nobody publishes /map"),
+        ("inputs", {"observed_ago_s": None, "input_problems": ("use UDP",)}, WARN, "use UDP"),
         ("drops", {"counts": Counts({"frame": 40}, 0, (FRAME,))}, WARN, "12 lately"),
         ("drops", {"counts": Counts({"frame": 40})}, OK, "nothing lately"),
         ("drops", {"counts": Counts(callback_errors=1)}, WARN, "nothing lately"),
@@ -127,8 +130,9 @@ def test_a_journal_that_cannot_be_written_is_an_error_and_one_that_is_off_is_non
     [told] = [f for f in findings(replace(WELL, journal=failing)) if f.name == "journal"]
     assert (told.level, told.message) == (ERROR, "the disk is full")
     assert told.values["lost"] == "3"
-    [told] = [f for f in findings(WELL) if f.name == "journal"]
-    assert (told.level, told.message) == (OK, "no journal is kept")
+    off = Condition(JournalState.OFF, "kept in a temporary file")
+    [told] = [f for f in findings(replace(WELL, journal=off)) if f.name == "journal"]
+    assert (told.level, told.message) == (OK, "kept in a temporary file")
 
 
 @pytest.mark.parametrize("clock", ["running", "paused", "stopped", "none"])
@@ -136,7 +140,7 @@ def test_what_is_said_is_read_again(clock: ClockState) -> None:
     recent = (FRAME, Recent("lost", "lost messages", 2), Recent("late_stamp", "late", 1))
     counts = Counts({"frame": 40, "lost": 5, "late_stamp": 1}, 3, recent)
     assert self_report(findings(replace(WELL, clock=clock, counts=counts))) == SelfReport(
-        clock, counts, OFF, "robot"
+        clock, counts, UNKNOWN, "robot"
     )
 
 
@@ -166,6 +170,17 @@ def test_what_is_said_of_the_journal_is_read_again() -> None:
     for stretch in ("1", "1 x", "x 1", " ", "1 " + 20 * "9"):
         values = {"state": "recording", "simulated": stretch}
         assert self_report([Finding("journal", OK, "", values)]).journal.simulated_ns is None
+
+
+def test_what_is_said_of_inputs_is_read_again_up_to_a_limit() -> None:
+    for count in (0, MAX_PROBLEMS):
+        problems = tuple(f"{number}: use UDP" for number in range(count))
+        assert self_report(findings(replace(WELL, input_problems=problems))).input_problems == (
+            problems
+        )
+    values = {f"problem {number}": "x" * (MAX_SHOWN + 1) for number in range(1, MAX_PROBLEMS + 2)}
+    read = self_report([Finding("inputs", WARN, "", values)]).input_problems
+    assert [len(each) for each in read] == [MAX_SHOWN] * MAX_PROBLEMS
 
 
 def test_who_says_nothing_is_not_said_to_have_dropped_nothing() -> None:

@@ -11,7 +11,6 @@ import pytest
 from lupin_twin.estimate_rounds import (
     HOLD_SHARE,
     MAX_GRADED,
-    ROUND_REST_FACTOR,
     ROUND_REST_S,
     Done,
     Heard,
@@ -149,7 +148,7 @@ def test_a_round_comes_with_the_first_model_and_then_with_scans() -> None:
     assert watch.due({}, 0.0) is None
     first = watch.due({"co2": MODEL}, 0.0)
     assert first == Round("co2", MODEL, (), None, None), "nothing was foretold before"
-    assert watch.begin(first, 0.0) == 0
+    assert watch.begin(first) == 0
     assert watch.due({"co2": MODEL}, 0.0) is None, "one at a time"
     watch.end(done(MODEL), 0.0625, S)
     assert watch.loaded("co2") is not None
@@ -170,7 +169,7 @@ def test_another_model_is_a_reason_too_and_the_longest_waiting_comes_first() -> 
         due = watch.due({"a": MODEL, "b": MODEL}, at_s)
         assert due is not None
         assert due.sensor == ("a" if at_s == 0.0 else "b")
-        watch.begin(due, at_s)
+        watch.begin(due)
         watch.end(done(MODEL), at_s, S)
     assert watch.due({"a": MODEL, "b": MODEL}, 90.0) is None
     other = watch.due({"a": OTHER_MODEL, "b": OTHER_MODEL}, 90.0)
@@ -182,30 +181,29 @@ def test_a_flood_is_sampled_and_told() -> None:
     watch = Watch(DAY_S)
     due = watch.due({"co2": MODEL}, 0.0)
     assert due is not None
-    watch.begin(due, 0.0)
+    watch.begin(due)
     watch.end(done(MODEL), 0.0, S)
     for number in range(MAX_GRADED + 3):
         watch.hear(scan(number * S, co2=400.0))
     due = watch.due({"co2": MODEL}, ROUND_REST_S)
     assert due is not None
     assert len(due.heard) == MAX_GRADED
-    assert watch.begin(due, ROUND_REST_S) == 3
+    assert watch.begin(due) == 3
     assert watch.skipped == 3
 
 
-def test_a_round_that_takes_long_comes_the_more_seldom_and_one_that_fails_changes_nothing() -> None:
+def test_a_round_that_fails_changes_nothing() -> None:
     watch = Watch(DAY_S)
     due = watch.due({"co2": MODEL}, 0.0)
     assert due is not None
-    watch.begin(due, 0.0)
+    watch.begin(due)
     watch.end(done(MODEL, 90, 10), 2.0, S)
     before = watch.loaded("co2")
     assert watch.distrusted(S) == ["co2"]
     watch.hear(scan(co2=1.0))
-    assert watch.due({"co2": MODEL}, 2.0 + 2.0 * ROUND_REST_FACTOR - 0.1) is None
-    due = watch.due({"co2": MODEL}, 2.0 + 2.0 * ROUND_REST_FACTOR)
+    due = watch.due({"co2": MODEL}, 2.0 + ROUND_REST_S)
     assert due is not None
-    watch.begin(due, 100.0)
+    watch.begin(due)
     watch.end(ValueError("why"), 100.0, S)
     assert watch.loaded("co2") is before
     assert watch.record("co2", S).week == Tally(90, 10)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
+from threading import Event
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,11 +18,12 @@ from lupin_msgs.srv import GetEstimate, GetEstimateReport
 from lupin_twin.diagnostics import Estimates
 from lupin_twin.estimate import STRONG_NATS, FitFailed
 from lupin_twin.estimate_rounds import Done, Loaded
-from lupin_twin.estimate_service import EstimateRules, EstimateService
+from lupin_twin.estimate_service import EstimateRules, EstimateService, Known
 from lupin_twin.estimates import FIRST_FIT, TagPast, readings_of
 from lupin_twin.grading import Tally
+from lupin_twin.history import History
 from lupin_twin.past_desk import MAX_QUESTIONS
-from lupin_twin.state import NANOSECONDS_PER_SECOND, Reading
+from lupin_twin.state import NANOSECONDS_PER_SECOND, Pose, Reading, Scan, TwinStore
 from tests.support import messages
 from tests.support.domains import own_domain
 from tests.support.journal import select
@@ -239,7 +241,7 @@ def test_what_is_wrong_with_models_is_said_in_the_log_and_for_diagnostics() -> N
 
     due = service.watch.due({"co2": nothing}, 0.0)
     assert due is not None
-    service.watch.begin(due, 0.0)
+    service.watch.begin(due)
     loaded = Loaded(0, nothing, nothing, ())
     service._rounded("co2", Done(Tally(90, 10), loaded, loaded))
     assert service.state() == Estimates({"co2": "singular"}, ("co2",), 1, 0)
@@ -254,7 +256,7 @@ def test_what_is_wrong_with_models_is_said_in_the_log_and_for_diagnostics() -> N
         model: Any = object()
         due = service.watch.due({"co2": model}, 1e9)
         assert due is not None
-        service.watch.begin(due, 1e9)
+        service.watch.begin(due)
         service._rounded("co2", Done(tally, loaded, loaded))
 
     grade(Tally(1, 0))
@@ -264,3 +266,51 @@ def test_what_is_wrong_with_models_is_said_in_the_log_and_for_diagnostics() -> N
     grade(Tally(100_000, 0))
     assert len(told) == 4, "and again where it was trusted in between"
     service.close()
+
+
+def test_scans_in_any_number_cost_no_more_than_a_tenth_of_a_core() -> None:
+    """Five sensors at thirty tags, forty scans a second: rounds and fits rest after their work."""
+    store, history, start_ns = TwinStore(), History(), time.time_ns()
+    habits: Any = SimpleNamespace(is_behind=False, warn=lambda *_: None, report=lambda *_: None)
+    nothing: Any = None
+    known = Known(store, history, nothing, lambda: None)
+    has_news = Event()
+    service = EstimateService(
+        habits, known, EstimateRules(86_400.0, 100), time.time_ns, has_news.set
+    )
+    sensors = ("temperature", "humidity", "co2", "light", "ph")
+
+    def scan(number: int, stamp_ns: int) -> None:
+        tag, place = number % 30, Pose(number % 6, number % 30 // 6, 0.0, 0.0, 0.0, 0.0, 1.0)
+        values = (20.0 + (number * 7919 + index * 31) % 97 / 97 for index in range(5))
+        readings = tuple(
+            Reading(name, value, stamp_ns) for name, value in zip(sensors, values, strict=True)
+        )
+        one = Scan(str(tag), stamp_ns, readings, place)
+        store.record(one)
+        history.add(one)
+        service.hear(one)
+
+    def cpu_of_others_s() -> float:
+        return time.process_time() - time.thread_time()
+
+    def scans_until(is_over: Callable[[], bool]) -> None:
+        number = 0
+        while not is_over():
+            number += 1
+            scan(number, time.time_ns())
+            service.go_on()
+            if has_news.wait(0.025):
+                has_news.clear()
+                service.deliver()
+
+    try:
+        for number in range(900):
+            scan(number, start_ns - (900 - number) * NANOSECONDS_PER_SECOND)
+        scans_until(lambda: all(service.models.of(name).model for name in sensors))
+        begun_s, cpu_s = time.monotonic(), cpu_of_others_s()
+        scans_until(lambda: time.monotonic() - begun_s > 8.0)
+        share = (cpu_of_others_s() - cpu_s) / (time.monotonic() - begun_s)
+        assert 0.0 < share < 0.1
+    finally:
+        service.close()

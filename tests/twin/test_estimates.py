@@ -206,15 +206,11 @@ def test_the_first_fit_comes_with_the_tenth_reading() -> None:
 def test_the_first_model_is_made_of_few_readings_and_soon_of_all() -> None:
     models = Models()
     heard(models, "co2", 300)
-    assert not models.fits_first()
     assert models.begin("co2", 0.0) == FIRST_FITTED
-    assert models.fits_first(), "all else that takes long waits"
     models.end("co2", MODEL, S)
-    assert not models.fits_first()
     assert models.due(FIT_REST_S - 1.0) is None
     assert models.due(FIT_REST_S) == "co2", "nothing was heard since, but most was left out"
     assert models.begin("co2", FIT_REST_S) == MAX_FITTED
-    assert not models.fits_first()
     models.end("co2", MODEL, 2 * S)
     heard(models, "co2", 1)
     assert models.due(FIT_REST_S + FIT_PERIOD_S - 1.0) is None

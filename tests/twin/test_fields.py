@@ -26,6 +26,7 @@ from lupin_twin.fields import (
     check_request,
     cost_s,
     default_box,
+    default_request,
 )
 from lupin_twin.grid import FieldGrid
 from lupin_twin.idw import Abandoned
@@ -415,3 +416,15 @@ def test_default_box_is_that_of_the_tags_and_their_reach() -> None:
 
 def test_default_box_without_a_tag_is_the_reach_around_the_origin() -> None:
     assert default_box([], 2.5) == (-2.5, -2.5, 2.5, 2.5)
+
+
+def test_default_box_goes_no_farther_for_a_tag_that_is_far_off() -> None:
+    positions = [(0.0, 0.0), (1.0, 2.0), (3.0, 1.0), (5000.0, 1.0)]
+    assert default_box(positions, 1.0) == (-1.0, -1.0, 4.0, 3.0)
+
+
+def test_cells_of_a_default_request_are_doubled_until_there_are_few_enough() -> None:
+    box = (0.0, 0.0, 400.0, 300.0)
+    assert default_request("co2", box, 12_000_000).resolution == np.float32(0.1)
+    assert default_request("co2", box, 11_999_999).resolution == np.float32(0.2)
+    assert default_request("co2", (-1e6, -1e6, 1e6, 1e6), 1).resolution >= 2e6

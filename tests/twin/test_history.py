@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lupin_twin import history as history_module
+from lupin_twin import ingest
 from lupin_twin.history import History, PastScan, PastTry, TagHistory
 from lupin_twin.state import Look, Reading, Scan, TagState, Try, TwinStore
 from tests.support.store import SCAN_FAILED, S, failed_look, look, scan
@@ -81,14 +82,14 @@ def test_the_same_observation_heard_three_times_is_one() -> None:
 def test_what_was_heard_is_known_by_kind_stamp_and_source() -> None:
     history = History()
     history.add(scan("1", at_s=5.0, source="a", co2=1.0))
-    assert history.knows(scan("1", at_s=5.0, source="a", co2=9.0))
+    assert history.news(scan("1", at_s=5.0, source="a", co2=9.0)) is None
     for other in (
         scan("2", at_s=5.0, source="a"),
         scan("1", at_s=6.0, source="a"),
         scan("1", at_s=5.0, source="b"),
         replace(look("1", at_s=5.0), source="a"),
     ):
-        assert not history.knows(other)
+        assert history.news(other) == other
 
 
 def test_two_sources_at_one_moment_are_two_in_the_order_of_their_arrival() -> None:
@@ -198,9 +199,7 @@ class Twin:
         self.store, self.own, self.followed = TwinStore(), History(), History()
 
     def write(self, write: Scan | Look) -> None:
-        write = self.own.dated(write)
-        self.store.record(write) if isinstance(write, Scan) else self.store.record_look(write)
-        self.own.add(write)
+        assert ingest.apply(write, self.store, self.own) is None
         self.tell()
 
     def tell(self, *, clock_went_back: bool = False) -> None:

@@ -21,8 +21,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from lupin_twin import layer_service as module
 from lupin_twin.convert_layers import MarkerArrays
+from lupin_twin.fields import DEFAULT_RESOLUTION_M
 from lupin_twin.idw import Abandoned
-from lupin_twin.layers import FINEST_M
 from lupin_twin.parameters import TwinParameters
 from tests.support.domains import own_domain
 from tests.support.messages import look, scan
@@ -427,19 +427,21 @@ def test_rviz_shows_what_the_twin_publishes(house: tuple[int, Process, Viewer]) 
     # A layer that is shown costs the twin something.
     assert [name for name, each in layers.items() if each["Enabled"]] == ["temperature"]
     assert {each["Channel Name"] for each in layers.values()} == {"value"}
-    assert {each["Size (m)"] for each in layers.values()} == {FINEST_M}
+    assert {each["Size (m)"] for each in layers.values()} == {DEFAULT_RESOLUTION_M}
     namespaces = {space for each in shown.values() for space in each.get("Namespaces", ())}
     assert namespaces == {"tags", "names", "planters"}
     assert manager["Global Options"]["Fixed Frame"] == TwinParameters().frame_id
 
 
-def test_tags_too_far_apart_are_told_of_and_cost_the_markers_nothing(
+def test_a_tag_that_is_far_off_makes_no_layer_wider_and_has_its_marker(
     house: tuple[int, Process, Viewer],
 ) -> None:
-    domain, process, robot = house
-    observe(robot, scan("far", {"co2": 1.0}, (1e39, 0.0)))
+    domain, _, robot = house
+    at = {"a": (0.0, 0.0), "b": (1.0, 0.0), "c": (1.0, 0.5), "far": (900.0, 0.0)}
+    observe(robot, *(scan(tag_id, {"co2": 1.0}, place) for tag_id, place in at.items()))
     with Viewer(domain, "viewer") as viewer:
         viewer.watch(CO2)
         viewer.watch(TAGS)
         viewer.newest(TAGS, lambda m: any(x.text == "far" for x in m.markers))
-        process.wait_for_output(f"nothing on {CO2}: bbox_max_x is inf")
+        layer = cells(viewer.newest(CO2, lambda m: m.width > 0))
+        assert layer[:, 0].max() < 100.0

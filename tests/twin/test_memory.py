@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import sqlite3
+import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -13,6 +14,7 @@ from lupin_twin import ingest
 from lupin_twin.history import History
 from lupin_twin.ingest import Pin
 from lupin_twin.journal.condition import JournalState
+from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.runs import Clock
 from lupin_twin.memory import MAX_NEW_RUNS, Memory, journal_path, open_journal, state_folder
 from lupin_twin.past import NotRemembered
@@ -101,7 +103,7 @@ def test_what_is_known_again_is_told_in_one_line(tmp_path: Path) -> None:
     [line] = told(path, wall(9))
     oldest = f"{datetime.fromtimestamp(PART.stamp_ns / S, UTC):%Y-%m-%dT%H:%M:%SZ}"
     assert line == (
-        f"journal {path}: 3 tags are known again, of 3 places, 4 scans and tries, 1 looks;"
+        f"journal {path}: 3 tags are known again, of 3 places, 3 readings, 1 looks;"
         f" the oldest is of {oldest}"
     )
     path = tmp_path / "simulated.sqlite"
@@ -147,7 +149,7 @@ def test_a_place_is_as_old_as_the_scan_that_brought_it_and_a_discovery_is_of_now
     with twin(path, wall(5)) as (memory, _, _):
         memory.apply(SCAN, NOW)
         memory.apply(Pin("9", HERE), NOW)
-    stamps = select(path, "SELECT stamp_ns FROM pin ORDER BY id")
+    stamps = select(path, "SELECT stamp_ns FROM place ORDER BY seq")
     assert stamps == [(NOW,), (NOW + 5 * S,)]
 
 
@@ -243,12 +245,18 @@ def test_what_is_refused_is_not_written(tmp_path: Path) -> None:
         wait_for(lambda: memory.condition.written == 1, "the look alone")
 
 
-def test_without_a_journal_all_else_is_as_it_was() -> None:
-    with twin(None, wall(5)) as (memory, store, history):
+def test_off_is_a_temporary_file_that_answers_and_is_gone_at_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with twin(None, wall(5)) as (memory, store, _):
         memory.apply(SCAN, NOW)
         assert store.knows("7")
-        assert len(history.of("7").scans) == 1
-        assert memory.condition.state is JournalState.OFF
+        wait_for(lambda: memory.condition.written == 2, "the scan and its place")
+        answer = memory.recall.ask(lambda c, _: state_at(c, NOW, "map")).result(10.0)
+        assert [tag.tag_id for tag in answer.tags] == ["7"]
+        assert Path(memory.condition.path).is_relative_to(tmp_path)
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 
 import pytest
 from lupin_msgs.msg import Observation
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 
 from tests.support import messages
@@ -100,3 +102,40 @@ def test_a_malformed_map_is_refused_and_the_last_good_one_stays(domain: int) -> 
 def known_cells(peer: Peer) -> list[bool]:
     response = peer.get_field(sensor_type="co2", resolution=1.0, bbox_max_x=2.0, bbox_max_y=1.0)
     return [not math.isnan(value) for value in response.values]
+
+
+def test_a_pose_too_far_off_is_dropped_on_each_path_and_the_readings_stay(twin: Twin) -> None:
+    peer = twin.peer
+    peer.observe(
+        scan("lost", {"temperature": 21.0}, at=(3.0, -5000.0)),
+        look("flower", "lupin", at=(1e30, 0.0)),
+    )
+    peer.discover(
+        discovered({"high": messages.pose(1, 1, 1001), "limit": messages.pose(-1000, 1000)})
+    )
+    peer.tag("limit")
+    twin.warning("/floranova/observations", "'lost'", "its y is -5000 m", "1000 m (max_pose_m)")
+    twin.warning("/perception/discovered_tags", "'high'", "its z is 1001 m")
+    twin.settled()
+    tags = twin.tags()
+    assert {name: tag.pose.orientation.w for name, tag in tags.items()} == {
+        "lost": 0.0,
+        "flower": 0.0,
+        "limit": 1.0,
+        "marker": 0.0,
+    }
+    assert [reading.value for reading in tags["lost"].readings] == [21.0]
+    assert tags["flower"].species == "lupin"
+    # The first pose that is possible is the tag's.
+    peer.observe(scan("lost", {"temperature": 22.0}, at=(3.0, 5.0)))
+    peer.tag("lost", lambda tag: tag.pose.position.y == 5.0)
+
+
+def test_the_limit_of_a_pose_may_be_changed_while_the_twin_runs(twin: Twin) -> None:
+    twin.peer.observe(scan("far", {"co2": 1.0}, at=(1500.0, 0.0)))
+    twin.warning("'far'", "its x is 1500 m")
+    limit = Parameter("max_pose_m", value=2000.0).to_parameter_msg()
+    answer = twin.peer.ask(SetParameters, "/lupin_twin/set_parameters", parameters=[limit])
+    assert answer.results[0].successful, answer.results[0].reason
+    twin.peer.observe(scan("far", {"co2": 2.0}, at=(1500.0, 0.0)))
+    twin.peer.tag("far", lambda tag: tag.pose.position.x == 1500.0)

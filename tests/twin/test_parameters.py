@@ -22,6 +22,7 @@ DEFAULTS = {
     "field_service_name": "twin/get_field",
     "state_publish_rate_hz": 1.0,
     "frame_id": "map",
+    "max_pose_m": 1000.0,
     "buffer_len": 32,
     "idw_power": 2.0,
     "idw_falloff_radius_m": 1.5,
@@ -139,6 +140,7 @@ CHANGEABLE = {
     "idw_max_distance_m": 2.0,
     "clip_to_explored": True,
     "layer_rate_hz": 0.5,
+    "max_pose_m": 2000.0,
 }
 
 

@@ -11,9 +11,7 @@ import pytest
 from builtin_interfaces.msg import Time
 from lupin_msgs.srv import GetHistory, GetStateAt
 
-from lupin_twin import recent
 from lupin_twin.habits import SERVICE_QOS
-from lupin_twin.history import History
 from lupin_twin.past import (
     HISTORY_SERVICE,
     MAX_POINTS,
@@ -24,15 +22,15 @@ from lupin_twin.past import (
     SeriesRequest,
 )
 from lupin_twin.past_desk import MAX_QUESTIONS, PastDesk
-from lupin_twin.past_service import PastService, RecentPast
+from lupin_twin.past_service import PastService
 from lupin_twin.past_writes import PastWrites, WritesRequest
 from lupin_twin.state import NANOSECONDS_PER_SECOND, Snapshot, TwinStore
 from lupin_twin.workers import Workers
-from tests.support import messages, store
+from tests.support import messages
 from tests.support.domains import own_domain
 from tests.support.processes import OFTEN, twin_node
 from tests.support.ros import Peer
-from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.waiting import wait_for
 
 S = NANOSECONDS_PER_SECOND
 NOW_NS = 100 * S
@@ -209,30 +207,6 @@ def test_one_question_too_many_is_told_to_come_again(node: Node) -> None:
     )
 
 
-def test_without_a_journal_the_history_is_looked_through_elsewhere() -> None:
-    history, workers = History(), Workers("test")
-    for second in (10, 20):
-        history.add(store.scan("a", second, co2=400.0 + second))
-    past = RecentPast(history, workers)
-    try:
-        asked = SeriesRequest("a", "co2")
-        search = past.series(asked, NOW_NS)
-        history.add(store.scan("a", 30, co2=0.0))
-        assert search.result(PATIENCE_S).means == (410.0, 420.0)
-        everywhere = SeriesRequest("*", "~scans")
-        search = past.series(everywhere, NOW_NS)
-        history.add(store.scan("b", 5, co2=0.0))
-        assert search.result(PATIENCE_S) == recent.series(
-            everywhere, {"a": history.of("a")}, NOW_NS
-        )
-        with pytest.raises(NotRemembered, match="parameter journal"):
-            past.state_at(5)
-        with pytest.raises(NotRemembered, match="~runs"):
-            past.series(SeriesRequest("*", "~runs"), NOW_NS)
-    finally:
-        workers.close()
-
-
 # --- over DDS, without a journal ----------------------------------------------------------------
 
 
@@ -267,11 +241,11 @@ def test_the_last_scans_of_a_twin_without_a_journal_can_be_asked_for(peer: Peer)
     assert list(events.means) == [2.0]
 
 
-def test_a_state_of_then_is_not_remembered_without_a_journal(peer: Peer) -> None:
+def test_a_state_of_then_is_known_without_a_journal_too(peer: Peer) -> None:
     response = peer.ask(GetStateAt, "/twin/get_state_at", at=Time(sec=15))
-    assert response == GetStateAt.Response(
-        error_message="not remembered: the twin keeps no journal (parameter journal)"
-    )
+    assert response.ok, response.error_message
+    [tag] = response.state.tags
+    assert (tag.tag_id, tag.readings[0].value) == ("a", 410.0)
 
 
 def test_a_moment_to_come_is_refused_by_the_nodes_own_clock(peer: Peer) -> None:

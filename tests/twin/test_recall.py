@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.journal.condition import OFF, Condition, JournalState
+from lupin_twin.journal.condition import Condition, JournalState
 from lupin_twin.past import NotRemembered
 from lupin_twin.recall import MAX_WAITING, Recall
 from lupin_twin.workers import LARGE_THREADS, SMALL_THREADS, ShouldStop
@@ -80,12 +80,6 @@ def test_a_question_sees_one_moment(path: Path) -> None:
     with recalling(path) as recall:
         assert recall.ask(twice).result(PATIENCE_S) == (1, 1)
         assert answer(recall) == 2
-
-
-def test_without_a_journal_the_parameter_is_named() -> None:
-    recall = Recall(lambda: OFF)
-    assert "parameter journal is off" in why_not(recall, is_lasting=True)
-    recall.close()
 
 
 def test_the_journal_of_another_twin_is_not_read(path: Path) -> None:

@@ -246,6 +246,8 @@ def _asked(request: HTTPConnection) -> Asked:
         fetch_site=headers.get("sec-fetch-site", ""),
         fetch_mode=headers.get("sec-fetch-mode", ""),
         fetch_dest=headers.get("sec-fetch-dest", ""),
+        referer=headers.get("referer", ""),
+        wants_page=_wants_page(request),
     )
 
 

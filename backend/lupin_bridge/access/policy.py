@@ -1,6 +1,6 @@
-"""Who may read, as far as it shows in a request's Host, Origin and Sec-Fetch headers. Pure.
+"""Who may read, by a request's Host, Origin, Sec-Fetch and Referer headers. Pure.
 
-A browser will carry any page's request to a bridge that its machine can reach. Three rules keep
+A browser will carry any page's request to a bridge that its machine can reach. Four rules keep
 foreign pages from reading, or computing, anything through it:
 
 - Host: the name that the browser used has to be one of this bridge's. A page at evil.example whose
@@ -11,8 +11,12 @@ foreign pages from reading, or computing, anything through it:
 - Sec-Fetch-Site (W3C Fetch Metadata): a request without Origin that a foreign page makes, for an
   `<img>` or an `<iframe>` say, is turned away as well. The page could not read the answer, only
   make us compute it.
+- Referer: beyond this machine and without TLS, browsers send no Sec-Fetch headers. What is no page
+  is then refused to whoever names a foreign page as where it comes from. A page passes, for that is
+  what a link looks like; none of ours can be framed. A foreign page may keep its name to itself:
+  nothing tells its request from a program's then.
 
-Programs other than browsers send neither Origin nor Sec-Fetch-Site and are not concerned.
+Programs other than browsers send none of Origin, Sec-Fetch-Site and Referer.
 """
 
 from __future__ import annotations
@@ -79,7 +83,8 @@ def parse_host(text: str) -> str:
 class Asked:
     """What a request says of where it comes from; headers in the order of their appearance.
 
-    `scheme` is http or https, for WebSockets too; the values of Sec-Fetch headers are "" if absent.
+    `scheme` is http or https, for WebSockets too; the values of Sec-Fetch headers and Referer are
+    "" if absent. `wants_page`: it may be a person who follows a link to one of our pages.
     """
 
     scheme: str
@@ -88,6 +93,8 @@ class Asked:
     fetch_site: str = ""
     fetch_mode: str = ""
     fetch_dest: str = ""
+    referer: str = ""
+    wants_page: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,27 +120,36 @@ class AccessPolicy:
 
     def judge(self, asked: Asked) -> Verdict:
         """Whether a request may pass."""
-        if len(asked.hosts) != 1:
-            return Verdict(f"the request has {len(asked.hosts)} Host headers, expected one")
-        authority = asked.hosts[0]
-        host = host_of(authority)
+        refusal = self._refusal_of_host(asked.hosts)
+        return Verdict(refusal) if refusal is not None else self._judge_page(asked)
+
+    def _refusal_of_host(self, hosts: Sequence[str]) -> str | None:
+        if len(hosts) != 1:
+            return f"the request has {len(hosts)} Host headers, expected one"
+        host = host_of(hosts[0])
         if host is None:
-            return Verdict(f"Host is {authority[:128]!r}, expected a host and a port")
+            return f"Host is {hosts[0][:128]!r}, expected a host and a port"
         if not self._goes_by(host):
-            return Verdict(
+            return (
                 f"this bridge does not go by the name {host[:128]!r}: use its IP address, or start "
                 f"it with --allow-host {host[:128]}"
             )
+        return None
+
+    def _judge_page(self, asked: Asked) -> Verdict:
         if asked.origins:
-            return self._judge_origin(asked, authority)
-        # A link shows our page to a person; the page that led there does not see it. A frame, or an
-        # object, is a navigation too, of which the person need not see anything.
-        is_link = asked.fetch_mode == "navigate" and asked.fetch_dest == "document"
-        if asked.fetch_site in ("cross-site", "same-site") and not is_link:
-            return Verdict(
-                "a page of another origin asks without naming itself: load it in CORS mode "
-                "(<img crossorigin>, or fetch) and start the bridge with --allow-origin for it"
-            )
+            return self._judge_origin(" ".join(asked.origins), asked)
+        if asked.fetch_site:
+            # A link shows our page to a person; the page that led there does not see it. A frame,
+            # or an object, is a navigation too, of which the person need not see anything.
+            is_link = asked.fetch_mode == "navigate" and asked.fetch_dest == "document"
+            if asked.fetch_site in ("cross-site", "same-site") and not is_link:
+                return Verdict(
+                    "a page of another origin asks without naming itself: load it in CORS mode "
+                    "(<img crossorigin>, or fetch) and start the bridge with --allow-origin for it"
+                )
+        elif asked.referer and not asked.wants_page:
+            return self._judge_origin("/".join(asked.referer.split("/", 3)[:3]), asked)
         return Verdict()
 
     def _goes_by(self, host: str) -> bool:
@@ -145,14 +161,13 @@ class AccessPolicy:
             or _is_ip(host)
         )
 
-    def _judge_origin(self, asked: Asked, authority: str) -> Verdict:
-        named = " ".join(asked.origins)
+    def _judge_origin(self, named: str, asked: Asked) -> Verdict:
         try:
             origin = parse_origin(named)
         except OriginError:
             # "null", for one: a page from a file, or in a sandbox.
             return Verdict(f"pages of the origin {named[:128]!r} may not read this bridge")
-        if origin == parse_origin(f"{asked.scheme}://{authority}"):
+        if origin == parse_origin(f"{asked.scheme}://{asked.hosts[0]}"):
             return Verdict()
         if origin in self.origins:
             return Verdict(foreign=origin)

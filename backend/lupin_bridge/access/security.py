@@ -5,10 +5,17 @@ from __future__ import annotations
 from typing import Final
 
 import orjson
-from starlette.datastructures import MutableHeaders
+from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-_METHODS: Final = ("GET", "HEAD")
+from lupin_bridge.access.entrance import path_of
+
+_READS: Final = ("GET", "HEAD")
+# Where a session begins and ends. A form, a link or a picture of a foreign page can ask for these
+# too, with the browser's cookie, but none of them can send a header of its own: for that, a script
+# has to ask first (CORS preflight), and is not given leave.
+POSTED: Final = frozenset({"/api/signin", "/api/signout"})
+OWN_HEADER: Final = "X-Lupin-Twin"
 
 # The page loads nothing from elsewhere, is framed by nobody, and runs no inline script. No other
 # page gets at an answer unless by CORS, which CORP does not touch. No HSTS: it would take the way
@@ -28,22 +35,29 @@ _HEADERS: Final = {
 
 
 class ReadOnly:
-    """ASGI middleware: GET and HEAD only, and the security headers on everything."""
+    """ASGI middleware: reads only, but for sign-in and sign-out, and the headers on everything."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a read on, refuse anything else."""
+        """Pass on what a path is there for, refuse anything else."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
 
         send = with_security_headers(send)
-        if scope["method"] in _METHODS:
-            await self._app(scope, receive, send)
+        method = scope["method"]
+        methods = ("POST",) if path_of(scope) in POSTED else _READS
+        if method not in methods:
+            detail = f"method {method[:16]} is not allowed here, use {' or '.join(methods)}"
+            await _refuse(405, detail, send, (b"allow", ", ".join(methods).encode()))
+        elif method == "POST" and OWN_HEADER not in Headers(scope=scope):
+            await _refuse(
+                403, f"{method} without the header {OWN_HEADER}, expected any value", send
+            )
         else:
-            await _refuse_method(scope["method"], send)
+            await self._app(scope, receive, send)
 
 
 def with_security_headers(send: Send) -> Send:
@@ -59,15 +73,14 @@ def with_security_headers(send: Send) -> Send:
     return send_with_headers
 
 
-async def _refuse_method(method: str, send: Send) -> None:
-    detail = f"method {method[:16]} is not allowed: nothing here writes, use GET or HEAD"
+async def _refuse(status: int, detail: str, send: Send, *headers: tuple[bytes, bytes]) -> None:
     body = orjson.dumps({"detail": detail})
     await send(
         {
             "type": "http.response.start",
-            "status": 405,
+            "status": status,
             "headers": [
-                (b"allow", b"GET, HEAD"),
+                *headers,
                 (b"content-type", b"application/json"),
                 (b"content-length", str(len(body)).encode()),
             ],

@@ -42,9 +42,7 @@ RETRY_S: Final = 5.0
 UNANSWERED_S: Final = 30.0
 # All is read again no oftener than this, whatever comes late.
 OVER_AGAIN_S: Final = 30.0
-_NOT_KEPT: Final = frozenset(
-    {JournalState.OFF, JournalState.FAILING, JournalState.IN_USE, JournalState.FOREIGN}
-)
+_NOT_KEPT: Final = frozenset({JournalState.FAILING, JournalState.IN_USE, JournalState.FOREIGN})
 # Numbers of what is heard here: beyond those of any journal.
 _FIRST_HEARD: Final = 2**62
 _ALL_TIME: Final = (RunSpan(RUN, 0, 2**63 - 1),)

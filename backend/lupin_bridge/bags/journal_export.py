@@ -22,11 +22,10 @@ _FLUSH_EVERY: Final = 1_000
 
 @dataclass(frozen=True, slots=True)
 class Exported:
-    """How many messages of each kind, and how many rows could not be read."""
+    """How many messages of each kind."""
 
     observations: int
     tags: int
-    damaged: int
 
 
 def export(
@@ -76,7 +75,7 @@ def _write(file: BagFile, rows: JournalRows) -> Exported:
         at_ns = row.arrival_ns
         if run.begun.is_simulated:
             # What ROS time was when it arrived.
-            now_ns = max(row.stamp_ns, at_ns - run.lead_ns)
+            now_ns = max(row.stamp_ns, at_ns - run.begun.arrival_ns + run.begun.stamp_ns)
             file.write(_CLOCK, at_ns, at_ns, journal_messages.clock(now_ns))
         if rows.places and not sum(counts):
             file.write(_TAGS, at_ns, at_ns, journal_messages.discovered(rows.places))
@@ -90,4 +89,4 @@ def _write(file: BagFile, rows: JournalRows) -> Exported:
         if sum(counts) % _FLUSH_EVERY == 0:
             file.flush()
     observations, tags = counts
-    return Exported(observations, tags, rows.damaged)
+    return Exported(observations, tags)

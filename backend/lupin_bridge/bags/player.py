@@ -1,243 +1,337 @@
-"""Plays a recording: which message is due, and what time it is by the recording. Knows no ROS.
+"""`python -m lupin_bridge.bags.player`: plays a recording to the one twin of `demo --from`.
 
-Time is an argument: `beat` is called at a steady rate, with a clock that never jumps. Whatever is
-published leaves by an `Outlet`.
+A process of its own, so that the data crosses DDS. ROS time is the recording's: its `/clock`, else
+the time at which its messages were recorded.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
+import signal
+import sys
+import time
 from collections import deque
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from typing import Final, Protocol
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any, Final
 
-from lupin_bridge.bags.gaps import TOLD_S, Gap
-from lupin_bridge.bags.recording import CLOCK_TOPIC, Recorded, clock_ns
-from lupin_bridge.bags.recordings import Recordings
+import rclpy
+from lupin_msgs.msg import DiscoveredTags, Observation
+from nav_msgs.msg import OccupancyGrid
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rosgraph_msgs.msg import Clock
 
-# How often the clock is told, Hz.
-BEAT_HZ: Final = 50.0
-# A message goes out so long, s, behind the clock that has come to its moment: whoever follows the
-# clock knows by then what time it is. Before that, its stamp would be one from the future.
-LAG_S: Final = 0.1
-# So many a beat, 250 a second: of 50 that may wait at a twin none is lost while it is kept away
-# from them for a fifth of a second. DDS acknowledges what waits there, taken or not.
-MAX_A_BEAT: Final = 5
-# So many, and so many bytes, are read ahead; then the clock waits for those who cannot keep up.
-MAX_AHEAD: Final = 250
-MAX_AHEAD_BYTES: Final = 64_000_000
-# A process that stood still, with its machine perhaps, goes on from where it stood.
-MAX_STEP_S: Final = 0.25
+from lupin_bridge.bags.recording import (
+    CLOCK_TOPIC,
+    MAP_TYPE,
+    OBSERVATION_TYPE,
+    TAGS_TYPE,
+    Recorded,
+    Recording,
+    RecordingError,
+    clock_ns,
+)
+from lupin_bridge.telling import say
+from lupin_twin import stop_signals
+from lupin_twin.convert import time_msg
+from lupin_twin.half_made import remove_half_made
+
+NODE_NAME: Final = "lupin_player"
+_TYPES: Final[Mapping[str, Any]] = {
+    OBSERVATION_TYPE: Observation,
+    TAGS_TYPE: DiscoveredTags,
+    MAP_TYPE: OccupancyGrid,
+}
+# As a twin subscribes to them (README, "Ask it over ROS").
+_DEPTHS: Final = {OBSERVATION_TYPE: 50, TAGS_TYPE: 50, MAP_TYPE: 1}
+_STATE_TYPE: Final = "lupin_msgs/msg/TwinState"
+_BEAT_S: Final = 0.02
+# So many a beat, 250 a second: of the 50 that may wait at a twin none is lost while its thread is
+# busy for a fifth of a second. DDS acknowledges what waits there, taken or not.
+_MAX_A_BEAT: Final = 5
+# A message goes out so long behind the clock, s: before the twin knows that time, its stamp would
+# be one from the future.
+_LAG_S: Final = 0.1
+# A machine that stood still goes on from where it stood.
+_MAX_STEP_S: Final = 0.25
+# Longer silences than this, s of waiting, are announced.
+_TOLD_S: Final = 60.0
+# How long the twin is waited for: DDS finds who is there within 3 s, a busy machine takes longer.
+_TWIN_S: Final = 30.0
+_LOOK_S: Final = 1.0
+# Before a loop begins again, DDS delivers what was published.
+_DELIVERY_S: Final = 0.5
 
 
-class Outlet(Protocol):
-    """Where what is played goes."""
-
-    def tell_time(self, now_ns: int) -> None:
-        """ROS time is this now, ns."""
-
-    def publish(self, topic: str, data: bytes) -> None:
-        """Publish a serialised message on a topic, by its name in the recording."""
-
-    def begin_again(self) -> None:
-        """The recording starts over: what was latched so far has not been observed yet."""
+class Refused(Exception):
+    """A recording that must not be played here; the message says why and what to do."""
 
 
-@dataclass(frozen=True, slots=True)
-class Playing:
-    """How a recording is to be played.
+def main(argv: Sequence[str] | None = None) -> int:
+    """Play until a signal comes; at the end of the recording the time stands."""
+    words = sys.argv[1:] if argv is None else list(argv)
+    own, ros_args = words, list[str]()
+    if "--ros-args" in words:
+        at = words.index("--ros-args")
+        own, ros_args = words[:at], words[at:]
+    options = parser().parse_args(own)
+    stop_signals.end_with_parent()
+    stopped = _stop_asked()
+    try:
+        with Recording(options.files) as recording:
+            recording.check_start(options.start)
+            rclpy.init(args=ros_args, signal_handler_options=SignalHandlerOptions.NO)
+            try:
+                remove_half_made(rclpy.get_default_context().get_domain_id())
+                node = PlayerNode(recording.inputs)
+                try:
+                    _play(recording, node, options, stopped)
+                finally:
+                    node.destroy_node()
+            finally:
+                rclpy.try_shutdown()
+    except (RecordingError, Refused) as error:
+        say(str(error))
+        return 1
+    return 0
 
-    `kept` is, of each topic that is published, how many messages a publisher keeps for who comes
-    late; the topics stand in the order in which a twin takes what waits. `start_s` is counted from
-    the recording's first message. A gap of more than `skip_s`, s of the recording, is jumped over.
-    """
 
-    kept: Mapping[str, int]
-    speed: float = 1.0
-    start_s: float = 0.0
-    loops: bool = False
-    is_paused: bool = False
-    skip_s: float = math.inf
+def parser() -> argparse.ArgumentParser:
+    """The options; `lupin-twin demo` has checked them."""
+    made = argparse.ArgumentParser(prog=f"python -m {__spec__.name}", allow_abbrev=False)
+    made.add_argument("files", metavar="FILE.mcap", type=Path, nargs="+")
+    made.add_argument("--speed", type=float, default=1.0)
+    made.add_argument("--start", type=float, default=0.0)
+    made.add_argument("--loop", action="store_true")
+    made.add_argument("--skip-gaps", type=float, default=math.inf)
+    return made
+
+
+class PlayerNode(Node):  # type: ignore[misc]  # rclpy is not typed
+    """Publishes the recorded topics and `/clock`, and looks who subscribes."""
+
+    def __init__(self, inputs: Mapping[str, str]) -> None:
+        super().__init__(NODE_NAME)
+        self._inputs = inputs
+        self._clock = self.create_publisher(Clock, CLOCK_TOPIC, 1)
+        self._publishers_by_topic: dict[str, Any] = {}
+        self.advertise()
+
+    def advertise(self) -> None:
+        """Publish by new publishers: a late subscriber gets nothing of an earlier loop."""
+        for publisher in self._publishers_by_topic.values():
+            self.destroy_publisher(publisher)
+        self._publishers_by_topic = {
+            topic: self.create_publisher(
+                _TYPES[kind],
+                topic,
+                QoSProfile(
+                    depth=_DEPTHS[kind],
+                    reliability=ReliabilityPolicy.RELIABLE,
+                    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+                ),
+            )
+            for topic, kind in self._inputs.items()
+        }
+
+    def publish_time(self, now_ns: int) -> None:
+        """Publish `/clock`."""
+        self._clock.publish(Clock(clock=time_msg(now_ns)))
+
+    def publish(self, message: Recorded) -> None:
+        """Publish a serialised message as it is."""
+        self._publishers_by_topic[message.topic].publish(message.data)
+
+    def deliver(self) -> None:
+        """Wait until the twin has what was published, within bounds."""
+        for publisher in self._publishers_by_topic.values():
+            publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=_DELIVERY_S))
+
+    @property
+    def has_subscribers(self) -> bool:
+        """Whether somebody subscribes to each topic."""
+        return all(p.get_subscription_count() for p in self._publishers_by_topic.values())
+
+    def check_alone(self) -> None:
+        """Refuse a second twin in this ROS domain: its journal would keep what is played.
+
+        Raises:
+            Refused: see above.
+
+        """
+        twins = [
+            f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+            for topic, types in self.get_topic_names_and_types()
+            if _STATE_TYPE in types
+            for info in self.get_publishers_info_by_topic(topic)
+        ]
+        if len(twins) > 1:
+            raise Refused(
+                f"several twins run in ROS domain {self.context.get_domain_id()} "
+                f"({', '.join(sorted(twins))}), and a journal would keep what is played: choose "
+                "another ROS_DOMAIN_ID for this demo"
+            )
 
 
 class Player:
-    """One recording, as it is played.
+    """What is due at which moment. Time is an argument of `beat`; `node` publishes.
 
-    What lies before the start is published at once, with the clock at the start: all of it of
-    topics of which more than one message is kept, for each says something that no other does; of
-    the others the last one.
+    What lies before the start is published first, all of it but of maps: of these the last one.
     """
 
-    def __init__(self, recording: Recordings, outlet: Outlet, playing: Playing) -> None:
+    def __init__(self, recording: Recording, node: PlayerNode, options: argparse.Namespace) -> None:
         self._recording = recording
-        self._outlet = outlet
-        self._playing = playing
-        self._ranks = {topic: rank for rank, topic in enumerate(playing.kept)}
-        self.is_paused = playing.is_paused
+        self._node = node
+        self._speed: float = options.speed
+        self._skip_ns = options.skip_gaps * 1e9
+        self._start_ns = recording.start_ns + round((options.start) * 1e9)
+        self._end_ns = recording.end_ns + round(_LAG_S * self._speed * 1e9)
         self.published = 0
-        self._gaps: list[Gap] = []
-        self._begin()
+        self.begin()
 
-    def _begin(self) -> None:
-        self.position_ns = self._recording.start_ns + round(self._playing.start_s * 1e9)
-        self._start_ns = self.position_ns
-        self._waiting: deque[tuple[float, Recorded]] = deque()
-        self._waiting_bytes = 0
-        self._before: Iterator[Recorded] | None = self._earlier()
-        topics = self._playing.kept.keys() | ({CLOCK_TOPIC} if self._recording.has_clock else set())
-        self._rest = self._recording.messages(topics, from_ns=self._start_ns)
-        self._next: Recorded | None = None
-        self._last_ns = self._start_ns
-        self._gap: Gap | None = None
-        self._time_ns: int | None = None
-        self._last_s: float | None = None
-        if self._recording.has_clock:
-            self._hear_clock(self._recording.last_before(CLOCK_TOPIC, self._start_ns))
+    def begin(self) -> None:
+        """Begin, or begin again."""
+        recording, inputs = self._recording, self._recording.inputs
+        self._position_ns = self._start_ns
+        self._time_ns: int | None = None if recording.has_clock else self._start_ns
+        if recording.has_clock:
+            newest = recording.messages([CLOCK_TOPIC], before_ns=self._start_ns, newest_first=True)
+            for message in islice(newest, 1):
+                self._time_ns = clock_ns(message.data)
+        self._before = deque[Recorded]()
+        if self._start_ns > recording.start_ns:
+            maps = [topic for topic, kind in inputs.items() if kind == MAP_TYPE]
+            for topic in maps:
+                last = recording.messages([topic], before_ns=self._start_ns, newest_first=True)
+                self._before.extend(islice(last, 1))
+            rest = inputs.keys() - set(maps)
+            self._earlier: Iterator[Recorded] = recording.messages(rest, before_ns=self._start_ns)
         else:
-            self._time_ns = self.position_ns
-        self._has_ended = False
-        # More is due than may wait.
-        self._is_full = False
-
-    @property
-    def position_s(self) -> float:
-        """How far it is, s from the recording's first message."""
-        return (self.position_ns - self._recording.start_ns) / 1e9
+            self._earlier = iter(())
+        topics = [*inputs, *([CLOCK_TOPIC] if recording.has_clock else [])]
+        self._rest = recording.messages(topics, from_ns=self._start_ns)
+        self._next = next(self._rest, None)
+        self._told_ns = -1
+        self._last_s: float | None = None
 
     @property
     def is_over(self) -> bool:
-        """Whether all of it was played."""
-        return self._has_ended and not self._waiting
-
-    def take_gaps(self) -> list[Gap]:
-        """Those that it has come to since, and that a person is told of."""
-        gaps, self._gaps = self._gaps, []
-        return gaps
-
-    def toggle(self) -> None:
-        """Pause, or go on."""
-        self.is_paused = not self.is_paused
+        """Whether all of it was published."""
+        return self._next is None and self._position_ns >= self._end_ns
 
     def beat(self, now_s: float) -> None:
-        """Tell the time, and publish what is due at `now_s`.
+        """Publish the time and what is due.
 
         Raises:
-            RecordingError: the file is broken here.
+            RecordingError: the recording is damaged here.
 
         """
-        if self.is_over and self._playing.loops:
-            self._outlet.begin_again()
-            self._begin()
+        left = _MAX_A_BEAT
+        while left and (earlier := self._take_earlier()) is not None:
+            self._publish(earlier)
+            left -= 1
+        if not left:
+            self._publish_time()
             return
-        self._advance(now_s)
-        self._read(now_s)
-        if self._time_ns is not None:
-            self._outlet.tell_time(self._time_ns)
-        rank = 0
-        for _ in range(MAX_A_BEAT):
-            if not self._waiting or self._waiting[0][0] > now_s:
-                return
-            message = self._waiting[0][1]
-            before, rank = rank, self._ranks[message.topic]
-            if rank < before:
-                # Whoever hears both could take them in the other order.
-                return
-            self._waiting.popleft()
-            self._waiting_bytes -= len(message.data)
-            self._outlet.publish(message.topic, message.data)
-            self.published += 1
-
-    # --- parts ------------------------------------------------------------------------------------
-
-    def _advance(self, now_s: float) -> None:
-        step_s = 0.0 if self._last_s is None else min(now_s - self._last_s, MAX_STEP_S)
+        step_s = 0.0 if self._last_s is None else min(now_s - self._last_s, _MAX_STEP_S)
         self._last_s = now_s
-        if not (self.is_paused or self._is_full or self._before is not None):
-            moved_ns = self.position_ns + round(step_s * self._playing.speed * 1e9)
-            self.position_ns = min(moved_ns, self._recording.end_ns)
-            if not self._recording.has_clock:
-                self._time_ns = self.position_ns
-
-    def _read(self, now_s: float) -> None:
-        """Take from the file what the clock has come to."""
-        due_s = now_s + LAG_S
-        if self._before is not None:
-            while self._has_room:
-                earlier = next(self._before, None)
-                if earlier is None:
-                    break
-                self._wait(due_s, earlier)
+        self._move(round(step_s * self._speed * 1e9))
+        lag_ns = round(_LAG_S * self._speed * 1e9)
+        while (message := self._next) is not None:
+            is_clock = message.topic == CLOCK_TOPIC
+            if message.log_ns > self._position_ns - (0 if is_clock else lag_ns):
+                break
+            if is_clock:
+                self._time_ns = clock_ns(message.data) or self._time_ns
+            elif left:
+                left -= 1
+                self._publish(message)
             else:
-                return
-            if not self._waiting:
-                # Published, all of it: from here on the time goes on.
-                self._before = None
-            return
-        self._is_full = False
-        while not self.is_paused:
-            if not self._has_room:
-                self._is_full = True
-                return
-            message = self._next or next(self._rest, None)
-            self._next = message
-            self._look_ahead(message)
-            if message is None:
-                self._has_ended = self.position_ns >= self._recording.end_ns
-                return
-            if message.log_ns > self.position_ns < self._recording.end_ns:
-                return
-            self._next = None
-            self._last_ns = message.log_ns
-            if message.topic == CLOCK_TOPIC and self._recording.has_clock:
-                self._hear_clock(message)
-            else:
-                self._wait(due_s, message)
+                # The time waits for what is due: the twin must be able to take it.
+                self._position_ns = message.log_ns + lag_ns
+                break
+            self._next = next(self._rest, None)
+        self._publish_time()
 
-    def _look_ahead(self, message: Recorded | None) -> None:
-        """See whether it is far to what comes next, and go there if that is asked for."""
-        end_ns = self._recording.end_ns
-        comes_ns = end_ns if message is None else min(message.log_ns, end_ns)
-        if comes_ns <= self.position_ns:
-            return
-        gap = self._gap
-        if gap is None or gap.start_ns != self._last_ns:
-            gap = Gap(self._last_ns, comes_ns)
-            gap = self._gap = replace(gap, is_skipped=gap.seconds > self._playing.skip_s)
-            if gap.is_skipped or gap.seconds > TOLD_S * self._playing.speed:
-                self._gaps.append(gap)
-        # What waits comes first: at the time at which it was recorded.
-        if gap.is_skipped and not self._waiting:
-            self.position_ns = comes_ns
-            if not self._recording.has_clock:
-                self._time_ns = comes_ns
+    def _move(self, step_ns: int) -> None:
+        self._position_ns = min(self._position_ns + step_ns, self._end_ns)
+        if self._next is not None:
+            silence_ns = self._next.log_ns - self._position_ns
+            if silence_ns > self._skip_ns:
+                self._position_ns = self._next.log_ns
+            elif silence_ns > _TOLD_S * self._speed * 1e9 and self._told_ns != self._next.log_ns:
+                self._told_ns = self._next.log_ns
+                say(
+                    f"the recording is silent for {silence_ns / 1e9:,.0f} s: "
+                    "--skip-gaps SECONDS jumps over that"
+                )
+        if not self._recording.has_clock:
+            self._time_ns = min(self._position_ns, self._recording.end_ns)
 
-    @property
-    def _has_room(self) -> bool:
-        return len(self._waiting) < MAX_AHEAD and self._waiting_bytes < MAX_AHEAD_BYTES
+    def _take_earlier(self) -> Recorded | None:
+        return self._before.popleft() if self._before else next(self._earlier, None)
 
-    def _wait(self, due_s: float, message: Recorded) -> None:
-        self._waiting.append((due_s, message))
-        self._waiting_bytes += len(message.data)
+    def _publish(self, message: Recorded) -> None:
+        self._node.publish(message)
+        self.published += 1
 
-    def _hear_clock(self, message: Recorded | None) -> None:
-        told_ns = None if message is None else clock_ns(message.data)
-        if told_ns is not None:
-            self._time_ns = told_ns
-
-    def _earlier(self) -> Iterator[Recorded]:
-        if not self._playing.start_s:
-            return
-        lasting = {topic for topic, depth in self._playing.kept.items() if depth > 1}
-        if lasting:
-            yield from self._recording.messages(lasting, before_ns=self._start_ns)
-        for topic in self._playing.kept.keys() - lasting:
-            last = self._recording.last_before(topic, self._start_ns)
-            if last is not None:
-                yield last
+    def _publish_time(self) -> None:
+        if self._time_ns is not None:
+            self._node.publish_time(self._time_ns)
 
 
-def due_in_s(started_s: float, now_s: float) -> float:
-    """How long until the next beat of those that began at `started_s`, s."""
-    beat_s = 1.0 / BEAT_HZ
-    return beat_s - (now_s - started_s) % beat_s
+def _play(
+    recording: Recording,
+    node: PlayerNode,
+    options: argparse.Namespace,
+    stopped: Callable[[], bool],
+) -> None:
+    until_s = time.monotonic() + _TWIN_S
+    while not node.has_subscribers and not stopped():
+        if time.monotonic() > until_s:
+            raise Refused(f"no twin has subscribed within {_TWIN_S:g} s")
+        time.sleep(_BEAT_S)
+    say(f"playing {recording.name}")
+    player = Player(recording, node, options)
+    is_told = False
+    looked_s = -math.inf
+    while not stopped():
+        now_s = time.monotonic()
+        if now_s - looked_s > _LOOK_S:
+            looked_s = now_s
+            node.check_alone()
+        player.beat(now_s)
+        if player.is_over and options.loop:
+            node.deliver()
+            node.advertise()
+            player.begin()
+        elif player.is_over and not is_told:
+            is_told = True
+            say(f"the end: {player.published:,} messages were published")
+        time.sleep(_BEAT_S)
+
+
+def _stop_asked() -> Callable[[], bool]:
+    """Whether a stop signal has come; from then on the process has to end.
+
+    Handlers only note it: a demo holds both signals back, and its child inherits that.
+    """
+    asked: list[int] = []
+
+    def note(number: int, _frame: object) -> None:
+        if not asked:
+            stop_signals.must_end()
+        asked.append(number)
+
+    for number in stop_signals.STOP_SIGNALS:
+        signal.signal(number, note)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, stop_signals.STOP_SIGNALS)
+    return lambda: bool(asked)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,256 +1,197 @@
-"""One file as it is read: what is in it, and its messages as a stream, as they were recorded.
+"""Recordings as `ros2 bag record -s mcap` leaves them: files and folders, read as one. No ROS.
 
-Of a file of any size there is one chunk in memory at a time. Knows no ROS.
+The `mcap` library reads them, a chunk at a time; what it cannot read, the `mcap` tool can repair.
 """
 
 from __future__ import annotations
 
-import errno
-import io
-import shlex
-import stat
+import heapq
 import struct
-from collections import deque
-from collections.abc import Iterable, Iterator
-from collections.abc import Set as AbstractSet
-from contextlib import ExitStack, contextmanager
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
-from itertools import islice
+from operator import attrgetter
 from pathlib import Path
 from typing import IO, Final, Self
 
-from mcap.records import (
-    Channel,
-    Chunk,
-    ChunkIndex,
-    Footer,
-    McapRecord,
-    Message,
-    Schema,
-    Statistics,
-)
-from mcap.stream_reader import StreamReader
-from mcap.writer import MCAP0_MAGIC
+from mcap.exceptions import McapError
+from mcap.reader import SeekingReader
+from mcap.records import Statistics
 
-from lupin_bridge.bags.chunks import DAMAGE, MAX_CHUNK, Found, TooLarge, messages_in, unpacked
-from lupin_bridge.bags.in_order import Asked, in_order
-from lupin_bridge.bags.topics import MESSAGE_ENCODING, QOS_KEY
+from lupin_bridge.bags.topics import MESSAGE_ENCODING, SUFFIX
 
-CLOCK_TYPE: Final = "rosgraph_msgs/msg/Clock"
 CLOCK_TOPIC: Final = "/clock"
-# CDR: the second byte of the header says the order of bytes; then come sec and nanosec.
+CLOCK_TYPE: Final = "rosgraph_msgs/msg/Clock"
+OBSERVATION_TYPE: Final = "lupin_msgs/msg/Observation"
+TAGS_TYPE: Final = "lupin_msgs/msg/DiscoveredTags"
+MAP_TYPE: Final = "nav_msgs/msg/OccupancyGrid"
+# What a twin subscribes to, and which of its parameters names the topic.
+INPUTS: Final = {
+    OBSERVATION_TYPE: "observations_topic",
+    TAGS_TYPE: "discovered_tags_topic",
+    MAP_TYPE: "map_topic",
+}
+# CDR: the second byte of the header gives the byte order; then come sec and nanosec.
 _CLOCK: Final = {0: struct.Struct(">iI"), 1: struct.Struct("<iI")}
 _HEADER_BYTES: Final = 4
-# A footer with its length, and the last eight bytes of a file.
-_END_BYTES: Final = 1 + 8 + 20 + len(MCAP0_MAGIC)
+# What reading a damaged file ends in, whichever of the library's layers meets it.
+_DAMAGE: Final = (McapError, ValueError, LookupError, struct.error, RuntimeError, EOFError)
 
 
 class RecordingError(Exception):
-    """A file that cannot be played; the message names it and says what to do."""
-
-
-class Empty(RecordingError):
-    """A file without a message."""
-
-
-@dataclass(frozen=True, slots=True)
-class Topic:
-    """One topic of a recording: its name, its messages' type, and what was told of its QoS."""
-
-    name: str
-    type_name: str
-    encoding: str
-    count: int
-    offered_qos: str
+    """A recording that cannot be played; the message names the file and what to do."""
 
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """One message, serialised, and when it was recorded, and published before that, ns."""
+    """One serialised message, and when it was recorded, ns."""
 
     topic: str
     log_ns: int
-    publish_ns: int
     data: bytes
 
 
 class Recording:
-    """A file that is open for reading; a context manager.
+    """Files, and the `.mcap` files of folders, as one recording; a context manager.
 
-    `start_ns` and `end_ns` are when its first and its last message were recorded.
+    `topics` gives each topic's type; `start_ns` and `end_ns` are when the first and the last
+    message were recorded.
 
     Raises:
-        RecordingError: there is no such file, or it is none, or a broken one.
+        RecordingError: one of them cannot be read, or none has messages.
 
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self._file: IO[bytes] = _opened(path)
-        with ExitStack() as otherwise, self._named():
-            otherwise.callback(self._file.close)
-            if not self._has_end():
-                raise self._unfinished()
-            statistics = self._overview()
-            otherwise.pop_all()
-        self.start_ns = int(statistics.message_start_time)
-        self.end_ns = int(statistics.message_end_time)
+    def __init__(self, named: Sequence[Path]) -> None:
+        self.name = str(named[0]) if len(named) == 1 else f"{named[0]} and {len(named) - 1} more"
+        self.topics: dict[str, str] = {}
+        self._readers: list[tuple[Path, SeekingReader]] = []
+        spans: list[tuple[int, int]] = []
+        with ExitStack() as files:
+            for path in _files(named):
+                file = files.enter_context(_opened(path))
+                reader, statistics = self._learn(path, file)
+                if statistics.message_count:
+                    self._readers.append((path, reader))
+                    spans.append((statistics.message_start_time, statistics.message_end_time))
+            if not spans:
+                raise RecordingError(f"{self.name} has no messages")
+            self._files = files.pop_all()
+        self.start_ns = min(start for start, _ in spans)
+        self.end_ns = max(end for _, end in spans)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Read it no more."""
-        self._file.close()
+        self._files.close()
 
     @property
     def has_clock(self) -> bool:
-        """Whether simulated time was recorded: then ROS time is that, and not when it was heard."""
-        return any(
-            (it.name, it.type_name, it.encoding) == (CLOCK_TOPIC, CLOCK_TYPE, MESSAGE_ENCODING)
-            and it.count > 0
-            for it in self.topics
-        )
+        """Whether simulated time was recorded: then ROS time is that."""
+        return self.topics.get(CLOCK_TOPIC) == CLOCK_TYPE
 
-    def messages(
-        self, topics: AbstractSet[str], *, from_ns: int | None = None, before_ns: int | None = None
-    ) -> Iterator[Recorded]:
-        """The messages of these topics, `from_ns` <= their time < `before_ns`, in its order.
+    @property
+    def inputs(self) -> dict[str, str]:
+        """The topics that a twin subscribes to, and their types.
 
-        Of a file without chunks, in the order in which they were written.
+        Of several grids, costmaps most likely, those alone that are called `map`, if there is one.
 
         Raises:
-            RecordingError: from there on the file is broken, or takes too much memory.
+            RecordingError: there are none.
 
         """
-        return self._read(topics, from_ns=from_ns, before_ns=before_ns)
+        found = {name: kind for name, kind in self.topics.items() if kind in INPUTS}
+        grids = {name for name, kind in found.items() if kind == MAP_TYPE}
+        maps = {name for name in grids if name.rpartition("/")[2] == "map"}
+        chosen = {k: v for k, v in found.items() if not maps or k not in grids or k in maps}
+        if all(kind == MAP_TYPE for kind in chosen.values()):
+            there = ", ".join(f"{name} ({kind})" for name, kind in list(self.topics.items())[:20])
+            raise RecordingError(
+                f"{self.name} has nothing that a twin subscribes to: expected a topic of "
+                f"{OBSERVATION_TYPE} or {TAGS_TYPE}, it has {there or 'no topics'}"
+            )
+        return chosen
 
-    def last_before(self, topic: str, before_ns: int) -> Recorded | None:
-        """The last message of a topic that was recorded before then."""
-        return next(self.newest_first(topic, 1, before_ns=before_ns), None)
+    def check_start(self, start_s: float) -> None:
+        """Refuse a start behind the end.
 
-    def newest_first(
-        self, topic: str, most: int, *, before_ns: int | None = None
-    ) -> Iterator[Recorded]:
-        """The last so many messages of a topic, of those that were recorded before then."""
-        if self._indexes:
-            yield from islice(self._read({topic}, before_ns=before_ns, newest_first=True), most)
-        else:
-            yield from reversed(deque(self._read({topic}, before_ns=before_ns), maxlen=most))
+        Raises:
+            RecordingError: see above.
 
-    def _overview(self) -> Statistics:
-        self._file.seek(-_END_BYTES, io.SEEK_END)
-        footer = next(self._records(), None)
-        if not isinstance(footer, Footer) or not footer.summary_start:
-            raise self._broken("it has no index")
-        self._file.seek(footer.summary_start)
-        types: dict[int, str] = {}
-        self._channels: dict[int, Channel] = {}
-        self._indexes: list[ChunkIndex] = []
-        statistics: Statistics | None = None
-        for record in self._records():
-            if isinstance(record, Schema):
-                types[record.id] = record.name
-            elif isinstance(record, Channel):
-                self._channels[record.id] = record
-            elif isinstance(record, ChunkIndex):
-                self._indexes.append(record)
-            elif isinstance(record, Statistics):
-                statistics = record
-        if statistics is None:
-            raise self._broken("its index does not count the messages")
-        if not statistics.message_count:
-            raise Empty(f"{self.path} has no messages")
-        if statistics.message_end_time < statistics.message_start_time:
-            raise self._broken("by its index it ends before it begins")
-        self.topics = _topics(self._channels, types, statistics)
-        return statistics
+        """
+        duration_s = (self.end_ns - self.start_ns) / 1e9
+        if start_s > duration_s:
+            raise RecordingError(
+                f"--start is {start_s:g} s, and {self.name} has {duration_s:.1f} s"
+            )
 
-    def _has_end(self) -> bool:
-        begin = len(MCAP0_MAGIC)
-        return self._file.seek(-begin, io.SEEK_END) >= begin and self._file.read() == MCAP0_MAGIC
-
-    def _records(self, *, from_begin: bool = False) -> Iterator[McapRecord]:
-        """The records from where the file is read; chunks as they are."""
-        return StreamReader(
-            self._file,
-            skip_magic=not from_begin,
-            emit_chunks=True,
-            validate_crcs=from_begin,
-            record_size_limit=MAX_CHUNK,
-        ).records
-
-    def _read(
+    def messages(
         self,
-        topics: AbstractSet[str],
+        topics: Collection[str],
         *,
         from_ns: int | None = None,
         before_ns: int | None = None,
         newest_first: bool = False,
     ) -> Iterator[Recorded]:
-        wanted = {number for number, it in self._channels.items() if it.topic in topics}
-        asked = Asked(wanted, from_ns, before_ns)
-        with self._named():
-            if self._indexes:
-                found = in_order(self._file, self._indexes, asked, newest_first=newest_first)
-            else:
-                found = self._as_written(asked)
-            for channel, log_ns, publish_ns, data in found:
-                yield Recorded(self._channels[channel].topic, log_ns, publish_ns, data)
+        """The messages of these topics, `from_ns` <= their time < `before_ns`, in its order.
 
-    def _as_written(self, asked: Asked) -> Iterator[Found]:
-        # To put it in the order of time would need all of it at once.
-        self._file.seek(0)
-        for record in self._records(from_begin=True):
-            if isinstance(record, Message):
-                found: Iterable[Found] = [
-                    Found(record.channel_id, record.log_time, record.publish_time, record.data)
-                ]
-            elif isinstance(record, Chunk):
-                found = messages_in(unpacked(record))
-            else:
-                continue
-            # Whoever takes them may read elsewhere in the file meanwhile.
-            place = self._file.tell()
-            yield from filter(asked.holds, found)
-            self._file.seek(place)
+        Raises:
+            RecordingError: a file is damaged from there on.
 
-    @contextmanager
-    def _named(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            # What it says of places before the file's begin.
-            if error.errno == errno.EINVAL:
-                raise self._broken("it is cut off") from error
-            raise RecordingError(f"cannot read {self.path}: {error.strerror}") from error
-        except TooLarge as error:
-            # Nothing is broken, and `recover` would be of no help.
-            raise RecordingError(
-                f"cannot read {self.path}: {error}; written anew in smaller chunks it can be read, "
-                "for example by mcap compress --chunk-size 4194304"
-            ) from error
-        except DAMAGE as error:
-            raise self._broken(str(error) or type(error).__name__) from error
-
-    def _unfinished(self) -> RecordingError:
-        return self._mendable("was not finished (its recorder was killed, or is still at work)")
-
-    def _broken(self, why: str) -> RecordingError:
-        return self._mendable(f"is broken ({why})")
-
-    def _mendable(self, what: str) -> RecordingError:
-        return RecordingError(
-            f"{self.path} {what}: what is whole of it is written anew by "
-            f"lupin-twin mcap recover {shlex.quote(str(self.path))}"
+        """
+        parts = (
+            self._messages_of(path, reader, topics, (from_ns, before_ns), newest_first)
+            for path, reader in self._readers
         )
+        return heapq.merge(*parts, key=attrgetter("log_ns"), reverse=newest_first)
+
+    def _messages_of(
+        self,
+        path: Path,
+        reader: SeekingReader,
+        topics: Collection[str],
+        period: tuple[int | None, int | None],
+        newest_first: bool,
+    ) -> Iterator[Recorded]:
+        try:
+            for _, channel, message in reader.iter_messages(
+                list(topics),
+                starting_at=period[0],
+                ending_before=period[1],
+                reverse=newest_first,
+            ):
+                yield Recorded(channel.topic, message.log_time, message.data)
+        except _DAMAGE as error:
+            raise _broken(path, str(error) or type(error).__name__) from error
+
+    def _learn(self, path: Path, file: IO[bytes]) -> tuple[SeekingReader, Statistics]:
+        try:
+            reader = SeekingReader(file, validate_crcs=True)
+            summary = reader.get_summary()
+        except (OSError, *_DAMAGE) as error:  # OSError: the footer lies before the file's begin
+            why = "it was not finished, or is cut off"
+            raise _broken(path, f"{why}: {str(error) or type(error).__name__}") from error
+        if summary is None or summary.statistics is None:
+            raise _broken(path, "it has no index")
+        for channel in summary.channels.values():
+            schema = summary.schemas.get(channel.schema_id)
+            kind = "" if schema is None else schema.name
+            if kind in INPUTS and channel.message_encoding != MESSAGE_ENCODING:
+                raise RecordingError(
+                    f"{path}: {channel.topic} is encoded as {channel.message_encoding!r}, must be "
+                    f"{MESSAGE_ENCODING!r}, which is what ROS 2 publishes"
+                )
+            if self.topics.setdefault(channel.topic, kind) != kind:
+                raise RecordingError(
+                    f"{path} has {channel.topic} as {kind}, a file before it as "
+                    f"{self.topics[channel.topic]}: they are not of one recording"
+                )
+        return reader, summary.statistics
 
 
 def clock_ns(data: bytes) -> int | None:
-    """The time that a serialised rosgraph_msgs/Clock tells, ns; None: it is none."""
+    """The time of a serialised rosgraph_msgs/Clock, ns; None: it is none."""
     order = _CLOCK.get(data[1]) if len(data) > 1 else None
     if order is None or len(data) < _HEADER_BYTES + order.size:
         return None
@@ -258,33 +199,30 @@ def clock_ns(data: bytes) -> int | None:
     return int(seconds) * 1_000_000_000 + int(nanoseconds)
 
 
+def _files(named: Sequence[Path]) -> list[Path]:
+    files: list[Path] = []
+    for path in named:
+        try:
+            inside = sorted(path.glob(f"*{SUFFIX}")) if path.is_dir() else [path]
+        except OSError as error:
+            raise RecordingError(f"cannot read {path}: {error.strerror}") from error
+        if not inside:
+            raise RecordingError(f"{path} is a folder in which no file ends in {SUFFIX}")
+        files += inside
+    return files
+
+
 def _opened(path: Path) -> IO[bytes]:
     try:
-        if not stat.S_ISREG(path.stat().st_mode):  # a pipe would be waited for
+        if not path.is_file() and path.exists():  # a pipe would be waited for
             raise RecordingError(f"{path} is no file")
-        file = path.open("rb")
-        begin = file.read(len(MCAP0_MAGIC))
+        return path.open("rb")
     except OSError as error:
         raise RecordingError(f"cannot read {path}: {error.strerror}") from error
-    if begin != MCAP0_MAGIC:
-        file.close()
-        raise RecordingError(f"{path} is no MCAP file")
-    return file
 
 
-def _topics(
-    channels: dict[int, Channel], types: dict[int, str], statistics: Statistics
-) -> tuple[Topic, ...]:
-    """A topic for each name: a recorder may have had several channels for one."""
-    found: dict[str, Topic] = {}
-    for number, channel in channels.items():
-        before = found.get(channel.topic)
-        qos = channel.metadata.get(QOS_KEY, "")
-        found[channel.topic] = Topic(
-            channel.topic,
-            types.get(channel.schema_id, ""),
-            channel.message_encoding,
-            statistics.channel_message_counts.get(number, 0) + (before.count if before else 0),
-            f"{before.offered_qos}\n{qos}" if before else qos,
-        )
-    return tuple(found.values())
+def _broken(path: Path, why: str) -> RecordingError:
+    return RecordingError(
+        f"cannot read {path}: {why}. If it is a recording, the mcap tool repairs it: "
+        f"mcap recover {path} -o repaired{SUFFIX}"
+    )

@@ -10,12 +10,11 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 import orjson
-from PIL import Image
-from PIL.PngImagePlugin import PngInfo
 
 from lupin_bridge.field.colour import rgb
 from lupin_bridge.judge.ranges import Sensor, Sensors
 from lupin_twin.estimate import EstimateGrid
+from lupin_twin.far_off import far_off_tags
 from lupin_twin.field_quality import leave_one_out, painted_share
 from lupin_twin.fields import FieldRules
 from lupin_twin.grid import FieldGrid
@@ -63,6 +62,11 @@ def metadata(grid: FieldGrid, sensor: Sensor) -> dict[str, str]:
         "Value-Max": str(np.float32(grid.value_max)),
         "Sample-Count": str(grid.sample_count),
     }
+
+
+def far_off(tags: Sequence[str]) -> dict[str, str]:
+    """How many tags a default box leaves out; in headers alone, for no picture is made of it."""
+    return {"Far-Off-Count": str(len(tags))}
 
 
 def write(
@@ -136,6 +140,7 @@ def write_quality(
             "rmse": quality.rmse,
             "worst": quality.worst,
             "painted_share": painted_share(grid),
+            "far_off_tags": far_off_tags(tags),
         }
     )
 
@@ -172,6 +177,10 @@ def write_png(grid: FieldGrid, sensor_type: str, sensors: Sensors, scale: int = 
     One hue, alpha rising from 0 at `value_min` to `max_alpha` at `value_max`: a palette and its
     transparency lose nothing of that, and take a fifth of RGBA's time (PNG, third edition, 11.3.2).
     """
+    # What only looks back, in a process of its own, makes no pictures, and need not hold Pillow.
+    from PIL import Image  # noqa: PLC0415
+    from PIL.PngImagePlugin import PngInfo  # noqa: PLC0415
+
     indices = np.flipud(_palette_indices(grid))
     if scale > 1:
         indices = indices.repeat(scale, axis=0).repeat(scale, axis=1)

@@ -16,9 +16,13 @@ from urllib.parse import quote
 
 from lupin_bridge.field.formats import FORMATS, JSON, PNG, FieldFormat
 from lupin_bridge.query_string import values_of
-from lupin_twin.fields import FieldRefused, FieldRequest
+from lupin_twin.fields import (
+    DEFAULT_RESOLUTION_M,
+    FieldRefused,
+    FieldRequest,
+    default_request,
+)
 
-DEFAULT_RESOLUTION_M: Final = 0.1
 BOX_NAMES: Final = ("bbox_min_x", "bbox_min_y", "bbox_max_x", "bbox_max_y")
 NAMES: Final = ("sensor_type", "resolution", *BOX_NAMES, "scale", "at")
 # An estimate is two numbers a cell, a picture shows one of them.
@@ -31,22 +35,25 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class FieldQuery:
-    """What a query string asks for; `box` is None where it is left to the server.
+    """What a query string asks for; `resolution` and `box` are None where left to the server.
 
     `at` is a moment as it was sent, None for now; `layer`, of an estimate's picture, one of
     `LAYERS`.
     """
 
     sensor_type: str
-    resolution: float
+    resolution: float | None
     box: Box | None
     scale: int
     at: str | None = None
     layer: str = LAYERS[0]
 
-    def request(self, default_box: Box) -> FieldRequest:
-        """The query as GetField's request."""
-        return FieldRequest(self.sensor_type, self.resolution, *(self.box or default_box))
+    def request(self, default_box: Box, max_cells: int) -> FieldRequest:
+        """The query as GetField's request; one that asks for neither has `max_cells` at most."""
+        if self.box is None and self.resolution is None:
+            return default_request(self.sensor_type, default_box, max_cells)
+        resolution = DEFAULT_RESOLUTION_M if self.resolution is None else self.resolution
+        return FieldRequest(self.sensor_type, resolution, *(self.box or default_box))
 
 
 def parse(parameters: Sequence[tuple[str, str]], names: Sequence[str] = NAMES) -> FieldQuery:
@@ -67,7 +74,9 @@ def parse(parameters: Sequence[tuple[str, str]], names: Sequence[str] = NAMES) -
         box = (min_x, min_y, max_x, max_y)
     return FieldQuery(
         sensor_type=values.get("sensor_type", ""),
-        resolution=_number("resolution", values.get("resolution", str(DEFAULT_RESOLUTION_M))),
+        resolution=(
+            _number("resolution", values["resolution"]) if "resolution" in values else None
+        ),
         box=box,
         scale=_scale(values.get("scale", "1")),
         at=values.get("at"),

@@ -2,13 +2,15 @@
 
 Nothing is retained but the bridge's own `online`, which the broker itself turns into `offline`: a
 retained reading or verdict would outlive what it says. Who comes later is told at Home Assistant's
-birth message, or with the next change.
+birth message, or with the next change. Nothing else is listened to: anybody may write to a topic,
+so what is heard is small, and what follows from it is no more than so often.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import random
 import secrets
 import time
@@ -16,7 +18,9 @@ from collections.abc import Callable
 from itertools import islice
 from typing import Final
 
-from aiomqtt import Client, MqttError, Will
+from aiomqtt import Client, MqttError, ProtocolVersion, Will
+from paho.mqtt.packettypes import PacketTypes
+from paho.mqtt.properties import Properties
 
 from lupin_bridge.outward.choosing import MqttTarget
 from lupin_bridge.outward.condition import Backoff, Condition
@@ -36,6 +40,12 @@ LOOK_S: Final = 1.0
 # for the first time (18 messages each), take some minutes and not the loop.
 WINDOW: Final = 32
 MAX_PER_S: Final = 1_000.0
+# `online` is said so often: the will of the process before, or another one's good-bye, comes late.
+STATUS_S: Final = 10.0
+# However often somebody says that he was born, all is told again so often at most.
+REPEAT_S: Final = 5.0
+# Of what a broker sends: a birth message has some forty bytes, an acknowledgement fewer.
+MAX_PACKET_BYTES: Final = 8_192
 # For the good-bye: Ctrl-C ends within 2 s, broker or not.
 GOODBYE_S: Final = 0.5
 ONLINE, OFFLINE = b"online", b"offline"
@@ -123,35 +133,40 @@ class Mqtt:
 
     async def _serve(self, client: Client) -> None:
         topics = self._topics
-        heard = [topics.status, *([topics.birth] if topics.discovery else [])]
-        await client.subscribe([(topic, AT_LEAST_ONCE) for topic in heard])
-        await client.publish(topics.status, ONLINE, qos=AT_LEAST_ONCE, retain=True)
+        if topics.discovery:
+            await client.subscribe(topics.birth, AT_LEAST_ONCE)
+        await self._say_online(client)
         if not self.condition.is_connected:
             log.info("MQTT: connected to %s", self._target.called)
         self.condition.taken()
         self._has_to_repeat = True
         try:
-            async with asyncio.TaskGroup() as both:
-                both.create_task(self._hear(client))
-                both.create_task(self._tell(client))
+            async with asyncio.TaskGroup() as together:
+                together.create_task(self._hear(client))
+                together.create_task(self._stay_online(client))
+                together.create_task(self._tell(client))
         except* MqttError as group:
             raise MqttError(str(group.exceptions[0])) from None
 
     async def _hear(self, client: Client) -> None:
         async for message in client.messages:
-            topic, said = message.topic.value, message.payload
-            if topic == self._topics.birth and said == ONLINE:
+            if message.payload == ONLINE:
                 self._has_to_repeat = True
-            elif topic == self._topics.status and said != ONLINE:
-                # The will of a bridge that was there before, or another one's good-bye.
-                await client.publish(topic, ONLINE, qos=AT_LEAST_ONCE, retain=True)
+
+    async def _stay_online(self, client: Client) -> None:
+        while True:
+            await asyncio.sleep(STATUS_S)
+            await self._say_online(client)
+
+    async def _say_online(self, client: Client) -> None:
+        await client.publish(self._topics.status, ONLINE, qos=AT_LEAST_ONCE, retain=True)
 
     async def _tell(self, client: Client) -> None:
+        repeated_s = -math.inf
         while True:
-            # However often somebody says that he was born: once a look.
-            if self._has_to_repeat:
+            if self._has_to_repeat and time.monotonic() - repeated_s >= REPEAT_S:
+                self._has_to_repeat, repeated_s = False, time.monotonic()
                 self._mirror.forget()
-            self._has_to_repeat = False
             self._see()
             messages = self._mirror.messages()
             while batch := list(islice(messages, WINDOW)):
@@ -177,10 +192,15 @@ class Mqtt:
 
     def _client(self) -> Client:
         target = self._target
+        # What is larger, whoever wrote it, the broker keeps to itself (MQTT 5, 3.1.2.11.4).
+        asked = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
+        asked.MaximumPacketSize = MAX_PACKET_BYTES
         client = Client(
             target.host,
             target.port,
             identifier=self._identifier,
+            protocol=ProtocolVersion.V5,
+            properties=asked,
             username=target.user,
             password=target.password,
             tls_context=target.tls,
@@ -190,6 +210,7 @@ class Mqtt:
             max_queued_incoming_messages=WINDOW,
         )
         client.pending_calls_threshold = 2 * WINDOW
+        _take_no_more_than(client, MAX_PACKET_BYTES)
         return client
 
     def _see(self) -> None:
@@ -209,3 +230,19 @@ class Mqtt:
         # So that what changes meanwhile is seen to wait.
         self._see()
         self._count()
+
+
+def _take_no_more_than(client: Client, most: int) -> None:
+    """End the connection at a larger packet before it is read: not every broker heeds the limit.
+
+    paho has no limit, and asks the socket for all that is left of a packet.
+    """
+    paho = client._client  # noqa: SLF001
+    receive = paho._sock_recv  # noqa: SLF001
+
+    def receive_little(count: int) -> bytes:
+        if count > most:
+            raise OSError(f"the broker sent a packet of {count} bytes, the limit is {most}")
+        return receive(count)
+
+    paho._sock_recv = receive_little  # type: ignore[method-assign, assignment]  # noqa: SLF001

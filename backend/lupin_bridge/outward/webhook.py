@@ -22,6 +22,9 @@ log = logging.getLogger(__name__)
 
 FIRST_WAIT_S: Final = 1.0
 MOST_WAIT_S: Final = 300.0
+# A twin elsewhere says once a second where observations come from, and one of before never does.
+ORIGIN_S: Final = 10.0
+ORIGIN_LOOK_S: Final = 0.1
 # What the receiver will not have, however often it comes: this message, not the receiver, is the
 # trouble. Others wait behind it, so it is given up.
 REFUSALS: Final = frozenset({400, 405, 409, 410, 413, 414, 415, 422, 431})
@@ -35,7 +38,12 @@ class Webhook:
 
     name: Final = "webhook"
 
-    def __init__(self, target: WebhookTarget, first_wait_s: float = FIRST_WAIT_S) -> None:
+    def __init__(
+        self,
+        target: WebhookTarget,
+        first_wait_s: float = FIRST_WAIT_S,
+        origin_s: float = ORIGIN_S,
+    ) -> None:
         self.condition = Condition(is_connected=True)
         self._target = target
         self._deliveries = Deliveries()
@@ -46,6 +54,9 @@ class Webhook:
         self._tasks: list[asyncio.Task[None]] = []
         self._unsubscribe: Callable[[], None] = lambda: None
         self._origin: Callable[[], Origin] = lambda: "unknown"
+        self._origin_s = origin_s
+        # Since when a delivery has waited for the origin alone.
+        self._unknown_since_s: float | None = None
 
     def start(
         self, alarms: AlarmBoard, now_ns: Callable[[], int | None], origin: Callable[[], Origin]
@@ -115,6 +126,8 @@ class Webhook:
         while (delivery := self._deliveries.first) is None:
             self._is_news.clear()
             await self._is_news.wait()
+        if delivery.origin == "unknown" and self._is_origin_to_come():
+            return ORIGIN_LOOK_S
         lost = self._deliveries.lost
         body = delivery.body(lost, self._origin())
         headers = signed(self._target.secret, delivery.id, int(time.time()), body)
@@ -141,6 +154,16 @@ class Webhook:
                 )
                 self._deliveries.over(delivery, taken=False)
         return self._failed(_said(answer), answer.retry_after_s)
+
+    def _is_origin_to_come(self) -> bool:
+        """Whether it is not known yet; nobody says it who has not for so long."""
+        if self._origin() != "unknown":
+            self._unknown_since_s = None
+            return False
+        now_s = time.monotonic()
+        if self._unknown_since_s is None:
+            self._unknown_since_s = now_s
+        return now_s - self._unknown_since_s < self._origin_s
 
     def _failed(self, why: str, at_least_s: float = 0.0) -> float:
         before = self.condition.detail

@@ -24,8 +24,15 @@ from lupin_bridge.judge.verdict import with_derived
 from lupin_bridge.stream.health_json import HealthJson
 from lupin_bridge.stream.state_json import StateJson
 from lupin_twin.explored import OccupancyMap
-from lupin_twin.fields import FieldRequest, FieldRules, check_request, compute_field, cost_s
-from lupin_twin.fields import default_box as box_of
+from lupin_twin.far_off import far_off_tags
+from lupin_twin.fields import (
+    FieldRequest,
+    FieldRules,
+    check_request,
+    compute_field,
+    cost_s,
+    default_box,
+)
 from lupin_twin.state import Snapshot, TagState, samples_of
 from lupin_twin.workers import ShouldStop
 
@@ -69,7 +76,8 @@ class FieldAsked:
     def request(self, tags: Sequence[TagState]) -> FieldRequest:
         """As GetField has it; without a box it is that of the tags as they were pinned then."""
         places = [(tag.pose.x, tag.pose.y) for tag in tags if tag.pose is not None]
-        return self.query.request(box_of(places, self.rules.max_distance_m))
+        box = default_box(places, self.rules.max_distance_m)
+        return self.query.request(box, self.rules.max_grid_cells)
 
     def check(self, field_format: FieldFormat) -> None:
         """Refuse what can be refused before anybody is asked what there was.
@@ -79,7 +87,8 @@ class FieldAsked:
 
         """
         width, height = check_request(
-            self.query.request((0.0, 0.0, 0.0, 0.0)), self.rules.max_grid_cells
+            self.query.request((0.0, 0.0, 0.0, 0.0), self.rules.max_grid_cells),
+            self.rules.max_grid_cells,
         )
         query.check_scale(self.query, field_format, width * height, self.rules.max_grid_cells)
 
@@ -126,19 +135,21 @@ def field(snapshot: Snapshot, asked: FieldAsked, field_format: FieldFormat) -> P
     width, height = check_request(request, max_cells)
     query.check_scale(asked.query, field_format, width * height, max_cells)
     samples = samples_of(with_derived(snapshot.tags, request.sensor_type), request.sensor_type)
+    far_off = far_off_tags(snapshot.tags)
 
     def write(should_stop: ShouldStop) -> Written:
         grid = compute_field(request, samples, asked.occupancy, asked.rules, should_stop)
         name = f"{request.sensor_type}.{field_format.name}"
+        metadata = formats.metadata(grid, asked.sensors.named(request.sensor_type))
         return Written(
             formats.write(grid, field_format, request.sensor_type, asked.sensors, scale),
             field_format.media_type,
-            query.headers(formats.metadata(grid, asked.sensors.named(request.sensor_type)), name),
+            query.headers({**metadata, **formats.far_off(far_off)}, name),
         )
 
     cost = cost_s(request, len(samples), asked.rules) + writing_s(request, asked)
     kind = f"field {field_format.name} {scale}"
-    return Plan(_etag(kind, (request, samples, *_conditions(asked))), cost, write)
+    return Plan(_etag(kind, (request, samples, far_off, *_conditions(asked))), cost, write)
 
 
 def quality(snapshot: Snapshot, asked: FieldAsked) -> Plan:
@@ -162,7 +173,8 @@ def quality(snapshot: Snapshot, asked: FieldAsked) -> Plan:
 
     cost = cost_s(request, len(samples), asked.rules) + len(tags) * JUDGE_TAG_S
     of = [tag.tag_id for tag in tags if samples_of((tag,), request.sensor_type)]
-    return Plan(_etag("quality", (request, samples, of, *_conditions(asked))), cost, write)
+    far_off = far_off_tags(snapshot.tags)
+    return Plan(_etag("quality", (request, samples, of, far_off, *_conditions(asked))), cost, write)
 
 
 def writing_s(request: FieldRequest, asked: FieldAsked) -> float:

@@ -18,16 +18,24 @@ import orjson
 from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import FieldFormat
 from lupin_bridge.judge.choosing import Criteria
+from lupin_bridge.judge.derived import DERIVED
 from lupin_bridge.judge.ranges import Sensors
-from lupin_bridge.past import as_of, history, timeline
+from lupin_bridge.past import as_of, derived, history, timeline
 from lupin_bridge.past.as_of import FieldAsked, Plan, Written
 from lupin_bridge.past.query import TimelineQuery
 from lupin_bridge.past.timeline import Parts
 from lupin_bridge.twin.looking import Found, Need, Work
 from lupin_twin.fields import FieldRefused, cost_s
-from lupin_twin.journal.asof import STATE_S_PER_TAG
-from lupin_twin.journal.series import SERIES_S, SERIES_S_PER_TAG
-from lupin_twin.past import EVERY_TAG, MAX_POINTS, Event, SeriesPast, SeriesRequest
+from lupin_twin.journal.fold import STATE_S_PER_TAG
+from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG
+from lupin_twin.past import (
+    DEFAULT_POINTS,
+    EVERY_TAG,
+    MAX_POINTS,
+    Event,
+    SeriesPast,
+    SeriesRequest,
+)
 from lupin_twin.state import Snapshot
 
 # A larger body goes by itself, and is not copied.
@@ -71,11 +79,11 @@ def _answered(
 class Asked(Protocol):
     """What is asked; of equal ones there is one answer at a time. It can be pickled."""
 
-    def look_s(self, tags: int) -> float:
-        """About what looking it up takes in a house of so many tags, s of one core."""
+    def cost_s(self, tags: int) -> float:
+        """About what all of it takes in a house of so many tags, s of one core.
 
-    def write_s(self, tags: int) -> float:
-        """The same of making the answer."""
+        That is whatever is looked up for it, and making the answer.
+        """
 
     def look(self) -> Generator[Need, Found, Plan]:
         """Yield what it has to know, get that, return the plan of the answer."""
@@ -116,13 +124,9 @@ class AsOf:
     at_ns: int
     of: OfState
 
-    def look_s(self, tags: int) -> float:
+    def cost_s(self, tags: int) -> float:
         """See `Asked`."""
-        return tags * (STATE_S_PER_TAG + _PLAN_TAG_S)
-
-    def write_s(self, tags: int) -> float:
-        """See `Asked`."""
-        return self.of.write_s(tags)
+        return tags * (STATE_S_PER_TAG + _PLAN_TAG_S) + self.of.write_s(tags)
 
     def look(self) -> Generator[Need, Found, Plan]:
         """See `Asked`."""
@@ -189,7 +193,7 @@ class Field:
         """See `OfState`; without a box, as if its tags stood side by side."""
         asked, rules = self.asked, self.asked.rules
         side_m = 2.0 * rules.max_distance_m * math.sqrt(max(tags, 1))
-        request = asked.query.request((0.0, 0.0, side_m, side_m))
+        request = asked.query.request((0.0, 0.0, side_m, side_m), rules.max_grid_cells)
         try:
             return cost_s(request, tags, rules) + as_of.writing_s(request, asked)
         except FieldRefused:
@@ -207,23 +211,23 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """One sensor of one tag, or one event."""
+    """One sensor of one tag, measured or derived, or one event."""
 
     request: SeriesRequest
     now_ns: int | None = field(compare=False)
     sensors: Sensors = field(compare=False)
 
-    def look_s(self, tags: int) -> float:
+    def cost_s(self, tags: int) -> float:
         """See `Asked`."""
-        return SERIES_S + (tags * SERIES_S_PER_TAG if self.request.tag_id == EVERY_TAG else 0.0)
-
-    def write_s(self, tags: int) -> float:  # noqa: ARG002  # it is one series
-        """See `Asked`."""
-        return self.request.max_points * _WRITE_ENTRY_S
+        asked = self.request
+        # Of what is derived, both of its parts are read, and again for buckets.
+        parts_s = 4 * _series_s(asked.tag_id, MAX_POINTS, tags)
+        is_derived = asked.sensor_type in DERIVED
+        return _series_s(asked.tag_id, asked.max_points, tags) + (parts_s if is_derived else 0.0)
 
     def look(self) -> Generator[Need, Found, Plan]:
         """See `Asked`."""
-        past: SeriesPast = yield self.request
+        past = yield from derived.series(self.request)
         return _plan(history.body(self.request, past, self.now_ns, self.sensors))
 
 
@@ -233,13 +237,12 @@ class Timeline:
 
     query: TimelineQuery
 
-    def look_s(self, tags: int) -> float:
-        """See `Asked`."""
-        return SERIES_S + (tags * SERIES_S_PER_TAG if self.query.tag_id is None else 0.0)
-
-    def write_s(self, tags: int) -> float:  # noqa: ARG002  # so many buckets at most
-        """See `Asked`."""
-        return self.query.points * _WRITE_ENTRY_S
+    def cost_s(self, tags: int) -> float:
+        """See `Asked`: as if all that is counted had to be asked for twice."""
+        counted_s = _series_s(self._tag_id, self.query.points, tags)
+        runs_s = _series_s(EVERY_TAG, DEFAULT_POINTS, tags)
+        silences_s = _series_s(self._tag_id, MAX_POINTS, tags)
+        return runs_s + 2 * len(timeline.COUNTED) * counted_s + silences_s
 
     def look(self) -> Generator[Need, Found, Plan]:
         """See `Asked`: the runs, every event over the one period, the silences."""
@@ -265,11 +268,21 @@ class Timeline:
         return counted
 
     def _of(self, event: Event, start_ns: int, end_ns: int, points: int) -> SeriesRequest:
-        return SeriesRequest(self.query.tag_id or EVERY_TAG, event, start_ns, end_ns, points)
+        return SeriesRequest(self._tag_id, event, start_ns, end_ns, points)
+
+    @property
+    def _tag_id(self) -> str:
+        return self.query.tag_id or EVERY_TAG
 
 
 # What writing a reading or a bucket takes, roughly and at worst.
 _WRITE_ENTRY_S: Final = 5e-6
+
+
+def _series_s(tag_id: str, points: int, tags: int) -> float:
+    """About what a series takes, looked up and written, s of one core."""
+    looked_at = tags if tag_id == EVERY_TAG else 0
+    return SERIES_S + looked_at * SERIES_S_PER_TAG + points * _WRITE_ENTRY_S
 
 
 def _plan(body: Mapping[str, Any]) -> Plan:

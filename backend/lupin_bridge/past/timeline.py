@@ -45,8 +45,8 @@ def period(asked: TimelineQuery, runs: SeriesPast) -> Grid:
 def coarsest(period: Grid, counted: Iterable[SeriesPast]) -> Grid:
     """The grid that all of it fits: that of the longest buckets which came.
 
-    What happened too often to be read one by one is told in whole five minutes, however short the
-    buckets of that period could be.
+    What happened too often to be read one by one is told in whole hours, however short the buckets
+    of that period could be.
     """
     came = (Grid(past.start_ns, past.end_ns, past.bucket_ns) for past in counted if past.bucket_ns)
     return max((period, *came), key=lambda told: told.bucket_ns)

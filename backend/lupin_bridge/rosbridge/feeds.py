@@ -1,6 +1,6 @@
 """Topics that come off the wire of ROS, on their way to rosbridge clients.
 
-What a client gets is written once for all who want it in the same form, by a worker: a map of
+What a client gets is written once for all who want it, by a worker: a map of
 millions of cells takes tenths of a second. Of what waits for a client, the topic's depth is kept:
 the newest map, the newest 50 observations; of one that is throttled the newest alone. Nor is it
 more than the topic's bytes: what waits for one client may be older than what waits for the others.
@@ -13,15 +13,13 @@ import logging
 from collections import OrderedDict
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
-from typing import Any, Final
-
-import cbor2
+from typing import Final
 
 from lupin_bridge.rosbridge import protocol
 from lupin_bridge.rosbridge.session import Feed
-from lupin_bridge.rosbridge.values import cbor_of, json_of
+from lupin_bridge.rosbridge.values import json_of
 from lupin_bridge.serving.client_json import shown
-from lupin_bridge.stream.frames import binary_frame, text_frame
+from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.twin.relay import Bounded, NotRelayedError, Relay, Sample
 from lupin_bridge.twin.shared import Shared
 from lupin_bridge.twin.source import TwinUnavailableError
@@ -45,7 +43,7 @@ class Writer:
         self._workers = workers
         self._writing: Shared[bytes] = Shared()
         # The sample is kept as well: its id is the key.
-        self._kept: OrderedDict[tuple[str, str, int], tuple[Sample, bytes]] = OrderedDict()
+        self._kept: OrderedDict[tuple[str, int], tuple[Sample, bytes]] = OrderedDict()
         self._kept_bytes = 0
 
     async def frame(self, feed: Feed, sample: Sample) -> bytes:
@@ -55,13 +53,13 @@ class Writer:
             ValueError: it is none of its type, or too large.
 
         """
-        key = (feed.name, feed.compression, id(sample))
+        key = (feed.name, id(sample))
         kept = self._kept.get(key)
         if kept is not None:
             return kept[1]
         return await self._writing.get(key, lambda: self._write(key, feed, sample))
 
-    async def _write(self, key: tuple[str, str, int], feed: Feed, sample: Sample) -> bytes:
+    async def _write(self, key: tuple[str, int], feed: Feed, sample: Sample) -> bytes:
         frame = await asyncio.wrap_future(
             self._workers.submit(
                 lambda _: _written(self.relay, feed, sample), len(sample.data) * _WRITE_S
@@ -76,21 +74,11 @@ class Writer:
 
 
 def _written(relay: Relay, feed: Feed, sample: Sample) -> bytes:
-    if feed.compression == "cbor-raw":
-        seconds, nanoseconds = divmod(sample.stamp_ns, 10**9)
-        raw = {"secs": seconds, "nsecs": nanoseconds, "bytes": sample.data}
-        return _cbor(feed, raw)
     message = relay.read(feed.topic, sample)
-    if feed.compression == "cbor":
-        return _cbor(feed, cbor_of(message))
     try:
         return text_frame(protocol.publish(feed.name, json_of(message)))
     except TypeError as error:
         raise ValueError(str(error)) from error
-
-
-def _cbor(feed: Feed, message: Any) -> bytes:
-    return binary_frame(cbor2.dumps({"op": "publish", "topic": feed.name, "msg": message}))
 
 
 class Feeding:

@@ -10,9 +10,8 @@ How the options meet our policy, which keeps the newest for a client and queues 
   passed, the newest state follows by itself (rosbridge would wait for the next message).
 - `queue_length` 0 or 1 is what every client gets: the newest, and of observations and discovered
   tags the newest 50. A longer queue is accepted as 1, with a warning.
-- `compression` `cbor` gives messages in CBOR, `cbor-raw` as they came off the wire of ROS; of
-  several subscriptions to a topic the last one's counts. `png`, and `fragment_size`: a warning, and
-  whole messages as plain JSON, which every client reads. Responses are always JSON.
+- `compression` other than `none`, and `fragment_size`: a warning, and whole messages as plain JSON,
+  which every client reads.
 - `id` is a string or an integer. null counts as not given, everywhere. Members that are not named
   here are passed over, as rosbridge does.
 
@@ -36,9 +35,8 @@ MAX_THROTTLE_RATE_MS: Final = 3_600_000.0
 Level = Literal["none", "error", "warning", "info"]
 LEVELS: Final[tuple[Level, ...]] = ("none", "error", "warning", "info")
 
-# How the messages of a topic are sent; none is JSON.
-Compression = Literal["none", "cbor", "cbor-raw"]
-COMPRESSIONS: Final[tuple[Compression, ...]] = ("none", "cbor", "cbor-raw")
+# What rosbridge knows; none is JSON, and all that is served.
+COMPRESSIONS: Final = ("none", "png", "cbor", "cbor-raw")
 
 Id = str | int | None
 
@@ -87,7 +85,6 @@ class Subscribe:
     topic: str
     type: str
     throttle_rate_ms: float
-    compression: Compression
     warnings: tuple[str, ...]
 
 
@@ -169,7 +166,7 @@ def _request(members: Mapping[str, Any], message_id: Id) -> Request:
 
 
 def _subscribe(members: Mapping[str, Any], message_id: Id) -> Subscribe:
-    compression, warnings = _transport(members)
+    warnings = _transport(members)
     queue_length = _number(members, "queue_length", 0.0)
     if queue_length > 1:
         warnings.append(f"queue_length {queue_length:.15g} is served as 1: the newest only")
@@ -184,7 +181,6 @@ def _subscribe(members: Mapping[str, Any], message_id: Id) -> Subscribe:
         topic=_text(members, "topic"),
         type=_text(members, "type", default=""),
         throttle_rate_ms=throttle_rate_ms,
-        compression=compression,
         warnings=tuple(warnings),
     )
 
@@ -192,9 +188,7 @@ def _subscribe(members: Mapping[str, Any], message_id: Id) -> Subscribe:
 def _call_service(members: Mapping[str, Any], message_id: Id) -> CallService:
     service = _text(members, "service")
     try:
-        compression, warnings = _transport(members)
-        if compression != "none":
-            warnings.append(f"compression {shown(compression)} is of messages: responses are JSON")
+        warnings = _transport(members)
         timeout_s = _number(members, "timeout", 0.0, low=-math.inf)
         return CallService(
             id=message_id,
@@ -224,19 +218,17 @@ def _set_level(members: Mapping[str, Any]) -> SetLevel:
     return SetLevel(level)
 
 
-def _transport(members: Mapping[str, Any]) -> tuple[Compression, list[str]]:
+def _transport(members: Mapping[str, Any]) -> list[str]:
     warnings = []
-    given = _text(members, "compression", default="none")
-    compression = next((known for known in COMPRESSIONS if known == given), None)
-    if given == "png":
-        warnings.append(f"compression {shown(given)} is not served: messages are plain JSON")
-        compression = "none"
-    if compression is None:
-        raise Refused(f"compression is {shown(given)}, expected {', '.join(COMPRESSIONS)} or png")
+    compression = _text(members, "compression", default="none")
+    if compression not in COMPRESSIONS:
+        raise Refused(f"compression is {shown(compression)}, expected {', '.join(COMPRESSIONS)}")
+    if compression != "none":
+        warnings.append(f"compression {shown(compression)} is not served: messages are plain JSON")
     if members.get("fragment_size") is not None:
         size = _number(members, "fragment_size", 0.0)
         warnings.append(f"fragment_size {size:.15g} is not served: messages are whole")
-    return compression, warnings
+    return warnings
 
 
 def _text(members: Mapping[str, Any], name: str, *, default: str | None = None) -> str:

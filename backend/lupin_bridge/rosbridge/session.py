@@ -14,7 +14,6 @@ from lupin_bridge.rosbridge import services as rosbridge_services
 from lupin_bridge.rosbridge.protocol import (
     LEVELS,
     CallService,
-    Compression,
     Id,
     Level,
     Refused,
@@ -25,7 +24,7 @@ from lupin_bridge.rosbridge.protocol import (
 from lupin_bridge.rosbridge.services import FieldCall
 from lupin_bridge.serving.client_json import shown
 from lupin_bridge.serving.client_pace import ClientPace
-from lupin_bridge.stream.frames import JSON, StateFrame
+from lupin_bridge.stream.frames import StateFrame
 from lupin_bridge.twin.names import Topic, TwinNames, topics_of
 
 MAX_SUBSCRIPTIONS: Final = 32
@@ -37,7 +36,6 @@ class Feed:
 
     topic: Topic
     name: str
-    compression: Compression
     min_interval_s: float
 
 
@@ -67,7 +65,7 @@ class Session:
 
     @property
     def is_subscribed(self) -> bool:
-        """Whether the client wants the state in JSON, which is written for everybody at once."""
+        """Whether the client wants the state, which is written for everybody at once."""
         return bool(self._states())
 
     @property
@@ -79,15 +77,17 @@ class Session:
     @property
     def feeds(self) -> dict[str, Feed]:
         """Whatever else it wants, by the topic as it spells it: to be heard off the wire of ROS."""
-        spelled = {name: one.compression for (name, _), one in self._subscriptions.items()}
         return {
-            name: Feed(self._topic(name), name, compression, self._interval_s(name))
-            for name, compression in spelled.items()
-            if name not in self._states()
+            name: Feed(self._topic(name), name, self._interval_s(name))
+            for name, _ in self._subscriptions
+            if not self._is_state(name)
         }
 
     def _topic(self, name: str) -> Topic:
         return self._topics[rosbridge_services.absolute(name)]
+
+    def _is_state(self, name: str) -> bool:
+        return self._topic(name).name == self._names.state_topic
 
     def _interval_s(self, name: str) -> float:
         rates = [
@@ -96,13 +96,8 @@ class Session:
         return min(rates) / 1000.0
 
     def _states(self) -> dict[str, None]:
-        """The spellings of the state's topic under which it is wanted in JSON."""
-        spelled = {name: one.compression for (name, _), one in self._subscriptions.items()}
-        return {
-            name: None
-            for name, compression in spelled.items()
-            if compression == "none" and self._topic(name).name == self._names.state_topic
-        }
+        """The spellings of the state's topic under which it is wanted."""
+        return {name: None for name, _ in self._subscriptions if self._is_state(name)}
 
     def receive(self, message: str | bytes, now_s: float) -> Reaction:
         """Take one frame from the client.
@@ -134,7 +129,7 @@ class Session:
         """
         spellings = self._states()
         return b"".join(
-            frame.wire(f"rosbridge {topic}", JSON, partial(_published, topic, frame))
+            frame.wire(f"rosbridge {topic}", partial(_published, topic, frame))
             for topic in spellings
         )
 
@@ -157,7 +152,7 @@ class Session:
         self._subscriptions[key] = request
         return Reaction(
             self._warn(request.warnings, request.id),
-            state_is_due=request.topic in self._states(),
+            state_is_due=self._is_state(request.topic),
             subscribed=request.topic,
         )
 

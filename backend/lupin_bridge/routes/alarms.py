@@ -9,6 +9,7 @@ from typing import Final
 import orjson
 from fastapi import APIRouter, Request, Response
 
+from lupin_bridge.access.middleware import client_of
 from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.past import query
 from lupin_bridge.past.query import AlarmsQuery
@@ -62,7 +63,7 @@ async def _alarms(request: Request) -> Response:
         return orjson.dumps(alarms_body(found, board.source, board.since_ns))
 
     async def compute() -> Answer:
-        with bridge.admission.computing():
+        with bridge.admission.computing(client_of(request)):
             text = await on_worker(bridge, lambda _: body(), len(alarms) * _WRITE_ALARM_S)
         return Answer(text, JSON_TYPE, NEVER_KEEP)
 

@@ -10,6 +10,7 @@ from typing import Final
 
 from fastapi import Request, Response
 
+from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.past.as_of import Written
 from lupin_bridge.past.asked import Answered, Answering, Asked, AsOf, OfState
@@ -57,7 +58,7 @@ async def response_as_of(request: Request, at_ns: int | None, of: OfState) -> Re
             return not_modified(plan.etag)
 
         async def write() -> Answer:
-            with bridge.admission.computing(is_large=plan.cost_s > SMALL_S):
+            with bridge.admission.computing(client_of(request), is_large=plan.cost_s > SMALL_S):
                 if plan.cost_s <= _AT_ONCE_S:
                     written = plan.write(never)
                 else:
@@ -87,7 +88,7 @@ async def response_of_past(request: Request, asked: Asked, kind: str) -> Respons
             key = (kind, asked, header, bridge.state_number)
             answered = await bridge.looking_back.get(
                 key,
-                lambda has=has: _answered(bridge, Answering(asked, has), kind),  # type: ignore[misc]
+                lambda has=has: _answered(request, Answering(asked, has), kind),  # type: ignore[misc]
             )
             if has_already(request, answered.etag):
                 return not_modified(answered.etag)
@@ -100,14 +101,16 @@ async def response_of_past(request: Request, asked: Asked, kind: str) -> Respons
     return await admitted_response(request, work)
 
 
-async def _answered(bridge: Bridge, question: Answering, kind: str) -> Answered:
+async def _answered(request: Request, question: Answering, kind: str) -> Answered:
+    bridge = bridge_of(request)
     tags = 0 if bridge.latest is None else len(bridge.latest.snapshot.tags)
-    look_s, write_s = question.asked.look_s(tags), question.asked.write_s(tags)
+    # Of all that it takes: in which lane it waits is decided once, whatever it asks for first.
+    cost_s = question.asked.cost_s(tags)
     with (
-        bridge.admission.computing(is_large=look_s + write_s > SMALL_S),
+        bridge.admission.computing(client_of(request), is_large=cost_s > SMALL_S),
         bridge.metrics.past_seconds.labels(kind).time(),
     ):
-        answered = await bridge.source.ask(question, look_s)
+        answered = await bridge.source.ask(question, cost_s)
     if answered.written is not None:
         _kept(bridge, answered.etag, answered.written)
     return answered

@@ -20,6 +20,7 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.field import formats as field_formats
 from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import FieldFormat
+from lupin_bridge.field.query import FieldQuery
 from lupin_bridge.routes.tools import (
     NEVER_KEEP,
     REVALIDATE,
@@ -30,8 +31,10 @@ from lupin_bridge.routes.tools import (
 from lupin_bridge.serving.admission import AdmissionError, BusyError
 from lupin_bridge.serving.kept import Answer
 from lupin_bridge.twin.source import TwinTimeoutError, TwinUnavailableError
+from lupin_twin.far_off import far_off_tags
 from lupin_twin.fields import FieldRequest, check_request, cost_s, default_box
 from lupin_twin.past import NotRemembered, PastRefused
+from lupin_twin.state import TagState
 from lupin_twin.workers import SMALL_S, ShouldStop
 
 ResultT = TypeVar("ResultT")
@@ -195,7 +198,7 @@ async def on_worker(
 
 
 async def made(
-    bridge: Bridge,
+    request: Request,
     key: Hashable,
     write: Callable[[], bytes],
     media_type: str,
@@ -209,7 +212,8 @@ async def made(
         BusyError: one computation too many.
 
     """
-    with bridge.admission.computing(is_large=cost > SMALL_S):
+    bridge = bridge_of(request)
+    with bridge.admission.computing(client_of(request), is_large=cost > SMALL_S):
         body = await on_worker(bridge, lambda _: write(), cost)
     answer = Answer(body, media_type, headers)
     bridge.kept.put(key, answer)
@@ -258,9 +262,9 @@ def write_s(cells: int, scale: int) -> float:
 
 
 async def field_answer(
-    bridge: Bridge, asked: FieldRequest, field_format: FieldFormat, scale: int = 1
+    bridge: Bridge, client: str, asked: FieldRequest, field_format: FieldFormat, scale: int = 1
 ) -> Answer:
-    """The field in a format, with its ETag; it is kept.
+    """The field in a format, with its ETag; it is kept. `client` is who asked first.
 
     Raises:
         lupin_twin.fields.FieldRefused: a bad request.
@@ -269,7 +273,7 @@ async def field_answer(
 
     """
     with (
-        bridge.admission.computing(is_large=is_large(bridge, asked, scale)),
+        bridge.admission.computing(client, is_large=is_large(bridge, asked, scale)),
         bridge.metrics.field_seconds.time(),
     ):
         result = await bridge.source.field(asked)
@@ -282,7 +286,7 @@ async def field_answer(
             write_s(grid.width * grid.height, scale),
         )
     headers = field_query.headers(
-        field_formats.metadata(grid, sensors.named(asked.sensor_type)),
+        {**field_formats.metadata(grid, sensors.named(asked.sensor_type)), **far_off(bridge)},
         f"{asked.sensor_type}.{field_format.name}",
     )
     answer = Answer(body, field_format.media_type, {**headers, "ETag": tag, **REVALIDATE})
@@ -290,11 +294,17 @@ async def field_answer(
     return answer
 
 
-def box_of_all_tags(bridge: Bridge) -> field_query.Box:
-    """The box of who asks for none: all pinned tags, and their reach."""
-    latest = bridge.latest
-    tags = () if latest is None else latest.snapshot.tags
-    return default_box(
-        [(tag.pose.x, tag.pose.y) for tag in tags if tag.pose is not None],
-        bridge.source.rules().max_distance_m,
-    )
+def request_of(bridge: Bridge, query: FieldQuery) -> FieldRequest:
+    """As GetField has it; the box of who asks for none is that of the tags, and their reach."""
+    rules = bridge.source.rules()
+    places = [(tag.pose.x, tag.pose.y) for tag in _tags(bridge) if tag.pose is not None]
+    return query.request(default_box(places, rules.max_distance_m), rules.max_grid_cells)
+
+
+def far_off(bridge: Bridge) -> dict[str, str]:
+    """How many tags are too far off for a default box, as a field's metadata."""
+    return field_formats.far_off(far_off_tags(_tags(bridge)))
+
+
+def _tags(bridge: Bridge) -> tuple[TagState, ...]:
+    return () if bridge.latest is None else bridge.latest.snapshot.tags

@@ -53,7 +53,7 @@ async def _written_once(
         return Response(write(), headers=REVALIDATE, media_type=media_type)
 
     def compute() -> Coroutine[Any, Any, Answer]:
-        return made(bridge, key, write, media_type, cost=_WRITE_S, headers=REVALIDATE)
+        return made(request, key, write, media_type, cost=_WRITE_S, headers=REVALIDATE)
 
     return await or_refusal(kept_or_computed(request, key, compute))
 

@@ -8,6 +8,7 @@ from lupin_bridge.field import query as field_query
 from lupin_bridge.past.moments import EXPECTED
 from lupin_bridge.stream import schema
 from lupin_twin.bounds import MAX_TEXT_LENGTH
+from lupin_twin.fields import DEFAULT_RESOLUTION_M
 from lupin_twin.past import DEFAULT_POINTS, MAX_POINTS
 
 
@@ -34,11 +35,15 @@ FIELD: Final = (
     SENSOR,
     parameter(
         "resolution",
-        {**_NUMBER, "exclusiveMinimum": 0, "default": field_query.DEFAULT_RESOLUTION_M},
-        "m, side of a square cell",
+        {**_NUMBER, "exclusiveMinimum": 0, "default": DEFAULT_RESOLUTION_M},
+        "m, side of a square cell; without a box either: doubled until the field is small enough",
     ),
     *(
-        parameter(name, _NUMBER, "m, map frame; without a box: all pinned tags and their reach")
+        parameter(
+            name,
+            _NUMBER,
+            "m, map frame; without a box: all pinned tags but those far off, and their reach",
+        )
         for name in field_query.BOX_NAMES
     ),
     parameter(

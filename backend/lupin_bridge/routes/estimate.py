@@ -6,15 +6,16 @@ from typing import Final
 
 from fastapi import APIRouter, Request, Response
 
-from lupin_bridge.bridge import Bridge
+from lupin_bridge.access.middleware import client_of
 from lupin_bridge.field import estimate_formats
 from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import PNG, FieldFormat
 from lupin_bridge.field.query import FieldQuery
 from lupin_bridge.past import query as past_query
 from lupin_bridge.routes.computing import (
-    box_of_all_tags,
+    far_off,
     on_worker,
+    request_of,
     unless_known,
     write_s,
 )
@@ -54,7 +55,7 @@ async def _answer(request: Request, field_format: FieldFormat) -> Response:
     if query.layer != field_query.LAYERS[0] and field_format != PNG:
         raise FieldRefused(f"layer is {query.layer!r}, but only a PNG has one")
     at_ns = past_query.at_of(query.at, bridge.ros_time_ns) or 0
-    asked = EstimateRequest(query.request(box_of_all_tags(bridge)), at_ns)
+    asked = EstimateRequest(request_of(bridge, query), at_ns)
     max_cells = bridge.source.rules().max_grid_cells
     width, height = check_request(asked.box, max_cells)
     field_query.check_scale(query, field_format, width * height, max_cells)
@@ -64,14 +65,15 @@ async def _answer(request: Request, field_format: FieldFormat) -> Response:
         request,
         revision and _etag(revision, asked, query, field_format),
         key,
-        lambda: _computed(bridge, asked, query, field_format),
+        lambda: _computed(request, asked, query, field_format),
     )
 
 
 async def _computed(
-    bridge: Bridge, asked: EstimateRequest, query: FieldQuery, field_format: FieldFormat
+    request: Request, asked: EstimateRequest, query: FieldQuery, field_format: FieldFormat
 ) -> Answer:
     """The estimate in a format, with its ETag; it is kept."""
+    bridge = bridge_of(request)
     max_cells = bridge.source.rules().max_grid_cells
     width, height = check_request(asked.box, max_cells)
     tags = 0 if bridge.latest is None else len(bridge.latest.snapshot.tags)
@@ -79,7 +81,7 @@ async def _computed(
     is_large = cost_s(asked, tags, max_cells) + writing_s > SMALL_S
     sensor_type, sensors = query.sensor_type, bridge.criteria.sensors
     with (
-        bridge.admission.computing(is_large=is_large),
+        bridge.admission.computing(client_of(request), is_large=is_large),
         bridge.metrics.estimate_seconds.time(),
     ):
         result = await bridge.source.estimate(asked)
@@ -97,7 +99,10 @@ async def _computed(
         )
     tag = _etag(result.revision, asked, query, field_format)
     headers = field_query.headers(
-        estimate_formats.metadata(result.estimate, sensors.named(sensor_type)),
+        {
+            **estimate_formats.metadata(result.estimate, sensors.named(sensor_type)),
+            **far_off(bridge),
+        },
         f"{sensor_type}.{field_format.name}",
         "Estimate",
     )

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from fastapi import APIRouter, Request, Response
 
+from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.estimates.following import MAX_SENSORS, newest_of
 from lupin_bridge.query_string import values_of
@@ -117,7 +118,7 @@ async def _answer(request: Request, names: Sequence[str], body: Body) -> Respons
 
 async def _made(request: Request, values: dict[str, str], body: Body) -> Answer:
     bridge = bridge_of(request)
-    with bridge.admission.computing(is_large=True):
+    with bridge.admission.computing(client_of(request), is_large=True):
         text = await body(bridge, values)
     headers: dict[str, Any] = {"ETag": f'"{blake2b(text, digest_size=12).hexdigest()}"'}
     return Answer(text, JSON_TYPE, {**headers, **REVALIDATE})

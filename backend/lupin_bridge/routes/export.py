@@ -25,6 +25,7 @@ from lupin_bridge.routes.computing import (
 )
 from lupin_bridge.routes.documented import NOT_REMEMBERED, PERIOD, parameter
 from lupin_bridge.routes.tools import NEVER_KEEP, bridge_of, read_route
+from lupin_bridge.serving.admission import Export
 from lupin_bridge.serving.http_protocol import CONNECTION_KEY, HttpConnection
 from lupin_twin.bounds import MAX_TEXT_LENGTH
 from lupin_twin.state import NANOSECONDS_PER_SECOND
@@ -71,10 +72,16 @@ async def _export(request: Request) -> Response:
     if request.method == "HEAD":
         return Response(headers=headers, media_type=table.MEDIA_TYPE)
     end_ns = asked.end_ns or now_ns or MAX_SECONDS * NANOSECONDS_PER_SECOND
+    client, connection = client_of(request), request.scope["state"][CONNECTION_KEY]
+
+    def end() -> None:
+        log.warning("the export of %s is slow and makes place for another one", client)
+        connection.break_off()
+
     with ExitStack() as held:
         # What has begun cannot be refused any more: so the first rows come before the answer.
-        with bridge.admission.request(client_of(request), time.monotonic()):
-            held.enter_context(bridge.admission.export(client_of(request)))
+        with bridge.admission.request(client, time.monotonic()):
+            export = held.enter_context(bridge.admission.export(client, time.monotonic(), end))
             write = partial(table.lines, sensors=bridge.criteria.sensors)
             lots = bridge.source.rows(
                 asked.start_ns, end_ns, asked.tag_id, asked.sensor_type, write
@@ -82,7 +89,9 @@ async def _export(request: Request) -> Response:
             first = await while_client_waits(request, within_time(bridge, _next(lots)))
         if first is None:
             return Response(status_code=CLIENT_GONE)
-        return ExportResponse(bridge, first.lot, lots, headers, held.pop_all().close)
+        return ExportResponse(
+            bridge, export, first.lot, lots, headers, give_back=held.pop_all().close
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,14 +116,16 @@ class ExportResponse(Response):
     def __init__(
         self,
         bridge: Bridge,
+        export: Export,
         first: bytes | None,
         lots: Lots,
         headers: dict[str, str],
+        *,
         give_back: Callable[[], None],
     ) -> None:
         super().__init__(headers=headers, media_type=table.MEDIA_TYPE)
         del self.headers["content-length"]
-        self._bridge, self._first, self._lots = bridge, first, lots
+        self._bridge, self._export, self._first, self._lots = bridge, export, first, lots
         self._give_back = give_back
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -143,6 +154,7 @@ class ExportResponse(Response):
         while lot is not None:
             if lot:
                 await send(_piece(lot))
+                self._export.take(len(lot), time.monotonic())
             lot = (await within_time(self._bridge, _next(self._lots))).lot
         await send({"type": "http.response.body", "body": b""})
 

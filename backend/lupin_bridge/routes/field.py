@@ -6,7 +6,7 @@ from typing import Final
 
 from fastapi import APIRouter, Request, Response
 
-from lupin_bridge.bridge import Bridge
+from lupin_bridge.access.middleware import client_of
 from lupin_bridge.field import formats as field_formats
 from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import JSON, FieldFormat
@@ -17,10 +17,10 @@ from lupin_bridge.past.as_of import FieldAsked
 from lupin_bridge.past.asked import Field
 from lupin_bridge.routes.as_of import response_as_of
 from lupin_bridge.routes.computing import (
-    box_of_all_tags,
     field_answer,
     is_large,
     on_worker,
+    request_of,
     unless_known,
 )
 from lupin_bridge.routes.documented import AT, FIELD
@@ -56,7 +56,7 @@ async def _quality(request: Request) -> Response:
     at_ns = past_query.at_of(query.at, bridge.ros_time_ns)
     if at_ns is not None or query.sensor_type in DERIVED:
         return await _as_of(request, at_ns, query, None)
-    asked = query.request(box_of_all_tags(bridge))
+    asked = request_of(bridge, query)
     check_request(asked, bridge.source.rules().max_grid_cells)
     field_query.check_scale(query, JSON, 1, 1)
     revision = bridge.source.field_revision(asked)
@@ -64,7 +64,7 @@ async def _quality(request: Request) -> Response:
         _revision_of_quality(revision, bridge.latest), asked, "quality", 1
     )
     key = (bridge.source.revision(), asked, "quality")
-    return await unless_known(request, tag, key, lambda: _quality_answer(bridge, asked))
+    return await unless_known(request, tag, key, lambda: _quality_answer(request, asked))
 
 
 async def _answer(request: Request, field_format: FieldFormat) -> Response:
@@ -75,7 +75,7 @@ async def _answer(request: Request, field_format: FieldFormat) -> Response:
     # What is derived, no twin knows: it is made here, of the newest state.
     if at_ns is not None or query.sensor_type in DERIVED:
         return await _as_of(request, at_ns, query, field_format)
-    asked = query.request(box_of_all_tags(bridge))
+    asked = request_of(bridge, query)
     max_cells = source.rules().max_grid_cells
     width, height = check_request(asked, max_cells)
     field_query.check_scale(query, field_format, width * height, max_cells)
@@ -83,7 +83,10 @@ async def _answer(request: Request, field_format: FieldFormat) -> Response:
     tag = revision and field_query.etag(revision, asked, field_format.name, query.scale)
     key = (source.revision(), asked, field_format.name, query.scale)
     return await unless_known(
-        request, tag, key, lambda: field_answer(bridge, asked, field_format, query.scale)
+        request,
+        tag,
+        key,
+        lambda: field_answer(bridge, client_of(request), asked, field_format, query.scale),
     )
 
 
@@ -99,10 +102,11 @@ async def _as_of(
     return await response_as_of(request, at_ns, Field(asked, field_format))
 
 
-async def _quality_answer(bridge: Bridge, asked: FieldRequest) -> Answer:
+async def _quality_answer(request: Request, asked: FieldRequest) -> Answer:
+    bridge = bridge_of(request)
     rules = bridge.source.rules()
     with (
-        bridge.admission.computing(is_large=is_large(bridge, asked)),
+        bridge.admission.computing(client_of(request), is_large=is_large(bridge, asked)),
         bridge.metrics.field_seconds.time(),
     ):
         result = await bridge.source.field(asked)

@@ -59,9 +59,7 @@ async def _health(request: Request) -> Response:
     judged = bridge.judged
 
     async def compute() -> Answer:
-        with bridge.admission.computing():
-            body = bridge.frames.health.whole(judged)
-        return Answer(body, JSON_TYPE, NEVER_KEEP)
+        return Answer(bridge.frames.health.whole(judged), JSON_TYPE, NEVER_KEEP)
 
     key = ("health", judged.number, bridge.status.is_live)
     return await kept_or_computed(request, key, compute)

@@ -74,7 +74,7 @@ async def _map(request: Request, kind: str) -> Response:
         request,
         key,
         lambda: made(
-            bridge,
+            request,
             key,
             lambda: map_png(occupancy),
             "image/png",

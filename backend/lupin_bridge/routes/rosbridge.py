@@ -188,5 +188,7 @@ class _Conversation:
             return bytes(answer.body)
         held.enter_context(bridge.admission.request(self._address, time.monotonic()))
         key = (bridge.source.revision(), request, JSON.name, 1)
-        answer = await bridge.answering.get(key, lambda: field_answer(bridge, request, JSON))
+        answer = await bridge.answering.get(
+            key, lambda: field_answer(bridge, self._address, request, JSON)
+        )
         return bytes(answer.body)

@@ -31,7 +31,7 @@ router = APIRouter()
 _FOLDER: Final = Path(__file__).parent / "signin_page"
 
 
-@read_route(router, "/api/signin", include_in_schema=False)
+@router.post("/api/signin", include_in_schema=False)
 async def sign_in(request: Request) -> Response:
     """Trade the token, which `AccessControl` has looked at, for a session cookie.
 
@@ -54,25 +54,17 @@ async def sign_in(request: Request) -> Response:
     return response
 
 
-@read_route(router, "/api/signout", include_in_schema=False)
+@router.post("/api/signout", include_in_schema=False)
 async def sign_out(request: Request) -> Response:
-    """End the session that the request comes with, and everything that it has open.
-
-    Only for pages of our own: a link, a picture or a prefetch elsewhere signs nobody out. To ask
-    how it would be (HEAD) does not, either.
-    """
+    """End the session that the request comes with, and everything that it has open."""
     access = _access_of(request)
     if access.credentials is None:
         return error_response("this bridge asks for no token: there is nothing to sign out of", 404)
-    site = request.headers.get("sec-fetch-site", "")
-    if site in ("cross-site", "same-site") or "sec-purpose" in request.headers:
-        return error_response("signing out is for the pages of this bridge", 403)
+    session = _session_of(request)
+    if session is not None:
+        access.sessions.sign_out(session, time.time())
     response = Response(status_code=204, headers=NEVER_KEEP)
-    if request.method == "GET":
-        session = _session_of(request)
-        if session is not None:
-            access.sessions.sign_out(session, time.time())
-        response.delete_cookie(access.credentials.cookie_name, **_place_of(request))
+    response.delete_cookie(access.credentials.cookie_name, **_place_of(request))
     return response
 
 

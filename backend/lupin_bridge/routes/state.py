@@ -32,7 +32,6 @@ from lupin_bridge.routes.tools import (
 from lupin_bridge.serving.kept import Answer
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.stream import listen_query, schema, state_json
-from lupin_bridge.stream.frames import ENCODINGS
 from lupin_bridge.stream.hub import CLOSE_POLICY, Client
 from lupin_bridge.stream.listen_query import ListenRefused
 
@@ -55,25 +54,18 @@ _NO_TAG = {404: {"model": schema.ErrorMessage, "description": "no such tag"}}
 async def ws_state(websocket: WebSocket) -> None:
     """The status and the current state at once, then every change; a client is not listened to."""
     bridge: Bridge = websocket.app.state.bridge
-    offered: list[str] = websocket.scope["subprotocols"]
+    await websocket.accept()
     try:
-        query = listen_query.parse(websocket.query_params.multi_items(), offered)
+        query = listen_query.parse(websocket.query_params.multi_items())
     except ListenRefused as error:
-        # A browser that offered subprotocols and got none would never see why.
-        known = next((name for name in offered if name in ENCODINGS), None)
-        await websocket.accept(subprotocol=known)
         await websocket.close(CLOSE_POLICY, str(error))
         return
-    # What is selected is what is sent: a query may ask for JSON although CBOR was offered.
-    chosen = query.encoding if query.encoding in offered else None
-    await websocket.accept(subprotocol=chosen)
     if not await has_place(websocket, bridge.hub):
         return
     connection: Connection = getattr(websocket.state, CONNECTION_KEY)
     client = Client(
         connection,
         address=client_of(websocket),
-        encoding=query.encoding,
         delta=query.delta,
         min_interval_s=query.min_interval_s,
     )
@@ -115,8 +107,7 @@ async def _state(request: Request) -> Response:
     key = ("state", bridge.state_number, int(time.monotonic() / AGES_HOLD_S))
 
     async def compute() -> Answer:
-        with bridge.admission.computing():
-            body = bridge.frames.json.state(latest.snapshot, bridge.ros_time_ns)
+        body = bridge.frames.json.state(latest.snapshot, bridge.ros_time_ns)
         answer = Answer(body, JSON_TYPE, NEVER_KEEP)
         bridge.kept.put(key, answer, instead_of=bridge.kept_state)
         bridge.kept_state = key
@@ -141,7 +132,7 @@ async def history(request: Request, tag_id: str) -> Response:
     number_of_tags = len(bridge.latest.snapshot.tags)
 
     async def compute() -> Answer:
-        with bridge.admission.computing():
+        with bridge.admission.computing(client_of(request)):
             past = await bridge.source.history(tag_id)
             if past is None:
                 raise _NoSuchTagError

@@ -4,24 +4,28 @@ What is kept already passes without it. Nothing waits for a turn: a request past
 at once, so that nothing piles up. A client's own requests count until it has taken the answer, all
 computations together until the answer is written: a client that does not read holds up nobody but
 itself. Large computations leave a quarter of the places to the small ones, which are soon done: a
-flood of the dearest fields keeps nobody from a cheap answer.
+flood of the dearest fields keeps nobody from a cheap answer. And no client takes more places than
+it leaves free: however many ask for much, there is one for who comes next.
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Final
 
 from lupin_bridge.serving.rate_limit import RateLimit
 
 # A page that opens asks for several fields at once; seconds' worth of field_rate_hz.
 BURST_S: Final = 2.0
-# An export goes on for as long as its reader takes: one a client, and few that share the disk.
-EXPORTS_A_CLIENT: Final = 1
+# An export goes on for as long as its reader takes: one a client, and few that share the disk. Who
+# takes no more than 100 kB/s of it may go on until somebody else wants the place.
 EXPORTS: Final = 4
+STRETCH_BYTES: Final = 500_000
+SLOW_STRETCH_S: Final = 5.0
 
 # Why something was refused, as it is counted.
 IN_FLIGHT: Final = "client_in_flight"
@@ -54,6 +58,24 @@ class BusyError(AdmissionError):
     """All clients together ask too much."""
 
 
+@dataclass(slots=True, eq=False)
+class Export:
+    """An export under way: since when its reader has been at the present stretch of it.
+
+    `end` breaks it off.
+    """
+
+    since_s: float
+    end: Callable[[], None]
+    taken_bytes: int = 0
+
+    def take(self, size: int, now_s: float) -> None:
+        """Its reader has taken so many bytes more."""
+        self.taken_bytes += size
+        if self.taken_bytes >= STRETCH_BYTES:
+            self.taken_bytes, self.since_s = 0, now_s
+
+
 class Admission:
     """The requests in flight. Belongs to the event loop."""
 
@@ -61,18 +83,16 @@ class Admission:
         self.refused: Counter[str] = Counter()
         self._rate_hz = rate_hz
         self._concurrency = concurrency
-        self._total_concurrency = total_concurrency
-        self._large_concurrency = total_concurrency - total_concurrency // 4
         self._rate = RateLimit(rate_hz, rate_hz * BURST_S)
         self._in_flight: Counter[str] = Counter()
-        self._exporting: Counter[str] = Counter()
-        self._computing = 0
-        self._large = 0
+        self._exports: dict[str, Export] = {}
+        self._computing = _Places(total_concurrency)
+        self._large = _Places(total_concurrency - total_concurrency // 4)
 
     @property
     def being_computed(self) -> int:
         """How many computations keep the twin and the workers busy now."""
-        return self._computing
+        return self._computing.taken.total()
 
     @contextmanager
     def request(self, client: str, now_s: float) -> Iterator[None]:
@@ -101,66 +121,88 @@ class Admission:
         try:
             yield
         finally:
-            self._in_flight[client] -= 1
-            if not self._in_flight[client]:
-                del self._in_flight[client]
+            _give_back(self._in_flight, client)
 
     @property
     def exporting(self) -> int:
         """How many exports are being sent now."""
-        return self._exporting.total()
+        return len(self._exports)
 
     @contextmanager
-    def export(self, client: str) -> Iterator[None]:
-        """A client's export, from its first row to its last.
+    def export(self, client: str, now_s: float, end: Callable[[], None]) -> Iterator[Export]:
+        """A client's export, from its first row to its last; `end` breaks it off.
+
+        The slowest makes place for it where it has to.
 
         Raises:
-            ClientLimitError: one more than the client may have at once.
-            BusyError: one more than there may be at once.
+            ClientLimitError: the client has one already.
+            BusyError: one more than there may be at once, and none is slow.
 
         """
-        if self._exporting[client] >= EXPORTS_A_CLIENT:
+        if client in self._exports:
             self.refused[CLIENT_EXPORTS] += 1
-            raise ClientLimitError(
-                f"{client} has {EXPORTS_A_CLIENT} export under way, the limit", 5.0
-            )
-        if self.exporting >= EXPORTS:
-            self.refused[ALL_EXPORTS] += 1
-            raise BusyError(f"{EXPORTS} exports are under way, the limit", 5.0)
-        self._exporting[client] += 1
+            raise ClientLimitError(f"{client} has 1 export under way, the limit", 5.0)
+        if len(self._exports) >= EXPORTS:
+            slowest = min(self._exports, key=lambda other: self._exports[other].since_s)
+            if now_s - self._exports[slowest].since_s < SLOW_STRETCH_S:
+                self.refused[ALL_EXPORTS] += 1
+                raise BusyError(f"{EXPORTS} exports are under way, the limit", 5.0)
+            self._exports.pop(slowest).end()
+        export = self._exports[client] = Export(now_s, end)
         try:
-            yield
+            yield export
         finally:
-            self._exporting[client] -= 1
-            if not self._exporting[client]:
-                del self._exporting[client]
+            if self._exports.get(client) is export:
+                del self._exports[client]
 
     @contextmanager
-    def computing(self, *, is_large: bool = False) -> Iterator[None]:
+    def computing(self, client: str, *, is_large: bool = False) -> Iterator[None]:
         """What keeps the twin and the workers busy, once for all who wait for it.
 
+        `client` is who asked first.
+
         Raises:
-            BusyError: one more than there may be at once.
+            BusyError: one more than there may be at once, or than the client leaves to others.
 
         """
-        if self._computing >= self._total_concurrency:
+        if self._computing.is_full_for(client):
             self.refused[TOTAL] += 1
             raise BusyError(
-                f"{self._total_concurrency} answers are being computed, the limit "
-                "(field_total_concurrency)",
-                1.0,
+                self._computing.why_not(client, "answers", "field_total_concurrency"), 1.0
             )
-        if is_large and self._large >= self._large_concurrency:
+        if is_large and self._large.is_full_for(client):
             self.refused[LARGE] += 1
-            raise BusyError(
-                f"{self._large_concurrency} large answers are being computed, the limit (three "
-                "quarters of field_total_concurrency)",
-                1.0,
-            )
-        self._computing += 1
-        self._large += is_large
+            limit = "three quarters of field_total_concurrency"
+            raise BusyError(self._large.why_not(client, "large answers", limit), 1.0)
+        taken = (self._computing, self._large) if is_large else (self._computing,)
+        for places in taken:
+            places.taken[client] += 1
         try:
             yield
         finally:
-            self._computing -= 1
-            self._large -= is_large
+            for places in taken:
+                _give_back(places.taken, client)
+
+
+class _Places:
+    """So many for all clients, of which none takes more than it leaves free."""
+
+    def __init__(self, limit: int) -> None:
+        self.limit = limit
+        self.taken: Counter[str] = Counter()
+
+    def is_full_for(self, client: str) -> bool:
+        return self.taken[client] >= self.limit - self.taken.total()
+
+    def why_not(self, client: str, what: str, limit: str) -> str:
+        return (
+            f"{self.taken.total()} {what} are being computed, {self.taken[client]} of them for "
+            f"{client}: the limit is {self.limit} ({limit}), and no client takes more than it "
+            "leaves free"
+        )
+
+
+def _give_back(taken: Counter[str], client: str) -> None:
+    taken[client] -= 1
+    if not taken[client]:
+        del taken[client]

@@ -5,12 +5,16 @@ a request, for as long as the client likes. A few hundred connections that ask f
 never read would fill the memory, and some thousand that never finish asking use up all sockets.
 The times hold for the connection, and so for whatever is sent: answers of routes, and refusals of
 the doorman, of the framework and of this protocol alike.
+
+A request is its head: no route wants a body. The parser gets one whole head at a time, of bounded
+size and number of lines. A request with a body is refused before any of the body is read.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
+import re
 import sys
 from collections.abc import Iterator
 from typing import Any, Final, cast
@@ -30,10 +34,43 @@ PIECE_BYTES: Final = 64 * 1024
 # The request's line and all header lines. The parser's own limit is one for what is incomplete: all
 # that comes at once, it would take, up to asyncio's 256 kB.
 MAX_HEAD_BYTES: Final = 32 * 1024
+# As many as the parser of WebSocket handshakes takes. What a head costs goes by its lines: 8,000
+# tiny ones take 23 ms to parse. A continued line (RFC 9112, section 5.2) counts as two.
+MAX_HEADERS: Final = 128
+MAX_LINES: Final = 1 + MAX_HEADERS + 1  # the request's line, and the blank one
 # From here on the next piece has to wait. asyncio's own value, but over TLS, where it is 512 kB.
 HIGH_WATER_BYTES: Final = 64 * 1024
 # Where a request's scope has its connection, among the state.
 CONNECTION_KEY: Final = "http_connection"
+
+# h11's own: where a head ends.
+_BLANK_LINE: Final = re.compile(rb"\n\r?\n")
+
+
+class _Requests(h11.Connection):
+    """h11's parser, for requests without a body and for a target that is a path."""
+
+    def next_event(self) -> Any:
+        """As h11; what is not served here is refused as what is no HTTP is."""
+        event = super().next_event()
+        if isinstance(event, h11.Request):
+            # RFC 9112, section 3.2.2, would have us take a whole address too. Only a client that
+            # takes us for its proxy sends one, and two names of the host are one too many.
+            if not event.target.startswith(b"/"):
+                raise h11.RemoteProtocolError(
+                    f"the request's target is {event.target[:128].decode('latin-1')!r}, expected a "
+                    "path that begins with /"
+                )
+            for name, value in event.headers:
+                # RFC 9112, section 6: these two, and nothing else, say that a body follows.
+                is_length = name == b"content-length"
+                if name == b"transfer-encoding" or (is_length and value.strip(b"0")):
+                    raise h11.RemoteProtocolError(
+                        f"the request has a body ({name.decode()}: {value[:32].decode('latin-1')}),"
+                        " and none is read here",
+                        error_status_hint=413,
+                    )
+        return event
 
 
 class HttpConnection(H11Protocol):
@@ -51,6 +88,7 @@ class HttpConnection(H11Protocol):
         _loop: asyncio.AbstractEventLoop | None = None,
     ) -> None:
         super().__init__(config, server_state, {**app_state, CONNECTION_KEY: self}, _loop)
+        self.conn = _Requests(h11.SERVER)
         self.address = ""
         self._deadline: asyncio.TimerHandle | None = None
         self._reader_deadline: asyncio.TimerHandle | None = None
@@ -78,8 +116,11 @@ class HttpConnection(H11Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Listen to a client, unless it was refused."""
-        self._unheard += data
-        self._listen()
+        if self._is_refused:
+            self.flow.pause_reading()  # who goes on is not read; who ends is noticed
+        else:
+            self._unheard += data
+            self._listen()
 
     def on_response_complete(self) -> None:
         """Go on to the next request, and start to wait for it."""
@@ -113,14 +154,10 @@ class HttpConnection(H11Protocol):
         super().connection_lost(exc)
 
     def send_400_response(self, msg: str) -> None:
-        """Answer what is no HTTP, where that is still possible, and end.
-
-        uvicorn calls this with the parser's complaint at hand, and answers even where the answer
-        to the request has gone out before its body turned out to be none.
-        """
+        """Answer what the parser does not take, and end; uvicorn calls this from its `except`."""
         complaint = sys.exception()
-        if isinstance(complaint, h11.RemoteProtocolError) and complaint.error_status_hint == 431:
-            self._refuse(431, f"the request's head is too long: {complaint}")
+        if isinstance(complaint, h11.RemoteProtocolError):
+            self._refuse(complaint.error_status_hint, str(complaint)[:500])
         else:
             self._refuse(400, msg)
 
@@ -140,35 +177,34 @@ class HttpConnection(H11Protocol):
         return self.scope["http_version"] == "1.1" and super()._should_upgrade()
 
     def _refuse(self, status: int, detail: str) -> None:
+        """Answer, and end; nothing that the client has asked for is under way now."""
         self._is_refused = True
-        if self.conn.our_state not in (h11.IDLE, h11.SEND_RESPONSE):
-            # An answer is on its way, or has gone: another one would be taken for a part of it.
-            self.transport.close()
-        else:
-            if self._is_at_work:
-                self.cycle.disconnected = True
-                self.cycle.message_event.set()
-            self.transport.write(refusal(status, detail))
-            # Closed at once, with more of the client's still on its way, the connection would be
-            # reset, and the answer lost.
-            if self.transport.can_write_eof():
-                self.transport.write_eof()
-            self.loop.call_later(CLOSE_GRACE_S, self.transport.close)
+        self.transport.write(refusal(status, detail))
+        # Closed at once, with more of the client's still on its way, the connection would be
+        # reset, and the answer lost.
+        if self.transport.can_write_eof():
+            self.transport.write_eof()
+        self.loop.call_later(CLOSE_GRACE_S, self.transport.close)
         self._wait_for_request()
 
     def _listen(self) -> None:
-        """Give the parser no more at a time than a whole head, and nothing of the next request.
-
-        It takes a whole head of any length; of one that is not all there, it has its limit.
-        """
+        """Give the parser one whole head, and the next one after the answer."""
         while self._unheard and not self._is_over:
-            if self.conn.their_state not in (h11.IDLE, h11.SEND_BODY):
+            if self.conn.their_state is not h11.IDLE:
                 self.flow.pause_reading()  # until the answer has gone
                 return
-            room = MAX_HEAD_BYTES - len(self.conn.trailing_data[0])
-            data = bytes(self._unheard[:room])
-            del self._unheard[:room]
-            super().data_received(data)
+            blank = _BLANK_LINE.search(self._unheard, 0, MAX_HEAD_BYTES)
+            end = min(len(self._unheard), MAX_HEAD_BYTES) if blank is None else blank.end()
+            if self._unheard.count(b"\n", 0, end) > MAX_LINES:
+                self._refuse(431, f"the request has more headers than the limit of {MAX_HEADERS}")
+            elif blank is None and end == MAX_HEAD_BYTES:
+                self._refuse(431, f"the request's head is longer than {MAX_HEAD_BYTES} bytes")
+            elif blank is None and self._unheard[0] > 0x20:
+                return  # the rest is on its way; a smaller byte begins no request, but TLS, say
+            else:
+                head = bytes(self._unheard[:end])
+                del self._unheard[:end]
+                super().data_received(head)
         if self._is_over:
             self._unheard.clear()
 

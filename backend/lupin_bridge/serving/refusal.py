@@ -9,6 +9,7 @@ import orjson
 # Not `http.HTTPStatus`: its names for 414 and 431 depend on the version of Python.
 _PHRASES: Final = {
     400: "Bad Request",
+    413: "Content Too Large",
     414: "URI Too Long",
     431: "Request Header Fields Too Large",
 }

@@ -18,7 +18,7 @@ from fastapi import FastAPI
 from uvicorn.server import HANDLED_SIGNALS
 
 from lupin_bridge.serving.acceptor import Acceptor, room_for_connections
-from lupin_bridge.serving.http_protocol import MAX_HEAD_BYTES, HttpConnection
+from lupin_bridge.serving.http_protocol import HttpConnection
 from lupin_bridge.serving.transports import tear_down
 from lupin_bridge.serving.ws_protocol import Connection
 from lupin_bridge.settings import Settings
@@ -51,8 +51,6 @@ class BridgeServer(uvicorn.Server):
             uvicorn.Config(
                 app,
                 http=HttpConnection,
-                # One less than fits: what fills it is too long, unless it is all.
-                h11_max_incomplete_event_size=MAX_HEAD_BYTES - 1,
                 ws=Connection,
                 ws_per_message_deflate=False,  # 2 ms against 30 ms of CPU for 50 clients a frame
                 ws_max_size=MAX_INBOUND_BYTES,

@@ -248,7 +248,6 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
 _REFUSED_AS: Final = {
     "RequestLineTooLong": 414,
     "HeaderLineTooLong": 431,
-    "TooManyHeaders": 431,
     "SecurityError": 431,
 }
 

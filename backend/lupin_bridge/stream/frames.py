@@ -1,28 +1,22 @@
-"""WebSocket frames of the state: each encoding made once, and shared by every client.
+"""WebSocket frames of the state: each written once, and shared by every client.
 
-Pure. A frame is written in an encoding when the first client asks for it, and kept for the others.
+Pure. A frame is written when the first client asks for it, and kept for the others.
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Final
 
-import cbor2
 import orjson
 from websockets.frames import Frame, Opcode
 
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judged
 from lupin_bridge.stream.health_json import HealthJson
-from lupin_bridge.stream.state_cbor import StateCbor, array, mapping
 from lupin_bridge.stream.state_json import StateJson, header
 from lupin_bridge.stream.status import Status
 from lupin_twin.state import Snapshot, TagState
-
-JSON: Final = "json"
-CBOR: Final = "cbor"
 
 
 def text_frame(payload: bytes) -> bytes:
@@ -45,18 +39,9 @@ def binary_head(length: int) -> bytes:
     return frame + struct.pack("!BQ", 127, length)
 
 
-_FRAMES: Final[Mapping[str, Callable[[bytes], bytes]]] = {JSON: text_frame, CBOR: binary_frame}
-ENCODINGS: Final = tuple(_FRAMES)
-
-
-def status_frame(status: Status, encoding: str = JSON) -> bytes:
+def status_frame(status: Status) -> bytes:
     """A status as a WebSocket frame."""
-    return encoded(orjson.dumps(status.frame()), encoding)
-
-
-def encoded(payload: bytes, encoding: str) -> bytes:
-    """JSON as a WebSocket frame in an encoding."""
-    return _FRAMES[encoding](_as_cbor(payload) if encoding == CBOR else payload)
+    return text_frame(orjson.dumps(status.frame()))
 
 
 @dataclass(slots=True, eq=False)
@@ -74,7 +59,7 @@ class StateFrame:
     _writer: FrameWriter
     _json: bytes | None = None
     _message_json: bytes | None = None
-    _wires: dict[tuple[str, str], bytes] = field(default_factory=dict)
+    _wires: dict[str, bytes] = field(default_factory=dict)
 
     @property
     def json(self) -> bytes:
@@ -97,20 +82,19 @@ class StateFrame:
         self._message_json = None
         self._wires.clear()
 
-    def full(self, encoding: str) -> bytes:
+    def full(self) -> bytes:
         """`schema.StateFrame` as a WebSocket frame."""
-        return self.wire("full", encoding, self._full if encoding == JSON else self._full_cbor)
+        return self.wire("full", self._full)
 
-    def delta(self, encoding: str) -> bytes:
+    def delta(self) -> bytes:
         """`schema.DeltaFrame` as a WebSocket frame: only what is not as in `base`."""
-        return self.wire("delta", encoding, self._delta if encoding == JSON else self._delta_cbor)
+        return self.wire("delta", self._delta)
 
-    def wire(self, kind: str, encoding: str, payload: Callable[[], bytes]) -> bytes:
-        """The frame of this kind in this encoding, from `payload()` if it is the first call."""
-        key = (kind, encoding)
-        if key not in self._wires:
-            self._wires[key] = _FRAMES[encoding](payload())
-        return self._wires[key]
+    def wire(self, kind: str, payload: Callable[[], bytes]) -> bytes:
+        """The frame of this kind, from `payload()` if it is the first call."""
+        if kind not in self._wires:
+            self._wires[kind] = text_frame(payload())
+        return self._wires[kind]
 
     def _full(self) -> bytes:
         return b'{"type":"state","seq":%d,"revision":%b,"state":%b,"health":%b}' % (
@@ -137,40 +121,6 @@ class StateFrame:
             self._writer.health.delta(self.base.judged, self.judged),
         )
 
-    def _full_cbor(self) -> bytes:
-        return mapping(
-            [
-                ("type", cbor2.dumps("state")),
-                ("seq", cbor2.dumps(self.seq)),
-                ("revision", cbor2.dumps(self.revision)),
-                ("state", self._writer.cbor.state(self.snapshot)),
-                ("health", self._writer.health_cbor(self.judged)),
-            ]
-        )
-
-    def _delta_cbor(self) -> bytes:
-        assert self.base is not None  # the hub asks only then
-        changed, removed = difference(self.base.snapshot.tags, self.snapshot.tags)
-        stamp_ns = self.snapshot.stamp_ns
-        return mapping(
-            [
-                ("type", cbor2.dumps("delta")),
-                ("seq", cbor2.dumps(self.seq)),
-                ("base", cbor2.dumps(self.base.seq)),
-                ("revision", cbor2.dumps(self.revision)),
-                ("header", cbor2.dumps(header(stamp_ns, self.snapshot.frame_id))),
-                (
-                    "changed",
-                    array([self._writer.cbor.tag(tag, self.snapshot.now_ns) for tag in changed]),
-                ),
-                ("removed", cbor2.dumps(removed)),
-                (
-                    "health",
-                    _as_cbor(self._writer.health.delta(self.base.judged, self.judged)),
-                ),
-            ]
-        )
-
 
 def difference(
     before: Sequence[TagState], after: Sequence[TagState]
@@ -193,10 +143,8 @@ class FrameWriter:
 
     def __init__(self) -> None:
         self.json = StateJson()
-        self.cbor = StateCbor()
         self.message_json = StateJson(has_times=False)
         self.health = HealthJson()
-        self._health_cbor: tuple[Judged, bytes] | None = None
         self._newest: StateFrame | None = None
 
     def state(
@@ -216,17 +164,5 @@ class FrameWriter:
         )
         self._newest = frame
         self.json.keep_only(snapshot)
-        self.cbor.keep_only(snapshot)
         self.message_json.keep_only(snapshot)
         return frame
-
-    def health_cbor(self, judged: Judged) -> bytes:
-        """All that was judged as CBOR; it is kept until something else is."""
-        if self._health_cbor is None or self._health_cbor[0] is not judged:
-            self._health_cbor = judged, _as_cbor(self.health.whole(judged))
-        return self._health_cbor[1]
-
-
-def _as_cbor(json: bytes) -> bytes:
-    """By way of the JSON: what the two encodings say is the same to the last field."""
-    return cbor2.dumps(orjson.loads(json))

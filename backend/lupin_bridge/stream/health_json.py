@@ -67,10 +67,10 @@ def _patrol(patrol: Patrol) -> dict[str, Any]:
 
 
 def _health(health: Health) -> dict[str, Any]:
-    return {
-        "verdict": health.verdict,
-        "reasons": [reason_json(reason) for reason in health.reasons],
-    }
+    told: dict[str, Any] = {"verdict": health.verdict}
+    if health.reasons:
+        told["reasons"] = [reason_json(reason) for reason in health.reasons]
+    return told
 
 
 def reason_json(reason: Reason) -> dict[str, Any]:

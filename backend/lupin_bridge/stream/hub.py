@@ -12,11 +12,11 @@ are arguments.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-from lupin_bridge.stream.frames import JSON, StateFrame, status_frame
+from lupin_bridge.stream.frames import StateFrame, status_frame
 from lupin_bridge.stream.status import Status
 from lupin_bridge.stream.unsent import Unsent
 
@@ -64,8 +64,8 @@ def plain_wire(client: Client, frame: StateFrame) -> bytes:
     """A frame for a listener of `/ws/state`: a delta where it asked for them and has the base."""
     base = frame.base
     if client.delta and base is not None and base.seq == client.sent_seq:
-        return frame.delta(client.encoding)
-    return frame.full(client.encoding)
+        return frame.delta()
+    return frame.full()
 
 
 @dataclass(slots=True, eq=False)
@@ -79,7 +79,6 @@ class Client:
 
     connection: Writable
     address: str = ""
-    encoding: str = JSON
     delta: bool = False
     min_interval_s: float = 0.0
     strict_interval: bool = False
@@ -112,10 +111,10 @@ class Hub:
         self.unsent: Unsent[Client] = Unsent()
         self._parties: Counter[str] = Counter()
         self._frame: StateFrame | None = None
-        self._alarms: Mapping[str, bytes] | None = None
+        self._alarms: bytes | None = None
         self._status_at = status_at
-        self._status_wires: dict[str, bytes] = {}
-        self._status_wires_s = 0.0
+        self._status_wire: bytes | None = None
+        self._status_wire_s = 0.0
 
     def __len__(self) -> int:
         return len(self._clients)
@@ -184,7 +183,7 @@ class Hub:
 
     def announce(self, now_s: float) -> None:
         """The status is another one: give it to everyone who can take it."""
-        self._status_wires.clear()
+        self._status_wire = None
         for client in self._clients:
             client.status_due = True
         self.serve_all(now_s)
@@ -199,9 +198,9 @@ class Hub:
             if client.blocked_since_s is None and now_s >= client.told_s + silence_s:
                 client.status_due = True
 
-    def tell_alarms(self, wires: Mapping[str, bytes], now_s: float) -> None:
-        """The alarms are others: give these frames, by encoding, to everyone who can take them."""
-        self._alarms = wires
+    def tell_alarms(self, wire: bytes, now_s: float) -> None:
+        """The alarms are others: give this frame to everyone who can take it."""
+        self._alarms = wire
         for client in self._clients:
             client.alarms_due = True
         self.serve_all(now_s)
@@ -214,7 +213,7 @@ class Hub:
     def serve(self, client: Client, now_s: float) -> None:
         """Give a client what it lacks, as far as its socket takes it and its rate allows."""
         if client.status_due and client.wants_status:
-            if not self._write(client, self._status_wire(client.encoding, now_s), now_s):
+            if not self._write(client, self._status_at_once(now_s), now_s):
                 return
             client.status_due = False
         if not client.wants_state:
@@ -226,7 +225,7 @@ class Hub:
         if not (client.wants_alarms and client.alarms_due and client.sent_seq):
             return
         if self._alarms is not None:
-            client.alarms_due = not self._write(client, self._alarms[client.encoding], now_s)
+            client.alarms_due = not self._write(client, self._alarms, now_s)
 
     def _serve_state(self, client: Client, now_s: float) -> None:
         frame = self._frame
@@ -261,15 +260,13 @@ class Hub:
         self.clients_dismissed += len(stuck)
         return len(stuck)
 
-    def _status_wire(self, encoding: str, now_s: float) -> bytes:
+    def _status_at_once(self, now_s: float) -> bytes:
         # Written once for all who get it at the same moment, and never kept for later: it tells an
         # age, and who joins a twin long dead must not take its tags for seconds old.
-        if now_s != self._status_wires_s:
-            self._status_wires.clear()
-            self._status_wires_s = now_s
-        if encoding not in self._status_wires:
-            self._status_wires[encoding] = status_frame(self._status_at(now_s), encoding)
-        return self._status_wires[encoding]
+        if self._status_wire is None or now_s != self._status_wire_s:
+            self._status_wire = status_frame(self._status_at(now_s))
+            self._status_wire_s = now_s
+        return self._status_wire
 
     def _write(self, client: Client, wire: bytes, now_s: float) -> bool:
         if not client.connection.can_take:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Final
 
 from lupin_bridge.field.query import plain_number
-from lupin_bridge.stream.frames import CBOR, ENCODINGS, JSON
 
 _SWITCH: Final = {"0": False, "1": True}
 MIN_RATE_HZ: Final = 0.01
@@ -26,7 +25,6 @@ class ListenQuery:
     """How a client wants its frames."""
 
     delta: bool = False
-    encoding: str = JSON
     max_rate_hz: float = math.inf
 
     @property
@@ -35,8 +33,8 @@ class ListenQuery:
         return 1.0 / self.max_rate_hz
 
 
-def parse(parameters: Sequence[tuple[str, str]], subprotocols: Sequence[str] = ()) -> ListenQuery:
-    """Read the query string's (name, value) pairs, and the subprotocols that the client offers.
+def parse(parameters: Sequence[tuple[str, str]]) -> ListenQuery:
+    """Read the query string's (name, value) pairs.
 
     Raises:
         ListenRefused: an unknown or repeated parameter, or a value out of its range.
@@ -44,20 +42,17 @@ def parse(parameters: Sequence[tuple[str, str]], subprotocols: Sequence[str] = (
     """
     values: dict[str, str] = {}
     for name, value in parameters:
-        if name not in ("delta", "encoding", "max_rate_hz"):
+        if name not in ("delta", "max_rate_hz"):
             raise ListenRefused(
-                f"parameter {_shown(name)} is unknown, expected delta, encoding or max_rate_hz"
+                f"parameter {_shown(name)} is unknown, expected delta or max_rate_hz"
             )
         if name in values:
             raise ListenRefused(f"{name} is given more than once, expected one value")
         values[name] = value
-    encoding = values.get("encoding", CBOR if CBOR in subprotocols else JSON)
-    if encoding not in ENCODINGS:
-        raise ListenRefused(f"encoding is {_shown(encoding)}, expected {' or '.join(ENCODINGS)}")
     delta = values.get("delta", "0")
     if delta not in _SWITCH:
         raise ListenRefused(f"delta is {_shown(delta)}, expected 0 or 1")
-    return ListenQuery(_SWITCH[delta], encoding, _rate(values.get("max_rate_hz")))
+    return ListenQuery(_SWITCH[delta], _rate(values.get("max_rate_hz")))
 
 
 def _rate(text: str | None) -> float:

@@ -1,10 +1,8 @@
 """The web contract as types: what each route and each WebSocket frame carries.
 
-Names are those of the ROS messages (`lupin_msgs`), field by field, so that a consumer of the topic
-and a consumer of the web read the same thing; what `/twin/times` tells stands beside them. The
-OpenAPI document and the browser's TypeScript types are generated from here; the bytes themselves
-are written by `state_json` and `field.formats`, and a test holds them against these models.
-
+Names are those of the ROS messages (`lupin_msgs`), whose own fields are always there; beside them
+stands what `/twin/times` says. A field that may be absent says what that means. The OpenAPI
+document and the browser types are generated from here; a test holds the bytes against them.
 Positions are metres in the map frame; numbers that ROS carries as NaN or infinity are null.
 """
 
@@ -64,9 +62,11 @@ class SensorReading(Contract):
 
     name: str
     value: float | None
-    observed_at: Time | None = Field(description="ROS time; null: the twin does not tell")
-    stale_seconds: float | None = Field(
-        description="s since observed_at, as the tag's; null: not known"
+    observed_at: Time | None = Field(
+        default_factory=lambda: None,
+        description="ROS time; null: the twin does not tell; absent: as of the reading before it, "
+        "of the first the tag's last_observed. Its age is stale_seconds of the tag, and what "
+        "last_observed is later",
     )
 
 
@@ -105,17 +105,22 @@ class TwinTagState(Contract):
     flowers: list[FlowerPoint]
     box_footprint: Polygon
     looked_at: Time | None = Field(
-        description="ROS time at which the flowers were last seen; null: never, or not known"
+        default_factory=lambda: None,
+        description="ROS time at which the flowers were last seen; absent: never, or not known",
     )
     last_try: Time | None = Field(
+        default_factory=lambda: None,
         description="ROS time of the latest scan or look, with success or without; null: none, or "
-        "not known"
+        "not known; absent, and so are the next two: it was OK, at last_observed",
     )
     last_try_status: int | None = Field(
+        default_factory=lambda: None,
         description="of the last try, as in lupin_msgs/Observation: 0 OK, 1 unreachable, 2 scan "
-        "failed, 3 skipped; null: as last_try"
+        "failed, 3 skipped; null: as last_try",
     )
-    last_try_detail: str = Field(description="why the last try was not OK, for a person to read")
+    last_try_detail: str = Field(
+        default_factory=str, description="why the last try was not OK, for a person to read"
+    )
 
 
 class TwinState(Contract):
@@ -152,7 +157,9 @@ class TagHealth(Contract):
     """The verdict of a tag: that of its worst reason; healthy: something recent was judged."""
 
     verdict: Literal["critical", "stressed", "unknown", "healthy"]
-    reasons: list[HealthReason] = Field(description="worst first")
+    reasons: list[HealthReason] = Field(
+        default_factory=list, description="worst first; absent: none"
+    )
 
 
 class Day(Contract):
@@ -238,8 +245,7 @@ class DeltaFrame(Contract):
 
     A client that has `base` replaces the `changed` tags, appends those it did not know, in this
     order, and drops the `removed` ones. In an unchanged tag, its age is `header.stamp` less its
-    `last_observed`, and that of a reading less its `observed_at`. A client that skipped a frame
-    gets a full `StateFrame` instead.
+    `last_observed`. A client that skipped a frame gets a full `StateFrame` instead.
     """
 
     type: Literal["delta"]
@@ -271,8 +277,9 @@ class Journal(Contract):
     """How the twin's journal does. Only while it is `recording` is everything kept."""
 
     state: Literal[
-        "unknown", "off", "starting", "recording", "slow", "failing", "in_use", "foreign"
-    ] = Field(description="unknown: the twin does not say")
+        "unknown", "off", "starting", "upgrading", "recording", "slow", "failing", "doubting",
+        "in_use", "foreign",
+    ] = Field(description="unknown: the twin does not say")  # fmt: skip
     detail: str = Field(description="for a person to read")
     set_aside: str = Field(description="the last damaged file, by its new name; empty: none")
     simulated: Stretch | None = Field(
@@ -298,13 +305,15 @@ class StatusFrame(Contract):
         "paused",
         "no_clock",
         "clock_stopped",
+        "clock_doubted",
         "never_seen",
         "stale",
         "thread_dead",
         "shutting_down",
     ] = Field(
         description="paused: simulated time stands, and is told to, the twin is live; no_clock, "
-        "clock_stopped: the twin's time does not run, no age is known, and it counts as offline"
+        "clock_stopped: the twin's time does not run; clock_doubted: it contradicts the journal; "
+        "no age is known then, and the twin counts as offline"
     )
     message: str = Field(description="for a person to read")
     state_age_seconds: float | None = Field(
@@ -314,6 +323,9 @@ class StatusFrame(Contract):
     origin: Literal["unknown", "robot", "simulated", "recorded", "sim_time"] = Field(
         description="where what was observed comes from, as the twin says; sim_time: it goes by "
         "/clock, so from a simulation, or a recording that is played"
+    )
+    input_problems: list[str] = Field(
+        description="why the twin does not hear all that is published for it, with the remedy"
     )
     drops: list[RecentDrop] = Field(description="what the twin did not take in lately, by reason")
     journal: Journal
@@ -357,6 +369,9 @@ class FieldQuality(Contract):
     rmse: float | None = Field(description="sensor's unit; null: no tag could be judged")
     worst: TagError | None
     painted_share: float = Field(description="cells that are known, 0 to 1")
+    far_off_tags: list[str] = Field(
+        description="tags too far from the others for a map: no default box goes as far"
+    )
 
 
 class MapMetaData(Contract):

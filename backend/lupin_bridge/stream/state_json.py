@@ -1,16 +1,14 @@
 """Snapshot to JSON text: the names of the ROS messages, NaN and infinity as null.
 
-Pure. A tag's text is kept until the tag changes, but for its ages, which change in every frame: so
-what is kept is a template with their places, and a frame of thousands of unchanged tags is one
-short formatting each. Readings of one scan are of one age, which is written once.
+Pure. A tag's text is kept until the tag changes, but for its age, which changes in every frame.
+What the web contract has beside the message's own fields is left out where it is as usual, as
+`schema` tells: every browser gets it ten times a second.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 import orjson
 
@@ -20,6 +18,7 @@ from lupin_twin.state import (
     Pose,
     Snapshot,
     TagState,
+    Try,
     age_seconds,
 )
 
@@ -27,35 +26,21 @@ from lupin_twin.state import (
 OWN_TIME: Final = -1
 
 
-@dataclass(frozen=True, slots=True)
-class _Template:
-    """A tag's text with a `%b` for each age; `picks` says which of the ages of `stamps_ns`."""
-
-    tag: TagState
-    text: bytes
-    stamps_ns: tuple[int, ...]
-    picks: tuple[int, ...]
-
-    def at(self, now_ns: int | None, write_age: Callable[[float], bytes], no_age: bytes) -> bytes:
-        """The text as of `now_ns`; None: now is not known, and no age is."""
-        if now_ns is None:
-            return self.text % ((no_age,) * len(self.picks))
-        ages = [write_age(age_seconds(stamp_ns, now_ns)) for stamp_ns in self.stamps_ns]
-        if len(ages) == 1:  # a tag that was scanned, and nothing else since
-            return self.text % tuple(ages * len(self.picks))
-        return self.text % tuple([ages[pick] for pick in self.picks])
+# It cannot occur inside a string: there the quotes of the key would be escaped.
+_NO_AGE: Final = b'"stale_seconds":null'
 
 
 class StateJson:
     """Writes snapshots as JSON and keeps the text of unchanged tags.
 
-    `has_times`: as the web contract has it, with the time and the age of each reading, the last
-    look and the last try; without, as the ROS message has it.
+    `has_times`: as the web contract has it, with the time of each reading, the last look and the
+    last try; without, as the ROS message has it.
     """
 
     def __init__(self, *, has_times: bool = True) -> None:
         self._has_times = has_times
-        self._kept: dict[str, _Template] = {}
+        # What stands before a tag's age and behind it.
+        self._kept: dict[str, tuple[TagState, bytes, bytes]] = {}
 
     def state(self, snapshot: Snapshot, now_ns: int | None = OWN_TIME) -> bytes:
         """The snapshot as JSON of `schema.TwinState`, ages as of `now_ns`, or of its own time.
@@ -70,28 +55,16 @@ class StateJson:
         )
 
     def tag(self, tag: TagState, now_ns: int | None) -> bytes:
-        """One tag as JSON of `schema.TwinTagState`, its ages as of `now_ns` (ROS time, ns)."""
+        """One tag as JSON of `schema.TwinTagState`, its age as of `now_ns` (ROS time, ns)."""
         kept = self._kept.get(tag.tag_id)
-        if kept is None or kept.tag is not tag:
-            kept = self._template(tag)
-            self._kept[tag.tag_id] = kept
-        return kept.at(now_ns, self.write_age, self.null)
-
-    # --- what another encoding writes in another way ----------------------------------------------
-
-    null: ClassVar[bytes] = b"null"
-    # It cannot occur inside a string: there the quotes of the key would be escaped.
-    no_age: ClassVar[bytes] = b'"stale_seconds":null'
-
-    @staticmethod
-    def write(fields: dict[str, Any]) -> bytes:
-        """A tag's fields, NaN and infinity as null."""
-        return orjson.dumps(fields)
-
-    @staticmethod
-    def write_age(stale_seconds: float) -> bytes:
-        """To the millisecond: a browser shows seconds, and short numbers make short frames."""
-        return b"%.3f" % stale_seconds
+        if kept is None or kept[0] is not tag:
+            before, _, behind = orjson.dumps(self._fields(tag)).partition(_NO_AGE)
+            kept = self._kept[tag.tag_id] = tag, before, behind
+        if now_ns is None or tag.last_observed_ns is None:
+            return kept[1] + _NO_AGE + kept[2]
+        # To the millisecond: a browser shows seconds, and short numbers make short frames.
+        age_s = age_seconds(tag.last_observed_ns, now_ns)
+        return b'%b"stale_seconds":%.3f%b' % (kept[1], age_s, kept[2])
 
     def keep_only(self, snapshot: Snapshot) -> None:
         """Forget the tags that are not in it: a restarted twin may know others."""
@@ -99,33 +72,28 @@ class StateJson:
             ids = {tag.tag_id for tag in snapshot.tags}
             self._kept = {tag_id: kept for tag_id, kept in self._kept.items() if tag_id in ids}
 
-    def _template(self, tag: TagState) -> _Template:
-        times = [r.observed_at_ns for r in tag.readings] if self._has_times else []
-        times.append(tag.last_observed_ns)
-        known = [stamp_ns for stamp_ns in times if stamp_ns is not None]
-        stamps_ns = tuple(dict.fromkeys(known))
-        places = iter(times)
-        no_age = self.no_age
-        key = no_age[: -len(self.null)]
-        text, *rest = self.write(self._fields(tag)).replace(b"%", b"%%").split(no_age)
-        for piece in rest:
-            text += (no_age if next(places) is None else key + b"%b") + piece
-        return _Template(tag, text, stamps_ns, tuple(map(stamps_ns.index, known)))
-
     def _fields(self, tag: TagState) -> dict[str, Any]:
         fields = message_fields(tag)
         if not self._has_times:
             return fields
+        last_observed_ns = tag.last_observed_ns or 0
+        usual_ns: int | None = last_observed_ns
         for reading, own in zip(fields["readings"], tag.readings, strict=True):
-            reading["observed_at"] = moment(own.observed_at_ns)
-            reading["stale_seconds"] = None
+            if own.observed_at_ns != usual_ns:
+                usual_ns = own.observed_at_ns
+                reading["observed_at"] = moment(usual_ns)
+        if tag.looked_at_ns is not None:
+            fields["looked_at"] = stamp(tag.looked_at_ns)
         last = tag.last_try
-        return fields | {
-            "looked_at": moment(tag.looked_at_ns),
-            "last_try": None if last is None else moment(last.stamp_ns),
-            "last_try_status": None if last is None else last.status,
-            "last_try_detail": "" if last is None else last.detail,
-        }
+        if last is None:
+            fields |= {"last_try": None, "last_try_status": None, "last_try_detail": ""}
+        elif last != Try(last_observed_ns, 0, ""):
+            fields |= {
+                "last_try": stamp(last.stamp_ns),
+                "last_try_status": last.status,
+                "last_try_detail": last.detail,
+            }
+        return fields
 
 
 def message_fields(tag: TagState) -> dict[str, Any]:
@@ -134,25 +102,25 @@ def message_fields(tag: TagState) -> dict[str, Any]:
     return {
         "tag_id": tag.tag_id,
         "pose": pose(tag.pose),
-        "readings": [{"name": r.name, "value": r.value} for r in tag.readings],
+        "readings": [{"name": r.name, "value": short(r.value)} for r in tag.readings],
         "last_observed": stamp(tag.last_observed_ns or 0),
         "stale_seconds": None,
         "species": flower.species,
-        "species_confidence": flower.confidence,
+        "species_confidence": short(flower.confidence),
         "anomaly": flower.anomaly,
         "flower_count": flower.flower_count,
         "bug_count": flower.bug_count,
         "flowers": [
             {
-                "position": {"x": bloom.x, "y": bloom.y, "z": bloom.z},
-                "height_m": bloom.height_m,
+                "position": point(bloom.x, bloom.y, bloom.z),
+                "height_m": short(bloom.height_m),
                 "species": bloom.species,
-                "confidence": bloom.confidence,
+                "confidence": short(bloom.confidence),
                 "anomaly": bloom.anomaly,
             }
             for bloom in flower.blooms
         ],
-        "box_footprint": {"points": [{"x": x, "y": y, "z": z} for x, y, z in flower.footprint]},
+        "box_footprint": {"points": [point(*corner) for corner in flower.footprint]},
     }
 
 
@@ -161,9 +129,19 @@ def pose(value: Pose | None) -> dict[str, Any]:
     if value is None:
         value = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     return {
-        "position": {"x": value.x, "y": value.y, "z": value.z},
-        "orientation": {"x": value.qx, "y": value.qy, "z": value.qz, "w": value.qw},
+        "position": point(value.x, value.y, value.z),
+        "orientation": {**point(value.qx, value.qy, value.qz), "w": short(value.qw)},
     }
+
+
+def point(x: float, y: float, z: float) -> dict[str, float]:
+    """`schema.Point`."""
+    return {"x": short(x), "y": short(y), "z": short(z)}
+
+
+def short(value: float) -> float:
+    """The same number, which JSON writes without `.0` where it is whole: many are."""
+    return int(value) if float(value).is_integer() and abs(value) < 1e15 else value
 
 
 def stamp(stamp_ns: int) -> dict[str, int]:

@@ -22,6 +22,7 @@ Reason = Literal[
     "paused",
     "no_clock",
     "clock_stopped",
+    "clock_doubted",
     "never_seen",
     "stale",
     "thread_dead",
@@ -32,6 +33,7 @@ _OF_CLOCK: dict[ClockState, Reason] = {
     "paused": "paused",
     "stopped": "clock_stopped",
     "none": "no_clock",
+    "doubted": "clock_doubted",
 }
 
 _MESSAGES: dict[Reason, str] = {
@@ -41,6 +43,8 @@ _MESSAGES: dict[Reason, str] = {
     "Start the simulation, or the twin without use_sim_time.",
     "clock_stopped": "The twin's time has stopped: nothing comes on /clock any more. Ages are not "
     "known. Check the simulation.",
+    "clock_doubted": "The twin's clock contradicts its journal. Ages are not known. Set the clock; "
+    "after ten minutes it is believed as it is.",
     "never_seen": "No twin has been heard yet. Start it, or check ROS_DOMAIN_ID.",
     "stale": "The twin has fallen silent. Check that its process runs and is reachable.",
     "thread_dead": "The bridge's ROS thread has ended. Restart the bridge.",
@@ -63,7 +67,7 @@ class Status:
 
     `twin_count` is how many nodes publish the state topic; more than one is a mistake. `has_map`
     spares a browser requests whose 404 it would show as an error. `origin` is where what the twin
-    observed comes from, as far as it says.
+    observed comes from, as far as it says; `input_problems` is why it does not hear all.
     """
 
     reason: Reason
@@ -74,6 +78,7 @@ class Status:
     journal: Condition = UNKNOWN
     outward: tuple[Outward, ...] = ()
     origin: Origin = "unknown"
+    input_problems: tuple[str, ...] = ()
 
     @property
     def is_live(self) -> bool:
@@ -100,6 +105,7 @@ class Status:
             or _news_of(before.journal) != _news_of(self.journal)
             or before.outward != self.outward
             or before.origin != self.origin
+            or before.input_problems != self.input_problems
         )
 
     def says_more_than(self, before: Status) -> bool:
@@ -116,6 +122,7 @@ class Status:
             "state_age_seconds": None if self.state_age_s is None else round(self.state_age_s, 3),
             "has_map": self.has_map,
             "origin": self.origin,
+            "input_problems": list(self.input_problems),
             "drops": [
                 {"reason": drop.reason, "message": drop.message, "count": drop.count}
                 for drop in self.drops
@@ -167,6 +174,7 @@ class Liveness:
     journal: Condition = UNKNOWN
     outward: tuple[Outward, ...] = ()
     origin: Origin = "unknown"
+    input_problems: tuple[str, ...] = ()
     thread_dead: bool = False
     shutting_down: bool = False
 
@@ -182,6 +190,7 @@ class Liveness:
             self.journal,
             self.outward,
             self.origin,
+            self.input_problems,
         )
 
     def _reason(self, age_s: float | None) -> Reason:

@@ -10,7 +10,7 @@ from concurrent.futures import Future
 from contextlib import aclosing, nullcontext
 from typing import Any, TypeVar
 
-from lupin_bridge.twin.looking import Itself, Question, look_up
+from lupin_bridge.twin.looking import Itself, Question
 from lupin_bridge.twin.names import TwinNames
 from lupin_bridge.twin.past_child import Now
 from lupin_bridge.twin.past_process import PastProcess
@@ -20,7 +20,6 @@ from lupin_bridge.twin.ros_thread import RosThread
 from lupin_bridge.twin.shared import Shared
 from lupin_bridge.twin.source import CacheCounts, RevisedGrid, Told, TwinTimeoutError
 from lupin_bridge.twin.trust import RevisedEstimate, Trust, revised
-from lupin_twin import recent
 from lupin_twin.estimate_report import ADVICE_S, Report, ReportRequest
 from lupin_twin.estimate_service import Task
 from lupin_twin.estimates import EstimateRequest, TagPast
@@ -28,8 +27,8 @@ from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldJob, FieldRequest, FieldRules
 from lupin_twin.grid import FieldGrid
 from lupin_twin.history import TagHistory
-from lupin_twin.journal.condition import Condition, JournalState
-from lupin_twin.journal.series import SERIES_S
+from lupin_twin.journal.condition import Condition
+from lupin_twin.journal.queries import SERIES_S
 from lupin_twin.journal.writes import WRITES_S
 from lupin_twin.node import TwinNode
 from lupin_twin.past import NotRemembered, PastRow, SeriesPast, SeriesRequest
@@ -88,6 +87,7 @@ class LocalTwin:
                         journal=node.memory.condition,
                         rules=node.fields.rules,
                         origin=node.origin,
+                        input_problems=node.habits.input_problems,
                     )
                 )
 
@@ -106,15 +106,10 @@ class LocalTwin:
             make_node, ros_args=self._ros_args, on_event=on_told, on_death=on_death
         )
         await self._thread.start()
-        self._rules, self._names, keeps_none = await self._thread.call(
-            lambda node: (
-                node.fields.rules,
-                names_of(node),
-                node.memory.condition.state is JournalState.OFF,
-            )
+        self._rules, self._names = await self._thread.call(
+            lambda node: (node.fields.rules, names_of(node))
         )
-        if not keeps_none:
-            self.past.start()
+        self.past.start()
 
     async def stop(self) -> None:
         """Stop the ROS thread, the workers and the process that looks back."""
@@ -199,40 +194,22 @@ class LocalTwin:
         return await self._in_time(self._thread.call(lambda node: node.history_of(tag_id)))
 
     async def ask(self, question: Question[ResultT], cost_s: float) -> ResultT:
-        """Answered in a process of its own; without a journal here, of what memory holds.
+        """Answered in a process of its own.
 
         What is observed within the journal's 100 ms may be missing.
         """
-        if self._has_journal:
-            return await self._in_time(self.past.ask(question, self._now(), cost_s))
-        return await self._in_time(look_up(question, self, self.workers))
+        return await self._in_time(self.past.ask(question, self._now(), cost_s))
 
     async def state_at(self, at_ns: int) -> Snapshot:
-        """The journal's answer.
-
-        Raises:
-            NotRemembered: there is none.
-
-        """
-        if not self._has_journal:
-            raise NotRemembered(recent.NO_JOURNAL, is_lasting=True)
+        """The journal's answer."""
         return await self.ask(Itself(at_ns), 0.0)
 
     async def series(self, request: SeriesRequest) -> SeriesPast:
-        """The journal's answer, as of now; without a journal, what memory holds."""
-        if not self._has_journal:
-            return await self._in_time(self._recent(request, self._now_ns))
+        """The journal's answer, as of now."""
         return await self.ask(Itself(request), SERIES_S)
 
     async def writes(self, request: WritesRequest) -> PastWrites:
-        """The journal's rows; what was heard within its 100 ms may be missing.
-
-        Raises:
-            NotRemembered: there is none.
-
-        """
-        if not self._has_journal:
-            raise NotRemembered(recent.NO_JOURNAL, is_lasting=True)
+        """The journal's rows; what was heard within its 100 ms may be missing."""
         return await self.ask(Itself(request), WRITES_S)
 
     async def rows(
@@ -244,8 +221,6 @@ class LocalTwin:
         write: Callable[[Sequence[PastRow]], ResultT],
     ) -> AsyncIterator[ResultT]:
         """Read a stretch when the last one was taken; what nobody takes is not read."""
-        if not self._has_journal:
-            raise NotRemembered(recent.NO_JOURNAL, is_lasting=True)
         query = start_ns, end_ns, tag_id, sensor_type
         async with aclosing(self.past.rows(query, write, self._now)) as lots:
             while True:
@@ -255,16 +230,6 @@ class LocalTwin:
                     return
                 yield lot
 
-    async def _recent(self, request: SeriesRequest, now_ns: int) -> SeriesPast:
-        recent.check_known(request)
-        histories = await self._thread.call(lambda node: node.history.all_later())
-        return await asyncio.wrap_future(
-            self.workers.submit(
-                lambda _: recent.series(request, histories(), now_ns),
-                len(self._told.snapshot.tags) * RECENT_S_PER_TAG,
-            )
-        )
-
     @property
     def _now_ns(self) -> int:
         """ROS time now: what was told last may be a heartbeat old."""
@@ -272,10 +237,6 @@ class LocalTwin:
         if now.clock != "running":
             return now.stamp_ns
         return now.stamp_ns + int((time.monotonic() - self._told.made_s) * NANOSECONDS_PER_SECOND)
-
-    @property
-    def _has_journal(self) -> bool:
-        return self._told.journal.state is not JournalState.OFF
 
     def _now(self) -> Now:
         told = self._told

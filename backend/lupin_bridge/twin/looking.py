@@ -7,14 +7,12 @@ the last of that what is left to do. Who drives it knows the past: over a journa
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Any, Final, Generic, Protocol, TypeVar
 
 from lupin_twin.past import NotRemembered, SeriesPast, SeriesRequest
 from lupin_twin.past_writes import WritesRequest
-from lupin_twin.recent import NO_JOURNAL
 from lupin_twin.state import Snapshot
 from lupin_twin.workers import ShouldStop, Workers
 
@@ -68,6 +66,8 @@ class Itself:
 
 async def look_up(question: Question[ResultT], past: Past, workers: Workers) -> ResultT:
     """Answer a question here; its work is done on a worker."""
+    import asyncio  # noqa: PLC0415  # `past_child` has no use for it, and it is 3 MB
+
     looking = question.look()
     try:
         need = next(looking)
@@ -75,7 +75,7 @@ async def look_up(question: Question[ResultT], past: Past, workers: Workers) -> 
             if isinstance(need, SeriesRequest):
                 need = looking.send(await past.series(need))
             elif isinstance(need, WritesRequest):
-                raise NotRemembered(NO_JOURNAL, is_lasting=True)
+                raise NotRemembered("what was heard is asked of the journal", is_lasting=True)
             else:
                 need = looking.send(await past.state_at(need))
     except StopIteration as end:

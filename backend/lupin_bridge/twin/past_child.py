@@ -24,10 +24,10 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from lupin_bridge.twin.looking import WRITE_ROW_S, Question, Work
-from lupin_twin.journal.asof import state_at
-from lupin_twin.journal.condition import OFF, Condition
+from lupin_twin.journal.condition import UNKNOWN, Condition
 from lupin_twin.journal.export import Export, lots
-from lupin_twin.journal.series import series
+from lupin_twin.journal.fold import state_at
+from lupin_twin.journal.queries import series
 from lupin_twin.journal.writes import writes
 from lupin_twin.past import NotRemembered, PastRow, SeriesRequest, check_moment
 from lupin_twin.past_writes import WritesRequest
@@ -203,7 +203,7 @@ class Child:
     def __init__(self, peer: socket.socket) -> None:
         self._peer = peer
         self._sending = threading.Lock()
-        self._condition = OFF
+        self._condition = UNKNOWN
         self._recall = Recall(lambda: self._condition)
         self._workers = Workers("answer")
         self._states = _States()

@@ -101,7 +101,7 @@ class PastProcess:
         self._refuse_all()
 
     async def ask(self, question: Question[AnswerT] | Step, now: Now, cost_s: float) -> AnswerT:
-        """The answer; `cost_s` estimates what looking it up takes, s of one core.
+        """The answer; `cost_s` estimates all that it takes, s of one core.
 
         Raises:
             NotRemembered: it has died, or too much is asked.
@@ -209,6 +209,7 @@ class PastProcess:
             otherwise.callback(ours.close)
             process = await asyncio.create_subprocess_exec(
                 sys.executable,
+                "-P",
                 "-c",
                 _MAIN,
                 str(its.fileno()),

@@ -57,7 +57,8 @@ class Told:
     was told (monotonic clock). `counts` is what the twin dropped, lost and met; None: it does not
     say. `own_counts` is the same of a node of ours that is not the twin; `cache` is that of a twin
     in this process, and `rules` are its own; `journal` is the twin's, wherever it is, as far as
-    that tells, and so is `origin`, where its observations come from.
+    that tells, and so are `origin`, where its observations come from, and `input_problems`, why it
+    does not hear all of what is published for it.
     """
 
     snapshot: Snapshot
@@ -70,6 +71,7 @@ class Told:
     journal: Condition = UNKNOWN
     rules: FieldRules | None = None
     origin: Origin = "unknown"
+    input_problems: tuple[str, ...] = ()
     made_s: float = field(default_factory=time.monotonic, compare=False)
 
     @property
@@ -184,7 +186,7 @@ class TwinSource(Protocol):
     # --- the past; each may raise `PastRefused`, `NotRemembered` or `TwinUnavailableError` --------
 
     async def ask(self, question: Question[ResultT], cost_s: float) -> ResultT:
-        """The answer to a question; `cost_s` estimates what looking it up takes, s of one core."""
+        """The answer to a question; `cost_s` estimates all that it takes, s of one core."""
 
     async def series(self, request: SeriesRequest) -> SeriesPast:
         """Readings of one sensor of one tag, or events, as they were or in buckets."""

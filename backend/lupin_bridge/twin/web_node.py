@@ -115,7 +115,7 @@ def _digest_of_publishers(publishers: Iterable[Any]) -> str:
 class WebNode(AdjustableNode):
     """Follows `/twin/state` with its `/twin/times`, and `/map`, and asks the twin's services.
 
-    Of `/diagnostics`, which all nodes of a domain share, it takes what the node says of itself that
+    Of `/diagnostics`, which all nodes of a domain share, it takes what the twin says of itself that
     publishes this state, and nothing else.
 
     `on_state(snapshot)` is called for each state, once its times are there. Its tags are the very
@@ -154,8 +154,6 @@ class WebNode(AdjustableNode):
         self._newest: Snapshot | None = None
         self._pairing = Pairing()
         self._stamp_watch = StampWatch()
-        self._twin_names: frozenset[str] = frozenset()
-        self._reporter = ""
         self._report = SelfReport()
         self._reported_s = -math.inf
         self._digests: dict[str, tuple[TagState, bytes]] = {}
@@ -184,7 +182,7 @@ class WebNode(AdjustableNode):
             depth=50,
             group=group,
             callback=self._take_diagnostics,
-            is_wanted=lambda data: any(name.encode() in data for name in self._twin_names),
+            is_wanted=lambda data: self._topics["state_topic"].encode() in data,
         )
         with naming("field_service_name", p.field_service_name):
             self.clients_of_twin = {
@@ -245,6 +243,11 @@ class WebNode(AdjustableNode):
     def origin(self) -> Origin:
         """Where the twin says that its observations come from."""
         return self._self_report(time.monotonic()).origin
+
+    @property
+    def input_problems(self) -> tuple[str, ...]:
+        """Why the twin says that it does not hear all."""
+        return self._self_report(time.monotonic()).input_problems
 
     def offers(self, service: Service) -> bool:
         """Whether a twin offers it now."""
@@ -325,9 +328,6 @@ class WebNode(AdjustableNode):
     def _look_at_publishers(self) -> None:
         topic = self._topics["state_topic"]
         publishers = self.get_publishers_info_by_topic(topic)
-        self._twin_names = frozenset(
-            f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in publishers
-        )
         publishers_digest = _digest_of_publishers(publishers)
         if publishers_digest != self.publishers_digest:
             self.publishers_digest = publishers_digest
@@ -358,11 +358,10 @@ class WebNode(AdjustableNode):
 
     def _take_diagnostics(self, msg: Any) -> None:
         # Told with the next state, like the map: a twin that publishes none is none to show.
-        for name in self._twin_names:
-            said = list(findings_of(msg, name))
-            if said:
-                self._reporter, self._report = name, self_report(said)
-                self._reported_s = time.monotonic()
+        said = list(findings_of(msg, self._topics["state_topic"]))
+        if said:
+            self._report = self_report(said)
+            self._reported_s = time.monotonic()
 
     def _adjust(self, now: TwinParameters) -> None:
         # A twin's own are not on the wire: they are set here as there.
@@ -381,7 +380,7 @@ class WebNode(AdjustableNode):
     def _self_report(self, now_s: float) -> SelfReport:
         """What the twin that is followed said of itself lately."""
         is_recent = now_s - self._reported_s < REPORT_HOLDS_S
-        return self._report if is_recent and self._reporter in self._twin_names else SelfReport()
+        return self._report if is_recent else SelfReport()
 
     def _digest_of(self, tags: Sequence[TagState]) -> str:
         total = blake2b(digest_size=12)

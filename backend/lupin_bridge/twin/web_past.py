@@ -19,7 +19,6 @@ from lupin_twin.past import (
     EVERY_TAG,
     HOUR_NS,
     MAX_POINTS,
-    SLOT_NS,
     Event,
     Grid,
     SeriesPast,
@@ -161,15 +160,14 @@ class WebPast:
 def grids_of(entries: Entries, start_ns: int, asked: SeriesRequest) -> list[Grid]:
     """The buckets that a twin may have divided a period into, the shorter ones first.
 
-    Where scans are given up, or too many, readings are told by the hour and events by the slot.
+    Where scans are deleted, or too many, they are told by the hour.
 
     Raises:
         TwinUnavailableError: none that fits.
 
     """
-    counted_ns = HOUR_NS if asked.event is None else SLOT_NS
     found: list[Grid] = []
-    for least_ns in (0, counted_ns):
+    for least_ns in (0, HOUR_NS):
         told = grid(start_ns, asked.end_ns, asked.max_points, least_ns)
         if told not in found and all(
             told.start_ns <= at_ns < told.end_ns and (at_ns - told.start_ns) % told.bucket_ns == 0

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import time
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Coroutine, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from hashlib import blake2b
@@ -50,6 +51,8 @@ ResultT = TypeVar("ResultT")
 MAX_REQUESTS = 4
 
 SERVICE_LOOK_S = 0.02
+# How often who waits for an answer looks whether the twin has fallen silent.
+SILENCE_LOOK_S: Final = 0.2
 
 # What reading a cell of an answer takes, roughly and at worst.
 _READ_CELL_S: Final = 10e-9
@@ -57,11 +60,17 @@ _READ_TAG_S: Final = 20e-6
 
 
 class WebTwin:
-    """`TwinSource` over the ROS contracts of a twin in another process."""
+    """`TwinSource` over the ROS contracts of a twin in another process.
 
-    def __init__(self, *, ros_args: Sequence[str], timeout_s: float) -> None:
+    One that was heard, and then for `stale_after_s` no more, is asked nothing.
+    """
+
+    def __init__(
+        self, *, ros_args: Sequence[str], timeout_s: float, stale_after_s: float = math.inf
+    ) -> None:
         self._ros_args = ros_args
         self._timeout_s = timeout_s
+        self._stale_after_s = stale_after_s
         self._thread: RosThread[WebNode, _Heard]
         self._heard = _Heard()
         self._rules: FieldRules
@@ -83,6 +92,8 @@ class WebTwin:
         self._slots = asyncio.Semaphore(MAX_REQUESTS)
         # One way is left to the small, which would wait behind the large otherwise.
         self._large_slots = asyncio.Semaphore(MAX_REQUESTS - 1)
+        # A large question of the past asks for one small thing after the other: so of those too.
+        self._large_questions = asyncio.Semaphore(MAX_REQUESTS - 1)
 
     async def start(self, on_state: Callable[[Told], None], on_death: Callable[[], None]) -> None:
         """Start the ROS thread with its node; see `TwinSource.start`."""
@@ -101,6 +112,7 @@ class WebTwin:
                     node.habits.counts(),
                     journal=node.journal,
                     origin=node.origin,
+                    input_problems=node.input_problems,
                 )
                 post_all()
 
@@ -188,9 +200,10 @@ class WebTwin:
         """The last scans and tries of a tag, as far as they were seen from here."""
         return await self._thread.call(lambda node: node.history_of(tag_id))
 
-    async def ask(self, question: Question[ResultT], cost_s: float) -> ResultT:  # noqa: ARG002  # the twin's
+    async def ask(self, question: Question[ResultT], cost_s: float) -> ResultT:
         """Answered here, of the answers of the twin's services; the same are asked once."""
-        return await look_up(question, self._past, self.workers)
+        async with self._large_questions if cost_s > SMALL_S else nullcontext():
+            return await look_up(question, self._past, self.workers)
 
     async def series(self, request: SeriesRequest) -> SeriesPast:
         """The answer of the twin's `get_history`; identical questions in flight are asked once."""
@@ -289,15 +302,38 @@ class WebTwin:
         lane = self._large_slots if cost_s > SMALL_S else nullcontext()
         try:
             async with asyncio.timeout(self._timeout_s), lane, self._slots:
+                self._check_heard()
                 await self._find(service)
-                return await self._thread.ask(
-                    lambda node: node.ask(service, request),
-                    lambda node, future: node.forget(service, future),
+                return await self._while_heard(
+                    self._thread.ask(
+                        lambda node: node.ask(service, request),
+                        lambda node, future: node.forget(service, future),
+                    )
                 )
         except TimeoutError:
             raise TwinTimeoutError(
                 f"the twin did not answer within {self._timeout_s:g} s (field_timeout_s)"
             ) from None
+
+    def _check_heard(self) -> None:
+        # DDS offers the services of a twin that was killed for another twenty seconds.
+        told = self._heard.told
+        if told is not None and time.monotonic() - told.made_s >= self._stale_after_s:
+            raise TwinUnavailableError(
+                f"nothing was heard on {self._names.state_topic} for {self._stale_after_s:g} s: "
+                "is the twin running?"
+            )
+
+    async def _while_heard(self, answer: Coroutine[Any, Any, Any]) -> Any:
+        asking = asyncio.create_task(answer)
+        try:
+            while not asking.done():
+                self._check_heard()
+                await asyncio.wait((asking,), timeout=SILENCE_LOOK_S)
+            return asking.result()
+        finally:
+            asking.cancel()
+            await asyncio.wait((asking,))
 
     async def _ask_once(self, epoch: int, request: FieldRequest) -> RevisedGrid:
         response = await self._ask(

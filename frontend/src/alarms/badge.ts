@@ -1,6 +1,5 @@
-/** The page's icon says how many alarms call for somebody, and how bad the worst is. */
+/** The page's icon says how many alarms are active, and how bad the worst is. */
 import type { Verdict } from '../contract/types';
-import { calling } from './list';
 import { alarmList } from './watch';
 
 /** The browser's bar of tabs follows no theme of ours: white on these is legible on any. */
@@ -30,7 +29,7 @@ export function startBadge(): () => void {
   if (!link) return () => undefined;
   const own = link.getAttribute('href') ?? '';
   const update = (): void => {
-    const items = calling(alarmList.get());
+    const items = alarmList.get().active;
     const href = badgeOf(items.length, items[0]?.verdict ?? 'unknown') ?? own;
     if (link.getAttribute('href') !== href) link.setAttribute('href', href);
   };

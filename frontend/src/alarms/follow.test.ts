@@ -2,11 +2,10 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { onMapCommand } from '../map/commands';
 import { act, receive, store } from '../store/app';
-import { NOT_ASKED } from '../store/twin';
 import { alarm, tellAlarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
-import { followAlarm, periodWith } from './follow';
+import { goToStart, periodWith, showAlarm } from './follow';
 import { NOTHING_KEPT } from './kept';
 import { calling } from './list';
 import { own } from './own';
@@ -52,40 +51,43 @@ describe('follow', () => {
     for (const stop of stops) stop();
     vi.restoreAllMocks();
   });
-  const follow = (): void => {
-    const [item] = calling(alarmList.get());
-    if (!item) throw new Error('no alarm');
-    followAlarm(item);
-  };
 
-  test('leads to its tag, its sensor and its moment, and counts as seen', () => {
-    tellAlarms({
-      ...alarm('a', { tag_id: '5', reason: { sensor: 'co2' } }),
-      raised_at: { sec: 9_000, nanosec: 1_200_001 },
-    });
+  test('an alarm leads to its tag and sensor as they are now, and is not acknowledged by that', () => {
+    const co2 = alarm('a', { tag_id: '5', raised: 9_000, reason: { sensor: 'co2' } });
+    tellAlarms(co2);
     act({ type: 'compare', compare: { by: 'ago', seconds: 60 } });
-    follow();
+    act({ type: 'moment', moment: 9_100 });
+    showAlarm(co2);
     const { view } = store.get();
-    // No earlier than the observation that raised it.
-    expect(view).toMatchObject({ moment: 9_000.002, selected: '5', sensor: 'co2', pane: 'map' });
-    expect(view).toMatchObject({ period: { kind: 'day' }, chart: null, compare: null });
+    expect(view).toMatchObject({ moment: null, selected: '5', sensor: 'co2', pane: 'map' });
+    expect(view).toMatchObject({ chart: null, compare: null });
     expect(commands).toEqual([{ type: 'show', tagId: '5' }]);
-    expect(calling(alarmList.get())).toEqual([]);
+    expect(calling(alarmList.get())).toHaveLength(1);
   });
 
-  test('of the house to its moment alone; without a memory to now', () => {
+  test('its start is the moment of the observation that raised it, and no earlier', () => {
+    const co2 = {
+      ...alarm('a', { tag_id: '5', reason: { sensor: 'co2' } }),
+      raised_at: { sec: 9_000, nanosec: 1_200_001 },
+    };
+    goToStart(co2);
+    const { view } = store.get();
+    expect(view).toMatchObject({ moment: 9_000.002, selected: '5', sensor: 'co2' });
+    expect(view.period).toEqual({ kind: 'day' });
+    expect(commands).toEqual([{ type: 'show', tagId: '5' }]);
+  });
+
+  test('of the greenhouse it leads to the moment alone; there is none that has not come yet', () => {
     act({ type: 'select', tagId: '1' });
-    tellAlarms(alarm('a', { tag_id: '', raised: 9_500, reason: { kind: 'silent', sensor: '' } }));
-    follow();
+    const silent = { kind: 'silent', sensor: '' } as const;
+    goToStart(alarm('a', { tag_id: '', raised: 9_500, reason: silent }));
     expect(store.get().view).toMatchObject({
       moment: 9_500,
       selected: null,
       sensor: 'temperature',
     });
     expect(commands).toEqual([]);
-    receive({ type: 'remembered', remembered: { ...NOT_ASKED, state: 'off' } });
-    tellAlarms(alarm('b', { raised: 9_500 }));
-    follow();
-    expect(store.get().view).toMatchObject({ moment: null, selected: '1' });
+    goToStart(alarm('b', { raised: 99_000 }));
+    expect(store.get().view.moment).toBe(9_500);
   });
 });

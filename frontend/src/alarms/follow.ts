@@ -1,12 +1,12 @@
-/** The way from an alarm to its tag on the map and its moment on the time bar. */
+/** The ways from an alarm: to its tag as it is now, and to the moment when it began. */
 import { now } from '../clock';
+import type { Alarm } from '../contract/types';
 import { spanOf, type Period } from '../domain/period';
 import { secondsOf } from '../domain/rostime';
 import { commandMap } from '../map/commands';
 import { act, store } from '../store/app';
 import { rosNow } from '../store/moment';
-import type { Item } from './list';
-import { seeAlarms } from './own';
+import type { ViewState } from '../store/view';
 
 /** Of the bar, what lies before the moment: how it came to it is to be seen as well. */
 const LEAD = 0.1;
@@ -28,28 +28,34 @@ export function periodWith(
   return fitting ?? { kind: 'own', from: Math.max(0, at - DAY_S / 2), to: at + DAY_S / 2 };
 }
 
-/** Leads there, and counts as seen: whoever goes there has seen it. */
-export function followAlarm(item: Item): void {
-  const { alarm } = item;
-  const { view, twin } = store.get();
+/** Shows the tag as it is now. */
+export const showAlarm = (alarm: Alarm): void => {
+  look(alarm, { moment: null });
+};
+
+/** Shows the moment when it began. */
+export function goToStart(alarm: Alarm): void {
   const nowS = rosNow(store.get(), now());
-  const { sensor } = alarm.reason;
+  const { period } = store.get().view;
+  const oldest = store.get().twin.remembered.value?.reach?.from ?? null;
   // To the millisecond that holds the observation, and not to the one before it.
   const at = Math.ceil(secondsOf(alarm.raised_at) * 1000) / 1000;
-  const canLookBack = nowS !== null && at <= nowS && twin.remembered.state !== 'off';
-  const oldest = twin.remembered.value?.reach?.from ?? null;
+  if (nowS === null || at > nowS) return;
+  look(alarm, { moment: at, period: periodWith(period, at, nowS, oldest) });
+}
+
+function look(alarm: Alarm, when: Partial<Pick<ViewState, 'moment' | 'period'>>): void {
+  const { view } = store.get();
   act({
     type: 'look',
     view: {
-      moment: canLookBack ? at : null,
-      period: canLookBack ? periodWith(view.period, at, nowS, oldest) : view.period,
+      ...when,
       selected: alarm.tag_id || null,
-      sensor: sensor || view.sensor,
+      sensor: alarm.reason.sensor || view.sensor,
       chart: null,
       compare: null,
       pane: 'map',
     },
   });
   if (alarm.tag_id !== '') commandMap({ type: 'show', tagId: alarm.tag_id });
-  seeAlarms([item]);
 }

@@ -5,14 +5,14 @@ import {
   FORGET_MS,
   isKept,
   isShelfHeld,
-  LONGEST_SHELF_MS,
-  markSeen,
-  MOST_SEEN,
+  acknowledge,
+  MOST_ACKNOWLEDGED,
   MOST_SHELVED,
   nextEnd,
   NOTHING_KEPT,
   pruned,
   readKept,
+  shelfMinutes,
   shelve,
   unshelve,
   whatOf,
@@ -34,9 +34,9 @@ const through = (kept: Kept): Kept => {
   return readKept({ getItem: () => text });
 };
 
-test('what was seen, put aside and wished for comes back after a reload', () => {
-  const seen = markSeen({ ...NOTHING_KEPT, sound: true }, [rated('a', 'critical')], AT);
-  const kept = shelve(seen, rated('b'), AT + 900_000);
+test('what was acknowledged, shelved and wished for comes back after a reload', () => {
+  const acknowledged = acknowledge({ ...NOTHING_KEPT, sound: true }, [rated('a', 'critical')], AT);
+  const kept = shelve(acknowledged, rated('b'), AT + 900_000, 'fan off');
   expect(through(kept)).toEqual(kept);
   expect(through(unshelve(kept, rated('b').alarm)).shelved.size).toBe(0);
 });
@@ -47,8 +47,9 @@ test.each([
   '{',
   'null',
   '7',
-  '{"seen":7,"shelved":{}}',
-  '{"seen":[7,["a"],["a","pink",1],["a","critical",null],[1,"critical",1]],"sound":1}',
+  '{"acknowledged":7,"shelved":{}}',
+  '{"acknowledged":[7,["a"],["a","pink",1],["a","critical",null],[1,"critical",1]],"sound":1}',
+  '{"shelved":[["a","stressed",1,7]]}',
 ])('%j counts as nothing kept', (text) => {
   expect(readKept({ getItem: () => text })).toEqual(NOTHING_KEPT);
 });
@@ -67,39 +68,41 @@ test('a full storage does no harm', () => {
 describe('bounds', () => {
   test('no more is kept than the limit, and the oldest goes first', () => {
     const listed = new Set<string>();
-    const full = markSeen(NOTHING_KEPT, many(MOST_SEEN), AT);
+    const full = acknowledge(NOTHING_KEPT, many(MOST_ACKNOWLEDGED), AT);
     expect(pruned(full, listed, AT)).toBe(full);
-    const over = pruned(markSeen(full, [rated('new')], AT), listed, AT);
-    expect(over.seen.size).toBe(MOST_SEEN);
-    expect([over.seen.has('a0'), over.seen.has('a1'), over.seen.has('new')]).toEqual([
-      false,
-      true,
-      true,
-    ]);
-    // Seen once more it is the newest.
-    expect(pruned(markSeen(full, [rated('a0'), rated('new')], AT), listed, AT).seen.has('a0')).toBe(
-      true,
-    );
+    const over = pruned(acknowledge(full, [rated('new')], AT), listed, AT);
+    expect(over.acknowledged.size).toBe(MOST_ACKNOWLEDGED);
+    expect([
+      over.acknowledged.has('a0'),
+      over.acknowledged.has('a1'),
+      over.acknowledged.has('new'),
+    ]).toEqual([false, true, true]);
+    // Acknowledged once more it is the newest.
+    expect(
+      pruned(acknowledge(full, [rated('a0'), rated('new')], AT), listed, AT).acknowledged.has('a0'),
+    ).toBe(true);
   });
 
   test('nor more shelves, nor more than that from a storage', () => {
     const aside = many(MOST_SHELVED + 1).reduce(
-      (kept, each) => shelve(kept, each, AT + 1_000),
+      (kept, each) => shelve(kept, each, AT + 1_000, ''),
       NOTHING_KEPT,
     );
     expect(pruned(aside, new Set(), AT).shelved.size).toBe(MOST_SHELVED);
     expect(through(aside).shelved.size).toBe(MOST_SHELVED);
-    expect(through(markSeen(NOTHING_KEPT, many(MOST_SEEN + 1), AT)).seen.size).toBe(MOST_SEEN);
+    expect(
+      through(acknowledge(NOTHING_KEPT, many(MOST_ACKNOWLEDGED + 1), AT)).acknowledged.size,
+    ).toBe(MOST_ACKNOWLEDGED);
   });
 
-  test('what was seen long ago is forgotten, unless it is still listed', () => {
-    const kept = markSeen(NOTHING_KEPT, [rated('a'), rated('b')], AT);
+  test('what was acknowledged long ago is forgotten, unless it is still listed', () => {
+    const kept = acknowledge(NOTHING_KEPT, [rated('a'), rated('b')], AT);
     expect(pruned(kept, new Set(), AT + FORGET_MS - 1)).toBe(kept);
-    expect([...pruned(kept, new Set(['b']), AT + FORGET_MS).seen.keys()]).toEqual(['b']);
+    expect([...pruned(kept, new Set(['b']), AT + FORGET_MS).acknowledged.keys()]).toEqual(['b']);
   });
 
   test('a shelf ends by itself, at its very moment', () => {
-    const kept = shelve(NOTHING_KEPT, rated('a'), AT + 1_000);
+    const kept = shelve(NOTHING_KEPT, rated('a'), AT + 1_000, '');
     expect(pruned(kept, new Set(), AT + 999)).toBe(kept);
     expect(pruned(kept, new Set(), AT + 1_000).shelved.size).toBe(0);
     expect(nextEnd(kept, AT)).toBe(AT + 1_000);
@@ -108,7 +111,7 @@ describe('bounds', () => {
 });
 
 test('a shelf holds until it ends, or the alarm gets worse', () => {
-  const shelf = { verdict: 'stressed', until: AT + 1_000 } as const;
+  const shelf = { verdict: 'stressed', until: AT + 1_000, reason: '' } as const;
   expect(isShelfHeld(shelf, 'stressed', AT)).toBe(true);
   expect(isShelfHeld(shelf, 'stressed', AT + 1_000)).toBe(false);
   expect(isShelfHeld(shelf, 'critical', AT)).toBe(false);
@@ -116,9 +119,19 @@ test('a shelf holds until it ends, or the alarm gets worse', () => {
 });
 
 test('a clock that is set back makes no shelf longer than any', () => {
-  const shelf = { verdict: 'stressed', until: AT + LONGEST_SHELF_MS } as const;
+  const shelf = { verdict: 'stressed', until: AT + 480 * 60_000, reason: '' } as const;
   expect(isShelfHeld(shelf, 'stressed', AT)).toBe(true);
   expect(isShelfHeld(shelf, 'stressed', AT - 1)).toBe(false);
+});
+
+test('a critical alarm is shelved for an hour at most, whatever the storage says', () => {
+  expect(Math.max(...shelfMinutes('critical'))).toBe(60);
+  expect(shelfMinutes('stressed')).toContain(480);
+  const shelf = { verdict: 'critical', until: AT + 3_600_000, reason: 'x' } as const;
+  expect(isShelfHeld(shelf, 'critical', AT)).toBe(true);
+  expect(isShelfHeld(shelf, 'critical', AT - 1)).toBe(false);
+  const text = JSON.stringify({ shelved: [['a', 'critical', AT + 28_800_000, 'x']] });
+  expect(pruned(readKept({ getItem: () => text }), new Set(), AT).shelved.size).toBe(0);
 });
 
 test('too cold is not too warm, here is not there, and the next time is the same again', () => {

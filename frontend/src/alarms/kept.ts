@@ -1,37 +1,46 @@
 /**
- * What this browser keeps about alarms: which were seen, which are put aside, and whether it may
- * make itself heard. Nothing of it goes to a server. Pure; moments are ms since the epoch.
+ * What this browser keeps about alarms: which are acknowledged, which are shelved, and whether it
+ * may make itself heard. Nothing of it goes to a server. Pure; moments are ms since the epoch.
  */
 import type { Alarm, Verdict } from '../contract/types';
 import { isOfRange, sideOf, VERDICTS } from '../domain/health';
 
 /** More than any list has; the oldest go first. */
-export const MOST_SEEN = 1_000;
+export const MOST_ACKNOWLEDGED = 1_000;
 export const MOST_SHELVED = 200;
-/** What was seen and is listed no more is forgotten after this long, ms. */
+/** What was acknowledged and is listed no more is forgotten after this long, ms. */
 export const FORGET_MS = 7 * 86_400_000;
-/** Nothing is put aside for longer, ms. */
-export const LONGEST_SHELF_MS = 8 * 3_600_000;
+/** For how long an alarm can be shelved, minutes: a critical one not as long. */
+export const shelfMinutes = (verdict: Verdict): readonly number[] =>
+  verdict === 'critical' ? [15, 60] : [15, 60, 480];
 
-/** For how long an alarm can be put aside, minutes. */
-export const SHELF_MINUTES = [15, 60, 480] as const;
+/** Nothing is shelved for longer, ms. */
+const longestShelfMs = (verdict: Verdict): number => Math.max(...shelfMinutes(verdict)) * 60_000;
 
-export interface Seen {
-  /** How bad it was when it was seen. */
+/** A reason is a short one, characters. */
+export const LONGEST_REASON = 120;
+
+/** Nobody shelves a critical alarm by the way: it takes a word why. */
+export const needsReason = (verdict: Verdict): boolean => verdict === 'critical';
+
+export interface Acknowledgement {
+  /** How bad it was when it was acknowledged. */
   readonly verdict: Verdict;
-  /** When it was seen. */
+  /** When it was acknowledged. */
   readonly at: number;
 }
 
 export interface Shelf {
-  /** How bad it was when it was put aside. */
+  /** How bad it was when it was shelved. */
   readonly verdict: Verdict;
   readonly until: number;
+  /** In the operator's words; may be empty. */
+  readonly reason: string;
 }
 
 export interface Kept {
   /** By the alarm's id. */
-  readonly seen: ReadonlyMap<string, Seen>;
+  readonly acknowledged: ReadonlyMap<string, Acknowledgement>;
   /** By `whatOf`: an alarm that comes back is as unwelcome as before. */
   readonly shelved: ReadonlyMap<string, Shelf>;
   readonly sound: boolean;
@@ -39,7 +48,7 @@ export interface Kept {
 }
 
 export const NOTHING_KEPT: Kept = {
-  seen: new Map(),
+  acknowledged: new Map(),
   shelved: new Map(),
   sound: false,
   notify: false,
@@ -59,20 +68,26 @@ export interface Rated {
   readonly verdict: Verdict;
 }
 
-export function markSeen(kept: Kept, alarms: readonly Rated[], at: number): Kept {
-  const seen = new Map(kept.seen);
+export function acknowledge(kept: Kept, alarms: readonly Rated[], at: number): Kept {
+  const acknowledged = new Map(kept.acknowledged);
   for (const { alarm, verdict } of alarms) {
     // The newest last, so that the oldest are the first to go.
-    seen.delete(alarm.id);
-    seen.set(alarm.id, { verdict, at });
+    acknowledged.delete(alarm.id);
+    acknowledged.set(alarm.id, { verdict, at });
   }
-  return { ...kept, seen };
+  return { ...kept, acknowledged };
 }
 
-export function shelve(kept: Kept, { alarm, verdict }: Rated, until: number): Kept {
+export function unacknowledge(kept: Kept, alarm: Alarm): Kept {
+  const acknowledged = new Map(kept.acknowledged);
+  acknowledged.delete(alarm.id);
+  return { ...kept, acknowledged };
+}
+
+export function shelve(kept: Kept, { alarm, verdict }: Rated, until: number, reason: string): Kept {
   const shelved = new Map(kept.shelved);
   shelved.delete(whatOf(alarm));
-  shelved.set(whatOf(alarm), { verdict, until });
+  shelved.set(whatOf(alarm), { verdict, until, reason });
   return { ...kept, shelved };
 }
 
@@ -82,33 +97,33 @@ export function unshelve(kept: Kept, alarm: Alarm): Kept {
   return { ...kept, shelved };
 }
 
-/** The same without what is over: shelves that ended, and what was seen long ago and is not listed. */
+/** The same without shelves that ended, and what was acknowledged long ago and is not listed. */
 export function pruned(kept: Kept, listed: ReadonlySet<string>, at: number): Kept {
-  const seen = [...kept.seen].filter(
+  const acknowledged = [...kept.acknowledged].filter(
     ([id, each]) => listed.has(id) || Math.abs(at - each.at) < FORGET_MS,
   );
-  const shelved = [...kept.shelved].filter(([, { until }]) => isAhead(until, at));
+  const shelved = [...kept.shelved].filter(([, shelf]) => isAhead(shelf, at));
   if (
-    seen.length === kept.seen.size &&
+    acknowledged.length === kept.acknowledged.size &&
     shelved.length === kept.shelved.size &&
-    seen.length <= MOST_SEEN &&
+    acknowledged.length <= MOST_ACKNOWLEDGED &&
     shelved.length <= MOST_SHELVED
   ) {
     return kept;
   }
   return {
     ...kept,
-    seen: new Map(seen.slice(-MOST_SEEN)),
+    acknowledged: new Map(acknowledged.slice(-MOST_ACKNOWLEDGED)),
     shelved: new Map(shelved.slice(-MOST_SHELVED)),
   };
 }
 
 /** Not for ever where somebody sets the clock back. */
-const isAhead = (until: number, at: number): boolean =>
-  until > at && until - at <= LONGEST_SHELF_MS;
+const isAhead = ({ verdict, until }: Shelf, at: number): boolean =>
+  until > at && until - at <= longestShelfMs(verdict);
 
 export const isShelfHeld = (shelf: Shelf, verdict: Verdict, at: number): boolean =>
-  isAhead(shelf.until, at) && !isWorse(verdict, shelf.verdict);
+  isAhead(shelf, at) && !isWorse(verdict, shelf.verdict);
 
 /** When the next shelf ends; null: there is none. */
 export const nextEnd = (kept: Kept, at: number): number | null => {
@@ -129,39 +144,50 @@ export function readKept(storage: Pick<Storage, 'getItem'>): Kept {
     return NOTHING_KEPT;
   }
   if (typeof parsed !== 'object' || parsed === null) return NOTHING_KEPT;
-  const { seen, shelved, sound, notify } = parsed as Readonly<Record<string, unknown>>;
+  const { acknowledged, shelved, sound, notify } = parsed as Readonly<Record<string, unknown>>;
   return {
-    seen: new Map(rows(seen, MOST_SEEN).map(([id, verdict, at]) => [id, { verdict, at }])),
+    acknowledged: new Map(
+      rows(acknowledged, MOST_ACKNOWLEDGED).map(([id, verdict, at]) => [id, { verdict, at }]),
+    ),
     shelved: new Map(
-      rows(shelved, MOST_SHELVED).map(([what, verdict, until]) => [what, { verdict, until }]),
+      rows(shelved, MOST_SHELVED).map(([what, verdict, until, reason = '']) => [
+        what,
+        { verdict, until, reason: reason.slice(0, LONGEST_REASON) },
+      ]),
     ),
     sound: sound === true,
     notify: notify === true,
   };
 }
 
-type KeptRow = readonly [string, Verdict, number];
+type KeptRow = readonly [string, Verdict, number, string?];
 
 const rows = (list: unknown, most: number): readonly KeptRow[] =>
   Array.isArray(list) ? list.filter(isRow).slice(-most) : [];
 
 function isRow(row: unknown): row is KeptRow {
   if (!Array.isArray(row)) return false;
-  const [name, verdict, moment] = row as readonly unknown[];
+  const [name, verdict, moment, text] = row as readonly unknown[];
   return (
     typeof name === 'string' &&
     VERDICTS.some((each) => each === verdict) &&
     typeof moment === 'number' &&
-    Number.isFinite(moment)
+    Number.isFinite(moment) &&
+    (text === undefined || typeof text === 'string')
   );
 }
 
 export function writeKept(storage: Pick<Storage, 'setItem'>, kept: Kept): void {
-  const seen = [...kept.seen].map(([id, { verdict, at }]) => [id, verdict, at]);
-  const shelved = [...kept.shelved].map(([what, { verdict, until }]) => [what, verdict, until]);
+  const acknowledged = [...kept.acknowledged].map(([id, { verdict, at }]) => [id, verdict, at]);
+  const shelved = [...kept.shelved].map(([what, { verdict, until, reason }]) => [
+    what,
+    verdict,
+    until,
+    reason,
+  ]);
   const { sound, notify } = kept;
   try {
-    storage.setItem(KEY, JSON.stringify({ seen, shelved, sound, notify }));
+    storage.setItem(KEY, JSON.stringify({ acknowledged, shelved, sound, notify }));
   } catch {
     // Storage is full or forbidden: it then lasts as long as the page.
   }

@@ -3,10 +3,11 @@ import { describe, expect, test } from 'vitest';
 import type { Alarm } from '../contract/types';
 import { alarm } from '../testing/alarms';
 import { reason } from '../testing/health';
-import { markSeen, NOTHING_KEPT, shelve, type Kept } from './kept';
+import { acknowledge, NOTHING_KEPT, shelve, type Kept } from './kept';
 import {
   calling,
   EMPTY_LIST,
+  heldList,
   LISTED_S,
   listOf,
   newsOf,
@@ -33,17 +34,17 @@ describe('order', () => {
     expect(ids(shown.active)).toEqual(['bad, new', 'bad, old', 'mild, new', 'not known']);
   });
 
-  test('over: what was cleared last first; no more than a day', () => {
+  test('resolved: what was cleared last first; no more than a day', () => {
     const far = LISTED_S + NOW_S;
     const over = [
       alarm('early', { raised: 500, cleared: NOW_S }),
       alarm('late', { raised: 100, cleared: NOW_S + 1 }),
     ];
-    expect(ids(list(over).over)).toEqual(['late', 'early']);
-    expect(ids(listOf(over, NOTHING_KEPT, far - 1, AT).over)).toEqual(['late', 'early']);
-    expect(ids(listOf(over, NOTHING_KEPT, far, AT).over)).toEqual(['late']);
+    expect(ids(list(over).resolved)).toEqual(['late', 'early']);
+    expect(ids(listOf(over, NOTHING_KEPT, far - 1, AT).resolved)).toEqual(['late', 'early']);
+    expect(ids(listOf(over, NOTHING_KEPT, far, AT).resolved)).toEqual(['late']);
     // Of a twin that has no time nobody knows how long ago that was.
-    expect(listOf(over, NOTHING_KEPT, null, AT).over).toHaveLength(2);
+    expect(listOf(over, NOTHING_KEPT, null, AT).resolved).toHaveLength(2);
   });
 
   test('of what came at once the order is the same, however it came', () => {
@@ -53,28 +54,28 @@ describe('order', () => {
   });
 });
 
-describe('seen and put aside', () => {
+describe('acknowledged and shelved', () => {
   const mild = { alarm: alarm('a', { reason: stressed }), verdict: 'stressed' } as const;
 
-  test('what was seen calls for nobody, until it gets worse', () => {
-    const kept = markSeen(NOTHING_KEPT, [mild], AT);
+  test('what was acknowledged calls for nobody, until it gets worse', () => {
+    const kept = acknowledge(NOTHING_KEPT, [mild], AT);
     expect(calling(list([mild.alarm]))).toHaveLength(1);
     expect(calling(list([mild.alarm], kept))).toEqual([]);
-    expect(list([mild.alarm], kept).active[0]?.isSeen).toBe(true);
+    expect(list([mild.alarm], kept).active[0]?.isAcknowledged).toBe(true);
     const worse = { ...mild.alarm, reason: reason() };
     expect(calling(list([worse], kept))).toHaveLength(1);
   });
 
-  test('what is put aside stands apart with its end, comes back then, or when it gets worse', () => {
-    const kept = shelve(NOTHING_KEPT, mild, AT + 1_000);
+  test('what is shelved stands apart with its end, comes back then, or when it gets worse', () => {
+    const kept = shelve(NOTHING_KEPT, mild, AT + 1_000, 'fan off');
     const shown = list([mild.alarm], kept);
     expect(shown.active).toEqual([]);
-    expect(shown.shelved[0]?.shelvedUntil).toBe(AT + 1_000);
+    expect(shown.shelved[0]?.shelf).toMatchObject({ until: AT + 1_000, reason: 'fan off' });
     expect(calling(shown)).toEqual([]);
     expect(listOf([mild.alarm], kept, NOW_S, AT + 1_000).shelved).toEqual([]);
     const worse = list([{ ...mild.alarm, reason: reason() }], kept);
     expect(calling(worse)).toHaveLength(1);
-    // The same thing that comes again is still put aside.
+    // The same thing that comes again is still shelved.
     expect(list([alarm('later', { raised: 990, reason: stressed })], kept).active).toEqual([]);
   });
 });
@@ -87,7 +88,7 @@ describe('news', () => {
     return [ids(raised), ids(cleared)];
   };
 
-  test('is what has come, got worse or is over; what stays is none', () => {
+  test('is what has come, got worse or is resolved; what stays is none', () => {
     expect(told(EMPTY_LIST, list([a]))).toEqual([['a'], []]);
     expect(told(list([a]), list([b, a]))).toEqual([['b'], []]);
     expect(told(list([a]), list([{ ...a, reason: reason() }]))).toEqual([['a'], []]);
@@ -98,12 +99,35 @@ describe('news', () => {
     expect(told(list([a]), list([]))).toEqual([[], []]);
   });
 
-  test('not what is seen or put aside; what comes back from there is', () => {
+  test('not what is acknowledged or shelved; what comes back from there is', () => {
     const mild = { alarm: a, verdict: 'stressed' } as const;
-    const kept = shelve(NOTHING_KEPT, mild, AT + 1_000);
+    const kept = shelve(NOTHING_KEPT, mild, AT + 1_000, 'fan off');
     expect(told(EMPTY_LIST, list([a], kept))).toEqual([[], []]);
-    expect(told(EMPTY_LIST, list([a], markSeen(NOTHING_KEPT, [mild], AT)))).toEqual([[], []]);
+    expect(told(EMPTY_LIST, list([a], acknowledge(NOTHING_KEPT, [mild], AT)))).toEqual([[], []]);
     expect(told(list([a], kept), list([a]))).toEqual([['a'], []]);
+  });
+});
+
+describe('an order that is held', () => {
+  const before = list([alarm('a'), alarm('b', { reason: stressed })]);
+
+  test('none comes, goes or moves; each is as it is now, and what is new is apart', () => {
+    const now = list([
+      alarm('new', { tag_id: '3', raised: 999 }),
+      alarm('a', { cleared: 990 }),
+      alarm('b', { tag_id: '2' }),
+    ]);
+    expect(ids(now.active)).toEqual(['new', 'b']);
+    const { shown, added } = heldList(before, now);
+    expect(ids(shown.active)).toEqual(['a', 'b']);
+    expect(shown.active[0]?.alarm.cleared_at).not.toBeNull();
+    expect(shown.active[1]?.verdict).toBe('critical');
+    expect([ids(shown.shelved), ids(shown.resolved)]).toEqual([[], []]);
+    expect(ids(added)).toEqual(['new']);
+  });
+
+  test('what the bridge takes back stays until the order is let go', () => {
+    expect(ids(heldList(before, EMPTY_LIST).shown.active)).toEqual(['a', 'b']);
   });
 });
 
@@ -114,7 +138,7 @@ test('what is the same stays the same, and the rest is not', () => {
   expect(next).not.toBe(before);
   expect(next.active[0]).toBe(before.active[0]);
   expect(next.active[1]).not.toBe(before.active[1]);
-  expect(next.over).toBe(before.over);
+  expect(next.resolved).toBe(before.resolved);
 });
 
 test('five hundred are put in order, the newest first, and are kept where they are the same', () => {

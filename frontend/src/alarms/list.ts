@@ -1,31 +1,31 @@
-/** The list of alarms: what is active, put aside and over, in its order. Pure. */
+/** The list of alarms: what is active, shelved and resolved, in its order. Pure. */
 import type { Alarm, Verdict } from '../contract/types';
 import { VERDICTS } from '../domain/health';
 import { secondsOf } from '../domain/rostime';
-import { isShelfHeld, isWorse, whatOf, type Kept } from './kept';
+import { isShelfHeld, isWorse, whatOf, type Kept, type Shelf } from './kept';
 
-/** What is over stays listed for so long, seconds. */
+/** What is resolved stays listed for so long, seconds. */
 export const LISTED_S = 86_400;
 
 export interface Item {
   readonly alarm: Alarm;
   /** The worst that was said of it. */
   readonly verdict: Verdict;
-  readonly isSeen: boolean;
-  /** Until when it is put aside, ms since the epoch; null: it is not. */
-  readonly shelvedUntil: number | null;
+  readonly isAcknowledged: boolean;
+  /** Null: it is not shelved. */
+  readonly shelf: Shelf | null;
 }
 
 export interface AlarmList {
-  /** Active and not put aside: the worst first, of equals the newest. */
+  /** Active and not shelved: the worst first, of equals the newest. */
   readonly active: readonly Item[];
-  /** Active and put aside, in the same order. */
+  /** Active and shelved, in the same order. */
   readonly shelved: readonly Item[];
-  /** Cleared by itself: what was cleared last first. */
-  readonly over: readonly Item[];
+  /** What was resolved last first. */
+  readonly resolved: readonly Item[];
 }
 
-export const EMPTY_LIST: AlarmList = { active: [], shelved: [], over: [] };
+export const EMPTY_LIST: AlarmList = { active: [], shelved: [], resolved: [] };
 
 /**
  * `nowS` is the twin's time (ROS seconds; null: nobody knows), `at` the browser's, ms since the epoch.
@@ -38,20 +38,20 @@ export function listOf(
 ): AlarmList {
   const items = alarms.map((alarm): Item => {
     const { verdict } = alarm.reason;
-    const seen = kept.seen.get(alarm.id);
+    const known = kept.acknowledged.get(alarm.id);
     const shelf = kept.shelved.get(whatOf(alarm));
     return {
       alarm,
       verdict,
-      isSeen: seen !== undefined && !isWorse(verdict, seen.verdict),
-      shelvedUntil: shelf && isShelfHeld(shelf, verdict, at) ? shelf.until : null,
+      isAcknowledged: known !== undefined && !isWorse(verdict, known.verdict),
+      shelf: shelf && isShelfHeld(shelf, verdict, at) ? shelf : null,
     };
   });
   const active = items.filter(({ alarm }) => alarm.cleared_at === null).sort(worstFirst);
   return {
-    active: active.filter(({ shelvedUntil }) => shelvedUntil === null),
-    shelved: active.filter(({ shelvedUntil }) => shelvedUntil !== null),
-    over: items
+    active: active.filter((item) => item.shelf === null),
+    shelved: active.filter((item) => item.shelf !== null),
+    resolved: items
       .filter(({ alarm }) => alarm.cleared_at !== null && isListed(endOf(alarm), nowS))
       .sort((a, b) => endOf(b.alarm) - endOf(a.alarm) || byName(a, b)),
   };
@@ -71,15 +71,15 @@ const worstFirst = (a: Item, b: Item): number =>
 /** Of what came at once the order is the same each time. */
 const byName = ({ alarm: a }: Item, { alarm: b }: Item): number => (a.id < b.id ? -1 : 1);
 
-/** Those that call for somebody: active, not seen, not put aside. */
+/** Those that call for somebody: active, not acknowledged, not shelved. */
 export const calling = ({ active }: AlarmList): readonly Item[] =>
-  active.filter(({ isSeen }) => !isSeen);
+  active.filter(({ isAcknowledged }) => !isAcknowledged);
 
 /** What is new between two lists, to be told once. */
 export interface News {
   /** New, come back, or worse than before; the worst first. */
   readonly raised: readonly Item[];
-  /** Called before, and cleared by itself since. */
+  /** Active before, and resolved since. */
   readonly cleared: readonly Item[];
 }
 
@@ -91,15 +91,41 @@ export function newsOf(before: AlarmList, now: AlarmList): News {
       const known = called.get(alarm.id);
       return known === undefined || isWorse(verdict, known);
     }),
-    cleared: now.over.filter(({ alarm }) => wasActive.has(alarm.id)),
+    cleared: now.resolved.filter(({ alarm }) => wasActive.has(alarm.id)),
   };
 }
 
+/** A list whose order is held, and what has become active since. */
+export interface HeldList {
+  /** The rows of then as they are now: none comes, goes or moves. */
+  readonly shown: AlarmList;
+  readonly added: readonly Item[];
+}
+
+export function heldList(held: AlarmList, now: AlarmList): HeldList {
+  const items = new Map(itemsOf(now).map((item) => [item.alarm.id, item]));
+  const keep = (rows: readonly Item[]): readonly Item[] =>
+    rows.map((item) => items.get(item.alarm.id) ?? item);
+  const known = new Set(itemsOf(held).map(({ alarm }) => alarm.id));
+  return {
+    shown: {
+      active: keep(held.active),
+      shelved: keep(held.shelved),
+      resolved: keep(held.resolved),
+    },
+    added: now.active.filter(({ alarm }) => !known.has(alarm.id)),
+  };
+}
+
+export const itemsOf = ({ active, shelved, resolved }: AlarmList): readonly Item[] => [
+  ...active,
+  ...shelved,
+  ...resolved,
+];
+
 /** The very same as before where it is: what follows from it is kept then. */
 export function sharedList(before: AlarmList, now: AlarmList): AlarmList {
-  const known = new Map(
-    [...before.active, ...before.shelved, ...before.over].map((item) => [item.alarm.id, item]),
-  );
+  const known = new Map(itemsOf(before).map((item) => [item.alarm.id, item]));
   const share = (was: readonly Item[], is: readonly Item[]): readonly Item[] => {
     const items = is.map((item) => sharedItem(known.get(item.alarm.id), item));
     return items.length === was.length && items.every((item, index) => item === was[index])
@@ -108,16 +134,17 @@ export function sharedList(before: AlarmList, now: AlarmList): AlarmList {
   };
   const active = share(before.active, now.active);
   const shelved = share(before.shelved, now.shelved);
-  const over = share(before.over, now.over);
-  const isSame = active === before.active && shelved === before.shelved && over === before.over;
-  return isSame ? before : { active, shelved, over };
+  const resolved = share(before.resolved, now.resolved);
+  const isSame =
+    active === before.active && shelved === before.shelved && resolved === before.resolved;
+  return isSame ? before : { active, shelved, resolved };
 }
 
 function sharedItem(was: Item | undefined, is: Item): Item {
   const isSame =
     was?.verdict === is.verdict &&
-    was.isSeen === is.isSeen &&
-    was.shelvedUntil === is.shelvedUntil &&
+    was.isAcknowledged === is.isAcknowledged &&
+    was.shelf === is.shelf &&
     (was.alarm === is.alarm || JSON.stringify(was.alarm) === JSON.stringify(is.alarm));
   return isSame ? was : is;
 }

@@ -4,7 +4,7 @@ import { createStore } from '../store/create';
 import { calling, type Item } from './list';
 import { alarmList, onNews } from './watch';
 
-/** The worst first; without those that were seen or put aside since, or are over. */
+/** The worst first; without those that were acknowledged or shelved since, or are resolved. */
 export const meanwhile = createStore<readonly Item[], readonly Item[]>([], (before, next) =>
   next.length === before.length && next.every((item, index) => item === before[index])
     ? before

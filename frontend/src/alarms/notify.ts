@@ -3,10 +3,10 @@ import { store } from '../store/app';
 import { createStore } from '../store/create';
 import { selectOrigin } from '../store/origin';
 import { S } from '../strings';
-import { followAlarm } from './follow';
+import { showAlarm } from './follow';
 import type { Item } from './list';
 import { own, preferTold } from './own';
-import { selectSpeech } from './speech';
+import { textNow } from './speech';
 import { onNews } from './watch';
 import { severalText } from './words';
 
@@ -41,7 +41,7 @@ function show(raised: readonly Item[]): void {
   if (!first) return;
   const body = severalText(
     raised.map(({ alarm }) => alarm),
-    selectSpeech(store.get()),
+    (alarm) => textNow(store.get(), alarm),
     S.alarmsRaised,
   );
   try {
@@ -53,7 +53,7 @@ function show(raised: readonly Item[]): void {
     });
     shown.onclick = () => {
       window.focus();
-      followAlarm(first);
+      showAlarm(first.alarm);
       shown.close();
     };
   } catch {

@@ -3,11 +3,12 @@ import { timeOfDay } from '../clock';
 import type { Alarm } from '../contract/types';
 import { createStore } from '../store/create';
 import {
+  acknowledge,
   isKept,
-  markSeen,
   NOTHING_KEPT,
   readKept,
   shelve,
+  unacknowledge,
   unshelve,
   writeKept,
   type Kept,
@@ -16,17 +17,59 @@ import {
 
 export const own = createStore<Kept, Kept>(NOTHING_KEPT, (_, next) => next);
 
-export const seeAlarms = (items: readonly Rated[]): void => {
-  own.dispatch(markSeen(own.get(), items, timeOfDay()));
+/** For so long the last action can be undone where it was done, ms; later in the list. */
+export const UNDO_MS = 10_000;
+
+/** What the operator has just done. */
+export interface Done {
+  readonly what: 'acknowledge' | 'unacknowledge' | 'shelve' | 'unshelve';
+  /** Alarms that it was done to. */
+  readonly count: number;
+  /** What was kept before. */
+  readonly before: Kept;
+}
+
+/** The last action, as long as it can be undone; null: there is none. */
+export const done = createStore<Done | null, Done | null>(null, (_, next) => next);
+
+let timer: ReturnType<typeof setTimeout> | undefined;
+
+function setDone(action: Done | null): void {
+  clearTimeout(timer);
+  done.dispatch(action);
+  if (action) timer = setTimeout(setDone, UNDO_MS, null);
+}
+
+function change(what: Done['what'], count: number, next: Kept): void {
+  const before = own.get();
+  own.dispatch(next);
+  setDone({ what, count, before });
+}
+
+export const acknowledgeAlarms = (items: readonly Rated[]): void => {
+  change('acknowledge', items.length, acknowledge(own.get(), items, timeOfDay()));
 };
 
-export const shelveAlarm = (item: Rated, minutes: number): void => {
-  own.dispatch(shelve(own.get(), item, timeOfDay() + minutes * 60_000));
+export const unacknowledgeAlarm = (alarm: Alarm): void => {
+  change('unacknowledge', 1, unacknowledge(own.get(), alarm));
+};
+
+export const shelveAlarm = (item: Rated, minutes: number, reason: string): void => {
+  change('shelve', 1, shelve(own.get(), item, timeOfDay() + minutes * 60_000, reason));
 };
 
 export const unshelveAlarm = (alarm: Alarm): void => {
-  own.dispatch(unshelve(own.get(), alarm));
+  change('unshelve', 1, unshelve(own.get(), alarm));
 };
+
+/** Takes the last action back. */
+export function undo(): void {
+  const last = done.get();
+  if (!last) return;
+  const { acknowledged, shelved } = last.before;
+  own.dispatch({ ...own.get(), acknowledged, shelved });
+  setDone(null);
+}
 
 export const preferTold = (way: Partial<Pick<Kept, 'sound' | 'notify'>>): void => {
   own.dispatch({ ...own.get(), ...way });
@@ -38,13 +81,16 @@ export function startOwn(storage: Pick<Storage, 'getItem' | 'setItem'>): () => v
   const stop = own.subscribe(() => {
     writeKept(storage, own.get());
   });
-  // Another tab has kept something.
+  // Another tab has kept something: to undo what was done here would undo that as well.
   const onStorage = ({ key }: StorageEvent): void => {
-    if (isKept(key)) own.dispatch(readKept(storage));
+    if (!isKept(key)) return;
+    own.dispatch(readKept(storage));
+    setDone(null);
   };
   window.addEventListener('storage', onStorage);
   return () => {
     stop();
+    setDone(null);
     window.removeEventListener('storage', onStorage);
   };
 }

@@ -1,8 +1,12 @@
-/** In whose words alarms are told: the sensors in force, and the operator's unit. */
+/** In whose words alarms are told: the sensors in force, and the operator's unit; and of what state. */
+import type { Alarm } from '../contract/types';
 import type { AppState } from '../store/app';
-import { selectCatalogue } from '../store/derived';
+import { selectCatalogue, selectNewestHealth } from '../store/derived';
+import { hourAgo, selectHourAgoNow, type HourAgo } from '../store/hourAgo';
 import { memoLast } from '../store/memo';
-import type { Speech } from './words';
+import { isHeardNow, selectNewestTag } from '../store/moment';
+import { nowOf, type Now } from './now';
+import { alarmText, type Speech } from './words';
 
 const speech = memoLast((sensors: Speech['sensors'], unit: Speech['unit']): Speech => ({
   sensors,
@@ -11,3 +15,19 @@ const speech = memoLast((sensors: Speech['sensors'], unit: Speech['unit']): Spee
 
 export const selectSpeech = (state: AppState): Speech =>
   speech(selectCatalogue(state), state.settings.unit);
+
+/** What an alarm is about as it is now, whatever moment is shown; null: there is no such value. */
+export function selectNow(
+  state: AppState,
+  alarm: Alarm,
+  last: HourAgo | null = hourAgo.get(),
+): Now | null {
+  const tag = selectNewestTag(state, alarm.tag_id);
+  const health = selectNewestHealth(state)?.byTag.get(alarm.tag_id);
+  const before = selectHourAgoNow(state, last)?.tags.get(alarm.tag_id) ?? null;
+  return nowOf(alarm, tag && health ? { tag, health } : null, before, isHeardNow(state));
+}
+
+/** An alarm in one line, as it is now. */
+export const textNow = (state: AppState, alarm: Alarm): string =>
+  alarmText(alarm, selectSpeech(state), selectNow(state, alarm));

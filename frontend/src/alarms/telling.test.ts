@@ -11,7 +11,7 @@ import { badgeOf, startBadge } from './badge';
 import { NOTHING_KEPT } from './kept';
 import { calling } from './list';
 import { notifyState, startNotify, wishNotify } from './notify';
-import { own, seeAlarms } from './own';
+import { own, acknowledgeAlarms } from './own';
 import { QUIET_MS, soundState, startSound, wishSound } from './sound';
 import { startTitle, titleOf } from './title';
 import { politeVoice, startVoices, urgentVoice } from './voices';
@@ -39,7 +39,7 @@ afterEach(() => {
 });
 
 describe('title', () => {
-  test('counts what is active and not seen, and says which moment is shown', () => {
+  test('counts what is active, acknowledged or not, and says which moment is shown', () => {
     start(startTitle);
     expect(document.title).toBe('Lupin twin');
     tellAlarms(cold, warm, alarm('over', { cleared: 950 }));
@@ -47,7 +47,9 @@ describe('title', () => {
     act({ type: 'moment', moment: 50 });
     receive({ type: 'past', past: { at: 50, house: NO_HOUSE } });
     expect(document.title).toBe('(2) sim 00:00:50 (past) · Lupin twin');
-    seeAlarms(calling(alarmList.get()));
+    acknowledgeAlarms(calling(alarmList.get()));
+    expect(document.title).toBe('(2) sim 00:00:50 (past) · Lupin twin');
+    tellAlarms();
     expect(document.title).toBe('sim 00:00:50 (past) · Lupin twin');
     expect(titleOf(0, null)).toBe('Lupin twin');
     expect(titleOf(2, null, true)).toBe('(2) Recording · Lupin twin');
@@ -67,7 +69,7 @@ describe('icon', () => {
     expect(drawn()).toMatch(/^data:image\/svg\+xml,<svg .*<circle.*>1<\/text>/);
     tellAlarms(warm, cold);
     expect(drawn()).toMatch(/<path.*>2<\/text>/);
-    seeAlarms(calling(alarmList.get()));
+    tellAlarms();
     expect(link.href).toMatch(/\/lupin\.svg$/);
     link.remove();
   });
@@ -89,7 +91,7 @@ describe('voices', () => {
     start(startVoices);
     const before = keys();
     tellAlarms(warm);
-    expect(said()).toEqual(['New: Tag 2: Temperature 30.0\u00a0°C, above 26.0', '']);
+    expect(said()).toEqual(['New: Tag 2: Temperature above 26.0\u00a0°C, worst 30.0\u00a0°C', '']);
     tellAlarms(cold, warm, alarm('other', { tag_id: '3' }));
     expect(said()[1]).toMatch(/^New: Tag 1: [^;]*; Tag 3: [^;]*$/);
     expect(keys()).toBe(before + 2);
@@ -99,11 +101,11 @@ describe('voices', () => {
     expect(keys()).toBe(before + 2);
   });
 
-  test('what is over is told once, in the same breath as what is new', () => {
+  test('what is resolved is told once, in the same breath as what is new', () => {
     start(startVoices);
     tellAlarms(warm);
     tellAlarms({ ...warm, cleared_at: { sec: 990, nanosec: 0 } }, alarm('x', { reason: STRESSED }));
-    expect(said()[0]).toMatch(/^New: Tag 1: .*\. Over: Tag 2: Temperature/);
+    expect(said()[0]).toMatch(/^New: Tag 1: .*\. Resolved: Tag 2: Temperature/);
   });
 });
 

@@ -1,10 +1,9 @@
-/** The name of the page's tab: how many alarms call for somebody, and which moment is shown. */
+/** The name of the page's tab: how many alarms are active, and which moment is shown. */
 import { rosText } from '../domain/rostime';
 import { store } from '../store/app';
 import { selectShown } from '../store/moment';
 import { selectIsRecorded } from '../store/origin';
 import { S } from '../strings';
-import { calling } from './list';
 import { alarmList } from './watch';
 
 export const titleOf = (count: number, moment: number | null, isRecorded = false): string => {
@@ -18,7 +17,7 @@ export function startTitle(): () => void {
   const update = (): void => {
     const state = store.get();
     const { moment } = selectShown(state);
-    const title = titleOf(calling(alarmList.get()).length, moment, selectIsRecorded(state));
+    const title = titleOf(alarmList.get().active.length, moment, selectIsRecorded(state));
     if (document.title !== title) document.title = title;
   };
   update();

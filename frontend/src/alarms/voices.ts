@@ -3,16 +3,16 @@ import { createVoice } from '../store/announcement';
 import { store } from '../store/app';
 import { S } from '../strings';
 import type { Item, News } from './list';
+import { textNow } from './speech';
 import { onNews } from './watch';
-import { selectSpeech } from './speech';
-import { severalText, type Speech } from './words';
+import { severalText } from './words';
 
 /** Waits until what is being read is read. */
 export const politeVoice = createVoice();
 /** Cuts in. */
 export const urgentVoice = createVoice();
 
-export function newsText({ raised, cleared }: News, speech: Speech): string {
+export function newsText({ raised, cleared }: News): string {
   const text = (
     items: readonly Item[],
     say: (texts: readonly string[], more: number) => string,
@@ -22,7 +22,7 @@ export function newsText({ raised, cleared }: News, speech: Speech): string {
       : [
           severalText(
             items.map(({ alarm }) => alarm),
-            speech,
+            (alarm) => textNow(store.get(), alarm),
             say,
           ),
         ];
@@ -34,5 +34,5 @@ export const startVoices = (): (() => void) =>
   onNews((news) => {
     const isUrgent = news.raised.some(({ verdict }) => verdict === 'critical');
     const voice = isUrgent ? urgentVoice : politeVoice;
-    voice.dispatch(newsText(news, selectSpeech(store.get())));
+    voice.dispatch(newsText(news));
   });

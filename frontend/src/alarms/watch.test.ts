@@ -7,7 +7,17 @@ import { wireTag } from '../testing/tags';
 import { NOTHING_KEPT } from './kept';
 import { calling } from './list';
 import { meanwhile, startMeanwhile } from './meanwhile';
-import { own, seeAlarms, shelveAlarm, startOwn, unshelveAlarm } from './own';
+import {
+  acknowledgeAlarms,
+  done,
+  own,
+  shelveAlarm,
+  startOwn,
+  unacknowledgeAlarm,
+  undo,
+  UNDO_MS,
+  unshelveAlarm,
+} from './own';
 import { alarmList, onNews, startAlarms } from './watch';
 
 const STRESSED = { verdict: 'stressed' } as const;
@@ -74,19 +84,19 @@ test('a bridge that starts anew and goes through the past tells nothing twice', 
   expect(told).toEqual(['b']);
 });
 
-test('what gets worse is told again, seen or not', () => {
+test('what gets worse is told again, acknowledged or not', () => {
   tellAlarms(alarm('a', { reason: STRESSED }));
-  seeAlarms([item('a')]);
+  acknowledgeAlarms([item('a')]);
   expect(ids()).toEqual([]);
   tellAlarms(alarm('a'));
   expect(ids()).toEqual(['a']);
   expect(told).toEqual(['a']);
 });
 
-test('seen holds after a reload, and what is done here is no news', () => {
+test('acknowledged holds after a reload, and what is done here is no news', () => {
   tellAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
-  seeAlarms([item('a')]);
-  shelveAlarm(item('b'), 15);
+  acknowledgeAlarms([item('a')]);
+  shelveAlarm(item('b'), 15, 'x');
   expect(ids()).toEqual([]);
   unshelveAlarm(item('b').alarm);
   expect(ids()).toEqual(['b']);
@@ -98,9 +108,9 @@ test('seen holds after a reload, and what is done here is no news', () => {
   expect(told).toEqual([]);
 });
 
-test('what was put aside comes back by itself when its time is over, and is told', () => {
+test('what was shelved comes back by itself when its time is over, and is told', () => {
   tellAlarms(alarm('a'));
-  shelveAlarm(item('a'), 15);
+  shelveAlarm(item('a'), 15, 'x');
   expect(alarmList.get().shelved).toHaveLength(1);
   vi.advanceTimersByTime(15 * 60_000 - 1);
   expect(ids()).toEqual([]);
@@ -110,14 +120,43 @@ test('what was put aside comes back by itself when its time is over, and is told
   expect(own.get().shelved.size).toBe(0);
 });
 
-test('what another tab of the browser has seen is seen here', () => {
+test('each action can be undone for a while; another tab’s word ends that', () => {
+  const last = (): unknown[] => [done.get()?.what, done.get()?.count];
+  tellAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
+  acknowledgeAlarms([item('a'), item('b')]);
+  expect(last()).toEqual(['acknowledge', 2]);
+  undo();
+  expect([ids(), done.get()]).toEqual([['a', 'b'], null]);
+  acknowledgeAlarms([item('a')]);
+  shelveAlarm(item('b'), 15, 'x');
+  expect(last()).toEqual(['shelve', 1]);
+  undo();
+  // The last alone: what was done before it stands.
+  expect(ids()).toEqual(['b']);
+  unacknowledgeAlarm(item('a').alarm);
+  expect(ids()).toEqual(['a', 'b']);
+  undo();
+  expect(ids()).toEqual(['b']);
+  shelveAlarm(item('b'), 15, 'x');
+  unshelveAlarm(item('b').alarm);
+  undo();
+  expect(ids()).toEqual([]);
+  unshelveAlarm(item('b').alarm);
+  vi.advanceTimersByTime(UNDO_MS);
+  expect(done.get()).toBeNull();
+  shelveAlarm(item('b'), 15, 'x');
+  window.dispatchEvent(new StorageEvent('storage', { key: 'lupin-twin.alarms' }));
+  expect(done.get()).toBeNull();
+});
+
+test('what another tab of the browser has acknowledged is so here', () => {
   tellAlarms(alarm('a'));
-  kept.set('lupin-twin.alarms', JSON.stringify({ seen: [['a', 'critical', Date.now()]] }));
+  kept.set('lupin-twin.alarms', JSON.stringify({ acknowledged: [['a', 'critical', Date.now()]] }));
   window.dispatchEvent(new StorageEvent('storage', { key: 'lupin-twin.alarms' }));
   expect(ids()).toEqual([]);
 });
 
-test('while another moment is shown, what comes is told apart until it is seen or over', () => {
+test('while another moment is shown, what comes is told apart until it is acknowledged or resolved', () => {
   const now = (): string[] => meanwhile.get().map(({ alarm: { id } }) => id);
   tellAlarms(alarm('a'));
   act({ type: 'moment', moment: 50 });
@@ -127,7 +166,7 @@ test('while another moment is shown, what comes is told apart until it is seen o
   tellAlarms(b, alarm('a'));
   tellAlarms(c, b, alarm('a'));
   expect(now()).toEqual(['c', 'b']);
-  seeAlarms([item('b')]);
+  acknowledgeAlarms([item('b')]);
   expect(now()).toEqual(['c']);
   tellAlarms({ ...c, cleared_at: { sec: 990, nanosec: 0 } }, b, alarm('a'));
   expect(now()).toEqual([]);

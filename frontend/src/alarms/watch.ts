@@ -20,13 +20,13 @@ export function onNews(listener: Listener): () => void {
   return () => listeners.delete(listener);
 }
 
-/** What is over leaves the list so late at most, ms. */
+/** What is resolved leaves the list so late at most, ms. */
 const SWEEP_MS = 60_000;
 
 export function startAlarms(): () => void {
   /** What was told of; null: nothing has come, and what comes first is no news. */
   let told: AlarmList | null = null;
-  let seenOf: readonly unknown[] = [];
+  let lookedAt: readonly unknown[] = [];
   let timer: ReturnType<typeof setTimeout> | undefined;
 
   const look = (isOwnDoing: boolean): void => {
@@ -35,13 +35,13 @@ export function startAlarms(): () => void {
     const state = store.get();
     const { alarms } = state.twin;
     const kept = pruned(own.get(), idsOf(alarms), at);
-    seenOf = [alarms, kept];
+    lookedAt = [alarms, kept];
     timer = setTimeout(look, Math.min(SWEEP_MS, (nextEnd(kept, at) ?? Infinity) - at), false);
     if (kept !== own.get()) own.dispatch(kept);
     if (!alarms) return;
     const list = listOf(alarms.alarms, kept, rosNow(state, now()), at);
     const news = told && !isOwnDoing ? newsOf(told, list) : null;
-    // While the past is gone through, what is missing from the list is not over.
+    // While the past is gone through, what is missing from the list is not resolved.
     if (alarms.source !== 'starting') told = list;
     alarmList.dispatch(sharedList(alarmList.get(), list));
     if (news && news.raised.length + news.cleared.length > 0) {
@@ -49,10 +49,10 @@ export function startAlarms(): () => void {
     }
   };
   const onStore = (): void => {
-    if (seenOf[0] !== store.get().twin.alarms) look(false);
+    if (lookedAt[0] !== store.get().twin.alarms) look(false);
   };
   const onOwn = (): void => {
-    if (seenOf[1] !== own.get()) look(true);
+    if (lookedAt[1] !== own.get()) look(true);
   };
   look(true);
   const stops = [store.subscribe(onStore), own.subscribe(onOwn)];

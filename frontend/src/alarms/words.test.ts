@@ -1,9 +1,19 @@
 import { expect, test } from 'vitest';
 
+import type { Alarm, Verdict } from '../contract/types';
 import { alarm } from '../testing/alarms';
 import { S } from '../strings';
 import { CATALOGUE } from '../testing/sensors';
-import { alarmText, severalText, spanText, whatText, whenText, worstText } from './words';
+import type { Now } from './now';
+import {
+  alarmText,
+  nameText,
+  severalText,
+  spanText,
+  unknownText,
+  valuesOf,
+  whenText,
+} from './words';
 
 const C = { sensors: CATALOGUE, unit: 'C' } as const;
 const F = { ...C, unit: 'F' } as const;
@@ -11,36 +21,73 @@ const F = { ...C, unit: 'F' } as const;
 /** Noon on the operator's own clock, ROS seconds. */
 const NOON = new Date(2026, 10, 14, 12).getTime() / 1000;
 
-test('what and where, of a tag and of the house', () => {
-  expect(alarmText(alarm('a', { tag_id: '5' }), C)).toBe(
-    'Tag 5: Temperature 6.6\u00a0°C, below 10.0 (critical)',
+const known = (value: number | null, verdict: Verdict): Now => ({
+  kind: 'known',
+  value,
+  verdict,
+  trend: null,
+});
+const CRITICAL = known(6.6, 'critical');
+
+test('what and where, of a tag and of the greenhouse', () => {
+  const cold = alarm('a', { tag_id: '5' });
+  expect(nameText(cold, C)).toBe('Tag 5: Temperature below 10.0\u00a0°C');
+  expect(alarmText(cold, C, CRITICAL)).toBe(
+    'Tag 5: Temperature below 10.0\u00a0°C, now 6.6\u00a0°C (critical)',
   );
-  expect(alarmText(alarm('a', { tag_id: '5' }), F)).toContain('43.9\u00a0°F, below 50.0');
+  expect(alarmText(cold, F, CRITICAL)).toContain('below 50.0\u00a0°F, now 43.9\u00a0°F');
   const silent = alarm('a', { tag_id: '', reason: { kind: 'silent', sensor: '', value: null } });
-  expect(alarmText(silent, C)).toMatch(/^Whole house: The twin is silent/);
+  expect(alarmText(silent, C, null)).toMatch(/^Whole greenhouse: The twin is silent/);
 });
 
-test('how bad at worst, with its unit, unless it was never worse', () => {
-  expect(worstText(alarm('a', { worst: 2.5 }), C)).toBe('at worst 2.5\u00a0°C (critical)');
-  expect(worstText(alarm('a', { worst: 2.5 }), F)).toBe('at worst 36.5\u00a0°F (critical)');
-  expect(worstText(alarm('a', { worst: 6.6 }), C)).toBeNull();
-  expect(worstText(alarm('a'), C)).toBeNull();
-  const pest = { kind: 'pest', sensor: '', value: 2, limit: null } as const;
-  expect(worstText(alarm('a', { worst: 4, reason: pest }), C)).toBe('at worst 4 pests seen');
-  expect(worstText(alarm('a', { worst: 2, reason: pest }), C)).toBeNull();
-});
-
-test('the verdict is that of the worst value: a milder one before it is not called critical', () => {
-  // Raised at 12.2 °C, below the ideal; later 8.7 °C, below what is critical.
-  const cold = { value: 12.2, limit: 18 };
-  const worse = alarm('a', { tag_id: '9', worst: 8.7, reason: cold });
-  expect(whatText(worse, C)).toBe('Temperature 12.2\u00a0°C, below 18.0');
-  expect(worstText(worse, C)).toBe('at worst 8.7\u00a0°C (critical)');
-  expect(alarmText(worse, C)).toBe(
-    'Tag 9: Temperature 12.2\u00a0°C, below 18.0, at worst 8.7\u00a0°C (critical)',
+test('now, at worst and at first, each with its own severity', () => {
+  const cold = alarm('a', { tag_id: '9', worst: 8.7, reason: { value: 12.2, limit: 18 } });
+  expect(valuesOf(cold, C, known(12.6, 'stressed'))).toMatchObject({
+    what: 'Temperature below 18.0\u00a0°C',
+    now: 'now 12.6\u00a0°C',
+    worst: 'worst 8.7\u00a0°C',
+    first: 'first 12.2\u00a0°C',
+  });
+  expect(alarmText(cold, C, known(12.6, 'stressed'))).toBe(
+    'Tag 9: Temperature below 18.0\u00a0°C, now 12.6\u00a0°C, worst 8.7\u00a0°C (critical)',
   );
-  const stressed = alarm('a', { worst: 11.9, reason: { ...cold, verdict: 'stressed' } });
-  expect(worstText(stressed, C)).toBe('at worst 11.9\u00a0°C');
+  expect(alarmText(cold, C, known(18.5, 'healthy'))).toContain('now 18.5\u00a0°C (in range)');
+  expect(alarmText(cold, C, known(8.7, 'critical'))).not.toContain('worst');
+});
+
+test('no value reads like the limit that it differs from', () => {
+  const dry = alarm('a', { worst: 44, reason: { sensor: 'humidity', value: 49.96, limit: 50 } });
+  expect(valuesOf(dry, C, known(50.02, 'healthy'))).toMatchObject({
+    what: 'Humidity below 50.00\u00a0%',
+    now: 'now 50.02\u00a0%',
+    worst: 'worst 44.00\u00a0%',
+    first: 'first 49.96\u00a0%',
+  });
+});
+
+test('what is not known now says so, with what was known last', () => {
+  const cold = alarm('a', { worst: 2.5 });
+  const unknown = (last: number | null): Extract<Now, { kind: 'unknown' }> => ({
+    kind: 'unknown',
+    last,
+    lastAt: 'unknown',
+  });
+  expect(unknownText(cold, C, unknown(7.4), 0, 2_520)).toBe(
+    'now not known, last 7.4\u00a0°C 42\u00a0min ago',
+  );
+  expect(unknownText(cold, C, unknown(null), 0, null)).toBe('now not known');
+  expect(alarmText(cold, C, unknown(7.4))).toBe(
+    'Tag 1: Temperature below 10.0\u00a0°C, worst 2.5\u00a0°C (critical)',
+  );
+});
+
+test('of a pest how many: now, at worst and at first', () => {
+  const reason = { kind: 'pest', sensor: '', value: 2, limit: null } as const;
+  const pest = alarm('a', { worst: 4, reason });
+  const texts = { what: 'Pest seen', worst: 'worst 4', first: 'first 2' };
+  expect(valuesOf(pest, C, known(3, 'critical'))).toMatchObject({ ...texts, now: 'now 3' });
+  expect(valuesOf(pest, C, known(0, 'critical')).now).toBe('now seen');
+  expect(valuesOf(pest, C, known(null, 'healthy')).now).toBe('now none');
 });
 
 test('since when and until when: of today the time alone', () => {
@@ -57,7 +104,10 @@ test('since when and until when: of today the time alone', () => {
 });
 
 test('of several the first are named', () => {
+  const text = (each: Alarm): string => alarmText(each, C, CRITICAL);
   const four = ['1', '2', '3', '4'].map((tag_id) => alarm(tag_id, { tag_id }));
-  expect(severalText(four.slice(0, 1), C, S.alarmsRaised)).toMatch(/^New: Tag 1: [^;]*critical\)$/);
-  expect(severalText(four, C, S.alarmsRaised)).toMatch(/Tag 3: [^;]* and 1 more$/);
+  expect(severalText(four.slice(0, 1), text, S.alarmsRaised)).toMatch(
+    /^New: Tag 1: [^;]*critical\)$/,
+  );
+  expect(severalText(four, text, S.alarmsRaised)).toMatch(/Tag 3: [^;]* and 1 more$/);
 });

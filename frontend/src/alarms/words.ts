@@ -1,13 +1,14 @@
-/** An alarm in words: what, where, since when, how bad at worst, until when. Pure. */
-import type { Alarm } from '../contract/types';
-import { ageText, clockText, readingText } from '../domain/format';
+/** An alarm in words: what, where, how bad now and at worst, since when, until when. Pure. */
+import type { Alarm, Verdict } from '../contract/types';
+import { ageText, clockText, digitsApart, readingText } from '../domain/format';
 import { isOfRange } from '../domain/health';
-import { reasonText } from '../domain/reasons';
+import { beyondText, reasonText } from '../domain/reasons';
 import { hasDate, rosText, secondsOf } from '../domain/rostime';
 import type { Catalogue } from '../domain/sensors';
 import { shown } from '../domain/text';
 import type { TemperatureUnit } from '../domain/units';
 import { S } from '../strings';
+import type { Now } from './now';
 
 /** Of a name that some robot made up. */
 const LONGEST_NAME = 24;
@@ -23,31 +24,85 @@ export interface Speech {
   readonly unit: TemperatureUnit;
 }
 
-/** What was wrong when it was raised. That it got critical is said of how bad it was at worst. */
-export const whatText = (alarm: Alarm, speech: Speech): string => {
+/** What is wrong, without its value, which changes; `more` digits of a limit. */
+export function whatText({ reason }: Alarm, { sensors, unit }: Speech, more = 0): string {
+  if (isOfRange(reason)) return beyondText(sensors, reason, unit, more);
+  // Of a pest how many, and of a changed sensor its reading, is told as it is now.
+  const value = reason.kind === 'pest' ? 0 : reason.kind === 'changed' ? null : reason.value;
+  return reasonText(sensors, { ...reason, value }, unit, null);
+}
+
+/** What and where in one line: of whatever moment it is read. */
+export const nameText = (alarm: Alarm, speech: Speech): string =>
+  S.alarmWhat(whereText(alarm), whatText(alarm, speech));
+
+/** An alarm's values in words that do not contradict each other, nor its limit. */
+export interface Values {
+  /** What is wrong; its limit has as many digits as the values. */
+  readonly what: string;
+  /** Null: it is not of a value, or resolved. */
+  readonly now: string | null;
+  /** Null: there is no such value. */
+  readonly worst: string | null;
+  readonly first: string | null;
+  /** Digits more than usual. */
+  readonly more: number;
+}
+
+export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values {
   const { reason } = alarm;
   const { sensors, unit } = speech;
-  const isMilder = isOfRange(reason) && worstText(alarm, speech) !== null;
-  return reasonText(sensors, isMilder ? { ...reason, verdict: 'stressed' } : reason, unit, null);
-};
-
-/** What and where in one line, and how bad at worst where that alone is critical. */
-export const alarmText = (alarm: Alarm, speech: Speech): string => {
-  const { reason } = alarm;
-  const worst =
-    isOfRange(reason) && reason.verdict === 'critical' ? worstText(alarm, speech) : null;
-  const what = [whatText(alarm, speech), worst].filter((text) => text !== null).join(', ');
-  return S.alarmWhat(whereText(alarm), what);
-};
-
-/** How bad it was at worst; null: no worse than when it was raised, or nothing to measure. */
-export function worstText({ reason, worst }: Alarm, { sensors, unit }: Speech): string | null {
+  const sensor = sensors.named(reason.sensor);
+  const worst = alarm.worst ?? (isOfRange(reason) ? reason.value : null);
+  const current = now?.kind === 'known' ? now.value : (now?.last ?? null);
+  const all = [current, worst, reason.value].filter((value) => value !== null);
+  const more = isOfRange(reason) ? digitsApart(sensor, all, reason.limit, unit) : 0;
   const text = (value: number): string =>
     reason.kind === 'pest'
-      ? S.reasons.pest(value)
-      : readingText(sensors.named(reason.sensor), value, unit);
-  if (worst === null || (reason.value !== null && text(worst) === text(reason.value))) return null;
-  return S.alarmWorst(text(worst), isOfRange(reason) && reason.verdict === 'critical');
+      ? value > 0
+        ? String(value)
+        : S.alarmPests.seen
+      : readingText(sensor, value, unit, more);
+  const isMeasured = isOfRange(reason) || reason.kind === 'pest' || reason.kind === 'changed';
+  return {
+    what: whatText(alarm, speech, more),
+    now:
+      now?.kind === 'known'
+        ? S.alarmNow(now.value === null ? S.alarmPests.none : text(now.value))
+        : null,
+    worst: worst === null ? null : S.alarmWorst(text(worst)),
+    first: isMeasured && reason.value !== null ? S.alarmFirst(text(reason.value)) : null,
+    more,
+  };
+}
+
+/** What and where in one line, as it is now, and how bad at worst where that differs. */
+export function alarmText(alarm: Alarm, speech: Speech, now: Now | null): string {
+  const { what, now: nowText, worst } = valuesOf(alarm, speech, now);
+  const isKnown = now?.kind === 'known';
+  const isWorstNow = isKnown && now.value === (alarm.worst ?? alarm.reason.value);
+  const texts = [
+    what,
+    isKnown && nowText !== null ? rated(nowText, now.verdict) : null,
+    worst === null || isWorstNow ? null : rated(worst, alarm.reason.verdict),
+  ];
+  return S.alarmWhat(whereText(alarm), texts.filter((text) => text !== null).join(', '));
+}
+
+/** With how bad it is; where nothing is said, it is out of its range. */
+const rated = (text: string, verdict: Verdict): string =>
+  verdict === 'critical' || verdict === 'healthy' ? `${text} (${S.alarmStatus[verdict]})` : text;
+
+/** That what it is about is not known now, and what was known last. */
+export function unknownText(
+  { reason: { sensor: name } }: Alarm,
+  { sensors, unit }: Speech,
+  { last }: Extract<Now, { kind: 'unknown' }>,
+  more: number,
+  age: number | null,
+): string {
+  const reading = last === null ? null : readingText(sensors.named(name), last, unit, more);
+  return S.alarmNowUnknown(reading, age === null ? null : ageText(age));
 }
 
 /** From when to when. `nowS` is the twin's time, ROS seconds; null: nobody knows. */
@@ -74,12 +129,12 @@ const dayOf = (at: number): string => new Date(at * 1000).toDateString();
 
 const clockOf = (at: number): string => clockText(Math.floor(at) * 1000);
 
-/** Some alarms in one breath. */
+/** Some alarms in one breath; `text` is that of one. */
 export function severalText(
   alarms: readonly Alarm[],
-  speech: Speech,
+  text: (alarm: Alarm) => string,
   say: (texts: readonly string[], more: number) => string,
 ): string {
-  const texts = alarms.slice(0, MOST_NAMED).map((alarm) => alarmText(alarm, speech));
+  const texts = alarms.slice(0, MOST_NAMED).map(text);
   return say(texts, alarms.length - texts.length);
 }

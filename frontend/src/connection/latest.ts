@@ -4,6 +4,7 @@
  * A delta names the frame that it builds on. Frames of one connection come in order, so a delta
  * that builds on another frame than the last means that the two sides have lost each other.
  */
+import { secondsBetween } from '../contract/time';
 import type { DeltaFrame, Latest, StateFrame, TwinTagState, WireTime } from '../contract/types';
 
 /** The state after a frame; null where the frame does not build on what is there. */
@@ -47,6 +48,3 @@ function aged(tag: TwinTagState, stamp: WireTime): TwinTagState {
   );
   return { ...tag, readings, stale_seconds: secondsBetween(tag.last_observed, stamp) };
 }
-
-const secondsBetween = (from: WireTime, to: WireTime): number =>
-  Math.max(0, to.sec - from.sec + (to.nanosec - from.nanosec) / 1e9);

@@ -22,6 +22,7 @@ const status = (twin: StatusFrame['twin']): StatusFrame => ({
   state_age_seconds: 0,
   has_map: true,
   origin: 'robot',
+  input_problems: [],
   drops: [],
   journal: { state: 'recording', detail: '', set_aside: '', simulated: null },
   outward: [],

@@ -12,6 +12,7 @@ import {
   type Check,
   orNull,
 } from './check';
+import { filledHealth, filledTag } from './filled';
 import { ALARM, HEADER, HOUSE_HEALTH, MAX_SENSORS, TAG, TAG_HEALTH, TEXT, TIME } from './shapes';
 import type { Alarm, Frame, TwinTagState } from './types';
 
@@ -67,6 +68,7 @@ const FRAMES: Readonly<Record<Frame['type'], Check>> = {
     has_map: boolean,
     // A word of a later server that is not known here is not told.
     origin: TEXT,
+    input_problems: list(TEXT, MAX_REASONS),
     drops: list(object({ reason: TEXT, message: TEXT, count }), MAX_REASONS),
     journal: object({
       // Nor this: a state that is not known here is not told, and no reason to stop.
@@ -126,7 +128,23 @@ export function parseFrame(data: unknown): Parsed {
   if (!isKnown(type)) return { kind: 'passed over' };
   const why = FRAMES[type](message);
   if (why !== null) return bad(type + why, type === 'delta');
-  return { kind: 'frame', frame: message as Frame };
+  return { kind: 'frame', frame: filled(message as Frame) };
+}
+
+function filled(frame: Frame): Frame {
+  switch (frame.type) {
+    case 'state': {
+      const state = { ...frame.state, tags: frame.state.tags.map(filledTag) };
+      return { ...frame, state, health: filledHealth(frame.health) };
+    }
+    case 'delta': {
+      const changed = frame.changed.map(filledTag);
+      return { ...frame, changed, health: filledHealth(frame.health) };
+    }
+    case 'status':
+    case 'alarms':
+      return frame;
+  }
 }
 
 const isKnown = (type: string): type is Frame['type'] => Object.hasOwn(FRAMES, type);

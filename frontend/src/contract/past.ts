@@ -1,6 +1,7 @@
 /** The routes of the past: how it was at a moment, and what happened when. Times are ROS seconds. */
 import { get, read } from './api';
 import { boolean, count, list, number, object, orNull } from './check';
+import { filledHealth, filledTag } from './filled';
 import { HEALTH, TAGS } from './frames';
 import { HEADER, TIME } from './shapes';
 import type { Judgement, Latest, Timeline, TwinState } from './types';
@@ -52,7 +53,12 @@ export async function fetchStateAt(at: number, signal: AbortSignal): Promise<Lat
   if (Math.abs(told - at) > SAME_MOMENT_S) {
     throw new Error(`the answer is about ${told.toFixed(3)} s, asked was ${at.toFixed(3)} s`);
   }
-  return { seq: 0, revision: `at ${sec}.${nanosec}`, state, health };
+  return {
+    seq: 0,
+    revision: `at ${sec}.${nanosec}`,
+    state: { ...state, tags: state.tags.map(filledTag) },
+    health: filledHealth(health),
+  };
 }
 
 /**

@@ -1,5 +1,16 @@
 /** The messages that frames and answers are made of, field by field. */
-import { boolean, count, integer, list, numberOrNull, object, oneOf, orNull, text } from './check';
+import {
+  boolean,
+  count,
+  integer,
+  list,
+  numberOrNull,
+  object,
+  oneOf,
+  optional,
+  orNull,
+  text,
+} from './check';
 
 /** Kinds of sensors of one tag, and in one frame: each is a column of the table. */
 export const MAX_SENSORS = 256;
@@ -19,8 +30,7 @@ export const TAG = object({
     object({
       name: TEXT,
       value: numberOrNull,
-      observed_at: orNull(TIME),
-      stale_seconds: numberOrNull,
+      observed_at: optional(orNull(TIME)),
     }),
     MAX_SENSORS,
   ),
@@ -42,10 +52,10 @@ export const TAG = object({
     MAX_BLOOMS_PER_TAG,
   ),
   box_footprint: object({ points: list(POINT, MAX_FOOTPRINT_POINTS) }),
-  looked_at: orNull(TIME),
-  last_try: orNull(TIME),
-  last_try_status: numberOrNull,
-  last_try_detail: TEXT,
+  looked_at: optional(orNull(TIME)),
+  last_try: optional(orNull(TIME)),
+  last_try_status: optional(numberOrNull),
+  last_try_detail: optional(TEXT),
 });
 
 const MAX_REASONS_PER_TAG = 1_000;
@@ -59,7 +69,7 @@ const REASON = object({
   limit: numberOrNull,
   since: orNull(TIME),
 });
-const HEALTH = { verdict: VERDICT, reasons: list(REASON, MAX_REASONS_PER_TAG) };
+const HEALTH = { verdict: VERDICT, reasons: optional(list(REASON, MAX_REASONS_PER_TAG)) };
 export const TAG_HEALTH = object(HEALTH);
 export const HOUSE_HEALTH = object({
   ...HEALTH,

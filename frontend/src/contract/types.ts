@@ -3,7 +3,26 @@ import type { components } from './openapi.gen';
 
 type Schemas = components['schemas'];
 
-export type StateFrame = Schemas['StateFrame'];
+/** As `filled.ts` makes it of what the server left out; each reading has its own age. */
+export type TwinTagState = Required<Omit<Schemas['TwinTagState'], 'readings'>> & {
+  readonly readings: readonly (Required<Schemas['SensorReading']> & {
+    /** s since it was observed; null: not known. */
+    readonly stale_seconds: number | null;
+  })[];
+};
+export type TagHealth = Required<Schemas['TagHealth']>;
+/** What the bridge's judge says of the house and of each tag. */
+export interface Judgement {
+  readonly house: Required<Schemas['HouseHealth']>;
+  readonly tags: Readonly<Record<string, TagHealth>>;
+}
+export type TwinState = Omit<Schemas['TwinState'], 'tags'> & {
+  readonly tags: readonly TwinTagState[];
+};
+export type StateFrame = Omit<Schemas['StateFrame'], 'state' | 'health'> & {
+  readonly state: TwinState;
+  readonly health: Judgement;
+};
 export type StatusFrame = Schemas['StatusFrame'];
 /** What the twin dropped in the last minutes, and why. */
 export type Drop = Schemas['RecentDrop'];
@@ -11,10 +30,11 @@ export type Drop = Schemas['RecentDrop'];
 export type Journal = Schemas['Journal'];
 /** How a channel does by which others are told: MQTT, the webhook. */
 export type Outward = Schemas['Outward'];
-export type DeltaFrame = Schemas['DeltaFrame'];
+export type DeltaFrame = Omit<Schemas['DeltaFrame'], 'changed' | 'health'> & {
+  readonly changed: readonly TwinTagState[];
+  readonly health: Judgement;
+};
 export type Frame = StateFrame | DeltaFrame | StatusFrame | AlarmsFrame;
-export type TwinState = Schemas['TwinState'];
-export type TwinTagState = Schemas['TwinTagState'];
 export type OccupancyGrid = Schemas['OccupancyGrid'];
 export type FieldQuality = Schemas['FieldQuality'];
 export type PastTry = Schemas['PastTry'];
@@ -25,9 +45,6 @@ export type Timeline = Schemas['Timeline'];
 export type Alarm = Schemas['Alarm'];
 export type AlarmsFrame = Schemas['AlarmsFrame'];
 export type Alarms = Schemas['Alarms'];
-/** What the bridge's judge says of the house and of each tag. */
-export type Judgement = Schemas['Judgement'];
-export type TagHealth = Schemas['TagHealth'];
 export type HealthReason = Schemas['HealthReason'];
 export type Verdict = TagHealth['verdict'];
 /** How well the estimates have foretold, by sensor. */

@@ -1,5 +1,6 @@
 import type { Range } from './ramp';
-import { LOCALE } from '../strings';
+import type { MapPoint } from '../geometry/coordinates';
+import { LOCALE, S } from '../strings';
 import type { Sensor } from './sensors';
 import { toShown, unitOf, type TemperatureUnit } from './units';
 
@@ -11,23 +12,53 @@ const POINT =
 /** A number's text as the reader writes it: their decimal point, and a true minus sign. */
 export const written = (text: string): string => text.replace('.', POINT).replace('-', '\u2212');
 
-/** A number at the precision that a climate sensor deserves. */
-export function numberText(value: number): string {
+/** A number at the precision that a climate sensor deserves, with so many digits more. */
+function roundedText(value: number, more: number): string {
   const size = Math.abs(value);
   const digits = size >= 1e6 ? null : size >= 100 ? 0 : size >= 1 || value === 0 ? 1 : 2;
-  const text = digits === null ? value.toExponential(2) : value.toFixed(digits);
-  return written(/^-0(\.0+)?$/.test(text) ? text.slice(1) : text);
+  const text = digits === null ? value.toExponential(2 + more) : value.toFixed(digits + more);
+  return /^-0(\.0+)?$/.test(text) ? text.slice(1) : text;
+}
+
+export const numberText = (value: number, more = 0): string => written(roundedText(value, more));
+
+/** Beyond this many digits more two numbers may read the same. */
+const MOST_MORE = 4;
+
+/**
+ * How many digits more it takes for no value to read like a limit that it differs from: "50.0 %,
+ * below 50.0" contradicts itself.
+ */
+export function digitsApart(
+  sensor: Sensor,
+  values: readonly number[],
+  limit: number,
+  unit: TemperatureUnit,
+): number {
+  const apart = (more: number): boolean => {
+    const rounded = (value: number): number =>
+      Number(roundedText(toShown(sensor, value, unit), more));
+    return values.every((value) => value === limit || rounded(value) !== rounded(limit));
+  };
+  let more = 0;
+  while (more < MOST_MORE && !apart(more)) more += 1;
+  return more;
 }
 
 /** A reading without its unit. */
-export function valueText(sensor: Sensor, value: number, unit: TemperatureUnit): string {
-  return numberText(toShown(sensor, value, unit));
+export function valueText(sensor: Sensor, value: number, unit: TemperatureUnit, more = 0): string {
+  return numberText(toShown(sensor, value, unit), more);
 }
 
 /** A reading with its unit, held together by a no-break space. */
-export function readingText(sensor: Sensor, value: number, unit: TemperatureUnit): string {
+export function readingText(
+  sensor: Sensor,
+  value: number,
+  unit: TemperatureUnit,
+  more = 0,
+): string {
   const suffix = unitOf(sensor, unit);
-  const number = valueText(sensor, value, unit);
+  const number = valueText(sensor, value, unit, more);
   return suffix ? `${number}\u00a0${suffix}` : number;
 }
 
@@ -85,3 +116,7 @@ export function percentText(share: number): string {
 export function metresText(value: number): string {
   return written(value.toFixed(2));
 }
+
+/** Why a tag that was pinned there is not on the map. */
+export const farOffText = ({ x, y }: MapPoint): string =>
+  S.farOffLong(S.position(metresText(x), metresText(y)));

@@ -18,6 +18,16 @@ describe('a reason in words', () => {
       `Temperature 30.0${NBSP}°C, above 26.0`,
     ],
     [
+      { sensor: 'humidity', verdict: 'stressed', value: 49.97, limit: 50 } as const,
+      null,
+      `Humidity 49.97${NBSP}%, below 50.00`,
+    ],
+    [
+      { sensor: 'co2', verdict: 'stressed', value: 400.4, limit: 400 } as const,
+      null,
+      `CO₂ 400.4${NBSP}ppm, above 400.0`,
+    ],
+    [
       { sensor: 'vpd', value: 1.68, limit: 1.3, verdict: 'stressed' } as const,
       null,
       `Vapour pressure deficit 1.7${NBSP}kPa, above 1.3`,

@@ -1,7 +1,7 @@
 /** Why a tag or the house has its verdict, in words. */
 import type { HealthReason } from '../contract/types';
 import { S } from '../strings';
-import { ageText, readingText, shortAgeText, valueText } from './format';
+import { ageText, digitsApart, readingText, shortAgeText, valueText } from './format';
 import { isOfRange, sideOf } from './health';
 import type { Catalogue } from './sensors';
 import { shown } from './text';
@@ -26,10 +26,11 @@ export function reasonText(
   const label = name === '' ? '' : shown(sensor.label, LONGEST_NAME);
   const R = S.reasons;
   if (isOfRange(reason)) {
+    const more = digitsApart(sensor, [reason.value], reason.limit, unit);
     return R.range(
-      `${label} ${readingText(sensor, reason.value, unit)}`,
+      `${label} ${readingText(sensor, reason.value, unit, more)}`,
       R.sides[sideOf(reason)],
-      valueText(sensor, reason.limit, unit),
+      valueText(sensor, reason.limit, unit, more),
       reason.verdict === 'critical',
     );
   }
@@ -60,6 +61,21 @@ export function reasonText(
       // Of a later server.
       return R.other(shown((kind as string).replaceAll('_', ' '), LONGEST_NAME), label);
   }
+}
+
+/** What lies on which side of which limit, without the value: that changes. */
+export function beyondText(
+  sensors: Catalogue,
+  reason: HealthReason & { readonly value: number; readonly limit: number },
+  unit: TemperatureUnit,
+  more: number,
+): string {
+  const sensor = sensors.named(reason.sensor);
+  return S.reasons.beyond(
+    shown(sensor.label, LONGEST_NAME),
+    S.reasons.sides[sideOf(reason)],
+    readingText(sensor, reason.limit, unit, more),
+  );
 }
 
 /** All reasons in one line, the worst first. */

@@ -105,7 +105,7 @@ function haystackOf({ tag, health }: Row, sensors: Catalogue): string {
     tag.species || S.unclassified,
     S.health[health.verdict],
     tag.anomaly ? S.pest : '',
-    tag.at ? '' : S.notOnMap,
+    tag.at ? '' : tag.farOff ? S.farOff : S.notOnMap,
     tag.scannedAt === 'never' ? S.neverObserved : '',
     tag.failedTry ? S.tried[tryKind(tag.failedTry.status)] : '',
     ...[...tag.readings.keys()].map((name) => `${name} ${sensors.named(name).label}`),
@@ -142,6 +142,7 @@ export function tableCsv(
     ...['last observed [UTC]', 'x [m]', 'y [m]'],
   ];
   const lines = rows.map(({ tag, health }): Cell[] => {
+    const place = tag.at ?? tag.farOff;
     const age = ageSeconds(tag.scannedAt, now);
     return [
       tag.id,
@@ -158,8 +159,8 @@ export function tableCsv(
       tag.anomaly ? 'yes' : 'no',
       age === null ? null : Math.round(age),
       observedText(tag.wire.last_observed),
-      tag.at && round(tag.at.x),
-      tag.at && round(tag.at.y),
+      place && round(place.x),
+      place && round(place.y),
     ];
   });
   return csv([header, ...lines]);

@@ -32,12 +32,17 @@ export function trendOf(sensor: string, now: TagThen, then: TagThen | null): Tre
   return { kind: 'by', by: value - before };
 }
 
-/** The value of a reading that has not grown too old, as the bridge judges age; null: there is none. */
-function held(sensor: string, { tag, health }: TagThen): number | null {
-  const isOld = health.reasons.some(
-    (reason) => reason.kind === 'old' && (reason.sensor === '' || reason.sensor === sensor),
+/** The value of a reading that has not grown too old; null: there is none. */
+const held = (sensor: string, then: TagThen): number | null =>
+  isOldReading(sensor, then) ? null : (then.tag.readings.get(sensor) ?? null);
+
+/** Whether a reading has grown too old, as the bridge judges age; of what is derived, any other. */
+export function isOldReading(sensor: string, { tag, health }: TagThen): boolean {
+  const isDerived = !tag.readings.has(sensor);
+  return health.reasons.some(
+    (reason) =>
+      reason.kind === 'old' && (isDerived || reason.sensor === '' || reason.sensor === sensor),
   );
-  return isOld ? null : (tag.readings.get(sensor) ?? null);
 }
 
 function sameReading(sensor: string, a: Tag, b: Tag): boolean {

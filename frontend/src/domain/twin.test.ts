@@ -184,3 +184,27 @@ describe('times of their own', () => {
     expect(silent.tags[0]?.scannedAt).toBe('unknown');
   });
 });
+
+describe('a tag that is far off', () => {
+  const at = (id: string, x: number): TwinTagState => {
+    const { pose } = wireTag();
+    return wireTag({ tag_id: id, pose: { ...pose, position: { x, y: 0, z: 0 } } });
+  };
+  const wire = [at('1', 0), at('2', 1), at('3', 2), at('lost', 5000)];
+  const first = snapshotOf(stateFrame(wire, { sec: 5 }), 1000, null);
+
+  test('has no place on the map, and is told where it is', () => {
+    expect(first.tags.map((tag) => tag.at?.x)).toEqual([0, 1, 2, undefined]);
+    expect(first.tags.map((tag) => tag.farOff?.x)).toEqual([undefined, undefined, undefined, 5000]);
+  });
+
+  test('is the very same tag as long as nothing but the time goes on', () => {
+    expect(snapshotOf(stateFrame(wire, { sec: 6 }), 2000, first).tags).toBe(first.tags);
+  });
+
+  test('is back on the map with as many others there', () => {
+    const more = [...wire, at('5', 5001), at('6', 5002)];
+    const next = snapshotOf(stateFrame(more, { sec: 6 }), 2000, first);
+    expect(next.tags.map((tag) => tag.at?.x)).toEqual([0, 1, 2, 5001, 5002, 5000]);
+  });
+});

@@ -1,6 +1,7 @@
 import type { Latest, TwinTagState, WirePoint, WireTime } from '../contract/types';
 import { mapPoint, type MapPoint } from '../geometry/coordinates';
 import type { When } from './age';
+import { holds, reachOf, type Reach } from './farOff';
 
 export interface Bloom {
   readonly at: MapPoint;
@@ -20,8 +21,10 @@ export interface FailedTry {
 /** One tag as the page uses it. Strings are as they came: show them through `domain/text`. */
 export interface Tag {
   readonly id: string;
-  /** Metres; null: the tag has no pose and gets no pin. */
+  /** Metres; null: the tag has no pose, or one that is far off, and gets no pin. */
   readonly at: MapPoint | null;
+  /** Where it was pinned, too far from the others for any map; null: it was not. */
+  readonly farOff: MapPoint | null;
   /** Latest reading by sensor, in its unit; null: the sensor gave not-a-number. */
   readonly readings: ReadonlyMap<string, number | null>;
   /** When each reading was made: a look at the flowers makes none younger. */
@@ -103,6 +106,7 @@ export function tagOf(wire: TwinTagState, state: TakenState): Tag {
     // w is exactly 0 where the twin has no pose; every rotation about z by less than half a
     // turn has another w, and ROS itself defaults it to 1.
     at: orientation.w === 0 || orientation.w === null ? null : pointOf(position),
+    farOff: null,
     readings: new Map(wire.readings.map(({ name, value }) => [name, value])),
     readAt,
     scannedAt: newest(readAt.values()),
@@ -204,8 +208,10 @@ export function snapshotOf(latest: Latest, arrivedAt: number, before: Snapshot |
   const takenAt = repeated ? Math.min(before.takenAt, arrivedAt) : arrivedAt;
   const state = { at: latest.state.header.stamp, takenAt };
   const known = new Map(before?.tags.map((tag) => [tag.id, tag]));
+  const read = latest.state.tags.map((wire) => sharedTag(known.get(wire.tag_id), wire, state));
+  const reach = reachOfTags(read);
   const tags = inOrder(
-    latest.state.tags.map((wire) => sharedTag(known.get(wire.tag_id), wire, state)),
+    read.map((tag) => within(reach, tag)),
     known,
     before?.tags ?? [],
   );
@@ -217,6 +223,19 @@ export function snapshotOf(latest: Latest, arrivedAt: number, before: Snapshot |
     takenAt,
     fresh: before && tags !== before.tags ? freshTags(known, tags) : [],
   };
+}
+
+/** How far a map of these tags goes. */
+export const reachOfTags = (tags: readonly Tag[]): Reach =>
+  reachOf(tags.flatMap((tag) => tag.at ?? tag.farOff ?? []));
+
+/** The tag as the map shows it: one that is far off has no place there. */
+function within(reach: Reach, tag: Tag): Tag {
+  const place = tag.at ?? tag.farOff;
+  const isFar = place !== null && !holds(reach, place);
+  return isFar === (tag.farOff !== null)
+    ? tag
+    : { ...tag, at: isFar ? null : place, farOff: isFar ? place : null };
 }
 
 /** By their ids. The very list of before if each tag is the very same: then nothing is redrawn. */

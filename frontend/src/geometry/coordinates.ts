@@ -74,12 +74,11 @@ export function corners(bounds: Bounds): MapPoint[] {
   ];
 }
 
+/** As far out as a hand zooms, but to all there is where that is larger. */
 export const MIN_SCALE = 4;
 export const MAX_SCALE = 2000;
 /** A single tag has a box of no size; a fit shows at least this much around it, in metres. */
 const MIN_EXTENT_M = 2;
-
-const clampScale = (scale: number): number => Math.min(MAX_SCALE, Math.max(MIN_SCALE, scale));
 
 /** The view that shows all of `bounds`, centred in what the insets leave free. */
 export function fit(bounds: Bounds, size: Size, insets: Insets): View {
@@ -87,7 +86,7 @@ export function fit(bounds: Bounds, size: Size, insets: Insets): View {
   const height = Math.max(1, size.height - insets.top - insets.bottom);
   const extentX = Math.max(MIN_EXTENT_M, bounds.maxX - bounds.minX);
   const extentY = Math.max(MIN_EXTENT_M, bounds.maxY - bounds.minY);
-  const scale = clampScale(Math.min(width / extentX, height / extentY));
+  const scale = Math.min(MAX_SCALE, width / extentX, height / extentY);
   const centre = mapPoint((bounds.minX + bounds.maxX) / 2, (bounds.minY + bounds.maxY) / 2);
   return {
     scale,
@@ -108,11 +107,26 @@ export function cameraOf(view: View, size: Size): Camera {
   return { x: centre.x, y: centre.y, span: Math.min(size.width, size.height) / view.scale };
 }
 
-export function viewOf(camera: Camera, size: Size): View {
-  const scale = clampScale(Math.min(size.width, size.height) / camera.span);
+export function viewOf(camera: Camera, size: Size, leastScale = MIN_SCALE): View {
+  const wanted = Math.min(size.width, size.height) / camera.span;
+  const scale = Math.min(MAX_SCALE, Math.max(leastScale, wanted));
   return {
     scale,
     x: size.width / 2 - camera.x * scale,
     y: size.height / 2 + camera.y * scale,
+  };
+}
+
+/** What of the bounds stays in sight, pixels along each side. */
+const KEPT_PX = 40;
+
+/** The view, moved back so far that some of the bounds is to be seen. */
+export function inSight({ x, y, scale }: View, size: Size, bounds: Bounds): View {
+  const clamp = (value: number, low: number, high: number): number =>
+    Math.max(low, Math.min(high, value));
+  return {
+    scale,
+    x: clamp(x, KEPT_PX - bounds.maxX * scale, size.width - KEPT_PX - bounds.minX * scale),
+    y: clamp(y, KEPT_PX + bounds.minY * scale, size.height - KEPT_PX + bounds.maxY * scale),
   };
 }

@@ -130,6 +130,39 @@ describe('camera', () => {
     for (const pin of content.pins) expect(isClear(viewport.view, pin, [buttons])).toBe(true);
   });
 
+  test('no hand and no link leads to where nothing of it is in sight', () => {
+    camera.goTo(null, content);
+    const isSeen = (): boolean => {
+      const low = toCanvas(viewport.view, mapPoint(bounds.minX, bounds.minY));
+      const high = toCanvas(viewport.view, mapPoint(bounds.maxX, bounds.maxY));
+      return high.x >= 0 && low.x <= size.width && low.y >= 0 && high.y <= size.height;
+    };
+    for (const [x, y] of [
+      [9, 0],
+      [-9, 0],
+      [0, 9],
+      [0, -9],
+    ] as const) {
+      camera.panBy(x, y);
+      expect(isSeen()).toBe(true);
+    }
+    camera.goTo({ x: 900_000, y: -900_000, span: 8 }, content);
+    expect(isSeen()).toBe(true);
+  });
+
+  test('a hand zooms out to all there is, and not much farther', () => {
+    camera.goTo(null, content);
+    camera.zoomBy(1e-6);
+    expect(viewport.view.scale).toBe(4);
+    const wide = { ...bounds, minX: -1000, maxX: 1000 };
+    camera.goTo(null, { bounds: wide, pins: corners(wide) });
+    const whole = viewport.view.scale;
+    expect(whole).toBeLessThan(600 / 2000);
+    camera.zoomBy(2);
+    camera.zoomBy(1e-6);
+    expect(viewport.view.scale).toBeCloseTo(whole);
+  });
+
   const mouse = (target: EventTarget, type: string, x: number): void => {
     const event = new MouseEvent(type, { clientX: x, clientY: 0, bubbles: true });
     // Which the constructor does not take: in a test, `window` is a stand-in for jsdom's own.

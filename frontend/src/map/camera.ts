@@ -4,6 +4,7 @@ import { zoom, zoomIdentity, type D3ZoomEvent, type ZoomTransform } from 'd3-zoo
 import { fitClear, isClear, type Box } from '../geometry/clear';
 import {
   cameraOf,
+  inSight,
   MAX_SCALE,
   MIN_SCALE,
   toCanvas,
@@ -55,6 +56,9 @@ export class MapCamera {
   #programmed = false;
   /** The view that the gestures under way began with. */
   #held: View | null = null;
+  /** What no move leads away from; null: not known yet. */
+  #content: Content | null = null;
+  #leastScale = MIN_SCALE;
 
   /** `isFixed`: the program alone moves it; no wheel, finger or mouse does. */
   constructor(element: HTMLElement, handlers: CameraHandlers, isFixed = false) {
@@ -67,6 +71,7 @@ export class MapCamera {
         [0, 0],
         [this.#viewport().size.width, this.#viewport().size.height],
       ])
+      .constrain((transform) => transformOf(this.#inSight(toView(transform))))
       .clickDistance(6)
       // At once, by the double click too: nothing here is animated (see `instantly.ts`).
       .duration(0);
@@ -101,14 +106,23 @@ export class MapCamera {
     if (this.#held !== null) return;
     const { view: before, size } = this.#viewport();
     if (size.width === 0 || size.height === 0) return;
-    const view = camera
-      ? viewOf(camera, size)
-      : content && fitClear(content.bounds, content.pins, size, fitInsets(size), covered);
+    const whole = content && fitClear(content.bounds, content.pins, size, fitInsets(size), covered);
+    if (whole) {
+      this.#content = content;
+      this.#leastScale = Math.min(MIN_SCALE, whole.scale);
+      this.#zoom.scaleExtent([this.#leastScale, MAX_SCALE]);
+    }
+    const view = camera ? this.#inSight(viewOf(camera, size, this.#leastScale)) : whole;
     if (!view) return;
     if (isSame(view, before)) return;
     this.#programmed = true;
     this.#zoom.transform(this.#selection, transformOf(view));
     this.#programmed = false;
+  }
+
+  #inSight(view: View): View {
+    const { size } = this.#viewport();
+    return this.#content ? inSight(view, size, this.#content.bounds) : view;
   }
 
   /** Whether the operator has hold of the map, or the wheel has not yet come to rest. */

@@ -1,7 +1,8 @@
 /** What there is to show on the map, and what stands on it. */
 import type { Field } from '../contract/types';
 import { fieldCorners } from '../domain/field';
-import type { Tag } from '../domain/twin';
+import { holds, isPossible } from '../domain/farOff';
+import { reachOfTags, type Tag } from '../domain/twin';
 import type { Box } from '../geometry/clear';
 import { boundsOf, corners, type Bounds, type MapPoint } from '../geometry/coordinates';
 import { memoOne } from '../store/memo';
@@ -14,9 +15,12 @@ export interface Content {
 
 const NO_TAGS: readonly Tag[] = [];
 
+/** A planter that was seen by a robot that is lost does not make the map wider. */
 const places = memoOne((tags: readonly Tag[]) => {
+  const reach = reachOfTags(tags);
   const pins = tags.flatMap((tag) => (tag.at ? [tag.at] : []));
-  const bounds = boundsOf([...pins, ...tags.flatMap((tag) => tag.footprint)]);
+  const planters = tags.flatMap((tag) => tag.footprint);
+  const bounds = boundsOf([...pins, ...planters.filter((corner) => holds(reach, corner))]);
   return { pins, corners: bounds ? corners(bounds) : [] };
 });
 
@@ -31,7 +35,7 @@ export function contentOf({ snapshot, map }: House, field: Field | null): Conten
     ...planted,
     // A field whose tags are gone is one of a twin before this one.
     ...(field && planted.length > 0 ? fieldCorners(field) : []),
-    ...(map.value?.known ?? []),
+    ...(map.value?.known ?? []).filter(isPossible),
   ]);
   return bounds && { bounds, pins };
 }

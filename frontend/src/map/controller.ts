@@ -183,7 +183,7 @@ export function runMap(
       });
     }
     const sameContent = !changedTags && sameMap && house.field === last.field;
-    if (view.camera !== before.view.camera || (!view.camera && !sameContent)) {
+    if (view.camera !== before.view.camera || !sameContent) {
       camera.goTo(view.camera, content(state), covered);
     }
   };

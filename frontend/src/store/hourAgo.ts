@@ -7,7 +7,7 @@ import { TREND_S, type TagThen } from '../domain/trend';
 import { snapshotOf } from '../domain/twin';
 import { store, type AppState } from './app';
 import { createStore } from './create';
-import { rosNow, selectShown, selectSnapshot } from './moment';
+import { rosNow, selectNewest, selectShown, selectSnapshot } from './moment';
 import { isColumnShown } from './settings';
 
 /** An answer serves for so long, seconds of the twin's time: less than anybody sees in a trend. */
@@ -42,6 +42,14 @@ export function selectHourAgo(state: AppState, last: HourAgo | null): HourAgo | 
   // Now it may be twice as old as it serves: the next answer is on its way.
   if (!last || base === null) return null;
   return Math.abs(base - last.of) <= (moment === null ? 2 * SERVES_S : 1) ? last : null;
+}
+
+/** What was known an hour before now, whatever moment is shown; null: not known. */
+export function selectHourAgoNow(state: AppState, last: HourAgo | null): HourAgo | null {
+  const { snapshot } = selectNewest(state);
+  return snapshot && last && Math.abs(secondsOf(snapshot.at) - last.of) <= 2 * SERVES_S
+    ? last
+    : null;
 }
 
 export function startHourAgo(): () => void {
@@ -88,7 +96,8 @@ export function startHourAgo(): () => void {
     const serving = [hourAgo.get()?.of, asking ? asked : null].some(
       (of) => of != null && base !== null && serves(of, base, isPast),
     );
-    const isWanted = base !== null && base >= TREND_S && isColumnShown(state.settings, 'trend');
+    const isSeen = isColumnShown(state.settings, 'trend') || state.view.list === 'alarms';
+    const isWanted = base !== null && base >= TREND_S && isSeen;
     if (!isWanted || serving) {
       rest();
       return;

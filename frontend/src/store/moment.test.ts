@@ -108,6 +108,7 @@ describe('how ages go on', () => {
     ['offline', 'stale', 'growing'],
     ['offline', 'no_clock', 'unknown'],
     ['offline', 'clock_stopped', 'unknown'],
+    ['offline', 'clock_doubted', 'unknown'],
   ] as const)('twin %s, %s: %s', (twin, reason, kind) => {
     goLive(status({ twin, reason }));
     const shown = selectShown(store.get());

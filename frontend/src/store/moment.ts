@@ -29,10 +29,12 @@ export function shownAt(twin: TwinState, moment: Moment): Shown {
   return shownThen(house, twin.latest.map, at);
 }
 
+const CLOCKS_LOST = new Set<unknown>(['no_clock', 'clock_stopped', 'clock_doubted']);
+
 /** How the time of the newest house goes on, as far as anybody knows. */
 function clockOf({ isTimeLost, connection }: TwinState): keyof typeof SHOWN_NOW {
   const reason = connection.status?.reason;
-  if (isTimeLost || reason === 'no_clock' || reason === 'clock_stopped') return 'unknown';
+  if (isTimeLost || CLOCKS_LOST.has(reason)) return 'unknown';
   return reason === 'paused' ? 'paused' : 'running';
 }
 

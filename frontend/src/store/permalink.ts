@@ -1,5 +1,6 @@
 /** The part of the view that a link carries, in the URL's fragment: it never reaches a server. */
 import type { Compare } from '../domain/difference';
+import { isPossible } from '../domain/farOff';
 import { VERDICTS } from '../domain/health';
 import { PERIOD_KINDS, type Period } from '../domain/period';
 import type { Range } from '../domain/ramp';
@@ -144,7 +145,7 @@ function rangesOf(parts: URLSearchParams, inView: string): ReadonlyMap<string, R
 function cameraOf(values: readonly number[] | null): Camera | null {
   const [x, y, span] = values ?? [];
   if (x === undefined || y === undefined || span === undefined || span <= 0) return null;
-  return { x, y, span };
+  return isPossible({ x, y }) ? { x, y, span } : null;
 }
 
 function numbers(text: string | null, count: number): readonly number[] | null {

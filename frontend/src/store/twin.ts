@@ -232,9 +232,13 @@ const sameStatus = (a: StatusFrame | null, b: StatusFrame | null): boolean =>
   a?.message === b?.message &&
   a?.has_map === b?.has_map &&
   a?.origin === b?.origin &&
+  sameTexts(a?.input_problems ?? [], b?.input_problems ?? []) &&
   sameDrops(a?.drops ?? [], b?.drops ?? []) &&
   sameJournal(a?.journal, b?.journal) &&
   sameOutward(a?.outward ?? [], b?.outward ?? []);
+
+const sameTexts = (a: readonly string[], b: readonly string[]): boolean =>
+  a.length === b.length && a.every((text, index) => b[index] === text);
 
 const sameJournal = (a?: Journal, b?: Journal): boolean =>
   a?.state === b?.state &&

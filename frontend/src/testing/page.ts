@@ -17,6 +17,7 @@ export const status = (over: Partial<StatusFrame> = {}): StatusFrame => ({
   state_age_seconds: 0,
   has_map: true,
   origin: 'robot',
+  input_problems: [],
   drops: [],
   journal: { state: 'recording', detail: 'recording', set_aside: '', simulated: null },
   outward: [],

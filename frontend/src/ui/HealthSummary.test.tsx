@@ -1,7 +1,9 @@
 import { act, fireEvent, render, screen } from '@testing-library/react';
 import { expect, test } from 'vitest';
 
+import { startAlarms } from '../alarms/watch';
 import { store } from '../store/app';
+import { alarm, tellAlarms } from '../testing/alarms';
 import { judgement, reason } from '../testing/health';
 import { goLost, showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
@@ -16,7 +18,7 @@ test('names the verdict, the tag that it comes from, and why', () => {
   showTags(TAGS, judgement({ 1: 'healthy', 5: [co2] }));
   render(<HealthSummary kiosk={false} />);
   expect(house().dataset['health']).toBe('critical');
-  expect(screen.getByRole('heading').textContent).toBe('House health: Critical');
+  expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: Critical');
   expect(driver().textContent).toBe('Tag 5: CO₂ 4000\u00a0ppm, above 3000 (critical)');
   fireEvent.click(driver());
   expect(store.get().view.selected).toBe('5');
@@ -52,6 +54,22 @@ test('all is well, hardly anything is known, and nothing is', () => {
     showTags([]);
   });
   expect(driver().textContent).toMatch(/^No reading/);
+});
+
+test('beside an active alarm, healthy says why', () => {
+  showTags(TAGS, judgement({ 1: 'healthy', 5: 'healthy' }));
+  const stop = startAlarms();
+  render(<HealthSummary kiosk={false} />);
+  act(() => {
+    tellAlarms(alarm('a'));
+  });
+  expect(house().dataset['health']).toBe('healthy');
+  expect(driver().textContent).toBe('1 alarm is still active: two good scans resolve it');
+  act(() => {
+    tellAlarms(alarm('a', { cleared: 950 }));
+  });
+  expect(driver().textContent).toMatch(/^Every judged reading/);
+  stop();
 });
 
 test('a house that is not heard of is unknown, whatever was said last', () => {

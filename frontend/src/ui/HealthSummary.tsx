@@ -1,9 +1,12 @@
 import type { JSX } from 'react';
 
+import { alarmList } from '../alarms/watch';
 import { VERDICTS, type HouseHealth } from '../domain/health';
 import { shown } from '../domain/text';
 import { act, useApp } from '../store/app';
+import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';
+import { selectShown } from '../store/moment';
 import { S } from '../strings';
 import { HealthMark, HealthShape } from './HealthMark';
 import { HouseLine } from './HouseLine';
@@ -15,7 +18,10 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
   const filter = useApp((state) => state.view.health);
   const { worst } = health;
   const reason = useReasonText(health.reasons[0] ?? worst?.health.reasons[0] ?? null);
-  const driver = driverText(health, reason);
+  // Of now, as the list of alarms is.
+  const isNow = useApp((state) => selectShown(state).moment === null);
+  const alarms = useSelected(alarmList, ({ active, shelved }) => active.length + shelved.length);
+  const driver = driverText(health, reason, isNow ? alarms : 0);
   return (
     <section
       className="health"
@@ -72,10 +78,14 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
 }
 
 /** What makes the house what it is; `reason` is the house's own, or that of its worst tag. */
-function driverText({ verdict, worst, counts }: HouseHealth, reason: string): string {
+function driverText(
+  { verdict, worst, counts }: HouseHealth,
+  reason: string,
+  alarms: number,
+): string {
   if (worst) return S.healthDriver(shown(worst.tagId, 24), reason);
   if (reason !== '') return reason;
-  if (verdict === 'healthy') return S.healthAllWell;
+  if (verdict === 'healthy') return alarms > 0 ? S.healthDespite(alarms) : S.healthAllWell;
   const { unknown } = counts;
   if (unknown === 0) return S.healthNothing;
   const all = VERDICTS.reduce((sum, each) => sum + counts[each], 0);

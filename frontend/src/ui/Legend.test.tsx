@@ -43,6 +43,7 @@ describe('legend', () => {
         rmse: 1.5,
         worst: null,
         painted_share: 0.5,
+        far_off_tags: [],
       },
     });
     prefer({ unit: 'F' });

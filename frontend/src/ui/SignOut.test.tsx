@@ -7,8 +7,9 @@ import { toast } from './toast';
 
 const server = (session: unknown, status = 204): string[] => {
   const asked: string[] = [];
-  vi.stubGlobal('fetch', (url: URL) => {
-    asked.push(url.pathname);
+  vi.stubGlobal('fetch', (url: URL, { method = 'GET', headers }: RequestInit) => {
+    const own = new Headers(headers).has('X-Lupin-Twin') ? ' by us' : '';
+    asked.push(`${method} ${url.pathname}${own}`);
     return Promise.resolve(
       url.pathname === '/api/session'
         ? Response.json(session)
@@ -28,7 +29,7 @@ test('a session can be ended, and the page leaves', async () => {
   await waitFor(() => {
     expect(leave.mock.lastCall?.[0].pathname).toBe('/signin');
   });
-  expect(asked).toEqual(['/api/session', '/api/signout']);
+  expect(asked).toEqual(['GET /api/session', 'POST /api/signout by us']);
   expect(close).toHaveBeenCalledOnce();
 });
 

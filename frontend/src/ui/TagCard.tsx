@@ -1,7 +1,7 @@
 import { useEffect, useRef, type JSX } from 'react';
 
 import type { When } from '../domain/age';
-import { metresText, percentText, readingText, valueText } from '../domain/format';
+import { farOffText, metresText, percentText, readingText, valueText } from '../domain/format';
 import { rangeReason, sideOf } from '../domain/health';
 import { rangesFor } from '../domain/sensors';
 import { shown } from '../domain/text';
@@ -162,7 +162,7 @@ function CardBody({
                 {S.position(metresText(at.x), metresText(at.y))}
               </button>
             ) : (
-              <span>{S.notOnMapLong}</span>
+              <span>{tag.farOff ? farOffText(tag.farOff) : S.notOnMapLong}</span>
             )}
           </dd>
         </div>

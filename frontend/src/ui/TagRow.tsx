@@ -1,7 +1,7 @@
 import { memo, type JSX } from 'react';
 
 import type { When } from '../domain/age';
-import { percentText, shortAgeText, valueText } from '../domain/format';
+import { farOffText, percentText, shortAgeText, valueText } from '../domain/format';
 import type { TagHealth } from '../contract/types';
 import { rangeReason, sideOf } from '../domain/health';
 import { reasonsText } from '../domain/reasons';
@@ -66,8 +66,8 @@ export const TagRow = memo(function TagRow({
           <bdi>{shown(tag.id, 24)}</bdi>
         </button>
         {!tag.at && (
-          <span className="chip" title={S.notOnMapLong}>
-            {S.notOnMap}
+          <span className="chip" title={tag.farOff ? farOffText(tag.farOff) : S.notOnMapLong}>
+            {tag.farOff ? S.farOff : S.notOnMap}
           </span>
         )}
       </th>

@@ -9,7 +9,7 @@ import type { TemperatureUnit } from '../domain/units';
 import type { HourAgo } from '../store/hourAgo';
 import { S } from '../strings';
 
-const ARROWS = { up: '\u2197', down: '\u2198', level: '\u2192' } as const;
+export const ARROWS = { up: '\u2197', down: '\u2198', level: '\u2192' } as const;
 
 /** A reading against an hour ago: an arrow and the difference, or why there is none. */
 export function TrendLine({

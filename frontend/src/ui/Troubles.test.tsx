@@ -62,6 +62,16 @@ test('what the twin dropped is told with its count, and a pause as one', () => {
   ]);
 });
 
+test('what the twin does not hear is told with the remedy, to its end', () => {
+  const why = `/a_node publishes ${'/long'.repeat(60)} as VOLATILE`;
+  goLive(status({ input_problems: [`${why}; use TRANSIENT_LOCAL`, 'nothing has come yet'] }));
+  render(<Troubles />);
+  expect(lines()).toEqual([
+    `The twin does not hear all that is published for it. ${why}; use TRANSIENT_LOCAL.`,
+    'The twin does not hear all that is published for it. Nothing has come yet.',
+  ]);
+});
+
 test('a recording stands still because it is paused, or over', () => {
   goLive(status({ reason: 'paused', origin: 'recorded' }));
   render(<Troubles />);
@@ -85,6 +95,12 @@ const journal = (over: Partial<Journal>): void => {
 test.each([
   ['failing', 'Nothing is being recorded.', /Database or disk is full\. The twin goes on,/],
   ['slow', 'The recording lags behind.', /What waits is written as the disk keeps up/],
+  ['upgrading', 'The recording of an older version is being upgraded.', /it may take minutes/],
+  [
+    'doubting',
+    'Nothing is being recorded: the clock contradicts the recording.',
+    /once the clock is right/,
+  ],
   ['in_use', 'This twin does not record: another one does.', /Stop one of them, or give/],
   [
     'foreign',

@@ -53,6 +53,10 @@ export function troublesOf(
       detail: S.pastFaultShown(rosText(moment), shown(pastFault.message, 160)),
     });
   }
+  for (const problem of status?.input_problems ?? []) {
+    const detail = sentence(problem, MAX_PROBLEM);
+    troubles.push({ id: `input ${problem}`, title: S.inputProblem, detail });
+  }
   for (const { reason, message, count } of status?.drops ?? []) {
     troubles.push({
       id: `drop ${reason}`,
@@ -62,6 +66,9 @@ export function troublesOf(
   }
   return troubles;
 }
+
+/** So long is what a twin says of an input: its remedy stands at the end. */
+const MAX_PROBLEM = 500;
 
 const TOLD = new Map<string, { title: string; hint: string }>(Object.entries(S.journal));
 
@@ -99,8 +106,8 @@ function outwardTroubles(channels: readonly Outward[]): readonly Trouble[] {
     }));
 }
 
-function sentence(text: string): string {
-  const said = shown(text, 240);
+function sentence(text: string, most = 240): string {
+  const said = shown(text, most);
   return said && `${said.charAt(0).toUpperCase()}${said.slice(1)}.`;
 }
 

@@ -39,6 +39,8 @@ interface Language {
   readonly sensors: Readonly<Record<string, string>>;
   readonly sides: readonly [below: string, above: string];
   readonly says: Readonly<Record<HealthReason['kind'], RegExp>>;
+  /** Of an alarm, whose value is that of now. */
+  readonly alarms: Readonly<Record<'range' | 'pest', RegExp>>;
   readonly tag: string;
   readonly house: string;
   readonly most: RegExp;
@@ -70,8 +72,9 @@ const LANGUAGES: Readonly<Record<'en' | 'de', Language>> = {
       silent: /twin is silent/,
       stopped: /^No tag is being scanned/,
     },
+    alarms: { range: /(below|above) \d/, pest: /^Pest seen, now \d+ \(critical\)$/ },
     tag: 'Tag 1',
-    house: 'Whole house',
+    house: 'Whole greenhouse',
     most: /More than half/,
   },
   de: {
@@ -100,8 +103,9 @@ const LANGUAGES: Readonly<Record<'en' | 'de', Language>> = {
       silent: /Zwilling schweigt/,
       stopped: /kein Messpunkt mehr gemessen/,
     },
+    alarms: { range: /(unter|über) \d/, pest: /^Schädling gesehen, jetzt \d+ \(kritisch\)$/ },
     tag: 'Messpunkt 1',
-    house: 'Ganzes Haus',
+    house: 'Ganzes Gewächshaus',
     most: /Mehr als die Hälfte/,
   },
 };
@@ -128,7 +132,6 @@ describe.each(['en', 'de'] as const)('%s', (language) => {
     ...(await import('../testing/tags')),
     ...(await import('./HealthSummary')),
     ...(await import('./TagTable')),
-    ...(await import('../alarms/words')),
     ...(await import('../alarms/title')),
     ...(await import('../alarms/speech')),
     ...(await import('../store/app')),
@@ -148,8 +151,12 @@ describe.each(['en', 'de'] as const)('%s', (language) => {
   });
 
   /** Whether a text says what a reason is about. */
-  const expectSaid = (text: string, [kind, , sensor, value, limit]: Told): void => {
-    expect(text).toMatch(words.says[kind]);
+  const expectSaid = (
+    text: string,
+    [kind, , sensor, value, limit]: Told,
+    says = words.says,
+  ): void => {
+    expect(text).toMatch(says[kind]);
     if (sensor !== '') expect(text).toContain(words.sensors[sensor]);
     if (kind === 'range' && value !== null && limit !== null) {
       expect(text).toContain(words.sides[value < limit ? 0 : 1]);
@@ -213,7 +220,6 @@ describe.each(['en', 'de'] as const)('%s', (language) => {
       for (const [index, each] of reasons.entries()) expectSaid(why.split('; ')[index] ?? '', each);
     }
 
-    const speech = page.selectSpeech(page.store.get());
     for (const [tag_id, kind, sensor, verdict] of state.alarms) {
       const of = tags.find(([id]) => id === tag_id)?.[1].reasons ?? [];
       const told: Told = of.find((it) => it[0] === kind && it[2] === sensor) ?? [
@@ -227,11 +233,11 @@ describe.each(['en', 'de'] as const)('%s', (language) => {
         ...{ id: `${tag_id} ${kind}`, tag_id, raised_at: SINCE, cleared_at: null, worst: null },
         reason: reasonOf(told),
       };
-      const text = page.alarmText(alarm, speech);
+      const text = page.textNow(page.store.get(), alarm);
       expect(text.startsWith(tag_id === '' ? words.house : words.tag.replace('1', tag_id))).toBe(
         true,
       );
-      expectSaid(text.slice(text.indexOf(': ') + 2), told);
+      expectSaid(text.slice(text.indexOf(': ') + 2), told, { ...words.says, ...words.alarms });
     }
     const calls = state.alarms.length;
     expect(page.titleOf(calls, null)).toBe(calls === 0 ? 'Lupin twin' : `(${calls}) Lupin twin`);

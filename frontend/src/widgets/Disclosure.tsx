@@ -19,11 +19,19 @@ interface Props {
   readonly label: string;
   readonly button: ReactNode;
   readonly className: string;
+  /** Of the button. */
+  readonly look?: string;
   readonly children: ReactNode;
 }
 
 /** A button that opens a panel beside it; Escape, a click elsewhere or leaving it closes. */
-export function Disclosure({ label, button, className, children }: Props): JSX.Element {
+export function Disclosure({
+  label,
+  button,
+  className,
+  look = 'icon-button',
+  children,
+}: Props): JSX.Element {
   const [open, setOpen] = useState(false);
   const root = useRef<HTMLDivElement>(null);
   const trigger = useRef<HTMLButtonElement>(null);
@@ -61,14 +69,15 @@ export function Disclosure({ label, button, className, children }: Props): JSX.E
     <div className={`disclosure ${className}`} ref={root}>
       <button
         type="button"
-        className="icon-button"
+        className={look}
         ref={trigger}
         aria-label={label}
         title={label}
         aria-expanded={open}
         aria-controls={id}
-        onClick={() => {
-          setOpen(!open);
+        onClick={(event) => {
+          // The second of a double click opens nothing that the first has closed, nor closes it.
+          if (event.detail < 2) setOpen(!open);
         }}
       >
         {button}

@@ -98,7 +98,7 @@ class StampWatch:
         if stamp_ns <= 0:
             return "none"
         if not ages_are_known:
-            return "stopped"
+            return "doubted" if reported == "doubted" else "stopped"
         standing_s = now_s - self._moved_s
         if reported == "paused" and (standing_s >= STANDS_AFTER_S or not self._has_moved):
             return "paused"

@@ -9,7 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
 from lupin_twin.convert import time_msg
-from lupin_twin.diagnostics import Finding
+from lupin_twin.diagnostics import STATE_TOPIC, Finding
 
 
 def diagnostics(findings: Iterable[Finding], node: str, now_ns: int) -> Any:
@@ -29,8 +29,9 @@ def diagnostics(findings: Iterable[Finding], node: str, now_ns: int) -> Any:
     )
 
 
-def findings_of(msg: Any, node: str) -> Iterator[Finding]:
-    """What `node`, by its full name, says of itself in a diagnostic_msgs/DiagnosticArray."""
+def findings_of(msg: Any, state_topic: str) -> Iterator[Finding]:
+    """What the twin says of itself that publishes `state_topic`, by its name from the root on."""
+    node = _node_of(msg, state_topic)
     begin = f"{node}: "
     for status in msg.status:
         if status.hardware_id == node and status.name.startswith(begin):
@@ -40,3 +41,10 @@ def findings_of(msg: Any, node: str) -> Iterator[Finding]:
                 message=status.message,
                 values={each.key: each.value for each in status.values},
             )
+
+
+def _node_of(msg: Any, state_topic: str) -> str | None:
+    for status in msg.status:
+        if any(each.key == STATE_TOPIC and each.value == state_topic for each in status.values):
+            return str(status.hardware_id)
+    return None

@@ -12,7 +12,6 @@ from typing import Final, Literal, get_args
 
 from lupin_twin.counts import LATE, LOST, Counts, Recent
 from lupin_twin.drops import Reason
-from lupin_twin.journal.condition import OFF as NO_JOURNAL
 from lupin_twin.journal.condition import UNKNOWN as UNKNOWN_JOURNAL
 from lupin_twin.journal.condition import Condition, JournalState
 from lupin_twin.state import ClockState
@@ -22,11 +21,18 @@ TOPIC: Final = "/diagnostics"
 # What a source calls itself is its own affair, and so is how long that is.
 MAX_SHOWN: Final = 500
 
+# Under this key a twin tells which state it publishes: by it a consumer knows its own twin. Not by
+# the node's name, which DDS tells once: after a gap in the link longer than its lease, never again.
+STATE_TOPIC: Final = "state topic"
+
 _REASONS: Final = (*(reason.value for reason in Reason), LOST, LATE)
 _LATELY: Final = "lately: "
 _LAST: Final = "last: "
 _ERRORS: Final = "callback errors"
 _MAX_DIGITS: Final = 15
+_PROBLEM: Final = "problem "
+# Of what is wrong with inputs no more is told: a broken network may have any number.
+MAX_PROBLEMS: Final = 8
 
 # diagnostic_msgs/DiagnosticStatus
 OK: Final = 0
@@ -39,6 +45,7 @@ _CLOCK: Final[Mapping[ClockState, tuple[int, str]]] = {
     "paused": (WARN, "ROS time is paused"),
     "stopped": (ERROR, "ROS time has stopped: ages are not known"),
     "none": (ERROR, "there is no ROS time: ages are not known"),
+    "doubted": (ERROR, "ROS time contradicts the journal: ages are not known; set the clock"),
 }
 
 
@@ -89,6 +96,7 @@ class Layers:
 class Health:
     """What is looked at. `inputs` is how many publish on each topic that is listened to.
 
+    `input_problems` says why not all of what they publish can be heard, with the remedy.
     `observed_ago_s` is how long ago the last observation was taken in; None: none was. `late` is
     how many observations each source gave behind its own earlier ones.
     """
@@ -99,13 +107,15 @@ class Health:
     observed_ago_s: float | None
     late: Mapping[str, int]
     twins: int
+    state_topic: str
     fields_computing: int
     fields_computed: int
     slowest_field_s: float
-    journal: Condition = NO_JOURNAL
+    journal: Condition = UNKNOWN_JOURNAL
     estimates: Estimates = Estimates()
     layers: Layers = Layers()
     origin: Origin = "robot"
+    input_problems: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +200,7 @@ def findings(health: Health) -> Iterator[Finding]:
         "twins",
         ERROR if several else OK,
         f"{health.twins} twins publish on the same topic" if several else "no other twin",
-        {"twins": str(health.twins)},
+        {"twins": str(health.twins), STATE_TOPIC: health.state_topic},
     )
 
 
@@ -213,7 +223,11 @@ def _inputs(health: Health) -> Finding:
     observed_ago_s = health.observed_ago_s
     if observed_ago_s is not None:
         values["last observation, s ago"] = f"{observed_ago_s:.1f}"
+    problems = [_shown(problem) for problem in health.input_problems]
+    values |= {f"{_PROBLEM}{number}": problem for number, problem in enumerate(problems, 1)}
     silent = [topic for topic, count in health.inputs.items() if not count]
+    if problems:
+        return Finding("inputs", WARN, "; ".join(problems), values)
     if observed_ago_s is None:
         return Finding("inputs", STALE, "no observation has been taken in yet", values)
     if silent:
@@ -240,13 +254,15 @@ def _shown(text: str) -> str:
 class SelfReport:
     """How a twin's clock does, and what it dropped, lost and met; None: it does not say.
 
-    `origin` is where its observations come from; `journal` has of its counts those that are told.
+    `origin` is where its observations come from; `journal` has of its counts those that are told;
+    `input_problems` is why it does not hear all.
     """
 
     clock: ClockState | None = None
     counts: Counts | None = None
     journal: Condition = UNKNOWN_JOURNAL
     origin: Origin = "unknown"
+    input_problems: tuple[str, ...] = ()
 
 
 def self_report(said: Iterable[Finding]) -> SelfReport:
@@ -256,8 +272,14 @@ def self_report(said: Iterable[Finding]) -> SelfReport:
     journal = _journal(by_name["journal"]) if "journal" in by_name else UNKNOWN_JOURNAL
     clock = next((state for state in _CLOCK if state == values.get("clock", {}).get("state")), None)
     origin = origin_of(values.get("origin", {}).get("origin", ""), is_simulated=False)
+    inputs = values.get("inputs", {})
+    problems = tuple(
+        _shown(inputs[key])
+        for number in range(1, MAX_PROBLEMS + 1)
+        if (key := f"{_PROBLEM}{number}") in inputs
+    )
     if "drops" not in values:
-        return SelfReport(clock, journal=journal, origin=origin)
+        return SelfReport(clock, journal=journal, origin=origin, input_problems=problems)
     both = {**values["drops"], **values.get("queues", {})}
     dropped = {reason: _number(both, reason) for reason in _REASONS}
     recent = tuple(
@@ -274,6 +296,7 @@ def self_report(said: Iterable[Finding]) -> SelfReport:
         ),
         journal,
         origin,
+        problems,
     )
 
 

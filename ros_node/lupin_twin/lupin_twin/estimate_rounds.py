@@ -23,10 +23,8 @@ from lupin_twin.idw import never
 from lupin_twin.state import NANOSECONDS_PER_SECOND, Scan
 from lupin_twin.workers import in_turns
 
-# A round of a sensor comes as often, s, and not so often that it keeps a core busy: after so many
-# times as long as the last one took.
+# A round of a sensor comes as often at most, s.
 ROUND_REST_S: Final = 2.0
-ROUND_REST_FACTOR: Final = 30.0
 # One posterior foretells for so long, a share of the day: a quarter of an hour. From one moment to
 # the next anybody can foretell; a day that is far too long is seen by what is foretold for later.
 HOLD_SHARE: Final = 1.0 / 96.0
@@ -204,7 +202,6 @@ class _Sensor:
     loaded: Loaded | None = None
     foretelling: Loaded | None = None
     rested_s: float = -math.inf
-    rest_s: float = ROUND_REST_S
 
 
 class Watch:
@@ -217,7 +214,7 @@ class Watch:
         self.skipped = 0
         self._day_length_s = day_length_s
         self._sensors: dict[str, _Sensor] = {}
-        self._running: tuple[str, float] | None = None
+        self._running: str | None = None
 
     def hear(self, scan: Scan) -> None:
         """A scan was accepted."""
@@ -244,7 +241,7 @@ class Watch:
             if one is None:
                 one = self._sensors[name] = _Sensor(Grades(self._day_length_s))
             is_new = one.loaded is None or one.loaded.model is not model
-            if (one.heard or is_new) and now_s - one.rested_s >= one.rest_s:
+            if (one.heard or is_new) and now_s - one.rested_s >= ROUND_REST_S:
                 waiting.append((one.rested_s, name))
         if not waiting:
             return None
@@ -252,10 +249,10 @@ class Watch:
         one = self._sensors[name]
         return Round(name, models[name], tuple(one.heard), one.loaded, one.foretelling)
 
-    def begin(self, round_: Round, now_s: float) -> int:
+    def begin(self, round_: Round) -> int:
         """It has begun; how many of its scans are not graded, being too many."""
         one = self._sensors[round_.sensor]
-        self._running = round_.sensor, now_s
+        self._running = round_.sensor
         one.heard, left = [], one.not_graded
         one.not_graded = 0
         return left
@@ -263,10 +260,9 @@ class Watch:
     def end(self, outcome: Done | Exception, now_s: float, now_ns: int) -> None:
         """It has ended; one that came to nothing leaves what was loaded before."""
         assert self._running is not None
-        (name, begun_s), self._running = self._running, None
+        name, self._running = self._running, None
         one = self._sensors[name]
         one.rested_s = now_s
-        one.rest_s = max(ROUND_REST_S, ROUND_REST_FACTOR * (now_s - begun_s))
         if not isinstance(outcome, Exception):
             one.loaded, one.foretelling = outcome.loaded, outcome.foretelling
             one.grades.add(outcome.graded, now_ns)

@@ -1,10 +1,12 @@
 """The services of the estimate: questions in, answers made off the node's thread.
 
-Models are kept fitted, and each new scan is held against what was foretold for it.
+Models are kept fitted, and each new scan is held against what was foretold for it: one fit or round
+at a time, and then a rest, so that scans cost no more the more of them come.
 """
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
@@ -42,9 +44,9 @@ from lupin_twin.fields import FieldRefused
 from lupin_twin.habits import SERVICE_QOS, Habits
 from lupin_twin.history import History, TagHistory
 from lupin_twin.idw import never
-from lupin_twin.journal.asof import STATE_S_PER_TAG
+from lupin_twin.journal.fold import STATE_S_PER_TAG
 from lupin_twin.journal.lately import lately
-from lupin_twin.journal.series import SERIES_S
+from lupin_twin.journal.queries import SERIES_S
 from lupin_twin.past import NotRemembered, PastRefused, message_of
 from lupin_twin.past_desk import PastDesk, Question
 from lupin_twin.recall import Recall
@@ -53,6 +55,8 @@ from lupin_twin.workers import ShouldStop, Workers, in_turns
 
 # A fit, and a round, s of one core at worst: everything small passes it.
 _FIT_S: Final = 2.0
+# After a fit or a round, neither for so many times as long: all of them take a thirtieth of a core.
+REST_FACTOR: Final = 30.0
 # What gathering a tag's scans takes, roughly and at worst.
 _GATHER_TAG_S: Final = 50e-6
 # Places for other tags that are kept, each until its sensor's next round.
@@ -125,6 +129,9 @@ class EstimateService:
         self._desk, self._fits = (
             PastDesk(self._workers, wake, lambda: habits.is_behind) for _ in range(2)
         )
+        self._is_working = False
+        self._has_fitted_last = False
+        self._rests_until_s = -math.inf
         self._gathered: Gather | None = None
         # Of these the log has said so, and nothing has been better since.
         self._told_distrusted: set[str] = set()
@@ -160,16 +167,22 @@ class EstimateService:
     def go_on(self) -> None:
         """Begin the fit or the round whose turn it is, on a worker; to be called once a second.
 
-        While a first model is awaited, no round comes in between.
+        A first model is awaited, and does not wait for the end of a rest. Otherwise fits and rounds
+        take turns: of a large house both are always due.
         """
         self._desk.go_on()
         self._fits.go_on()
         now_s = time.monotonic()
         sensor = self.models.due(now_s)
-        if sensor is not None:
+        is_first = sensor is not None and self.models.of(sensor).model is None
+        if self._is_working or (now_s < self._rests_until_s and not is_first):
+            return
+        goes_round = sensor is None or (self._has_fitted_last and not is_first)
+        if goes_round and self._go_round(now_s):
+            self._has_fitted_last = False
+        elif sensor is not None:
             self._fit(sensor, now_s)
-        elif not self.models.fits_first():
-            self._go_round(now_s)
+            self._has_fitted_last = True
 
     def _fit(self, sensor: str, now_s: float) -> None:
         gather, now_ns, day_s = self._gather(), self._now_ns(), self._rules.day_length_s
@@ -201,22 +214,23 @@ class EstimateService:
             self._habits.report("the estimate's fit", outcome)
         self.go_on()
 
-    def _go_round(self, now_s: float) -> None:
+    def _go_round(self, now_s: float) -> bool:
         due = self.watch.due(self.models.serving(), now_s)
         if due is None:
-            return
+            return False
         gather, now_ns = self._gather(), self._now_ns()
         self._begin(
             lambda stop: due.run(gather(due.sensor), now_ns, stop),
             partial(self._rounded, due.sensor),
         )
-        left = self.watch.begin(due, now_s)
+        left = self.watch.begin(due)
         if left:
             self._habits.warn(
                 ("grading", due.sensor),
                 f"{left} scans of {due.sensor} came too fast to be held against what was foretold "
                 f"for them: of each lot, {MAX_GRADED} are",
             )
+        return True
 
     def _rounded(self, sensor: str, outcome: Done | Exception) -> None:
         now_ns = self._now_ns()
@@ -240,8 +254,24 @@ class EstimateService:
         self.go_on()
 
     def _begin(self, work: Callable[[ShouldStop], Any], reply: Callable[[Any], None]) -> None:
+        worked_s = 0.0
+
+        def timed(should_stop: ShouldStop) -> Any:
+            nonlocal worked_s
+            begun_s = time.thread_time()
+            try:
+                return work(should_stop)
+            finally:
+                worked_s = time.thread_time() - begun_s
+
+        def rest(outcome: Any) -> None:
+            self._is_working = False
+            self._rests_until_s = time.monotonic() + REST_FACTOR * worked_s
+            reply(outcome)
+
+        self._is_working = True
         self._fits.ask(
-            Question(lambda: self._workers.submit(work, _FIT_S), lambda made: made, _FIT_S, reply)
+            Question(lambda: self._workers.submit(timed, _FIT_S), lambda made: made, _FIT_S, rest)
         )
 
     def _gather(self) -> Gather:

@@ -358,10 +358,6 @@ class Models:
         ]
         return min(waiting)[1] if waiting else None
 
-    def fits_first(self) -> bool:
-        """Whether the fit under way is a sensor's first: whatever else takes long is to wait."""
-        return self._fitting is not None and self.of(self._fitting).model is None
-
     def begin(self, sensor: str, now_s: float) -> int:
         """A fit has begun, of so many readings at most."""
         one = self._sensors[sensor]

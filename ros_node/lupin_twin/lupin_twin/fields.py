@@ -15,11 +15,14 @@ import numpy as np
 
 from lupin_twin.bounds import MAX_TEXT_LENGTH
 from lupin_twin.explored import OccupancyMap, explored_mask
+from lupin_twin.far_off import reach_of
 from lupin_twin.field_cache import FieldCache, FieldKey
 from lupin_twin.grid import FieldGrid, grid_dimensions
 from lupin_twin.idw import compute_idw_field, never
 from lupin_twin.state import TwinStore
 
+# m, of who asks for none.
+DEFAULT_RESOLUTION_M: Final = 0.1
 # The revision of a map that has not come yet; a real one is never negative.
 _NO_MAP_REVISION = -1
 
@@ -275,12 +278,38 @@ def default_box(
     """(min_x, min_y, max_x, max_y) for a request without a box: all that can be painted.
 
     The box of the tags' `positions` (x, y), wider by `max_distance_m` on every side; without a tag
-    the same around the origin.
+    the same around the origin. Tags that are far off (`far_off`) have no say.
     """
-    xs, ys = zip(*positions, strict=True) if (positions := list(positions)) else ((0.0,), (0.0,))
+    positions = list(positions)
+    reach = reach_of(positions)
+    positions = [(x, y) for x, y in positions if reach.holds(x, y)]
+    xs, ys = zip(*positions, strict=True) if positions else ((0.0,), (0.0,))
     return (
         min(xs) - max_distance_m,
         min(ys) - max_distance_m,
         max(xs) + max_distance_m,
         max(ys) + max_distance_m,
     )
+
+
+def default_request(
+    sensor_type: str, box: tuple[float, float, float, float], max_cells: int
+) -> FieldRequest:
+    """The field over a default box for who asks for no resolution either.
+
+    Cells are `DEFAULT_RESOLUTION_M` wide, or 2, 4, 8... times as wide where they would be more than
+    `max_cells`.
+    """
+    resolution = DEFAULT_RESOLUTION_M
+    while True:
+        request = FieldRequest(sensor_type, resolution, *box)
+        width, height = grid_dimensions(
+            request.bbox_min_x,
+            request.bbox_min_y,
+            request.bbox_max_x,
+            request.bbox_max_y,
+            request.resolution,
+        )
+        if width * height <= max_cells:
+            return request
+        resolution *= 2.0

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from lupin_twin.explored import OccupancyMap
+from lupin_twin.far_off import reach_of
 from lupin_twin.grid import FloatArray
 
 # Next to a tag another tells nothing that this one does not.
@@ -23,8 +24,6 @@ MAX_PLACES: Final = 300
 # Of a house of so many tags fewer: each place has a neighbourhood of its own to be reckoned with.
 _MANY_TAGS: Final = 64
 _PLACES_OF_MANY: Final = 100
-# Of tags that are farther apart at least one is where no house is: nothing is advised.
-LONGEST_M: Final = 1e6
 # nav_msgs/OccupancyGrid: percent; from here on it is more likely a wall.
 _OCCUPIED: Final = 50
 
@@ -32,13 +31,14 @@ _OCCUPIED: Final = 50
 def floor(tags: FloatArray, occupancy: OccupancyMap | None) -> FloatArray:
     """Places (m, 2) all over the house: the map's free cells, or without a map about `tags`.
 
-    None where these are more than `LONGEST_M` apart.
+    None about a tag that is far off.
     """
     if occupancy is None or occupancy.cells.size == 0:
-        low, high = tags.min(axis=0) - MARGIN_M, tags.max(axis=0) + MARGIN_M
-        # Each half of a double, or they may be farther apart than one can say.
-        if not (high / 2 - low / 2 < LONGEST_M / 2).all():
+        reach = reach_of((x, y) for x, y in tags.tolist())
+        tags = tags[[reach.holds(x, y) for x, y in tags.tolist()]]
+        if len(tags) == 0:
             return np.empty((0, 2))
+        low, high = tags.min(axis=0) - MARGIN_M, tags.max(axis=0) + MARGIN_M
         x, y = (_along(*ends) for ends in zip(low, high, strict=True))
         return _thinned(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2), len(tags))
     columns, rows = (_cells(count) for count in (occupancy.width, occupancy.height))

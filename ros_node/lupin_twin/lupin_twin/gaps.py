@@ -41,3 +41,11 @@ class Gaps:
         del self._next[:-MAX_WRITERS]
         self.lost += lost
         return lost
+
+    def settle(self, writers: int) -> None:
+        """Note that of so many writers those that were not heard by now have said nothing yet."""
+        self._next[:0] = [1] * (writers - len(self._next))
+
+    def unsettle(self) -> None:
+        """Note that other writers are there than before: whoever is new may begin anywhere."""
+        self._next = [expected for expected in self._next if expected != 1]

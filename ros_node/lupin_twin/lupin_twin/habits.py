@@ -13,6 +13,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Final
 
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -20,8 +21,9 @@ from rclpy.serialization import deserialize_message
 
 from lupin_twin.cdr import MessageShape, TooManyError
 from lupin_twin.counts import Counts, Tally
+from lupin_twin.diagnostics import MAX_PROBLEMS
 from lupin_twin.drops import Drop, Reason
-from lupin_twin.gaps import Gaps
+from lupin_twin.inputs import Input
 from lupin_twin.lateness import Late
 from lupin_twin.ros_parameters import naming
 from lupin_twin.throttle import Throttle
@@ -88,6 +90,9 @@ class Habits:
         # How long before it was received the message in hand was published, s, by the two clocks.
         self.published_ago_s = 0.0
         self._node = node
+        self._inputs: list[Input] = []
+        # As it was looked at last.
+        self.input_problems: tuple[str, ...] = ()
         self._drains: list[Callable[[], None]] = []
         self._behind_until_s = -math.inf
         self._throttle = Throttle(WARNING_PERIOD_S)
@@ -106,6 +111,9 @@ class Habits:
     ) -> str:
         """Have `callback(message)` called, guarded, for each message on a latched topic.
 
+        Publishers that do not latch it, or are not reliable, are heard too, as soon as DDS tells of
+        one that it has matched with no subscription: see `inputs`.
+
         With `is_wanted` the topic is one that is not latched and that many share: what is not
         wanted, serialised as it is, or is lost of it, is nothing to be counted.
 
@@ -118,21 +126,19 @@ class Habits:
             lupin_twin.parameters.ParameterError: a name that ROS does not take.
 
         """
-        gaps = Gaps()
-        qos = latched(depth) if is_wanted is None else QoSProfile(depth=depth)
+        heard = Input(depth)
 
         def read(data: bytes, info: dict[str, Any]) -> None:
-            if is_wanted is not None and not is_wanted(data):
+            if not (is_wanted(data) if is_wanted is not None else heard.is_new(info)):
                 return
             self._see_wait(info["received_timestamp"])
-            name = str(subscription.topic_name)
             self.published_ago_s = (info["received_timestamp"] - info["source_timestamp"]) / 1e9
             number = info["publication_sequence_number"]
             if on_number is not None and number is not None:
                 on_number(number)
             # Of depth 1, the newest is wanted and nothing else.
             if depth > 1 and number is not None and is_wanted is None:
-                lost = gaps.see(number, lambda: int(self._node.count_publishers(name)))
+                lost = heard.gaps.see(number, lambda: int(self._node.count_publishers(name)))
                 if lost:
                     self.lose(lost, name)
             message = read_message(data, shape)
@@ -141,13 +147,57 @@ class Habits:
             else:
                 self.guarded(name, callback)(message)
 
-        with naming(parameter, topic):
+        def listen(qos: QoSProfile, events: SubscriptionEventCallbacks | None) -> str:
             subscription = self._node.create_subscription(
-                shape.message_type, topic, read, qos, callback_group=group, raw=True
+                shape.message_type,
+                topic,
+                read,
+                qos,
+                callback_group=group,
+                raw=True,
+                event_callbacks=events,
             )
-        if depth > 1:
-            self._drain_behind(subscription, read, depth)
-        return str(subscription.topic_name)
+            if depth > 1:
+                self._drain_behind(subscription, read, depth)
+            return str(subscription.topic_name)
+
+        with naming(parameter, topic):
+            if is_wanted is not None:
+                name = listen(QoSProfile(depth=depth), None)
+            else:
+                name = heard.topic = self._hear_all(heard, listen)
+                self._inputs.append(heard)
+        return name
+
+    def _hear_all(
+        self, heard: Input, listen: Callable[[QoSProfile, SubscriptionEventCallbacks], str]
+    ) -> str:
+        """Subscribe, and once more as soon as DDS tells of a publisher that was not matched."""
+        level = heard.subscriptions
+
+        def on_unmatched(_: object) -> None:
+            if heard.subscriptions == level + 1 < len(heard.profiles):
+                self._hear_all(heard, listen)
+
+        heard.subscriptions += 1
+        guarded = self.guarded("a publisher that was not matched", on_unmatched)
+        return listen(heard.profiles[level], SubscriptionEventCallbacks(incompatible_qos=guarded))
+
+    def look_at_inputs(self) -> tuple[str, ...]:
+        """What is wrong with what publishes on latched topics; what is new of it is logged."""
+        before, now_s = self.input_problems, time.monotonic()
+        domain = self._node.context.get_domain_id()
+        self.input_problems = tuple(
+            problem
+            for each in self._inputs
+            for problem in each.look(
+                self._node.get_publishers_info_by_topic(each.topic), domain, now_s
+            )
+        )[:MAX_PROBLEMS]
+        for problem in self.input_problems:
+            if problem not in before:
+                self.warn(("input", problem), problem)
+        return self.input_problems
 
     def _drain_behind(
         self, subscription: Any, read: Callable[[bytes, dict[str, Any]], None], depth: int

@@ -64,8 +64,9 @@ class _Past(Protocol):
 
 
 PastT = TypeVar("PastT", bound=_Past)
-# The stamp in the key of what a clock that went back has moved: no observation has it.
-_HELD: Final = -1
+# In the place of the stamp that was sent: what a clock that went back has moved, and no observation
+# that is received again is taken for.
+KNOWN_BY_NOTHING: Final = -1
 # What an observation is known by: its kind, its producer's stamp (ns), its source.
 Key = tuple[int | None, int, str]
 
@@ -78,9 +79,10 @@ class _Line(Generic[PastT]):
 
     def find(self, key: Key) -> int | None:
         """The place of what is known by `key`; most often it is one of the newest."""
-        for index in range(len(self.entries) - 1, -1, -1):
-            if self.entries[index][0] == key:
-                return index
+        if key[1] != KNOWN_BY_NOTHING:
+            for index in range(len(self.entries) - 1, -1, -1):
+                if self.entries[index][0] == key:
+                    return index
         return None
 
     def put(self, key: Key, past: PastT) -> None:
@@ -90,12 +92,12 @@ class _Line(Generic[PastT]):
             index -= 1
         self.entries.insert(index, (key, past))
 
-    def hold_to(self, now_ns: int, held: Callable[[PastT, int], PastT]) -> None:
-        """Nothing is later than `now_ns`. What was, is known by nothing: it comes again as new."""
+    def hold_to(self, now_ns: int, held: Callable[[PastT, int], PastT], *, keeps_key: bool) -> None:
+        """Nothing is later than `now_ns`; what was is known by its key still, or by nothing."""
         self.entries = [
             (key, past)
             if past.stamp_ns <= now_ns
-            else ((key[0], _HELD, key[2]), held(past, now_ns))
+            else (key if keeps_key else (key[0], KNOWN_BY_NOTHING, key[2]), held(past, now_ns))
             for key, past in self.entries
         ]
 
@@ -144,24 +146,26 @@ class History:
 
     # --- a twin's own: every observation ------------------------------------------------------
 
-    def knows(self, write: Scan | Look) -> bool:
-        """Whether the very same observation was heard before, as far as that is kept."""
-        tag = self._tags.get(write.tag_id)
-        return tag is not None and tag.tries.find(_key(write)) is not None
+    def news(self, write: Scan | Look) -> Scan | Look | None:
+        """What of an observation was not heard before, as far as that is kept; None: nothing.
 
-    def dated(self, write: Scan | Look) -> Scan | Look:
-        """`write`, made when it was first heard, if that was earlier than it seems to be now.
-
-        What has a stamp from the future counts as made on arrival: on its first one.
+        It was made when it was first heard, if that was earlier than it seems to be now: what has a
+        stamp from the future counts as made on arrival, on its first one. A sensor that is known of
+        it keeps its value; others are further parts of the same scan.
         """
-        tag = self._tags.get(write.tag_id)
-        if tag is None or not write.own_stamp_ns > write.stamp_ns:
+        tag, key = self._tags.get(write.tag_id), _key(write)
+        index = None if tag is None else tag.tries.find(key)
+        if tag is None or index is None:
             return write
-        index = tag.tries.find(_key(write))
-        if index is None:
-            return write
+        if not isinstance(write, Scan):
+            return None
+        found = tag.scans.find(key)
+        scan = None if found is None else tag.scans.entries[found][1]
+        known = frozenset(reading.name for reading in scan.readings) if scan else frozenset()
+        readings = tuple(reading for reading in write.readings if reading.name not in known)
         first_ns = tag.tries.entries[index][1].stamp_ns
-        return replace(write, stamp_ns=min(write.stamp_ns, first_ns))
+        stamp_ns = min(write.stamp_ns, first_ns)
+        return replace(write, stamp_ns=stamp_ns, readings=readings) if readings else None
 
     def add(self, write: Scan | Look) -> None:
         """Keep an observation, or add to what is kept of it."""
@@ -169,10 +173,18 @@ class History:
         readings = write.readings if isinstance(write, Scan) else ()
         self._add(write.tag_id, _key(write), what, readings)
 
-    def hold_to(self, now_ns: int) -> None:
-        """Follow a clock that has gone back, see `TwinStore.hold_to`."""
+    def hold_to(self, now_ns: int, *, keeps_keys: bool = False) -> None:
+        """Follow a clock that has gone back, see `TwinStore.hold_to`.
+
+        `keeps_keys`: what was later is still the same, received again; else it comes as new.
+        """
         for tag in self._tags.values():
-            _hold(tag, now_ns)
+            _hold(tag, now_ns, keeps_keys=keeps_keys)
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._tags.clear()
+        self._items = 0
 
     # --- of a twin elsewhere: its states, one by one -------------------------------------------
 
@@ -185,7 +197,7 @@ class History:
         """
         kept = self._tags.get(tag.tag_id)
         if clock_went_back and kept is not None and (times := _times_of(tag)):
-            _hold(kept, max(times))
+            _hold(kept, max(times), keeps_keys=False)
         by_stamp: dict[int, list[Reading]] = {}
         for reading in tag.readings:
             if reading.observed_at_ns is not None and not _is_kept(kept, reading):
@@ -256,10 +268,14 @@ def _key(write: Scan | Look) -> Key:
     return kind_of(write), write.own_stamp_ns or write.stamp_ns, write.source
 
 
-def _hold(tag: _Tag, now_ns: int) -> None:
-    tag.scans.hold_to(now_ns, lambda scan, at_ns: replace(scan, stamp_ns=at_ns))
+def _hold(tag: _Tag, now_ns: int, *, keeps_keys: bool) -> None:
+    tag.scans.hold_to(
+        now_ns, lambda scan, at_ns: replace(scan, stamp_ns=at_ns), keeps_key=keeps_keys
+    )
     tag.tries.hold_to(
-        now_ns, lambda past, at_ns: replace(past, what=replace(past.what, stamp_ns=at_ns))
+        now_ns,
+        lambda past, at_ns: replace(past, what=replace(past.what, stamp_ns=at_ns)),
+        keeps_key=keeps_keys,
     )
 
 

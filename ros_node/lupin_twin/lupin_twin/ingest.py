@@ -137,20 +137,46 @@ def discoveries(
 
 
 def apply(write: Write, store: TwinStore, history: History) -> Drop | None:
-    """Write what is now, and what was; returns what the store refused."""
+    """Write what is now, and what was; returns what the store refused.
+
+    What was heard before is nothing new, but for a place that its tag does not have yet.
+    """
     try:
         if isinstance(write, Pin):
             store.pin(write.tag_id, write.pose)
             return None
-        write = history.dated(write)
-        if isinstance(write, Scan):
-            store.record(write)
+        news = history.news(write)
+        if news is None:
+            if write.pose is not None:
+                store.pin(write.tag_id, write.pose)
+            return None
+        if isinstance(news, Scan):
+            store.record(news)
         else:
-            store.record_look(write)
+            store.record_look(news)
     except Rejected as error:
         return Drop(Reason.REJECTED, str(error))
-    history.add(write)
+    history.add(news)
     return None
+
+
+def near(write: Write | Drop, max_pose_m: float) -> tuple[Write | None, Drop | None]:
+    """What is left of a write, and what is dropped of it: a pose with a coordinate past the limit.
+
+    A robot that is lost still reads its sensors: what else an observation brought stays.
+    """
+    if isinstance(write, Drop):
+        return None, write
+    pose = write.pose
+    if pose is None:
+        return write, None
+    for axis, metres in (("x", pose.x), ("y", pose.y), ("z", pose.z)):
+        if abs(metres) > max_pose_m:
+            what = f"the pose of tag {write.tag_id[:_QUOTED]!r}"
+            why = f"its {axis} is {metres:g} m, the limit is {max_pose_m:g} m (max_pose_m)"
+            left = None if isinstance(write, Pin) else replace(write, pose=None)
+            return left, Drop(Reason.POSE, why, what, case="far")
+    return write, None
 
 
 def wrong_frame(frame_id: str, expected: str) -> Drop | None:

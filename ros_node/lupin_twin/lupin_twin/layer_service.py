@@ -182,7 +182,7 @@ class LayerService:
         topic.key, topic.begun_s = key, now_s
         try:
             plan = topic.plan()
-        except ValueError as error:  # tags too far apart, or a field that is refused
+        except ValueError as error:  # a field that is refused
             self._refuse(topic, error)
             return
         topic.is_under_way = True

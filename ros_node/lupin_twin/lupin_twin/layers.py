@@ -14,14 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from lupin_twin.estimate import EstimateGrid
-from lupin_twin.fields import FieldRequest, default_box
-from lupin_twin.grid import FieldGrid, cell_centres, grid_dimensions
+from lupin_twin.fields import FieldRequest, default_box, default_request
+from lupin_twin.grid import FieldGrid, cell_centres
 from lupin_twin.parameters import ParameterError
 
 # Where layers are published, relative to the node's namespace.
 LAYERS_BELOW: Final = "twin/field/"
-# Cells are so wide, m, or twice as wide, and so on, until there are few enough of them.
-FINEST_M: Final = 0.1
 # A point takes 20 bytes: no message is larger than 1 MB, whatever max_grid_cells says. Beside those
 # of 2.5 MB, an answer of a service came 3 s late now and then; beside those of 1.4 MB, none did.
 MAX_POINTS: Final = 50_000
@@ -73,28 +71,10 @@ def layer_request(
 ) -> FieldRequest:
     """The field of a whole house: the box of the tags' `positions`, and all that they can paint.
 
-    Cells are `FINEST_M` wide, or 2, 4, 8... times as wide where they would be more than
-    `max_grid_cells`, or than `MAX_POINTS`.
-
-    Raises:
-        ValueError: positions so far apart that no grid can be made.
-
+    Cells are as `default_request` has them, and not more than `MAX_POINTS`.
     """
     box = default_box(positions, max_distance_m)
-    most = min(max_grid_cells, MAX_POINTS)
-    resolution = FINEST_M
-    while True:
-        request = FieldRequest(sensor, resolution, *box)
-        width, height = grid_dimensions(
-            request.bbox_min_x,
-            request.bbox_min_y,
-            request.bbox_max_x,
-            request.bbox_max_y,
-            request.resolution,
-        )
-        if width * height <= most:
-            return request
-        resolution *= 2.0
+    return default_request(sensor, box, min(max_grid_cells, MAX_POINTS))
 
 
 def points(grid: FieldGrid, estimate: EstimateGrid | None) -> PointArray:

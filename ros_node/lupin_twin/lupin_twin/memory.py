@@ -1,5 +1,8 @@
 """What the twin knows and its journal, kept together: each write handed over, each start restored.
 
+A wall clock that contradicts the log is doubted (`_Doubt`): what was known is shown as it was, what
+is observed is shown and waits. Once the clock agrees it is written, moved by what the clock jumped.
+
 No ROS; time and environment are arguments. Everything here runs on the thread that the store
 belongs to, and takes microseconds, but for the start: that waits for what was known before.
 """
@@ -7,22 +10,25 @@ belongs to, and takes microseconds, but for the start: that waits for what was k
 from __future__ import annotations
 
 import re
-from collections import Counter, deque
-from collections.abc import Mapping, Sequence
+import tempfile
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from lupin_twin import ingest
 from lupin_twin.bounds import MAX_TEXT_LENGTH
 from lupin_twin.drops import Drop
 from lupin_twin.history import KIND_FLOWER, KIND_TAG_READING, History
 from lupin_twin.ingest import Pin
-from lupin_twin.journal.condition import OFF, Condition
-from lupin_twin.journal.restoring import Restored
+from lupin_twin.journal.condition import Condition
+from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rows import LookRow, PinRow, Row, ScanRow
-from lupin_twin.journal.runs import Clock, is_new_run
+from lupin_twin.journal.runs import CORRECTION_NS, Clock, Turn, turn_of
 from lupin_twin.journal.writer import Journal
 from lupin_twin.recall import Recall
 from lupin_twin.state import Look, Scan, TwinStore
@@ -36,6 +42,10 @@ _START_WAIT_S: Final = 10.0
 # file: so many may begin within such a time, by the wall's clock.
 MAX_NEW_RUNS: Final = 10
 NEW_RUNS_NS: Final = 100 * 1_000_000_000
+# A clock that has contradicted the log for so long, by the steady clock, is believed.
+DOUBT_NS: Final = 600 * 1_000_000_000
+# Writes that are kept at most while what the log knows is waited for.
+MAX_EARLY: Final = 20_000
 
 
 def journal_path(
@@ -80,21 +90,56 @@ def state_folder(environ: Mapping[str, str]) -> Path:
     return home / "lupin-twin"
 
 
-class Memory:
-    """A store, its history, and the journal of both, if one is kept; `recall` asks that.
+class _Early(NamedTuple):
+    """A write that was taken in before the log's last word was known; when, by the steady clock.
 
-    `buffer_len` scans of a series are restored at most.
+    `lead_ns` is what the wall's clock was ahead of the steady one then.
+    """
+
+    write: ingest.Write
+    arrival_ns: int
+    mission: str
+    lead_ns: int
+
+
+class _Doubt(NamedTuple):
+    """A wall clock that contradicts the log, from `clock` on; the log knows `last_ns`."""
+
+    clock: Clock
+    since_ns: int
+    last_ns: int
+
+
+class Memory:
+    """A store, its history, and the journal of both; `recall` asks that.
+
+    `buffer_len` scans of a series are restored at most; `steady_ns` is a clock that never jumps.
     """
 
     def __init__(
-        self, store: TwinStore, history: History, journal: Journal | None, buffer_len: int
+        self,
+        store: TwinStore,
+        history: History,
+        journal: Journal,
+        buffer_len: int,
+        steady_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self._store = store
         self._history = history
         self._journal = journal
         self._buffer_len = buffer_len
+        self._steady_ns = steady_ns
         self._clock: Clock | None = None
+        # What the wall's clock is ahead of the steady one.
+        self._lead_ns = 0
         self._begun_ns: deque[int] = deque(maxlen=MAX_NEW_RUNS)
+        # From when each tag has its place.
+        self._placed_ns: dict[str, int] = {}
+        self._early: deque[_Early] | None = deque(maxlen=MAX_EARLY)
+        self._lost = 0
+        self._doubt: _Doubt | None = None
+        self._is_asked = False
+        self._agrees = False
         self.recall = Recall(lambda: self.condition, heal=self.heal)
 
     def follow(self, now: Clock) -> str | None:
@@ -105,50 +150,56 @@ class Memory:
         goes back time and again stays in a run, as at its latest, until it may begin another
         (`MAX_NEW_RUNS`).
         """
-        if self._journal is None or now.stamp_ns <= 0:
+        if now.stamp_ns <= 0:
             return None
-        before = self._clock
+        before, lead_before_ns = self._clock, self._lead_ns
+        lead_ns = now.arrival_ns - self._steady_ns()
         if before is None:
-            self._clock = now
+            self._clock, self._lead_ns = now, lead_ns
             self._journal.begin(now, self._buffer_len)
             return self._take(self._journal.take_restored(_START_WAIT_S), now)
-        is_new = before.is_simulated != now.is_simulated or is_new_run(before, now)
-        if not is_new or self._may_begin(now.arrival_ns):
-            self._clock = now
-            if is_new:
-                self._journal.begin(now, before_ns=before.stamp_ns)
+        if self._doubt is not None:
+            self._clock, self._lead_ns = now, lead_ns
+            return self._look_whether_to_believe(self._doubt, now)
+        turn = turn_of(before, now, lead_ns - lead_before_ns)
+        if turn in {None, Turn.AHEAD} or self._may_begin(now.arrival_ns):
+            self._clock, self._lead_ns = now, lead_ns
+            if turn is not None:
+                self._journal.begin(now, turn=turn, before_ns=before.stamp_ns)
+                self._hold_places(now)
         return self._take(self._journal.take_restored(), now)
 
     def apply(self, write: ingest.Write, arrival_ns: int, mission: str = "") -> Drop | None:
         """Write what is now and what was, and hand it over; returns what the store refused."""
-        was_pinned = self._store.is_pinned(write.tag_id)
+        if self._early is not None:
+            self._lost += len(self._early) == MAX_EARLY
+            self._early.append(_Early(write, arrival_ns, mission, self._lead_ns))
         dropped = ingest.apply(write, self._store, self._history)
-        if dropped is not None or self._journal is None:
-            return dropped
-        if write.pose is not None and not was_pinned:
-            now_ns = 0 if self._clock is None else self._clock.stamp_ns
-            # A place belongs to the moment of the scan that brought it, as its readings do.
-            stamp_ns = now_ns if isinstance(write, Pin) else write.stamp_ns
-            self._journal.write(PinRow(write.tag_id, stamp_ns, arrival_ns, write.pose))
-        if not isinstance(write, Pin):
-            self._journal.write(_row(write, arrival_ns, mission[:MAX_TEXT_LENGTH]))
-        return None
+        if dropped is None and self._doubt is None:
+            self._hand_over(write, arrival_ns, mission)
+        return dropped
+
+    @property
+    def is_clock_doubted(self) -> bool:
+        """Whether the clock contradicts the journal, so that ages are not known."""
+        return self._doubt is not None
 
     @property
     def condition(self) -> Condition:
         """How the journal is doing."""
-        return OFF if self._journal is None else self._journal.condition
+        condition, early = self._journal.condition, self._early
+        if self._doubt is None or early is None:
+            return condition
+        return replace(condition, waiting=len(early), lost=self._lost)
 
     def heal(self, damage: str) -> None:
         """Have a journal in which somebody has met damage set aside; from any thread."""
-        if self._journal is not None:
-            self._journal.heal(damage)
+        self._journal.heal(damage)
 
     def close(self) -> None:
         """Answer nothing more, and write what is waiting."""
         self.recall.close()
-        if self._journal is not None:
-            self._journal.close()
+        self._journal.close()
 
     def _may_begin(self, arrival_ns: int) -> bool:
         begun = self._begun_ns
@@ -157,34 +208,128 @@ class Memory:
         begun.append(arrival_ns)
         return True
 
+    def _hand_over(self, write: ingest.Write, arrival_ns: int, mission: str) -> None:
+        if write.pose is not None:
+            now_ns = 0 if self._clock is None else self._clock.stamp_ns
+            # A place belongs to the moment of the scan that brought it, as its readings do.
+            stamp_ns = now_ns if isinstance(write, Pin) else write.stamp_ns
+            pose = self._store.pose_of(write.tag_id)
+            placed_ns = self._placed_ns.get(write.tag_id)
+            if pose is not None and (placed_ns is None or stamp_ns < placed_ns):
+                self._placed_ns[write.tag_id] = stamp_ns
+                self._journal.write(PinRow(write.tag_id, stamp_ns, arrival_ns, pose))
+        if not isinstance(write, Pin):
+            self._journal.write(_row(write, arrival_ns, mission[:MAX_TEXT_LENGTH]))
+
+    def _hold_places(self, now: Clock) -> None:
+        self._placed_ns = {
+            tag_id: min(at_ns, now.stamp_ns) for tag_id, at_ns in self._placed_ns.items()
+        }
+
+    # --- what was known before ----------------------------------------------------------------
+
     def _take(self, restored: Restored | None, now: Clock) -> str | None:
+        """Begin with what the log knows, and what came meanwhile on top of it."""
         if restored is None:
             return None
+        doubt, early = self._doubt, self._early or ()
+        self._is_asked = False
+        self._doubt = None
+        if restored.is_doubted:
+            self._doubt = doubt or _Doubt(now, self._steady_ns(), 0)
+            self._doubt = self._doubt._replace(last_ns=restored.last_ns)
+        else:
+            self._early = None
+        self._restore(restored)
+        for entry in early:
+            if doubt is not None and self._agrees:
+                entry = _moved(entry, self._lead_ns - entry.lead_ns)  # noqa: PLW2901
+            ingest.apply(entry.write, self._store, self._history)
+            if doubt is not None and self._doubt is None:
+                self._hand_over(entry.write, entry.arrival_ns, entry.mission)
+        self.hold_to(now)
+        return f"journal {self.condition.path}: {_told(restored, now)}"
+
+    def _restore(self, restored: Restored) -> None:
+        count = self._store.observation_count
+        self._store.restore(restored.known.tags, restored.known.observed)
+        self._history.clear()
         for row in restored.rows:
-            ingest.apply(_write(row), self._store, self._history)
+            self._history.add(_write(row))
+        # From before what was handed over meanwhile, if it was earlier.
+        placed = dict(restored.known.placed_ns)
+        for tag_id, at_ns in self._placed_ns.items():
+            placed[tag_id] = min(at_ns, placed.get(tag_id, at_ns))
+        self._placed_ns = placed
         # The count goes on where it was: it never falls, over a restart either.
-        self._store.observation_count = max(self._store.observation_count, restored.count)
-        if self._store.hold_to(now.stamp_ns):
-            self._history.hold_to(now.stamp_ns)
-        return f"journal {self.condition.path}: {_told(restored.rows, now)}"
+        self._store.observation_count = max(
+            self._store.observation_count, count + 1, restored.last_seq
+        )
+
+    def hold_to(self, now: Clock) -> bool:
+        """Follow a clock that has gone back; returns whether anything was later than now.
+
+        What a simulation says again is new; a wall clock comes to no moment twice.
+        """
+        if not self._store.hold_to(now.stamp_ns):
+            return False
+        self._history.hold_to(now.stamp_ns, keeps_keys=not now.is_simulated)
+        return True
+
+    def _look_whether_to_believe(self, doubt: _Doubt, now: Clock) -> str | None:
+        """Ask the log again once the clock agrees with it, or has contradicted it for long."""
+        if self._is_asked:
+            return self._take(self._journal.take_restored(), now)
+        self._agrees = now.is_simulated or now.arrival_ns >= doubt.last_ns - CORRECTION_NS
+        if self._agrees:
+            self._journal.begin(now, self._buffer_len)
+        elif self._steady_ns() - doubt.since_ns >= DOUBT_NS:
+            self._journal.begin(doubt.clock, self._buffer_len, Turn.BELIEVED)
+        else:
+            return None
+        self._is_asked = True
+        return self._take(self._journal.take_restored(_START_WAIT_S), now)
 
 
-def open_journal(path: Path | None, holder: str, days: float, max_mb: float) -> Journal | None:
-    """A journal at work, None where none is kept; `holder` is what others are told who has it."""
-    return None if path is None else Journal(path, holder, Limits(days, int(max_mb * 1e6)))
+def open_journal(path: Path | None, holder: str, days: float, max_mb: float) -> Journal:
+    """A journal at work; without a path it is kept in a temporary file, gone at the end.
+
+    `holder` is what others are told who has it.
+    """
+    limits = Limits(days, int(max_mb * 1e6))
+    if path is not None:
+        return Journal(path, holder, limits)
+    folder = Path(tempfile.mkdtemp(prefix="lupin-twin-"))
+    return Journal(folder / "journal.sqlite", holder, limits, is_temporary=True)
 
 
-def _told(rows: Sequence[Row], now: Clock) -> str:
-    if not rows:
+def _moved(early: _Early, by_ns: int) -> _Early:
+    """What was taken in by a clock that was wrong by so much, as of the right one.
+
+    Where the producer's own clock was right, it is as old as that said.
+    """
+    write = early.write
+    if not isinstance(write, Pin):
+        stamp_ns, own_ns = write.stamp_ns + by_ns, write.own_stamp_ns
+        was_right = write.stamp_ns < own_ns <= stamp_ns
+        write = replace(write, stamp_ns=own_ns if was_right else stamp_ns)
+    return early._replace(write=write, arrival_ns=early.arrival_ns + by_ns)
+
+
+def _told(restored: Restored, now: Clock) -> str:
+    tags = restored.known.tags
+    if not tags:
         return "nothing was known before"
-    counts = Counter(type(row) for row in rows)
-    oldest_ns = min(row.stamp_ns for row in rows)
-    what = ", ".join(
-        f"{counts[kind]:,} {name}"
-        for kind, name in ((PinRow, "places"), (ScanRow, "scans and tries"), (LookRow, "looks"))
-    )
-    tags = len({row.tag_id for row in rows})
-    return f"{tags:,} tags are known again, of {what}; the oldest is of {_moment(oldest_ns, now)}"
+    counts = {
+        "places": sum(tag.pose is not None for tag in tags),
+        "readings": sum(len(tag.readings) for tag in tags),
+        "looks": sum(tag.looked_at_ns is not None for tag in tags),
+    }
+    what = ", ".join(f"{count:,} {name}" for name, count in counts.items())
+    times = [r.observed_at_ns for tag in tags for r in tag.readings if r.observed_at_ns is not None]
+    times += [tag.last_observed_ns for tag in tags if tag.last_observed_ns is not None]
+    oldest = f"; the oldest is of {_moment(min(times), now)}" if times else ""
+    return f"{len(tags):,} tags are known again, of {what}{oldest}"
 
 
 def _moment(stamp_ns: int, now: Clock) -> str:
@@ -215,9 +360,7 @@ def _row(write: Scan | Look, arrival_ns: int, mission: str) -> Row:
     )
 
 
-def _write(row: Row) -> ingest.Write:
-    if isinstance(row, PinRow):
-        return Pin(row.tag_id, row.pose)
+def _write(row: ScanRow | LookRow) -> Scan | Look:
     own = row.stamp_ns if row.own_stamp_ns is None else row.own_stamp_ns
     if isinstance(row, LookRow):
         return Look(row.tag_id, row.stamp_ns, row.flower, source=row.source, own_stamp_ns=own)

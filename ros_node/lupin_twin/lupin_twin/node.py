@@ -1,7 +1,6 @@
 """The rclpy node `lupin_twin`: parameters, QoS, callbacks, and nothing that can be tested without.
 
-Everything here runs on one thread, through one executor and one mutually exclusive callback
-group; so the store and the cache need no lock.
+Everything here runs on one thread, in one callback group: the store and the cache need no lock.
 """
 
 from __future__ import annotations
@@ -35,7 +34,6 @@ from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused
 from lupin_twin.grid import FieldGrid
 from lupin_twin.habits import SERVICE_QOS, Habits, latched, waker
 from lupin_twin.history import History, TagHistory, kind_of
-from lupin_twin.journal.condition import JournalState
 from lupin_twin.journal.runs import Clock as RunClock
 from lupin_twin.lateness import LATCHED_AFTER_S, Lateness
 from lupin_twin.layer_service import LAYER_LOOK_S, LayerService, Shown
@@ -43,7 +41,7 @@ from lupin_twin.memory import Memory, journal_path, open_journal
 from lupin_twin.other_twins import OtherTwins
 from lupin_twin.parameters import ParameterError, TwinParameters
 from lupin_twin.past_desk import PastDesk
-from lupin_twin.past_service import JournalPast, PastService, RecentPast
+from lupin_twin.past_service import JournalPast, PastService
 from lupin_twin.resending import TRY_EVERY_S, Resending
 from lupin_twin.ros_parameters import AdjustableNode, declare, naming, naming_own_parameters
 from lupin_twin.state import ClockState, Look, Scan, Snapshot, TwinStore
@@ -152,7 +150,7 @@ class TwinNode(AdjustableNode):
     def snapshot(self) -> Snapshot:
         """Every tag, now by ROS time, and whether that runs."""
         snapshot = self.store.snapshot(self._now_ns(), self.parameters.frame_id)
-        return replace(snapshot, clock=self._clock_watch.state)
+        return replace(snapshot, clock=self._clock_state)
 
     def history_of(self, tag_id: str) -> TagHistory | None:
         """The last scans and tries of a tag; None: no such tag."""
@@ -194,11 +192,7 @@ class TwinNode(AdjustableNode):
         kind, name, answer = GetField, p.field_service_name, self._on_get_field
         with naming("field_service_name", name):
             self.create_service(kind, name, answer, qos_profile=SERVICE_QOS, callback_group=group)
-        past = (
-            RecentPast(self.history, self._workers)
-            if self.memory.condition.state is JournalState.OFF
-            else JournalPast(self.memory.recall, self.store, p.frame_id)
-        )
+        past = JournalPast(self.memory.recall, self.store, p.frame_id)
         PastService(self.habits, self._past_desk, past, self.store, self._now_ns).offer(self, group)
         self.estimates.offer(self, group)
         self.layers.offer(self, p.layers, p.frame_id)
@@ -253,7 +247,7 @@ class TwinNode(AdjustableNode):
         if isinstance(write, Drop):
             self.habits.drop(write, topic)
             return
-        is_news = not self.history.knows(write)
+        is_news = self.history.news(write) is not None
         if self._apply(write, topic, msg.mission_id):
             self._observed_s = time.monotonic()
             if is_news:
@@ -345,18 +339,20 @@ class TwinNode(AdjustableNode):
         now_s = time.monotonic()
         health = Health(
             journal=self.memory.condition,
-            clock=self._clock_watch.state,
+            clock=self._clock_state,
             counts=self.habits.counts(),
             inputs={topic: int(self.count_publishers(topic)) for topic in self._topics.values()},
             observed_ago_s=None if self._observed_s is None else now_s - self._observed_s,
             late=self.lateness.counts,
             twins=self.twins.value,
+            state_topic=self._state_publisher.topic_name,
             fields_computing=self._desk.computing,
             fields_computed=self._desk.computed,
             slowest_field_s=self._desk.slowest_s,
             estimates=self.estimates.state(),
             layers=self.layers.state(),
             origin=self.origin,
+            input_problems=self.habits.look_at_inputs(),
         )
         self._diagnostics.publish(
             diagnostics(findings(health), self.get_fully_qualified_name(), self._now_ns())
@@ -372,6 +368,10 @@ class TwinNode(AdjustableNode):
         self._others.look(self._state_publisher.topic_name)
 
     @property
+    def _clock_state(self) -> ClockState:
+        return "doubted" if self.memory.is_clock_doubted else self._clock_watch.state
+
+    @property
     def origin(self) -> Origin:
         """Where what is observed comes from."""
         return origin_of(self.parameters.origin, is_simulated=self.get_clock().ros_time_is_active)
@@ -379,13 +379,13 @@ class TwinNode(AdjustableNode):
     # --- small parts ------------------------------------------------------------------------
 
     def _apply(self, write: ingest.Write | Drop, topic: str, mission: str = "") -> bool:
-        dropped = (
-            write if isinstance(write, Drop) else self.memory.apply(write, time.time_ns(), mission)
-        )
-        if dropped is not None:
-            self.habits.drop(dropped, topic)
+        near, dropped = ingest.near(write, self.parameters.max_pose_m)
+        refused = None if near is None else self.memory.apply(near, time.time_ns(), mission)
+        for drop in filter(None, (dropped, refused)):
+            self.habits.drop(drop, topic)
+        if near is None or refused is not None:
             return False
-        self.estimates.hear(write)
+        self.estimates.hear(near)
         return True
 
     def _tell_listeners(self) -> None:
@@ -430,20 +430,20 @@ class TwinNode(AdjustableNode):
         now_ns = int(clock.now().nanoseconds)
         self._watch_clock(now_ns, is_simulated=bool(clock.ros_time_is_active))
         self._follow(now_ns, is_simulated=bool(clock.ros_time_is_active))
-        if self.store.hold_to(now_ns):
-            self.history.hold_to(now_ns)
+        return now_ns
+
+    def _follow(self, now_ns: int, *, is_simulated: bool) -> None:
+        now = RunClock(now_ns, time.time_ns(), is_simulated)
+        told = self.memory.follow(now)
+        if told is not None:
+            self.get_logger().info(told)
+            self.estimates.restore()
+        if self.memory.hold_to(now):
             self.lateness.hold_to(now_ns)
             self.habits.warn(
                 ("clock", 0),
                 "ROS time has gone back: all observations from later than now age from here on",
             )
-        return now_ns
-
-    def _follow(self, now_ns: int, *, is_simulated: bool) -> None:
-        told = self.memory.follow(RunClock(now_ns, time.time_ns(), is_simulated))
-        if told is not None:
-            self.get_logger().info(told)
-            self.estimates.restore()
         condition = self.memory.condition
         if not condition.is_well:
             self.habits.warn(("journal", condition.state), f"journal: {condition.detail}")

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Final
 
+from lupin_twin.far_off import FARTHEST_M
+
 # Of the parameter of that name, see `diagnostics.Origin`.
 ORIGINS: Final = ("robot", "simulated", "recorded")
 # Of a parameter that is a list.
@@ -87,6 +89,12 @@ class TwinParameters:
         1.0, "how often the state is published, by the steady clock", 0.01, 100.0
     )
     frame_id: str = _parameter("map", "the frame that every pose has to be in", fixed=_MEANING)
+    max_pose_m: float = _parameter(
+        1000.0,
+        "a pose with a coordinate farther than this from the frame's origin is dropped, m",
+        0.001,
+        FARTHEST_M,
+    )
     buffer_len: int = _parameter(32, "scans kept per tag for its history", 1, 10_000, fixed=_MADE)
     idw_power: float = _parameter(2.0, "exponent of the distance in the weights", 0.01, 100.0)
     idw_falloff_radius_m: float = _parameter(

@@ -21,8 +21,9 @@ HISTORY_SERVICE: Final = "twin/get_history"
 
 DEFAULT_POINTS: Final = 500
 MAX_POINTS: Final = 5_000
-# What is counted as it is written: events in slots, readings in hours.
+# Longer buckets begin on whole ones.
 SLOT_NS: Final = 300 * 1_000_000_000
+# What is counted as it is written.
 HOUR_NS: Final = 3_600 * 1_000_000_000
 # The `tag_id` that asks for events of the whole house.
 EVERY_TAG: Final = "*"

@@ -8,12 +8,11 @@ from typing import Any, Final, Protocol
 
 from lupin_msgs.srv import GetHistory, GetStateAt, GetWrites
 
-from lupin_twin import convert, convert_past, convert_writes, recent
+from lupin_twin import convert, convert_past, convert_writes
 from lupin_twin.deferred import Later
 from lupin_twin.habits import SERVICE_QOS, Habits
-from lupin_twin.history import History
-from lupin_twin.journal.asof import STATE_S_PER_TAG, state_at
-from lupin_twin.journal.series import SERIES_S, SERIES_S_PER_TAG, series
+from lupin_twin.journal.fold import STATE_S_PER_TAG, state_at
+from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG, series
 from lupin_twin.journal.writes import WRITES_S, writes
 from lupin_twin.past import (
     EVERY_TAG,
@@ -29,7 +28,7 @@ from lupin_twin.past_desk import PastDesk, Question
 from lupin_twin.past_writes import WRITES_SERVICE, PastWrites, WritesRequest
 from lupin_twin.recall import Recall
 from lupin_twin.state import Snapshot, TwinStore
-from lupin_twin.workers import SMALL_S, Workers
+from lupin_twin.workers import SMALL_S
 
 # What the message of a series takes at worst, s of one core; and looking through all tags.
 MESSAGE_S: Final = SMALL_S
@@ -164,45 +163,3 @@ class JournalPast:
     def writes(self, request: WritesRequest) -> Future[PastWrites]:
         """The journal's rows."""
         return self._recall.ask(lambda connection, _: writes(connection, request), WRITES_S)
-
-
-class RecentPast:
-    """What is remembered where no journal is kept; belongs to the thread of the history."""
-
-    def __init__(self, history: History, workers: Workers) -> None:
-        self._history = history
-        self._workers = workers
-
-    def state_at(self, at_ns: int) -> Future[Snapshot]:  # noqa: ARG002  # of no moment
-        """Nothing.
-
-        Raises:
-            NotRemembered: always.
-
-        """
-        raise NotRemembered(recent.NO_JOURNAL, is_lasting=True)
-
-    def writes(self, request: WritesRequest) -> Future[PastWrites]:  # noqa: ARG002  # of none
-        """Nothing: what was heard in which order is not kept.
-
-        Raises:
-            NotRemembered: always.
-
-        """
-        raise NotRemembered(recent.NO_JOURNAL, is_lasting=True)
-
-    def series(self, request: SeriesRequest, now_ns: int) -> Future[SeriesPast]:
-        """The last scans and tries, see `recent.series`.
-
-        Raises:
-            NotRemembered: an event that memory does not hold.
-
-        """
-        recent.check_known(request)
-        if request.tag_id == EVERY_TAG:
-            copied = self._history.all_later()
-            return self._workers.submit(
-                lambda _: recent.series(request, copied(), now_ns), EVERY_TAG_S
-            )
-        history = {request.tag_id: self._history.of(request.tag_id)}
-        return self._workers.submit(lambda _: recent.series(request, history, now_ns), MESSAGE_S)

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 from lupin_twin.journal.condition import Condition, JournalState
-from lupin_twin.journal.schema import FILE_ERRORS, Foreign, Kept, open_reader, says_damaged
+from lupin_twin.journal.schema import FILE_ERRORS, Foreign, open_reader, says_damaged
 from lupin_twin.past import NotRemembered
 from lupin_twin.workers import ShouldStop, Workers
 
@@ -63,8 +63,6 @@ class Recall:
         self._workers = Workers("memory")
         self._changed = threading.Condition()
         self._idle: list[_Open] = []
-        # Of the file that was opened last: what one question finds for good, the next ones know.
-        self._kept: tuple[tuple[int, int], Kept] = ((-1, -1), {})
         self._asking = 0
         self._is_closed = False
 
@@ -122,8 +120,6 @@ class Recall:
 
     def _path(self) -> Path:
         condition = self._condition()
-        if condition.state is JournalState.OFF:
-            raise NotRemembered("no journal is kept: the parameter journal is off", is_lasting=True)
         if condition.state is JournalState.IN_USE:
             raise NotRemembered(f"{condition.detail}: ask that twin", is_lasting=False)
         return Path(condition.path)
@@ -157,11 +153,7 @@ class Recall:
             if opened.file == file:
                 return opened
             opened.connection.close()
-        with self._changed:
-            if self._kept[0] != file:
-                self._kept = (file, {})
-            kept = self._kept[1]
-        connection = open_reader(path, kept=kept)
+        connection = open_reader(path)
         connection.execute(f"PRAGMA cache_size = -{_CACHE_KB}")
         return _Open(connection, file)
 

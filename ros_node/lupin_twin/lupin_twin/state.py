@@ -11,7 +11,7 @@ itself belongs to one thread.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -21,6 +21,7 @@ from lupin_twin.bounds import (
     MAX_ITEMS,
     MAX_SENSORS_PER_TAG,
     MAX_TAGS,
+    Rejected,
     check_length,
     check_texts,
 )
@@ -199,7 +200,7 @@ class TagState:
 
 
 # Paused: it stands, and is told to; stopped: it stands, and nobody says so; none: never started.
-ClockState = Literal["running", "paused", "stopped", "none"]
+ClockState = Literal["running", "paused", "stopped", "none", "doubted"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -315,6 +316,21 @@ class TwinStore:
         self._observed = {tag_id: min(at_ns, now_ns) for tag_id, at_ns in self._observed.items()}
         return True
 
+    def restore(self, tags: Iterable[TagState], observed: Container[str]) -> None:
+        """Begin with what was known before, in the place of what is there.
+
+        `observed` are the tags at which anything was observed: others were only tried.
+        """
+        self._tags, self._observed, self._newest_ns, self._items = {}, {}, 0, 0
+        for tag in tags:
+            try:
+                self._tag(tag.tag_id)
+                self._keep(tag)
+            except Rejected:  # past a bound that was wider
+                continue
+            if tag.tag_id in observed and tag.last_observed_ns is not None:
+                self._observed[tag.tag_id] = tag.last_observed_ns
+
     @property
     def size(self) -> tuple[int, int]:
         """How many tags are kept, and how many readings, flowers and footprint points of theirs."""
@@ -328,6 +344,11 @@ class TwinStore:
         """Whether the tag is known and has a pose."""
         tag = self._tags.get(tag_id)
         return tag is not None and tag.pose is not None
+
+    def pose_of(self, tag_id: str) -> Pose | None:
+        """Where a tag is, None where that is not known."""
+        tag = self._tags.get(tag_id)
+        return None if tag is None else tag.pose
 
     def snapshot(self, now_ns: int, frame_id: str) -> Snapshot:
         """Every tag at `now_ns` (ROS time, ns), poses in `frame_id`. O(tags), nothing is copied."""

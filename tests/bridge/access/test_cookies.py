@@ -64,7 +64,7 @@ def closed() -> Iterator[Served]:
 
 def session_of(closed: Served) -> tuple[str, str]:
     """The name and the value of a session's cookie."""
-    pair = closed.get("/api/signin", BEARER).headers["set-cookie"].partition(";")[0]
+    pair = closed.post("/api/signin", BEARER).headers["set-cookie"].partition(";")[0]
     name, _, value = pair.partition("=")
     return name, value
 

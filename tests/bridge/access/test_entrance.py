@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from lupin_bridge.access.entrance import ComesIn, Entrance, path_of
 from lupin_bridge.settings import SettingError, Settings
-from tests.support.access import BEARER, TOKEN, Served, refused_start, served
+from tests.support.access import BEARER, OWN, TOKEN, Served, refused_start, served
 from tests.support.waiting import wait_for
 
 BEHIND_TWO = Entrance.of(Settings(trusted_proxy=("10.0.0.7", "192.168.0.0/24", "fd00::/64")))
@@ -213,10 +213,12 @@ def test_the_scheme_in_origins_and_cookies_is_the_proxys(live: Served) -> None:
         429,
     )
     with live.client(PROXY) as client:
-        answer = client.get("/gh1/api/signin", headers={**BEARER, "X-Forwarded-Proto": "https"})
+        answer = client.post(
+            "/gh1/api/signin", headers={**BEARER, **OWN, "X-Forwarded-Proto": "https"}
+        )
         cookie = [part.strip() for part in answer.headers["set-cookie"].split(";")]
         assert {"Secure", "Path=/gh1/"} <= set(cookie)
-        answer = client.get("/gh1/api/signin", headers=BEARER)
+        answer = client.post("/gh1/api/signin", headers={**BEARER, **OWN})
         assert "Secure" not in answer.headers["set-cookie"]
 
 

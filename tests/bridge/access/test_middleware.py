@@ -16,7 +16,7 @@ from lupin_bridge.access.middleware import (
 )
 from lupin_bridge.settings import SettingError, Settings
 from lupin_bridge.stream import schema
-from tests.support.access import BEARER, TOKEN, Served, refused_start, served
+from tests.support.access import BEARER, OWN, TOKEN, Served, refused_start, served
 from tests.support.domains import own_domain
 from tests.support.processes import lupin_twin, patrols_of, url_of
 from tests.support.waiting import wait_for
@@ -141,6 +141,7 @@ def test_an_allowed_page_may_ask_before_it_sends_a_token(open_bridge: Served) ->
     assert answer.headers["access-control-allow-origin"] == PANEL
     assert answer.headers["access-control-allow-methods"] == "GET, HEAD"
     assert "Authorization" in answer.headers["access-control-allow-headers"]
+    assert "X-Lupin-Twin" not in answer.headers["access-control-allow-headers"]
     for origin, status in (("http://evil.example", 403), (open_bridge.url, 405)):
         other = open_bridge.get("/api/state", {"Origin": origin, **asks}, method="OPTIONS")
         assert other.status_code == status
@@ -161,6 +162,28 @@ def test_a_picture_in_a_foreign_page_is_not_even_computed(open_bridge: Served) -
         framed = open_bridge.get("/api/field?sensor_type=co2", {**frame, "Sec-Fetch-Dest": dest})
         assert framed.status_code == 403
     assert open_bridge.get("/", {**frame, "Sec-Fetch-Dest": "document"}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "path", ["/api/field.png?sensor_type=co2", "/api/state", "/healthz", "/x.js"]
+)
+def test_over_plain_http_it_is_told_by_the_page_it_comes_from(
+    open_bridge: Served, path: str
+) -> None:
+    """Beyond the own machine and without TLS, browsers send no Sec-Fetch headers."""
+    image = {"Accept": "image/avif,image/webp,*/*;q=0.8"}
+    answer = open_bridge.get(path, {**image, "Referer": "http://evil.example/page"})
+    assert answer.status_code == 403
+    assert "'http://evil.example'" in refusal_of(answer)
+    for referer in (f"{open_bridge.url}/", f"{PANEL}/board"):
+        assert open_bridge.get(path, {**image, "Referer": referer}).status_code != 403
+
+
+@pytest.mark.parametrize("path", ["/", "/docs", "/signin"])
+def test_a_link_to_a_page_may_stand_anywhere(open_bridge: Served, path: str) -> None:
+    linked = {**PAGE, "Referer": "http://wiki.example/greenhouse"}
+    assert open_bridge.get(path, linked).status_code in (200, 303)
+    assert open_bridge.get("/api/state", linked).status_code == 403, "a frame looks the same"
 
 
 def test_an_address_has_a_limit(open_bridge: Served) -> None:
@@ -237,7 +260,7 @@ def test_a_websocket_wants_the_token(closed: Served, path: str) -> None:
 
 def test_a_websocket_opens_with_the_token_or_a_session(closed: Served) -> None:
     assert closed.handshake(headers=BEARER) == 101
-    session = closed.get("/api/signin", BEARER).headers["set-cookie"].partition(";")[0]
+    session = closed.post("/api/signin", BEARER).headers["set-cookie"].partition(";")[0]
     assert closed.handshake(headers={"Cookie": session}) == 101
     assert closed.handshake(headers={"Cookie": f"other=1; {session}"}) == 101
     assert closed.handshake(headers={"Cookie": session[:-1] + "x"}) == 401
@@ -256,12 +279,18 @@ def test_a_good_token_does_not_open_the_door_to_foreign_pages(closed: Served) ->
 
 def test_guessing_is_slowed_down_for_the_guesser_alone(closed: Served) -> None:
     with closed.client("127.0.5.1") as guesser, closed.client("127.0.5.2") as other:
-        session = other.get("/api/signin", headers=BEARER).headers["set-cookie"].partition(";")[0]
+        session = (
+            other.post("/api/signin", headers={**BEARER, **OWN})
+            .headers["set-cookie"]
+            .partition(";")[0]
+        )
         taken = 0
 
         def is_right_one_refused() -> bool:
             nonlocal taken
-            while (answer := guesser.get("/api/signin", headers=WRONG)).status_code == 401:
+            while (
+                answer := guesser.post("/api/signin", headers={**WRONG, **OWN})
+            ).status_code == 401:
                 assert "not the bridge's token" in refusal_of(answer)
                 taken += 1
                 assert taken < 20 * GUESS_BURST, "there is no end to guessing"
@@ -289,8 +318,8 @@ def test_good_tokens_and_old_cookies_are_no_guesses(closed: Served) -> None:
 
 def test_no_log_carries_a_token_or_a_session(tmp_path: Path) -> None:
     with served(LUPIN_TOKEN=TOKEN, ROS_LOG_DIR=str(tmp_path)) as live:
-        session = live.get("/api/signin", BEARER).headers["set-cookie"].partition(";")[0]
-        live.get("/api/signin", WRONG)
+        session = live.post("/api/signin", BEARER).headers["set-cookie"].partition(";")[0]
+        live.post("/api/signin", WRONG)
         live.get(f"/api/state?token={TOKEN}", {"Cookie": session})
         live.get("/api/state", {"Authorization": f"Basic {TOKEN}"})
         live.handshake(headers=BEARER)

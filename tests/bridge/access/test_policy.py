@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -251,6 +253,33 @@ def test_a_foreign_page_that_does_not_name_itself_gets_nothing(
 def test_an_allowed_origin_that_names_itself_may_be_cross_site() -> None:
     asked = Asked("http", ["127.0.0.1"], ["http://panel.example:3000"], "cross-site", "cors")
     assert POLICY.judge(asked).refusal is None
+
+
+# --- Referer ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("referer", "passes"),
+    [
+        ("", True),  # a program, or a page that keeps its name to itself
+        ("http://127.0.0.1:8000/", True),
+        ("http://127.0.0.1:8000/docs?a=http://evil.example", True),
+        ("http://panel.example:3000/board", True),
+        ("http://evil.example", False),
+        ("http://evil.example/http://127.0.0.1:8000/", False),
+        ("http://127.0.0.1:3000/", False),
+        ("http://127.0.0.1:8000@evil.example/", False),
+        ("https://127.0.0.1:8000/", False),
+        ("android-app://com.example/", False),
+    ],
+)
+def test_without_sec_fetch_the_referer_names_the_page(referer: str, passes: bool) -> None:
+    asked = Asked("http", ["127.0.0.1:8000"], referer=referer)
+    assert (POLICY.judge(asked).refusal is None) == passes
+    assert POLICY.judge(replace(asked, wants_page=True)).refusal is None, "it may be a link"
+    assert POLICY.judge(replace(asked, fetch_site="same-origin")).refusal is None
+    hidden = replace(asked, fetch_site="cross-site", wants_page=True)
+    assert POLICY.judge(hidden).refusal is not None, "it tells more than a Referer does"
 
 
 # --- what is said at the start ------------------------------------------------------------------

@@ -7,7 +7,9 @@ from collections.abc import Iterator
 import httpx
 import pytest
 
+from lupin_bridge.access.security import POSTED
 from lupin_bridge.stream import schema
+from tests.support.access import OWN
 from tests.support.messages import occupancy_grid, scan
 from tests.support.waiting import wait_for
 from tests.support.web import ROUTES, Bridge, bridge
@@ -69,12 +71,24 @@ def test_anything_but_a_read_is_refused(live: Bridge, path: str, method: str) ->
     assert answer.status_code == 405
     assert answer.headers["allow"] == "GET, HEAD"
     message = schema.ErrorMessage.model_validate_json(answer.content)
-    assert message.detail == f"method {method} is not allowed: nothing here writes, use GET or HEAD"
+    assert message.detail == f"method {method} is not allowed here, use GET or HEAD"
 
 
-def test_a_refused_body_is_not_mistaken_for_the_next_request(live: Bridge) -> None:
-    assert live.http.post("/api/state", content=b"x" * 100_000).status_code == 405
-    assert live.get("/healthz").status_code == 200
+@pytest.mark.parametrize("path", sorted(POSTED))
+@pytest.mark.parametrize("method", ["GET", "HEAD", "PUT", "DELETE", "OPTIONS"])
+def test_signing_in_and_out_is_posted_and_nothing_else(
+    live: Bridge, path: str, method: str
+) -> None:
+    answer = live.http.request(method, path, headers=OWN)
+    assert (answer.status_code, answer.headers["allow"]) == (405, "POST")
+
+
+@pytest.mark.parametrize("path", sorted(POSTED))
+def test_what_is_posted_has_a_header_that_no_form_can_send(live: Bridge, path: str) -> None:
+    answer = live.http.post(path)
+    assert answer.status_code == 403
+    assert answer.json() == {"detail": "POST without the header X-Lupin-Twin, expected any value"}
+    assert live.http.post(path, headers=OWN).status_code == 404, "this bridge asks for no token"
 
 
 @pytest.mark.parametrize(

@@ -161,7 +161,7 @@ def test_the_own_origin_is_https_then(secure: Served) -> None:
 
 
 def test_the_cookie_never_leaves_tls(secure: Served) -> None:
-    cookie = secure.get("/api/signin", BEARER).headers["set-cookie"]
+    cookie = secure.post("/api/signin", BEARER).headers["set-cookie"]
     assert "secure" in [part.strip().lower() for part in cookie.split(";")]
 
 

@@ -16,7 +16,7 @@ from lupin_bridge.judge import following
 from lupin_bridge.judge.choosing import Criteria
 from lupin_bridge.settings import Settings
 from lupin_bridge.twin.source import Told, TwinUnavailableError
-from lupin_twin.journal.condition import OFF, Condition, JournalState
+from lupin_twin.journal.condition import Condition, JournalState
 from lupin_twin.past_writes import PastWrite, PastWrites, RunSpan, WritesRequest
 from lupin_twin.state import Flower, Look, Snapshot, TwinStore
 from lupin_twin.workers import Workers
@@ -227,7 +227,7 @@ def test_alarms_that_a_journal_has_not_confirmed_for_long_are_not_told_as_all_th
 
 def test_without_a_journal_states_tell_and_a_silent_twin_is_one_alarm_of_the_house() -> None:
     async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
-        feed.on_state(told(3, journal=OFF))
+        feed.on_state(told(3, journal=Condition(JournalState.FAILING)))
         await changed(board)
         assert (board.now.source, source.asked) == ("heard", 0)
         assert [alarm.worst for alarm in board.now.active] == [3.0]

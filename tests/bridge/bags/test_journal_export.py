@@ -14,7 +14,7 @@ from lupin_bridge.bags.journal_rows import LOT
 from lupin_twin import convert, ingest
 from lupin_twin.drops import Drop
 from lupin_twin.history import History
-from lupin_twin.journal.asof import state_at
+from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.rows import Row
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
@@ -87,14 +87,14 @@ def test_a_period_begins_with_the_places_of_before(tmp_path: Path) -> None:
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
     kept(path, ROWS)
     made = exported(path, target, NOW + 4 * SECOND, NOW + 6 * SECOND, namespace="/house/")
-    assert made == Exported(observations=1, tags=2, damaged=0)
+    assert made == Exported(observations=1, tags=2)
     first, *_ = read(target)
     assert first[:2] == ("/house/perception/discovered_tags", NOW + 4 * SECOND + 2000)
     tags = deserialize_message(first[3], DiscoveredTags).tags
     assert [(tag.tag_id, tag.pose_in_map.position.x) for tag in tags] == [("7", 1.5), ("8", 8.5)]
     target.unlink()
     made = exported(path, target, NOW + 5 * SECOND, NOW + 6 * SECOND + 1)
-    assert made == Exported(observations=1, tags=2, damaged=0)
+    assert made == Exported(observations=1, tags=2)
 
 
 def test_simulated_time_is_told_by_the_clock(tmp_path: Path) -> None:
@@ -115,7 +115,7 @@ def test_simulated_time_is_told_by_the_clock(tmp_path: Path) -> None:
 def test_of_nothing_or_a_part_no_file_is_left_and_none_is_overwritten(tmp_path: Path) -> None:
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
     kept(path, ROWS)
-    assert exported(path, target, 0, NOW) == Exported(0, 0, 0)
+    assert exported(path, target, 0, NOW) == Exported(0, 0)
     assert not target.exists()
     target.write_bytes(b"mine")
     with pytest.raises(FileExistsError):

@@ -9,8 +9,8 @@ import pytest
 from lupin_bridge.bags import journal_rows
 from lupin_bridge.bags.journal_rows import JournalRows
 from lupin_twin.journal.rows import PinRow, Row
-from lupin_twin.journal.runs import Clock
-from lupin_twin.journal.schema import open_reader, open_writer
+from lupin_twin.journal.runs import Carries, Clock
+from lupin_twin.journal.schema import open_reader
 from tests.support.journal import NOW, SECOND, kept, look, opened, pin, scan
 
 ROWS: list[Row] = [
@@ -31,7 +31,6 @@ def held(path: Path, start_ns: int = 0, end_ns: int = 2**62) -> tuple[list[Row],
     with closing(open_reader(path)) as connection:
         rows = JournalRows(connection, start_ns, end_ns)
         found = [row for _, row in rows]
-        assert rows.damaged == 0
         return found, rows.places
 
 
@@ -67,7 +66,6 @@ def test_what_comes_while_it_is_read_is_read_too(
         first = [next(reading)[1] for _ in range(2)]
         kept(path, [later])
         assert [*first, *(row for _, row in reading)] == [*ROWS, later]
-        assert rows.damaged == 0
 
 
 def test_of_an_earlier_run_the_places_are_known(tmp_path: Path) -> None:
@@ -75,23 +73,12 @@ def test_of_an_earlier_run_the_places_are_known(tmp_path: Path) -> None:
     again = Clock(50 * SECOND, NOW + 60 * SECOND, is_simulated=True)
     row = replace(scan("7", 60 * SECOND), arrival_ns=NOW + 70 * SECOND)
     with opened(path) as file:
-        first = file.first_run(Clock(100 * SECOND, NOW, is_simulated=True))
+        first = file.start(Clock(100 * SECOND, NOW, is_simulated=True), 1, is_believed=False).run
         file.append([(first, pin("7", 100 * SECOND)), (first, scan("7", 100 * SECOND))])
-        file.append([(file.next_run(first, again, 101 * SECOND), row)])
+        file.append([(file.begin(again, first, Carries.ALL), row)])
     with closing(open_reader(path)) as connection:
         rows = JournalRows(connection, 55 * SECOND, 90 * SECOND)
         [(run, found)] = list(rows)
     assert (run.begun, found) == (again, row)
     assert rows.is_simulated
     assert [place.tag_id for place in rows.places] == ["7"]
-
-
-def test_what_is_damaged_costs_itself(tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-    kept(path, ROWS)
-    with closing(open_writer(path)) as connection:
-        connection.execute("UPDATE scan SET readings = x'00' WHERE id = 2")
-    with closing(open_reader(path)) as connection:
-        rows = JournalRows(connection, 0, 2**62)
-        assert [row for _, row in rows] == [ROWS[0], *ROWS[2:]]
-        assert rows.damaged == 1

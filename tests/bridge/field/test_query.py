@@ -30,13 +30,21 @@ def test_a_full_query() -> None:
 
 def test_what_is_left_out_has_a_default_and_the_box_is_left_to_the_server() -> None:
     query = parse([("sensor_type", "co2")])
-    assert query == FieldQuery("co2", field_query.DEFAULT_RESOLUTION_M, None, 1)
-    assert query.request((0.0, 1.0, 2.0, 3.0)) == FieldRequest("co2", 0.1, 0.0, 1.0, 2.0, 3.0)
+    assert query == FieldQuery("co2", None, None, 1)
+    assert query.request((0.0, 1.0, 2.0, 3.0), 400) == FieldRequest("co2", 0.1, 0.0, 1.0, 2.0, 3.0)
 
 
 def test_a_box_of_the_query_comes_before_the_default_one() -> None:
     query = parse([("sensor_type", "co2"), *BOX.items()])
-    assert query.request((0.0, 1.0, 2.0, 3.0)) == REQUEST
+    assert query.request((0.0, 1.0, 2.0, 3.0), 1) == REQUEST
+
+
+def test_cells_of_a_default_box_are_wide_enough_unless_the_query_says_how_wide() -> None:
+    whole = (0.0, 1.0, 2.0, 3.0)
+    coarser = parse([("sensor_type", "co2")]).request(whole, 399)
+    assert coarser == FieldRequest("co2", 0.2, *whole)
+    fixed = parse([("sensor_type", "co2"), ("resolution", "0.1")]).request(whole, 399)
+    assert fixed == FieldRequest("co2", 0.1, *whole)
 
 
 @pytest.mark.parametrize(
@@ -49,7 +57,9 @@ def test_numbers_as_people_and_programs_write_them(text: str, number: float) -> 
 
 def test_what_is_a_number_but_not_finite_is_left_for_get_fields_own_check() -> None:
     assert parse([("resolution", "-inf")]).resolution == -math.inf
-    assert math.isnan(parse([("resolution", "nan")]).resolution)
+    not_a_number = parse([("resolution", "nan")]).resolution
+    assert not_a_number is not None
+    assert math.isnan(not_a_number)
 
 
 def test_a_missing_sensor_is_left_for_get_fields_own_check() -> None:

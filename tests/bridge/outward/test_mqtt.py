@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import socket
+import threading
 from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -155,6 +157,56 @@ def test_who_says_that_it_is_gone_is_contradicted(shared: Broker) -> None:
 
     with Subscriber(shared) as heard:
         asyncio.run(run(heard))
+
+
+def test_a_flood_of_good_byes_and_births_is_answered_once_in_a_while(shared: Broker) -> None:
+    async def run(heard: Subscriber) -> None:
+        async with telling(shared, House()) as channel:
+            await until(lambda: channel.condition.sent > 10, "the first time")
+            before, sent = len(heard.of("lt/status")), channel.condition.sent
+            for _ in range(100):
+                heard.say("lt/status", "offline", retain=True)
+                heard.say("homeassistant/status", "online")
+            await until(lambda: heard.of("lt/status")[-1:] == [b"online"], "that it is there")
+            await until(lambda: channel.condition.sent > sent, "all of it, again")
+            said = heard.of("lt/status")[before:]
+            assert said.count(b"offline") == 100
+            # The flood took a moment; by the clock there was time for one or two.
+            assert said.count(b"online") <= 3
+            assert channel.condition.sent <= 3 * sent
+
+    with Subscriber(shared) as heard:
+        asyncio.run(run(heard))
+
+
+def test_a_broker_that_sends_a_packet_of_256_mb_is_left_before_it_is_read() -> None:
+    """As none does that was asked for less; before the connection is over, it is in no memory."""
+    taken: list[int] = []
+
+    def serve(listener: socket.socket) -> None:
+        client, _ = listener.accept()
+        with client, suppress(OSError):
+            client.recv(4_096)
+            client.sendall(b"\x20\x03\x00\x00\x00")  # CONNACK, no property
+            client.sendall(b"\x30\xff\xff\xff\x7f")  # PUBLISH, the longest that there can be
+            taken.append(0)
+            while taken[0] < 256_000_000:
+                taken[0] += client.send(bytes(1 << 20))
+
+    async def run(port: int) -> None:
+        target = Targets.of(Settings(mqtt_url=f"mqtt://127.0.0.1:{port}"), Secrets()).mqtt
+        assert target is not None
+        channel = Mqtt(target, Mirror(target.topics, SENSORS), first_wait_s=PATIENCE_S)
+        channel.start(House().look)
+        await until(lambda: channel.condition.failed, "the end of the connection")
+        await channel.stop()
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        thread = threading.Thread(target=serve, args=(listener,))
+        thread.start()
+        asyncio.run(run(listener.getsockname()[1]))
+        thread.join()
+    assert taken[0] < 32_000_000, "what the sockets of the two hold, and no more"
 
 
 def test_two_bridges_of_one_prefix_do_not_throw_each_other_out(shared: Broker) -> None:

@@ -15,13 +15,13 @@ import pytest
 from lupin_bridge.outward import webhook as webhook_module
 from lupin_bridge.outward.choosing import Targets
 from lupin_bridge.outward.deliveries import Delivery
-from lupin_bridge.outward.webhook import AT_ONCE, MAX_REFUSALS, Webhook
+from lupin_bridge.outward.webhook import AT_ONCE, MAX_REFUSALS, ORIGIN_S, Webhook
 from lupin_bridge.settings import Secrets, Settings
 from lupin_twin.diagnostics import Origin
 from tests.support.mosquitto import free_port
 from tests.support.receiver import Answer, Posted, Receiver, receiver, silence, status
 from tests.support.seen import NOW_NS, Alarms, S, alarm
-from tests.support.waiting import until
+from tests.support.waiting import PATIENCE_S, until
 
 SECRET = "a secret of 20 chars"
 A, B = alarm("a"), alarm("b", raised_ns=NOW_NS + S)
@@ -29,13 +29,16 @@ A, B = alarm("a"), alarm("b", raised_ns=NOW_NS + S)
 
 @asynccontextmanager
 async def telling(
-    port: int, board: Alarms, origin: Callable[[], Origin] = lambda: "simulated"
+    port: int,
+    board: Alarms,
+    origin: Callable[[], Origin] = lambda: "simulated",
+    origin_s: float = ORIGIN_S,
 ) -> AsyncIterator[Webhook]:
     """A webhook that is in a hurry."""
     settings = Settings(webhook_url=f"http://127.0.0.1:{port}/hook")
     target = Targets.of(settings, Secrets(webhook_secret=SECRET)).webhook
     assert target is not None
-    hook = Webhook(target, first_wait_s=0.001)
+    hook = Webhook(target, first_wait_s=0.001, origin_s=origin_s)
     hook.start(board, lambda: NOW_NS, origin)
     try:
         yield hook
@@ -122,6 +125,40 @@ def test_what_is_not_taken_comes_again_with_the_same_id_and_the_rest_behind_it(
         asyncio.run(run(server))
     assert server.ids == [f"{A.id}.raised"] * 3 + [f"{B.id}.raised"]
     assert {it.json["origin"] for it in server.posted} == {"robot"}, "what it was as it was heard"
+
+
+def test_nothing_is_posted_before_it_is_known_where_it_comes_from() -> None:
+    asked: list[int] = []
+    origins: list[Origin] = ["unknown"]
+
+    def origin() -> Origin:
+        asked.append(1)
+        return origins[-1]
+
+    async def run(server: Receiver) -> None:
+        board = Alarms()
+        board.show([A, B])
+        async with telling(server.port, board, origin, origin_s=PATIENCE_S) as hook:
+            await until(lambda: len(asked) > 4, "it to be looked for, again and again")
+            assert (hook.condition.waiting, server.posted) == (2, [])
+            origins.append("robot")
+            await until(lambda: hook.condition.sent == 2, "both")
+
+    with receiver(status(200)) as server:
+        asyncio.run(run(server))
+    assert [it.json["origin"] for it in server.posted] == ["robot", "robot"]
+
+
+def test_of_a_twin_that_never_says_where_it_comes_from_alarms_are_posted_all_the_same() -> None:
+    async def run(server: Receiver) -> None:
+        board = Alarms()
+        board.show([A, B])
+        async with telling(server.port, board, lambda: "unknown", origin_s=0.5) as hook:
+            await until(lambda: hook.condition.sent == 2, "both")
+
+    with receiver(status(200)) as server:
+        asyncio.run(run(server))
+    assert [it.json["origin"] for it in server.posted] == ["unknown", "unknown"]
 
 
 def test_one_that_refuses_and_comes_later_gets_all_of_it() -> None:

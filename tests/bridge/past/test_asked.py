@@ -97,13 +97,13 @@ def test_a_tag_that_was_not_known_is_told_with_how_many_were() -> None:
 
 
 def test_a_large_house_and_a_large_field_cost_more_than_small_ones() -> None:
-    def cost_s(question: Asked, tags: int) -> float:
-        return question.look_s(tags) + question.write_s(tags)
-
     for question in QUESTIONS:
-        assert cost_s(question, 10_000) >= cost_s(question, 30)
-    assert cost_s(QUESTIONS[0], 30) < SMALL_S < cost_s(QUESTIONS[0], 10_000)
+        assert question.cost_s(10_000) >= question.cost_s(30)
+    assert QUESTIONS[0].cost_s(30) < SMALL_S < QUESTIONS[0].cost_s(10_000)
     fine = AsOf(0, Field(asked(resolution=0.001), PNG))
-    assert cost_s(fine, 30) > SMALL_S, "one that will be refused is no small one"
+    assert fine.cost_s(30) > SMALL_S, "one that will be refused is no small one"
+    # All that is looked up counts, and not the first of it alone.
+    assert History(SeriesRequest("a", "co2"), None, own_sensors()).cost_s(30) < SMALL_S
+    assert Timeline(TimelineQuery(0, 0, 1, "a")).cost_s(30) > SMALL_S
     for question in QUESTIONS[:5]:
-        assert json.dumps(cost_s(question, 0))
+        assert json.dumps(question.cost_s(0))

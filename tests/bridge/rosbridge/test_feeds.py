@@ -8,14 +8,13 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-import cbor2
 import orjson
 import pytest
 
 from lupin_bridge.rosbridge import feeds
 from lupin_bridge.rosbridge.feeds import Feeding, Writer
 from lupin_bridge.rosbridge.session import Feed
-from lupin_bridge.stream.frames import binary_frame, text_frame
+from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.twin.names import Topic
 from lupin_bridge.twin.relay import NotRelayedError, Sample
 from lupin_twin.workers import Workers
@@ -81,7 +80,7 @@ def json_frame(text: str) -> bytes:
 
 
 def feed(**options: Any) -> Feed:
-    return replace(Feed(INPUT, "in", "none", 0.0), **options)
+    return replace(Feed(INPUT, "in", 0.0), **options)
 
 
 def play(scene: Callable[[Relay, Writer], Awaitable[None]]) -> None:
@@ -105,14 +104,7 @@ def test_a_message_is_written_once_for_all_who_want_it_alike() -> None:
         await until(lambda: all(client.frames for client in clients), "the message")
         assert [client.frames for client in clients] == [[json_frame("a")]] * 3
         assert relay.read_count == 1
-        late = Client(writer)
-        late.feeding.follow({"in": feed(compression="cbor")}, "in")
-        await until(lambda: len(relay.ears) == 4, "the late one to listen")
-        relay.publish("b")
-        await until(lambda: bool(late.frames), "the message in CBOR")
-        told = cbor2.dumps({"op": "publish", "topic": "in", "msg": {"text": "b"}})
-        assert late.frames == [binary_frame(told)]
-        for client in (*clients, late):
+        for client in clients:
             client.feeding.close()
         await until(lambda: not relay.ears, "nobody to listen")
 
@@ -185,21 +177,6 @@ def test_who_is_throttled_gets_the_newest_and_not_before_its_time() -> None:
         await until(lambda: len(often.frames) == 2, "the newest")
         assert often.frames == [json_frame("0"), json_frame("3")]
         assert rare.frames == [json_frame("0")]
-
-    play(scene)
-
-
-def test_cbor_raw_is_the_bytes_with_their_time_and_nothing_is_read() -> None:
-    async def scene(relay: Relay, writer: Writer) -> None:
-        client = Client(writer)
-        client.feeding.follow({"in": feed(compression="cbor-raw")}, "in")
-        await until(lambda: bool(relay.ears), "it to listen")
-        relay.publish("bad")
-        await until(lambda: bool(client.frames), "the bytes")
-        raw = {"secs": 5, "nsecs": 6, "bytes": b"bad"}
-        told = cbor2.dumps({"op": "publish", "topic": "in", "msg": raw})
-        assert client.frames == [binary_frame(told)]
-        assert relay.read_count == 0
 
     play(scene)
 

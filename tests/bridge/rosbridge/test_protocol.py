@@ -55,14 +55,14 @@ def refusal_of(**members: Any) -> Refused:
 
 def test_a_subscription_as_roslib_sends_it() -> None:
     assert read(**FROM_ROSLIB) == Subscribe(
-        "subscribe:/twin/state:0b5a", TOPIC, "lupin_msgs/msg/TwinState", 0.0, "none", ()
+        "subscribe:/twin/state:0b5a", TOPIC, "lupin_msgs/msg/TwinState", 0.0, ()
     )
 
 
 def test_a_subscription_needs_a_topic_alone() -> None:
-    assert read(op="subscribe", topic=TOPIC) == Subscribe(None, TOPIC, "", 0.0, "none", ())
+    assert read(op="subscribe", topic=TOPIC) == Subscribe(None, TOPIC, "", 0.0, ())
     assert read(op="subscribe", topic=TOPIC, type=None, throttle_rate=None, id=None) == Subscribe(
-        None, TOPIC, "", 0.0, "none", ()
+        None, TOPIC, "", 0.0, ()
     )
 
 
@@ -85,6 +85,11 @@ def test_a_longer_queue_is_served_as_one_with_a_warning(length: int, warned: boo
     ("option", "warning"),
     [
         ({"compression": "png"}, "compression 'png' is not served: messages are plain JSON"),
+        ({"compression": "cbor"}, "compression 'cbor' is not served: messages are plain JSON"),
+        (
+            {"compression": "cbor-raw"},
+            "compression 'cbor-raw' is not served: messages are plain JSON",
+        ),
         ({"fragment_size": 12_345_678}, "fragment_size 12345678 is not served: messages are whole"),
     ],
 )
@@ -217,7 +222,7 @@ def test_what_cannot_be_read_is_refused(message: str | bytes, text: str) -> None
         ({"throttle_rate": 3_600_001}, "throttle_rate is 3600001, expected 0 to 3600000 ms"),
         ({"queue_length": -1}, "queue_length is -1, must not be less than 0"),
         ({"queue_length": []}, "queue_length is an array, expected a number"),
-        ({"compression": "CBOR"}, "compression is 'CBOR', expected none, cbor, cbor-raw or png"),
+        ({"compression": "CBOR"}, "compression is 'CBOR', expected none, png, cbor, cbor-raw"),
         ({"compression": 0}, "compression is 0, expected a string"),
         ({"fragment_size": "x"}, "fragment_size is 'x', expected a number"),
     ],
@@ -233,7 +238,7 @@ def test_a_subscription_with_a_wrong_option_is_refused(option: dict[str, Any], t
         ({"args": "temperature"}, "args is 'temperature', expected an object or an array"),
         ({"timeout": "soon"}, "timeout is 'soon', expected a number"),
         ({"type": {}}, "type is an object, expected a string"),
-        ({"compression": "zip"}, "compression is 'zip', expected none, cbor, cbor-raw or png"),
+        ({"compression": "zip"}, "compression is 'zip', expected none, png, cbor, cbor-raw"),
     ],
 )
 def test_a_refused_call_names_its_service_for_the_one_who_waits(

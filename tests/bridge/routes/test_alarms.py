@@ -20,7 +20,7 @@ from tests.support.web import Bridge, bridge
 
 @pytest.fixture(scope="module")
 def live() -> Iterator[Bridge]:
-    """Without a journal."""
+    """With a journal that goes at the end."""
     with bridge("--ros-args", "-p", "journal:=off") as running:
         running.peer.wait_for_twin()
         running.peer.observe(look("a", anomaly=True, bug_count=2))
@@ -33,11 +33,11 @@ def alarms(live: Bridge, **query: Any) -> list[schema.Alarm]:
     return body.alarms
 
 
-def test_without_a_journal_it_tells_what_it_heard_and_says_so(live: Bridge) -> None:
+def test_it_tells_of_the_journal_and_says_so(live: Bridge) -> None:
     body = schema.Alarms.model_validate(live.json("/api/alarms"))
     [pest] = body.alarms
     assert (pest.tag_id, pest.reason.kind, pest.worst, pest.cleared_at) == ("a", "pest", 2.0, None)
-    assert (body.source, body.since) == ("heard", pest.raised_at)
+    assert (body.source, body.since) == ("journal", pest.raised_at)
     with ros_at(live.url) as ros:
         ros.subscribe()
         live.peer.observe(look("b"))

@@ -6,18 +6,21 @@ import asyncio
 import math
 from collections import deque
 from collections.abc import AsyncIterator
+from contextlib import ExitStack
 
 import httpx
 import pytest
 
 from lupin_bridge.judge.choosing import own_sensors
 from lupin_bridge.past import table
+from lupin_bridge.serving.admission import EXPORTS
 from lupin_bridge.settings import Settings
 from lupin_twin.past import PastRow
 from tests.bridge.routes.test_past import remembering
+from tests.support import raw_http
 from tests.support.inprocess import run
 from tests.support.past import NS, MadeUp
-from tests.support.waiting import until
+from tests.support.waiting import until, until_answered
 from tests.support.web import deaf_client
 
 PATH = "/api/export.csv"
@@ -130,6 +133,42 @@ def test_a_client_has_one_export_and_who_leaves_frees_its_place(domain: int) -> 
             assert past.is_closed
 
     run(domain, test())
+
+
+def test_slow_readers_keep_nobody_waiting_for_long(
+    domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    """They take a byte now and then, and so are not cut off as readers that take nothing."""
+    past = MadeUp(lots=[rows(1_000)] * MANY)
+
+    async def test() -> None:
+        async with remembering(past, Settings(client_timeout_s=3_600.0)) as it:
+            with ExitStack() as stack:
+                slow = [
+                    stack.enter_context(raw_http.connect(it.url, f"127.0.9.{number}", room=4_096))
+                    for number in range(1, EXPORTS + 1)
+                ]
+                for client in slow:
+                    client.sendall(f"GET {PATH} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+                await until(lambda: it.bridge.admission.exporting == EXPORTS, "all places taken")
+                refused = await it.http.get(PATH)
+                assert refused.status_code == 503
+                assert refused.headers["retry-after"] == "5"
+
+                async def is_served() -> bool:
+                    for client in slow:
+                        client.recv(1)
+                    async with it.http.stream("GET", PATH) as answer:
+                        return answer.status_code == 200
+
+                await until_answered(is_served, "an export")
+                with pytest.raises(ConnectionResetError):
+                    deque(iter(lambda: slow[0].recv(65_536), b""))
+            await until(lambda: it.bridge.admission.exporting == 0, "their places")
+
+    run(domain, test())
+    assert "the export of 127.0.9.1 is slow and makes place for another one" in caplog.text
+    assert [record for record in caplog.records if record.levelname == "ERROR"] == []
 
 
 def test_who_leaves_while_a_lot_is_being_read_ends_the_reading(

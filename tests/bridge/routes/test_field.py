@@ -156,6 +156,7 @@ def test_every_format_says_in_its_headers_what_it_shows(live: Bridge, suffix: st
         "x-field-value-min": str(np.float32(min(values))),
         "x-field-value-max": str(np.float32(max(values))),
         "x-field-sample-count": "3",
+        "x-field-far-off-count": "0",
     }
     assert headers["content-disposition"] == f'inline; filename="temperature.{suffix}"'
     assert headers["cache-control"] == "no-cache"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 
@@ -21,6 +22,7 @@ from lupin_bridge.serving.admission import (
     Admission,
     BusyError,
     ClientLimitError,
+    Export,
 )
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream import schema
@@ -53,7 +55,11 @@ def test_a_client_has_its_number_in_flight_and_the_next_is_refused_by_name() -> 
 def test_a_request_that_fails_gives_its_place_back() -> None:
     admission = Admission(rate_hz=1000.0, concurrency=1, total_concurrency=1)
     for _ in range(3):
-        with pytest.raises(ZeroDivisionError), admission.request("a", 0.0), admission.computing():
+        with (
+            pytest.raises(ZeroDivisionError),
+            admission.request("a", 0.0),
+            admission.computing("a"),
+        ):
             raise ZeroDivisionError
 
 
@@ -81,19 +87,43 @@ def test_a_page_that_is_dragged_through_the_past_is_let_in_and_a_flood_is_not() 
 def test_a_client_has_one_export_at_a_time_and_all_together_have_few() -> None:
     admission = Admission(rate_hz=1000.0, concurrency=9, total_concurrency=9)
     with ExitStack() as running_:
-        running_.enter_context(admission.export("a"))
+        running_.enter_context(admission.export("a", 0.0, pytest.fail))
         with pytest.raises(ClientLimitError, match="a has 1 export under way, the limit") as more:
-            running_.enter_context(admission.export("a"))
+            running_.enter_context(admission.export("a", 99.0, pytest.fail))
         assert more.value.headers == {"Retry-After": "5"}
         for number in range(EXPORTS - 1):
-            running_.enter_context(admission.export(str(number)))
+            running_.enter_context(admission.export(str(number), 0.0, pytest.fail))
         assert admission.exporting == EXPORTS
         with pytest.raises(BusyError, match=f"{EXPORTS} exports are under way, the limit"):
-            running_.enter_context(admission.export("b"))
+            running_.enter_context(admission.export("b", 4.9, pytest.fail))
     assert admission.exporting == 0
-    with admission.export("a"):
+    with admission.export("a", 5.0, pytest.fail):
         pass
     assert admission.refused == {CLIENT_EXPORTS: 1, ALL_EXPORTS: 1}
+
+
+def test_the_slowest_export_makes_place_and_who_takes_enough_does_not() -> None:
+    admission = Admission(rate_hz=1000.0, concurrency=9, total_concurrency=9)
+    ended: list[str] = []
+    with ExitStack() as taken:
+
+        def begin(client: str, now_s: float) -> Export:
+            return taken.enter_context(
+                admission.export(client, now_s, lambda: ended.append(client))
+            )
+
+        running_ = {client: begin(client, 0.0) for client in "abcd"}
+        for now_s in range(1, 100):  # "b" takes half of what is enough
+            for client, size in (("a", 150_000), ("b", 50_000), ("c", 150_000), ("d", 200_000)):
+                running_[client].take(size, now_s)
+        begin("e", 100.0)
+        assert ended == ["b"]
+        with pytest.raises(BusyError):
+            begin("f", 100.0)
+        assert admission.exporting == EXPORTS
+        begin("f", 105.0)
+        assert len(ended) == 2
+    assert admission.exporting == 0
 
 
 def test_a_client_has_its_rate_and_is_told_when_to_come_back() -> None:
@@ -124,33 +154,38 @@ def test_a_request_refused_for_its_number_costs_no_turn() -> None:
 
 def test_all_together_have_a_number_too() -> None:
     admission = Admission(rate_hz=1.0, concurrency=1, total_concurrency=2)
-    with admission.computing():
-        with admission.computing(), pytest.raises(BusyError) as refused, admission.computing():
+    with admission.computing("a"):
+        with (
+            admission.computing("b"),
+            pytest.raises(BusyError) as refused,
+            admission.computing("c"),
+        ):
             pytest.fail("let in")
         assert str(refused.value) == (
-            "2 answers are being computed, the limit (field_total_concurrency)"
+            "2 answers are being computed, 0 of them for c: the limit is 2 "
+            "(field_total_concurrency), and no client takes more than it leaves free"
         )
-        with admission.computing():
+        with admission.computing("b"):
             pass
 
 
 def test_large_computations_leave_a_quarter_of_the_places_to_small_ones() -> None:
     admission = Admission(rate_hz=1.0, concurrency=1, total_concurrency=8)
     with ExitStack() as taken:
-        for _ in range(6):
-            taken.enter_context(admission.computing(is_large=True))
-        with pytest.raises(BusyError) as refused, admission.computing(is_large=True):
+        for client in range(6):
+            taken.enter_context(admission.computing(str(client), is_large=True))
+        with pytest.raises(BusyError) as refused, admission.computing("new", is_large=True):
             pytest.fail("let in")
         assert str(refused.value) == (
-            "6 large answers are being computed, the limit (three quarters of "
-            "field_total_concurrency)"
+            "6 large answers are being computed, 0 of them for new: the limit is 6 (three quarters "
+            "of field_total_concurrency), and no client takes more than it leaves free"
         )
-        for _ in range(2):
-            taken.enter_context(admission.computing())
-        with pytest.raises(BusyError, match="8 answers are being computed"), admission.computing():
+        for client in range(2):
+            taken.enter_context(admission.computing(f"small {client}"))
+        with pytest.raises(BusyError, match="8 answers are"), admission.computing("new"):
             pytest.fail("let in")
         assert admission.refused == {LARGE: 1, TOTAL: 1}
-    with admission.computing(is_large=True):
+    with admission.computing("a", is_large=True):
         assert admission.being_computed == 1
 
 
@@ -158,8 +193,26 @@ def test_large_computations_leave_a_quarter_of_the_places_to_small_ones() -> Non
 def test_few_places_are_for_large_computations_too(total: int) -> None:
     admission = Admission(rate_hz=1.0, concurrency=1, total_concurrency=total)
     with ExitStack() as taken:
-        for _ in range(total):
-            taken.enter_context(admission.computing(is_large=True))
+        for client in range(total):
+            taken.enter_context(admission.computing(str(client), is_large=True))
+
+
+@pytest.mark.parametrize("is_large", [False, True])
+def test_of_six_clients_that_ask_for_all_they_may_each_has_a_place(is_large: bool) -> None:
+    settings = Settings()
+    admission = Admission(
+        settings.field_rate_hz, settings.field_concurrency, settings.field_total_concurrency
+    )
+    places: Counter[str] = Counter()
+    with ExitStack() as taken:
+        for client in "abcdef":
+            for _ in range(settings.field_concurrency):
+                with suppress(BusyError):
+                    taken.enter_context(admission.computing(client, is_large=is_large))
+                    places[client] += 1
+        assert places["a"] == settings.field_concurrency, "who is alone has all that he may have"
+        assert min(places[client] for client in "abcdef") >= 1
+    assert admission.being_computed == 0
 
 
 def test_refusals_are_counted_by_reason() -> None:
@@ -254,13 +307,16 @@ def test_with_all_places_taken_it_is_503_until_one_is_free(domain: int) -> None:
     async def test() -> None:
         async with running(Settings(field_total_concurrency=2)) as it:
             with ExitStack() as taken:
-                for _ in range(2):
-                    taken.enter_context(it.bridge.admission.computing())
+                for client in "ab":
+                    taken.enter_context(it.bridge.admission.computing(client))
                 busy = await it.http.get("/api/field" + QUERY)
                 assert it.bridge.admission.refused == {TOTAL: 1}
                 assert busy.status_code == 503
                 assert busy.headers["retry-after"] == "1"
-                assert "the limit (field_total_concurrency)" in busy.json()["detail"]
+                assert "2 (field_total_concurrency)" in busy.json()["detail"]
+                # What is live and cheap takes no place.
+                for live in ("/api/state", "/api/health"):
+                    assert (await it.http.get(live)).status_code == 200
             free = await asyncio.gather(*(it.http.get("/api/field" + QUERY) for _ in range(2)))
             assert [answer.status_code for answer in free] == [200, 200]
 

@@ -1,23 +1,22 @@
-"""Frames: numbered, made once in each encoding, and of the contract's types."""
+"""Frames: numbered, made once, and of the contract's types."""
 
 from __future__ import annotations
 
 import json
+from collections import Counter
 from dataclasses import replace
 from typing import Any
 
-import cbor2
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from websockets.frames import Frame, Opcode
 from websockets.streams import StreamReader
 
+from lupin_bridge.judge.choosing import own_sensors
+from lupin_bridge.judge.daylight import judge_day
+from lupin_bridge.judge.judging import Judge
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.frames import (
-    CBOR,
-    ENCODINGS,
-    JSON,
     FrameWriter,
     StateFrame,
     binary_frame,
@@ -26,7 +25,7 @@ from lupin_bridge.stream.frames import (
     text_frame,
 )
 from lupin_bridge.stream.status import Status
-from lupin_twin.state import Reading, Snapshot, TagState
+from lupin_twin.state import Pose, Reading, Snapshot, TagState, Try
 
 
 def received(wire: bytes) -> Frame:
@@ -43,12 +42,11 @@ def received(wire: bytes) -> Frame:
     return frame
 
 
-def content(wire: bytes, encoding: str = JSON) -> dict[str, Any]:
+def content(wire: bytes) -> dict[str, Any]:
     """What a frame says."""
     frame = received(wire)
-    assert frame.opcode is (Opcode.BINARY if encoding == CBOR else Opcode.TEXT)
-    read = cbor2.loads if encoding == CBOR else json.loads
-    decoded: dict[str, Any] = read(bytes(frame.data))
+    assert frame.opcode is Opcode.TEXT
+    decoded: dict[str, Any] = json.loads(bytes(frame.data))
     return decoded
 
 
@@ -73,39 +71,30 @@ def test_a_frame_is_whole_and_unmasked() -> None:
         assert binary_head(size) + b"x" * size == binary_frame(b"x" * size)
 
 
-@pytest.mark.parametrize("encoding", ENCODINGS)
-def test_a_status_frame_is_the_contracts(encoding: str) -> None:
+def test_a_status_frame_is_the_contracts() -> None:
     frame = schema.StatusFrame.model_validate(
-        content(status_frame(Status("stale", 4.0), encoding), encoding), strict=True
+        content(status_frame(Status("stale", 4.0))), strict=True
     )
     assert (frame.twin, frame.reason, frame.state_age_seconds) == ("offline", "stale", 4.0)
 
 
-@pytest.mark.parametrize("encoding", ENCODINGS)
-def test_a_state_frame_is_the_contracts_and_carries_its_revision(encoding: str) -> None:
+def test_a_state_frame_is_the_contracts_and_carries_its_revision() -> None:
     frame = FrameWriter().state(snapshot(tag("7", 412.5)), 'a"b-7')
-    state = schema.StateFrame.model_validate(content(frame.full(encoding), encoding))
+    state = schema.StateFrame.model_validate(content(frame.full()))
     assert (state.seq, state.revision) == (frame.seq, frame.revision) == (1, 'a"b-7')
     assert state.state.tags[0].readings[0].value == 412.5
 
 
-@pytest.mark.parametrize("encoding", ENCODINGS)
-def test_a_delta_frame_is_the_contracts(encoding: str) -> None:
+def test_a_delta_frame_is_the_contracts() -> None:
     writer = FrameWriter()
     same = tag("same")
     writer.state(snapshot(same, tag("gone")), "r1")
     frame = writer.state(snapshot(same, tag("new", 2.0)), "r2")
-    delta = schema.DeltaFrame.model_validate(content(frame.delta(encoding), encoding))
+    delta = schema.DeltaFrame.model_validate(content(frame.delta()))
     assert (delta.seq, delta.base, delta.revision) == (2, 1, "r2")
     assert [changed.tag_id for changed in delta.changed] == ["new"]
     assert delta.removed == ["gone"]
     assert delta.header == schema.Header(stamp=schema.Time(sec=10, nanosec=0), frame_id="map")
-
-
-def test_both_encodings_say_the_same() -> None:
-    odd = TagState("ä", readings=(Reading("co2", float("nan")), Reading("light", 1e300)))
-    frame = FrameWriter().state(snapshot(odd, tag("7")), "r")
-    assert content(frame.full(JSON)) == content(frame.full(CBOR), CBOR)
 
 
 def test_seq_grows_by_one_a_frame() -> None:
@@ -120,9 +109,8 @@ def test_a_frame_is_written_once_for_all_clients() -> None:
     writer = FrameWriter()
     writer.state(snapshot(), "r")
     frame = writer.state(snapshot(tag("7")), "r")
-    for encoding in ENCODINGS:
-        assert frame.full(encoding) is frame.full(encoding)
-        assert frame.delta(encoding) is frame.delta(encoding)
+    assert frame.full() is frame.full()
+    assert frame.delta() is frame.delta()
 
 
 def test_no_more_than_two_frames_are_kept() -> None:
@@ -130,7 +118,7 @@ def test_no_more_than_two_frames_are_kept() -> None:
     frames: list[StateFrame] = []
     for number in range(4):
         frames.append(writer.state(snapshot(tag("7", number)), "r"))
-        frames[-1].full(JSON)
+        frames[-1].full()
     assert frames[3].base is frames[2]
     assert frames[2].base is None, "or every frame ever made would stay in memory"
 
@@ -171,11 +159,11 @@ def test_who_applies_the_deltas_has_the_state(steps: list[dict[str, int]]) -> No
             for tag_id, value in step.items()
         }
         frame = writer.state(snapshot(*known.values(), stamp_ns=number), "r")
-        whole = content(frame.full(JSON))["state"]
+        whole = content(frame.full())["state"]
         if frame.base is None:
             mine = whole
             continue
-        delta = content(frame.delta(JSON))
+        delta = content(frame.delta())
         assert len(delta["changed"]) <= len(step)
         mine = apply(mine, delta)
         assert ageless(mine) == ageless(whole)
@@ -187,7 +175,44 @@ def test_a_delta_leaves_out_what_did_not_change_and_appends_what_is_new_in_order
     first = writer.state(snapshot(*tags), "r")
     tags = [tags[0], replace(tags[1], readings=()), tag("z"), tag("c")]
     second = writer.state(snapshot(*tags), "r")
-    delta = content(second.delta(JSON))
+    delta = content(second.delta())
     assert [changed["tag_id"] for changed in delta["changed"]] == ["b", "z", "c"]
-    whole = content(second.full(JSON))["state"]
-    assert apply(content(first.full(JSON))["state"], delta)["tags"] == whole["tags"]
+    whole = content(second.full())["state"]
+    assert apply(content(first.full())["state"], delta)["tags"] == whole["tags"]
+
+
+# --- weight -------------------------------------------------------------------------------------
+
+# What every browser gets ten times a second, of a house of thirty tags with five sensors each.
+MAX_HOUSE_BYTES = 16_000
+
+
+def house() -> Snapshot:
+    """As a patrol leaves it: each tag scanned once, half a minute after the one before."""
+    now_ns = 1_790_000_123_456_789_012
+    values = {"temperature": 21.3, "humidity": 64.0, "co2": 612.0, "light": 742.5, "ph": 6.2}
+    tags = []
+    for number in range(30):
+        at_ns = now_ns - (30 - number) * 31_234_567_891
+        wrong = {"co2": 5000.0} if number % 10 == 0 else {}
+        tags.append(
+            TagState(
+                str(number + 1),
+                pose=Pose(0.5 * (number % 6), 0.7 * (number // 6), 0.0, 0.0, 0.0, 0.0, 1.0),
+                readings=tuple(Reading(*each, at_ns) for each in (values | wrong).items()),
+                last_observed_ns=at_ns,
+                last_try=Try(at_ns),
+            )
+        )
+    return Snapshot(now_ns, "map", tuple(tags))
+
+
+def test_a_frame_of_a_house_is_within_its_budget_of_bytes() -> None:
+    scanned = house()
+    judged = Judge(own_sensors(), recent_s=3600.0).see(
+        scanned, lambda light: judge_day(light, None, None)
+    )
+    verdicts = Counter(health.verdict for health in judged.tags.values())
+    assert verdicts == {"healthy": 27, "critical": 3}
+    frame = FrameWriter().state(scanned, "0123456789abcdef-1234-5", judged)
+    assert len(frame.full()) <= MAX_HOUSE_BYTES

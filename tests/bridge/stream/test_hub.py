@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 
 from lupin_bridge.stream.alarms_json import alarms_frame
-from lupin_bridge.stream.frames import CBOR, JSON, FrameWriter, encoded
+from lupin_bridge.stream.frames import FrameWriter, text_frame
 from lupin_bridge.stream.hub import CLOSE_POLICY, Client, Hub
 from lupin_bridge.stream.status import Reason, Status
 from lupin_twin.state import Snapshot, TagState
-from tests.bridge.stream.test_frames import content, received
+from tests.bridge.stream.test_frames import received
 from tests.support.seen import alarm
 
 TIMEOUT_S = 30.0
@@ -77,7 +77,7 @@ class Stage:
     def alarms(self, *tag_ids: str, now_s: float = 0.0) -> None:
         """Tell of active alarms at these tags."""
         text = alarms_frame([alarm(tag_id) for tag_id in tag_ids], "journal", 0)
-        self.hub.tell_alarms({which: encoded(text, which) for which in (JSON, CBOR)}, now_s)
+        self.hub.tell_alarms(text_frame(text), now_s)
 
     def join(self, socket: Socket, now_s: float = 0.0, **asked: Any) -> Client:
         client = Client(socket, **asked)
@@ -299,16 +299,6 @@ def test_deltas_go_to_who_asked_and_has_the_frame_before(stage: Stage) -> None:
     assert socket.got[3:] == [5, (5, 6)], "whole after a gap"
 
 
-def test_cbor_goes_to_who_asked(stage: Stage) -> None:
-    socket = Socket()
-    stage.announce("live")
-    stage.join(socket, encoding=CBOR, delta=True)
-    stage.publish()
-    stage.publish()
-    frames = [content(wire, CBOR) for wire in socket.wires]
-    assert [in_short(frame) for frame in frames] == ["live", 1, (1, 2)]
-
-
 def test_a_rate_holds_on_average_and_a_status_does_not_wait_for_it(stage: Stage) -> None:
     socket = Socket()
     stage.join(socket, min_interval_s=1.0)
@@ -422,16 +412,6 @@ def test_a_rate_for_states_does_not_hold_up_alarms(stage: Stage) -> None:
     stage.publish(1.0)
     stage.alarms("a", now_s=1.0)
     assert socket.got == [1, {"a"}]
-
-
-def test_alarms_are_told_in_cbor_to_who_asked(stage: Stage) -> None:
-    socket = Socket()
-    stage.publish()
-    stage.join(socket, encoding=CBOR, wants_status=False)
-    stage.alarms("a")
-    frame = content(socket.wires[1], CBOR)
-    assert in_short(frame) == {"a"}
-    assert json.loads(json.dumps(frame)) == json.loads(alarms_frame([alarm("a")], "journal", 0))
 
 
 def test_who_does_not_want_alarms_gets_none_and_is_not_taken_for_stuck(stage: Stage) -> None:

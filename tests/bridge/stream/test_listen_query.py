@@ -13,41 +13,25 @@ from lupin_bridge.stream.listen_query import MIN_RATE_HZ, ListenQuery, ListenRef
 MAX_REASON_BYTES = 123  # RFC 6455, section 5.5, less the two of the code
 
 
-def test_who_asks_for_nothing_gets_every_state_whole_as_json() -> None:
-    assert parse([]) == ListenQuery(delta=False, encoding="json", max_rate_hz=math.inf)
+def test_who_asks_for_nothing_gets_every_state_whole() -> None:
+    assert parse([]) == ListenQuery(delta=False, max_rate_hz=math.inf)
     assert parse([]).min_interval_s == 0.0
 
 
 def test_a_full_query() -> None:
-    query = parse([("delta", "1"), ("encoding", "cbor"), ("max_rate_hz", "0.5")])
-    assert query == ListenQuery(delta=True, encoding="cbor", max_rate_hz=0.5)
+    query = parse([("delta", "1"), ("max_rate_hz", "0.5")])
+    assert query == ListenQuery(delta=True, max_rate_hz=0.5)
     assert query.min_interval_s == 2.0
-
-
-@pytest.mark.parametrize(
-    ("query", "subprotocols", "encoding"),
-    [
-        ([], ["cbor"], "cbor"),
-        ([], ["other", "cbor"], "cbor"),
-        ([], ["other"], "json"),
-        ([("encoding", "json")], ["cbor"], "json"),
-        ([("encoding", "cbor")], [], "cbor"),
-    ],
-)
-def test_an_encoding_is_asked_for_by_name_or_by_subprotocol(
-    query: list[tuple[str, str]], subprotocols: list[str], encoding: str
-) -> None:
-    assert parse(query, subprotocols).encoding == encoding
 
 
 @pytest.mark.parametrize(
     ("query", "named"),
     [
-        ([("rate", "1")], ["'rate' is unknown", "expected delta, encoding or max_rate_hz"]),
+        ([("rate", "1")], ["'rate' is unknown", "expected delta or max_rate_hz"]),
         ([("delta", "1"), ("delta", "1")], ["delta is given more than once"]),
         ([("delta", "yes")], ["delta is 'yes'", "0 or 1"]),
         ([("delta", "")], ["delta is ''", "0 or 1"]),
-        ([("encoding", "xml")], ["encoding is 'xml'", "json or cbor"]),
+        ([("encoding", "cbor")], ["'encoding' is unknown", "expected delta or max_rate_hz"]),
         ([("max_rate_hz", "0")], ["max_rate_hz is '0'", "from 0.01"]),
         ([("max_rate_hz", "-1")], ["max_rate_hz is '-1'", "from 0.01"]),
         ([("max_rate_hz", "nan")], ["max_rate_hz is 'nan'", "from 0.01"]),
@@ -67,7 +51,7 @@ def test_what_cannot_be_served_is_named(query: list[tuple[str, str]], named: lis
 @given(
     st.lists(
         st.tuples(
-            st.sampled_from(["delta", "encoding", "max_rate_hz"]) | st.text(max_size=200),
+            st.sampled_from(["delta", "max_rate_hz"]) | st.text(max_size=200),
             st.text(max_size=200),
         ),
         max_size=3,

@@ -7,16 +7,15 @@ import math
 from dataclasses import replace
 from typing import Any
 
-import cbor2
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lupin_bridge.stream import schema, state_json
-from lupin_bridge.stream.state_cbor import StateCbor
 from lupin_bridge.stream.state_json import StateJson
 from lupin_twin.history import PastScan, PastTry, TagHistory
 from lupin_twin.state import Bloom, ClockState, Flower, Pose, Reading, Snapshot, TagState, Try
+from tests.support.web import filled
 
 ANY_NUMBER = st.floats(width=64)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
@@ -93,12 +92,11 @@ def times_of(tag: TagState) -> dict[str, Any]:
     }
 
 
-def reading_of(reading: Reading, now_ns: int, has_times: bool) -> dict[str, Any]:
+def reading_of(reading: Reading, has_times: bool) -> dict[str, Any]:
     fields: dict[str, Any] = {"name": reading.name, "value": number(reading.value)}
     if has_times:
         at_ns = reading.observed_at_ns
         fields["observed_at"] = None if at_ns is None else stamp(at_ns)
-        fields["stale_seconds"] = age(at_ns, now_ns)
     return fields
 
 
@@ -114,9 +112,7 @@ def plainly(snapshot: Snapshot, has_times: bool = True) -> dict[str, Any]:
                     "position": xyz(pose.x, pose.y, pose.z),
                     "orientation": {**xyz(pose.qx, pose.qy, pose.qz), "w": pose.qw},
                 },
-                "readings": [
-                    reading_of(reading, snapshot.stamp_ns, has_times) for reading in tag.readings
-                ],
+                "readings": [reading_of(reading, has_times) for reading in tag.readings],
                 "last_observed": stamp(tag.last_observed_ns or 0),
                 "stale_seconds": age(tag.last_observed_ns, snapshot.stamp_ns),
                 "species": flower.species,
@@ -148,7 +144,9 @@ def plainly(snapshot: Snapshot, has_times: bool = True) -> dict[str, Any]:
 @settings(max_examples=100)
 def test_any_snapshot_is_written_as_the_contract_has_it(snapshot: Snapshot) -> None:
     text = StateJson().state(snapshot)
-    assert json.loads(text, parse_constant=pytest.fail) == plainly(snapshot)
+    written = json.loads(text, parse_constant=pytest.fail)
+    written["tags"] = [filled(tag) for tag in written["tags"]]
+    assert written == plainly(snapshot)
     schema.TwinState.model_validate_json(text, strict=True)
 
 
@@ -178,18 +176,32 @@ def test_a_tag_that_did_not_change_gets_older_all_the_same() -> None:
     assert ages == [0.0, 2.5, 0.0]
 
 
-def test_every_reading_gets_older_by_its_own_time() -> None:
-    writer = StateJson()
-    readings = (Reading("co2", 1.0, 10 * S), Reading("light", 2.0, 7210 * S), Reading("no", 3.0))
+def test_the_time_of_a_reading_is_told_where_it_is_not_that_of_the_one_before() -> None:
+    times_s = (7210, 10, 10, None, None, 7210)
+    readings = tuple(Reading(str(i), 1.0, s and s * S) for i, s in enumerate(times_s))
     tag = TagState("7", POSE, readings, last_observed_ns=7210 * S, looked_at_ns=3610 * S)
-    for now_s in (7210, 7300):
-        written = json.loads(writer.tag(tag, now_s * S))
-        ages = [reading["stale_seconds"] for reading in written["readings"]]
-        assert ages == [now_s - 10, now_s - 7210, None]
-        assert written["stale_seconds"] == now_s - 7210
-    assert written["readings"][0]["observed_at"] == {"sec": 10, "nanosec": 0}
-    assert written["readings"][2]["observed_at"] is None
+    written = json.loads(StateJson().tag(tag, 7300 * S))
+    assert [reading.get("observed_at", "absent") for reading in written["readings"]] == [
+        "absent",
+        {"sec": 10, "nanosec": 0},
+        "absent",
+        None,
+        "absent",
+        {"sec": 7210, "nanosec": 0},
+    ]
     assert written["looked_at"] == {"sec": 3610, "nanosec": 0}
+
+
+def test_the_last_try_is_told_unless_it_was_the_last_observation() -> None:
+    tag = TagState("7", POSE, last_observed_ns=5 * S, last_try=Try(5 * S))
+    assert (
+        not {"last_try", "last_try_status", "last_try_detail"}
+        & json.loads(StateJson().tag(tag, 5 * S)).keys()
+    )
+    for tried in (Try(6 * S), Try(5 * S, 2), Try(5 * S, 0, "late"), None):
+        written = json.loads(StateJson().tag(replace(tag, last_try=tried), 5 * S))
+        assert written["last_try"] == (tried and stamp(tried.stamp_ns))
+        assert written["last_try_status"] == (tried and tried.status)
 
 
 def test_tags_that_are_gone_are_forgotten() -> None:
@@ -274,12 +286,10 @@ def test_a_history_that_nobody_tells_is_not_known_rather_than_empty() -> None:
 
 @pytest.mark.parametrize("clock", ["none", "stopped"])
 def test_without_a_clock_that_runs_no_age_is_known(clock: ClockState) -> None:
-    tag = TagState("1", readings=(Reading("co2", 1.0, S),), last_observed_ns=S)
+    tag = TagState("1", readings=(Reading("co2", 1.0, S),), last_observed_ns=2 * S)
     snapshot = Snapshot(9 * S, "map", (tag,), clock=clock)
-    state = json.loads(StateJson().state(snapshot))
-    assert state == cbor2.loads(StateCbor().state(snapshot))
-    [told] = state["tags"]
-    assert (told["stale_seconds"], told["readings"][0]["stale_seconds"]) == (None, None)
+    [told] = json.loads(StateJson().state(snapshot))["tags"]
+    assert told["stale_seconds"] is None
     assert told["readings"][0]["observed_at"] == {"sec": 1, "nanosec": 0}
     paused = json.loads(StateJson().state(replace(snapshot, clock="paused")))
-    assert paused["tags"][0]["stale_seconds"] == 8.0
+    assert paused["tags"][0]["stale_seconds"] == 7.0

@@ -86,6 +86,11 @@ def test_what_is_news_for_clients_and_what_for_people() -> None:
     recorded = Liveness(last_state_s=0.0, origin="recorded").status(0.1)
     assert recorded.is_news_after(live)
     assert schema.StatusFrame.model_validate(recorded.frame()).origin == "recorded"
+    unheard = Liveness(last_state_s=0.0, input_problems=("use UDP",)).status(0.1)
+    assert unheard.is_live
+    assert unheard.is_news_after(live)
+    assert not unheard.says_more_than(live)
+    assert schema.StatusFrame.model_validate(unheard.frame()).input_problems == ["use UDP"]
     mapped = Status("live", 0.1, has_map=True)
     assert mapped.is_news_after(live)
     assert not mapped.says_more_than(live)
@@ -98,6 +103,7 @@ def test_what_is_news_for_clients_and_what_for_people() -> None:
         ("paused", "paused"),
         ("stopped", "clock_stopped"),
         ("none", "no_clock"),
+        ("doubted", "clock_doubted"),
     ],
 )
 def test_a_clock_that_does_not_run_is_said_unless_the_twin_is_silent(

@@ -124,17 +124,25 @@ def test_the_future_is_refused(domain: int, stage_of: Callable[..., Any]) -> Non
     run(domain, test())
 
 
-def test_without_a_journal_there_is_no_past(domain: int, stage_of: Callable[..., Any]) -> None:
+def test_a_journal_that_is_off_remembers_for_as_long_as_the_twin_lives(
+    domain: int, stage_of: Callable[..., Any]
+) -> None:
     async def test() -> None:
         async with stage_of("--ros-args", "-p", "journal:=off") as stage:
-            with pytest.raises(NotRemembered, match="parameter journal") as caught:
-                await stage.twin.state_at(5)
-            assert caught.value.is_lasting
-            with pytest.raises(NotRemembered, match="parameter journal"):
-                await stage.twin.ask(Itself(5), 0.0)
-            with pytest.raises(NotRemembered, match="parameter journal"):
-                await anext(stage.twin.rows(0, 5, None, None, list))
-            assert stage.twin.past.starts == 0, "a process that nobody needs"
+            await until(lambda: stage.twin.journal().state == "off", "the journal")
+            folder = Path(stage.twin.journal().path).parent
+
+            def take(node: TwinNode) -> None:
+                at_ns = node._now_ns()
+                node.memory.apply(Scan("1", at_ns, (Reading("co2", 400.0),)), at_ns)
+
+            await stage.twin._thread.call(take)
+            now_ns = stage.twin._now_ns
+            await until(lambda: stage.twin.journal().written, "the scan")
+            [tag] = (await stage.twin.state_at(now_ns)).tags
+            assert tag.readings[0].value == 400.0
+            assert folder.exists()
+        assert not folder.exists()
 
     run(domain, test())
 

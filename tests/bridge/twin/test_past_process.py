@@ -24,9 +24,9 @@ from lupin_twin.journal.condition import Condition, JournalState
 from lupin_twin.past import NotRemembered, PastRefused
 from tests.support.domains import ros_env
 from tests.support.journal import NOW, SECOND, kept, pin, scan
-from tests.support.looking import Body, Count, Dying, Endless, Failing, Knows, MapCells, Running
+from tests.support.looking import Body, Count, Dying, Endless, Failing, MapCells, Running
 from tests.support.processes import Process
-from tests.support.waiting import PATIENCE_S, until, until_answered, wait_for
+from tests.support.waiting import PATIENCE_S, until, wait_for
 
 NOW_NS = NOW + SECOND
 
@@ -85,17 +85,14 @@ def test_one_that_expects_questions_is_there_before_the_first(
 ) -> None:
     monkeypatch.setattr(past_process, "START_AFTER_S", 0.01)
 
-    async def test(expects_now: Now | None, known: list[str]) -> None:
+    async def test(expects_now: Now | None) -> None:
         async with looking_back(Body, expects_now) as past:
             await until(lambda: past.starts == 1, "its start")
-            await until_answered(
-                lambda: past.ask(Knows(), now(path), 0.0), "its names", lambda it: it == known
-            )
             assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
 
     kept(path, [pin()])
-    asyncio.run(test(None, []))
-    asyncio.run(test(now(path), ["1", "tag"]))  # places of the first run, and names
+    asyncio.run(test(None))
+    asyncio.run(test(now(path)))
 
 
 def test_what_it_meets_is_raised_here(path: Path) -> None:

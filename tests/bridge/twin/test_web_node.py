@@ -341,6 +341,10 @@ def test_a_map_that_is_told_again_changes_nothing(
 # --- what the twin says of itself ---------------------------------------------------------------
 
 
+def of_state(topic: str) -> Finding:
+    return Finding("twins", 0, "", {"state topic": topic})
+
+
 def test_only_the_twin_that_is_followed_is_heard_on_diagnostics(stage: Stage, peer: Peer) -> None:
     drops = Finding("drops", 0, "", {"frame": "7", "lately: frame": "2", "last: frame": "odom"})
     publish = peer.node.create_publisher(DiagnosticArray, "/diagnostics", 10).publish
@@ -349,10 +353,11 @@ def test_only_the_twin_that_is_followed_is_heard_on_diagnostics(stage: Stage, pe
     assert stage.node.journal.state == "unknown"
     assert stage.node.twin_counts is None, "a twin that says nothing has not dropped nothing"
     # Another greenhouse's is in the same message, before it and behind it, and in one of its own.
-    theirs = diagnostics([Finding("drops", 0, "", {"kind": "100"})], "/gh2/peer", 0)
+    others = [Finding("drops", 0, "", {"kind": "100"}), of_state("/gh2/twin/state")]
+    theirs = diagnostics(others, "/gh2/peer", 0)
     journal = Finding("journal", 2, "no room", {"state": "failing"})
     origin = Finding("origin", 0, "", {"origin": "simulated"})
-    ours = diagnostics([drops, journal, origin], "/peer", 0)
+    ours = diagnostics([drops, journal, origin, of_state("/twin/state")], "/the_twin", 0)
     ours.status = [*theirs.status, *ours.status, *theirs.status]
 
     def heard() -> Counts | None:

@@ -16,13 +16,13 @@ from hypothesis import strategies as st
 from lupin_bridge.twin.source import TwinUnavailableError
 from lupin_bridge.twin.web_past import WebPast, grids_of
 from lupin_twin.convert_past import Entries
-from lupin_twin.journal.asof import state_at
+from lupin_twin.journal.fold import state_at
+from lupin_twin.journal.queries import series
 from lupin_twin.journal.schema import open_reader
-from lupin_twin.journal.series import series
-from lupin_twin.past import HOUR_NS, SLOT_NS, Event, Grid, PastRefused, SeriesRequest
+from lupin_twin.past import HOUR_NS, Event, Grid, PastRefused, SeriesRequest
 from tests.support.elsewhere import Elsewhere
 from tests.support.journal import kept, scan
-from tests.support.past_strategy import BEGUN, LATEST, MINUTE, TAGS, lived, periods, steps
+from tests.support.log_life import BEGUN, LATEST, MINUTE, TAGS, lived, periods, steps
 
 END = BEGUN + (LATEST + 200) * MINUTE
 _numbers = count()
@@ -47,8 +47,8 @@ def test_a_series_is_the_twins_own(
     points: int,
     of: tuple[str, str],
 ) -> None:
-    with lived(folder / f"{next(_numbers)}.sqlite", told) as reference:
-        connection = reference.file._connection
+    with lived(folder / f"{next(_numbers)}.sqlite", told) as life:
+        connection = life.connection
         request = SeriesRequest(*of, *period, points)
         here = series(connection, request, END)
         there = Elsewhere(connection, END).ask(lambda past: past.series(request))
@@ -58,8 +58,8 @@ def test_a_series_is_the_twins_own(
 @given(steps, st.integers(0, LATEST))
 @settings(max_examples=20)
 def test_a_state_is_the_twins_own(folder: Path, told: list[tuple[str, Any]], minute: int) -> None:
-    with lived(folder / f"{next(_numbers)}.sqlite", told) as reference:
-        connection = reference.file._connection
+    with lived(folder / f"{next(_numbers)}.sqlite", told) as life:
+        connection = life.connection
         at_ns = BEGUN + minute * MINUTE + 1
         there = Elsewhere(connection, END).ask(lambda past: past.state_at(at_ns))
         assert repr(there) == repr(state_at(connection, at_ns, "map"))
@@ -125,7 +125,7 @@ def test_an_answer_that_cannot_be_is_told_and_not_believed(twin: Elsewhere, spoi
         twin.ask(lambda past: past.series(temperature(BEGUN, BEGUN + 100 * MINUTE, 20)))
 
 
-def test_what_was_given_up_is_known_by_its_hours_and_slots() -> None:
+def test_what_was_deleted_is_known_by_its_hours() -> None:
     hours = (BEGUN, BEGUN + HOUR_NS, BEGUN + 5 * HOUR_NS)
     of = Entries(True, hours, (9, 9, 9), *[(1.0, 1.0, 1.0)] * 3)
     asked = temperature(BEGUN + 7, BEGUN + 6 * HOUR_NS)
@@ -135,7 +135,7 @@ def test_what_was_given_up_is_known_by_its_hours_and_slots() -> None:
         told.bucket_ns for told in grids_of(of._replace(stamps_ns=hours[:1]), BEGUN, events)
     ] == [
         MINUTE,
-        SLOT_NS,
+        HOUR_NS,
     ]
     uneven = of._replace(stamps_ns=(BEGUN, BEGUN + MINUTE))
     assert [told.bucket_ns for told in grids_of(uneven, BEGUN, events)] == [MINUTE]

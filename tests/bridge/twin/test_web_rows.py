@@ -23,7 +23,7 @@ from lupin_twin.journal.schema import open_reader
 from lupin_twin.past import HOUR_NS, MAX_POINTS, NotRemembered, PastRow
 from tests.support.elsewhere import Elsewhere, gathered
 from tests.support.journal import NOW, SECOND, kept, pin, scan
-from tests.support.past_strategy import BEGUN, LATEST, MINUTE, give_up, lived, steps
+from tests.support.log_life import BEGUN, LATEST, MINUTE, lived, steps
 
 END = BEGUN + (LATEST + 200) * MINUTE
 _numbers = count()
@@ -65,8 +65,8 @@ def test_they_are_those_of_the_twins_own_export(
 ) -> None:
     start_ns, end_ns = (BEGUN + minute * MINUTE for minute in sorted(period))
     asked = (start_ns, end_ns, tag_id, sensor_type)
-    with lived(folder / f"{next(_numbers)}.sqlite", told) as reference:
-        connection = reference.file._connection
+    with lived(folder / f"{next(_numbers)}.sqlite", told) as life:
+        connection = life.connection
         here = [as_told(row) for lot in rows(connection, *asked) for row in lot]
         found = there(Elsewhere(connection, END), *asked)
     assert [row.stamp_ns for row in found] == [row.stamp_ns for row in here]
@@ -148,10 +148,10 @@ def test_what_is_given_up_meanwhile_breaks_it_off_and_only_if_it_was_to_come(
     number, hour = 3_000, 60  # a minute each
     end_ns = BEGUN + number * MINUTE
 
-    with lived(path, []) as reference, closing(open_reader(path)) as reader:
+    with lived(path, []) as life, closing(open_reader(path)) as reader:
 
         def give_up_to(first: int) -> None:
-            give_up(reference, BEGUN + first * MINUTE)
+            life.delete(BEGUN + first * MINUTE)
 
         async def told(past: WebPast, until: int, first: int) -> list[float]:
             """The values; as so many are there, those before `first` are given up."""
@@ -163,9 +163,7 @@ def test_what_is_given_up_meanwhile_breaks_it_off_and_only_if_it_was_to_come(
                     until = number
             return found
 
-        reference.write(
-            [scan(at_ns=BEGUN + n * MINUTE, temperature=float(n)) for n in range(number)]
-        )
+        life.write([scan(at_ns=BEGUN + n * MINUTE, temperature=float(n)) for n in range(number)])
         twin = Elsewhere(reader, end_ns)
         give_up_to(10)  # long ago
         begun = int(twin.ask(lambda past: told(past, number, 0))[0])

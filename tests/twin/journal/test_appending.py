@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.journal.rows import KIND_FLOWER, Row
-from tests.support.journal import NOW, SECOND, kept, known, look, pin, scan, select
+from lupin_twin.journal.rows import ScanRow
+from lupin_twin.state import Reading
+from tests.support.journal import NOW, SECOND, kept, look, scan, select
 
 
 @pytest.fixture
@@ -14,66 +15,70 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "j.sqlite"
 
 
-FAILED = replace(scan(at_ns=NOW + 5), readings=(), status=2, detail="no answer")
-BLIND = replace(scan(at_ns=NOW + 6), readings=(), kind=KIND_FLOWER, status=1, detail="dark")
+def sent(row: ScanRow, own_ns: int) -> ScanRow:
+    """As it is taken in where its stamp could not be true."""
+    return replace(row, own_stamp_ns=own_ns)
 
 
-@pytest.mark.parametrize("row", [scan(), look(), look(anomaly=True), pin(), FAILED, BLIND])
-def test_what_is_handed_over_is_there(path: Path, row: Row) -> None:
-    assert kept(path, [row]) == (1, 0)
-    assert known(path) == {row}
-
-
-@pytest.mark.parametrize("row", [scan(), look(), pin(), FAILED])
-def test_the_same_heard_again_is_nothing_new(path: Path, row: Row) -> None:
-    assert kept(path, [row, row]) == (1, 0)
-    assert kept(path, [row, replace(row, arrival_ns=row.arrival_ns + SECOND)]) == (0, 0)
-    assert known(path) == {row}
-
-
-def test_an_older_one_is_new_and_the_same_older_one_is_not(path: Path) -> None:
-    rows = [scan(at_ns=NOW + n * SECOND) for n in (5, 3, 4, 3, 5)]
-    assert kept(path, rows) == (3, 0)
-    assert kept(path, rows) == (0, 0)
-
-
-def test_what_differs_in_tag_source_status_or_sensors_is_not_the_same(path: Path) -> None:
-    rows = [
-        scan(),
-        scan("8"),
-        scan(source="other"),
-        scan(humidity=50.0),
-        replace(scan(), status=2),
+@pytest.mark.parametrize("in_one_life", [True, False])
+def test_a_write_is_known_by_tag_kind_own_stamp_and_source(
+    path: Path, *, in_one_life: bool
+) -> None:
+    first = scan("7", NOW, temperature=20.0)
+    again = [
+        scan("7", NOW, temperature=25.0),
+        replace(first, status=2, detail="no"),
+        replace(first, readings=()),
     ]
-    assert kept(path, rows) == (5, 0)
-    assert known(path) == set(rows)
-
-
-def test_a_stamp_from_the_future_is_known_by_what_was_sent(path: Path) -> None:
-    future = replace(scan(), own_stamp_ns=4_070_908_800 * SECOND)
-    again = replace(future, stamp_ns=NOW + 9 * SECOND)
-    assert kept(path, [future]) == (1, 0)
-    assert kept(path, [again]) == (0, 0)
-    assert known(path) == {future}
-
-
-def test_without_a_stamp_nothing_can_be_known_again(path: Path) -> None:
-    rows = [replace(scan(at_ns=NOW + n), own_stamp_ns=0) for n in range(2)]
-    assert kept(path, rows) == (2, 0)
-
-
-def test_numbers_go_over_all_kinds_and_on_after_a_restart(path: Path) -> None:
-    kept(path, [scan(), look(), pin()])
-    kept(path, [scan(at_ns=NOW + 1)])
-    ids = [
-        number
-        for table in ("scan", "look", "pin")
-        for (number,) in select(path, f"SELECT id FROM {table}")
+    others = [
+        scan("8", NOW),
+        scan("7", NOW + 1),
+        scan("7", NOW - 1),
+        scan("7", NOW, source="other"),
+        replace(first, kind=1, readings=(), status=2),
     ]
-    assert sorted(ids, key=str) == [1, 2, 3, 4]
+    if in_one_life:
+        assert kept(path, [first, *again, *others]) == (1 + len(others), 0)
+    else:
+        assert kept(path, [first]) == (1, 0)
+        assert kept(path, again) == (0, 0)
+        assert kept(path, others) == (len(others), 0)
+    assert kept(path, [*others, *again]) == (0, 0)
 
 
-def test_a_text_that_is_no_unicode_is_kept_as_far_as_it_is(path: Path) -> None:
-    row = replace(scan(), source="a\udcffb", detail="c\udcffd")
-    assert kept(path, [row]) == (1, 0)
-    assert known(path) == {replace(row, source="a?b", detail="c?d")}
+def test_of_what_is_known_new_sensors_are_a_further_part(path: Path) -> None:
+    kept(
+        path, [scan(temperature=20.0), scan(temperature=25.0, co2=400.0), scan(co2=1.0, light=2.0)]
+    )
+    asked = "SELECT sensors, readings FROM scan JOIN series USING (series) ORDER BY seq"
+    found = select(path, asked)
+    assert found == [('["temperature"]', "[20.0]"), ('["co2"]', "[400.0]"), ('["light"]', "[2.0]")]
+
+
+def test_a_stamp_from_the_future_is_known_when_it_has_come(path: Path) -> None:
+    own_ns = NOW + 60 * SECOND
+    assert kept(path, [sent(scan(at_ns=NOW), own_ns)]) == (1, 0)
+    assert kept(path, [sent(scan(at_ns=NOW + 30 * SECOND), own_ns)]) == (0, 0)
+    assert kept(path, [scan(at_ns=own_ns)]) == (0, 0)
+    assert kept(path, [scan(at_ns=own_ns, co2=400.0)]) == (1, 0)
+    assert select(path, "SELECT stamp_ns, own_stamp_ns FROM scan") == [(NOW, own_ns)] * 2
+
+
+def test_a_look_and_one_that_failed_are_of_one_kind(path: Path) -> None:
+    failed = ScanRow("7", NOW, NOW, kind=1, status=2, source="robot")
+    assert kept(path, [look(), failed, look(anomaly=True)]) == (1, 0)
+
+
+def test_what_is_no_text_or_no_number_costs_nothing_else(path: Path) -> None:
+    odd = replace(scan("\ud800", t=float("nan"), u=float("inf"), v=1.5), mission="\udfff")
+    assert kept(path, [odd]) == (1, 0)
+    assert select(path, "SELECT tag, readings FROM scan JOIN series USING (series)") == [
+        ("?", "[null,null,1.5]")
+    ]
+
+
+def test_a_sensor_that_comes_twice_in_a_scan_has_its_last_value(path: Path) -> None:
+    kept(path, [replace(scan(), readings=(Reading("t", 1.0), Reading("t", 2.0)))])
+    assert select(path, "SELECT sensors, readings FROM scan JOIN series USING (series)") == [
+        ('["t"]', "[2.0]")
+    ]

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from lupin_twin.journal.condition import OFF, UNKNOWN, Condition, JournalState
+from lupin_twin.journal.condition import UNKNOWN, Condition, JournalState
 
 WELL = {JournalState.UNKNOWN, JournalState.OFF, JournalState.STARTING, JournalState.RECORDING}
 
@@ -12,7 +12,5 @@ def test_what_does_not_keep_its_promise_has_to_be_told(state: JournalState) -> N
     assert Condition(state).is_well == (state in WELL)
 
 
-def test_off_says_so_and_so_does_who_does_not_know() -> None:
+def test_who_does_not_know_says_so() -> None:
     assert UNKNOWN.state is JournalState.UNKNOWN
-    assert OFF.state is JournalState.OFF
-    assert OFF.detail == "no journal is kept"

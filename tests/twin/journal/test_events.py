@@ -1,22 +1,33 @@
 from __future__ import annotations
 
-from dataclasses import replace
+from collections import Counter
 from itertools import count
 from pathlib import Path
+from sqlite3 import Connection
 from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lupin_twin.journal.events import events
-from lupin_twin.journal.rows import Row
-from lupin_twin.journal.schema import open_reader
-from lupin_twin.journal.series import series
-from lupin_twin.past import EVERY_TAG, Event, SeriesPast, SeriesRequest
-from tests.support.journal import NOW, SECOND, kept, look, scan
-from tests.support.past_reference import check
-from tests.support.past_strategy import BEGUN, LATEST, MINUTE, give_up, lived, periods, steps
+from lupin_twin.journal.hours import SILENCE_NS
+from lupin_twin.journal.queries import series
+from lupin_twin.past import EVERY_TAG, HOUR_NS, Event, SeriesPast, SeriesRequest
+from tests.support.log_life import (
+    BEGUN,
+    HOUR,
+    LATEST,
+    MINUTE,
+    SECOND,
+    check,
+    failure,
+    lived,
+    look,
+    periods,
+    scan,
+    steps,
+)
+from tests.twin.journal.conftest import Copied
 
 END = BEGUN + (LATEST + 200) * MINUTE
 COUNTED = (
@@ -26,6 +37,7 @@ COUNTED = (
     Event.PESTS_SEEN,
     Event.PESTS_CLEARED,
 )
+numbers = count()
 
 
 @pytest.fixture(scope="module")
@@ -33,11 +45,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("events")
 
 
-numbers = count()
-
-
 def ask(
-    path: Path,
+    connection: Connection,
     event: Event,
     tag_id: str = EVERY_TAG,
     *,
@@ -46,11 +55,7 @@ def ask(
     points: int = 500,
     now: int = END,
 ) -> SeriesPast:
-    connection = open_reader(path)
-    try:
-        return series(connection, SeriesRequest(tag_id, event, start, end, points), now)
-    finally:
-        connection.close()
+    return series(connection, SeriesRequest(tag_id, event, start, end, points), now)
 
 
 def told(answer: SeriesPast) -> list[tuple[int, float]]:
@@ -58,90 +63,185 @@ def told(answer: SeriesPast) -> list[tuple[int, float]]:
     return list(zip(answer.stamps_ns, answer.means, strict=True))
 
 
-@given(steps, periods, st.integers(1, 30), st.sampled_from([EVERY_TAG, "7"]))
+@given(steps, st.tuples(periods, st.integers(1, 30)), st.sampled_from([EVERY_TAG, "7"]))
 @settings(deadline=None, max_examples=60)
-def test_they_are_those_of_a_plain_list(
-    folder: Path, life: list[tuple[str, Any]], period: tuple[int, int], points: int, tag_id: str
+def test_they_are_those_of_a_plain_list_on_either_engine(
+    folder: Path,
+    copied: Copied,
+    lives: list[tuple[str, Any]],
+    asked: tuple[tuple[int, int], int],
+    tag_id: str,
 ) -> None:
-    with lived(folder / f"{next(numbers)}.sqlite", life) as reference:
-        connection = reference.file._connection
-        for event in COUNTED:
-            request = SeriesRequest(tag_id, event, *period, points)
-            answer = events(connection, request, END)
-            check(answer, request, reference.events(tag_id, event), now_ns=END)
-        request = SeriesRequest(tag_id, Event.SILENCES, *period)
-        start_ns = period[0] or min(reference.tries(tag_id), default=END)
-        expected = reference.silences(tag_id, start_ns, period[1] or END + 1, END)
-        assert told(events(connection, request, END)) == expected
+    period, points = asked
+    with lived(folder / f"{next(numbers)}.sqlite", lives) as life:
+        for connection, site in ((life.connection, "local"), copied(life.connection)):
+            for event in COUNTED:
+                request = SeriesRequest(tag_id, event, *period, points)
+                answer = series(connection, request, END, site)
+                check(answer, request, life.events(tag_id, event), now_ns=END)
+            request = SeriesRequest(tag_id, Event.SILENCES, *period)
+            start_ns = period[0] or min(life.attempts(tag_id), default=END)
+            expected = life.silences(tag_id, start_ns, period[1] or END + 1, END)
+            assert told(series(connection, request, END, site)) == expected
 
 
-@given(steps, periods, st.integers(1, 30), st.integers(0, LATEST))
+@given(steps, st.tuples(periods, st.integers(1, 30)), st.integers(0, LATEST))
 @settings(deadline=None, max_examples=40)
-def test_those_of_the_house_outlive_scans_that_were_given_up(
-    folder: Path, life: list[tuple[str, Any]], period: tuple[int, int], points: int, minute: int
+def test_those_of_the_site_outlive_rows_that_were_deleted(
+    folder: Path,
+    copied: Copied,
+    lives: list[tuple[str, Any]],
+    asked: tuple[tuple[int, int], int],
+    minute: int,
 ) -> None:
-    one_run = [step for step in life if step[0] != "back"]
-    with lived(folder / f"{next(numbers)}.sqlite", one_run) as reference:
-        give_up(reference, BEGUN + minute * MINUTE)
-        for event in COUNTED:
-            request = SeriesRequest(EVERY_TAG, event, *period, points)
-            answer = events(reference.file._connection, request, END)
-            check(answer, request, reference.events(EVERY_TAG, event), now_ns=END)
+    period, points = asked
+    one_run = [step for step in lives if step[0] != "back"]
+    with lived(folder / f"{next(numbers)}.sqlite", one_run) as life:
+        life.delete(BEGUN + minute * MINUTE)
+        for connection, site in ((life.connection, "local"), copied(life.connection)):
+            for event in COUNTED:
+                request = SeriesRequest(EVERY_TAG, event, *period, points)
+                answer = series(connection, request, END, site)
+                check(answer, request, life.events(EVERY_TAG, event), now_ns=END)
 
 
 def test_values_are_those_of_the_contract(tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-    failed = replace(scan(at_ns=NOW + 1), readings=(), status=2)
-    rows: list[Row] = [
-        scan(at_ns=NOW, temperature=1.0, co2=2.0),
-        failed,
-        replace(failed, kind=1, status=1, stamp_ns=NOW + 2),
-        look(at_ns=NOW + 3),
-        look(at_ns=NOW + 4, anomaly=True),
-        look(at_ns=NOW + 5, anomaly=True),
-        look(at_ns=NOW + 6),
-    ]
-    kept(path, rows)
-    assert told(ask(path, Event.SCANS)) == [(NOW, 2.0)]
-    assert told(ask(path, Event.FAILURES, "7")) == [(NOW + 1, 2.0), (NOW + 2, 1.0)]
-    assert [value for _, value in told(ask(path, Event.LOOKS))] == [0.0, 1.0, 1.0, 0.0]
-    assert told(ask(path, Event.PESTS_SEEN)) == [(NOW + 4, 1.0)]
-    assert told(ask(path, Event.PESTS_CLEARED, "7")) == [(NOW + 6, 0.0)]
-    assert told(ask(path, Event.SCANS, "8")) == []
+    with lived(tmp_path / "j.sqlite") as life:
+        life.write(
+            [
+                scan(at_ns=BEGUN, temperature=1.0, co2=2.0),
+                failure(at_ns=BEGUN + 1, status=2),
+                failure(at_ns=BEGUN + 2, status=1, kind=1),
+                look(at_ns=BEGUN + 3),
+                look(at_ns=BEGUN + 4, anomaly=True),
+                look(at_ns=BEGUN + 5, anomaly=True),
+                look(at_ns=BEGUN + 6),
+            ]
+        )
+        log = life.connection
+        assert told(ask(log, Event.SCANS)) == [(BEGUN, 2.0)]
+        assert told(ask(log, Event.FAILURES, "7")) == [(BEGUN + 1, 2.0), (BEGUN + 2, 1.0)]
+        assert [value for _, value in told(ask(log, Event.LOOKS))] == [0.0, 1.0, 1.0, 0.0]
+        assert told(ask(log, Event.PESTS_SEEN)) == [(BEGUN + 4, 1.0)]
+        assert told(ask(log, Event.PESTS_CLEARED, "7")) == [(BEGUN + 6, 0.0)]
+        assert told(ask(log, Event.SCANS, "8")) == []
 
 
 def test_a_look_that_comes_late_changes_what_changed(tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-    kept(path, [look(at_ns=NOW), look(at_ns=NOW + 2, anomaly=True), look(at_ns=NOW + 4)])
-    assert told(ask(path, Event.PESTS_SEEN)) == [(NOW + 2, 1.0)]
-    kept(path, [look(at_ns=NOW + 1, anomaly=True)])
-    assert told(ask(path, Event.PESTS_SEEN)) == [(NOW + 1, 1.0)]
-    kept(path, [look(at_ns=NOW + 3)])
-    assert told(ask(path, Event.PESTS_CLEARED)) == [(NOW + 3, 0.0)]
+    with lived(tmp_path / "j.sqlite") as life:
+        log = life.connection
+        life.write([look(at_ns=BEGUN), look(at_ns=BEGUN + 2, anomaly=True), look(at_ns=BEGUN + 4)])
+        assert told(ask(log, Event.PESTS_SEEN)) == [(BEGUN + 2, 1.0)]
+        life.write([look(at_ns=BEGUN + 1, anomaly=True)])
+        assert told(ask(log, Event.PESTS_SEEN)) == [(BEGUN + 1, 1.0)]
+        life.write([look(at_ns=BEGUN + 3)])
+        assert told(ask(log, Event.PESTS_CLEARED)) == [(BEGUN + 3, 0.0)]
 
 
-def test_events_without_end_are_counted(tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-    kept(path, [scan(str(n % 3), NOW + n * SECOND) for n in range(100)])
-    answer = ask(path, Event.SCANS, start=NOW, end=NOW + 100 * SECOND, points=10)
-    assert answer.counts == (10,) * 10
-    assert answer.bucket_ns == 10 * SECOND
-    assert len(ask(path, Event.SCANS, points=100).stamps_ns) == 100
+def test_of_looks_that_were_deleted_it_is_known_whether_there_was_a_pest(tmp_path: Path) -> None:
+    with lived(tmp_path / "j.sqlite") as life:
+        life.write([look(at_ns=BEGUN, anomaly=True)])
+        life.delete(BEGUN + HOUR)
+        life.write([look(at_ns=BEGUN + 2 * HOUR, anomaly=True), look(at_ns=BEGUN + 3 * HOUR)])
+        assert told(ask(life.connection, Event.PESTS_SEEN)) == [(BEGUN, 1.0)]
+        assert told(ask(life.connection, Event.PESTS_CLEARED)) == [(BEGUN + 3 * HOUR, 0.0)]
+
+
+def test_events_of_minutes_are_counted(tmp_path: Path) -> None:
+    with lived(tmp_path / "j.sqlite") as life:
+        life.write(scan(str(n % 3), BEGUN + n * SECOND) for n in range(100))
+        answer = ask(life.connection, Event.SCANS, start=BEGUN, end=BEGUN + 100 * SECOND, points=10)
+        assert answer.counts == (10,) * 10
+        assert answer.bucket_ns == 10 * SECOND
+        assert len(ask(life.connection, Event.SCANS, points=100).stamps_ns) == 100
+
+
+def test_too_many_events_are_counted_by_the_hour(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with lived(tmp_path / "j.sqlite") as life:
+        life.write(scan(at_ns=BEGUN + n * MINUTE) for n in range(120))
+
+        def scans() -> SeriesPast:
+            end = BEGUN + 2 * HOUR
+            return ask(life.connection, Event.SCANS, start=BEGUN, end=end, points=100)
+
+        monkeypatch.setattr("lupin_twin.journal.events.MAX_ROWS", 120)
+        assert scans().bucket_ns == 72 * SECOND
+        monkeypatch.setattr("lupin_twin.journal.events.MAX_ROWS", 119)
+        answer = scans()
+        assert (answer.bucket_ns, answer.counts) == (HOUR_NS, (60, 60))
+
+
+def test_long_buckets_of_the_site_come_from_tallies_alone(tmp_path: Path) -> None:
+    with lived(tmp_path / "j.sqlite") as life:
+        life.write(scan(at_ns=BEGUN + n * 10 * MINUTE) for n in range(180))
+        life.connection.execute("DELETE FROM scan WHERE seq > 20")
+        answer = ask(life.connection, Event.SCANS, start=BEGUN, end=BEGUN + 30 * HOUR, points=10)
+        assert (answer.bucket_ns, answer.counts) == (3 * HOUR_NS, (18,) * 10)
 
 
 def test_runs_are_told_as_spans_of_the_period(tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-    with lived(path, [("back", 30)]) as reference:
-        reference.write([scan(at_ns=BEGUN + 100 * MINUTE)])
-        connection = reference.file._connection
+    with lived(tmp_path / "j.sqlite", [("back", 30)]) as life:
+        life.write([scan(at_ns=BEGUN + 100 * MINUTE)])
+        log = life.connection
 
         def runs(start: int, end: int) -> list[tuple[int, float]]:
-            return told(events(connection, SeriesRequest(EVERY_TAG, Event.RUNS, start, end), END))
+            return told(ask(log, Event.RUNS, start=start, end=end))
 
         assert runs(BEGUN, BEGUN + 200 * MINUTE) == [
             (BEGUN, 30 * 60.0),
             (BEGUN + 30 * MINUTE, 170 * 60.0),
         ]
         assert runs(BEGUN + 40 * MINUTE, BEGUN + 50 * MINUTE) == [(BEGUN + 40 * MINUTE, 600.0)]
-        answer = events(connection, SeriesRequest(EVERY_TAG, Event.RUNS), END)
+        answer = ask(log, Event.RUNS)
         assert answer.minima == answer.maxima == (1.0,)
+
+
+def test_a_silence_is_longer_than_ten_minutes_and_than_three_usual_intervals(
+    tmp_path: Path,
+) -> None:
+    with lived(tmp_path / "j.sqlite") as life:
+        log = life.connection
+        stamps = [0, 1, 2, 3, 600, 603, 1203, 1203 + 601]
+        life.write(scan(at_ns=BEGUN + second * SECOND) for second in stamps)
+        last = BEGUN + stamps[-1] * SECOND
+        expected = [(BEGUN + 1203 * SECOND, 601.0)]
+        assert told(ask(log, Event.SILENCES, now=last + SILENCE_NS)) == expected
+        # One that goes on lasts until now.
+        assert told(ask(log, Event.SILENCES, now=last + 700 * SECOND))[-1] == (last, 700.0)
+        cut = ask(log, Event.SILENCES, end=last + 9 * SECOND, now=last + 9000 * SECOND)
+        assert told(cut)[-1] == (last, 9.0)
+    with lived(tmp_path / "hourly.sqlite") as life:
+        log = life.connection
+        life.write([scan(at_ns=BEGUN + hour * HOUR) for hour in (0, 1, 2, 5, 9)])
+        assert told(ask(log, Event.SILENCES, now=BEGUN + 9 * HOUR)) == []
+        seconds = [hour * 3600 for hour in range(5)]
+        seconds += [7 * 3600, 10 * 3600 + 1, 11 * 3600 + 1]
+        life.write([scan("9", at_ns=BEGUN + second * SECOND) for second in seconds])
+        silences = told(ask(log, Event.SILENCES, "9", now=BEGUN + seconds[-1] * SECOND))
+        assert silences == [(BEGUN + 7 * HOUR, 3 * 3600 + 1.0)]
+
+
+def test_too_many_silences_are_counted(tmp_path: Path) -> None:
+    stamps = [BEGUN + (n // 2) * HOUR + n for n in range(40)]
+    with lived(tmp_path / "j.sqlite") as life:
+        life.write(scan(at_ns=stamp_ns) for stamp_ns in stamps)
+        singly = told(ask(life.connection, Event.SILENCES, points=19, now=stamps[-1]))
+        assert len(singly) == 19
+        answer = ask(life.connection, Event.SILENCES, points=18, now=stamps[-1])
+    assert sum(answer.counts) == 19
+    start_ns, bucket_ns = answer.start_ns, answer.bucket_ns
+    assert bucket_ns is not None
+    begins = Counter(start_ns + (at - start_ns) // bucket_ns * bucket_ns for at, _ in singly)
+    assert dict(zip(answer.stamps_ns, answer.counts, strict=True)) == begins
+    assert answer.means[0] == pytest.approx(3600.0)
+
+
+def test_of_years_that_were_deleted_silences_are_still_told(tmp_path: Path) -> None:
+    stamps = [BEGUN + minute * MINUTE for minute in (*range(30), *range(90, 120))]
+    with lived(tmp_path / "j.sqlite") as life:
+        life.write(scan(at_ns=stamp_ns) for stamp_ns in stamps)
+        life.delete(BEGUN + 110 * MINUTE)
+        answer = ask(life.connection, Event.SILENCES, start=BEGUN, now=BEGUN + 121 * MINUTE)
+    assert told(answer) == [(BEGUN + 29 * MINUTE, 61 * 60.0)]

@@ -1,86 +1,92 @@
+"""What follows from rows does not depend on the order in which they came, nor on the engine."""
+
 from __future__ import annotations
 
-import math
-import sqlite3
-from collections.abc import Sequence
+import json
+from itertools import count
+from pathlib import Path
+from typing import Any
 
-from hypothesis import example, given
+import pytest
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lupin_twin.journal.hours import merged_hours
-from lupin_twin.journal.packing import Bucket, Damaged, pack_buckets, unpack_buckets
+from lupin_twin.journal.hours import WrittenLook, WrittenScan, delete_before
+from lupin_twin.journal.hours import count as count_rows
+from lupin_twin.journal.reading import numbers_of
+from lupin_twin.journal.site_log import SiteLog
+from tests.support.log_life import BEGUN, HOUR, MINUTE, lived, look, scan, steps
+from tests.twin.journal.conftest import Copied
 
-SERIES = 5
-SENSORS = 3
-# Few enough to be met again, and one that float32 does not hold.
-NUMBERS = st.sampled_from([-1.5, 0.0, 20.0, 20.1, 1e300])
-BUCKETS = st.builds(Bucket, st.sampled_from([0, 1, 6, 70_000]), NUMBERS, NUMBERS, NUMBERS)
-HOURS = st.dictionaries(
-    st.integers(0, 40),
-    st.lists(BUCKETS, min_size=SENSORS, max_size=SENSORS).map(pack_buckets)
-    # Damaged: of no length, of too few sensors, of anything.
-    | st.sampled_from([b"", pack_buckets([Bucket(1, 2.0, 2.0, 2.0)]), b"x" * 55])
-    | st.binary(min_size=18 * SENSORS, max_size=18 * SENSORS),
-    max_size=30,
-)
+numbers = count()
+_DERIVED = ("hour", "tally", "event")
 
 
-def table(hours: dict[int, bytes]) -> sqlite3.Connection:
-    connection = sqlite3.connect(":memory:")
-    connection.execute("CREATE TABLE rollup (series, hour, buckets, PRIMARY KEY (series, hour))")
-    rows = [(SERIES, hour, packed) for hour, packed in hours.items()]
-    rows += [(SERIES + 1, hour, pack_buckets([Bucket(9, 9.0, 9.0, 9.0)])) for hour in range(40)]
-    connection.executemany("INSERT INTO rollup VALUES (?, ?, ?)", rows)
-    return connection
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("hours")
 
 
-def one_by_one(
-    hours: dict[int, bytes], within: tuple[int, int], places: Sequence[int], width: int, origin: int
-) -> dict[int, tuple[int, float, float, float]]:
-    """The same, hour by hour."""
-    told: dict[int, tuple[int, float, float, float]] = {}
-    for hour in sorted(hours):
-        if not within[0] <= hour < within[1]:
-            continue
-        index = (max(hour, origin) - origin) // width
-        n, total, low, high = told.get(index, (0, 0.0, math.inf, -math.inf))
-        try:
-            buckets = unpack_buckets(hours[hour], SENSORS)
-        except Damaged:
-            continue
-        for bucket in (buckets[place] for place in places):
-            n += bucket.n
-            total += bucket.n * bucket.mean
-            low, high = min(low, bucket.low), max(high, bucket.high)
-        told[index] = (n, total, low, high)
-    return {index: (n, total / n, low, high) for index, (n, total, low, high) in told.items() if n}
-
-
-# Floats that are no numbers, and of the kind that is not quiet about it.
-@example({0: b"\xbf\x7f" * 9 * SENSORS}, (0, 1), [0], 1, 0)
-@given(
-    HOURS,
-    st.tuples(st.integers(0, 40), st.integers(0, 41)),
-    st.lists(st.integers(0, SENSORS - 1), min_size=1, max_size=SENSORS, unique=True).map(sorted),
-    st.integers(1, 12),
-    st.integers(0, 40),
-)
-def test_they_are_those_that_are_told_one_by_one(
-    hours: dict[int, bytes], within: tuple[int, int], places: list[int], width: int, origin: int
-) -> None:
-    connection = table(hours)
-    found = {
-        index: (bucket.n, bucket.mean, bucket.low, bucket.high)
-        for index, bucket in merged_hours(
-            connection,
-            SERIES,
-            within,
-            sensors=SENSORS,
-            places=places,
-            width=width,
-            origin=origin,
+def derived(log: SiteLog) -> list[list[tuple[Any, ...]]]:
+    """The three tables, without sums, and the sums."""
+    found = [
+        sorted(log.execute(f"SELECT {columns} WHERE site = :site").fetchall())
+        for columns in (
+            "series, hour, CAST(n AS TEXT), CAST(low AS TEXT), CAST(high AS TEXT) FROM hour",
+            "run, event, hour, n, total, low, high, first_ns, last_ns FROM tally",
+            "run, event, stamp_ns, seq, tag, value FROM event",
         )
-    }
-    connection.close()
-    # To the last digit; what is damaged may be no number.
-    assert repr(found) == repr(one_by_one(hours, within, places, width, origin))
+    ]
+    totals = "SELECT series, hour, CAST(total AS TEXT) FROM hour WHERE site = :site"
+    return [*found, [tuple(json.loads(row[2])) for row in sorted(log.execute(totals).fetchall())]]
+
+
+@given(steps, st.randoms(use_true_random=False))
+@settings(deadline=None, max_examples=30)
+def test_what_is_counted_in_another_order_on_the_other_engine_is_the_same(
+    folder: Path, copied: Copied, told: list[tuple[str, Any]], random: Any
+) -> None:
+    with lived(folder / f"{next(numbers)}.sqlite", told) as life:
+        log = SiteLog(life.connection)
+        archive = SiteLog(*copied(life.connection))
+        for table in _DERIVED:
+            archive.execute(f"DELETE FROM {table} WHERE site = :site")
+        found: list[WrittenScan | WrittenLook] = [
+            WrittenScan(run, series, kind, stamp_ns, status, numbers_of([readings])[0])
+            for run, series, kind, stamp_ns, status, readings in log.execute(
+                "SELECT run, scan.series, kind, stamp_ns, status, readings FROM scan"
+                " JOIN series ON series.series = scan.series WHERE is_copy = 0"
+            )
+        ]
+        found += [
+            WrittenLook(run, tag, seq, stamp_ns, bool(anomaly), bug_count)
+            for run, tag, seq, stamp_ns, anomaly, bug_count in log.execute(
+                "SELECT run, tag, seq, stamp_ns, anomaly, bug_count FROM look WHERE is_copy = 0"
+            )
+        ]
+        random.shuffle(found)
+        size = random.randint(1, 9)
+        for first in range(0, len(found), size):
+            lot = found[first : first + size]
+            count_rows(
+                archive,
+                [row for row in lot if isinstance(row, WrittenScan)],
+                [row for row in lot if isinstance(row, WrittenLook)],
+            )
+        *there, there_sums = derived(archive)
+        *here, here_sums = derived(log)
+        assert there == here
+        for one, other in zip(there_sums, here_sums, strict=True):
+            assert one == pytest.approx(other, rel=1e-12, abs=1e-6)
+
+
+def test_what_is_older_than_a_stamp_goes_at_once(tmp_path: Path) -> None:
+    with lived(tmp_path / "j.sqlite") as life:
+        stamps = [BEGUN + n * 30 * MINUTE for n in range(8)]
+        life.write(scan(at_ns=at_ns) for at_ns in stamps)
+        life.write(look(at_ns=at_ns, anomaly=n % 2 == 0) for n, at_ns in enumerate(stamps))
+        log = SiteLog(life.connection)
+        delete_before(log, 2, BEGUN + 2 * HOUR)
+        assert [len(rows) for rows in derived(log)[:3]] == [4, 8, 15]
+        delete_before(log, 1, BEGUN + 2 * HOUR)
+        assert [len(rows) for rows in derived(log)[:3]] == [2, 4, 7]

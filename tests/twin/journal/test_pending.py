@@ -29,6 +29,16 @@ def test_at_its_bound_nothing_is_lost_and_past_it_the_oldest() -> None:
     assert pending.take(9) == [entry(1), entry(2), entry(3)]
 
 
+def test_what_is_taken_waits_until_it_is_done_with() -> None:
+    pending = Pending()
+    for number in range(3):
+        pending.put(entry(number))
+    taken = pending.take(2)
+    assert pending.counts() == (3, 0, 2.0)
+    pending.put_back(taken[1:])
+    assert pending.counts() == (2, 0, 1.0)
+
+
 def test_what_is_put_back_is_the_oldest_again_and_lost_first() -> None:
     pending = Pending(max_weight=6)
     for number in range(3):
@@ -44,4 +54,5 @@ def test_one_that_weighs_more_than_all_may_is_kept_alone() -> None:
     pending = Pending(max_weight=1)
     pending.put(entry(0))
     assert pending.take(1) == [entry(0)]
+    pending.put_back([])
     assert pending.counts() == (0, 0, None)

@@ -5,13 +5,14 @@ from pathlib import Path
 
 import pytest
 
+from lupin_twin.journal.appending import PURGED_SEQ
 from lupin_twin.journal.condition import JournalState
 from lupin_twin.journal.lock import InUse, Lock
 from lupin_twin.journal.prefilling import Stretch, is_empty, prefill, simulated
 from lupin_twin.journal.rows import Row
 from lupin_twin.journal.runs import Clock
-from lupin_twin.journal.salvage import set_aside
-from lupin_twin.journal.schema import open_reader, open_writer
+from lupin_twin.journal.salvage import quarantine
+from lupin_twin.journal.schema import open_reader, open_writer, set_meta
 from tests.support.journal import (
     CLOCK,
     NOW,
@@ -56,8 +57,8 @@ def test_a_journal_that_is_not_there_gets_a_past_that_goes_on(tmp_path: Path) ->
     assert {type(row).__name__ for row in known(path, CLOCK)} == {"PinRow", "ScanRow", "LookRow"}
     # Past and present are one run of the clock.
     kept(path, [scan(at_ns=NOW + SECOND)], CLOCK)
-    assert select(path, "SELECT id, begun_stamp_ns FROM run") == [(1, START)]
-    assert restored(path, CLOCK).count == 5
+    assert select(path, "SELECT run, begun_stamp_ns FROM run") == [(1, START)]
+    assert restored(path).last_seq == 5
 
 
 def test_it_is_filled_once(tmp_path: Path) -> None:
@@ -72,7 +73,7 @@ def test_a_twin_that_heard_nothing_leaves_it_empty(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     kept(path, [], CLOCK)
     assert filled(path)
-    assert select(path, "SELECT id, begun_stamp_ns FROM run") == [(1, START)]
+    assert select(path, "SELECT run, begun_stamp_ns FROM run") == [(1, START)]
 
 
 @pytest.mark.parametrize("row", [scan(), look(), pin()])
@@ -88,7 +89,7 @@ def test_nor_into_one_that_has_given_all_of_it_up(tmp_path: Path) -> None:
     kept(path, [scan()], CLOCK)
     with closing(open_writer(path)) as connection:
         connection.execute("DELETE FROM scan")
-        connection.execute("INSERT INTO meta VALUES ('purged_id', 1)")
+        set_meta(connection, PURGED_SEQ, 1)
         assert not is_empty(connection)
     assert not filled(path)
 
@@ -118,10 +119,10 @@ def test_a_journal_at_work_says_what_of_it_is_simulated(tmp_path: Path) -> None:
 def test_what_was_salvaged_is_no_less_simulated(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     filled(path)
-    aside = set_aside(path, "20261121T141500Z")
+    aside = quarantine(path, "20261121T141500Z")
     with closing(open_writer(path)) as connection:
-        connection.execute("INSERT INTO meta VALUES ('salvage', ?)", (aside.name,))
+        set_meta(connection, "salvage", aside.name)
     with opened(path) as file:
-        while file.look_after():
+        while file.look_after(may_purge=True):
             pass
     assert mark(path) == (START, NOW)

@@ -6,19 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.journal.reading import runs
 from lupin_twin.journal.retention import (
-    ROLLUP_DAYS,
     Limits,
-    purge_rollups_step,
+    horizon_ns,
     purge_step,
     purged_ns,
     shrink_step,
     used_bytes,
 )
-from lupin_twin.journal.rollups import set_meta
 from lupin_twin.journal.schema import open_reader, open_writer, transaction
-from lupin_twin.past import HOUR_NS, SLOT_NS
+from lupin_twin.past import HOUR_NS
 from tests.support.journal import NOW, SECOND, kept, look, pin, restored, scan
 
 DAY = 24 * HOUR_NS
@@ -28,7 +25,7 @@ ROWS = 2_000
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """A journal with a scan every minute, all of it in the rollups."""
+    """A journal with a scan every minute."""
     made = tmp_path / "j.sqlite"
     kept(made, [pin(), look(), *(scan(at_ns=NOW + n * 60 * SECOND) for n in range(ROWS))])
     return made
@@ -37,7 +34,6 @@ def path(tmp_path: Path) -> Path:
 @pytest.fixture
 def file(path: Path) -> Iterator[sqlite3.Connection]:
     connection = open_writer(path)
-    set_meta(connection, rolled_id=ROWS + 2, tallied_id=ROWS + 2)
     yield connection
     connection.close()
 
@@ -47,13 +43,13 @@ def purge(file: sqlite3.Connection, limits: Limits, now_ns: int) -> int:
     steps = 0
     while True:
         with transaction(file):
-            if not purge_step(file, limits, now_ns):
+            if not purge_step(file, limits, now_ns - int(limits.days * DAY)):
                 return steps
         steps += 1
 
 
 def scans(file: sqlite3.Connection) -> list[int]:
-    return [stamp for (stamp,) in file.execute("SELECT stamp_ns FROM scan ORDER BY id")]
+    return [stamp for (stamp,) in file.execute("SELECT stamp_ns FROM scan ORDER BY seq")]
 
 
 def test_what_is_past_its_age_goes_and_nothing_else(file: sqlite3.Connection) -> None:
@@ -65,7 +61,7 @@ def test_what_is_past_its_age_goes_and_nothing_else(file: sqlite3.Connection) ->
         at for at in (NOW + n * 60 * SECOND for n in range(ROWS)) if at + 1000 >= horizon
     ]
     assert file.execute("SELECT count(*) FROM look").fetchone() == (0,)
-    assert file.execute("SELECT count(*) FROM pin").fetchone() == (1,)
+    assert file.execute("SELECT count(*) FROM place").fetchone() == (1,)
 
 
 def test_what_is_too_large_loses_its_oldest(file: sqlite3.Connection) -> None:
@@ -79,13 +75,6 @@ def test_what_is_too_large_loses_its_oldest(file: sqlite3.Connection) -> None:
 
 def test_within_its_limits_nothing_goes(file: sqlite3.Connection) -> None:
     assert purge(file, Limits(1.0, used_bytes(file)), NOW + DAY) == 0
-
-
-@pytest.mark.parametrize("counted", ["rolled_id", "tallied_id"])
-def test_what_is_in_no_rollup_or_tally_yet_stays(file: sqlite3.Connection, counted: str) -> None:
-    set_meta(file, **{counted: 500})
-    purge(file, Limits(0.0, 0), NOW + 99 * DAY)
-    assert scans(file)[0] == NOW + 498 * 60 * SECOND
 
 
 def test_purging_shrinks_the_file_in_small_steps(
@@ -116,53 +105,23 @@ def test_a_reader_is_not_blocked_and_sees_what_it_began_with(
 
 
 def test_numbers_go_on_when_everything_is_gone(path: Path, file: sqlite3.Connection) -> None:
-    file.execute("DELETE FROM pin")
+    file.execute("DELETE FROM place")
     purge(file, Limits(0.0, ENOUGH), NOW + 99 * DAY)
     file.close()
     assert kept(path, [scan(at_ns=NOW + 200 * DAY)]) == (1, 0)
-    assert restored(path).count == ROWS + 3
-
-
-def test_rollups_are_kept_for_ten_years(file: sqlite3.Connection) -> None:
-    hour = NOW // HOUR_NS
-    file.executemany("INSERT INTO rollup VALUES (2, ?, x'00')", [(hour,), (hour + 1,)])
-    assert purge_rollups_step(file, NOW + ROLLUP_DAYS * DAY, 0) == 0
-    assert file.execute("SELECT count(*) FROM rollup").fetchone() == (2,)
-    purge_rollups_step(file, (hour + 1 + ROLLUP_DAYS * 24) * HOUR_NS, 0)
-    assert file.execute("SELECT hour FROM rollup").fetchall() == [(hour + 1,)]
-
-
-def test_tallies_and_changes_are_kept_for_ten_years(file: sqlite3.Connection) -> None:
-    for table, unit_ns in (("tally", SLOT_NS), ("tally_hour", HOUR_NS)):
-        for slot in (NOW // unit_ns, NOW // unit_ns + 1):
-            file.execute(
-                f"INSERT INTO {table} (run, slot, first_ns, last_ns, gap_ns)"
-                " VALUES (1, ?, 0, 0, 0)",
-                (slot,),
-            )
-    file.execute("INSERT INTO change VALUES (1, 1, 1, ?, 1, 1)", (NOW,))
-    purge_rollups_step(file, NOW + ROLLUP_DAYS * DAY, 0)
-    assert [count(file, table) for table in ("tally", "tally_hour", "change")] == [2, 2, 1]
-    purge_rollups_step(file, NOW + ROLLUP_DAYS * DAY + HOUR_NS, 0)
-    assert [count(file, table) for table in ("tally", "tally_hour", "change")] == [0, 1, 0]
-
-
-def count(file: sqlite3.Connection, table: str) -> int:
-    return int(file.execute(f"SELECT count(*) FROM {table}").fetchone()[0])
+    assert restored(path).last_seq == ROWS + 3
 
 
 def test_where_scans_were_given_up_is_known(file: sqlite3.Connection) -> None:
-    run = runs(file)[1]
-    assert purged_ns(file, run) == -1
+    assert purged_ns(file, 1) == -1
     purge(file, Limits(1.0, ENOUGH), NOW + DAY + 10 * 60 * SECOND)
-    assert purged_ns(file, run) == scans(file)[0] - 60 * SECOND
+    assert purged_ns(file, 1) == scans(file)[0] - 60 * SECOND
 
 
-def test_rollups_of_many_series_go_in_steps(
-    file: sqlite3.Connection, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("lupin_twin.journal.retention._SERIES", 1)
-    after, steps = 0, 0
-    while (after := purge_rollups_step(file, NOW, after)) and steps < 9:
-        steps += 1
-    assert steps == 2  # the look's and the scans'
+def test_a_clock_that_is_a_year_ahead_gives_nothing_up_at_once(file: sqlite3.Connection) -> None:
+    limits, last = Limits(90.0, ENOUGH), NOW + (ROWS - 1) * 60 * SECOND + 1000
+    # Nothing is received by that clock yet: what is there is as old as it was.
+    assert horizon_ns(file, limits, NOW + 365 * DAY) == last - 90 * DAY
+    # And by then no more than a day of it goes in one round.
+    file.execute("UPDATE scan SET arrival_ns = ? WHERE seq = ?", (NOW + 365 * DAY, ROWS + 2))
+    assert horizon_ns(file, limits, NOW + 365 * DAY) == NOW + 1000 + DAY

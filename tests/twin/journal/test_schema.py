@@ -2,19 +2,20 @@ from __future__ import annotations
 
 import sqlite3
 from contextlib import closing, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from lupin_twin.journal import schema
+from lupin_twin.journal.checking import find_damage
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
     VERSION,
     DamagedFile,
     Empty,
     Foreign,
-    find_damage,
     open_named,
     open_reader,
     open_writer,
@@ -75,21 +76,22 @@ def test_a_file_that_is_being_made_is_empty_or_whole_but_never_another(
     path = tmp_path / "j.sqlite"
     maker = sqlite3.connect(path, isolation_level=None, timeout=0.0)
     make = (
-        f"BEGIN; {schema._TABLES} PRAGMA application_id = {schema.APPLICATION_ID};"
+        f"BEGIN; {schema.SQLITE_TABLES} PRAGMA application_id = {schema.APPLICATION_ID};"
         f"PRAGMA user_version = {VERSION}"
     )
     for statement in make.split(";"):
         maker.execute(statement)
     steps = iter(range(after))
 
-    class Reader(schema.Reader):
+    class Reader(sqlite3.Connection):
         def execute(self, *asked: Any) -> sqlite3.Cursor:
             if next(steps, None) is None and maker.in_transaction:
                 with suppress(sqlite3.OperationalError):  # it waits for the reader
                     maker.execute("COMMIT")
             return super().execute(*asked)
 
-    monkeypatch.setattr(schema, "Reader", Reader)
+    connect = sqlite3.connect
+    monkeypatch.setattr(sqlite3, "connect", partial(connect, factory=Reader))
     with closing(maker), suppress(Empty):
         open_reader(path).close()
 
@@ -178,7 +180,7 @@ def test_a_journal_with_a_damaged_header_is_damaged_and_not_somebody_elses(path:
 
 def test_a_flipped_letter_in_a_table_s_definition_is_damage(path: Path) -> None:
     whole = path.read_bytes()
-    for letter in ("scan_at", "stamp_ns + run", "readings BLOB"):
+    for letter in ("scan_at", "stamp_ns BIGINT", "readings TEXT"):
         at = whole.index(letter.encode())
         for bit in (0x02, 0x80):  # another letter, and none at all
             broken = bytearray(whole)
@@ -199,8 +201,8 @@ def test_a_missing_file_and_a_locked_one_are_no_damage(tmp_path: Path) -> None:
 def test_a_transaction_is_all_or_nothing(path: Path) -> None:
     connection = open_writer(path)
     with pytest.raises(sqlite3.IntegrityError), transaction(connection):
-        connection.executemany("INSERT INTO tag (tag_id) VALUES (?)", [("7",), ("7",)])
-    assert connection.execute("SELECT count(*) FROM tag").fetchone() == (0,)
+        connection.executemany("INSERT INTO site VALUES (?, '')", [("7",), ("7",)])
+    assert connection.execute("SELECT site FROM site").fetchall() == [("local",)]
     connection.close()
 
 
@@ -209,7 +211,8 @@ def test_rows_can_be_read_with_any_sqlite(tmp_path: Path) -> None:
     kept(path, [scan("7")])
     connection = sqlite3.connect(path)
     (row,) = connection.execute(
-        "SELECT run, tag_id, stamp_ns - arrival_ns, status, source, mission, sensors FROM scans"
+        "SELECT run, tag, stamp_ns - arrival_ns, status, source, mission, sensors, readings"
+        " FROM scan JOIN series USING (site, series)"
     )
     connection.close()
-    assert row == (1, "7", -1000, 0, "robot", "m1", '["temperature"]')
+    assert row == (1, "7", -1000, 0, "robot", "m1", '["temperature"]', "[21.5]")

@@ -23,7 +23,7 @@ def test_what_is_written_is_synced_once_and_nothing_else(
     monkeypatch.setattr(os, "fdatasync", watched)
     path = tmp_path / "j.sqlite"
     connection = open_writer(path)
-    connection.execute("INSERT INTO tag (tag_id) VALUES ('7')")
+    connection.execute("INSERT INTO site VALUES ('7', '')")
     syncing = Syncing(path, period_s=0.01)
     try:
         for count in (1, 2):
@@ -44,7 +44,7 @@ def test_a_failed_sync_is_told_with_the_next_write(
     monkeypatch.setattr(os, "fdatasync", fail)
     path = tmp_path / "j.sqlite"
     connection = open_writer(path)
-    connection.execute("INSERT INTO tag (tag_id) VALUES ('7')")
+    connection.execute("INSERT INTO site VALUES ('7', '')")
     syncing = Syncing(path, period_s=0.0)
     syncing.has_written()
     wait_for(lambda: not syncing._thread.is_alive(), "the end of the thread")

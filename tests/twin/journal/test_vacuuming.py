@@ -28,7 +28,10 @@ def path(tmp_path: Path) -> Path:
     made = tmp_path / "j.sqlite"
     kept(made, [pin(), *(scan(at_ns=NOW + n * SECOND, a=n / 3) for n in range(5000))])
     with closing(open_writer(made)) as connection:
-        connection.execute("DELETE FROM scan WHERE id < 4500")
+        connection.execute("DELETE FROM scan WHERE seq < 4500")
+        # As what deletes them notes it.
+        until_ns = NOW + 4500 * SECOND
+        connection.execute(f"INSERT INTO meta VALUES ('local', 'purged_ns:1', '{until_ns}')")
     return made
 
 
@@ -77,7 +80,7 @@ def test_a_database_that_is_no_journal_is_left_and_nothing_made_beside_it(tmp_pa
 
 def test_a_damaged_journal_is_left_as_it_is(path: Path) -> None:
     with closing(open_writer(path)) as connection:
-        connection.execute("UPDATE scan SET readings = x'00' WHERE id = 4700")
+        connection.execute("UPDATE scan SET readings = '[]' WHERE seq = 4700")
         connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     content = path.read_bytes()
     said = r"j\.sqlite is damaged and left as it is \(scan 4700 of tag '7' is not what was wri"

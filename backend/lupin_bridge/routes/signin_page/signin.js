@@ -22,8 +22,8 @@ const signIn = async () => {
   if (!/^[\w.~+/-]+=*$/.test(token)) {
     return words.odd;
   }
-  const headers = { Authorization: `Bearer ${token}` };
-  const response = await fetch('api/signin', { headers, cache: 'no-store' });
+  const headers = { Authorization: `Bearer ${token}`, 'X-Lupin-Twin': '1' };
+  const response = await fetch('api/signin', { method: 'POST', headers });
   if (response.ok) {
     enter();
     return '';

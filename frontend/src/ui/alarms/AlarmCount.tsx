@@ -6,11 +6,11 @@ import { useSelected } from '../../store/create';
 import { S } from '../../strings';
 import { HealthShape } from '../HealthMark';
 
-/** "Alarms" and how many are active, with the sign of the worst that was not seen. */
+/** "Alarms" and how many are active, with the sign of the worst that nobody has acknowledged. */
 export function AlarmsLabel(): JSX.Element {
   const list = useSelected(alarmList, (it) => it);
-  const unseen = calling(list);
-  const [worst] = unseen;
+  const unacknowledged = calling(list);
+  const [worst] = unacknowledged;
   const { length } = list.active;
   return (
     <>
@@ -21,7 +21,7 @@ export function AlarmsLabel(): JSX.Element {
           {length}
         </span>
       )}
-      <span className="unseen">, {S.alarmsCount(unseen.length, length)}</span>
+      <span className="unseen">, {S.alarmsCount(unacknowledged.length, length)}</span>
     </>
   );
 }

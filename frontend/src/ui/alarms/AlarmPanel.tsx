@@ -1,25 +1,30 @@
 import { useState, type JSX } from 'react';
 
 import type { Item } from '../../alarms/list';
-import { seeAlarms } from '../../alarms/own';
+import { acknowledgeAlarms } from '../../alarms/own';
 import { alarmList } from '../../alarms/watch';
 import { useSelected } from '../../store/create';
 import { S } from '../../strings';
 import { Disclosure } from '../../widgets/Disclosure';
 import { Icon } from '../../widgets/Icon';
 import { AlarmNotes } from './AlarmNotes';
-import { AlarmRow } from './AlarmRow';
+import { AlarmRow, type GroupName } from './AlarmRow';
+import { DoneLine } from './DoneLine';
 import { ALARMS_ID, ListChoice } from './ListChoice';
+import { once } from './once';
 import { TellMe } from './TellMe';
+import { useHeldOrder } from './useHeldOrder';
 
 /** Rows of one group at first, and so many more with each wish for more. */
 const MOST_ROWS = 100;
 
-/** The alarms of now, beside the map: active, put aside, and what is over. */
+/** The alarms of now, beside the map: active, shelved, and resolved. */
 export function AlarmPanel(): JSX.Element {
-  const { active, shelved, over } = useSelected(alarmList, (list) => list);
-  const unseen = [...active, ...over].filter(({ isSeen }) => !isSeen);
+  const list = useSelected(alarmList, (it) => it);
+  const { active, shelved, resolved } = list;
+  const unacknowledged = [...active, ...resolved].filter(({ isAcknowledged }) => !isAcknowledged);
   const hasAny = active.length + shelved.length > 0;
+  const { shown, added, release, ...hold } = useHeldOrder(list);
   return (
     <>
       <div className="filter-bar">
@@ -27,17 +32,18 @@ export function AlarmPanel(): JSX.Element {
         <button
           type="button"
           className="text-button all-seen"
-          disabled={unseen.length === 0}
-          onClick={() => {
-            seeAlarms(unseen);
-          }}
+          disabled={unacknowledged.length === 0}
+          onClick={once(() => {
+            acknowledgeAlarms(unacknowledged);
+          })}
         >
-          <Icon name="check" size={18} /> {S.alarmAllSeen}
+          <Icon name="check" size={18} /> {S.alarmAcknowledgeAll}
         </button>
         <Disclosure label={S.alarmTell} button={<Icon name="bell" />} className="tell-me">
           <TellMe />
         </Disclosure>
       </div>
+      <DoneLine added={added.length} onShow={release} />
       <div
         className="alarms"
         id={ALARMS_ID}
@@ -47,11 +53,12 @@ export function AlarmPanel(): JSX.Element {
         // eslint-disable-next-line jsx-a11y/no-noninteractive-tabindex
         tabIndex={0}
         data-testid="alarms"
+        {...hold}
       >
         <AlarmNotes isEmpty={!hasAny} />
-        <Group name="active" items={active} />
-        <Group name="shelved" items={shelved} />
-        <Group name="over" items={over} />
+        <Group name="active" items={shown.active} count={active.length} />
+        <Group name="shelved" items={shown.shelved} count={shelved.length} />
+        <Group name="resolved" items={shown.resolved} count={resolved.length} />
         {hasAny && <p className="alarms-mine faint">{S.alarmsMine}</p>}
       </div>
     </>
@@ -61,19 +68,22 @@ export function AlarmPanel(): JSX.Element {
 function Group({
   name,
   items,
+  count,
 }: {
-  name: 'active' | 'shelved' | 'over';
+  name: GroupName;
   items: readonly Item[];
+  /** As elsewhere in the page, whatever order is held. */
+  count: number;
 }): JSX.Element | null {
   const [most, setMost] = useState(MOST_ROWS);
   if (items.length === 0) return null;
   const rest = items.length - most;
   return (
     <section data-group={name}>
-      <h3>{S.alarmGroups[name](items.length)}</h3>
+      <h3>{S.alarmGroups[name](count)}</h3>
       <ul>
         {items.slice(0, most).map((item) => (
-          <AlarmRow key={item.alarm.id} item={item} />
+          <AlarmRow key={item.alarm.id} item={item} group={name} />
         ))}
       </ul>
       {rest > 0 && (

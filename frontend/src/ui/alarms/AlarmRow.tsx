@@ -1,31 +1,44 @@
-import { memo, useState, type JSX } from 'react';
+import { memo, type JSX } from 'react';
 
-import { followAlarm } from '../../alarms/follow';
-import { SHELF_MINUTES } from '../../alarms/kept';
+import { goToStart, showAlarm } from '../../alarms/follow';
 import type { Item } from '../../alarms/list';
-import { seeAlarms, shelveAlarm, unshelveAlarm } from '../../alarms/own';
+import { acknowledgeAlarms, unacknowledgeAlarm, unshelveAlarm } from '../../alarms/own';
 import { selectSpeech } from '../../alarms/speech';
-import { alarmText, spanText, whatText, whereText, worstText } from '../../alarms/words';
-import { clockText } from '../../domain/format';
-import { store, useApp } from '../../store/app';
-import { rosNow } from '../../store/moment';
+import { nameText, whereText } from '../../alarms/words';
+import { useApp } from '../../store/app';
 import { S } from '../../strings';
-import { useTicking } from '../../widgets/useNow';
 import { HealthMark } from '../HealthMark';
+import { AlarmFacts, useValues } from './AlarmFacts';
+import { Either } from './Either';
+import { once } from './once';
+import { Shelving } from './Shelving';
 
-/** One alarm: what, where, since when, how bad at worst, until when; it leads there. */
-export const AlarmRow = memo(function AlarmRow({ item }: { item: Item }): JSX.Element {
-  const { alarm, verdict, isSeen } = item;
-  const speech = useApp(selectSpeech);
-  const isActive = alarm.cleared_at === null;
+export type GroupName = 'active' | 'shelved' | 'resolved';
+
+/** One alarm: what, where, how bad now and at worst, since when; it leads to its tag as it is now. */
+export const AlarmRow = memo(function AlarmRow({
+  item,
+  group,
+}: {
+  item: Item;
+  /** Where the row stands: while the order is held, not where the alarm belongs by now. */
+  group: GroupName;
+}): JSX.Element {
+  const { alarm, verdict, isAcknowledged } = item;
+  const values = useValues(alarm);
   return (
-    <li data-alarm={alarm.id} data-where={alarm.tag_id} data-health={verdict} data-seen={isSeen}>
+    <li
+      data-alarm={alarm.id}
+      data-where={alarm.tag_id}
+      data-health={verdict}
+      data-acknowledged={isAcknowledged}
+    >
       <button
         type="button"
         className="alarm-go"
-        title={S.alarmFollow}
+        title={S.alarmShow}
         onClick={() => {
-          followAlarm(item);
+          showAlarm(alarm);
         }}
       >
         <HealthMark verdict={verdict} word={false} />
@@ -35,86 +48,55 @@ export const AlarmRow = memo(function AlarmRow({ item }: { item: Item }): JSX.El
               <bdi>{whereText(alarm)}</bdi>
             </strong>
             {': '}
-            {whatText(alarm, speech)}
+            {values.what}
           </span>
-          <Facts item={item} />
+          <AlarmFacts item={item} values={values} isShelved={group === 'shelved'} />
         </span>
-        {/* What is active has a button that says so. */}
-        {!isSeen && !isActive && <span className="alarm-new">{S.alarmNew}</span>}
       </button>
-      {isActive && <Tools item={item} what={alarmText(alarm, speech)} />}
+      <Tools item={item} group={group} />
     </li>
   );
 });
 
-/** Since when, how bad, and what this browser made of it. */
-function Facts({ item: { alarm, shelvedUntil } }: { item: Item }): JSX.Element {
-  const speech = useApp(selectSpeech);
-  const span = useTicking((now) => spanText(alarm, rosNow(store.get(), now)));
-  const facts = [
-    span,
-    worstText(alarm, speech),
-    shelvedUntil === null ? null : S.alarmShelved(clockText(shelvedUntil)),
-  ];
-  return (
-    <span className="alarm-facts faint">{facts.filter((fact) => fact !== null).join(' · ')}</span>
-  );
-}
-
-function Tools({ item, what }: { item: Item; what: string }): JSX.Element {
-  const [isChoosing, setChoosing] = useState(false);
-  if (item.shelvedUntil !== null) {
-    return (
-      <div className="alarm-tools">
-        <button
-          type="button"
-          aria-label={S.alarmUnshelveOf(what)}
-          onClick={() => {
-            unshelveAlarm(item.alarm);
-          }}
-        >
-          {S.alarmUnshelve}
-        </button>
-      </div>
-    );
-  }
+function Tools({ item, group }: { item: Item; group: GroupName }): JSX.Element {
+  const { alarm, isAcknowledged, shelf } = item;
+  const name = useApp((state) => nameText(alarm, selectSpeech(state)));
+  const canLookBack = useApp((state) => state.twin.remembered.state !== 'off');
   return (
     <div className="alarm-tools">
-      {!item.isSeen && (
+      <button
+        type="button"
+        aria-label={(isAcknowledged ? S.alarmUnacknowledgeOf : S.alarmAcknowledgeOf)(name)}
+        onClick={once(() => {
+          if (isAcknowledged) unacknowledgeAlarm(alarm);
+          else acknowledgeAlarms([item]);
+        })}
+      >
+        <Either texts={[S.alarmAcknowledge, S.alarmUnacknowledge]} at={isAcknowledged ? 1 : 0} />
+      </button>
+      {shelf !== null ? (
         <button
           type="button"
-          aria-label={S.alarmSeenOf(what)}
-          onClick={() => {
-            seeAlarms([item]);
-          }}
+          aria-label={S.alarmUnshelveOf(name)}
+          onClick={once(() => {
+            unshelveAlarm(alarm);
+          })}
         >
-          {S.alarmSeen}
+          <Either texts={[S.alarmShelve, S.alarmUnshelve]} at={1} />
         </button>
+      ) : (
+        group !== 'resolved' && <Shelving item={item} name={name} />
       )}
       <button
         type="button"
-        title={S.alarmShelveHint}
-        aria-label={S.alarmShelveOf(what)}
-        aria-expanded={isChoosing}
+        disabled={!canLookBack}
+        aria-label={S.alarmStartOf(name)}
         onClick={() => {
-          setChoosing(!isChoosing);
+          goToStart(alarm);
         }}
       >
-        {S.alarmShelve}
+        {S.alarmStart}
       </button>
-      {isChoosing &&
-        SHELF_MINUTES.map((minutes) => (
-          <button
-            key={minutes}
-            type="button"
-            onClick={() => {
-              setChoosing(false);
-              shelveAlarm(item, minutes);
-            }}
-          >
-            {minutes < 60 ? S.alarmShelveMinutes(minutes) : S.alarmShelveHours(minutes / 60)}
-          </button>
-        ))}
     </div>
   );
 }

@@ -1,9 +1,7 @@
 import type { JSX } from 'react';
 
 import { meanwhile } from '../../alarms/meanwhile';
-import { seeAlarms } from '../../alarms/own';
-import { selectSpeech } from '../../alarms/speech';
-import { alarmText } from '../../alarms/words';
+import { textNow } from '../../alarms/speech';
 import { shown } from '../../domain/text';
 import { act, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
@@ -12,18 +10,17 @@ import { S } from '../../strings';
 /** Says that an alarm has come while another moment is shown, and leads to now. */
 export function Meanwhile(): JSX.Element | null {
   const items = useSelected(meanwhile, (it) => it);
-  const speech = useApp(selectSpeech);
   const [worst] = items;
+  const text = useApp((state) => (worst ? textNow(state, worst.alarm) : ''));
   if (!worst) return null;
   const { alarm } = worst;
   return (
     <div className="meanwhile" data-testid="meanwhile" data-health={worst.verdict}>
-      <strong>{S.alarmsMeanwhile(alarmText(alarm, speech), items.length - 1)}</strong>
+      <strong>{S.alarmsMeanwhile(text, items.length - 1)}</strong>
       <button
         type="button"
         onClick={() => {
           act({ type: 'look', view: { moment: null, selected: alarm.tag_id || null } });
-          seeAlarms([worst]);
         }}
       >
         {alarm.tag_id === '' ? S.backToLive : S.meanwhileShow(shown(alarm.tag_id, 24))}

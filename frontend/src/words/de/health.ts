@@ -14,6 +14,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     sides: { below: 'unter', above: 'über' },
     range: (reading, side, limit, isCritical) =>
       `${reading}, ${side} ${limit}${isCritical ? ' (kritisch)' : ''}`,
+    beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
     readingFailed: (sensor) => `${sensor}: Der Sensor liefert keinen Wert`,
     scanFailed: (outcome, age) =>
       `Letzte Messung gescheitert: ${outcome}${age === null ? '' : `, vor ${age}`}`,
@@ -42,7 +43,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
   reasonsLabel: 'Warum',
-  healthHeading: 'Zustand des Hauses',
+  healthHeading: 'Zustand des Gewächshauses',
   healthDriver: (tag, reason) => `Messpunkt ${tag}: ${reason}`,
   healthMostUnknown: 'Mehr als die Hälfte der Messpunkte ist unbekannt',
   healthSomeUnknown: (count) =>
@@ -57,6 +58,10 @@ export const HEALTH: In<typeof ENGLISH> = {
   idealParts: { any: 'ideal', day: 'ideal am Tag', night: 'ideal bei Nacht' },
   healthIdeal: (ideal, low, high, unit) => `${ideal} ${low} bis ${high} ${unit}`.trim(),
   healthAllWell: 'Jeder beurteilte Messwert liegt im Idealbereich',
+  healthDespite: (alarms) =>
+    alarms === 1
+      ? '1 Alarm steht noch an: Zwei gute Messungen beheben ihn'
+      : `${alarms} Alarme stehen noch an: Je zwei gute Messungen beheben sie`,
   healthNothing: 'Noch kein Messwert zu beurteilen',
   healthFilter: ', nur diese Messpunkte zeigen',
   houseRhythm: (interval) => `alle ${interval} ein Scan`,

@@ -44,6 +44,7 @@ export const PAGE: In<typeof ENGLISH> = {
     no_clock: 'Der Zwilling kennt die Uhrzeit noch nicht und damit auch nicht das Alter der Werte.',
     clock_stopped:
       'Die Uhr des Zwillings ist stehen geblieben. Wie alt die Werte sind, ist nicht bekannt.',
+    clock_doubted: 'Die Uhr des Zwillings geht falsch. Wie alt die Werte sind, ist nicht bekannt.',
     never_seen: 'Der Server hat noch von keinem Zwilling gehört. Ist er eingeschaltet?',
     stale: 'Der Zwilling meldet sich nicht mehr. Bitte prüfen, ob er noch läuft.',
     thread_dead: 'Der Server hat den Kontakt zum Zwilling verloren und muss neu gestartet werden.',
@@ -54,6 +55,7 @@ export const PAGE: In<typeof ENGLISH> = {
     paused: '',
     no_clock: 'Der Zwilling läuft mit simulierter Zeit, und auf /clock kommt nichts.',
     clock_stopped: 'Der Zwilling läuft mit simulierter Zeit, und auf /clock kommt nichts mehr.',
+    clock_doubted: 'Sie zeigt eine Zeit vor der Aufzeichnung: bitte stellen.',
     never_seen: 'Zwilling und Bridge müssen in derselben ROS-Domain laufen (ROS_DOMAIN_ID).',
     stale: 'Die Bridge läuft, aber auf /twin/state wird nichts mehr veröffentlicht.',
     thread_dead: 'Der ROS-Thread der Bridge ist beendet; warum, steht in ihrem Log.',
@@ -67,6 +69,7 @@ export const PAGE: In<typeof ENGLISH> = {
   unreadLast: (why) => `Die letzte: ${why}`,
   paused: 'Die Zeit ist angehalten.',
   pausedHint: 'Die Simulation oder die Aufzeichnung steht still, und kein Messwert altert.',
+  inputProblem: 'Der Zwilling hört nicht alles, was für ihn veröffentlicht wird.',
   drops: (count) =>
     `Der Zwilling hat in den letzten Minuten ${counted(count, 'Nachricht', 'Nachrichten')} verworfen.`,
   dropsLast: (message) => `Die letzte: ${message}`,
@@ -82,6 +85,14 @@ export const PAGE: In<typeof ENGLISH> = {
     failing: {
       title: 'Die Aufzeichnung schlägt fehl.',
       hint: 'Der Zwilling läuft weiter, versucht es immer wieder und schreibt alles, was wartet, sobald er kann: Bitte Platz schaffen oder den Datenträger prüfen.',
+    },
+    upgrading: {
+      title: 'Die Aufzeichnung einer älteren Version wird umgestellt.',
+      hint: 'Was beobachtet wird, ist zu sehen und wartet. Was vorher bekannt war, ist wieder da, sobald das getan ist; das kann Minuten dauern.',
+    },
+    doubting: {
+      title: 'Es wird nichts aufgezeichnet: Die Uhr widerspricht der Aufzeichnung.',
+      hint: 'Was beobachtet wird, ist zu sehen und wartet. Es wird geschrieben, sobald die Uhr stimmt, oder nach zehn Minuten, wie es ist.',
     },
     in_use: {
       title: 'Dieser Zwilling zeichnet nicht auf: Ein anderer tut es bereits.',

@@ -26,6 +26,9 @@ export const TAGS: In<typeof ENGLISH> = {
   pestCount: (count) => counted(count, 'Schädling', 'Schädlinge'),
   notOnMap: 'Ohne Ort',
   notOnMapLong: 'Die Position ist noch nicht bekannt; der Messpunkt fehlt auf der Karte.',
+  farOff: 'Weit ab, nicht auf der Karte',
+  farOffLong: (place) =>
+    `Die Position (${place}) ist weit von allen anderen Messpunkten entfernt; der Messpunkt fehlt auf der Karte.`,
   ageUnknown: 'nicht bekannt',
   ageUnknownLong: 'Wie alt das ist, weiß niemand, bis der Zwilling wieder seine Zeit nennt.',
   neverObserved: 'nie',

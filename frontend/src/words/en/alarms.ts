@@ -1,4 +1,4 @@
-/** Alarms: what is active, put aside and over, and how it is told of. */
+/** Alarms: what is active, shelved and resolved, and how it is notified. */
 import { counted } from './counted';
 
 export const ALARMS = {
@@ -6,54 +6,82 @@ export const ALARMS = {
   listChoice: 'Beside the map',
   /** Beside the word, to hear. */
   alarmsCount: (unseen: number, active: number): string =>
-    active === 0 ? 'none active' : `${active} active, ${unseen} of them not seen`,
+    active === 0 ? 'none active' : `${active} active, ${unseen} not acknowledged`,
   alarmGroups: {
     active: (count: number): string => `Active (${count})`,
-    shelved: (count: number): string => `Put aside (${count})`,
-    over: (count: number): string => `Over by itself in the last 24 h (${count})`,
+    shelved: (count: number): string => `Shelved (${count})`,
+    resolved: (count: number): string => `Resolved in the last 24 h (${count})`,
   },
-  alarmHouse: 'Whole house',
+  alarmHouse: 'Whole greenhouse',
   alarmWhat: (where: string, what: string): string => `${where}: ${what}`,
   alarmSince: (when: string, length: string | null): string =>
     length === null ? `since ${when}` : `since ${when} (${length})`,
   alarmUntil: (from: string, until: string, length: string): string =>
     `${from} until ${until} (${length})`,
-  alarmWorst: (reading: string, isCritical: boolean): string =>
-    `at worst ${reading}${isCritical ? ' (critical)' : ''}`,
-  alarmNew: 'not seen',
-  alarmFollow: 'Show where and when it began',
-  alarmSeen: 'Mark seen',
-  alarmSeenOf: (what: string): string => `Mark seen: ${what}`,
-  alarmAllSeen: 'Mark all seen',
-  alarmShelve: 'Put aside',
-  alarmShelveOf: (what: string): string => `Put aside: ${what}`,
-  alarmShelveHint: 'It is not told of for a while, unless it gets worse',
+  /** Its value now, at worst, and when it was raised. */
+  alarmNow: (reading: string): string => `now ${reading}`,
+  alarmNowUnknown: (last: string | null, age: string | null): string =>
+    last === null
+      ? 'now not known'
+      : `now not known, last ${last}${age === null ? '' : ` ${age} ago`}`,
+  /** Of a pest, in place of how many. */
+  alarmPests: { none: 'none', seen: 'seen' },
+  alarmWorst: (reading: string): string => `worst ${reading}`,
+  alarmFirst: (reading: string): string => `first ${reading}`,
+  alarmStatus: { critical: 'critical', healthy: 'in range' },
+  alarmShow: 'Show the tag as it is now',
+  alarmStart: 'Go to start',
+  alarmStartOf: (what: string): string => `Go to start: ${what}`,
+  alarmAcknowledge: 'Acknowledge',
+  alarmAcknowledgeOf: (what: string): string => `Acknowledge: ${what}`,
+  alarmAcknowledgeAll: 'Acknowledge all',
+  alarmUnacknowledge: 'Unacknowledge',
+  alarmUnacknowledgeOf: (what: string): string => `Unacknowledge: ${what}`,
+  alarmShelve: 'Shelve',
+  alarmShelveOf: (what: string): string => `Shelve: ${what}`,
+  alarmShelveHint: 'You are not notified of it for a while, unless it gets worse.',
+  alarmShelveCritical: 'A critical alarm is shelved for 1 h at most, and with a reason.',
+  alarmShelfReason: 'Reason',
+  alarmShelfReasonOptional: 'Reason (optional)',
   alarmShelveMinutes: (minutes: number): string => `For ${minutes} min`,
   alarmShelveHours: (hours: number): string => `For ${hours} h`,
-  alarmShelved: (until: string): string => `put aside until ${until}`,
-  alarmUnshelve: 'Take back',
-  alarmUnshelveOf: (what: string): string => `Take back: ${what}`,
+  alarmShelved: (until: string, reason: string): string =>
+    `shelved until ${until}${reason === '' ? '' : `: ${reason}`}`,
+  alarmUnshelve: 'Unshelve',
+  alarmUnshelveOf: (what: string): string => `Unshelve: ${what}`,
+  alarmUndo: 'Undo',
+  /** What the operator has just done. */
+  alarmDone: {
+    acknowledge: (count: number): string => `${counted(count, 'alarm', 'alarms')} acknowledged`,
+    unacknowledge: (count: number): string =>
+      `${counted(count, 'alarm', 'alarms')} no longer acknowledged`,
+    shelve: (count: number): string => `${counted(count, 'alarm', 'alarms')} shelved`,
+    unshelve: (count: number): string => `${counted(count, 'alarm', 'alarms')} no longer shelved`,
+  },
+  /** Above a list whose order is held. */
+  alarmsNew: (count: number): string => `${count} new`,
+  alarmsNewHint: 'The order is held while you are in the list. Show what is new',
   alarmMore: (count: number): string => `Show ${count} more`,
   alarmsNone: 'No alarm is active',
   alarmsNoneHint:
-    'An alarm is raised when something is wrong in two scans in a row; a pest, or a house that is not heard of, at once.',
-  alarmsNotYet: 'Whether there are alarms is not known yet',
-  alarmsStarting: 'The past is still being gone through: more alarms may follow.',
+    'An alarm is raised when something is wrong in two scans in a row. A pest, or a silent greenhouse, raises one at once.',
+  alarmsNotYet: 'It is not known yet whether there are alarms',
+  alarmsStarting: 'The past is still being read: more alarms may follow.',
   alarmsHeard: (since: string): string =>
     `Nothing is recorded: alarms from before ${since} are not known.`,
   alarmsLost: (clock: string): string =>
-    `As last heard at ${clock}. What has come since is not known.`,
+    `As last received at ${clock}. What has happened since is not known.`,
   alarmsOfNow: (moment: string): string =>
     `These are the alarms of now. The rest of the page shows ${moment}.`,
-  alarmsMine: '“Seen” and “put aside” hold in this browser alone.',
+  alarmsMine: '“Acknowledged” and “shelved” apply in this browser only.',
 
-  alarmTell: 'Tell me of alarms',
+  alarmTell: 'Notify me of alarms',
   alarmSound: 'Sound',
   alarmSoundHint: 'A short sound for new alarms, at most one in 10 s.',
   alarmSoundWaits: 'The browser plays it after your first click on this page.',
   alarmSoundNone: 'This browser cannot play it.',
   alarmNotify: 'Notification',
-  alarmNotifyHint: 'The browser tells of new alarms while you look at something else.',
+  alarmNotifyHint: 'The browser notifies you of new alarms while you look at something else.',
   alarmNotifyInsecure:
     'Browsers allow it only where the page’s address begins with https:// or with http://localhost.',
   alarmNotifyRefused:
@@ -65,8 +93,8 @@ export const ALARMS = {
   alarmsRaised: (alarms: readonly string[], more: number): string =>
     `New: ${alarms.join('; ')}${more > 0 ? ` and ${more} more` : ''}`,
   alarmsCleared: (alarms: readonly string[], more: number): string =>
-    `Over: ${alarms.join('; ')}${more > 0 ? ` and ${more} more` : ''}`,
+    `Resolved: ${alarms.join('; ')}${more > 0 ? ` and ${more} more` : ''}`,
   alarmsMeanwhile: (alarm: string, more: number): string =>
-    `Now: ${alarm}${more > 0 ? ` and ${counted(more, 'more alarm', 'more alarms')}` : ''}`,
+    `New alarm: ${alarm}${more > 0 ? ` and ${counted(more, 'more alarm', 'more alarms')}` : ''}`,
   alarmsTitle: (count: number, title: string): string => `(${count}) ${title}`,
 } as const;

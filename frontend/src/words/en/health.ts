@@ -13,6 +13,8 @@ export const HEALTH = {
     sides: { below: 'below', above: 'above' },
     range: (reading: string, side: string, limit: string, isCritical: boolean): string =>
       `${reading}, ${side} ${limit}${isCritical ? ' (critical)' : ''}`,
+    /** What is wrong, whatever the value is by now. */
+    beyond: (sensor: string, side: string, limit: string): string => `${sensor} ${side} ${limit}`,
     readingFailed: (sensor: string): string => `${sensor}: the sensor gives no value`,
     scanFailed: (outcome: string, age: string | null): string =>
       `Last scan failed: ${outcome}${age === null ? '' : `, ${age} ago`}`,
@@ -39,7 +41,7 @@ export const HEALTH = {
     other: (kind: string, sensor: string): string => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
   reasonsLabel: 'Why',
-  healthHeading: 'House health',
+  healthHeading: 'Greenhouse status',
   healthDriver: (tag: string, reason: string): string => `Tag ${tag}: ${reason}`,
   healthMostUnknown: 'More than half of the tags are unknown',
   healthSomeUnknown: (count: number): string => `${counted(count, 'tag', 'tags')} cannot be judged`,
@@ -55,6 +57,10 @@ export const HEALTH = {
   healthIdeal: (ideal: string, low: string, high: string, unit: string): string =>
     `${ideal} ${low} to ${high} ${unit}`.trim(),
   healthAllWell: 'Every judged reading lies within its ideal range',
+  healthDespite: (alarms: number): string =>
+    alarms === 1
+      ? '1 alarm is still active: two good scans resolve it'
+      : `${alarms} alarms are still active: two good scans resolve each`,
   healthNothing: 'No reading to judge yet',
   healthFilter: ', show only these tags',
   houseRhythm: (interval: string): string => `a scan every ${interval}`,

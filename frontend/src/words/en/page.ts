@@ -40,6 +40,7 @@ export const PAGE = {
     paused: '',
     no_clock: 'The twin does not know the time yet, and so not how old the readings are.',
     clock_stopped: 'The twin’s clock has stopped. How old the readings are is not known.',
+    clock_doubted: 'The twin’s clock is wrong. How old the readings are is not known.',
     never_seen: 'The server has not heard from any twin yet. Is it switched on?',
     stale: 'The twin has fallen silent. Check that it still runs.',
     thread_dead: 'The server has lost touch with the twin and has to be restarted.',
@@ -51,6 +52,7 @@ export const PAGE = {
     paused: '',
     no_clock: 'The twin runs with simulated time, and nothing comes on /clock.',
     clock_stopped: 'The twin runs with simulated time, and nothing comes on /clock any more.',
+    clock_doubted: 'It is earlier than what is recorded: set it.',
     never_seen: 'Twin and bridge have to run in the same ROS domain (ROS_DOMAIN_ID).',
     stale: 'The bridge runs, but nothing is published on /twin/state any more.',
     thread_dead: 'The bridge’s ROS thread has ended; its log says why.',
@@ -64,6 +66,7 @@ export const PAGE = {
   unreadLast: (why: string): string => `The last: ${why}`,
   paused: 'Time is paused.',
   pausedHint: 'The simulation, or the recording, stands still, and so do all ages.',
+  inputProblem: 'The twin does not hear all that is published for it.',
   drops: (count: number): string =>
     `The twin dropped ${counted(count, 'message', 'messages')} in the last minutes.`,
   dropsLast: (message: string): string => `The last: ${message}`,
@@ -80,6 +83,14 @@ export const PAGE = {
     failing: {
       title: 'Nothing is being recorded.',
       hint: 'The twin goes on, tries again and again, and writes what waits once it can: make room, or see to the disk.',
+    },
+    upgrading: {
+      title: 'The recording of an older version is being upgraded.',
+      hint: 'What is observed is shown and waits. What was known before is there as soon as that is done; it may take minutes.',
+    },
+    doubting: {
+      title: 'Nothing is being recorded: the clock contradicts the recording.',
+      hint: 'What is observed is shown and waits. It is written once the clock is right, or after ten minutes as it is.',
     },
     in_use: {
       title: 'This twin does not record: another one does.',

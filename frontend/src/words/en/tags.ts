@@ -22,6 +22,9 @@ export const TAGS = {
   pestCount: (count: number): string => counted(count, 'bug', 'bugs'),
   notOnMap: 'No pin',
   notOnMapLong: 'No position known yet, so the tag has no pin on the map.',
+  farOff: 'Far off, not on the map',
+  farOffLong: (place: string): string =>
+    `Its position (${place}) is far from all other tags, so the tag has no pin on the map.`,
   ageUnknown: 'not known',
   ageUnknownLong: 'How old this is nobody knows until the twin tells its time anew.',
   neverObserved: 'never',

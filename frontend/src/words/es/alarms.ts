@@ -1,4 +1,4 @@
-/** Alarmas: lo activo, lo aplazado y lo pasado, y cómo se avisa. */
+/** Alarmas: lo activo, lo aplazado y lo resuelto, y cómo se avisa. */
 import type { ALARMS as ENGLISH } from '../en/alarms';
 import type { In } from '../shape';
 import { counted } from './counted';
@@ -7,43 +7,66 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarms: 'Alarmas',
   listChoice: 'Junto al mapa',
   alarmsCount: (unseen, active) =>
-    active === 0 ? 'ninguna activa' : `${active} activas, ${unseen} sin ver`,
+    active === 0 ? 'ninguna activa' : `${active} activas, ${unseen} sin reconocer`,
   alarmGroups: {
     active: (count) => `Activas (${count})`,
     shelved: (count) => `Aplazadas (${count})`,
-    over: (count) => `Terminadas por sí solas en las últimas 24 h (${count})`,
+    resolved: (count) => `Resueltas en las últimas 24 h (${count})`,
   },
   alarmHouse: 'Todo el invernadero',
   alarmWhat: (where, what) => `${where}: ${what}`,
   alarmSince: (when, length) => (length === null ? `desde ${when}` : `desde ${when} (${length})`),
   alarmUntil: (from, until, length) => `${from} hasta ${until} (${length})`,
-  alarmWorst: (reading, isCritical) =>
-    `en el peor momento ${reading}${isCritical ? ' (crítico)' : ''}`,
-  alarmNew: 'sin ver',
-  alarmFollow: 'Mostrar dónde y cuándo empezó',
-  alarmSeen: 'Marcar vista',
-  alarmSeenOf: (what) => `Marcar vista: ${what}`,
-  alarmAllSeen: 'Marcar todas vistas',
+  alarmNow: (reading) => `ahora ${reading}`,
+  alarmNowUnknown: (last, age) =>
+    last === null
+      ? 'ahora se desconoce'
+      : `ahora se desconoce, lo último ${last}${age === null ? '' : ` hace ${age}`}`,
+  alarmPests: { none: 'ninguna', seen: 'vista' },
+  alarmWorst: (reading) => `peor valor ${reading}`,
+  alarmFirst: (reading) => `al principio ${reading}`,
+  alarmStatus: { critical: 'crítico', healthy: 'dentro del rango' },
+  alarmShow: 'Mostrar el punto como está ahora',
+  alarmStart: 'Ir al comienzo',
+  alarmStartOf: (what) => `Ir al comienzo: ${what}`,
+  alarmAcknowledge: 'Reconocer',
+  alarmAcknowledgeOf: (what) => `Reconocer: ${what}`,
+  alarmAcknowledgeAll: 'Reconocer todas',
+  alarmUnacknowledge: 'Anular',
+  alarmUnacknowledgeOf: (what) => `Anular reconocimiento: ${what}`,
   alarmShelve: 'Aplazar',
   alarmShelveOf: (what) => `Aplazar: ${what}`,
-  alarmShelveHint: 'No se avisa de ella durante un tiempo, salvo que empeore',
+  alarmShelveHint: 'No se avisa de ella durante un tiempo, salvo que empeore.',
+  alarmShelveCritical: 'Una alarma crítica se aplaza 1 h como mucho, y con un motivo.',
+  alarmShelfReason: 'Motivo',
+  alarmShelfReasonOptional: 'Motivo (opcional)',
   alarmShelveMinutes: (minutes) => `Durante ${minutes} min`,
   alarmShelveHours: (hours) => `Durante ${hours} h`,
-  alarmShelved: (until) => `aplazada hasta ${until}`,
+  alarmShelved: (until, reason) => `aplazada hasta ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Recuperar',
   alarmUnshelveOf: (what) => `Recuperar: ${what}`,
+  alarmUndo: 'Deshacer',
+  alarmDone: {
+    acknowledge: (count) => counted(count, 'alarma reconocida', 'alarmas reconocidas'),
+    unacknowledge: (count) =>
+      counted(count, 'alarma ya no reconocida', 'alarmas ya no reconocidas'),
+    shelve: (count) => counted(count, 'alarma aplazada', 'alarmas aplazadas'),
+    unshelve: (count) => counted(count, 'alarma recuperada', 'alarmas recuperadas'),
+  },
+  alarmsNew: (count) => counted(count, 'nueva', 'nuevas'),
+  alarmsNewHint: 'El orden se mantiene mientras esté en la lista. Mostrar las nuevas',
   alarmMore: (count) => `Mostrar ${count} más`,
   alarmsNone: 'Ninguna alarma activa',
   alarmsNoneHint:
-    'Una alarma salta cuando algo va mal en dos mediciones seguidas; con una plaga, o si no se sabe nada del invernadero, de inmediato.',
+    'Una alarma salta cuando algo va mal en dos mediciones seguidas. Con una plaga, o si no llega nada del invernadero, salta de inmediato.',
   alarmsNotYet: 'Aún no se sabe si hay alarmas',
-  alarmsStarting: 'Todavía se está repasando el pasado: pueden aparecer más alarmas.',
+  alarmsStarting: 'Todavía se está leyendo el pasado: pueden aparecer más alarmas.',
   alarmsHeard: (since) => `No se graba nada: no se conocen las alarmas anteriores a ${since}.`,
   alarmsLost: (clock) =>
     `Según lo último recibido a las ${clock}. Lo ocurrido desde entonces no se conoce.`,
   alarmsOfNow: (moment) =>
     `Estas son las alarmas de ahora. El resto de la página muestra ${moment}.`,
-  alarmsMine: '«Vista» y «aplazada» valen solo en este navegador.',
+  alarmsMine: '«Reconocida» y «aplazada» valen solo en este navegador.',
 
   alarmTell: 'Avisarme de las alarmas',
   alarmSound: 'Sonido',
@@ -61,8 +84,8 @@ export const ALARMS: In<typeof ENGLISH> = {
 
   alarmsRaised: (alarms, more) => `Nuevo: ${alarms.join('; ')}${more > 0 ? ` y ${more} más` : ''}`,
   alarmsCleared: (alarms, more) =>
-    `Terminado: ${alarms.join('; ')}${more > 0 ? ` y ${more} más` : ''}`,
+    `Resuelto: ${alarms.join('; ')}${more > 0 ? ` y ${more} más` : ''}`,
   alarmsMeanwhile: (alarm, more) =>
-    `Ahora: ${alarm}${more > 0 ? ` y ${counted(more, 'alarma más', 'alarmas más')}` : ''}`,
+    `Alarma nueva: ${alarm}${more > 0 ? ` y ${counted(more, 'alarma más', 'alarmas más')}` : ''}`,
   alarmsTitle: (count, title) => `(${count}) ${title}`,
 };

@@ -14,6 +14,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     sides: { below: 'por debajo de', above: 'por encima de' },
     range: (reading, side, limit, isCritical) =>
       `${reading}, ${side} ${limit}${isCritical ? ' (crítico)' : ''}`,
+    beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
     readingFailed: (sensor) => `${sensor}: el sensor no da ningún valor`,
     scanFailed: (outcome, age) =>
       `Última medición fallida: ${outcome}${age === null ? '' : `, hace ${age}`}`,
@@ -54,6 +55,10 @@ export const HEALTH: In<typeof ENGLISH> = {
   idealParts: { any: 'ideal', day: 'ideal de día', night: 'ideal de noche' },
   healthIdeal: (ideal, low, high, unit) => `${ideal} de ${low} a ${high} ${unit}`.trim(),
   healthAllWell: 'Todas las lecturas juzgadas están en su rango ideal',
+  healthDespite: (alarms) =>
+    alarms === 1
+      ? 'Aún hay 1 alarma activa: dos mediciones buenas la resuelven'
+      : `Aún hay ${alarms} alarmas activas: dos mediciones buenas resuelven cada una`,
   healthNothing: 'Aún no hay lecturas que juzgar',
   healthFilter: ', mostrar solo estos puntos',
   houseRhythm: (interval) => `una lectura cada ${interval}`,

@@ -40,6 +40,7 @@ export const PAGE: In<typeof ENGLISH> = {
     paused: '',
     no_clock: 'El gemelo aún no sabe la hora y, por tanto, tampoco la antigüedad de las lecturas.',
     clock_stopped: 'El reloj del gemelo se ha parado. No se sabe la antigüedad de las lecturas.',
+    clock_doubted: 'El reloj del gemelo no va bien. No se sabe la antigüedad de las lecturas.',
     never_seen: 'El servidor aún no sabe de ningún gemelo. ¿Está encendido?',
     stale: 'El gemelo ya no da señales. Compruebe que sigue en marcha.',
     thread_dead: 'El servidor ha perdido el contacto con el gemelo y hay que reiniciarlo.',
@@ -50,6 +51,7 @@ export const PAGE: In<typeof ENGLISH> = {
     paused: '',
     no_clock: 'El gemelo funciona con tiempo simulado y no llega nada por /clock.',
     clock_stopped: 'El gemelo funciona con tiempo simulado y ya no llega nada por /clock.',
+    clock_doubted: 'Marca una hora anterior a lo registrado: póngalo en hora.',
     never_seen:
       'El gemelo y el puente («bridge») deben estar en el mismo dominio de ROS (ROS_DOMAIN_ID).',
     stale: 'El puente («bridge») funciona, pero ya no se publica nada en /twin/state.',
@@ -64,6 +66,7 @@ export const PAGE: In<typeof ENGLISH> = {
   unreadLast: (why) => `El último: ${why}`,
   paused: 'El tiempo está en pausa.',
   pausedHint: 'La simulación o la grabación está parada, y nada envejece.',
+  inputProblem: 'El gemelo no oye todo lo que se publica para él.',
   drops: (count) =>
     `El gemelo ha descartado ${counted(count, 'mensaje', 'mensajes')} en los últimos minutos.`,
   dropsLast: (message) => `El último: ${message}`,
@@ -79,6 +82,14 @@ export const PAGE: In<typeof ENGLISH> = {
     failing: {
       title: 'El registro está fallando.',
       hint: 'El gemelo sigue, lo intenta una y otra vez y escribirá lo pendiente en cuanto pueda: haga sitio o revise el disco.',
+    },
+    upgrading: {
+      title: 'El registro de una versión anterior se está actualizando.',
+      hint: 'Lo observado se muestra y espera. Lo que se sabía antes vuelve en cuanto termine; puede tardar minutos.',
+    },
+    doubting: {
+      title: 'No se registra nada: el reloj contradice al registro.',
+      hint: 'Lo observado se muestra y espera. Se escribirá cuando el reloj esté en hora o, tras diez minutos, tal como está.',
     },
     in_use: {
       title: 'Este gemelo no registra: ya lo hace otro.',

@@ -26,6 +26,9 @@ export const TAGS: In<typeof ENGLISH> = {
   pestCount: (count) => counted(count, 'insecto', 'insectos'),
   notOnMap: 'Sin lugar',
   notOnMapLong: 'Aún no se conoce su posición, así que el punto no está en el mapa.',
+  farOff: 'Lejos, fuera del mapa',
+  farOffLong: (place) =>
+    `Su posición (${place}) está muy lejos de los demás puntos, así que el punto no está en el mapa.`,
   ageUnknown: 'no se sabe',
   ageUnknownLong: 'Nadie sabe su antigüedad hasta que el gemelo vuelva a dar su hora.',
   neverObserved: 'nunca',

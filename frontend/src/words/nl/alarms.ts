@@ -1,4 +1,4 @@
-/** Alarmen: wat actief, uitgesteld en voorbij is, en hoe het wordt gemeld. */
+/** Alarmen: wat actief, uitgesteld en opgelost is, en hoe het wordt gemeld. */
 import type { ALARMS as ENGLISH } from '../en/alarms';
 import type { In } from '../shape';
 import { counted } from './counted';
@@ -7,41 +7,63 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarms: 'Alarmen',
   listChoice: 'Naast de kaart',
   alarmsCount: (unseen, active) =>
-    active === 0 ? 'geen actief' : `${active} actief, waarvan ${unseen} niet gezien`,
+    active === 0 ? 'geen actief' : `${active} actief, waarvan ${unseen} niet bevestigd`,
   alarmGroups: {
     active: (count) => `Actief (${count})`,
     shelved: (count) => `Uitgesteld (${count})`,
-    over: (count) => `Vanzelf voorbij in de laatste 24 h (${count})`,
+    resolved: (count) => `Opgelost in de laatste 24 h (${count})`,
   },
   alarmHouse: 'Hele kas',
   alarmWhat: (where, what) => `${where}: ${what}`,
   alarmSince: (when, length) => (length === null ? `sinds ${when}` : `sinds ${when} (${length})`),
   alarmUntil: (from, until, length) => `${from} tot ${until} (${length})`,
-  alarmWorst: (reading, isCritical) => `op zijn ergst ${reading}${isCritical ? ' (kritiek)' : ''}`,
-  alarmNew: 'niet gezien',
-  alarmFollow: 'Tonen waar en wanneer het begon',
-  alarmSeen: 'Als gezien markeren',
-  alarmSeenOf: (what) => `Als gezien markeren: ${what}`,
-  alarmAllSeen: 'Alles als gezien markeren',
+  alarmNow: (reading) => `nu ${reading}`,
+  alarmNowUnknown: (last, age) =>
+    last === null
+      ? 'nu onbekend'
+      : `nu onbekend, laatst ${last}${age === null ? '' : ` ${age} geleden`}`,
+  alarmPests: { none: 'geen', seen: 'gezien' },
+  alarmWorst: (reading) => `op zijn ergst ${reading}`,
+  alarmFirst: (reading) => `eerst ${reading}`,
+  alarmStatus: { critical: 'kritiek', healthy: 'binnen bereik' },
+  alarmShow: 'Meetpunt tonen zoals het nu is',
+  alarmStart: 'Naar het begin',
+  alarmStartOf: (what) => `Naar het begin: ${what}`,
+  alarmAcknowledge: 'Bevestigen',
+  alarmAcknowledgeOf: (what) => `Bevestigen: ${what}`,
+  alarmAcknowledgeAll: 'Alles bevestigen',
+  alarmUnacknowledge: 'Intrekken',
+  alarmUnacknowledgeOf: (what) => `Bevestiging intrekken: ${what}`,
   alarmShelve: 'Uitstellen',
   alarmShelveOf: (what) => `Uitstellen: ${what}`,
-  alarmShelveHint: 'Het wordt een tijd niet gemeld, tenzij het erger wordt',
+  alarmShelveHint: 'Het wordt een tijd niet gemeld, tenzij het erger wordt.',
+  alarmShelveCritical: 'Een kritiek alarm kan hoogstens 1 h worden uitgesteld, met een reden.',
+  alarmShelfReason: 'Reden',
+  alarmShelfReasonOptional: 'Reden (niet verplicht)',
   alarmShelveMinutes: (minutes) => `Voor ${minutes} min`,
   alarmShelveHours: (hours) => `Voor ${hours} h`,
-  alarmShelved: (until) => `uitgesteld tot ${until}`,
+  alarmShelved: (until, reason) => `uitgesteld tot ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Terughalen',
   alarmUnshelveOf: (what) => `Terughalen: ${what}`,
+  alarmUndo: 'Ongedaan maken',
+  alarmDone: {
+    acknowledge: (count) => `${counted(count, 'alarm', 'alarmen')} bevestigd`,
+    unacknowledge: (count) => `${counted(count, 'alarm', 'alarmen')} niet meer bevestigd`,
+    shelve: (count) => `${counted(count, 'alarm', 'alarmen')} uitgesteld`,
+    unshelve: (count) => `${counted(count, 'alarm', 'alarmen')} teruggehaald`,
+  },
+  alarmsNew: (count) => `${count} nieuw`,
+  alarmsNewHint: 'De volgorde blijft zolang u in de lijst bent. Nieuwe tonen',
   alarmMore: (count) => `Nog ${count} tonen`,
   alarmsNone: 'Geen alarm actief',
   alarmsNoneHint:
-    'Een alarm komt als er bij twee metingen na elkaar iets niet klopt; bij een plaag, of als er van de kas niets wordt gehoord, meteen.',
+    'Een alarm komt als er bij twee metingen na elkaar iets niet klopt. Bij een plaag, of als de kas niets meer stuurt, komt het meteen.',
   alarmsNotYet: 'Of er alarmen zijn, is nog niet bekend',
-  alarmsStarting: 'Het verleden wordt nog doorgenomen: er kunnen alarmen bijkomen.',
+  alarmsStarting: 'Het verleden wordt nog gelezen: er kunnen alarmen bijkomen.',
   alarmsHeard: (since) => `Er wordt niets opgenomen: alarmen van voor ${since} zijn niet bekend.`,
-  alarmsLost: (clock) =>
-    `Zoals het laatst gehoord om ${clock}. Wat er sindsdien kwam, is niet bekend.`,
+  alarmsLost: (clock) => `Stand van ${clock}. Wat er sindsdien kwam, is niet bekend.`,
   alarmsOfNow: (moment) => `Dit zijn de alarmen van nu. De rest van de pagina toont ${moment}.`,
-  alarmsMine: '“Gezien” en “uitgesteld” gelden alleen in deze browser.',
+  alarmsMine: '“Bevestigd” en “uitgesteld” gelden alleen in deze browser.',
 
   alarmTell: 'Alarmen melden',
   alarmSound: 'Geluid',
@@ -59,8 +81,8 @@ export const ALARMS: In<typeof ENGLISH> = {
 
   alarmsRaised: (alarms, more) => `Nieuw: ${alarms.join('; ')}${more > 0 ? ` en nog ${more}` : ''}`,
   alarmsCleared: (alarms, more) =>
-    `Voorbij: ${alarms.join('; ')}${more > 0 ? ` en nog ${more}` : ''}`,
+    `Opgelost: ${alarms.join('; ')}${more > 0 ? ` en nog ${more}` : ''}`,
   alarmsMeanwhile: (alarm, more) =>
-    `Nu: ${alarm}${more > 0 ? ` en nog ${counted(more, 'alarm', 'alarmen')}` : ''}`,
+    `Nieuw alarm: ${alarm}${more > 0 ? ` en nog ${counted(more, 'alarm', 'alarmen')}` : ''}`,
   alarmsTitle: (count, title) => `(${count}) ${title}`,
 };

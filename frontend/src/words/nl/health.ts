@@ -14,6 +14,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     sides: { below: 'onder', above: 'boven' },
     range: (reading, side, limit, isCritical) =>
       `${reading}, ${side} ${limit}${isCritical ? ' (kritiek)' : ''}`,
+    beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
     readingFailed: (sensor) => `${sensor}: de sensor geeft geen waarde`,
     scanFailed: (outcome, age) =>
       `Laatste meting mislukt: ${outcome}${age === null ? '' : `, ${age} geleden`}`,
@@ -56,6 +57,10 @@ export const HEALTH: In<typeof ENGLISH> = {
   idealParts: { any: 'ideaal', day: 'ideaal overdag', night: 'ideaal ’s nachts' },
   healthIdeal: (ideal, low, high, unit) => `${ideal} ${low} tot ${high} ${unit}`.trim(),
   healthAllWell: 'Elke beoordeelde meetwaarde ligt binnen het ideale bereik',
+  healthDespite: (alarms) =>
+    alarms === 1
+      ? '1 alarm is nog actief: twee goede metingen lossen het op'
+      : `${alarms} alarmen zijn nog actief: telkens twee goede metingen lossen ze op`,
   healthNothing: 'Nog geen meetwaarde om te beoordelen',
   healthFilter: ', alleen deze meetpunten tonen',
   houseRhythm: (interval) => `elke ${interval} een scan`,

@@ -43,6 +43,8 @@ export const PAGE: In<typeof ENGLISH> = {
     no_clock: 'De tweeling weet nog niet hoe laat het is, en dus niet hoe oud de meetwaarden zijn.',
     clock_stopped:
       'De klok van de tweeling staat stil. Hoe oud de meetwaarden zijn, is niet bekend.',
+    clock_doubted:
+      'De klok van de tweeling loopt verkeerd. Hoe oud de meetwaarden zijn, is niet bekend.',
     never_seen: 'De server heeft nog van geen tweeling gehoord. Staat hij aan?',
     stale: 'De tweeling laat niets meer horen. Controleer of hij nog draait.',
     thread_dead:
@@ -54,6 +56,7 @@ export const PAGE: In<typeof ENGLISH> = {
     paused: '',
     no_clock: 'De tweeling draait op gesimuleerde tijd, en op /clock komt niets binnen.',
     clock_stopped: 'De tweeling draait op gesimuleerde tijd, en op /clock komt niets meer binnen.',
+    clock_doubted: 'Hij wijst een tijd van vóór de opname aan: zet hem goed.',
     never_seen: 'Tweeling en bridge moeten in hetzelfde ROS-domein draaien (ROS_DOMAIN_ID).',
     stale: 'De bridge draait, maar op /twin/state wordt niets meer gepubliceerd.',
     thread_dead: 'De ROS-thread van de bridge is gestopt; zijn log zegt waarom.',
@@ -67,6 +70,7 @@ export const PAGE: In<typeof ENGLISH> = {
   unreadLast: (why) => `Het laatste: ${why}`,
   paused: 'De tijd staat stil.',
   pausedHint: 'De simulatie of de opname staat stil, en niets wordt ouder.',
+  inputProblem: 'De tweeling hoort niet alles wat voor hem wordt gepubliceerd.',
   drops: (count) =>
     `De tweeling heeft de afgelopen minuten ${counted(count, 'bericht', 'berichten')} weggegooid.`,
   dropsLast: (message) => `Het laatste: ${message}`,
@@ -82,6 +86,14 @@ export const PAGE: In<typeof ENGLISH> = {
     failing: {
       title: 'Het vastleggen mislukt.',
       hint: 'De tweeling gaat door, blijft het proberen en schrijft wat wacht zodra het kan: maak ruimte vrij of kijk de schijf na.',
+    },
+    upgrading: {
+      title: 'De opname van een oudere versie wordt omgezet.',
+      hint: 'Wat wordt waargenomen, is te zien en wacht. Wat eerder bekend was, is er weer zodra dat klaar is; dat kan minuten duren.',
+    },
+    doubting: {
+      title: 'Er wordt niets vastgelegd: de klok spreekt de opname tegen.',
+      hint: 'Wat wordt waargenomen, is te zien en wacht. Het wordt geschreven zodra de klok klopt, of na tien minuten zoals het is.',
     },
     in_use: {
       title: 'Deze tweeling legt niets vast: een andere doet het al.',

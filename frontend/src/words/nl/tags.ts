@@ -26,6 +26,9 @@ export const TAGS: In<typeof ENGLISH> = {
   pestCount: (count) => counted(count, 'insect', 'insecten'),
   notOnMap: 'Geen plek',
   notOnMapLong: 'De positie is nog niet bekend; het meetpunt staat niet op de kaart.',
+  farOff: 'Ver weg, niet op de kaart',
+  farOffLong: (place) =>
+    `De positie (${place}) ligt ver van alle andere meetpunten; het meetpunt staat niet op de kaart.`,
   ageUnknown: 'niet bekend',
   ageUnknownLong: 'Hoe oud dit is, weet niemand tot de tweeling weer zijn tijd meldt.',
   neverObserved: 'nooit',

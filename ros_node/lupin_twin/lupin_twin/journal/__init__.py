@@ -1,1 +1,1 @@
-"""The durable log of everything the twin accepted: one SQLite file, one thread that writes it."""
+"""The log: what was observed, in plain SQL, and all that is asked of it."""

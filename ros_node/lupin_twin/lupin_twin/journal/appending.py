@@ -1,190 +1,310 @@
-"""Rows into tables: numbers for names and series, and nothing that is there already."""
+"""Rows into tables: each write once, whatever is received again.
+
+A write is known by tag, kind, the stamp that it was sent with (`stamp_ns` where it has none) and
+source. Of what is known already a sensor keeps its first value; sensors that are new are a further
+part of the same scan.
+"""
 
 from __future__ import annotations
 
 import json
+import math
 import sqlite3
-from collections.abc import Callable, Iterable
-from typing import Final, TypeVar
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Final
 
-from lupin_twin.journal.changes import put_change
-from lupin_twin.journal.packing import columns, pack_numbers, pack_shape, seal
-from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, LookRow, PinRow, Row, ScanRow
-from lupin_twin.journal.runs import Run
+from lupin_twin.journal.hours import WrittenLook, WrittenScan, count
+from lupin_twin.journal.reading import sensor_names
+from lupin_twin.journal.rows import KIND_FLOWER, LookRow, PinRow, Row, ScanRow, weight
+from lupin_twin.journal.schema import LOCAL_SITE, get_meta
+from lupin_twin.journal.site_log import SiteLog
+from lupin_twin.state import Flower
 
-# Numbers kept at hand; past that they are looked up in the file again.
-_MAX_AT_HAND: Final = 200_000
+PURGED_SEQ: Final = "purged_seq"
+# The numbers go on from here at least: rows that had later ones are gone.
+LAST_SEQ: Final = "last_seq"
+# In the place of the stamp that was sent: a copy that nothing received again is taken for.
+KNOWN_BY_NOTHING: Final = -1
+# Groups kept at hand; past that they are looked up in the file again.
+_MAX_AT_HAND: Final = 100_000
+# Readings, flowers and rows that wait for `flush`: a few MB.
+_MAX_WAITING_WEIGHT: Final = 20_000
 
-_Key = TypeVar("_Key")
-_SERIES = tuple[int, int, int, int, int, int]  # run, tag, kind, source, status, sensors
+_ADD: Final = {
+    table: f"INSERT INTO {table} VALUES ('{LOCAL_SITE}'{', ?' * columns})"  # noqa: S608
+    for table, columns in (("scan", 11), ("look", 16), ("place", 13))
+}
+_KNOWN_SCAN: Final = (
+    "SELECT stamp_ns, own_stamp_ns FROM scan WHERE site = :site AND series = :series"
+    " AND stamp_ns = :key AND source = :source AND coalesce(own_stamp_ns, 0) = 0 UNION ALL "
+    "SELECT stamp_ns, own_stamp_ns FROM scan WHERE site = :site AND series = :series"
+    " AND own_stamp_ns = :key AND source = :source LIMIT 1"
+)
+_KNOWN_LOOK: Final = (
+    "SELECT 1 FROM look WHERE site = :site AND run = :run AND tag = :tag"
+    " AND stamp_ns = :key AND source = :source AND coalesce(own_stamp_ns, 0) = 0 UNION ALL "
+    "SELECT 1 FROM look WHERE site = :site AND run = :run AND tag = :tag"
+    " AND own_stamp_ns = :key AND source = :source LIMIT 1"
+)
+
+
+class _Group:
+    """The series of one tag and kind in a run, and the latest stamp that anything is known by."""
+
+    __slots__ = ("newest_ns", "series")
+
+    def __init__(self, series: dict[tuple[str, ...], int], newest_ns: int) -> None:
+        self.series = series
+        self.newest_ns = newest_ns
 
 
 class Appender:
     """Writes rows through a connection, inside its caller's transaction.
 
     What it remembers of the file is wrong after a transaction that was rolled back: make another
-    one then.
+    one then. Rows stand in the tables after `flush`; that returns the scans among them.
     """
 
     def __init__(self, connection: sqlite3.Connection) -> None:
-        self._execute = connection.execute
-        (self.last_id,) = self._execute(
-            "SELECT max(coalesce((SELECT max(id) FROM scan), 0),"
-            " coalesce((SELECT max(id) FROM look), 0), coalesce((SELECT max(id) FROM pin), 0),"
-            " coalesce((SELECT value FROM meta WHERE key = 'purged_id'), 0))"
-        ).fetchone()
-        self._tags: dict[str, int] = {}
-        self._names: dict[str, int] = {}
-        self._sensors: dict[tuple[str, ...], int] = {}
-        self._series: dict[_SERIES, int] = {}
-        self._newest: dict[int, int] = {}
+        self._connection = connection
+        newest = (
+            f"SELECT coalesce(max(seq), 0) FROM {table} WHERE site = '{LOCAL_SITE}'"  # noqa: S608
+            for table in ("scan", "look", "place")
+        )
+        self.last_seq = max(
+            int(get_meta(connection, PURGED_SEQ) or 0),
+            int(get_meta(connection, LAST_SEQ) or 0),
+            *(connection.execute(text).fetchone()[0] for text in newest),
+            *(row[0] - 1 for row in connection.execute("SELECT begun_seq FROM run")),
+        )
+        self._groups: dict[tuple[int, str, int], _Group] = {}
+        self._waiting: dict[str, list[tuple[object, ...]]] = {table: [] for table in _ADD}
+        self._waiting_weight = 0
+        self._scans: list[WrittenScan] = []
+        self._looks: list[WrittenLook] = []
 
-    def append(self, run: Run, rows: Iterable[Row]) -> int:
-        """Write what is not there yet; returns how many rows that were."""
-        return sum(self._append(run, row) for row in rows)
+    def append(self, run: int, rows: Iterable[Row], *, are_copies: bool = False) -> int:
+        """Take in what is not there yet; returns how many rows that were."""
+        new = 0
+        for row in rows:
+            new += self._append(run, row, int(are_copies))
+            # As texts they take more than as values: a batch of the largest, hundreds of MB.
+            self._waiting_weight += weight(row)
+            if self._waiting_weight > _MAX_WAITING_WEIGHT:
+                self.flush()
+        return new
 
-    def _append(self, run: Run, row: Row) -> bool:
-        lag_us = (row.arrival_ns - row.stamp_ns - run.lead_ns) // 1000
-        tag = self._number(self._tags, "tag", "tag_id", row.tag_id)
+    def flush(self) -> None:
+        """Have what was taken in in the tables."""
+        self._waiting_weight = 0
+        for table, rows in self._waiting.items():
+            if rows:
+                self._connection.executemany(_ADD[table], rows)
+                rows.clear()
+        if self._scans or self._looks:
+            count(SiteLog(self._connection), self._scans, self._looks)
+            self._scans, self._looks = [], []
+
+    # --- the three kinds ----------------------------------------------------------------------
+
+    def _append(self, run: int, row: Row, is_copy: int) -> bool:
+        tag = _unicode(row.tag_id)
         if isinstance(row, PinRow):
             pose = row.pose
-            packed = pack_numbers((pose.x, pose.y, pose.z, pose.qx, pose.qy, pose.qz, pose.qw))
-            check = columns(run.id, tag, row.stamp_ns, lag_us)
-            written = self._execute(
-                "INSERT OR IGNORE INTO pin VALUES (?, ?, ?, ?, ?, ?)",
-                (self.last_id + 1, run.id, tag, row.stamp_ns, lag_us, seal(check, packed)),
+            numbers = (pose.x, pose.y, pose.z, pose.qx, pose.qy, pose.qz, pose.qw)
+            self.last_seq += 1
+            self._waiting["place"].append(
+                (self.last_seq, run, tag, row.stamp_ns, row.arrival_ns, *numbers, is_copy)
             )
-            self.last_id += written.rowcount
-            return written.rowcount == 1
-        kind, status, names = (
-            (KIND_FLOWER, STATUS_OK, ())
-            if isinstance(row, LookRow)
-            else (row.kind, row.status, tuple(reading.name for reading in row.readings))
-        )
-        source = self._number(self._names, "name", "text", row.source)
-        series = self._series_number(
-            (run.id, tag, kind, source, status, self._sensors_number(names))
-        )
-        table = "look" if isinstance(row, LookRow) else "scan"
-        if not self._is_new(table, series, row):
-            return False
-        mission = self._number(self._names, "name", "text", row.mission)
-        self.last_id += 1
-        if isinstance(row, ScanRow):
-            self._put_scan(row, series, lag_us, mission)
+            return True
+        if isinstance(row, LookRow):
+            return self._put_look(run, tag, row, is_copy)
+        return self._put_scan(run, tag, row, is_copy)
+
+    def _put_scan(self, run: int, tag: str, scan: ScanRow, is_copy: int) -> bool:
+        group = self._group(run, tag, scan.kind)
+        readings = {_unicode(reading.name): reading.value for reading in scan.readings}
+        stamp_ns, own_ns, source = scan.stamp_ns, scan.own_stamp_ns, _unicode(scan.source)
+        key = own_ns or stamp_ns
+        if is_copy or key > group.newest_ns:
+            group.newest_ns = max(group.newest_ns, key)
         else:
-            self._put_look(row, series, lag_us, mission)
-            put_change(self._execute, self.last_id, (run.id, tag), row)
+            self.flush()
+            known = self._known((run, tag, scan.kind), key, source)
+            if known is not None:
+                known_ns, own_ns, sensors = known
+                stamp_ns = min(stamp_ns, known_ns)
+                readings = {name: value for name, value in readings.items() if name not in sensors}
+                if not readings:
+                    return False
+        self.last_seq += 1
+        series = self._series(group, run, tag, scan.kind, tuple(readings))
+        values = list(readings.values())
+        self._waiting["scan"].append(
+            (
+                self.last_seq,
+                series,
+                stamp_ns,
+                own_ns,
+                scan.arrival_ns,
+                scan.status,
+                source,
+                _unicode(scan.mission),
+                _unicode(scan.detail),
+                is_copy,
+                _numbers(values),
+            )
+        )
+        if not is_copy:
+            self._scans.append(WrittenScan(run, series, scan.kind, stamp_ns, scan.status, values))
         return True
 
-    def _put_scan(self, scan: ScanRow, series: int, lag_us: int, mission: int) -> None:
-        detail = _unicode(scan.detail) or None
-        check = columns(series, scan.stamp_ns, scan.own_stamp_ns, lag_us, mission, detail)
-        packed = pack_numbers([reading.value for reading in scan.readings])
-        self._execute(
-            "INSERT INTO scan VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
-            (
-                self.last_id,
-                series,
-                scan.stamp_ns,
-                scan.own_stamp_ns,
-                lag_us,
-                mission,
-                detail,
-                seal(check, packed),
-            ),
-        )
-
-    def _put_look(self, look: LookRow, series: int, lag_us: int, mission: int) -> None:
-        flower = look.flower
-        species = self._number(self._names, "name", "text", flower.species)
-        at = (series, look.stamp_ns, look.own_stamp_ns, lag_us)
-        told = (mission, species, int(flower.anomaly), flower.flower_count, flower.bug_count)
-        check = columns(*at, *told)
-        self._execute(
-            "INSERT INTO look VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-            (self.last_id, *at, *told, seal(check, pack_shape(flower))),
-        )
-
-    def _is_new(self, table: str, series: int, row: ScanRow | LookRow) -> bool:
-        """Whether a series has nothing of this stamp; mostly it is past all of them."""
-        stamp_ns = row.stamp_ns
-        if row.own_stamp_ns:
-            found = self._execute(
-                f"SELECT 1 FROM {table} WHERE series = ? AND own_stamp_ns = ?",  # noqa: S608
-                (series, row.own_stamp_ns),
-            )
-            if found.fetchone() is not None:
+    def _put_look(self, run: int, tag: str, look: LookRow, is_copy: int) -> bool:
+        group = self._group(run, tag, KIND_FLOWER)
+        source, key = _unicode(look.source), look.own_stamp_ns or look.stamp_ns
+        if is_copy or key > group.newest_ns:
+            group.newest_ns = max(group.newest_ns, key)
+        else:
+            self.flush()
+            if self._known((run, tag, KIND_FLOWER), key, source) is not None:
                 return False
-        if series not in self._newest:
-            if len(self._newest) >= _MAX_AT_HAND:
-                self._newest.clear()
-            (newest,) = self._execute(
-                f"SELECT max(stamp_ns) FROM {table} WHERE series = ?",  # noqa: S608  # a constant
-                (series,),
-            ).fetchone()
-            self._newest[series] = -1 if newest is None else newest
-        if stamp_ns > self._newest[series]:
-            self._newest[series] = stamp_ns
-            return True
-        found = self._execute(
-            f"SELECT 1 FROM {table} WHERE series = ? AND stamp_ns = ?",  # noqa: S608
-            (series, stamp_ns),
+        self.last_seq += 1
+        self._series(group, run, tag, KIND_FLOWER, ())
+        flower = look.flower
+        self._waiting["look"].append(
+            (
+                self.last_seq,
+                run,
+                tag,
+                look.stamp_ns,
+                look.own_stamp_ns,
+                look.arrival_ns,
+                source,
+                _unicode(look.mission),
+                _unicode(flower.species),
+                flower.confidence,
+                int(flower.anomaly),
+                flower.flower_count,
+                flower.bug_count,
+                is_copy,
+                _blooms(flower),
+                f"[{','.join(map(_numbers, flower.footprint))}]",
+            )
         )
-        return found.fetchone() is None
+        if not is_copy:
+            self._looks.append(
+                WrittenLook(
+                    run, tag, self.last_seq, look.stamp_ns, flower.anomaly, flower.bug_count
+                )
+            )
+        return True
 
-    # --- numbers for names --------------------------------------------------------------------
+    # --- what is there already ----------------------------------------------------------------
 
-    def _number(self, known: dict[str, int], table: str, column: str, text: str) -> int:
-        text = _unicode(text)
-        return self._remembered(
-            known,
-            text,
-            lambda: self._looked_up(
-                f"SELECT id FROM {table} WHERE {column} = ?",  # noqa: S608  # constants
-                f"INSERT INTO {table} ({column}) VALUES (?)",  # noqa: S608
-                (text,),
-            ),
+    def _known(
+        self, at: tuple[int, str, int], key: int, source: str
+    ) -> tuple[int, int | None, set[str]] | None:
+        """The stamps of the write that is known by `key`, and its sensors; None: there is none."""
+        run, tag, kind = at
+        asked = {
+            "site": LOCAL_SITE, "run": run, "tag": tag, "key": key, "source": source, "series": 0,
+        }  # fmt: skip
+        execute = self._connection.execute
+        if kind == KIND_FLOWER and execute(_KNOWN_LOOK, asked).fetchone() is not None:
+            return 0, None, set()
+        stamps: tuple[int, int | None] | None = None
+        sensors: set[str] = set()
+        for names, series in self._group(run, tag, kind).series.items():
+            asked["series"] = series
+            found = execute(_KNOWN_SCAN, asked).fetchone()
+            if found is not None:
+                stamps = found
+                sensors.update(names)
+        return None if stamps is None else (*stamps, sensors)
+
+    def _group(self, run: int, tag: str, kind: int) -> _Group:
+        group = self._groups.get((run, tag, kind))
+        if group is None:
+            if len(self._groups) >= _MAX_AT_HAND:
+                self._groups.clear()
+            group = self._groups[run, tag, kind] = self._look_up(run, tag, kind)
+        return group
+
+    def _look_up(self, run: int, tag: str, kind: int) -> _Group:
+        self.flush()
+        execute = self._connection.execute
+        found = execute(
+            "SELECT series, sensors FROM series WHERE site = ? AND run = ? AND tag = ?"
+            " AND kind = ?",
+            (LOCAL_SITE, run, tag, kind),
+        ).fetchall()
+        newest: list[int | None] = [0]
+        for column in ("stamp_ns", "own_stamp_ns"):
+            for series, _ in found:
+                newest += execute(
+                    f"SELECT max({column}) FROM scan WHERE site = ? AND series = ?"  # noqa: S608
+                    f" AND {column} IS NOT NULL",
+                    (LOCAL_SITE, series),
+                ).fetchone()
+            if kind == KIND_FLOWER:
+                newest += execute(
+                    f"SELECT max({column}) FROM look WHERE site = ? AND run = ?"  # noqa: S608
+                    f" AND tag = ? AND {column} IS NOT NULL",
+                    (LOCAL_SITE, run, tag),
+                ).fetchone()
+        return _Group(
+            {sensor_names(text): series for series, text in found},
+            max(stamp_ns for stamp_ns in newest if stamp_ns is not None),
         )
 
-    def _sensors_number(self, names: tuple[str, ...]) -> int:
-        return self._remembered(
-            self._sensors,
-            names,
-            lambda: self._looked_up(
-                "SELECT id FROM sensors WHERE names = ?",
-                "INSERT INTO sensors (names) VALUES (?)",
-                (json.dumps(names),),
-            ),
-        )
+    def _series(self, group: _Group, run: int, tag: str, kind: int, names: tuple[str, ...]) -> int:
+        """The series of a write, the newest one, which is its first if there is none."""
+        series = group.series.get(names)
+        if series is None:
+            series = group.series[names] = self.last_seq
+            self._connection.execute(
+                "INSERT INTO series VALUES (?, ?, ?, ?, ?, ?)",
+                (LOCAL_SITE, series, run, tag, kind, json.dumps(names, separators=(",", ":"))),
+            )
+        return series
 
-    def _series_number(self, series: _SERIES) -> int:
-        return self._remembered(
-            self._series,
-            series,
-            lambda: self._looked_up(
-                "SELECT id FROM series WHERE run = ? AND tag = ? AND kind = ? AND source = ?"
-                " AND status = ? AND sensors = ?",
-                "INSERT INTO series (run, tag, kind, source, status, sensors)"
-                " VALUES (?, ?, ?, ?, ?, ?)",
-                series,
-            ),
-        )
 
-    def _looked_up(self, select: str, insert: str, values: tuple[object, ...]) -> int:
-        found = self._execute(select, values).fetchone()
-        return int(found[0]) if found else int(self._execute(insert, values).lastrowid or 0)
+def _numbers(values: Iterable[float]) -> str:
+    """A JSON list; what is not finite is null."""
+    text = ",".join(map(repr, values))
+    if "n" in text:  # nan, inf
+        finite = (float(value) if math.isfinite(value) else None for value in values)
+        return json.dumps(list(finite), separators=(",", ":"))
+    return f"[{text}]"
 
-    @staticmethod
-    def _remembered(known: dict[_Key, int], key: _Key, look_up: Callable[[], int]) -> int:
-        number = known.get(key)
-        if number is None:
-            if len(known) >= _MAX_AT_HAND:
-                known.clear()
-            number = known[key] = look_up()
-        return number
+
+def _blooms(flower: Flower) -> str:
+    """A JSON list of lists: x, y, z, height, species, confidence, anomaly."""
+    return json.dumps(
+        [
+            [
+                *json.loads(_numbers((bloom.x, bloom.y, bloom.z, bloom.height_m))),
+                bloom.species,
+                *json.loads(_numbers((bloom.confidence,))),
+                int(bloom.anomaly),
+            ]
+            for bloom in flower.blooms
+        ],
+        separators=(",", ":"),
+    )
 
 
 def _unicode(text: str) -> str:
     """The text as SQLite takes it: what is no Unicode must not cost the row."""
-    return text.encode("utf-8", "replace").decode("utf-8")
+    return text if text.isascii() else text.encode("utf-8", "replace").decode("utf-8")
+
+
+def held(row: Row, begun_ns: int, *, keeps_key: bool) -> Row:
+    """A row as a copy of it at `begun_ns`: nothing is later. `keeps_key`: it is the same write."""
+    if row.stamp_ns <= begun_ns:
+        return row
+    if isinstance(row, PinRow):
+        return replace(row, stamp_ns=begun_ns)
+    own_ns = (row.own_stamp_ns or row.stamp_ns) if keeps_key else KNOWN_BY_NOTHING
+    return replace(row, stamp_ns=begun_ns, own_stamp_ns=own_ns)

@@ -13,11 +13,13 @@ class JournalState(StrEnum):
     """What the journal is at. Only in `recording` is everything kept as promised."""
 
     UNKNOWN = "unknown"  # the twin is elsewhere, and does not say
-    OFF = "off"
+    OFF = "off"  # recorded into a temporary file, which goes at the end
     STARTING = "starting"
+    UPGRADING = "upgrading"  # the file is of an older version; nothing is known before it is done
     RECORDING = "recording"
     SLOW = "slow"  # the disk does not keep up: what is waiting is not safe yet
     FAILING = "failing"  # nothing can be written; tried again and again
+    DOUBTING = "doubting"  # the clock contradicts the journal: nothing is written until it agrees
     IN_USE = "in_use"  # another process writes this file
     FOREIGN = "foreign"  # the file is somebody else's, or of a newer version
 
@@ -56,4 +58,3 @@ _WELL = frozenset(
     {JournalState.UNKNOWN, JournalState.OFF, JournalState.STARTING, JournalState.RECORDING}
 )
 UNKNOWN = Condition(JournalState.UNKNOWN, "the twin does not say whether it keeps a journal")
-OFF = Condition(JournalState.OFF, "no journal is kept")

@@ -3,37 +3,47 @@
 from __future__ import annotations
 
 import sqlite3
-import struct
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from lupin_twin.journal.appending import Appender
+from lupin_twin.journal.appending import Appender, held
+from lupin_twin.journal.checking import find_damage
+from lupin_twin.journal.fold import Restored, copies, fold
 from lupin_twin.journal.prefilling import Stretch, simulated
-from lupin_twin.journal.reading import ending, heard_until
-from lupin_twin.journal.restoring import Restored, restore
+from lupin_twin.journal.reading import newest_rows
 from lupin_twin.journal.retention import (
     Limits,
+    horizon_ns,
     note_limits,
-    purge_rollups_step,
+    purge_hours,
     purge_step,
     shrink_step,
 )
-from lupin_twin.journal.rollups import Folding, get_meta
-from lupin_twin.journal.rows import Row
-from lupin_twin.journal.runs import Carries, Clock, Run, carried_at_start, goes_on
-from lupin_twin.journal.salvage import Salvage, set_aside
+from lupin_twin.journal.rows import PinRow, Row
+from lupin_twin.journal.runs import (
+    CORRECTION_NS,
+    FOREVER_NS,
+    Carries,
+    Clock,
+    Run,
+    runs,
+    simulation_goes_on,
+)
+from lupin_twin.journal.salvage import Salvage, quarantine
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
-    find_damage,
+    LOCAL_SITE,
+    get_meta,
     open_writer,
     says_damaged,
+    set_meta,
     transaction,
 )
 from lupin_twin.journal.syncing import Syncing
-from lupin_twin.journal.tallying import TALLIED, tally_step
 
 # A file up to this size is read through for damage as it is opened: a quarter of a second.
 _CHECKED_BYTES: Final = 64_000_000
@@ -41,22 +51,24 @@ _CHECKED_BYTES: Final = 64_000_000
 _LOG_BYTES: Final = 8_000_000
 # So much of a damaged file is read before the twin goes on with what is there.
 _SALVAGE_S: Final = 1.5
-# Readers count what is not tallied yet; the rarer it is done, the fewer pages are written.
-_TALLY_EVERY_S: Final = 60.0
-_TALLY_ROWS: Final = 1_000
-_FOLD_EVERY_S: Final = 3600.0
-# So many waiting rows are a reason to fold, and so many are held in memory at most.
-_FOLD_ROWS: Final = 50_000
 _PURGE_EVERY_S: Final = 60.0
-_PURGE_ROLLUPS_EVERY_S: Final = 86_400.0
+_PURGE_HOURS_EVERY_S: Final = 86_400.0
 _LOOK_EVERY_S: Final = 1.0
+_SALVAGE: Final = "salvage"
+
+_LAST_SCANS: Final = (
+    "SELECT stamp_ns, arrival_ns FROM scan JOIN series ON series.site = scan.site"
+    " AND series.series = scan.series WHERE scan.site = ? AND run = ? ORDER BY seq DESC LIMIT 100"
+)
+_LAST_LOOKS: Final = (
+    "SELECT stamp_ns, arrival_ns FROM look WHERE site = ? AND run = ? ORDER BY seq DESC LIMIT 100"
+)
 
 # What a row can be refused for by its own fault.
 _ROW_ERRORS: Final = (
     ValueError,
     OverflowError,
     TypeError,
-    struct.error,
     sqlite3.DataError,
     sqlite3.IntegrityError,
     sqlite3.InterfaceError,
@@ -87,7 +99,10 @@ class JournalFile:
     def close(self) -> None:
         """Close it; what was committed is put into the file, and its log goes."""
         self._syncing.close()
-        self._connection.close()
+        try:
+            self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+        finally:
+            self._connection.close()
 
     # --- opening ------------------------------------------------------------------------------
 
@@ -98,7 +113,7 @@ class JournalFile:
 
     def _set_aside(self) -> None:
         # Wall time, as whoever looks for the file reads it.
-        self.set_aside = str(set_aside(self._path, time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())))
+        self.set_aside = str(quarantine(self._path, time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())))
 
     def _open(self) -> None:
         try:
@@ -112,11 +127,10 @@ class JournalFile:
             self._salvage()
             self._appender = Appender(self._connection)
             self.simulated = simulated(self._connection)
-            self._folding: Folding | None = None
-            self._tallied_s = self._folded_s = self._purged_s = self._looked_s = 0.0
-            self._purging = False
-            self._shrinking = False
-            self._rollups_purged_s, self._rollup_series = time.monotonic(), 0
+            self._purged_s = self._looked_s = 0.0
+            self._hours_purged_s = time.monotonic()
+            self._purges_before_ns: int | None = None
+            self._is_shrinking = False
             self._syncing = Syncing(self._path)
         except BaseException:  # whatever it was: nobody has this object, and could close it
             self._connection.close()
@@ -126,13 +140,11 @@ class JournalFile:
     def _salvage(self) -> None:
         """Go on with what was set aside, now or before the last end."""
         if self.set_aside:
-            self._connection.execute(
-                "INSERT OR REPLACE INTO meta VALUES ('salvage', ?)", (Path(self.set_aside).name,)
-            )
-        found = self._connection.execute("SELECT value FROM meta WHERE key = 'salvage'").fetchone()
-        if not found:
+            set_meta(self._connection, _SALVAGE, Path(self.set_aside).name)
+        name = get_meta(self._connection, _SALVAGE)
+        if not name:
             return
-        self._salvaging = Salvage(self._path.with_name(found[0]), self._connection).steps()
+        self._salvaging = Salvage(self._path.with_name(name), self._connection).steps()
         enough_s = time.monotonic() + _SALVAGE_S
         while self._salvage_step() and time.monotonic() < enough_s:
             pass
@@ -140,84 +152,153 @@ class JournalFile:
     def _salvage_step(self) -> bool:
         if self._salvaging is not None and next(self._salvaging, self) is self:
             self._salvaging = None
-            self._connection.execute("DELETE FROM meta WHERE key = 'salvage'")
+            self._connection.execute("DELETE FROM meta WHERE key = ?", (_SALVAGE,))
         return self._salvaging is not None
 
     # --- runs ---------------------------------------------------------------------------------
 
-    def first_run(self, now: Clock) -> Run:
-        """The run that a twin which starts now is in: the last one, or a new one."""
-        last = ending(self._connection, is_simulated=now.is_simulated)
-        if last is not None and goes_on(last, now):
-            with self._transaction():
-                self._go_on_with(last.run.id)
-            return last.run
-        follows = None if last is None else last.run.id
-        return self._new_run(now, follows, carried_at_start(now))
+    def start(self, now: Clock, scans_per_series: int, *, is_believed: bool) -> Restored:
+        """What a twin that starts now knows, in the run that it is in: the last one, or a new one.
 
-    def next_run(self, before: Run, now: Clock, ended_ns: int | None = None) -> Run:
-        """A new run of a clock that has gone back, from `ended_ns`, while the twin lived."""
-        if ended_ns is not None:
-            with self._transaction():
-                self._connection.execute(
-                    "UPDATE run SET ended_stamp_ns = ? WHERE id = ?", (ended_ns, before.id)
-                )
-        return self._new_run(now, before.id, Carries.ALL)
-
-    def _new_run(self, now: Clock, follows: int | None, carries: Carries) -> Run:
-        (last,) = self._connection.execute("SELECT coalesce(max(id), 0) FROM run").fetchone()
-        run = Run(last + 1, now, follows, carries if follows is not None else Carries.NOTHING)
-        self.keep_runs([run])
-        return run
-
-    def keep_runs(self, runs: Sequence[Run]) -> None:
-        """Have the runs in the file, as they are in another one that is gone; the last goes on."""
-        if not runs:
-            return
-        with self._transaction():
-            self._connection.executemany(
-                "INSERT OR IGNORE INTO run VALUES (?, ?, ?, ?, ?, ?, ?, NULL)",
-                [
-                    (
-                        run.id,
-                        int(run.begun.is_simulated),
-                        run.begun.stamp_ns,
-                        run.begun.arrival_ns,
-                        run.lead_ns,
-                        run.follows,
-                        int(run.carries),
-                    )
-                    for run in runs
-                ],
-            )
-            self._go_on_with(runs[-1].id)
-
-    def _go_on_with(self, run: int) -> None:
-        """One run goes on; another, whose end nobody saw, ended with the last heard in it."""
-        self._connection.execute("UPDATE run SET ended_stamp_ns = NULL WHERE id = ?", (run,))
-        unended = self._connection.execute(
-            "SELECT id, begun_stamp_ns FROM run WHERE ended_stamp_ns IS NULL AND id != ?", (run,)
-        ).fetchall()
-        for other, begun_ns in unended:
-            self._connection.execute(
-                "UPDATE run SET ended_stamp_ns = ? WHERE id = ?",
-                (max(begun_ns, heard_until(self._connection, other)), other),
-            )
-
-    def restore(self, run: Run, scans_per_series: int) -> Restored:
-        """What is known in a run. A file of which that cannot be read is set aside once."""
+        A wall clock that is earlier than what the log has heard is doubted, unless `is_believed`:
+        nothing is begun then. Of a file that cannot be read what can be is salvaged, once.
+        """
         try:
-            restored = restore(self._connection, run, scans_per_series)
-            if not restored.damaged or self.set_aside:
-                return restored
+            return self._start(now, scans_per_series, is_believed=is_believed)
         except FILE_ERRORS as error:
             if self.set_aside or not says_damaged(error):
                 raise
         self.close()
         self._set_aside()
         self._open()
-        self.keep_runs([run])
-        return restore(self._connection, run, scans_per_series)
+        return self._start(now, scans_per_series, is_believed=is_believed)
+
+    def _start(self, now: Clock, scans_per_series: int, *, is_believed: bool) -> Restored:
+        every = self._runs()
+        run = next((r for r in reversed(every) if r.begun.is_simulated == now.is_simulated), None)
+        if run is None:
+            return self._restored(self.begin(now, None, Carries.NOTHING), scans_per_series)
+        root = next(r for r in every if r.id == run.root)
+        last = self._last(root)
+        if now.is_simulated and not simulation_goes_on(root.begun, last, now):
+            run = self.begin(now, run, Carries.NOTHING)
+        elif not now.is_simulated and now.arrival_ns < last.arrival_ns - CORRECTION_NS:
+            if not is_believed:
+                restored = self._restored(run, scans_per_series)
+                return replace(restored, last_ns=last.arrival_ns, is_doubted=True)
+            run = self.begin(now, run, Carries.PLACES)
+        elif not now.is_simulated and now.stamp_ns < last.stamp_ns:
+            run = self.begin(now, run, Carries.ALL, joins=root.id)
+        else:
+            with self._transaction():
+                self._go_on_with(root.id)
+        return self._restored(run, scans_per_series)
+
+    def _restored(self, run: Run, scans_per_series: int) -> Restored:
+        known = fold(self._connection, run.root, FOREVER_NS, run.begun_seq)
+        rows = newest_rows(self._connection, run.root, scans_per_series)
+        return Restored(run, known, tuple(rows), self._appender.last_seq)
+
+    def begin(
+        self,
+        now: Clock,
+        before: Run | None,
+        carries: Carries,
+        joins: int | None = None,
+        ended_ns: int | None = None,
+    ) -> Run:
+        """A new run, or a step into `joins`; what was known in `before` is copied into it.
+
+        `ended_ns` is how far the clock had come in `before`, where the twin saw it go back.
+        """
+        execute = self._connection.execute
+        with self._transaction():
+            (number,) = execute("SELECT coalesce(max(run), 0) + 1 FROM run").fetchone()
+            run = Run(number, now, self._appender.last_seq + 1, joins)
+            execute(
+                "INSERT INTO run VALUES (?, ?, ?, ?, ?, ?, ?, NULL)",
+                (
+                    LOCAL_SITE,
+                    run.id,
+                    int(now.is_simulated),
+                    now.stamp_ns,
+                    now.arrival_ns,
+                    run.begun_seq,
+                    joins,
+                ),
+            )
+            if before is not None:
+                self._copy(before, run, carries)
+                if ended_ns is not None and before.root != run.root:
+                    execute(
+                        "UPDATE run SET ended_stamp_ns = ? WHERE run = ?", (ended_ns, before.root)
+                    )
+            self._go_on_with(run.root)
+        return run
+
+    def _copy(self, before: Run, run: Run, carries: Carries) -> None:
+        rows: list[Row] = []
+        for row in copies(self._connection, before, carries):
+            is_here = before.root == run.root and row.stamp_ns <= run.begun.stamp_ns
+            if not (is_here and isinstance(row, PinRow)):
+                now = replace(row, arrival_ns=run.begun.arrival_ns)
+                # What a simulation says again is new; a wall clock comes to no moment twice.
+                rows.append(held(now, run.begun.stamp_ns, keeps_key=not run.begun.is_simulated))
+        self._appender.append(run.root, rows, are_copies=True)
+        self._appender.flush()
+
+    def rejoin(self, now: Clock, before: Run) -> Run:
+        """The wall's clock jumped ahead: the run that it had gone back from goes on, if any.
+
+        That is one that ended before now, the newest; else the run stays.
+        """
+        roots = [r for r in self._runs() if r.joins is None and not r.begun.is_simulated]
+        begun = next(r for r in roots if r.id == before.root).begun
+        for older in reversed([r for r in roots if r.id < before.root]):
+            ended_ns = self._last(older).stamp_ns
+            if begun.stamp_ns < ended_ns <= now.stamp_ns:
+                return self.begin(now, before, Carries.ALL, joins=older.id)
+        return before
+
+    def keep_run(self, run: Run) -> None:
+        """Have the run in the file, as it was in another one that is gone."""
+        if all(known.id != run.root for known in self._runs()):
+            with self._transaction():
+                self._connection.execute(
+                    "INSERT INTO run VALUES (?, ?, ?, ?, ?, ?, NULL, NULL)",
+                    (
+                        LOCAL_SITE,
+                        run.root,
+                        int(run.begun.is_simulated),
+                        run.begun.stamp_ns,
+                        run.begun.arrival_ns,
+                        self._appender.last_seq + 1,
+                    ),
+                )
+
+    def _runs(self) -> list[Run]:
+        return runs(self._connection.execute)
+
+    def _last(self, run: Run) -> Clock:
+        """The last that was heard in a run."""
+        last = run.begun
+        # The rows of a run lie together at the end; only a latched one may be older than others.
+        for text in (_LAST_SCANS, _LAST_LOOKS):
+            for stamp_ns, arrival_ns in self._connection.execute(text, (LOCAL_SITE, run.id)):
+                if stamp_ns > last.stamp_ns:
+                    last = Clock(stamp_ns, max(arrival_ns, last.arrival_ns), last.is_simulated)
+        return last
+
+    def _go_on_with(self, run: int) -> None:
+        """One run goes on; another, whose end nobody saw, ended with the last heard in it."""
+        execute = self._connection.execute
+        execute("UPDATE run SET ended_stamp_ns = NULL WHERE run = ?", (run,))
+        for other in self._runs():
+            if other.ended_ns is None and other.joins is None and other.id != run:
+                execute(
+                    "UPDATE run SET ended_stamp_ns = ? WHERE run = ?",
+                    (self._last(other).stamp_ns, other.id),
+                )
 
     # --- writing ------------------------------------------------------------------------------
 
@@ -228,16 +309,24 @@ class JournalFile:
             sqlite3.Error, OSError: nothing was written.
 
         """
-        written = refused = 0
         if not rows:
-            return written, refused
-        with self._transaction():
-            for run, row in rows:
-                try:
-                    written += self._appender.append(run, (row,))
-                except _ROW_ERRORS:
-                    refused += 1
+            return 0, 0
+        try:
+            return self._append(rows), 0
+        except _ROW_ERRORS:
+            written = refused = 0
+        for entry in rows:
+            try:
+                written += self._append([entry])
+            except _ROW_ERRORS:
+                refused += 1
         return written, refused
+
+    def _append(self, rows: Sequence[tuple[Run, Row]]) -> int:
+        with self._transaction():
+            written = sum(self._appender.append(run.root, (row,)) for run, row in rows)
+            self._appender.flush()
+        return written
 
     def size(self) -> int:
         """Bytes on the disk, the log included."""
@@ -245,8 +334,10 @@ class JournalFile:
 
     # --- upkeep -------------------------------------------------------------------------------
 
-    def look_after(self) -> bool:
+    def look_after(self, *, may_purge: bool) -> bool:
         """One small step of what has to be done; returns whether there is more to do at once.
+
+        `may_purge`: the clock is believed.
 
         Raises:
             sqlite3.Error, OSError: the file is no longer what it was.
@@ -261,53 +352,28 @@ class JournalFile:
             self._connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
         if self._salvaging is not None:
             return self._salvage_step()
-        return self._tally(now_s) or self._fold(now_s) or self._purge(now_s)
-
-    def _tally(self, now_s: float) -> bool:
-        waiting = self._appender.last_id - get_meta(self._connection, TALLIED)
-        is_time = now_s - self._tallied_s >= _TALLY_EVERY_S
-        if not waiting or not (is_time or waiting >= _TALLY_ROWS):
-            return False
-        self._tallied_s = now_s
-        with self._transaction():
-            return tally_step(self._connection)
-
-    def _fold(self, now_s: float) -> bool:
-        if self._folding is None:
-            rolled_id = get_meta(self._connection, "rolled_id")
-            waiting = self._appender.last_id - rolled_id
-            is_time = now_s - self._folded_s >= _FOLD_EVERY_S or not self._folded_s
-            if not waiting or not (is_time or waiting >= _FOLD_ROWS):
-                return False
-            last_id = min(self._appender.last_id, rolled_id + _FOLD_ROWS)
-            self._folding = Folding(self._connection, last_id)
-        with self._transaction():
-            has_more = self._folding.step()
-        if has_more:
-            return True
-        self._folding, self._folded_s = None, now_s
-        return bool(self._appender.last_id - get_meta(self._connection, "rolled_id") >= _FOLD_ROWS)
+        return may_purge and self._purge(now_s)
 
     def _purge(self, now_s: float) -> bool:
-        if not self._purging and not self._shrinking:
+        if now_s - self._hours_purged_s >= _PURGE_HOURS_EVERY_S:
+            self._hours_purged_s = now_s
+            with self._transaction():
+                purge_hours(self._connection, time.time_ns())
+        if self._purges_before_ns is None and not self._is_shrinking:
             if now_s - self._purged_s < _PURGE_EVERY_S:
                 return False
-            self._purged_s, self._purging = now_s, True
+            self._purged_s = now_s
             with self._transaction():
                 note_limits(self._connection, self._limits)
-        if self._purging:
+            self._purges_before_ns = horizon_ns(self._connection, self._limits, time.time_ns())
+        if self._purges_before_ns is not None:
             with self._transaction():
-                self._purging = purge_step(self._connection, self._limits, time.time_ns())
-            self._shrinking = True
-        elif self._shrinking:
-            self._shrinking = shrink_step(self._connection)
-        if self._rollup_series or now_s - self._rollups_purged_s >= _PURGE_ROLLUPS_EVERY_S:
-            self._rollups_purged_s = now_s
-            with self._transaction():
-                self._rollup_series = purge_rollups_step(
-                    self._connection, time.time_ns(), self._rollup_series
-                )
-        return self._purging or self._shrinking
+                if not purge_step(self._connection, self._limits, self._purges_before_ns):
+                    self._purges_before_ns = None
+            self._is_shrinking = True
+        else:
+            self._is_shrinking = shrink_step(self._connection)
+        return self._purges_before_ns is not None or self._is_shrinking
 
     def _log_bytes(self) -> int:
         try:
@@ -317,6 +383,10 @@ class JournalFile:
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:
-        with transaction(self._connection):
-            yield
+        try:
+            with transaction(self._connection):
+                yield
+        except BaseException:
+            self._appender = Appender(self._connection)
+            raise
         self._syncing.has_written()

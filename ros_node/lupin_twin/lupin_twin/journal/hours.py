@@ -1,91 +1,355 @@
-"""Rollups of one series, many hours at once: one by one, those of a year take 20 ms."""
+# ruff: noqa: S608  # SQL is put together of constants
+"""What long views need, upserted in the transaction that writes the rows it follows from.
+
+By the hour: readings of each sensor (`hour`), the site's scans, failures and looks (`tally`). One
+by one, for they are rare (`event`): pests seen and cleared, stretches without an attempt. All of it
+stays when rows are deleted, and none of it is ever computed anew: a row that comes late is added.
+"""
 
 from __future__ import annotations
 
-import sqlite3
-from collections.abc import Iterator, Sequence
-from typing import Final
+import json
+from collections.abc import Iterable, Sequence
+from typing import Any, Final, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+from lupin_twin.journal.rows import KIND_READING, STATUS_OK
+from lupin_twin.journal.runs import Span
+from lupin_twin.journal.schema import DamagedFile
+from lupin_twin.journal.site_log import SiteLog
+from lupin_twin.past import HOUR_NS, Event, Grid, SeriesPast
 
-from lupin_twin.journal.columns import Ints, Packed, fetch
-from lupin_twin.journal.packing import Bucket
-
-# As `packing.pack_buckets` packs a sensor, by the bytes that it takes.
-_LAYOUTS: Final = {
-    kind.itemsize: kind
-    for kind in (
-        np.dtype([("n", count), ("mean", "<f8"), ("low", ends), ("high", ends)])
-        for count in ("<u2", "<u4")
-        for ends in ("<f4", "<f8")
-    )
-}
-
-Floats = NDArray[np.float64]
+# Shorter stretches without an attempt are no silence, whatever is usual.
+SILENCE_NS: Final = 600 * 1_000_000_000
+# What is counted by the hour.
+TALLIED: Final = (Event.SCANS, Event.FAILURES, Event.LOOKS)
+# A sum of larger readings could be beyond any number, which PostgreSQL refuses.
+_LARGEST: Final = 1e290
 
 
-def merged_hours(
-    connection: sqlite3.Connection,
-    series: int,
-    hours: tuple[int, int],
-    *,
-    sensors: int,
-    places: Sequence[int],
-    width: int,
-    origin: int,
-) -> Iterator[tuple[int, Bucket]]:
-    """(index, bucket) of the rollups of some hours, first to before last, `width` hours a bucket.
+class WrittenScan(NamedTuple):
+    """A scan as it stands in the table, no copy; `values` are of its series' sensors, in order."""
 
-    Bucket 0 begins at the hour `origin`, or with the first hour if that is earlier. Told are the
-    sensors at `places` of the series' `sensors`, all together. An hour that is damaged is left out.
+    run: int
+    series: int
+    kind: int
+    stamp_ns: int
+    status: int
+    values: Sequence[float]
+
+
+class WrittenLook(NamedTuple):
+    """A look as it stands in the table, no copy."""
+
+    run: int
+    tag: str
+    seq: int
+    stamp_ns: int
+    anomaly: bool
+    bug_count: int
+
+
+def is_counted(value: float) -> bool:
+    """Whether a reading counts in the long views: those that are no number do not."""
+    return -_LARGEST < value < _LARGEST
+
+
+def count(log: SiteLog, scans: Iterable[WrittenScan], looks: Sequence[WrittenLook]) -> None:
+    """Count rows that are in the tables now, each once, whatever its stamp."""
+    hours: dict[tuple[int, int], list[Sequence[float]]] = {}
+    tallies: dict[tuple[int, str, int], list[int]] = {}
+    stamps: dict[int, list[int]] = {}
+    for run, series, kind, stamp_ns, status, values in scans:
+        stamps.setdefault(run, []).append(stamp_ns)
+        hour = stamp_ns // HOUR_NS
+        if status != STATUS_OK:
+            _tally(tallies, (run, Event.FAILURES, hour), status, stamp_ns)
+        elif kind == KIND_READING:
+            _tally(tallies, (run, Event.SCANS, hour), len(values), stamp_ns)
+        if values:
+            hours.setdefault((series, hour), []).append(values)
+    for look in looks:
+        stamps.setdefault(look.run, []).append(look.stamp_ns)
+        key = (look.run, Event.LOOKS, look.stamp_ns // HOUR_NS)
+        _tally(tallies, key, look.bug_count, look.stamp_ns)
+    for run, of_run in stamps.items():
+        _note_silences(log, run, sorted(of_run))
+    _upsert_hours(log, hours)
+    log.execute_many(_TALLY, [(log.site, *key, *entry) for key, entry in sorted(tallies.items())])
+    for look in looks:
+        _note_pests(log, look)
+
+
+def extent(log: SiteLog, run: int) -> tuple[int, int] | None:
+    """The first and the last attempt of a run; None if there was none."""
+    found = [
+        row
+        for event in TALLIED
+        for sql in (_FIRST, _LAST)
+        for row in log.execute(sql, {"run": run, "event": event}).fetchall()
+    ]
+    return (min(found)[0], max(last for _, last in found)) if found else None
+
+
+def delete_before(log: SiteLog, run: int, stamp_ns: int) -> None:
+    """Delete all of this that is older than a stamp of a run."""
+    for sql in (
+        (
+            "DELETE FROM hour WHERE site = :site AND hour < :hour"
+            " AND series IN (SELECT series FROM series WHERE site = :site AND run = :run)"
+        ),
+        "DELETE FROM tally WHERE site = :site AND run = :run AND hour < :hour",
+        "DELETE FROM event WHERE site = :site AND run = :run AND stamp_ns < :at",
+    ):
+        log.execute(sql, {"run": run, "at": stamp_ns, "hour": stamp_ns // HOUR_NS})
+
+
+# --- reading them ---------------------------------------------------------------------------------
+
+
+class Buckets:
+    """Counts, sums, least and largest by the bucket of a grid."""
+
+    def __init__(self, told: Grid) -> None:
+        self.told = told
+        self._found: dict[int, list[float]] = {}
+
+    def are_hours(self) -> bool:
+        """Whether each has whole hours."""
+        return self.told.bucket_ns % HOUR_NS == 0 and self.told.start_ns % HOUR_NS == 0
+
+    def add(self, index: int, n: int, total: float, low: float, high: float) -> None:
+        """Add some to a bucket."""
+        bucket = self._found.get(index)
+        if bucket is None:
+            self._found[index] = [n, total, low, high]
+            return
+        bucket[0] += n
+        bucket[1] += total
+        bucket[2], bucket[3] = min(bucket[2], low), max(bucket[3], high)
+
+    def add_value(self, stamp_ns: int, value: float) -> None:
+        """Add one."""
+        index = (stamp_ns - self.told.start_ns) // self.told.bucket_ns
+        self.add(index, 1, value, value, value)
+
+    def past(self) -> SeriesPast:
+        """The answer. 12 digits are the same in whatever way, and on whichever engine, it came."""
+        told, found = self.told, sorted(self._found.items())
+        return SeriesPast(
+            told.start_ns,
+            told.end_ns,
+            told.bucket_ns,
+            tuple(told.start_ns + index * told.bucket_ns for index, _ in found),
+            tuple(int(n) for _, (n, *_) in found),
+            tuple(_rounded(total / n) for _, (n, total, *_) in found),
+            tuple(_rounded(low) for _, (*_, low, _) in found),
+            tuple(_rounded(high) for _, (*_, high) in found),
+        )
+
+
+def _rounded(number: float) -> float:
+    return float(f"{number:.12g}")
+
+
+def deleted_ns(log: SiteLog, run: int) -> int:
+    """The last stamp of a run of which something was deleted; -1 if nothing was."""
+    found = log.execute(
+        "SELECT value FROM meta WHERE site = :site AND key = :key", {"key": f"purged_ns:{run}"}
+    ).fetchone()
+    return int(found[0]) if found else -1
+
+
+def whole_hours(span: Span, horizon_ns: int) -> tuple[tuple[int, int], list[Span]]:
+    """The hours that a span has whole, first to before last, and what else is in it.
+
+    Up to the horizon rows were deleted: there an hour is the span's that begins or ends in it.
     """
-    found = fetch(
-        connection,
-        ("hour",),
-        ("buckets",),
-        "FROM rollup WHERE series = ? AND hour >= ? AND hour < ?",
-        (series, *hours),
-    )
-    if not len(found):
+    start_ns, end_ns = span.start_ns, span.end_ns
+    first, last = -(-start_ns // HOUR_NS), end_ns // HOUR_NS
+    if start_ns <= horizon_ns:
+        first = start_ns // HOUR_NS
+    if max(start_ns, last * HOUR_NS) <= horizon_ns:
+        last = -(-end_ns // HOUR_NS)
+    if first >= last:
+        return (0, 0), [span]
+    edges = (start_ns, first * HOUR_NS), (last * HOUR_NS, end_ns)
+    return (first, last), [Span(span.run, *edge) for edge in edges if edge[0] < edge[1]]
+
+
+# --- by the hour ----------------------------------------------------------------------------------
+
+_LEAST: Final = "CASE WHEN excluded.{0} < tally.{0} THEN excluded.{0} ELSE tally.{0} END"
+_MOST: Final = "CASE WHEN excluded.{0} > tally.{0} THEN excluded.{0} ELSE tally.{0} END"
+
+
+_HOUR: Final = (
+    "INSERT INTO hour (site, series, hour, n, total, low, high) VALUES (?, ?, ?, ?, ?, ?, ?)"
+    " ON CONFLICT (site, series, hour) DO UPDATE SET n = excluded.n, total = excluded.total,"
+    " low = excluded.low, high = excluded.high"
+)
+_OF_HOUR: Final = (
+    "SELECT CAST(n AS TEXT), CAST(total AS TEXT), CAST(low AS TEXT), CAST(high AS TEXT)"
+    " FROM hour WHERE site = :site AND series = :series AND hour = :hour"
+)
+_TALLY: Final = (
+    "INSERT INTO tally (site, run, event, hour, n, total, low, high, first_ns, last_ns)"
+    " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"
+    " ON CONFLICT (site, run, event, hour) DO UPDATE SET"
+    " n = tally.n + excluded.n, total = tally.total + excluded.total,"
+    f" low = {_LEAST.format('low')}, high = {_MOST.format('high')},"
+    f" first_ns = {_LEAST.format('first_ns')},"
+    f" last_ns = {_MOST.format('last_ns')}"
+)
+_ENDS: Final = (
+    "SELECT first_ns, last_ns FROM tally WHERE site = :site AND run = :run AND event = :event"
+    " ORDER BY hour {} LIMIT 1"
+)
+_FIRST: Final = _ENDS.format("ASC")
+_LAST: Final = _ENDS.format("DESC")
+
+
+def _upsert_hours(log: SiteLog, hours: dict[tuple[int, int], list[Sequence[float]]]) -> None:
+    rows: list[tuple[Any, ...]] = []
+    n: list[int]
+    total: list[float]
+    low: list[Any]  # None where there is nothing
+    high: list[Any]
+    # In the order of the table: its pages are met once.
+    for (series, hour), scans in sorted(hours.items()):
+        found = log.execute(_OF_HOUR, {"series": series, "hour": hour}).fetchone()
+        if found is None:
+            width = len(scans[0])
+            n, total, low, high = [0] * width, [0.0] * width, [None] * width, [None] * width
+        else:
+            n, total, low, high = _lists(found)
+        for values in scans:
+            for sensor, value in enumerate(values):
+                if not -_LARGEST < value < _LARGEST:  # nor NaN, see `is_counted`
+                    continue
+                if n[sensor]:
+                    n[sensor] += 1
+                    total[sensor] += value
+                    if value < low[sensor]:
+                        low[sensor] = value
+                    elif value > high[sensor]:
+                        high[sensor] = value
+                else:
+                    n[sensor], total[sensor] = 1, value
+                    low[sensor] = high[sensor] = value
+        # What a sum has beyond 15 digits is noise, and takes room.
+        total = [float(f"{number:.15g}") for number in total]
+        rows.append((log.site, series, hour, *map(_json, (n, total, low, high))))
+    log.execute_many(_HOUR, rows)
+
+
+def _lists(texts: Sequence[str]) -> list[list[Any]]:
+    try:
+        lists: list[list[Any]] = json.loads(f"[{','.join(texts)}]")
+    except ValueError:
+        raise DamagedFile("an hour in the journal is no list of numbers") from None
+    return lists
+
+
+def _json(numbers: object) -> str:
+    return json.dumps(numbers, separators=(",", ":"))
+
+
+def _tally(
+    tallies: dict[tuple[int, str, int], list[int]],
+    key: tuple[int, str, int],
+    value: int,
+    stamp_ns: int,
+) -> None:
+    entry = tallies.get(key)
+    if entry is None:
+        tallies[key] = [1, value, value, value, stamp_ns, stamp_ns]
         return
-    index = (np.maximum(found.numbers[0], origin) - origin) // width
-    order = np.argsort(index, kind="stable")
-    told, starts, which = np.unique(index[order], return_index=True, return_inverse=True)
-    n, mean, low, high = (of[order] for of in _unpacked(found.packed[0], sensors, places))
-    # What is damaged, or beyond any number, is told as it is.
-    with np.errstate(all="ignore"):
-        counts = np.add.reduceat(n.sum(axis=1), starts)
-        # Hour by hour, as `Bucket` would: pairs would give another last digit.
-        means = np.bincount(np.repeat(which, len(places)), weights=(n * mean).ravel()) / counts
-        lows = np.fmin.reduceat(np.fmin.reduce(low, axis=1, initial=np.inf), starts)
-        highs = np.fmax.reduceat(np.fmax.reduce(high, axis=1, initial=-np.inf), starts)
-    columns = (told, counts, means, lows, highs)
-    for at, count, *rest in zip(*(column.tolist() for column in columns), strict=True):
-        if count:
-            yield at, Bucket(count, *rest)
+    entry[0] += 1
+    entry[1] += value
+    entry[2], entry[3] = min(entry[2], value), max(entry[3], value)
+    entry[4], entry[5] = min(entry[4], stamp_ns), max(entry[5], stamp_ns)
 
 
-def _unpacked(
-    packed: Packed, sensors: int, places: Sequence[int]
-) -> tuple[Ints, Floats, Floats, Floats]:
-    """(n, mean, low, high), a row an hour, a column each of the places; none where damaged.
+# --- one by one -----------------------------------------------------------------------------------
 
-    `packing.unpack_buckets` for many.
-    """
-    shape = (len(packed.lengths), len(places))
-    n = np.zeros(shape, dtype=np.int64)
-    mean, low, high = np.zeros(shape), np.full(shape, np.inf), np.full(shape, -np.inf)
-    data = np.frombuffer(packed.data, dtype=np.uint8)
-    starts = np.cumsum(packed.lengths) - packed.lengths
-    for each, layout in _LAYOUTS.items():
-        rows = np.flatnonzero(packed.lengths == each * sensors)
-        if not len(rows):
-            continue
-        # Of a row no more than what is told of it: the rest would be most of the time.
-        where = starts[rows][:, None] + np.array(places) * each
-        told = data[where[:, :, None] + np.arange(each)].view(layout)[:, :, 0]
-        with np.errstate(invalid="ignore"):  # what is damaged may be a signalling NaN
-            for name, column in (("n", n), ("mean", mean), ("low", low), ("high", high)):
-                column[rows] = told[name]
-    return n, mean, low, high
+_EVENT: Final = (
+    "INSERT INTO event (site, run, event, stamp_ns, seq, tag, value)"
+    " VALUES (:site, :run, :event, :at, :seq, :tag, :value) ON CONFLICT DO NOTHING"
+)
+_NOT_EVENT: Final = (
+    "DELETE FROM event WHERE site = :site AND run = :run AND event = :event AND stamp_ns = :at"
+    " AND seq = :seq"
+)
+_SILENCE_OVER: Final = (
+    "SELECT stamp_ns, stamp_ns + value FROM event WHERE site = :site AND run = :run"
+    " AND event = :event AND stamp_ns < :at ORDER BY stamp_ns DESC LIMIT 1"
+)
+
+
+def silence_over(log: SiteLog, run: int, at_ns: int) -> tuple[int, int] | None:
+    """The attempts between which a moment is, if they are far apart; the later may be then."""
+    asked = {"run": run, "event": Event.SILENCES, "at": at_ns}
+    found = log.execute(_SILENCE_OVER, asked).fetchone()
+    return (found[0], found[1]) if found and found[1] >= at_ns else None
+
+
+def _note_silences(log: SiteLog, run: int, stamps: list[int]) -> None:
+    first_ns, last_ns = extent(log, run) or (stamps[0], stamps[0])
+    for at_ns in stamps:
+        if at_ns > last_ns:
+            _note_silence(log, run, last_ns, at_ns)
+            last_ns = at_ns
+        elif at_ns < first_ns:
+            _note_silence(log, run, at_ns, first_ns)
+            first_ns = at_ns
+        elif (over := silence_over(log, run, at_ns)) is not None and over[1] > at_ns:
+            gone = {"run": run, "event": Event.SILENCES, "at": over[0], "seq": 0}
+            log.execute(_NOT_EVENT, gone)
+            _note_silence(log, run, over[0], at_ns)
+            _note_silence(log, run, at_ns, over[1])
+
+
+def _note_silence(log: SiteLog, run: int, start_ns: int, end_ns: int) -> None:
+    value = end_ns - start_ns
+    if value > SILENCE_NS:
+        key = {"run": run, "event": Event.SILENCES, "at": start_ns, "seq": 0, "tag": ""}
+        log.execute(_EVENT, key | {"value": value})
+
+
+_LOOK: Final = (
+    "SELECT stamp_ns, seq, anomaly, bug_count FROM look WHERE site = :site AND run = :run"
+    " AND tag = :tag AND is_copy = 0 AND (stamp_ns, seq) {0} (:at, :seq)"
+    " ORDER BY stamp_ns {1}, seq {1} LIMIT 1"
+)
+_BEFORE: Final = _LOOK.format("<", "DESC")
+_AFTER: Final = _LOOK.format(">", "ASC")
+_LAST_CHANGE: Final = (
+    "SELECT event FROM event WHERE site = :site AND run = :run AND tag = :tag"
+    " AND (stamp_ns, seq) < (:at, :seq) ORDER BY stamp_ns DESC, seq DESC LIMIT 1"
+)
+
+
+def _note_pests(log: SiteLog, look: WrittenLook) -> None:
+    """Note what a look changes; one that comes late may make the next one a change, or none."""
+    within = {"run": look.run, "tag": look.tag, "at": look.stamp_ns, "seq": look.seq}
+    before = log.execute(_BEFORE, within).fetchone()
+    if before is not None:
+        had = bool(before[2])
+    else:
+        # A tag without a look has no pest; that of a deleted one is known by what it changed.
+        change = log.execute(_LAST_CHANGE, within).fetchone()
+        had = change is not None and change[0] == Event.PESTS_SEEN
+    _note_pest(log, within, look.bug_count, (had, look.anomaly))
+    after = log.execute(_AFTER, within).fetchone()
+    if after is not None:
+        within |= {"at": after[0], "seq": after[1]}
+        _note_pest(log, within, after[3], (look.anomaly, bool(after[2])))
+
+
+def _note_pest(log: SiteLog, at: dict[str, Any], bugs: int, pests: tuple[bool, bool]) -> None:
+    had, has = pests
+    event = Event.PESTS_SEEN if has else Event.PESTS_CLEARED
+    if had != has:
+        log.execute(_EVENT, at | {"event": event, "value": bugs})
+    else:
+        log.execute(_NOT_EVENT, at | {"event": event})

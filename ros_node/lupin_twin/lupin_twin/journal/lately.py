@@ -6,8 +6,8 @@ import math
 import sqlite3
 from collections.abc import Iterator
 
-from lupin_twin.journal.asof import state_at
-from lupin_twin.journal.series import newest, series
+from lupin_twin.journal.fold import state_at
+from lupin_twin.journal.queries import newest, series
 from lupin_twin.past import MAX_POINTS, SeriesPast, SeriesRequest
 
 # A tag's id, its place (m, map frame), and its readings: (ns of ROS time, value).
@@ -19,7 +19,7 @@ def lately(
 ) -> Iterator[TagLately]:
     """The tags that had a place and a reading at `at_ns`, with their last `most` finite readings.
 
-    `reach_ns` is how far back. Where scans were given up, the means of stretches.
+    `reach_ns` is how far back. Where rows were deleted, the means of stretches.
     """
     for tag in state_at(connection, at_ns, "").tags:
         if tag.pose is None or all(reading.name != sensor_type for reading in tag.readings):

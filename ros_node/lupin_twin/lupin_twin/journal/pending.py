@@ -34,6 +34,7 @@ class Pending:
         self._entries: deque[Entry] = deque()
         self._weight = 0
         self._lost = 0
+        self._taken = 0
 
     def put(self, entry: Entry) -> None:
         """Hand over; takes microseconds, whatever the disk does."""
@@ -46,18 +47,20 @@ class Pending:
             self.arrived.set()
 
     def take(self, count: int) -> list[Entry]:
-        """At most so many of the oldest."""
+        """At most so many of the oldest; they wait still, until something is put back."""
         self.arrived.clear()
         with self._lock:
             taken = [self._entries.popleft() for _ in range(min(count, len(self._entries)))]
             self._weight -= sum(weight(entry.row) for entry in taken)
+            self._taken = len(taken)
             if self._entries:
                 self.arrived.set()
         return taken
 
     def put_back(self, entries: Sequence[Entry]) -> None:
-        """What was taken and could not be written is the oldest again."""
+        """What was taken and could not be written is the oldest again; the rest is done with."""
         with self._lock:
+            self._taken = 0
             self._entries.extendleft(reversed(entries))
             self._weight += sum(weight(entry.row) for entry in entries)
             if self._weight > self._max_weight:
@@ -72,4 +75,4 @@ class Pending:
         """(waiting, lost, when the oldest that waits was handed over)."""
         with self._lock:
             oldest = self._entries[0].handed_over_s if self._entries else None
-            return len(self._entries), self._lost, oldest
+            return len(self._entries) + self._taken, self._lost, oldest

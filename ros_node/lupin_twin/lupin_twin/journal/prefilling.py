@@ -7,18 +7,18 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from lupin_twin.journal.appending import Appender
 from lupin_twin.journal.lock import Lock
-from lupin_twin.journal.rollups import get_meta, set_meta
 from lupin_twin.journal.rows import Row
-from lupin_twin.journal.runs import Clock, Run
-from lupin_twin.journal.schema import open_writer, transaction
+from lupin_twin.journal.schema import LOCAL_SITE, get_meta, open_writer, set_meta, transaction
 
 _FROM: Final = "simulated_from_ns"
 _UNTIL: Final = "simulated_until_ns"
+_LOT: Final = 1_000
 
 
 class Stretch(NamedTuple):
@@ -30,11 +30,7 @@ class Stretch(NamedTuple):
 
 def is_empty(connection: sqlite3.Connection) -> bool:
     """Whether nothing was ever observed into a journal."""
-    rows = [
-        connection.execute(f"SELECT 1 FROM {table} LIMIT 1").fetchone()  # noqa: S608  # constants
-        for table in ("scan", "look", "pin", "rollup")
-    ]
-    return rows == [None] * 4 and not get_meta(connection, "purged_id")
+    return not Appender(connection).last_seq
 
 
 def prefill(path: Path, holder: str, rows: Sequence[Row], until_ns: int) -> bool:
@@ -51,28 +47,28 @@ def prefill(path: Path, holder: str, rows: Sequence[Row], until_ns: int) -> bool
     if not rows:
         return False
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    with Lock(path, holder):
-        connection = open_writer(path)
-        try:
-            if not is_empty(connection):
-                return False
-            first = rows[0]
-            run = Run(1, Clock(first.stamp_ns, first.arrival_ns, is_simulated=False))
-            with transaction(connection):
-                # Of twins that have heard nothing.
-                connection.execute("DELETE FROM run")
-                connection.execute(
-                    "INSERT INTO run VALUES (?, 0, ?, ?, 0, NULL, 0, NULL)",
-                    (run.id, run.begun.stamp_ns, run.begun.arrival_ns),
-                )
-                Appender(connection).append(run, rows)
-                set_meta(connection, **{_FROM: first.stamp_ns, _UNTIL: until_ns})
-        finally:
-            connection.close()
+    with Lock(path, holder), closing(open_writer(path)) as connection:
+        if not is_empty(connection):
+            return False
+        first = rows[0]
+        with transaction(connection):
+            # Of twins that have heard nothing.
+            connection.execute("DELETE FROM run")
+            connection.execute(
+                "INSERT INTO run VALUES (?, 1, 0, ?, ?, 1, NULL, NULL)",
+                (LOCAL_SITE, first.stamp_ns, first.arrival_ns),
+            )
+            appender = Appender(connection)
+            for start in range(0, len(rows), _LOT):
+                appender.append(1, rows[start : start + _LOT])
+                appender.flush()
+            set_meta(connection, _FROM, first.stamp_ns)
+            set_meta(connection, _UNTIL, until_ns)
+        connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
     return True
 
 
 def simulated(connection: sqlite3.Connection) -> Stretch | None:
     """The stretch of a journal that was filled in, None if nothing was."""
-    until_ns = get_meta(connection, _UNTIL)
-    return Stretch(get_meta(connection, _FROM), until_ns) if until_ns else None
+    start_ns, end_ns = get_meta(connection, _FROM), get_meta(connection, _UNTIL)
+    return Stretch(int(start_ns), int(end_ns)) if start_ns and end_ns else None

@@ -1,8 +1,7 @@
 """What is given up, by age and by size, a little at a time: the oldest first.
 
 Rows go by ranges of their numbers, which lie together in the file; the pages they leave are used
-again, and what is left over is given back to the disk. Only what is in rollups and tallies already
-goes.
+again, and what is left over is given back to the disk. Hours stay for ten years.
 """
 
 from __future__ import annotations
@@ -11,21 +10,21 @@ import sqlite3
 from dataclasses import dataclass
 from typing import Final
 
-from lupin_twin.journal.rollups import get_meta, set_meta
-from lupin_twin.journal.runs import Run
-from lupin_twin.journal.tallying import TALLIED, purge_tallies
+from lupin_twin.journal.appending import PURGED_SEQ
+from lupin_twin.journal.hours import delete_before
+from lupin_twin.journal.runs import runs
+from lupin_twin.journal.schema import LOCAL_SITE, get_meta, set_meta
+from lupin_twin.journal.site_log import SiteLog
 from lupin_twin.past import HOUR_NS
 
-_DAY_NS: Final = 24 * HOUR_NS
-ROLLUP_DAYS: Final = 3652  # ten years
+DAY_NS: Final = 24 * HOUR_NS
+_HOURS_DAYS: Final = 3652  # ten years
 
 # What one step deletes or moves: some ten milliseconds, for observations wait behind it.
 _ROWS: Final = 300
-_SERIES: Final = 200
 _PAGES: Final = 128
 # Free pages that are kept for what is written next: a hundredth of the file, and 256 at least.
 _FREE_PAGES: Final = 256
-
 
 # The limits stand in the file, for who looks at it without its twin.
 KEPT_NS: Final = "kept_ns"
@@ -44,9 +43,9 @@ class Limits:
 
 def note_limits(connection: sqlite3.Connection, limits: Limits) -> None:
     """Have the limits in the file."""
-    noted = {KEPT_NS: int(limits.days * _DAY_NS), KEPT_BYTES: limits.max_bytes}
-    if any(get_meta(connection, key) != value for key, value in noted.items()):
-        set_meta(connection, **noted)
+    for key, value in ((KEPT_NS, int(limits.days * DAY_NS)), (KEPT_BYTES, limits.max_bytes)):
+        if get_meta(connection, key) != str(value):
+            set_meta(connection, key, value)
 
 
 def used_bytes(connection: sqlite3.Connection) -> int:
@@ -55,80 +54,87 @@ def used_bytes(connection: sqlite3.Connection) -> int:
     return (pages - free) * size
 
 
-def purge_step(connection: sqlite3.Connection, limits: Limits, now_ns: int) -> bool:
-    """Delete some rows that are too old or too many; returns whether there may be more.
+def purged_ns(connection: sqlite3.Connection, run: int, site: str = LOCAL_SITE) -> int:
+    """The last stamp of a run of which something was given up; -1 if nothing was."""
+    found = get_meta(connection, f"{_HORIZON}{run}", site)
+    return -1 if found is None else int(found)
 
-    `now_ns` is wall time: what a simulation said is as old as its arrival.
+
+def horizon_ns(connection: sqlite3.Connection, limits: Limits, now_ns: int) -> int:
+    """What was received before this, by the wall's clock, goes now.
+
+    That clock may be ahead: what was received last tells how far it has come, and no more than a
+    day of what is there goes at once.
     """
-    oldest = connection.execute(
-        "SELECT scan.id, stamp_ns + lead_ns + 1000 * lag_us FROM scan"
-        " JOIN series ON series.id = series JOIN run ON run.id = run ORDER BY scan.id LIMIT ?",
-        (_ROWS,),
-    ).fetchall()
-    looks = connection.execute(
-        "SELECT look.id, stamp_ns + lead_ns + 1000 * lag_us FROM look"
-        " JOIN series ON series.id = series JOIN run ON run.id = run ORDER BY look.id LIMIT ?",
-        (_ROWS,),
-    ).fetchall()
-    rolled_id = min(get_meta(connection, "rolled_id"), get_meta(connection, TALLIED))
-    # Where both go on past what was read, only what both were read up to can go.
-    reach = min((rows[-1][0] for rows in (oldest, looks) if len(rows) == _ROWS), default=rolled_id)
-    known = [(n, arrival) for n, arrival in (*oldest, *looks) if n <= min(reach, rolled_id)]
+    received = [
+        connection.execute(
+            f"SELECT arrival_ns FROM {table} WHERE site = ? ORDER BY seq {way} LIMIT 1",  # noqa: S608
+            (LOCAL_SITE,),
+        ).fetchone()
+        for way in ("ASC", "DESC")
+        for table in ("scan", "look")
+    ]
+    first = min((row[0] for row in received[:2] if row), default=now_ns)
+    last = max((row[0] for row in received[2:] if row), default=now_ns)
+    return min(min(now_ns, last) - int(limits.days * DAY_NS), first + DAY_NS)
+
+
+def purge_step(connection: sqlite3.Connection, limits: Limits, before_ns: int) -> bool:
+    """Delete some rows that are too old or too many; returns whether there may be more."""
+    oldest = sorted(
+        row
+        for table in ("scan", "look")
+        for row in connection.execute(
+            f"SELECT seq, arrival_ns FROM {table} WHERE site = ? ORDER BY seq LIMIT ?",  # noqa: S608
+            (LOCAL_SITE, _ROWS),
+        )
+    )[:_ROWS]
     is_too_large = used_bytes(connection) > limits.max_bytes
-    horizon_ns = now_ns - int(limits.days * _DAY_NS)
-    last = max((n for n, arrival in known if is_too_large or arrival < horizon_ns), default=0)
+    last = 0
+    for seq, arrival_ns in oldest:
+        if not (is_too_large or arrival_ns < before_ns):
+            break
+        last = seq
     if not last:
         return False
     _keep_horizons(connection, last)
-    connection.execute("DELETE FROM scan WHERE id <= ?", (last,))
-    connection.execute("DELETE FROM look WHERE id <= ?", (last,))
+    for table in ("scan", "look"):
+        connection.execute(
+            f"DELETE FROM {table} WHERE site = ? AND seq <= ?",  # noqa: S608  # constants
+            (LOCAL_SITE, last),
+        )
     # The numbers go on when everything is gone.
-    set_meta(connection, purged_id=max(last, get_meta(connection, "purged_id")))
+    set_meta(connection, PURGED_SEQ, last)
     return True
-
-
-def purged_ns(connection: sqlite3.Connection, run: Run) -> int:
-    """The last stamp of a run of which something was given up; -1 if nothing was."""
-    return get_meta(connection, f"{_HORIZON}{run.id}", -1)
 
 
 def _keep_horizons(connection: sqlite3.Connection, last: int) -> None:
-    for table in ("scan", "look"):
-        for run, stamp_ns in connection.execute(
-            f"SELECT run, max(stamp_ns) FROM {table}"  # noqa: S608  # a constant
-            f" JOIN series ON series.id = series WHERE {table}.id <= ? GROUP BY run",
-            (last,),
-        ).fetchall():
-            key = f"{_HORIZON}{run}"
-            set_meta(connection, **{key: max(stamp_ns, get_meta(connection, key, -1))})
+    for run, stamp_ns in connection.execute(
+        "SELECT run, max(stamp_ns) FROM (SELECT run, stamp_ns FROM scan JOIN series"
+        " ON series.site = scan.site AND series.series = scan.series"
+        " WHERE scan.site = :site AND seq <= :last"
+        " UNION ALL SELECT run, stamp_ns FROM look WHERE site = :site AND seq <= :last)"
+        " GROUP BY run",
+        {"site": LOCAL_SITE, "last": last},
+    ).fetchall():
+        set_meta(connection, f"{_HORIZON}{run}", max(stamp_ns, purged_ns(connection, run)))
 
 
-def purge_rollups_step(connection: sqlite3.Connection, now_ns: int, after_series: int) -> int:
-    """Delete the rollups of some series that are past ten years; returns the last series, 0: done.
-
-    `after_series` is what the last step returned, 0 at first.
-    """
-    series = connection.execute(
-        "SELECT series.id, lead_ns FROM series JOIN run ON run.id = run"
-        " WHERE series.id > ? ORDER BY series.id LIMIT ?",
-        (after_series, _SERIES),
-    ).fetchall()
-    if not after_series:
-        for run, lead_ns in connection.execute("SELECT id, lead_ns FROM run").fetchall():
-            purge_tallies(connection, run, now_ns - ROLLUP_DAYS * _DAY_NS - lead_ns)
-    for number, lead_ns in series:
-        horizon = (now_ns - ROLLUP_DAYS * _DAY_NS - lead_ns) // HOUR_NS
-        connection.execute("DELETE FROM rollup WHERE series = ? AND hour < ?", (number, horizon))
-    return int(series[-1][0]) if len(series) == _SERIES else 0
+def purge_hours(connection: sqlite3.Connection, now_ns: int) -> None:
+    """Delete the hours that are past ten years; what a simulation said is as old as its arrival."""
+    for run in runs(connection.execute):
+        delete_before(SiteLog(connection), run.id, now_ns - run.lead_ns - _HOURS_DAYS * DAY_NS)
 
 
 def shrink_step(connection: sqlite3.Connection) -> bool:
-    """Give some free pages back to the disk; returns whether there may be more."""
+    """Give some free pages back to the disk; returns whether there are more."""
     pages, free, _ = _pages(connection)
-    if free <= max(_FREE_PAGES, pages // 100):
+    spare = free - max(_FREE_PAGES, pages // 100)
+    if spare <= 0:
         return False
-    connection.execute(f"PRAGMA incremental_vacuum({_PAGES})").fetchall()
-    return True
+    # A script: `execute` would take the first of its steps alone, which is one page.
+    connection.executescript(f"PRAGMA incremental_vacuum({min(spare, _PAGES)})")
+    return spare > _PAGES
 
 
 def _pages(connection: sqlite3.Connection) -> tuple[int, int, int]:

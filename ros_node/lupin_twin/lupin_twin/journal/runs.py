@@ -1,27 +1,50 @@
-"""Runs of the clock: which one a twin that starts, or a clock that goes back, belongs to.
+"""Runs of the clock: which one a twin that starts is in, and which one a moment belongs to.
 
-Pure. Wall time goes on over a restart, a simulation begins again at 0: what it said yesterday at
-second 500 must not look fresh at second 510 today.
+Wall time goes on over a restart, and is set a little now and then; a simulation begins again at 0:
+what it said yesterday at second 500 must not look fresh at second 510 today.
+
+Where runs overlap, the newest that holds a moment has it. Between the end of a run and the next
+one's beginning the earlier one goes on, and so does the last; before all of them is the first.
 """
 
 from __future__ import annotations
 
+import heapq
+from bisect import bisect_right
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from enum import IntEnum
-from typing import Final
+from enum import Enum, IntEnum
+from typing import Any, Final
+
+from lupin_twin.journal.schema import LOCAL_SITE
 
 # A wall clock that is set back by no more is the same clock, corrected.
-CORRECTION_NS: Final = 60 * 1_000_000_000
+CORRECTION_NS: Final = 300 * 1_000_000_000
 # How much faster than before a simulation may go on.
 _FASTER: Final = 2.0
+# Later than any stamp.
+FOREVER_NS: Final = 2**63 - 1
+
+# `execute` of a connection to either engine.
+Execute = Callable[..., Any]
 
 
 class Carries(IntEnum):
-    """What of an earlier run still holds as another begins."""
+    """What of an earlier run still holds as another begins: it is copied into that."""
 
     NOTHING = 0
     PLACES = 1  # tags do not move, but how old their readings are is not known
     ALL = 2  # the twin lived through it: what is later than the new now ages from there on
+
+
+class Turn(Enum):
+    """Why a clock is followed anew."""
+
+    START = "start"
+    BELIEVED = "believed"  # the start, with a clock that contradicts the log and stays so
+    STEP = "step"  # a wall clock was set back a little: the run goes on
+    BACK = "back"  # a new run
+    AHEAD = "ahead"  # a wall clock jumped ahead: a run that it had gone back from may go on
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,52 +58,132 @@ class Clock:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A stretch of ROS time that never goes back; `follows` is the id of the run before it."""
+    """A stretch of ROS time, or a step within one (`joins` is the run that it is part of).
+
+    What holds in it was written with `begun_seq` or later, copies of what was known included.
+    """
 
     id: int
     begun: Clock
-    follows: int | None = None
-    carries: Carries = Carries.NOTHING
+    begun_seq: int
+    joins: int | None = None
+    ended_ns: int | None = None
+
+    @property
+    def root(self) -> int:
+        """The number of the run that rows refer to."""
+        return self.id if self.joins is None else self.joins
 
     @property
     def lead_ns(self) -> int:
-        """What arrivals are ahead of stamps, about: keeps the differences in the file small."""
+        """What arrivals are ahead of stamps, about."""
         return self.begun.arrival_ns - self.begun.stamp_ns if self.begun.is_simulated else 0
 
 
 @dataclass(frozen=True, slots=True)
-class Ending:
-    """The last run of a kind that the journal knows, and the last that was heard in it."""
+class Span:
+    """A stretch of ROS time, `start_ns <= stamp < end_ns`, and the run that it belongs to."""
 
     run: Run
-    last: Clock
+    start_ns: int
+    end_ns: int
 
 
-def goes_on(ending: Ending, now: Clock) -> bool:
-    """Whether a twin that starts `now` is still in that run.
+def runs(execute: Execute, site: str = LOCAL_SITE) -> list[Run]:
+    """Every run and step, in the order in which they began."""
+    return [
+        Run(row[0], Clock(row[2], row[3], bool(row[1])), row[4], row[5], row[6])
+        for row in execute(
+            "SELECT run, is_simulated, begun_stamp_ns, begun_arrival_ns, begun_seq, joins,"
+            " ended_stamp_ns FROM run WHERE site = :site ORDER BY run",
+            {"site": site},
+        ).fetchall()
+    ]
 
-    A simulation is the same if its clock is further on than one could be that began after the last
-    word of the old one: at twice the pace that the old one had, or the wall's. Where the wall's
-    clock was set back meanwhile, how long that was is not known, and it is another.
+
+def since_seq(every: Iterable[Run], root: int, at_ns: int) -> int:
+    """From which seq on the rows of a run hold as of a moment: its last step by then."""
+    steps = [run for run in every if run.root == root]
+    begun = [run for run in steps if run.begun.stamp_ns <= at_ns]
+    return (begun or steps)[-1 if begun else 0].begun_seq
+
+
+def spans(every: Iterable[Run]) -> tuple[Span, ...]:
+    """All of the axis from 0 to `FOREVER_NS`, in order; empty where there is no run."""
+    every = list(every)
+    roots = [run for run in every if run.joins is None]
+    # A step may lead to before the beginning.
+    begun: dict[int, int] = {}
+    for run in every:
+        stamp_ns = run.begun.stamp_ns
+        begun[run.root] = min(stamp_ns, begun.get(run.root, stamp_ns))
+    waiting = sorted(roots, key=lambda run: (begun[run.id], run.id), reverse=True)
+    # A run holds its beginning at least, and the last moment that was heard.
+    until = {
+        run.id: FOREVER_NS if run.ended_ns is None else max(run.ended_ns, run.begun.stamp_ns) + 1
+        for run in roots
+    }
+    edges = set(begun.values()) | set(until.values()) - {FOREVER_NS}
+    starts: list[tuple[int, Run]] = []
+    holding: list[tuple[int, int, Run]] = []  # the newest first
+    for at_ns in sorted(edges):
+        while waiting and begun[waiting[-1].id] <= at_ns:
+            run = waiting.pop()
+            heapq.heappush(holding, (-run.id, until[run.id], run))
+        while holding and holding[0][1] <= at_ns:
+            heapq.heappop(holding)
+        if holding and (not starts or starts[-1][1] is not holding[0][2]):
+            starts.append((at_ns if starts else 0, holding[0][2]))
+    if not starts:
+        return ()
+    ends_ns = [*(start_ns for start_ns, _ in starts[1:]), FOREVER_NS]
+    return tuple(
+        Span(run, start_ns, end_ns) for (start_ns, run), end_ns in zip(starts, ends_ns, strict=True)
+    )
+
+
+def span_at(every: Iterable[Run], at_ns: int) -> Span | None:
+    """The span of a moment; None before 0, and where there is no run."""
+    found = spans(every)
+    index = bisect_right([span.start_ns for span in found], at_ns)
+    return found[index - 1] if index else None
+
+
+def spans_within(every: Iterable[Run], start_ns: int, end_ns: int) -> tuple[Span, ...]:
+    """The spans of `start_ns <= stamp < end_ns`, cut to that."""
+    return tuple(
+        Span(span.run, max(span.start_ns, start_ns), min(span.end_ns, end_ns))
+        for span in spans(every)
+        if max(span.start_ns, start_ns) < min(span.end_ns, end_ns)
+    )
+
+
+def simulation_goes_on(begun: Clock, last: Clock, now: Clock) -> bool:
+    """Whether a simulation that is heard `now` is the one last heard at `last`.
+
+    It is if its clock is further on than one could be that began after the last word of the old
+    one: at twice the pace that the old one had, or the wall's. Where the wall's clock was set back
+    meanwhile, how long that was is not known, and it is another.
     """
-    passed = now.stamp_ns - ending.last.stamp_ns
-    if not now.is_simulated:
-        return passed >= -CORRECTION_NS
-    waited_ns = now.arrival_ns - ending.last.arrival_ns
+    waited_ns = now.arrival_ns - last.arrival_ns
     if waited_ns < -CORRECTION_NS:
         return False
-    begun = ending.run.begun
-    lasted_ns = max(1, ending.last.arrival_ns - begun.arrival_ns)
-    pace = max(1.0, (ending.last.stamp_ns - begun.stamp_ns) / lasted_ns)
-    return passed >= 0 and now.stamp_ns > _FASTER * pace * max(0, waited_ns)
+    lasted_ns = max(1, last.arrival_ns - begun.arrival_ns)
+    pace = max(1.0, (last.stamp_ns - begun.stamp_ns) / lasted_ns)
+    is_later = now.stamp_ns >= last.stamp_ns
+    return is_later and now.stamp_ns > _FASTER * pace * max(0, waited_ns)
 
 
-def carried_at_start(now: Clock) -> Carries:
-    """What holds of the last run for a twin that starts in a new one."""
-    return Carries.NOTHING if now.is_simulated else Carries.PLACES
+def turn_of(before: Clock, now: Clock, jumped_ns: int) -> Turn | None:
+    """What a clock has done while the twin lived; None: it went on.
 
-
-def is_new_run(before: Clock, now: Clock) -> bool:
-    """Whether a clock has gone back so far, while the twin lived, that a new run begins."""
+    `jumped_ns` is how much further it went than the steady clock.
+    """
     back_ns = before.stamp_ns - now.stamp_ns
-    return back_ns > (0 if now.is_simulated else CORRECTION_NS)
+    if before.is_simulated != now.is_simulated or (now.is_simulated and back_ns > 0):
+        return Turn.BACK
+    if now.is_simulated:
+        return None
+    if back_ns > 0:
+        return Turn.STEP if back_ns <= CORRECTION_NS else Turn.BACK
+    return Turn.AHEAD if jumped_ns > CORRECTION_NS else None

@@ -1,41 +1,82 @@
-"""A damaged file: set aside under a name that says when, and read as far as it can be read."""
+# ruff: noqa: S608  # SQL is put together of constants
+"""A damaged file: quarantined under a name that says when, and read page by page.
+
+A row is found where it stands, on whatever page, without the trees that lead to it
+(https://www.sqlite.org/fileformat2.html, 1.6 and 2): so it does not matter which pages are lost.
+The pages of its write-ahead log are read in the place of those that they were to replace.
+"""
 
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing
+import struct
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final
-from urllib.parse import quote
+from types import NoneType
+from typing import IO, Any, Final
 
-from lupin_twin.journal.carving import carve
-from lupin_twin.journal.packing import Damaged, columns, unseal
-from lupin_twin.journal.reading import LOOK, SCAN, sensor_names
-from lupin_twin.journal.rollups import get_meta, set_meta
-from lupin_twin.journal.schema import PAGE_SIZE, DamagedFile, transaction
+from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ
+from lupin_twin.journal.hours import WrittenLook, WrittenScan, count
+from lupin_twin.journal.reading import flower_of, numbers_of, sensor_names
+from lupin_twin.journal.schema import LOCAL_SITE, PAGE_SIZE, DamagedFile, set_meta, transaction
+from lupin_twin.journal.site_log import SiteLog
+from lupin_twin.past import HOUR_NS
 
-_ROWS: Final = 500
+_LEAF: Final = 0x0A
+_INNER: Final = 0x02
+_FIRST_PAGE_HEADER: Final = 100
+_INT_BYTES: Final = (0, 1, 2, 3, 4, 6, 8)
+_REAL: Final = struct.Struct(">d")
+# What of a row stands on its page, at most and at least, where the rest goes on on others.
+_LARGEST_HERE: Final = (PAGE_SIZE - 12) * 64 // 255 - 23
+_LEAST_HERE: Final = (PAGE_SIZE - 12) * 32 // 255 - 23
+# No row of ours is longer, and a damaged page may say anything.
+_MAX_PAYLOAD: Final = 10_000_000
+_LOG_HEADER: Final = 32
+_FRAME_HEADER: Final = 24
+
 _LEAST_ROW_BYTES: Final = 20
-# What gives the other rows their meaning, and the few that are looked up by what they say.
-_SMALL: Final = {
-    "run": "id, is_simulated, begun_stamp_ns, begun_arrival_ns, lead_ns, follows, carries,"
-    " ended_stamp_ns",
-    "tag": "id, tag_id",
-    "name": "id, text",
-    "sensors": "id, names",
-    "series": "id, run, tag, kind, status, source, sensors",
-    "pin": "id, run, tag, stamp_ns, lag_us, pose",
-    "change": "id, run, tag, stamp_ns, anomaly, bug_count",
+# By what a row of each table is known: text, integer, number, and those that may be missing.
+_KINDS: Final = {
+    "meta": "ttt",
+    "run": "tiiiiiII",
+    "series": "tiitit",
+    "scan": "tiiiIiitttit",
+    "look": "tiitiIitttFiiiitt",
+    "place": "tiitiifffffffi",
+    "hour": "tiitttt",
+    "tally": "titiiiiiii",
+    "event": "titiiti",
+    "note": "ttittttI",
+    # The index of the series: all that their table says.
+    "series_of": "tititi",
 }
-_LARGE: Final = {
-    "scan": SCAN,
-    "look": LOOK,
+_TYPES: Final[dict[str, tuple[type, ...]]] = {
+    "t": (str,),
+    "i": (int,),
+    "I": (int, NoneType),
+    "f": (int, float),
+    "F": (int, float, NoneType),
 }
-_LAST_ID: Final = 2**62
+_WRITTEN: Final = ("scan", "look")
+_NO_RUN: Final = "run NOT IN (SELECT run FROM run)"
+_MEANINGLESS: Final = {
+    "run": "joins NOT IN (SELECT run FROM run)",
+    "series": f"{_NO_RUN} OR NOT json_valid(sensors)",
+    "place": _NO_RUN,
+}
+# What was counted outlives the rows; of rows that are there it is counted again.
+_COUNTED: Final = ("hour", "tally", "event")
+# Later than any stamp that we write.
+_NEVER: Final = 2**62
+# A run begins at a moment of the wall's clock; nothing is counted that far.
+_LATE: Final = 10**12
+
+Record = tuple[Any, ...]
 
 
-def set_aside(path: Path, when: str) -> Path:
+def quarantine(path: Path, when: str) -> Path:
     """Rename a file and its log; returns the new name. Nothing is ever deleted or overwritten."""
     number = 0
     while True:
@@ -52,228 +93,269 @@ def set_aside(path: Path, when: str) -> Path:
     return aside
 
 
+class _Broken(ValueError):
+    """Bytes that are no row."""
+
+
+class Pages:
+    """The pages of a file, those in its log included."""
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("rb")
+        self._log: IO[bytes] | None = None
+        self._in_log: dict[int, int] = {}
+        log = path.with_name(path.name + "-wal")
+        if log.exists():
+            self._log = log.open("rb")
+            self._read_log()
+        self.count = max(path.stat().st_size // PAGE_SIZE, *self._in_log, 0)
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._file.close()
+        if self._log is not None:
+            self._log.close()
+
+    def __getitem__(self, number: int) -> bytes:
+        at = self._in_log.get(number)
+        file, at = (self._file, (number - 1) * PAGE_SIZE) if at is None else (self._log, at)
+        assert file is not None
+        file.seek(at)
+        return file.read(PAGE_SIZE)
+
+    def _read_log(self) -> None:
+        """Where each page stands in it last."""
+        assert self._log is not None
+        salt = self._log.read(_LOG_HEADER)[16:24]
+        at = _LOG_HEADER
+        while len(header := self._log.read(_FRAME_HEADER)) == _FRAME_HEADER:
+            if header[8:16] != salt:  # left behind by an earlier log
+                break
+            self._in_log[int.from_bytes(header[:4], "big")] = at + _FRAME_HEADER
+            at = self._log.seek(at + _FRAME_HEADER + PAGE_SIZE)
+
+    # --- rows ---------------------------------------------------------------------------------
+
+    def rows(self, *tables: str) -> Iterator[tuple[str, list[Record]]]:
+        """Rows of some tables, page by page from the last one on: the newest first, mostly."""
+        for number in range(self.count, 0, -1):
+            page = self[number]
+            at = _FIRST_PAGE_HEADER if number == 1 else 0
+            if len(page) < PAGE_SIZE or page[at] not in (_LEAF, _INNER):
+                continue
+            # All that stands on a page is of one table.
+            records = self._records(page, at)
+            first = next((record for record in records if _table_of(record)), ())
+            table = _table_of(first)
+            if table in tables:
+                yield table, [first, *(record for record in records if _table_of(record) == table)]
+
+    def _records(self, page: bytes, at: int) -> Iterator[Record]:
+        is_inner = page[at] == _INNER
+        cells = int.from_bytes(page[at + 3 : at + 5], "big")
+        first = at + (12 if is_inner else 8)
+        for pointer in range(first, min(first + 2 * cells, PAGE_SIZE - 1), 2):
+            cell = int.from_bytes(page[pointer : pointer + 2], "big") + (4 if is_inner else 0)
+            try:
+                yield self._record(page, cell)
+            except (_Broken, IndexError, UnicodeDecodeError, struct.error):
+                continue
+
+    def _record(self, page: bytes, at: int) -> Record:
+        length, at = _varint(page, at)
+        payload = self._payload(page, at, length)
+        header, at = _varint(payload, 0)
+        kinds = []
+        while at < header:
+            kind, at = _varint(payload, at)
+            kinds.append(kind)
+        values = []
+        for kind in kinds:
+            value, at = _value(payload, at, kind)
+            values.append(value)
+        return tuple(values)
+
+    def _payload(self, page: bytes, at: int, length: int) -> bytes:
+        """What stands on the page, and the pages that it goes on on."""
+        if length <= _LARGEST_HERE:
+            return page[at : at + length]
+        if length > _MAX_PAYLOAD:
+            raise _Broken
+        here = _LEAST_HERE + (length - _LEAST_HERE) % (PAGE_SIZE - 4)
+        here = here if here <= _LARGEST_HERE else _LEAST_HERE
+        found = bytearray(page[at : at + here])
+        following = int.from_bytes(page[at + here : at + here + 4], "big")
+        while len(found) < length:
+            more = self[following] if 0 < following <= self.count else b""
+            if len(more) < PAGE_SIZE:
+                raise _Broken
+            following = int.from_bytes(more[:4], "big")
+            found += more[4 : 4 + length - len(found)]
+        return bytes(found)
+
+
+def _table_of(record: Record) -> str:
+    """The table whose row it looks like; empty: of none, an index's entry for example."""
+    for table, kinds in _KINDS.items():
+        if (
+            len(kinds) == len(record)
+            and all(isinstance(v, _TYPES[kind]) for v, kind in zip(record, kinds, strict=True))
+            and (table != "run" or record[4] > _LATE)
+        ):
+            return table
+    return ""
+
+
+def _varint(data: bytes, at: int) -> tuple[int, int]:
+    """A number of up to nine bytes, and where it ends."""
+    value = 0
+    for index in range(8):
+        byte = data[at + index]
+        value = value << 7 | byte & 0x7F
+        if byte < 0x80:
+            return value, at + index + 1
+    return value << 8 | data[at + 8], at + 9
+
+
+def _value(data: bytes, at: int, kind: int) -> tuple[Any, int]:
+    """A value of a record by its serial type, and where it ends."""
+    if kind == 0:
+        return None, at
+    if kind in (8, 9):
+        return kind - 8, at
+    if kind < len(_INT_BYTES):
+        end = at + _INT_BYTES[kind]
+        return int.from_bytes(data[at:end], "big", signed=True), end
+    if kind == 7:
+        return _REAL.unpack(data[at : at + 8])[0], at + 8
+    end = at + (kind - 13) // 2
+    if kind < 13 or not kind % 2 or end > len(data):
+        raise _Broken
+    return data[at:end].decode(), end
+
+
 class Salvage:
     """Copies what can be read of a damaged journal into a new one, the newest first.
 
-    Rows keep their numbers. A row whose check does not fit, or whose series is lost, is left. Where
-    the tree above rows is damaged, they are looked for on every page.
+    Rows keep their numbers; one that is no row any more, or whose series is lost, is left.
     """
 
     def __init__(self, aside: Path, connection: sqlite3.Connection) -> None:
         self._aside = aside
         self._connection = connection
-        self.rows = 0
-        self._is_torn = False
+        self._log = SiteLog(connection)
+        # Run, kind and number of sensors of each series.
+        self._series: dict[int, tuple[int, int, int]] = {}
+        self._runs: set[int] = set()
+        self._purged_seq = 0
+        self._purged_ns: dict[int, int] = {}
 
-    def steps(self) -> Iterator[None]:
-        """Each step is one transaction; after the first, names, series and pins are there.
+    def steps(self) -> Generator[None, None, None]:
+        """Each step is one transaction; after the first, runs, series and places are there.
 
-        What was salvaged is folded into rollups again where those cannot be read: until the last
-        step is done nothing may be folded or purged. Steps that were done before do no harm.
+        Steps that were done before do no harm.
         """
         try:
-            source = _open_damaged(self._aside)
-        except sqlite3.Error:
+            pages = Pages(self._aside)
+        except OSError:
             return
-        with closing(source):
-            kept: dict[str, set[int]] = {}
+        try:
             with transaction(self._connection):
-                for table, what in _SMALL.items():
-                    rows = [row for lot in _readable(source, table, what) for row in lot]
-                    rows = [row for row in rows if _has_meaning(table, row, kept)]
-                    self._insert(table, what, rows)
-                    kept[table] = {row[0] for row in rows}
-                known = kept["series"]
-                # The numbers go on past all that may have been lost at the end.
-                last_id = max(_largest_id(source), *_noted(source), self._most_rows())
-                set_meta(
-                    self._connection, purged_id=last_id + 1_000_000, salvaged_id=last_id + 1_000_000
-                )
+                self._begin(pages)
             yield
-            for table in _LARGE:
-                for lot in _readable(source, table, _LARGE[table], self._tear):
-                    self._keep(table, lot, known)
-                    yield
-            if self._is_torn:
-                yield from self._carve(known, _noted(source)[0])
-            yield from self._tallies(source)
-            yield from self._rollups(source, sorted(known))
-
-    def _tear(self) -> None:
-        self._is_torn = True
-
-    def _keep(self, table: str, rows: list[tuple[Any, ...]], known: set[int]) -> None:
-        whole = [row for row in rows if row[1] in known and _is_whole(row)]
-        with transaction(self._connection):
-            self._insert(table, _LARGE[table], whole)
-        self.rows += len(whole)
-
-    def _carve(self, known: set[int], purged_id: int) -> Iterator[None]:
-        """What stands on the pages, found without the trees; some of it is there already."""
-        tables = {len(what.split(",")): table for table, what in _LARGE.items()}
-        found: dict[str, list[tuple[Any, ...]]] = {table: [] for table in _LARGE}
-        for rows in carve(self._aside, PAGE_SIZE, tuple(tables)):
-            for row in rows:
-                # What was given up stays so, though its page was not written since.
-                if row[0] > purged_id:
-                    found[tables[len(row)]].append(row)
-            for table, waiting in found.items():
-                if len(waiting) >= _ROWS:
-                    self._keep(table, waiting, known)
-                    waiting.clear()
-                    yield
-        for table, waiting in found.items():
-            self._keep(table, waiting, known)
-        yield
-
-    def _most_rows(self) -> int:
-        return self._aside.stat().st_size // _LEAST_ROW_BYTES
-
-    def _tallies(self, source: sqlite3.Connection) -> Iterator[None]:
-        """All of them or none: without, what was salvaged is counted again."""
-        tallied = 0
-        for table in ("tally", "tally_hour"):
-            try:
-                ((tallied,),) = source.execute("SELECT value FROM meta WHERE key = 'tallied_id'")
-                rows = source.execute(f"SELECT * FROM {table}").fetchall()  # noqa: S608
-            except (sqlite3.Error, ValueError):
+            for table, rows in pages.rows(*_WRITTEN):
                 with transaction(self._connection):
-                    self._connection.execute("DELETE FROM tally")
-                return
-            for first in range(0, len(rows), _ROWS):
-                with transaction(self._connection):
-                    self._connection.executemany(
-                        f"INSERT OR REPLACE INTO {table} VALUES ({', '.join('?' * 17)})",  # noqa: S608
-                        rows[first : first + _ROWS],
-                    )
+                    self._write(table, rows)
                 yield
-        with transaction(self._connection):
-            set_meta(self._connection, tallied_id=int(tallied))
+        finally:
+            pages.close()
 
-    def _rollups(self, source: sqlite3.Connection, known: list[int]) -> Iterator[None]:
-        try:
-            rolled = source.execute(
-                "SELECT key, value FROM meta WHERE key LIKE 'roll%' OR key LIKE 'purged_ns:%'"
-                " OR key LIKE 'simulated%'"
-            ).fetchall()
-        except sqlite3.Error:
-            return
-        for first in range(0, len(known), _ROWS):
-            with transaction(self._connection):
-                for series in known[first : first + _ROWS]:
-                    try:
-                        rows = source.execute(
-                            "SELECT series, hour, buckets FROM rollup WHERE series = ?", (series,)
-                        ).fetchall()
-                    except sqlite3.Error:
-                        continue
-                    self._insert("rollup", "series, hour, buckets", rows)
-            yield
-        with transaction(self._connection):
-            set_meta(self._connection, **{str(key): int(value) for key, value in rolled})
+    def _begin(self, pages: Pages) -> None:
+        found: dict[str, set[Record]] = {table: set() for table in _KINDS}
+        for table, rows in pages.rows(*(table for table in _KINDS if table not in _WRITTEN)):
+            found[table].update(row for row in rows if row[0] == LOCAL_SITE)
+        self._note(found["meta"])
+        for site, run, tag, kind, sensors, series in found["series_of"]:
+            found["series"].add((site, series, run, tag, kind, sensors))
+        for table in ("run", "series", "place", "note"):
+            self._put(table, found[table])
+        execute = self._connection.execute
+        for table, is_meaningless in _MEANINGLESS.items():
+            execute(f"DELETE FROM {table} WHERE {is_meaningless}")
+        self._runs = {run for (run,) in execute("SELECT run FROM run")}
+        for series, run, kind, sensors in execute("SELECT series, run, kind, sensors FROM series"):
+            with suppress(DamagedFile):
+                self._series[series] = (run, kind, len(sensor_names(sensors)))
+        for table in _COUNTED:
+            self._put(table, (row for row in found[table] if self._is_given_up(table, row)))
 
-    def _insert(self, table: str, what: str, rows: list[tuple[Any, ...]]) -> None:
-        marks = ", ".join("?" * len(what.split(",")))
-        self._connection.executemany(
-            f"INSERT OR IGNORE INTO {table} ({what}) VALUES ({marks})",  # noqa: S608  # constants
-            rows,
+    def _note(self, rows: Iterable[Record]) -> None:
+        meta = {key: value for _, key, value in rows}
+        for key, value in meta.items():
+            run = key.removeprefix("purged_ns:")
+            if key != run and run.isdecimal() and value.isdecimal():
+                self._purged_ns[int(run)] = int(value)
+        if meta.get(PURGED_SEQ, "").isdecimal():
+            self._purged_seq = int(meta[PURGED_SEQ])
+        for key, value in meta.items():
+            if key not in ("journal_id", LAST_SEQ):
+                set_meta(self._connection, key, value)
+        # The numbers go on past all that may have been lost at the end.
+        last = meta.get(LAST_SEQ, "")
+        largest = max(
+            self._purged_seq,
+            int(last) if last.isdecimal() else 0,
+            self._aside.stat().st_size // _LEAST_ROW_BYTES,
         )
+        for (seq,) in self._connection.execute("SELECT max(seq) FROM place"):
+            largest = max(largest, seq or 0)
+        set_meta(self._connection, LAST_SEQ, largest + 1_000_000)
 
-
-def _noted(source: sqlite3.Connection) -> tuple[int, int]:
-    """Up to which number rows were given up, and folded; 0 where that cannot be read."""
-    try:
-        return get_meta(source, "purged_id"), get_meta(source, "rolled_id")
-    except sqlite3.Error:
-        return 0, 0
-
-
-def _largest_id(source: sqlite3.Connection) -> int:
-    lots = [next(_readable(source, table, "id"), []) for table in (*_LARGE, "pin")]
-    return max((int(lot[0][0]) for lot in lots if lot), default=0)
-
-
-def _has_meaning(table: str, row: tuple[Any, ...], kept: Mapping[str, set[int]]) -> bool:
-    """Whether a small row says something, and what it refers to is there.
-
-    A series without its tag or sensors would be found damaged at each start again.
-    """
-    if table == "sensors":
-        try:
-            sensor_names(row[1])
-        except DamagedFile:
-            return False
-    if table == "series":
-        _, _, tag, _, _, source, sensors = row
-        return tag in kept["tag"] and source in kept["name"] and sensors in kept["sensors"]
-    return True
-
-
-def _is_whole(row: tuple[Any, ...]) -> bool:
-    try:
-        unseal(columns(*row[1:-1]), row[-1])
-    except (Damaged, TypeError):
-        return False
-    return True
-
-
-def _open_damaged(path: Path) -> sqlite3.Connection:
-    connection = sqlite3.connect(
-        f"file:{quote(str(path))}?mode=ro", uri=True, isolation_level=None, timeout=5.0
-    )
-    # Without it SQLite refuses all of a file that is shorter than its header says.
-    connection.execute("PRAGMA writable_schema = ON")
-    return connection
-
-
-def _readable(
-    source: sqlite3.Connection, table: str, what: str, on_damage: Callable[[], None] = lambda: None
-) -> Iterator[list[tuple[Any, ...]]]:
-    """The rows of a table in lots, newest first, without those that cannot be reached."""
-    below = _LAST_ID
-    while True:
-        sizes = (_ROWS, _ROWS // 20, 1)
-        lots = (_lot(source, table, what, below, size) for size in sizes)
-        lot = next((lot for lot in lots if lot is not None), None)
-        if lot is None:
-            on_damage()
-            below = _past_damage(source, table, what, below)
-            if below <= 0:
-                return
-            continue
-        if not lot:
-            return
-        yield lot
-        # Where pages are mixed up, rows come that were not asked for: never go round in circles.
-        below = min(int(lot[-1][0]), below - 1)
-
-
-def _lot(
-    source: sqlite3.Connection, table: str, what: str, below: int, limit: int
-) -> list[tuple[Any, ...]] | None:
-    try:
-        return source.execute(
-            f"SELECT {what} FROM {table} WHERE id < ? ORDER BY id DESC LIMIT ?",  # noqa: S608
-            (below, limit),
-        ).fetchall()
-    except sqlite3.Error:
-        return None
-
-
-def _past_damage(source: sqlite3.Connection, table: str, what: str, below: int) -> int:
-    """The largest number under which a row can be read again; 0 if there is none."""
-    bad, good, step = below, below, 1
-    while _lot(source, table, what, good, 1) is None:
-        bad = good
-        # From the very end, where no number is known yet, by halves; else by ever longer steps.
-        good = bad // 2 if below == _LAST_ID else bad - step
-        step *= 2
-        if good <= 0:
-            return 0
-    while bad - good > 1:
-        middle = (good + bad) // 2
-        if _lot(source, table, what, middle, 1) is None:
-            bad = middle
+    def _is_given_up(self, table: str, row: Record) -> bool:
+        """Whether a count is of rows that were deleted before the damage."""
+        if table == "hour":
+            run, hour = self._series.get(row[1], (-1,))[0], row[2]
         else:
-            good = middle
-    return good
+            run, hour = row[1], row[3] if table == "tally" else row[3] // HOUR_NS
+        return run in self._runs and hour <= self._purged_ns.get(run, -1) // HOUR_NS
+
+    def _write(self, table: str, rows: list[Record]) -> None:
+        scans, looks = [], []
+        for row in rows:
+            if row[0] != LOCAL_SITE or row[1] <= self._purged_seq:
+                continue
+            written = self._scan(row) if table == "scan" else self._look(row)
+            if written is None or not self._put(table, [row]):
+                continue
+            is_copy = row[10] if table == "scan" else row[14]
+            if is_copy:
+                continue
+            if isinstance(written, WrittenScan):
+                scans.append(written)
+            else:
+                looks.append(written)
+        count(self._log, scans, looks)
+
+    def _scan(self, row: Record) -> WrittenScan | None:
+        run, kind, sensors = self._series.get(row[2], (0, 0, -1))
+        try:
+            (values,) = numbers_of([row[11]])
+        except DamagedFile:
+            return None
+        if len(values) != sensors or not 0 <= row[3] < _NEVER:
+            return None
+        return WrittenScan(run, row[2], kind, row[3], row[6], values)
+
+    def _look(self, row: Record) -> WrittenLook | None:
+        try:
+            flower_of([*row[9:14], *row[15:17]])
+        except DamagedFile:
+            return None
+        if row[2] not in self._runs or not 0 <= row[4] < _NEVER:
+            return None
+        return WrittenLook(row[2], row[3], row[1], row[4], bool(row[11]), row[13])
+
+    def _put(self, table: str, rows: Iterable[Record]) -> int:
+        marks = ", ".join("?" * len(_KINDS[table]))
+        text = f"INSERT OR IGNORE INTO {table} VALUES ({marks})"
+        return int(self._connection.executemany(text, rows).rowcount)

@@ -1,13 +1,22 @@
-"""The file: its tables, how it is opened, and what a file that is none of ours is called.
+"""The tables, for SQLite and PostgreSQL alike, and how a file with them is opened.
 
-One row a scan, append-only. `id` is the number of the write, one sequence over all kinds, so that
-the order in which things were heard can be replayed. A `series` is what scans have in common: run,
-tag, kind, status, source and the set of sensors. It keeps rows short, and the newest of each series
-by a moment is one step in `scan_at`. A stamp that was sent and could not be true (from the future,
-or none: 0) stands in `own_stamp_ns`. The view `scans` spells rows out, arrivals included. The one
-run that goes on has no `ended_stamp_ns`. A `change` is a look that saw a pest where the look before
-it had not, or the other way round; a `tally` counts tries in five minutes, `tally_hour` in an hour.
-A site would be a column of `run`, for everything hangs on that.
+Plain SQL that any tool reads. `site` leads every key; in a twin's own file there is one, `local`.
+Times are ns: stamps ROS time, arrivals wall time.
+
+`seq` is one sequence over scan, look and place, in the order in which things were received; the
+number of a series is the seq of its first write. Looks have one too, of kind 1 without sensors. A
+failed attempt is a scan with another status than 0, a failed look at flowers one of that series.
+`own_stamp_ns` is the stamp that was sent, where that could not be true (from the future; 0: none),
+NULL where it is `stamp_ns`, and -1 in a copy that is known by no stamp. A copy (`is_copy`) is what
+was known as a run or a step began; `begun_seq` is its first. A step is a row of `run` that `joins`
+another: the same run, whose clock was set a little. Rows refer to the run, never to the step.
+`ended_stamp_ns` is NULL in the run that goes on, and in a step.
+
+What follows from the rows is written with them, copies left out, and outlives them (see `hours`).
+`hour` has the finite readings of each sensor, in the order of `sensors`, as JSON lists: how many,
+their sum, least and largest. `tally` has the same of the site's scans, failures and looks, with the
+first stamp and the last. `event` has what is rare: pests seen and cleared, with the number of bugs,
+and stretches of more than ten minutes without an attempt, in ns.
 """
 
 from __future__ import annotations
@@ -18,79 +27,84 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 from urllib.parse import quote
 
 APPLICATION_ID: Final = 0x4C55504A  # "LUPJ"
-VERSION: Final = 3
+VERSION: Final = 4
+LOCAL_SITE: Final = "local"
 
-# A commit writes whole pages, and a commit is a few scans: with 1 kB pages the disk gets 0.8 kB a
-# reading at 10,000 tags, with 4 kB pages 2.0 kB; the file is a twentieth larger.
+# A commit writes whole pages, and a commit is a few scans: measured, fewest bytes to the disk.
 PAGE_SIZE: Final = 1024
 
-_TALLY: Final = """
-    run INTEGER NOT NULL, slot INTEGER NOT NULL,
-    first_ns INTEGER NOT NULL, last_ns INTEGER NOT NULL, gap_ns INTEGER NOT NULL,
-    scan_n INTEGER, scan_total INTEGER, scan_low INTEGER, scan_high INTEGER,
-    failure_n INTEGER, failure_total INTEGER, failure_low INTEGER, failure_high INTEGER,
-    look_n INTEGER, look_total INTEGER, look_low INTEGER, look_high INTEGER,
-    PRIMARY KEY (run, slot)
-"""
-_TABLES: Final = f"""
-CREATE TABLE meta (key TEXT PRIMARY KEY, value ANY NOT NULL) STRICT, WITHOUT ROWID;
+# {key}: what SQLite keeps a table by, PostgreSQL has no such thing. {json}: both have `->>` for it.
+_TABLES: Final = """
+CREATE TABLE meta (
+    site TEXT NOT NULL, key TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (site, key)
+){key};
+CREATE TABLE site (site TEXT NOT NULL PRIMARY KEY, name TEXT NOT NULL){key};
 CREATE TABLE run (
-    id INTEGER PRIMARY KEY, is_simulated INTEGER NOT NULL,
-    begun_stamp_ns INTEGER NOT NULL, begun_arrival_ns INTEGER NOT NULL, lead_ns INTEGER NOT NULL,
-    follows INTEGER, carries INTEGER NOT NULL, ended_stamp_ns INTEGER
-) STRICT;
-CREATE TABLE tag (id INTEGER PRIMARY KEY, tag_id TEXT NOT NULL UNIQUE) STRICT;
-CREATE TABLE name (id INTEGER PRIMARY KEY, text TEXT NOT NULL UNIQUE) STRICT;
-CREATE TABLE sensors (id INTEGER PRIMARY KEY, names TEXT NOT NULL UNIQUE) STRICT;
+    site TEXT NOT NULL, run BIGINT NOT NULL, is_simulated INTEGER NOT NULL,
+    begun_stamp_ns BIGINT NOT NULL, begun_arrival_ns BIGINT NOT NULL, begun_seq BIGINT NOT NULL,
+    joins BIGINT, ended_stamp_ns BIGINT, PRIMARY KEY (site, run)
+){key};
 CREATE TABLE series (
-    id INTEGER PRIMARY KEY, run INTEGER NOT NULL, tag INTEGER NOT NULL, kind INTEGER NOT NULL,
-    status INTEGER NOT NULL, source INTEGER NOT NULL, sensors INTEGER NOT NULL,
-    UNIQUE (run, tag, kind, source, status, sensors)
-) STRICT;
+    site TEXT NOT NULL, series BIGINT NOT NULL, run BIGINT NOT NULL, tag TEXT NOT NULL,
+    kind INTEGER NOT NULL, sensors TEXT NOT NULL, PRIMARY KEY (site, series)
+){key};
+CREATE UNIQUE INDEX series_of ON series (site, run, tag, kind, sensors);
 CREATE TABLE scan (
-    id INTEGER PRIMARY KEY, series INTEGER NOT NULL, stamp_ns INTEGER NOT NULL,
-    own_stamp_ns INTEGER, lag_us INTEGER NOT NULL, mission INTEGER NOT NULL, detail TEXT,
-    readings BLOB NOT NULL
-) STRICT;
-CREATE INDEX scan_at ON scan (series, stamp_ns);
-CREATE INDEX scan_sent ON scan (series, own_stamp_ns) WHERE own_stamp_ns IS NOT NULL;
+    site TEXT NOT NULL, seq BIGINT NOT NULL, series BIGINT NOT NULL, stamp_ns BIGINT NOT NULL,
+    own_stamp_ns BIGINT, arrival_ns BIGINT NOT NULL, status INTEGER NOT NULL,
+    source TEXT NOT NULL, mission TEXT NOT NULL, detail TEXT NOT NULL, is_copy INTEGER NOT NULL,
+    readings TEXT NOT NULL, PRIMARY KEY (site, seq)
+){key};
+CREATE INDEX scan_at ON scan (site, series, stamp_ns, seq);
+CREATE INDEX scan_sent ON scan (site, series, own_stamp_ns) WHERE own_stamp_ns IS NOT NULL;
+CREATE INDEX scan_failed ON scan (site, series, stamp_ns) WHERE status != 0;
 CREATE TABLE look (
-    id INTEGER PRIMARY KEY, series INTEGER NOT NULL, stamp_ns INTEGER NOT NULL,
-    own_stamp_ns INTEGER, lag_us INTEGER NOT NULL, mission INTEGER NOT NULL,
-    species INTEGER NOT NULL, anomaly INTEGER NOT NULL, flower_count INTEGER NOT NULL,
-    bug_count INTEGER NOT NULL, shape BLOB NOT NULL
-) STRICT;
-CREATE INDEX look_at ON look (series, stamp_ns);
-CREATE INDEX look_sent ON look (series, own_stamp_ns) WHERE own_stamp_ns IS NOT NULL;
-CREATE TABLE pin (
-    id INTEGER PRIMARY KEY, run INTEGER NOT NULL, tag INTEGER NOT NULL, stamp_ns INTEGER NOT NULL,
-    lag_us INTEGER NOT NULL, pose BLOB NOT NULL, UNIQUE (run, tag)
-) STRICT;
-CREATE TABLE rollup (
-    series INTEGER NOT NULL, hour INTEGER NOT NULL, buckets BLOB NOT NULL,
-    PRIMARY KEY (series, hour)
-) STRICT, WITHOUT ROWID;
-CREATE TABLE change (
-    id INTEGER PRIMARY KEY, run INTEGER NOT NULL, tag INTEGER NOT NULL, stamp_ns INTEGER NOT NULL,
-    anomaly INTEGER NOT NULL, bug_count INTEGER NOT NULL
-) STRICT;
-CREATE INDEX change_of ON change (run, tag, stamp_ns, anomaly, bug_count);
-CREATE INDEX change_at ON change (run, stamp_ns, anomaly, bug_count);
-CREATE TABLE tally ({_TALLY}) STRICT, WITHOUT ROWID;
-CREATE TABLE tally_hour ({_TALLY}) STRICT, WITHOUT ROWID;
-CREATE VIEW scans AS
-    SELECT scan.id, series.run, tag.tag_id, stamp_ns,
-        stamp_ns + run.lead_ns + 1000 * lag_us AS arrival_ns, kind, status, detail,
-        source.text AS source, mission.text AS mission, sensors.names AS sensors, readings
-    FROM scan JOIN series ON series.id = scan.series JOIN tag ON tag.id = series.tag
-        JOIN run ON run.id = series.run JOIN sensors ON sensors.id = series.sensors
-        JOIN name AS source ON source.id = series.source
-        JOIN name AS mission ON mission.id = scan.mission;
-"""  # noqa: S608  # of constants
+    site TEXT NOT NULL, seq BIGINT NOT NULL, run BIGINT NOT NULL, tag TEXT NOT NULL,
+    stamp_ns BIGINT NOT NULL, own_stamp_ns BIGINT, arrival_ns BIGINT NOT NULL,
+    source TEXT NOT NULL, mission TEXT NOT NULL, species TEXT NOT NULL,
+    confidence DOUBLE PRECISION, anomaly INTEGER NOT NULL, flower_count INTEGER NOT NULL,
+    bug_count INTEGER NOT NULL, is_copy INTEGER NOT NULL, blooms TEXT NOT NULL, box TEXT NOT NULL,
+    PRIMARY KEY (site, seq)
+){key};
+CREATE INDEX look_at ON look (site, run, tag, stamp_ns, seq);
+CREATE INDEX look_when ON look (site, run, stamp_ns);
+CREATE INDEX look_sent ON look (site, run, tag, own_stamp_ns) WHERE own_stamp_ns IS NOT NULL;
+CREATE TABLE place (
+    site TEXT NOT NULL, seq BIGINT NOT NULL, run BIGINT NOT NULL, tag TEXT NOT NULL,
+    stamp_ns BIGINT NOT NULL, arrival_ns BIGINT NOT NULL,
+    x DOUBLE PRECISION NOT NULL, y DOUBLE PRECISION NOT NULL, z DOUBLE PRECISION NOT NULL,
+    qx DOUBLE PRECISION NOT NULL, qy DOUBLE PRECISION NOT NULL, qz DOUBLE PRECISION NOT NULL,
+    qw DOUBLE PRECISION NOT NULL, is_copy INTEGER NOT NULL, PRIMARY KEY (site, seq)
+){key};
+CREATE INDEX place_of ON place (site, run, tag);
+CREATE TABLE hour (
+    site TEXT NOT NULL, series BIGINT NOT NULL, hour BIGINT NOT NULL, n {json} NOT NULL,
+    total {json} NOT NULL, low {json} NOT NULL, high {json} NOT NULL,
+    PRIMARY KEY (site, series, hour)
+){key};
+CREATE TABLE tally (
+    site TEXT NOT NULL, run BIGINT NOT NULL, event TEXT NOT NULL, hour BIGINT NOT NULL,
+    n BIGINT NOT NULL, total BIGINT NOT NULL, low BIGINT NOT NULL, high BIGINT NOT NULL,
+    first_ns BIGINT NOT NULL, last_ns BIGINT NOT NULL, PRIMARY KEY (site, run, event, hour)
+){key};
+CREATE TABLE event (
+    site TEXT NOT NULL, run BIGINT NOT NULL, event TEXT NOT NULL, stamp_ns BIGINT NOT NULL,
+    seq BIGINT NOT NULL, tag TEXT NOT NULL, value BIGINT NOT NULL,
+    PRIMARY KEY (site, run, event, stamp_ns, seq)
+){key};
+CREATE INDEX event_of ON event (site, run, tag, stamp_ns, seq);
+CREATE TABLE note (
+    site TEXT NOT NULL, id TEXT NOT NULL, made_at_ns BIGINT NOT NULL, made_by TEXT NOT NULL,
+    kind TEXT NOT NULL, subject TEXT NOT NULL, text TEXT NOT NULL, until_ns BIGINT,
+    PRIMARY KEY (site, id)
+){key};
+"""
+SQLITE_TABLES: Final = _TABLES.format(key=" WITHOUT ROWID", json="TEXT")
+POSTGRESQL_TABLES: Final = _TABLES.format(key="", json="JSON")
 
 _MAGIC: Final = b"SQLite format 3\0"
 # Errors that say that the file itself is no longer what was written.
@@ -100,6 +114,10 @@ _BAD_TEXT: Final = ("Could not decode to UTF-8", "malformed JSON")
 
 class Foreign(Exception):
     """A file of somebody else, or of a newer version: it is left as it is."""
+
+
+class Older(Foreign):
+    """A journal of an older version: it is upgraded by the twin that starts with it."""
 
 
 class Empty(FileNotFoundError):
@@ -133,7 +151,7 @@ def open_writer(path: Path) -> sqlite3.Connection:
     syncs that. Nothing is checkpointed unless asked for.
 
     Raises:
-        Foreign: the file is somebody else's.
+        Foreign: the file is somebody else's, `Older`: it is of an older version.
         sqlite3.Error, OSError: it cannot be opened, or is damaged (`says_damaged`).
 
     """
@@ -159,8 +177,10 @@ def _create(connection: sqlite3.Connection, path: Path) -> None:
     connection.execute(f"PRAGMA page_size = {PAGE_SIZE}")
     # All of it comes in one transaction: for the mode of the vacuum alone SQLite writes a page too.
     connection.executescript(
-        f"BEGIN; PRAGMA auto_vacuum = INCREMENTAL; {_TABLES} "
-        f"PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {VERSION}; COMMIT;"
+        f"BEGIN; PRAGMA auto_vacuum = INCREMENTAL; {SQLITE_TABLES}"  # noqa: S608  # constants
+        f" INSERT INTO site VALUES ('{LOCAL_SITE}', '');"
+        f" INSERT INTO meta VALUES ('{LOCAL_SITE}', 'journal_id', lower(hex(randomblob(16))));"
+        f" PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {VERSION}; COMMIT;"
     )
     connection.execute("PRAGMA journal_mode = WAL")
     sync_folder(path.parent)
@@ -179,6 +199,19 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
         raise
 
 
+@contextmanager
+def one_view(connection: sqlite3.Connection) -> Iterator[None]:
+    """All that is read within is of one moment; keep it short, for the log grows meanwhile."""
+    if connection.in_transaction:
+        yield
+        return
+    connection.execute("BEGIN")
+    try:
+        yield
+    finally:
+        connection.rollback()  # does nothing where an interrupted statement has ended it
+
+
 def sync_folder(folder: Path) -> None:
     """Make the names in a folder last."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
@@ -188,23 +221,10 @@ def sync_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
-# What was found of a file and never changes, by what it is: see `journal.fixed`.
-Kept = dict[object, Any]
-
-
-class Reader(sqlite3.Connection):
-    """A connection that cannot write, and what was found over it or over others to the file."""
-
-    def __init__(self, *args: Any, **options: Any) -> None:
-        super().__init__(*args, **options)
-        self.kept: Kept = {}
-
-
-def open_reader(path: Path, *, is_still: bool = False, kept: Kept | None = None) -> Reader:
+def open_reader(path: Path, *, is_still: bool = False) -> sqlite3.Connection:
     """A connection that cannot write; it may be used in one thread at a time.
 
     `is_still`: nobody writes the file, and it has no log: then its folder may be read-only too.
-    `kept` is what other connections to the same file keep, which may be used meanwhile.
 
     Raises:
         Empty: nothing is in it yet.
@@ -217,13 +237,10 @@ def open_reader(path: Path, *, is_still: bool = False, kept: Kept | None = None)
         isolation_level=None,
         timeout=5.0,
         check_same_thread=False,
-        factory=Reader,
     )
     try:
         connection.execute("PRAGMA mmap_size = 0")
         connection.execute("PRAGMA query_only = 1")
-        if kept is not None:
-            connection.kept = kept
         _check_identity(connection, path)
     except BaseException:
         connection.close()
@@ -231,7 +248,7 @@ def open_reader(path: Path, *, is_still: bool = False, kept: Kept | None = None)
     return connection
 
 
-def open_named(path: Path, *, is_still: bool = False) -> Reader:
+def open_named(path: Path, *, is_still: bool = False) -> sqlite3.Connection:
     """As `open_reader`, of a file that somebody names: what is no database is not called damaged.
 
     Raises:
@@ -267,33 +284,43 @@ def _check_identity(connection: sqlite3.Connection, path: Path) -> None:
         if ours:
             raise DamagedFile(f"{path} is a journal with a damaged header")
         raise Foreign(f"{path} is a database, but not a journal of lupin-twin")
+    if 0 < version < VERSION:
+        raise Older(
+            f"{path} is a journal of version {version}, this is version {VERSION}:"
+            " a twin that starts with it upgrades it"
+        )
     if version != VERSION:
         raise Foreign(f"{path} is a journal of version {version}, this is version {VERSION}")
     if connection.execute(_SCHEMA).fetchall() != _own_tables():
         raise DamagedFile(f"the tables of {path} are not those of a journal")
 
 
-# Tables, indexes and the view, word for word: no other check sees a flipped letter in them.
+# Tables and indexes, word for word: no other check sees a flipped letter in them.
 _SCHEMA: Final = "SELECT CAST(sql AS BLOB) FROM sqlite_schema WHERE sql != '' ORDER BY sql"
 
 
 @cache
 def _own_tables() -> list[tuple[bytes]]:
     with closing(sqlite3.connect(":memory:")) as new:
-        new.executescript(_TABLES)
+        new.executescript(SQLITE_TABLES)
         return new.execute(_SCHEMA).fetchall()
 
 
-def find_damage(path: Path) -> str | None:
-    """The first thing that is wrong with the file's structure, None if nothing is.
+# --- facts about the log as a whole, by name ------------------------------------------------------
 
-    Reads all of it, tables against their indexes: about half a second for 64 MB.
-    """
-    try:
-        with closing(open_reader(path)) as connection:
-            (found,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
-    except FILE_ERRORS as error:
-        return str(error) if says_damaged(error) else None
-    except (Foreign, Empty):
-        return None
-    return None if found == "ok" else str(found)
+
+def get_meta(connection: sqlite3.Connection, key: str, site: str = LOCAL_SITE) -> str | None:
+    """A noted fact, None where it is not noted."""
+    found = connection.execute(
+        "SELECT value FROM meta WHERE site = ? AND key = ?", (site, key)
+    ).fetchone()
+    return None if found is None else str(found[0])
+
+
+def set_meta(connection: sqlite3.Connection, key: str, value: object) -> None:
+    """Note a fact of this twin's own log."""
+    connection.execute(
+        "INSERT INTO meta VALUES (?, ?, ?) ON CONFLICT (site, key) DO UPDATE SET"
+        " value = excluded.value",
+        (LOCAL_SITE, key, str(value)),
+    )

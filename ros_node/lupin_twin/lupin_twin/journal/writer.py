@@ -8,6 +8,7 @@ thread.
 from __future__ import annotations
 
 import math
+import shutil
 import threading
 import time
 from pathlib import Path
@@ -15,14 +16,15 @@ from typing import Final, NamedTuple
 
 from lupin_twin.journal.condition import Condition, JournalState
 from lupin_twin.journal.file import JournalFile
+from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.lock import InUse, Lock
 from lupin_twin.journal.pending import MAX_WEIGHT, Entry, Pending
 from lupin_twin.journal.prefilling import Stretch
-from lupin_twin.journal.restoring import Restored
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rows import Row
-from lupin_twin.journal.runs import Clock, Run
+from lupin_twin.journal.runs import Carries, Clock, Run, Turn
 from lupin_twin.journal.schema import DamagedFile, Foreign, says_damaged
+from lupin_twin.journal.upgrade import is_version3, upgrade
 
 # Rows wait so long for others to share a commit with, from when the first of them was handed over;
 # half of the 100 ms in which they are safe from a killed process. Late ones do not wait.
@@ -37,29 +39,41 @@ _IDLE_S: Final = 1.0
 _HEAL_EVERY_S: Final = 86_400.0
 
 
-_HEALED_IN: Final = (JournalState.RECORDING, JournalState.FAILING)
+_WELL: Final = (JournalState.RECORDING, JournalState.OFF)
+_HEALED_IN: Final = (*_WELL, JournalState.FAILING)
 
 
 class _Era(NamedTuple):
-    """A clock that the twin has followed; `scans` are restored per series at the start.
+    """A clock that the twin has followed, and why; `scans` are restored per series at the start.
 
     `before_ns` is where the one before it had come to, where the twin saw it go back.
     """
 
     clock: Clock
+    turn: Turn
     scans: int
     before_ns: int | None
 
 
 class Journal:
-    """Records from construction to `close`. Every method is for the thread that hands over."""
+    """Records from construction to `close`. Every method is for the thread that hands over.
+
+    `is_temporary`: the file's folder is its own and goes at the end.
+    """
 
     def __init__(
-        self, path: Path, holder: str, limits: Limits, max_weight: int = MAX_WEIGHT
+        self,
+        path: Path,
+        holder: str,
+        limits: Limits,
+        max_weight: int = MAX_WEIGHT,
+        *,
+        is_temporary: bool = False,
     ) -> None:
         self._path = path
         self._holder = holder
         self._limits = limits
+        self._is_temporary = is_temporary
         self._pending = Pending(max_weight)
         self._eras: list[_Era] = []
         self._stop = threading.Event()
@@ -75,18 +89,29 @@ class Journal:
         self._met_damage = ""
         self._heals_from_s = -math.inf
         self._set_aside = ""
+        self._left_out = ""
+        # What was heard last, as the log has it, where the clock contradicts that.
+        self._doubted_ns: int | None = None
         self._simulated: Stretch | None = None
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
         self._thread.start()
 
     # --- for the twin -------------------------------------------------------------------------
 
-    def begin(self, clock: Clock, scans_per_series: int = 1, before_ns: int | None = None) -> None:
-        """Follow a clock from now on: the first one, or one that has gone back from `before_ns`.
+    def begin(
+        self,
+        clock: Clock,
+        scans_per_series: int = 1,
+        turn: Turn = Turn.START,
+        before_ns: int | None = None,
+    ) -> None:
+        """Follow a clock from now on, and say why.
 
-        Nothing is written before the first. With that, the journal restores.
+        Nothing is written before the first. With that, the journal restores; if what it restores
+        `is_doubted`, it waits for another start, of a clock that agrees or is believed.
         """
-        self._eras.append(_Era(clock, scans_per_series, before_ns))
+        self._was_tried.clear()
+        self._eras.append(_Era(clock, turn, scans_per_series, before_ns))
         self._pending.arrived.set()
 
     def write(self, row: Row) -> None:
@@ -110,10 +135,10 @@ class Journal:
         behind_s = 0.0 if oldest_s is None else time.monotonic() - oldest_s
         told = self._told
         state, detail = told.state, told.detail
-        if state is JournalState.RECORDING and behind_s > _SLOW_S:
+        if state in _WELL and behind_s > _SLOW_S:
             state = JournalState.SLOW
             detail = f"the disk is slow: the journal is {behind_s:.0f} s behind"
-        if lost and state is not JournalState.RECORDING:
+        if lost and state not in _WELL:
             detail += f"; {lost} observations were lost to it"
         return Condition(
             state=state,
@@ -144,6 +169,8 @@ class Journal:
         self._stop.set()
         self._pending.arrived.set()
         self._thread.join(wait_s)
+        if self._is_temporary:
+            shutil.rmtree(self._path.parent, ignore_errors=True)
 
     # --- the writer thread --------------------------------------------------------------------
 
@@ -169,20 +196,24 @@ class Journal:
         self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         if self._lock is None:
             self._lock = Lock(self._path, self._holder)
+        # One that cannot be read is set aside like any other.
+        if self._is_sound is not False and is_version3(self._path):
+            self._left_out = upgrade(self._path, self._tell_progress)
         file = JournalFile(self._path, self._limits, is_sound=self._is_sound)
         try:
             self._is_sound = True
             self._set_aside = file.set_aside or self._set_aside
             self._simulated = file.simulated
-            file.keep_runs(self._runs)
+            if self._runs:
+                file.keep_run(self._runs[-1])
             is_last = False
             while not is_last:
                 is_last = self._stop.is_set()
                 self._see_damage()
                 self._catch_up(file)
-                self._write(file, is_last=is_last)
-                has_more = file.look_after() if not is_last else False
-                self._tell(JournalState.RECORDING, self._summary(), file.size())
+                self._write(file, all_that_waits=is_last)
+                has_more = not is_last and file.look_after(may_purge=bool(self._runs))
+                self._tell_well(file.size())
                 if not is_last and not self._pending.arrived.wait(0.0 if has_more else _IDLE_S):
                     continue
                 # Others may be about to come.
@@ -207,16 +238,29 @@ class Journal:
         while len(self._runs) < len(self._eras):
             era = self._eras[len(self._runs)]
             if self._runs:
-                self._runs.append(file.next_run(self._runs[-1], era.clock, era.before_ns))
+                # A run begins with what was known: all that was heard before it is written first.
+                self._write(file, all_that_waits=True)
+                self._runs.append(self._next_run(file, self._runs[-1], era))
+                continue
+            believed = era.turn is Turn.BELIEVED
+            restored = file.start(era.clock, era.scans, is_believed=believed)
+            self._set_aside = file.set_aside or self._set_aside
+            self._doubted_ns = restored.last_ns if restored.is_doubted else None
+            if restored.is_doubted:
+                del self._eras[0]
             else:
-                run = file.first_run(era.clock)
-                restored = file.restore(run, era.scans)
-                self._set_aside = file.set_aside or self._set_aside
-                self._runs.append(run)
-                self._restored = restored
-                self._was_tried.set()
+                self._runs.append(restored.run)
+            self._restored = restored
+            self._was_tried.set()
 
-    def _write(self, file: JournalFile, *, is_last: bool) -> None:
+    @staticmethod
+    def _next_run(file: JournalFile, before: Run, era: _Era) -> Run:
+        if era.turn is Turn.AHEAD:
+            return file.rejoin(era.clock, before)
+        joins = before.root if era.turn is Turn.STEP else None
+        return file.begin(era.clock, before, Carries.ALL, joins, era.before_ns)
+
+    def _write(self, file: JournalFile, *, all_that_waits: bool) -> None:
         if not self._runs:
             self._pending.arrived.clear()
         while self._runs:
@@ -233,20 +277,38 @@ class Journal:
             except BaseException:
                 self._pending.put_back(entries)
                 raise
-            self._pending.put_back(later)
             self._failures = 0
             self._written += written
             self._refused += refused
             self._repeated += len(known) - written - refused
-            if later or not is_last:
+            self._pending.put_back(later)
+            if later or not all_that_waits:
                 return
 
     # --- telling ------------------------------------------------------------------------------
 
     def _summary(self) -> str:
+        if self._is_temporary:
+            return "what is observed is kept in a temporary file, which goes at the end"
         if self._set_aside:
             return f"recording; a damaged journal was set aside as {self._set_aside}"
-        return "recording"
+        return f"recording; {self._left_out}" if self._left_out else "recording"
+
+    def _tell_progress(self, share: float) -> None:
+        detail = f"the journal {self._path} is being upgraded: {share:.0%} is done"
+        self._tell(JournalState.UPGRADING, detail)
+
+    def _tell_well(self, file_bytes: int) -> None:
+        if self._doubted_ns is None:
+            state = JournalState.OFF if self._is_temporary else JournalState.RECORDING
+            self._tell(state, self._summary(), file_bytes)
+            return
+        until = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(self._doubted_ns // 10**9))
+        detail = (
+            f"the clock contradicts the journal {self._path}, which was written until {until}:"
+            " nothing is written before they agree, or ten minutes have passed"
+        )
+        self._tell(JournalState.DOUBTING, detail, file_bytes)
 
     def _tell(self, state: JournalState, detail: str, file_bytes: int | None = None) -> None:
         self._told = Condition(

@@ -1,63 +1,58 @@
-# ruff: noqa: S608  # SQL is put together of constants
-"""What was heard, write by write, in the order of hearing: see `lupin_twin.past_writes`."""
+"""What was received, write by write, in that order: see `lupin_twin.past_writes`."""
 
 from __future__ import annotations
 
-import sqlite3
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any, Final
 
-from lupin_twin.journal.packing import Damaged, columns, unpack_numbers, unseal
-from lupin_twin.journal.reading import SCAN, one_view, sensor_names
-from lupin_twin.journal.spans import spans
+from lupin_twin.journal.reading import numbers_of, sensor_names
+from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK
+from lupin_twin.journal.runs import runs, spans
+from lupin_twin.journal.schema import LOCAL_SITE
+from lupin_twin.journal.site_log import SiteLog
 from lupin_twin.past_writes import PastWrite, PastWrites, RunSpan, WritesRequest
 
 # What an answer of so many writes takes, about, s.
 WRITES_S: Final = 0.05
 
+_NEWEST: Final = "SELECT max(seq) FROM {} WHERE site = :site"
 _ARRIVAL: Final = (
-    "SELECT scan.id, stamp_ns + run.lead_ns + 1000 * lag_us FROM scan"
-    " JOIN series ON series.id = series JOIN run ON run.id = run"
-    " WHERE scan.id >= ? ORDER BY scan.id LIMIT 1"
+    "SELECT seq, arrival_ns FROM scan WHERE site = :site AND seq > :after ORDER BY seq LIMIT 1"
 )
 _SCANS: Final = (
-    "SELECT run, tag_id, kind, status, names, "
-    + ", ".join(f"scan.{column}" for column in SCAN.split(", "))
-    + " FROM scan JOIN series ON series.id = scan.series JOIN tag ON tag.id = tag"
-    " JOIN sensors ON sensors.id = sensors WHERE scan.id > ? ORDER BY scan.id LIMIT ?"
+    "SELECT seq, run, tag, stamp_ns, kind, status, sensors, readings FROM scan JOIN series"
+    " ON series.site = scan.site AND series.series = scan.series"
+    " WHERE scan.site = :site AND seq > :after AND is_copy = 0 ORDER BY seq LIMIT :count"
 )
 _LOOKS: Final = (
-    "SELECT look.id, run, tag_id, stamp_ns, kind, status, text, anomaly, bug_count"
-    " FROM look JOIN series ON series.id = look.series JOIN tag ON tag.id = tag"
-    " JOIN name ON name.id = species WHERE look.id > ? ORDER BY look.id LIMIT ?"
+    "SELECT seq, run, tag, stamp_ns, species, anomaly, bug_count FROM look"
+    " WHERE site = :site AND seq > :after AND is_copy = 0 ORDER BY seq LIMIT :count"
 )
 
 
-def writes(connection: sqlite3.Connection, request: WritesRequest) -> PastWrites:
-    """The next writes; what is damaged costs itself."""
-    with one_view(connection):
-        newest = max(_newest(connection, "scan"), _newest(connection, "look"))
-        after = request.after or _beginning(connection, request, newest)
-        count = request.max_count
-        scans = connection.execute(_SCANS, (after, count)).fetchall()
-        looks = connection.execute(_LOOKS, (after, count)).fetchall()
-        numbers = sorted([*(row[5] for row in scans), *(row[0] for row in looks)])
-        is_all = len(numbers) <= count and len(scans) < count and len(looks) < count
-        last = max(newest, after) if is_all else numbers[min(count, len(numbers)) - 1]
-        found = [*_read_scans(scans, last), *_read_looks(looks, last)]
-        found.sort(key=lambda write: write.number)
-        axis = tuple(RunSpan(s.run.id, s.start_ns, s.end_ns) for s in spans(connection))
-        return PastWrites(_identity(connection), axis, tuple(found), last, is_all)
+def writes(connection: Any, request: WritesRequest, site: str = LOCAL_SITE) -> PastWrites:
+    """The next writes, copies left out."""
+    log = SiteLog(connection, site)
+    with log.one_view():
+        newest = max(
+            log.execute(_NEWEST.format(table)).fetchone()[0] or 0 for table in ("scan", "look")
+        )
+        after = request.after or _beginning(log, request, newest)
+        asked = {"after": after, "count": request.max_count}
+        scans = log.execute(_SCANS, asked).fetchall()
+        looks = log.execute(_LOOKS, asked).fetchall()
+        found = sorted([*_of_scans(scans), *_of_looks(looks)], key=lambda write: write.number)
+        is_all = len(found) < request.max_count
+        found = found[: request.max_count]
+        last = max(newest, after) if is_all else found[-1].number
+        axis = tuple(
+            RunSpan(s.run.id, s.start_ns, s.end_ns) for s in spans(runs(log.execute, log.site))
+        )
+        return PastWrites(_journal_id(log), axis, tuple(found), last, is_all)
 
 
-def _newest(connection: sqlite3.Connection, table: str) -> int:
-    (newest,) = connection.execute(f"SELECT max(id) FROM {table}").fetchone()
-    return int(newest or 0)
-
-
-def _beginning(connection: sqlite3.Connection, request: WritesRequest, newest: int) -> int:
+def _beginning(log: SiteLog, request: WritesRequest, newest: int) -> int:
     """The number before the first write that is asked for: arrivals ascend with numbers."""
     low, high = 0, newest
     if request.reach_count:
@@ -67,7 +62,7 @@ def _beginning(connection: sqlite3.Connection, request: WritesRequest, newest: i
     since_ns = time.time_ns() - int(request.reach_s * 1e9)
     while low < high:
         middle = (low + high) // 2
-        row = connection.execute(_ARRIVAL, (middle + 1,)).fetchone()
+        row = log.execute(_ARRIVAL, {"after": middle}).fetchone()
         if row is None or row[1] >= since_ns:
             high = middle
         else:
@@ -75,31 +70,23 @@ def _beginning(connection: sqlite3.Connection, request: WritesRequest, newest: i
     return low
 
 
-def _read_scans(rows: list[tuple[Any, ...]], last: int) -> Iterator[PastWrite]:
-    names: dict[str, tuple[str, ...]] = {}
-    for run, tag_id, kind, status, text, *row in rows:
-        if row[0] > last:
-            return
-        if text not in names:
-            names[text] = sensor_names(text)
-        try:
-            values = unpack_numbers(unseal(columns(*row[1:-1]), row[-1]), len(names[text]))
-        except Damaged:
-            continue
-        sensors = names[text] if values else ()
-        yield PastWrite(row[0], run, tag_id, row[2], kind, status, sensors, tuple(values))
+def _of_scans(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:
+    names = {text: sensor_names(text) for text in {row[6] for row in rows}}
+    every = numbers_of([row[7] for row in rows])
+    for row, values in zip(rows, every, strict=True):
+        seq, run, tag, stamp_ns, kind, status, sensors, _ = row
+        yield PastWrite(seq, run, tag, stamp_ns, kind, status, names[sensors], tuple(values))
 
 
-def _read_looks(rows: list[tuple[Any, ...]], last: int) -> Iterator[PastWrite]:
-    for number, run, tag_id, stamp_ns, kind, status, species, anomaly, bugs in rows:
-        if number > last:
-            return
-        seen = (species, bool(anomaly), bugs)
-        yield PastWrite(number, run, tag_id, stamp_ns, kind, status, (), (), True, *seen)
+def _of_looks(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:
+    for seq, run, tag, stamp_ns, species, anomaly, bug_count in rows:
+        seen = (species, bool(anomaly), bug_count)
+        yield PastWrite(seq, run, tag, stamp_ns, KIND_FLOWER, STATUS_OK, (), (), True, *seen)
 
 
-def _identity(connection: sqlite3.Connection) -> str:
-    """One file's name among files: one that was set aside has another in its place."""
-    path = connection.execute("PRAGMA database_list").fetchone()[2]
-    status = Path(path).stat()
-    return f"{status.st_dev:x}-{status.st_ino:x}"
+def _journal_id(log: SiteLog) -> str:
+    """One log's name among logs: what was quarantined has another in its place."""
+    found = log.execute(
+        "SELECT value FROM meta WHERE site = :site AND key = :key", {"key": "journal_id"}
+    ).fetchone()
+    return str(found[0]) if found else ""

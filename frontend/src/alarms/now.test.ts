@@ -1,0 +1,77 @@
+import { expect, test } from 'vitest';
+
+import type { HealthReason } from '../contract/types';
+import type { TagThen } from '../domain/trend';
+import { alarm } from '../testing/alarms';
+import { reason } from '../testing/health';
+import { readings, tag } from '../testing/tags';
+import { nowOf } from './now';
+
+const cold = alarm('a', { worst: 4 });
+const state = (value: number | null, ...reasons: readonly Partial<HealthReason>[]): TagThen => ({
+  tag: tag({ readings: readings({ temperature: value }) }),
+  health: { verdict: 'unknown', reasons: reasons.map(reason) },
+});
+const old = { kind: 'old', verdict: 'unknown', value: null } as const;
+
+test('the reading of now, as bad as the bridge says it is now', () => {
+  expect(nowOf(cold, state(8, { verdict: 'stressed' }), null, true)).toMatchObject({
+    kind: 'known',
+    value: 8,
+    verdict: 'stressed',
+    trend: null,
+  });
+  expect(nowOf(cold, state(20), null, true)).toMatchObject({ value: 20, verdict: 'healthy' });
+});
+
+test('its trend is that against an hour before', () => {
+  const before = {
+    ...state(11),
+    tag: tag({
+      readings: [
+        { name: 'temperature', value: 11, observed_at: { sec: 1, nanosec: 0 }, stale_seconds: 5 },
+      ],
+    }),
+  };
+  expect(nowOf(cold, state(8, {}), before, true)).toMatchObject({ trend: -3 });
+  expect(nowOf(cold, state(8, {}), state(8), true)).toMatchObject({ trend: null });
+});
+
+test.each([
+  ['its reading is too old', state(8, {}, { ...old, sensor: 'temperature' }), true, 8],
+  ['all readings are too old', state(8, {}, { ...old, sensor: '' }), true, 8],
+  ['the sensor gives none', state(null), true, null],
+  ['the twin is silent', state(8, {}), false, 8],
+  ['there is no such tag', null, true, null],
+] as const)('it is not known where %s', (_, then, isLive, last) => {
+  expect(nowOf(cold, then, null, isLive)).toMatchObject({ kind: 'unknown', last });
+});
+
+test('another sensor’s age does not matter, but of what is derived', () => {
+  const others = { ...old, sensor: 'humidity' };
+  expect(nowOf(cold, state(8, {}, others), null, true)?.kind).toBe('known');
+  const vpd = { sensor: 'vpd', value: 1.7, limit: 1.3 };
+  const dry = alarm('b', { reason: vpd });
+  expect(nowOf(dry, state(8, vpd), null, true)).toMatchObject({ kind: 'known', value: 1.7 });
+  expect(nowOf(dry, state(8, vpd, others), null, true)).toMatchObject({ kind: 'unknown' });
+  // Of what is within its range nothing is said, so it is not known.
+  expect(nowOf(dry, state(8), null, true)).toMatchObject({ kind: 'unknown', last: null });
+});
+
+test('of a pest how many were seen last', () => {
+  const pest = { kind: 'pest', sensor: '', value: 3, limit: null } as const;
+  const seen = alarm('a', { reason: pest });
+  const infested = {
+    tag: tag({ anomaly: true, bug_count: 3 }),
+    health: { verdict: 'critical', reasons: [reason(pest)] },
+  } as const;
+  expect(nowOf(seen, infested, null, true)).toMatchObject({ value: 3, verdict: 'critical' });
+  expect(nowOf(seen, state(8), null, true)).toMatchObject({ value: null, verdict: 'healthy' });
+  expect(nowOf(seen, infested, null, false)).toMatchObject({ kind: 'unknown' });
+});
+
+test('what is resolved, or of no value, has none', () => {
+  expect(nowOf(alarm('a', { cleared: 950 }), state(8), null, true)).toBeNull();
+  expect(nowOf(alarm('a', { reason: { kind: 'old' } }), state(8), null, true)).toBeNull();
+  expect(nowOf(alarm('a', { reason: { kind: 'silent' } }), null, null, true)).toBeNull();
+});

@@ -1,0 +1,53 @@
+/** What an alarm is about, as it is now: its value, how bad that is, and its trend. Pure. */
+import type { Alarm, Verdict } from '../contract/types';
+import type { When } from '../domain/age';
+import { isOldReading, trendOf, type TagThen } from '../domain/trend';
+
+export type Now =
+  | {
+      readonly kind: 'known';
+      /** In the sensor's unit; of a pest how many were counted, null: none was seen. */
+      readonly value: number | null;
+      /** How bad that is. */
+      readonly verdict: Verdict;
+      /** What it is less what it was an hour ago; null: not known, or the same reading. */
+      readonly trend: number | null;
+    }
+  /** Too old, no reading, or the twin is silent. */
+  | {
+      readonly kind: 'unknown';
+      readonly last: number | null;
+      readonly lastAt: When;
+    };
+
+const unknown = (last: number | null, lastAt: When): Now => ({ kind: 'unknown', last, lastAt });
+
+/**
+ * `tag` and `hourAgo` are the alarm's tag as the bridge judged it last, and an hour before; null: not
+ * known. `isLive`: false, and what was received last says nothing about now. Null: the alarm has no
+ * value, or is resolved.
+ */
+export function nowOf(
+  { reason, cleared_at: clearedAt }: Alarm,
+  tag: TagThen | null,
+  hourAgo: TagThen | null,
+  isLive: boolean,
+): Now | null {
+  const { kind, sensor } = reason;
+  const isPest = kind === 'pest';
+  if (clearedAt !== null || !(isPest || kind === 'range' || kind === 'changed')) return null;
+  if (!tag || (isPest && !isLive)) return unknown(null, 'unknown');
+  const said = tag.health.reasons.find((each) => each.kind === kind && each.sensor === sensor);
+  const verdict = said?.verdict ?? 'healthy';
+  if (isPest) {
+    return { kind: 'known', value: said ? (said.value ?? 0) : null, verdict, trend: null };
+  }
+  const { readings, readAt } = tag.tag;
+  // What is derived has no reading: what there is of it stands in its reason.
+  const last = readings.has(sensor) ? (readings.get(sensor) ?? null) : (said?.value ?? null);
+  if (!isLive || last === null || isOldReading(sensor, tag)) {
+    return unknown(last, readAt.get(sensor) ?? 'unknown');
+  }
+  const trend = trendOf(sensor, tag, hourAgo);
+  return { kind: 'known', value: last, verdict, trend: trend?.kind === 'by' ? trend.by : null };
+}

@@ -1,0 +1,123 @@
+import type { JSX } from 'react';
+
+import type { Item } from '../../alarms/list';
+import type { Now } from '../../alarms/now';
+import { selectNow, selectSpeech } from '../../alarms/speech';
+import { spanText, unknownText, valuesOf, type Values } from '../../alarms/words';
+import type { Alarm, Verdict } from '../../contract/types';
+import { ageSeconds } from '../../domain/age';
+import { clockText } from '../../domain/format';
+import { differenceShown } from '../../domain/trend';
+import { store, useApp } from '../../store/app';
+import { useSelected } from '../../store/create';
+import { hourAgo } from '../../store/hourAgo';
+import { rosNow } from '../../store/moment';
+import { S } from '../../strings';
+import { useTicking } from '../../widgets/useNow';
+import { HealthMark } from '../HealthMark';
+import { ARROWS } from '../TrendLine';
+
+interface ValuesNow extends Values {
+  readonly state: Now | null;
+}
+
+/** An alarm's values as the newest state has them. */
+export function useValues(alarm: Alarm): ValuesNow {
+  const last = useSelected(hourAgo, (known) => known);
+  const speech = useApp(selectSpeech);
+  // As a text: a state that says the same of this tag renders nothing anew.
+  const key = useApp((state) => JSON.stringify(selectNow(state, alarm, last)));
+  const state = JSON.parse(key) as Now | null;
+  return { ...valuesOf(alarm, speech, state), state };
+}
+
+/** How bad it is now and was at worst, since when, and until when it is shelved. */
+export function AlarmFacts({
+  item: { alarm, verdict, shelf },
+  values: { state, now: current, worst, first, more },
+  isShelved,
+}: {
+  item: Item;
+  values: ValuesNow;
+  isShelved: boolean;
+}): JSX.Element {
+  const span = useTicking((at) => spanText(alarm, rosNow(store.get(), at)));
+  return (
+    <>
+      {(state ?? worst) !== null && (
+        <span className="alarm-values">
+          {state?.kind === 'known' && current !== null && (
+            <Fact name="now" verdict={state.verdict} text={current}>
+              {state.value !== null && state.trend !== null && (
+                <Trend alarm={alarm} value={state.value} by={state.trend} />
+              )}
+            </Fact>
+          )}
+          {state?.kind === 'unknown' && <NotKnown alarm={alarm} state={state} more={more} />}
+          {worst !== null && <Fact name="worst" verdict={verdict} text={worst} />}
+        </span>
+      )}
+      <span className="alarm-facts faint">
+        {[span, first].filter((text) => text !== null).join(', ')}
+      </span>
+      {isShelved && shelf && (
+        <span className="alarm-facts faint">
+          {S.alarmShelved(clockText(shelf.until), shelf.reason)}
+        </span>
+      )}
+    </>
+  );
+}
+
+function Fact({
+  name,
+  verdict,
+  text,
+  children,
+}: {
+  name: 'now' | 'worst';
+  verdict: Verdict;
+  text: string;
+  children?: JSX.Element | false;
+}): JSX.Element {
+  return (
+    <span data-fact={name} data-status={verdict} title={text}>
+      <HealthMark verdict={verdict} word={false} /> {text}
+      {children && <> {children}</>}
+    </span>
+  );
+}
+
+/** What was received last, where that says nothing about now. */
+function NotKnown({
+  alarm,
+  state,
+  more,
+}: {
+  alarm: Alarm;
+  state: Extract<Now, { kind: 'unknown' }>;
+  more: number;
+}): JSX.Element {
+  const speech = useApp(selectSpeech);
+  const text = useTicking((at) =>
+    unknownText(alarm, speech, state, more, ageSeconds(state.lastAt, at)),
+  );
+  return (
+    <span data-fact="now" data-status="unknown" title={text}>
+      {text}
+    </span>
+  );
+}
+
+/** Up, down or level against an hour before. */
+function Trend({ alarm, value, by }: { alarm: Alarm; value: number; by: number }): JSX.Element {
+  const { sensors, unit } = useApp(selectSpeech);
+  const sensor = sensors.named(alarm.reason.sensor);
+  const { way, text } = differenceShown(sensor, value, by, unit);
+  const title = `${S.trendTitle(sensor.label)}: ${text}`;
+  return (
+    <span data-trend={way} title={title}>
+      <span aria-hidden="true">{ARROWS[way]}</span> <span className="unseen">{title}</span>
+    </span>
+  );
+}

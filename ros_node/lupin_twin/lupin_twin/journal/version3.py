@@ -1,0 +1,447 @@
+# ruff: noqa: S608  # SQL is put together of constants
+"""A journal of version 3, as far as its upgrade has to read it: rows of packed bytes.
+
+Numbers are little-endian, float32 where that holds all of a row exactly, else float64. The last two
+bytes of a row's blob are a check over the row's other columns and the bytes before: the high half
+of Adler-32 (RFC 1950, section 8.2). A row whose check does not fit is left out and counted.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+import sqlite3
+import struct
+import zlib
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import lru_cache
+from typing import Any, Final, NamedTuple
+
+from lupin_twin.journal.hours import SILENCE_NS
+from lupin_twin.journal.reading import sensor_names
+from lupin_twin.journal.rows import KIND_READING, LookRow, PinRow, Row, ScanRow
+from lupin_twin.journal.runs import Carries, Clock
+from lupin_twin.journal.schema import DamagedFile, says_damaged
+from lupin_twin.past import HOUR_NS, SLOT_NS, Event
+from lupin_twin.state import Bloom, Flower, Pose, Reading
+
+VERSION: Final = 3
+
+_SCAN: Final = "id, series, stamp_ns, own_stamp_ns, lag_us, mission, detail, readings"
+_TALLIED: Final = {"scan": Event.SCANS, "failure": Event.FAILURES, "look": Event.LOOKS}
+# Rows that are read in one go; where some cannot be read, one by one.
+_LOT: Final = 2_000
+_LAST_ID: Final = 2**61
+_NOTHING: Final = -(2**63)
+_COLUMN: Final = struct.Struct("<q")
+_SHAPE: Final = struct.Struct("<HHH")  # flowers, corners of the box, species named
+_LENGTH: Final = struct.Struct("<H")
+_BLOOM: Final = struct.Struct("<?H")  # anomaly, which species
+# An hour of one sensor: count, mean, least, largest.
+_BUCKETS: Final = {
+    layout.size: layout for layout in map(struct.Struct, ("<Hdff", "<Idff", "<Hddd", "<Iddd"))
+}
+
+Bucket = tuple[int, float, float, float]
+
+
+class OldRun(NamedTuple):
+    """A run of the clock; `follows` is the run whose knowledge it `carries`."""
+
+    id: int
+    begun: Clock
+    follows: int | None
+    carries: Carries
+    ended_ns: int | None
+
+
+class OldHour(NamedTuple):
+    """An hour of a set of sensors at a tag, for each of them count, sum, least and largest."""
+
+    tag_id: str
+    kind: int
+    sensors: tuple[str, ...]
+    hour: int
+    buckets: list[Bucket]
+
+
+class OldTally(NamedTuple):
+    """An hour of the site's attempts of one kind, with the first and the last of all."""
+
+    event: str
+    hour: int
+    n: int
+    total: int
+    low: int
+    high: int
+    first_ns: int
+    last_ns: int
+
+
+class _Series(NamedTuple):
+    run: int
+    tag: int
+    tag_id: str
+    kind: int
+    status: int
+    source: str
+    sensors: tuple[str, ...]
+
+
+class _BadRow(ValueError):
+    """A row that is not what was written."""
+
+
+class Version3:
+    """What a connection to such a file gives; `damaged` counts the rows that were left out.
+
+    Raises:
+        sqlite3.Error: the file cannot be read at all.
+
+    """
+
+    def __init__(self, connection: sqlite3.Connection) -> None:
+        self._connection = connection
+        self.damaged = 0
+        self.runs = {run.id: run for run in self._runs()}
+        self._leads = {
+            run.id: run.begun.arrival_ns - run.begun.stamp_ns if run.begun.is_simulated else 0
+            for run in self.runs.values()
+        }
+        self._tags = {row[0]: str(row[1]) for row in self._table("tag", "id, tag_id")}
+        self._names = {row[0]: str(row[1]) for row in self._table("name", "id, text")}
+        self._series = dict(self._every_series())
+        # Numbers alone: other keys are not ours to read.
+        self._meta = {row[0]: row[1] for row in connection.execute("SELECT key, value FROM meta")}
+
+    def meta(self, key: str, default: int = 0) -> int:
+        """A number of the file's own, `default` where it was never set."""
+        value = self._meta.get(key)
+        return value if isinstance(value, int) else default
+
+    def rows(self) -> Iterator[tuple[int, int, Row]]:
+        """(number, run, row) of each write, in the order in which they were received."""
+        yield from heapq.merge(self._scans(), self._looks(), self._pins(), key=lambda row: row[0])
+
+    def last_id(self) -> int:
+        """The number of the last write, about."""
+        found = self._all("SELECT max(id) FROM scan UNION SELECT max(id) FROM look", ())
+        return max(1, *(number or 0 for (number,) in found))
+
+    def purged_ns(self, run: int) -> int:
+        """The last stamp of a run of which something was deleted by age or size; -1: nothing."""
+        return self.meta(f"purged_ns:{run}", -1)
+
+    def hours(self, run: int) -> Iterator[OldHour]:
+        """Of the hours in which scans were deleted, what is not in the scans that are left."""
+        horizon = self.purged_ns(run) // HOUR_NS
+        # Tags in the order in which they were first heard of.
+        for number, series in sorted(self._series.items(), key=lambda entry: entry[1].tag):
+            if series.run != run or horizon < 0 or not series.sensors:
+                continue
+            left = self._left(number, series, horizon)
+            for hour, packed in self._all(
+                "SELECT hour, buckets FROM rollup WHERE series = ? AND hour <= ? ORDER BY hour",
+                (number, horizon),
+            ):
+                try:
+                    buckets = _buckets(packed, len(series.sensors))
+                except _BadRow:
+                    self.damaged += 1
+                    continue
+                for values in left.get(hour, ()):
+                    buckets = list(map(_without, buckets, values))
+                yield OldHour(series.tag_id, series.kind, series.sensors, hour, buckets)
+
+    def _left(
+        self, number: int, series: _Series, horizon: int
+    ) -> dict[int, list[tuple[float, ...]]]:
+        """By hour, the values of the scans of a series that are there, and in its rollups."""
+        up_to = "rolling_to" if number <= self.meta("rolling_series") else "rolled_id"
+        found: dict[int, list[tuple[float, ...]]] = {}
+        for row in self._all(
+            f"SELECT {_SCAN} FROM scan WHERE series = ? AND stamp_ns < ? AND id <= ?",
+            (number, (horizon + 1) * HOUR_NS, self.meta(up_to)),
+        ):
+            with suppress(_BadRow):
+                values = _numbers(_unsealed(row[1:-1], row[-1]), len(series.sensors))
+                found.setdefault(row[2] // HOUR_NS, []).append(values)
+        return found
+
+    def tallies(self, run: int) -> Iterator[OldTally]:
+        """Attempts of the hours in which some were deleted, but for those that are left."""
+        horizon = self.purged_ns(run) // HOUR_NS
+        left: dict[tuple[str, int], list[int]] = {}
+        for number, series in self._series.items():
+            if series.run == run:
+                for table in ("scan", "look"):
+                    self._count_left(left, table, number, series, horizon)
+        columns = ", ".join(
+            f"{kind}_{part}" for kind in _TALLIED for part in ("n", "total", "low", "high")
+        )
+        for hour, first_ns, last_ns, *numbers in self._all(
+            f"SELECT slot, first_ns, last_ns, {columns} FROM tally_hour"
+            " WHERE run = ? AND slot <= ?",
+            (run, horizon),
+        ):
+            for index, event in enumerate(_TALLIED.values()):
+                n, total, low, high = numbers[4 * index : 4 * index + 4]
+                of_left = left.get((event, hour), [])
+                if n is not None and n > len(of_left):
+                    rest = (n - len(of_left), total - sum(of_left), low, high)
+                    yield OldTally(event, hour, *rest, first_ns, last_ns)
+
+    def _count_left(
+        self,
+        left: dict[tuple[str, int], list[int]],
+        table: str,
+        number: int,
+        series: _Series,
+        horizon: int,
+    ) -> None:
+        value = "bug_count" if table == "look" else "0"
+        for stamp_ns, bugs in self._all(
+            f"SELECT stamp_ns, {value} FROM {table} WHERE series = ? AND stamp_ns < ? AND id <= ?",
+            (number, (horizon + 1) * HOUR_NS, self.meta("tallied_id")),
+        ):
+            if table == "look":
+                event, counted = Event.LOOKS, bugs
+            elif series.status:
+                event, counted = Event.FAILURES, series.status
+            elif series.kind == KIND_READING:
+                event, counted = Event.SCANS, len(series.sensors)
+            else:
+                continue
+            left.setdefault((event, stamp_ns // HOUR_NS), []).append(counted)
+
+    def silences(self, run: int) -> Iterator[tuple[int, int]]:
+        """(from, to) of pauses of more than ten minutes, of which scans may have been deleted."""
+        last: int | None = None
+        for first_ns, last_ns in self._all(
+            "SELECT first_ns, last_ns FROM tally WHERE run = ? AND slot < ? ORDER BY slot",
+            (run, (self.purged_ns(run) // HOUR_NS + 1) * HOUR_NS // SLOT_NS),
+        ):
+            if last is not None and first_ns - last > SILENCE_NS:
+                yield last, first_ns
+            last = last_ns
+
+    def pests(self, run: int) -> Iterator[tuple[int, str, int, bool, int]]:
+        """(number, tag, stamp, whether one was seen, bugs) of changes whose looks are deleted."""
+        for number, tag, stamp_ns, anomaly, bugs in self._all(
+            "SELECT id, tag, stamp_ns, anomaly, bug_count FROM change WHERE run = ?"
+            " AND id NOT IN (SELECT id FROM look)",
+            (run,),
+        ):
+            if tag in self._tags:
+                yield number, self._tags[tag], stamp_ns, bool(anomaly), bugs
+
+    def _all(self, sql: str, values: tuple[object, ...]) -> list[tuple[Any, ...]]:
+        """What was counted of deleted rows; where that is damaged, none of it is told."""
+        try:
+            return self._connection.execute(sql, values).fetchall()
+        except sqlite3.Error as error:
+            if not says_damaged(error):
+                raise
+            self.damaged += 1
+            return []
+
+    # --- small tables -------------------------------------------------------------------------
+
+    def _runs(self) -> Iterator[OldRun]:
+        for row in self._table(
+            "run",
+            "id, is_simulated, begun_stamp_ns, begun_arrival_ns, follows, carries, ended_stamp_ns",
+        ):
+            number, is_simulated, stamp_ns, arrival_ns, follows, carries, ended_ns = row
+            begun = Clock(stamp_ns, arrival_ns, bool(is_simulated))
+            is_known = carries in list(Carries) and follows is not None and follows < number
+            what = Carries(carries) if is_known else Carries.NOTHING
+            yield OldRun(number, begun, follows, what, ended_ns)
+
+    def _every_series(self) -> Iterator[tuple[int, _Series]]:
+        sets: dict[int, tuple[str, ...]] = {}
+        for number, text in self._table("sensors", "id, names"):
+            with suppress(DamagedFile):
+                sets[number] = sensor_names(text)
+        for row in self._table("series", "id, run, tag, kind, status, source, sensors"):
+            number, run, tag, kind, status, source, sensors = row
+            known = (run in self.runs, tag in self._tags, source in self._names, sensors in sets)
+            if all(known):
+                told = (self._tags[tag], kind, status, self._names[source], sets[sensors])
+                yield number, _Series(run, tag, *told)
+
+    # --- rows ---------------------------------------------------------------------------------
+
+    def _scans(self) -> Iterator[tuple[int, int, Row]]:
+        for row in self._table("scan", _SCAN):
+            number, series_number, stamp_ns, own_stamp_ns, lag_us, mission, detail, packed = row
+            try:
+                series = self._series[series_number]
+                values = _numbers(_unsealed(row[1:-1], packed), len(series.sensors))
+                scan = ScanRow(
+                    series.tag_id,
+                    stamp_ns,
+                    stamp_ns + self._leads[series.run] + 1000 * lag_us,
+                    tuple(map(Reading, series.sensors, values)),
+                    series.kind,
+                    series.status,
+                    detail or "",
+                    series.source,
+                    self._names[mission],
+                    own_stamp_ns,
+                )
+                yield number, series.run, scan
+            except (_BadRow, KeyError):
+                self.damaged += 1
+
+    def _looks(self) -> Iterator[tuple[int, int, Row]]:
+        what = (
+            "id, series, stamp_ns, own_stamp_ns, lag_us, mission, species, anomaly, flower_count,"
+            " bug_count, shape"
+        )
+        for row in self._table("look", what):
+            number, series_number, stamp_ns, own_stamp_ns, lag_us, mission, *seen, packed = row
+            species, anomaly, count, bugs = seen
+            try:
+                series = self._series[series_number]
+                confidence, blooms, box = _shape(_unsealed(row[1:-1], packed))
+                name = self._names[species]
+                flower = Flower(name, confidence, bool(anomaly), count, bugs, blooms, box)
+                arrival_ns = stamp_ns + self._leads[series.run] + 1000 * lag_us
+                at = (series.tag_id, stamp_ns, arrival_ns)
+                told = (series.source, self._names[mission], own_stamp_ns)
+                yield number, series.run, LookRow(*at, flower, *told)
+            except (_BadRow, KeyError):
+                self.damaged += 1
+
+    def _pins(self) -> Iterator[tuple[int, int, Row]]:
+        for row in self._table("pin", "id, run, tag, stamp_ns, lag_us, pose"):
+            number, run, tag, stamp_ns, lag_us, packed = row
+            try:
+                pose = Pose(*_numbers(_unsealed(row[1:-1], packed), 7))
+                arrival_ns = stamp_ns + self._leads[run] + 1000 * lag_us
+                yield number, run, PinRow(self._tags[tag], stamp_ns, arrival_ns, pose)
+            except (_BadRow, KeyError):
+                self.damaged += 1
+
+    def _table(self, table: str, what: str) -> Iterator[tuple[Any, ...]]:
+        """The rows of a table in the order of their numbers, without those out of reach."""
+        first, size = 0, _LOT
+        while True:
+            lot = self._lot(table, what, first, size)
+            if lot is None and size > 1:
+                size = 1
+                continue
+            if lot is None:
+                self.damaged += 1
+                first, size = self._past_damage(table, what, first), _LOT
+                if first >= _LAST_ID:
+                    return
+                continue
+            if not lot:
+                return
+            yield from lot
+            # Where pages are mixed up, rows come that were not asked for: never in circles.
+            first = max(first, int(lot[-1][0])) + 1
+
+    def _lot(self, table: str, what: str, first: int, size: int) -> list[tuple[Any, ...]] | None:
+        try:
+            return self._connection.execute(
+                f"SELECT {what} FROM {table} WHERE id >= ? ORDER BY id LIMIT ?", (first, size)
+            ).fetchall()
+        except sqlite3.Error as error:
+            if says_damaged(error):
+                return None
+            raise
+
+    def _past_damage(self, table: str, what: str, bad: int) -> int:
+        """The least number from which on rows can be read again; past all if there is none."""
+        step = 1
+        while self._lot(table, what, bad + step, 1) is None and bad + step < _LAST_ID:
+            bad += step
+            step *= 2
+        good = bad + step
+        while good - bad > 1:
+            middle = (good + bad) // 2
+            if self._lot(table, what, middle, 1) is None:
+                bad = middle
+            else:
+                good = middle
+        return good
+
+
+# --- bytes ----------------------------------------------------------------------------------------
+
+
+def _unsealed(columns: tuple[Any, ...], sealed: object) -> bytes:
+    """What was packed, if it is what was written."""
+    if not isinstance(sealed, bytes) or len(sealed) < 2:
+        raise _BadRow
+    try:
+        check = zlib.adler32(
+            b"".join(
+                value.encode("utf-8", "surrogatepass")
+                if isinstance(value, str)
+                else _COLUMN.pack(_NOTHING if value is None else value)
+                for value in columns
+            )
+        )
+    except struct.error as error:
+        raise _BadRow from error
+    if zlib.adler32(sealed[:-2], check) >> 16 != int.from_bytes(sealed[-2:], "little"):
+        raise _BadRow
+    return sealed[:-2]
+
+
+@lru_cache(maxsize=256)
+def _layout(count: int, letter: str) -> struct.Struct:
+    return struct.Struct(f"<{count}{letter}")
+
+
+def _numbers(packed: bytes, count: int) -> tuple[float, ...]:
+    for letter in "df":
+        layout = _layout(count, letter)
+        if layout.size == len(packed):
+            return layout.unpack(packed)
+    raise _BadRow
+
+
+def _buckets(packed: bytes, count: int) -> list[Bucket]:
+    layout = _BUCKETS.get(len(packed) // count)
+    if layout is None or layout.size * count != len(packed):
+        raise _BadRow
+    return [(n, n * mean, low, high) for n, mean, low, high in layout.iter_unpack(packed)]
+
+
+def _without(bucket: Bucket, value: float) -> Bucket:
+    """A bucket before it counted a value."""
+    n, total, low, high = bucket
+    return (n - 1, total - value, low, high) if math.isfinite(value) else bucket
+
+
+def _shape(
+    packed: bytes,
+) -> tuple[float, tuple[Bloom, ...], tuple[tuple[float, float, float], ...]]:
+    """(confidence, blooms, box) of a look."""
+    try:
+        bloom_count, corner_count, species_count = _SHAPE.unpack_from(packed)
+        at = _SHAPE.size
+        species = []
+        for _ in range(species_count):
+            (length,) = _LENGTH.unpack_from(packed, at)
+            at += _LENGTH.size
+            species.append(packed[at : at + length].decode("utf-8", "surrogatepass"))
+            at += length
+        marks = [_BLOOM.unpack_from(packed, at + i * _BLOOM.size) for i in range(bloom_count)]
+        at += bloom_count * _BLOOM.size
+        numbers = iter(_numbers(packed[at:], 1 + 5 * bloom_count + 3 * corner_count))
+        confidence = next(numbers)
+        blooms = []
+        for is_odd, index in marks:
+            x, y, z, height_m, sure = (next(numbers) for _ in range(5))
+            blooms.append(Bloom(x, y, z, height_m, species[index], sure, is_odd))
+        box = tuple((next(numbers), next(numbers), next(numbers)) for _ in range(corner_count))
+    except (struct.error, UnicodeDecodeError, IndexError) as error:
+        raise _BadRow from error
+    return confidence, tuple(blooms), box

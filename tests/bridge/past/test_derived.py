@@ -1,0 +1,90 @@
+"""The past of what is derived: pairs of one scan, or nothing that could be taken for them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from lupin_bridge.judge.derived import vapour_pressure_deficit_kpa as vpd
+from lupin_bridge.past import derived
+from lupin_twin.past import MAX_POINTS, PastRefused, SeriesPast, SeriesRequest
+
+S = 10**9
+NOW_NS = 1_000 * S
+Known = dict[str, dict[int, float]]
+HOUSE: Known = {
+    "temperature": {10 * S: 20.0, 20 * S: 30.0, 30 * S: 25.0, 40 * S: 26.0},
+    # Of another moment, out of what can be, failed.
+    "humidity": {10 * S: 50.0, 20 * S + 1: 50.0, 30 * S: 120.0, 40 * S: math.nan, 50 * S: 9.0},
+}
+ASKED = SeriesRequest("a", "vpd", 0, 0, 100)
+
+
+def answer(request: SeriesRequest, known: Known) -> tuple[SeriesPast, list[SeriesRequest]]:
+    """What is made of a house that has these readings, and what was asked for."""
+    looking, asked = derived.series(request), list[SeriesRequest]()
+    found: Any = None
+    try:
+        while True:
+            need = looking.send(found)
+            asked.append(need)
+            end_ns = need.end_ns or NOW_NS + len(asked)  # time goes on
+            of = known.get(need.sensor_type, {})
+            of = {at: value for at, value in of.items() if need.start_ns <= at < end_ns}
+            start_ns = need.start_ns or min(of, default=end_ns)
+            found = SeriesPast(start_ns, end_ns)
+            if len(of) > need.max_points:
+                found = replace(found, bucket_ns=end_ns)
+            else:
+                values = tuple(of.values())
+                found = SeriesPast(
+                    start_ns, end_ns, None, tuple(of), (1,) * len(of), values, values, values
+                )
+    except StopIteration as end:
+        return end.value, asked
+
+
+def test_only_what_was_read_in_one_scan_and_can_be_is_paired() -> None:
+    past, asked = answer(ASKED, HOUSE)
+    assert past.stamps_ns == (10 * S,)
+    assert past.means == past.minima == past.maxima == (vpd(20.0, 50.0),)
+    assert (past.counts, past.is_bucketed, past.start_ns) == ((1,), False, 10 * S)
+    assert [it.sensor_type for it in asked] == ["vpd", "temperature", "humidity"]
+    assert asked[2].end_ns == past.end_ns == NOW_NS + 2, "one now for both"
+
+
+def test_a_sensor_of_that_name_goes_first_and_of_a_measured_one_nothing_else_is_asked() -> None:
+    for name in ("vpd", "co2"):
+        past, asked = answer(replace(ASKED, sensor_type=name), {**HOUSE, name: {5 * S: 1.0}})
+        assert (past.means, len(asked)) == ((1.0,), 1)
+    past, asked = answer(replace(ASKED, sensor_type="co2"), HOUSE)
+    assert (past.stamps_ns, len(asked)) == ((), 1)
+
+
+def test_more_than_are_wanted_come_in_buckets_of_what_was_derived() -> None:
+    stamps = [n * 60 * S for n in range(60)]
+    known: Known = {
+        "temperature": {at: 20.0 + n % 10 for n, at in enumerate(stamps)},
+        "humidity": {at: 40.0 + n % 10 for n, at in enumerate(stamps)},
+    }
+    # Buckets of five minutes begin on whole ones, also before what was asked for.
+    past, _ = answer(SeriesRequest("a", "vpd", 301 * S, 3_300 * S, 9), known)
+    assert past.bucket_ns == 600 * S
+    assert past.stamps_ns == tuple(range(300 * S, 3_300 * S, 600 * S))
+    first = [vpd(20.0 + n % 10, 40.0 + n % 10) for n in range(5, 15)]
+    assert (past.counts[0], past.minima[0], past.maxima[0]) == (10, min(first), max(first))
+    assert past.means[0] == pytest.approx(sum(first) / 10)
+
+
+def test_too_many_to_be_read_one_by_one_are_refused_by_name_and_limit() -> None:
+    known: Known = {"temperature": dict.fromkeys(range(S, S + MAX_POINTS + 1), 20.0)}
+    with pytest.raises(PastRefused) as refused:
+        answer(ASKED, known)
+    assert str(refused.value) == (
+        "vpd is derived of temperature and humidity, reading by reading: from 1.000000000 s to "
+        "1000.000000002 s temperature has more than 5000 of them, the limit, or hours alone: ask "
+        "for a shorter period"
+    )

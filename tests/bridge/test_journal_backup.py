@@ -1,0 +1,119 @@
+"""A copy of a journal: made while its twin writes, whole, and enough for another start."""
+
+from __future__ import annotations
+
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import httpx
+import pytest
+
+from lupin_bridge.cli import main
+from lupin_bridge.journal_backup import backup
+from tests.support.journal import NOW, kept
+from tests.support.journal import scan as row
+from tests.support.messages import scan
+from tests.support.processes import lupin_twin, url_of
+from tests.support.ros import Peer
+from tests.support.waiting import PATIENCE_S, wait_for
+
+
+def journal(*words: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "lupin_bridge.cli", "journal", *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_a_backup_of_a_twin_at_work_is_what_another_twin_starts_with(
+    domain: int, tmp_path: Path
+) -> None:
+    source, copy = tmp_path / "twin.sqlite", tmp_path / "copy.sqlite"
+
+    def tags(url: str) -> set[str]:
+        answer = httpx.get(f"{url}/api/state", trust_env=False, timeout=PATIENCE_S)
+        return {tag["tag_id"] for tag in answer.json()["tags"]}
+
+    with (
+        Peer(domain) as robot,
+        lupin_twin(domain, "serve", "--ros-args", "-p", f"journal:={source}") as twin,
+    ):
+        url = url_of(twin)
+        robot.observe(scan("before", {"co2": 1.0}))
+        wait_for(lambda: "before" in tags(url), "the first tag")
+        wait_for(lambda: "before" in journal("export", "--journal", source).stdout, "its row")
+        assert journal("backup", copy, "--journal", source).returncode == 0
+        # It is whole by itself: nothing lies beside it.
+        assert list(tmp_path.glob("copy.sqlite*")) == [copy]
+        robot.observe(scan("after", {"co2": 3.0}))
+        wait_for(lambda: "after" in tags(url), "the last tag")
+        wait_for(lambda: "after" in journal("export", "--journal", source).stdout, "its row")
+        twin.stop()
+    # As the README says.
+    for beside in ("-wal", "-shm"):
+        source.with_name(source.name + beside).unlink(missing_ok=True)
+    source.write_bytes(copy.read_bytes())
+    assert journal("check", "--journal", source).returncode == 0
+    # The robot has gone: what it had said after the copy would be heard again.
+    with lupin_twin(domain, "serve", "--ros-args", "-p", f"journal:={source}") as twin:
+        assert tags(url_of(twin)) == {"before"}
+
+
+def test_what_is_written_meanwhile_neither_gets_in_nor_begins_it_anew(tmp_path: Path) -> None:
+    source, copy = tmp_path / "large.sqlite", tmp_path / "copy.sqlite"
+    shares: list[float] = []
+    with closing(sqlite3.connect(source, isolation_level=None)) as writer:
+        writer.execute("PRAGMA journal_mode = WAL")
+        writer.execute("CREATE TABLE large AS SELECT zeroblob(20000000) AS bytes")
+
+        def tell(share: float) -> None:
+            shares.append(share)
+            assert len(shares) < 100, "begun anew, again and again"
+            writer.execute(f"CREATE TABLE meanwhile_{len(shares)} (number)")
+
+        with closing(sqlite3.connect(source, isolation_level=None)) as reader:
+            assert backup(reader, copy, tell) == copy.stat().st_size > 20_000_000
+    assert len(shares) > 2
+    assert shares == sorted(set(shares))
+    with closing(sqlite3.connect(copy)) as found:
+        assert found.execute("SELECT name FROM sqlite_schema").fetchall() == [("large",)]
+
+
+def test_nothing_is_overwritten_and_what_cannot_be_made_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / "twin.sqlite"
+    kept(source, [row(at_ns=NOW + n, a=n / 3) for n in range(2000)])
+    taken = tmp_path / "taken"
+    taken.write_text("mine", encoding="ascii")
+    for target, why in (
+        (taken, "is there already, and nothing is overwritten"),
+        (source, "is there already, and nothing is overwritten"),
+        (tmp_path / "none" / "copy", "No such file or directory"),
+    ):
+        assert main(["journal", "backup", str(target), "--journal", str(source)]) == 1
+        said = capsys.readouterr().err
+        assert said.startswith("lupin-twin: ")
+        assert str(target) in said
+        assert said.endswith(f"{why}\n")
+    assert taken.read_text(encoding="ascii") == "mine"
+
+
+def test_of_a_backup_that_failed_nothing_is_left(tmp_path: Path) -> None:
+    source, copy = tmp_path / "twin.sqlite", tmp_path / "copy.sqlite"
+    kept(source, [row(at_ns=NOW + n, a=n / 3) for n in range(2000)])
+    assert source.stat().st_size > 40_960
+    # A disk that takes 40 kB a file: not the copy, but SQLite's 32 kB beside the journal.
+    # Its signal is ignored, so that SQLite sees the error.
+    limit = "import resource as r, signal as s, runpy, sys; s.signal(s.SIGXFSZ, s.SIG_IGN);"
+    limit += " r.setrlimit(r.RLIMIT_FSIZE, (40_960, 40_960));"
+    limit += " runpy.run_module('lupin_bridge.cli', run_name='__main__')"
+    words = ["journal", "backup", str(copy), "--journal", str(source)]
+    done = subprocess.run(
+        [sys.executable, "-c", limit, *words],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1, done.stderr
+    assert done.stderr.splitlines()[-1].startswith(f"lupin-twin: cannot write {copy}: ")
+    assert list(tmp_path.glob("copy*")) == []

@@ -1,0 +1,96 @@
+"""What a journal answers, as plain JSON: to compare one file's answers with those of another.
+
+A question is a list: the name of what is asked, and its arguments.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import math
+import shutil
+import sqlite3
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Final
+
+from lupin_twin.journal.export import rows
+from lupin_twin.journal.fold import state_at
+from lupin_twin.journal.lately import lately
+from lupin_twin.journal.queries import series
+from lupin_twin.journal.writes import writes
+from lupin_twin.past import SeriesRequest
+from lupin_twin.past_writes import WritesRequest
+
+JOURNALS: Final = Path(__file__).parents[1] / "fixtures" / "journals"
+NAMES: Final = sorted(path.stem for path in JOURNALS.glob("*.sqlite"))
+
+
+def old(name: str, folder: Path) -> Path:
+    """A journal as a twin finds it."""
+    return Path(shutil.copy(JOURNALS / f"{name}.sqlite", folder / "j.sqlite"))
+
+
+def answers(name: str) -> list[tuple[list[Any], Any]]:
+    """Questions, and what the old build said."""
+    text = gzip.decompress((JOURNALS / f"{name}.answers.json.gz").read_bytes())
+    # What is infinite is kept as no number now.
+    found: list[tuple[list[Any], Any]] = json.loads(text, parse_constant=lambda _: math.nan)
+    return found
+
+
+def answer(connection: sqlite3.Connection, question: list[Any]) -> Any:
+    """What the journal says, as JSON reads it back."""
+    kind, *arguments = question
+    return _plain(_ANSWERS[kind](connection, *arguments))
+
+
+def _state(connection: sqlite3.Connection, at_ns: int) -> Any:
+    return [asdict(tag) for tag in state_at(connection, at_ns, "map").tags]
+
+
+def _series(connection: sqlite3.Connection, *arguments: Any) -> Any:
+    *request, now_ns = arguments
+    past = series(connection, SeriesRequest(*request), now_ns)
+    entries = zip(past.stamps_ns, past.counts, past.means, past.minima, past.maxima, strict=True)
+    return [past.start_ns, past.end_ns, past.bucket_ns, list(entries)]
+
+
+def _export(connection: sqlite3.Connection, *arguments: Any) -> Any:
+    return [list(asdict(row).values()) for lot in rows(connection, *arguments) for row in lot]
+
+
+def _lately(connection: sqlite3.Connection, *arguments: Any) -> Any:
+    return list(lately(connection, *arguments))
+
+
+def _writes(connection: sqlite3.Connection) -> Any:
+    """All of them; a write's number is that of its file."""
+    found = writes(connection, WritesRequest(0, 5_000)).writes
+    return [[value for name, value in asdict(write).items() if name != "number"] for write in found]
+
+
+_ANSWERS: dict[str, Callable[..., Any]] = {
+    "state": _state,
+    "series": _series,
+    "export": _export,
+    "lately": _lately,
+    "writes": _writes,
+}
+
+
+def _plain(value: Any) -> Any:
+    return json.loads(json.dumps(value))
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two answers are the same, but for the last digits of a mean."""
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(same, one, other))
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
+    if isinstance(one, float) and isinstance(other, float):
+        both_nan = math.isnan(one) and math.isnan(other)
+        return both_nan or math.isclose(one, other, rel_tol=1e-9, abs_tol=1e-9)
+    return bool(one == other)

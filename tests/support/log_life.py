@@ -1,0 +1,317 @@
+"""A log that lives through something, and the plainest account of it: every row, in a list."""
+
+from __future__ import annotations
+
+import math
+import sqlite3
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from hypothesis import strategies as st
+
+from lupin_twin.journal.appending import KNOWN_BY_NOTHING, Appender
+from lupin_twin.journal.retention import Limits, purge_step
+from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, LookRow, PinRow, Row, ScanRow
+from lupin_twin.journal.runs import runs, spans
+from lupin_twin.journal.schema import open_writer, transaction
+from lupin_twin.past import EVERY_TAG, Event, PastRow, SeriesPast, SeriesRequest
+from lupin_twin.state import NO_FLOWER, Pose, Reading
+
+SECOND = 1_000_000_000
+MINUTE = 60 * SECOND
+HOUR = 60 * MINUTE
+BEGUN = 1_763_700_000 * SECOND // HOUR * HOUR
+LATEST = 400  # minutes
+TAGS = ("7", "8", "ü 9")
+SILENCE_NS = 600 * SECOND
+Entry = tuple[int, int, float]  # stamp, number, value
+
+
+def scan(tag: str = "7", at_ns: int = BEGUN, *, source: str = "robot", **values: float) -> ScanRow:
+    """A scan that worked."""
+    readings = (values or {"temperature": 21.5}).items()
+    return ScanRow(
+        tag, at_ns, at_ns + 1000, tuple(Reading(name, value) for name, value in readings),
+        source=source, mission="m1",
+    )  # fmt: skip
+
+
+def failure(tag: str = "7", at_ns: int = BEGUN, status: int = 2, kind: int = 0) -> ScanRow:
+    """An attempt that failed."""
+    return ScanRow(tag, at_ns, at_ns + 1000, (), kind, status, "no", source="robot")
+
+
+def look(tag: str = "7", at_ns: int = BEGUN, *, anomaly: bool = False) -> LookRow:
+    """A look at flowers."""
+    flower = replace(NO_FLOWER, species="lupin", anomaly=anomaly, bug_count=int(anomaly))
+    return LookRow(tag, at_ns, at_ns + 2000, flower, source="robot", mission="m1")
+
+
+def pin(tag: str = "7", at_ns: int = BEGUN, x: float = 1.5) -> PinRow:
+    """A place."""
+    return PinRow(tag, at_ns, at_ns + 1000, Pose(x, 2.5, 0.0, 0.0, 0.0, 0.0, 1.0))
+
+
+@dataclass
+class Life:
+    """Writes rows into a log and remembers each that is new, with its run."""
+
+    connection: sqlite3.Connection
+    rows: list[tuple[int, Row]] = field(default_factory=list)
+    run: int = 0
+    batches: list[list[Row]] = field(default_factory=list)
+    _known: dict[object, set[str]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._appender = Appender(self.connection)
+
+    def write(self, rows: Iterable[Row]) -> None:
+        """Rows that come together."""
+        rows = list(rows)
+        with transaction(self.connection):
+            self._appender.append(self.run, rows)
+            self._appender.flush()
+        for row in rows:
+            if (new := self._new(row)) is not None:
+                self.rows.append((self.run, new))
+
+    def _new(self, row: Row) -> Row | None:
+        """What is new of it: of a write that is known already, other sensors."""
+        if isinstance(row, PinRow):
+            return row
+        kind = row.kind if isinstance(row, ScanRow) else KIND_FLOWER
+        key = (self.run, row.tag_id, kind, row.stamp_ns, row.source)
+        known = self._known.get(key)
+        sensors = self._known.setdefault(key, set())
+        if isinstance(row, ScanRow):
+            row = replace(row, readings=tuple(r for r in row.readings if r.name not in sensors))
+            sensors |= {reading.name for reading in row.readings}
+            return row if known is None or row.readings else None
+        return row if known is None else None
+
+    def begin(self, at_ns: int, ended_ns: int | None = None) -> None:
+        """A clock that is new, or has gone back; the latest of what was known is copied."""
+        before, self.run = self.run, self.run + 1
+        copied: dict[object, Row] = {}
+        for run, row in self.rows:
+            if run == before:
+                copied[type(row), row.tag_id] = replace(row, stamp_ns=min(row.stamp_ns, at_ns))
+        with transaction(self.connection):
+            self.connection.execute(
+                "UPDATE run SET ended_stamp_ns = ? WHERE run = ?", (ended_ns, before)
+            )
+            self.connection.execute(
+                "INSERT INTO run VALUES ('local', ?, 1, ?, ?, ?, NULL, NULL)",
+                (self.run, at_ns, at_ns, self._appender.last_seq + 1),
+            )
+            self._appender.append(
+                self.run,
+                [
+                    row if isinstance(row, PinRow) else replace(row, own_stamp_ns=KNOWN_BY_NOTHING)
+                    for row in copied.values()
+                ],
+                are_copies=True,
+            )
+            self._appender.flush()
+
+    def delete(self, before_ns: int) -> None:
+        """Have retention delete what arrived before."""
+        with transaction(self.connection):
+            while purge_step(self.connection, Limits(0.0, 10**12), before_ns):
+                pass
+
+    def _holds(self) -> list[tuple[int, Row]]:
+        axis = spans(runs(self.connection.execute))
+        return [
+            (number, row)
+            for number, (run, row) in enumerate(self.rows)
+            if any(s.start_ns <= row.stamp_ns < s.end_ns and s.run.id == run for s in axis)
+        ]
+
+    def _of(self, tag_id: str) -> list[tuple[int, Row]]:
+        return [(n, row) for n, row in self._holds() if tag_id in (EVERY_TAG, row.tag_id)]
+
+    # --- what there was -----------------------------------------------------------------------
+
+    def readings(self, tag_id: str, sensor: str) -> list[Entry]:
+        return sorted(
+            (row.stamp_ns, number, reading.value)
+            for number, row in self._of(tag_id)
+            if isinstance(row, ScanRow)
+            for reading in row.readings
+            if reading.name == sensor
+        )
+
+    def events(self, tag_id: str, event: Event) -> list[Entry]:
+        if event in (Event.PESTS_SEEN, Event.PESTS_CLEARED):
+            return self._changes(tag_id, is_seen=event is Event.PESTS_SEEN)
+        found = []
+        for number, row in self._of(tag_id):
+            value: float | None = None
+            if isinstance(row, LookRow) and event is Event.LOOKS:
+                value = row.flower.bug_count
+            elif isinstance(row, ScanRow) and row.status != STATUS_OK and event is Event.FAILURES:
+                value = row.status
+            elif isinstance(row, ScanRow) and row.status == STATUS_OK and event is Event.SCANS:
+                value = len(row.readings)
+            if value is not None:
+                found.append((row.stamp_ns, number, float(value)))
+        return sorted(found)
+
+    def _changes(self, tag_id: str, *, is_seen: bool) -> list[Entry]:
+        held = {number for number, _ in self._holds()}
+        found = []
+        had: dict[tuple[int, str], bool] = {}
+        looks = [(row.stamp_ns, n, run, row) for n, (run, row) in enumerate(self.rows)]
+        for stamp_ns, number, run, row in sorted(looks, key=lambda look: look[:2]):
+            if not isinstance(row, LookRow) or tag_id not in (EVERY_TAG, row.tag_id):
+                continue
+            has = row.flower.anomaly
+            if has != had.get((run, row.tag_id), False) and has == is_seen and number in held:
+                found.append((stamp_ns, number, float(row.flower.bug_count)))
+            had[run, row.tag_id] = has
+        return found
+
+    def attempts(self, tag_id: str) -> list[int]:
+        found = self._of(tag_id)
+        return sorted(row.stamp_ns for _, row in found if isinstance(row, ScanRow | LookRow))
+
+    def silences(
+        self, tag_id: str, start_ns: int, end_ns: int, now_ns: int
+    ) -> list[tuple[int, float]]:
+        attempts = self.attempts(tag_id)
+        within = [stamp_ns for stamp_ns in attempts if start_ns <= stamp_ns < end_ns]
+        usual_ns = median(b - a for a, b in pairwise(within)) if len(within) > 1 else 0
+        if attempts:
+            attempts.append(max(now_ns, attempts[-1]))
+        return [
+            (max(a, start_ns), (min(b, end_ns) - max(a, start_ns)) / 1e9)
+            for a, b in pairwise(attempts)
+            if b - a > max(SILENCE_NS, 3 * usual_ns) and max(a, start_ns) < min(b, end_ns)
+        ]
+
+    def export(self, start_ns: int, end_ns: int, tag_id: str | None) -> list[PastRow]:
+        # Each run carries what the one before it knew; it knows nothing of those behind it.
+        places: dict[tuple[int, str], tuple[float, float]] = {}
+        for since, row in self.rows:
+            if isinstance(row, PinRow):
+                for run in range(since, self.run + 1):
+                    places.setdefault((run, row.tag_id), (row.pose.x, row.pose.y))
+        held = {number for number, _ in self._holds()}
+        scans = sorted(
+            (row.stamp_ns, number, run, row)
+            for number, (run, row) in enumerate(self.rows)
+            if isinstance(row, ScanRow)
+            and start_ns <= row.stamp_ns < end_ns
+            and tag_id in (None, row.tag_id)
+        )
+        found = []
+        for stamp_ns, number, run, row in scans:
+            x, y = places.get((run, row.tag_id), (math.nan, math.nan))
+            if number in held:
+                found += [
+                    PastRow(stamp_ns, row.tag_id, x, y, name, value, row.status, row.source)
+                    for name, value in [(r.name, r.value) for r in row.readings] or [("", math.nan)]
+                ]
+        return found
+
+
+def check(answer: SeriesPast, request: SeriesRequest, entries: list[Entry], *, now_ns: int) -> None:
+    """An answer holds all entries that there were: each, or each bucket's count and values."""
+    end_ns = request.end_ns or now_ns + 1
+    asked = [entry for entry in entries if request.start_ns <= entry[0] < end_ns]
+    if not answer.is_bucketed:
+        assert len(asked) <= request.max_points
+        assert list(answer.stamps_ns) == [stamp_ns for stamp_ns, *_ in asked]
+        # What is no number is null in the log.
+        values = [value if math.isfinite(value) else math.nan for *_, value in asked]
+        assert repr(answer.means) == repr(tuple(values))
+        assert repr(answer.minima) == repr(answer.maxima) == repr(answer.means)
+        assert answer.counts == (1,) * len(asked)
+        return
+    bucket_ns = answer.bucket_ns or 0
+    if entries:
+        assert answer.start_ns <= max(request.start_ns, entries[0][0])
+    assert answer.end_ns >= end_ns
+    assert bucket_ns * request.max_points >= answer.end_ns - answer.start_ns
+    buckets: dict[int, list[float]] = {}
+    for stamp_ns, _, value in entries:
+        if answer.start_ns <= stamp_ns < answer.end_ns and math.isfinite(value):
+            index = (stamp_ns - answer.start_ns) // bucket_ns
+            buckets.setdefault(answer.start_ns + index * bucket_ns, []).append(value)
+    assert list(answer.stamps_ns) == sorted(buckets)
+    for start_ns, n, mean, low, high in zip(
+        answer.stamps_ns, answer.counts, answer.means, answer.minima, answer.maxima, strict=True
+    ):
+        values = buckets[start_ns]
+        assert n == len(values)
+        size = max(map(abs, values))
+        assert math.isclose(mean, sum(values) / n, rel_tol=1e-9, abs_tol=1e-12 * size)
+        assert low == float(f"{min(values):.12g}")
+        assert high == float(f"{max(values):.12g}")
+
+
+# --- for hypothesis: rows in any order, some late, some again; clocks go back ---------------------
+
+_stamps = st.builds(
+    lambda minute, ns: BEGUN + minute * MINUTE + ns, st.integers(0, LATEST), st.integers(0, 3)
+)
+_values = st.one_of(
+    st.floats(-1e6, 1e6), st.sampled_from([float("nan"), float("inf"), 21.5, 1e-7, 21.53])
+)
+_tags = st.sampled_from(TAGS)
+_rows: st.SearchStrategy[Row] = st.one_of(
+    st.builds(
+        lambda tag, at_ns, source, values: scan(tag, at_ns, source=source, **values),
+        _tags,
+        _stamps,
+        st.sampled_from(["robot", "other"]),
+        st.dictionaries(st.sampled_from(["temperature", "co2"]), _values, min_size=1),
+    ),
+    st.builds(failure, _tags, _stamps, st.integers(1, 3), st.integers(0, 1)),
+    st.builds(
+        lambda tag, at, anomaly: look(tag, at, anomaly=anomaly), _tags, _stamps, st.booleans()
+    ),
+    st.builds(pin, _tags, _stamps),
+)
+steps = st.lists(
+    st.one_of(
+        st.tuples(st.just("rows"), st.lists(_rows, min_size=1, max_size=12)),
+        st.tuples(st.just("again"), st.integers(0, 9)),
+        st.tuples(st.just("back"), st.integers(0, LATEST)),
+    ),
+    min_size=1,
+    max_size=8,
+)
+periods = st.one_of(
+    st.tuples(_stamps, _stamps).map(sorted),
+    st.tuples(st.just(0), _stamps),
+    st.tuples(_stamps, st.just(0)),
+    st.just((0, 0)),
+)
+
+
+@contextmanager
+def lived(path: Path, told: Iterable[tuple[str, Any]] = ()) -> Iterator[Life]:
+    """A log that has lived through the steps."""
+    connection = open_writer(path)
+    connection.execute("PRAGMA synchronous = OFF")
+    try:
+        life = Life(connection)
+        life.begin(BEGUN)
+        for what, arg in told:
+            match what:
+                case "rows":
+                    life.write(arg)
+                case "again":
+                    life.write([row for run, row in life.rows if run == life.run][-arg:])
+                case "back":
+                    life.begin(BEGUN + arg * MINUTE, BEGUN + (arg + 60) * MINUTE)
+        yield life
+    finally:
+        connection.close()

@@ -1,0 +1,111 @@
+"""A twin over a file, without ROS: its clocks are set by hand, its observations made by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from lupin_twin import ingest
+from lupin_twin.drops import Drop
+from lupin_twin.history import KIND_FLOWER, KIND_TAG_READING, History
+from lupin_twin.ingest import Heard, HeardLook, HeardReading
+from lupin_twin.journal.fold import state_at
+from lupin_twin.journal.runs import Clock
+from lupin_twin.memory import Memory, open_journal
+from lupin_twin.state import Flower, Pose, Reading, Snapshot, TagState, TwinStore
+from tests.support.waiting import wait_for
+
+S = 1_000_000_000
+NOW = 1_900_000_000 * S
+HERE = Pose(1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+THERE = Pose(5.0, 6.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+NOWHERE = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class Twin:
+    """A life of a twin over a file, without ROS; its clocks are set by hand."""
+
+    def __init__(self, path: Path, at_s: float, *, is_simulated: bool = False) -> None:
+        self.store, self.history = TwinStore(), History(8)
+        self.steady_s = 1_000.0
+        self.is_simulated = is_simulated
+        self.memory = Memory(
+            self.store,
+            self.history,
+            open_journal(path, "/twin", 1e4, 1e4),
+            8,
+            lambda: int(self.steady_s * S),
+        )
+        self.at(at_s)
+
+    def at(self, at_s: float, *, passed_s: float = 0.0) -> None:
+        """The clock says `at_s`, s after `NOW`; `passed_s` by the steady clock."""
+        self.steady_s += passed_s
+        self.now_ns = int(at_s * S) + (0 if self.is_simulated else NOW)
+        self.wall_ns = NOW + int(at_s * S)
+        now = Clock(self.now_ns, self.wall_ns, self.is_simulated)
+        self.memory.follow(now)
+        self.memory.hold_to(now)
+
+    def hear(
+        self,
+        stamp_s: float | None,
+        *,
+        tag: str = "7",
+        source: str = "a",
+        pose: Pose = NOWHERE,
+        status: int = 0,
+        flower: Flower | None = None,
+        **readings: float,
+    ) -> None:
+        """An observation comes, now, with this stamp; with a flower it is a look."""
+        stamp_ns = 0 if stamp_s is None else int(stamp_s * S)
+        stamp_ns += 0 if self.is_simulated or stamp_s is None else NOW
+        part = (
+            HeardReading(tag, 0, tuple(Reading(*each) for each in readings.items()), pose)
+            if flower is None
+            else HeardLook(tag, "", flower, pose)
+        )
+        kind = KIND_TAG_READING if flower is None else KIND_FLOWER
+        heard = Heard(kind, source, status, "", "", stamp_ns, part)
+        write = ingest.observation(heard, "map", self.now_ns)
+        assert not isinstance(write, Drop)
+        assert self.memory.apply(write, self.wall_ns) is None
+
+    def doubts(self) -> bool:
+        """Whether its clock contradicts the log."""
+        return self.memory.is_clock_doubted
+
+    @property
+    def live(self) -> dict[str, TagState]:
+        """What is known now."""
+        return by_id(self.store.snapshot(self.now_ns, "map"))
+
+    def past(self, at_s: float | None = None) -> dict[str, TagState]:
+        """What the log says of a moment; of now without one."""
+        wait_for(lambda: self.memory.condition.waiting == 0, "all to be written")
+        offset_ns = 0 if self.is_simulated else NOW
+        at_ns = self.now_ns if at_s is None else int(at_s * S) + offset_ns
+        asked = self.memory.recall.ask(lambda connection, _: state_at(connection, at_ns, "map"))
+        return by_id(asked.result(20.0))
+
+    def says(self, name: str = "t", tag: str = "7") -> tuple[float, float | None]:
+        """A sensor's value and age, the same live and in the log."""
+        assert self.live == self.past()
+        [reading] = [r for r in self.live[tag].readings if r.name == name]
+        assert reading.observed_at_ns is not None
+        return reading.value, (self.now_ns - reading.observed_at_ns) / S
+
+
+def by_id(snapshot: Snapshot) -> dict[str, TagState]:
+    return {tag.tag_id: tag for tag in snapshot.tags}
+
+
+@contextmanager
+def twin(path: Path, at_s: float = 0.0, *, is_simulated: bool = False) -> Iterator[Twin]:
+    life = Twin(path, at_s, is_simulated=is_simulated)
+    try:
+        yield life
+    finally:
+        life.memory.close()

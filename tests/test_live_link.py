@@ -1,0 +1,207 @@
+"""What DDS does not deliver, or not at once: the twin and `web` know it, say it, and recover."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from lupin_msgs.msg import Observation
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+
+from lupin_bridge.twin.web_node import REPORT_HOLDS_S
+from lupin_twin.inputs import SETTLED_S
+from tests.support.domains import ros_env
+from tests.support.live import attached, wait_until_ready
+from tests.support.messages import scan
+from tests.support.processes import OFTEN, Process, lupin_twin, twin_node
+from tests.support.ros import Peer
+from tests.support.waiting import wait_for
+from tests.support.web import Bridge, bridge
+
+TOPIC = "/floranova/observations"
+SHORT_LEASE = """<?xml version="1.0" encoding="UTF-8" ?>
+<profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
+  <participant profile_name="short_lease" is_default_profile="true">
+    <rtps><builtin><discovery_config>
+      <leaseDuration><sec>2</sec></leaseDuration>
+      <leaseAnnouncement><sec>0</sec><nanosec>500000000</nanosec></leaseAnnouncement>
+    </discovery_config></builtin></rtps>
+  </participant>
+</profiles>
+"""
+
+
+def test_web_knows_its_twin_again_after_a_gap_longer_than_the_lease(
+    domain: int, tmp_path: Path
+) -> None:
+    profile = tmp_path / "lease.xml"
+    profile.write_text(SHORT_LEASE)
+    lease = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(profile)}
+    with (
+        Peer(domain) as peer,
+        twin_node(domain, *OFTEN, afresh=True, **lease) as twin,
+        lupin_twin(domain, "web", afresh=True, **lease) as web,
+        attached(web, peer) as live,
+    ):
+
+        def is_known() -> bool:
+            told = live.get("/readyz").json()
+            return (told["reason"], told["origin"], told["journal"]["state"]) == (
+                "live",
+                "robot",
+                "recording",
+            )
+
+        wait_until_ready(live)
+        wait_for(is_known, "what the twin says of itself")
+        twin.freeze()
+        wait_for(lambda: not peer.node.count_publishers("/twin/state"), "the lease to end")
+        # Web's ends with it; and what the twin said before must not stand for what it says then.
+        ended_s = time.monotonic() + REPORT_HOLDS_S
+        wait_for(lambda: time.monotonic() > ended_s, "what was said before to be too old")
+        twin.thaw()
+        wait_for(is_known, "what the twin says of itself, after the gap")
+
+
+# --- publishers that the contract's QoS does not match --------------------------------------------
+
+
+@pytest.fixture
+def running() -> Iterator[Bridge]:
+    with bridge(*OFTEN) as live:
+        yield live
+
+
+@pytest.mark.parametrize(
+    ("qos", "remedy"),
+    [
+        (QoSProfile(depth=10), "use TRANSIENT_LOCAL"),
+        (
+            QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT),
+            "use TRANSIENT_LOCAL and RELIABLE",
+        ),
+    ],
+    ids=["default", "best effort"],
+)
+def test_a_publisher_of_another_qos_is_heard_and_told_of(
+    running: Bridge, qos: QoSProfile, remedy: str
+) -> None:
+    peer = running.peer
+    publisher = peer.node.create_publisher(Observation, TOPIC, qos)
+
+    def is_heard() -> bool:
+        publisher.publish(scan("foreign", {"co2": 1.0}))
+        return running.get("/api/tags/foreign").status_code == 200
+
+    wait_for(is_heard, "what it says")
+    (said,) = wait_for(lambda: running.json("/readyz")["input_problems"], "the problem")
+    assert said.startswith(f"/peer publishes {TOPIC} with another QoS")
+    assert said.endswith(remedy)
+    assert running.process.output.count(said) == 1
+    assert diagnosed(peer, lambda values: said in values.get("inputs", {}).values())
+    # Who keeps to the contract is heard by both subscriptions, and counts once; it gives no stamp.
+    for value in range(20):
+        peer.observe(scan("ours", {"co2": float(value)}))
+    running.tag("ours", lambda tag: tag["readings"][0]["value"] == 19.0)
+    publisher.publish(scan("the last", {"co2": 1.0}))
+    running.tag("the last")
+    assert len(running.json("/api/tags/ours/history")["tries"]) == 20
+    assert running.json("/readyz")["drops"] == []
+    peer.node.destroy_publisher(publisher)
+    wait_for(lambda: not running.json("/readyz")["input_problems"], "nothing to be wrong")
+
+
+# --- what is lost ---------------------------------------------------------------------------------
+
+
+def test_of_a_publisher_that_had_said_nothing_each_loss_is_counted(domain: int) -> None:
+    count = 1_000
+    with twin_node(domain, afresh=True) as twin, Peer(domain) as peer:
+        publisher = peer.publisher(TOPIC, Observation)
+        peer.until(publisher.get_subscription_count, "the twin")
+        settled_s = time.monotonic() + SETTLED_S + 2.0
+        peer.until(lambda: time.monotonic() > settled_s, "the twin to have seen its silence")
+        twin.freeze()
+        for number in range(count):
+            message = scan(f"tag {number % 30}", {"co2": float(number)})
+            message.header.stamp.sec = 1 + number
+            publisher.publish(message)
+        twin.thaw()
+
+        def is_all(values: dict[str, dict[str, str]]) -> bool:
+            lost = int(values["queues"]["lost"])
+            return lost > 0 and lost + int(values["journal"]["written"]) == count
+
+        assert diagnosed(peer, is_all)
+
+
+# --- other users ----------------------------------------------------------------------------------
+
+NOBODY = 65534
+# Everything is imported while the files can be read.
+AS_NOBODY = f"""
+import os, time, rclpy, rclpy.executors, rclpy.node
+from lupin_msgs.msg import Observation
+from rclpy.qos import DurabilityPolicy, QoSProfile
+Observation.__class__.__import_type_support__()
+os.setgid({NOBODY}), os.setuid({NOBODY})
+rclpy.init()
+node = rclpy.create_node("somebody_else")
+qos = QoSProfile(depth=50, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+publisher = node.create_publisher(Observation, "{TOPIC}", qos)
+while True:
+    publisher.publish(Observation())
+    rclpy.spin_once(node, timeout_sec=0.1)
+"""
+
+
+@contextmanager
+def home_for_all() -> Iterator[str]:
+    """A folder that every user may write to, in one that every user may enter."""
+    with TemporaryDirectory() as home:
+        Path(home).chmod(0o777)
+        yield home
+
+
+if os.geteuid() == 0:  # nobody else can run a process as another user; see test_inputs too
+
+    def test_a_publisher_of_another_user_from_whom_nothing_comes_is_hinted_at(
+        domain: int,
+    ) -> None:
+        with (
+            home_for_all() as home,
+            bridge(*OFTEN, domain=domain) as live,
+            Process(
+                [sys.executable, "-c", AS_NOBODY], ros_env(domain, HOME=home, ROS_LOG_DIR=home)
+            ),
+        ):
+            (said,) = wait_for(lambda: live.json("/readyz")["input_problems"], "the hint")
+        assert said.startswith(f"nothing has come yet from the publisher of {TOPIC}")
+        assert f"uid {NOBODY}" in said
+        assert "FASTDDS_BUILTIN_TRANSPORTS=UDPv4" in said
+
+
+def diagnosed(peer: Peer, accept: Callable[[dict[str, dict[str, str]]], bool]) -> bool:
+    """Wait until what the twin says on `/diagnostics`, by finding and key, is as expected."""
+    said: list[Any] = []
+    subscription = peer.node.create_subscription(DiagnosticArray, "/diagnostics", said.append, 10)
+
+    def look() -> bool:
+        return bool(said) and accept(
+            {
+                status.name.rpartition(": ")[2]: {it.key: it.value for it in status.values}
+                for status in said[-1].status
+            }
+        )
+
+    peer.until(look, "the diagnosis")
+    peer.node.destroy_subscription(subscription)
+    return True

@@ -1,0 +1,99 @@
+"""A robot that is lost pins a tag kilometres away: the site stays usable, and says which tag."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+
+from tests.support.messages import scan
+from tests.support.web import Bridge, bridge
+
+AT = {"1": (1.0, 1.0), "2": (3.0, 1.0), "3": (3.0, 3.0)}
+# A twin that knows such a pose already, from before there was a limit.
+ALL_POSES = ("--ros-args", "-p", "max_pose_m:=1000000.0")
+LOST = "lost"
+
+
+def at_home(running: Bridge) -> None:
+    for tag_id, at in AT.items():
+        running.peer.observe(scan(tag_id, {"temperature": 20.0}, at=at))
+        running.tag(tag_id)
+
+
+@pytest.fixture(scope="module")
+def far() -> Iterator[Bridge]:
+    """A greenhouse of three tags, and one that a lost robot has pinned at x = 5,000 m."""
+    with bridge(*ALL_POSES) as running:
+        at_home(running)
+        running.peer.observe(scan(LOST, {"temperature": 40.0}, at=(5000.0, 1.0)))
+        running.tag(LOST)
+        yield running
+
+
+@pytest.mark.parametrize("is_past", [False, True])
+@pytest.mark.parametrize("sensor", ["temperature", "vpd"])
+def test_the_default_field_is_that_of_the_tags_at_home(
+    far: Bridge, sensor: str, is_past: bool
+) -> None:
+    query: dict[str, Any] = {"sensor_type": sensor}
+    if is_past:
+        stamp = far.json("/api/state")["header"]["stamp"]
+        query["at"] = f"{stamp['sec']}.{stamp['nanosec']:09d}"
+    answer = far.get("/api/field", **query)
+    assert answer.status_code == 200, answer.text
+    body = answer.json()
+    assert (body["origin_x"], body["origin_y"]) == (-0.5, -0.5)
+    assert (body["width"], body["height"]) == (50, 50)
+    assert answer.headers["x-field-far-off-count"] == "1"
+
+
+def test_quality_says_which_tags_are_left_out(far: Bridge) -> None:
+    quality = far.json("/api/field/quality", sensor_type="temperature")
+    assert quality["far_off_tags"] == [LOST]
+    assert quality["sample_count"] == 4
+
+
+def test_a_box_of_one_s_own_shows_the_tag_that_is_far_off(far: Bridge) -> None:
+    box: dict[str, Any] = {"bbox_min_x": 4999, "bbox_min_y": 0, "bbox_max_x": 5001, "bbox_max_y": 2}
+    body = far.json("/api/field", sensor_type="temperature", resolution=0.5, **box)
+    assert set(body["values"]) == {40.0}
+
+
+def test_the_default_field_of_a_house_too_large_for_fine_cells_has_wider_ones() -> None:
+    with bridge("--ros-args", "-p", "max_grid_cells:=1000") as running:
+        at_home(running)
+        body = running.json("/api/field", sensor_type="temperature")
+        assert (body["width"], body["height"]) == (25, 25)
+        assert body["resolution_used"] == 0.2
+        # Who says how wide has to be told that it is too fine.
+        fine = running.get("/api/field", sensor_type="temperature", resolution=0.1)
+        assert fine.status_code == 400
+        assert "the limit is 1000" in fine.json()["error_message"]
+
+
+def test_a_pose_that_is_dropped_is_counted_where_drops_are() -> None:
+    heard: list[Any] = []
+
+    def counted() -> bool:
+        found = [
+            {pair.key: pair.value for pair in status.values}
+            for status in (heard[-1].status if heard else ())
+            if status.name == "/lupin_twin: drops"
+        ]
+        return bool(found) and found[0].get("pose") == "1" and "'lost'" in found[0]["last: pose"]
+
+    with bridge() as running:
+        peer = running.peer
+        peer.node.create_subscription(DiagnosticArray, "/diagnostics", heard.append, 10)
+        at_home(running)
+        peer.observe(scan(LOST, {"temperature": 40.0}, at=(5000.0, 1.0)))
+        tag = running.tag(LOST)
+        assert tag["pose"]["orientation"]["w"] == 0
+        assert tag["readings"][0]["value"] == 40.0
+        peer.until(counted, "the pose among the drops")
+        assert 'lupin_dropped_total{reason="pose"} 1.0' in running.get("/metrics").text
+        body = running.json("/api/field", sensor_type="temperature")
+        assert (body["width"], body["height"]) == (50, 50)

@@ -1,0 +1,200 @@
+"""A journal of version 3 is upgraded: what is answered is what was, whatever happens meanwhile."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from lupin_twin.journal.condition import JournalState
+from lupin_twin.journal.schema import open_reader
+from lupin_twin.journal.upgrade import is_version3, upgrade
+from lupin_twin.journal.writer import Journal
+from tests.support.journal_answers import answer, answers, old, same
+from tests.support.upgrade_child import CLOCK, LIMITS
+from tests.support.waiting import wait_for
+
+
+class Usage(NamedTuple):
+    total: int
+    used: int
+    free: int
+
+
+@contextmanager
+def started(path: Path) -> Iterator[Journal]:
+    """The journal of a twin that starts."""
+    journal = Journal(path, "/test", LIMITS)
+    journal.begin(CLOCK)
+    try:
+        yield journal
+    finally:
+        journal.close(30.0)
+
+
+def check_states(path: Path, name: str) -> None:
+    """The upgraded file knows at every moment what the old one did."""
+    with closing(open_reader(path)) as connection:
+        for question, right in answers(name):
+            if question[0] == "state":
+                assert same(answer(connection, question), right), question
+
+
+def names_in(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+# --- what comes along -----------------------------------------------------------------------------
+
+
+def test_the_old_file_stays_beside_the_new_one_as_it_was(tmp_path: Path) -> None:
+    path = old("day", tmp_path)
+    path.chmod(0o640)
+    content = path.read_bytes()
+    shares: list[float] = []
+    assert upgrade(path, shares.append) == ""
+    assert names_in(tmp_path) == {"j.sqlite", "j.sqlite.v3"}
+    assert path.with_name("j.sqlite.v3").read_bytes() == content
+    assert path.stat().st_mode & 0o777 == 0o640
+    assert shares == sorted(shares)
+    # Put back and upgraded again, nothing is overwritten.
+    path.unlink()
+    path.write_bytes(content)
+    upgrade(path, shares.append)
+    assert names_in(tmp_path) == {"j.sqlite", "j.sqlite.v3", "j.sqlite.v3-1"}
+
+
+def test_the_log_of_a_killed_twin_comes_along(tmp_path: Path) -> None:
+    (tmp_path / "killed").mkdir()
+    first = old("day", tmp_path)
+    with closing(sqlite3.connect(first, isolation_level=None)) as writer:
+        writer.execute("PRAGMA wal_autocheckpoint = 0")
+        writer.execute("DELETE FROM look")
+        for end in ("", "-wal"):
+            shutil.copy(f"{first}{end}", tmp_path / "killed" / f"j.sqlite{end}")
+    path = tmp_path / "killed" / "j.sqlite"
+    upgrade(path, lambda share: None)
+    assert names_in(path.parent) == {"j.sqlite", "j.sqlite.v3"}
+    with closing(open_reader(path)) as connection:
+        assert connection.execute("SELECT count(*) FROM look").fetchone() == (0,)
+        assert connection.execute("SELECT count(*) > 300 FROM scan").fetchone() == (1,)
+
+
+def test_what_is_damaged_is_left_out_and_said(tmp_path: Path) -> None:
+    path = old("flipped", tmp_path)
+    with started(path) as journal:
+        assert journal.take_restored(30.0) is not None
+        wait_for(lambda: journal.condition.state is JournalState.RECORDING, "recording")
+        assert "7 rows of" in journal.condition.detail
+        assert "j.sqlite.v3 are damaged and left out" in journal.condition.detail
+    check_states(path, "flipped")
+
+
+# --- what may happen meanwhile --------------------------------------------------------------------
+
+
+def child(path: Path, number: int) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tests.support.upgrade_child", str(path), str(number)]
+    return subprocess.run(command, check=False, capture_output=True, text=True)
+
+
+def test_killed_at_any_moment_it_is_done_at_the_next_start(tmp_path: Path) -> None:
+    whole = old("late", tmp_path)
+    content = whole.read_bytes()
+    moments, _ = map(int, child(whole, 0).stdout.split())
+    assert moments > 15
+    for number in range(1, moments + 1):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        path = old("late", folder)
+        assert child(path, number).returncode == -signal.SIGKILL
+        # Until it is done, all is in the old file.
+        assert not is_version3(path) or path.read_bytes() == content
+        with started(path) as journal:
+            assert journal.take_restored(30.0) is not None, number
+        assert names_in(folder) == {"j.sqlite", "j.sqlite.v3", "j.sqlite.lock"}
+        assert path.with_name("j.sqlite.v3").read_bytes() == content
+        check_states(path, "late")
+
+
+def test_on_a_full_disk_the_old_file_is_left_and_it_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = old("day", tmp_path)
+    content = path.read_bytes()
+    with monkeypatch.context() as full:
+        full.setattr(shutil, "disk_usage", lambda _: Usage(10**9, 10**9, 10_000))
+        with started(path) as journal:
+            wait_for(lambda: journal.condition.state is JournalState.FAILING, "failing")
+            assert "has 0.0 MB free, and its upgrade takes up to 0.1 MB" in journal.condition.detail
+            assert path.read_bytes() == content
+            full.undo()
+            # As soon as there is room.
+            assert wait_for(lambda: journal.take_restored(1.0), "what was known") is not None
+    check_states(path, "day")
+
+
+def test_a_disk_that_fills_meanwhile_leaves_the_old_file_as_it_was(tmp_path: Path) -> None:
+    path = old("day", tmp_path)
+    content = path.read_bytes()
+    # A file that may not grow fails as one on a full disk does.
+    program = (
+        "import resource, sys; from pathlib import Path;"
+        "from lupin_twin.journal.upgrade import upgrade;"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000));"
+        "upgrade(Path(sys.argv[1]), print)"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program, str(path)], check=False, capture_output=True, text=True
+    )
+    assert ended.returncode == 1
+    assert ended.stderr.splitlines()[-1].startswith("sqlite3.OperationalError: ")
+    assert path.read_bytes() == content
+    assert names_in(tmp_path) == {"j.sqlite"}
+
+
+def test_while_somebody_reads_it_waits(tmp_path: Path) -> None:
+    path = old("day", tmp_path)
+    with (
+        closing(sqlite3.connect(path, isolation_level=None)) as writer,
+        closing(sqlite3.connect(path, isolation_level=None)) as reader,
+    ):
+        reader.execute("BEGIN")
+        reader.execute("SELECT count(*) FROM scan").fetchone()
+        writer.execute("UPDATE run SET begun_arrival_ns = begun_arrival_ns + 1")
+        with pytest.raises(sqlite3.OperationalError, match="somebody reads"):
+            upgrade(path, lambda share: None)
+        reader.execute("ROLLBACK")
+        # To have it open is no hindrance, and it goes on with what it has, whatever is written.
+        upgrade(path, lambda share: None)
+        with started(path) as journal:
+            assert journal.take_restored(30.0) is not None
+            assert reader.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+        assert reader.execute("SELECT count(*) FROM scan").fetchone()[0] > 300
+    check_states(path, "day")
+
+
+def test_a_file_without_its_tables_is_quarantined(tmp_path: Path) -> None:
+    path = old("day", tmp_path)
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute("DROP TABLE run")
+    with started(path) as journal:
+        wait_for(lambda: journal.condition.state is JournalState.RECORDING, "recording", 30.0)
+        assert "j.sqlite.damaged-" in journal.condition.set_aside
+    assert not is_version3(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"x", b"SQLite format 3\0" + bytes(90)])
+def test_what_is_no_such_journal_is_none(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    assert not is_version3(path)
+    path.write_bytes(content)
+    assert not is_version3(path)

@@ -70,3 +70,11 @@ def domain() -> Iterator[int]:
     """A ROS domain of the test's own."""
     with own_domain() as leased:
         yield leased
+
+
+@pytest.fixture
+def children_know_the_tests() -> Iterator[None]:
+    """Our Python children look for modules neither here nor in their folder (`-P`)."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(Path(__file__).parents[1]))
+        yield

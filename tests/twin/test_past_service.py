@@ -223,6 +223,11 @@ def peer() -> Iterator[Peer]:
         peer.observe(messages.scan("a", status=2, stamp_s=40.0))
         peer.observe(messages.scan("last", {"co2": 1.0}))
         peer.tag("last")
+        # What is shown is in the log within 100 ms.
+        wait_for(
+            lambda: peer.ask(GetHistory, HISTORY_SERVICE, tag_id="last", sensor_type="co2").stamps,
+            "the last scan in the log",
+        )
         yield peer
 
 

@@ -32,6 +32,8 @@ from tests.support.waiting import until
 
 __all__ = ["stage_of"]  # a fixture
 
+pytestmark = pytest.mark.usefixtures("children_know_the_tests")
+
 
 def test_a_state_as_of_then_is_the_journals(domain: int, stage_of: Callable[..., Any]) -> None:
     async def test() -> None:

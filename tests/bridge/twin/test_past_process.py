@@ -28,6 +28,8 @@ from tests.support.looking import Body, Count, Dying, Endless, Failing, MapCells
 from tests.support.processes import Process
 from tests.support.waiting import PATIENCE_S, until, wait_for
 
+pytestmark = pytest.mark.usefixtures("children_know_the_tests")
+
 NOW_NS = NOW + SECOND
 
 

@@ -15,7 +15,7 @@ from tests.support.processes import OFTEN, lupin_twin, twin_node
 from tests.support.receiver import receiver, status
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
-from tests.support.web import bridge
+from tests.support.web import bridge, filled
 
 READING = "farm/gh1/tags/a_2Fb/readings/temperature"
 
@@ -34,7 +34,7 @@ def test_an_observation_comes_out_at_the_broker_and_a_killed_bridge_is_offline(
     ):
         live.peer.observe(scan("a/b", {"temperature": 6.5}, at=(1, 1)))
         reading = wait_for(lambda: heard.last(READING), "the reading")
-        told = live.tag("a/b")["readings"][0]
+        told = filled(live.tag("a/b"))["readings"][0]
         assert (reading["value"], reading["stamp"]) == (6.5, told["observed_at"])
         health = wait_for(lambda: heard.last("farm/gh1/tags/a_2Fb/health"), "the verdict")
         assert health["verdict"] == "critical"

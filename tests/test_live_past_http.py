@@ -49,7 +49,7 @@ class House:
         kept = ("-p", f"journal:={self.journal}") if role == "serve" else ()
         process = stack.enter_context(lupin_twin(self.domain, role, *CLIPPED, *kept))
         running = stack.enter_context(attached(process, self.peer))
-        wait_for(lambda: running.get("/readyz").status_code == 200, "a live twin")
+        wait_for(lambda: says_all(running), "a live twin that tells of its journal")
         return running
 
     def scans(self) -> int:
@@ -74,6 +74,11 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[House]:
             )
             wait_for(lambda: it.scans() == 6, "all of it in the journal")
         yield it
+
+
+def says_all(running: Bridge) -> bool:
+    answer = running.get("/readyz")
+    return answer.status_code == 200 and answer.json()["journal"]["state"] == "recording"
 
 
 def answers(running: Bridge, etags: dict[str, str] | None = None) -> dict[str, httpx.Response]:

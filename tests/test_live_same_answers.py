@@ -60,7 +60,9 @@ def fill(tag: dict[str, Any]) -> None:
 
 
 def known(found: Any, right: Any) -> Any:
-    """An answer without the fields that have come since."""
+    """An answer without the fields that have come since, and what a refusal says besides."""
+    if isinstance(found, str) and isinstance(right, str) and right.startswith("no tag "):
+        return found[: len(right)]
     if isinstance(found, dict) and isinstance(right, dict):
         return {name: known(found[name], right[name]) for name in right if name in found}
     if isinstance(found, list) and isinstance(right, list) and len(found) == len(right):

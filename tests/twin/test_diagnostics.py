@@ -162,14 +162,20 @@ def test_what_is_said_of_the_journal_is_read_again() -> None:
         refused=1,
         set_aside="/j.sqlite.damaged",
         simulated_ns=(1_763_440_800_000_000_001, 1_763_700_000_000_000_000),
+        complete_ns=1_763_700_000_000_000_002,
+        kept_ns=((0, 5), (7, 2**63 - 1)),
     )
-    for journal in (told, replace(told, simulated_ns=None)):
+    none: dict[str, Any] = {"simulated_ns": None, "complete_ns": None, "kept_ns": ()}
+    for journal in (told, replace(told, **none)):
         assert self_report(findings(replace(WELL, journal=journal))).journal == journal
     for values in ({}, {"state": "constructor"}):
         assert self_report([Finding("journal", OK, "", values)]).journal == UNKNOWN
     for stretch in ("1", "1 x", "x 1", " ", "1 " + 20 * "9"):
         values = {"state": "recording", "simulated": stretch}
         assert self_report([Finding("journal", OK, "", values)]).journal.simulated_ns is None
+        values = {"state": "recording", "complete to": stretch, "kept": stretch}
+        read = self_report([Finding("journal", OK, "", values)]).journal
+        assert (read.complete_ns, read.kept_ns) == (1 if stretch == "1" else None, ())
 
 
 def test_what_is_said_of_inputs_is_read_again_up_to_a_limit() -> None:

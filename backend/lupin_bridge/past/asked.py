@@ -20,12 +20,13 @@ from lupin_bridge.field.formats import FieldFormat
 from lupin_bridge.judge.choosing import Criteria
 from lupin_bridge.judge.derived import DERIVED
 from lupin_bridge.judge.ranges import Sensors
-from lupin_bridge.past import as_of, derived, history, timeline
+from lupin_bridge.past import as_of, complete, derived, history, timeline
 from lupin_bridge.past.as_of import FieldAsked, Plan, Written
 from lupin_bridge.past.query import TimelineQuery
 from lupin_bridge.past.timeline import Parts
 from lupin_bridge.twin.looking import Found, Need, Work
 from lupin_twin.fields import FieldRefused, cost_s
+from lupin_twin.journal.condition import Condition
 from lupin_twin.journal.fold import STATE_S_PER_TAG
 from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG
 from lupin_twin.past import (
@@ -216,6 +217,7 @@ class History:
     request: SeriesRequest
     now_ns: int | None = field(compare=False)
     sensors: Sensors = field(compare=False)
+    journal: Condition = field(compare=False)
 
     def cost_s(self, tags: int) -> float:
         """See `Asked`."""
@@ -228,7 +230,7 @@ class History:
     def look(self) -> Generator[Need, Found, Plan]:
         """See `Asked`."""
         past = yield from derived.series(self.request)
-        return _plan(history.body(self.request, past, self.now_ns, self.sensors))
+        return _plan(history.body(self.request, past, self.now_ns, self.sensors, self.journal))
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,6 +238,7 @@ class Timeline:
     """What happened when."""
 
     query: TimelineQuery
+    journal: Condition = field(compare=False)
 
     def cost_s(self, tags: int) -> float:
         """See `Asked`: as if all that is counted had to be asked for twice."""
@@ -254,10 +257,15 @@ class Timeline:
             # What comes one by one is asked for over all of the wider period too.
             period = coarsest
             counted = yield from self._counted(period.start_ns, period.end_ns)
+        # Of what was not written yet, nobody knows whether it is a silence.
+        until_ns = complete.complete_to(self.journal, period.end_ns)
         silences: SeriesPast = yield self._of(
-            Event.SILENCES, period.start_ns, period.end_ns, MAX_POINTS
+            Event.SILENCES,
+            period.start_ns,
+            max(period.start_ns, period.end_ns if until_ns is None else until_ns),
+            MAX_POINTS,
         )
-        return _plan(timeline.body(Parts(runs, period, counted, silences)))
+        return _plan(timeline.body(Parts(runs, period, counted, silences), self.journal))
 
     def _counted(
         self, start_ns: int, end_ns: int

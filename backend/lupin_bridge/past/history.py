@@ -9,7 +9,9 @@ from itertools import accumulate, pairwise
 from typing import Any, Final
 
 from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.past import complete
 from lupin_bridge.stream.state_json import stamp
+from lupin_twin.journal.condition import UNKNOWN, Condition
 from lupin_twin.past import Event, SeriesPast, SeriesRequest
 from lupin_twin.state import NANOSECONDS_PER_SECOND
 
@@ -20,9 +22,15 @@ Stretches = list[tuple[int, int]]
 
 
 def body(
-    asked: SeriesRequest, past: SeriesPast, now_ns: int | None, sensors: Sensors
+    asked: SeriesRequest,
+    past: SeriesPast,
+    now_ns: int | None,
+    sensors: Sensors,
+    journal: Condition = UNKNOWN,
 ) -> dict[str, Any]:
-    """`schema.History`; no gap is told of what is later than `now_ns`."""
+    """`schema.History`; no gap is told of what is later than `now_ns`, or not written yet."""
+    known = [at_ns for at_ns in (now_ns, journal.complete_ns) if at_ns is not None]
+    now_ns = min(known, default=None)
     entries = list(
         zip(past.stamps_ns, past.counts, past.means, past.minima, past.maxima, strict=True)
     )
@@ -43,6 +51,7 @@ def body(
         if past.is_bucketed
         else [],
         "gaps": [stretch(*gap) for gap in gaps(past, now_ns)] if asked.event is None else [],
+        **complete.body(journal, past.start_ns, past.end_ns),
     }
 
 

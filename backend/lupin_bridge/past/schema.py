@@ -6,6 +6,13 @@ from pydantic import Field
 
 from lupin_bridge.stream.schema import Contract, HistoryReading, Time
 
+_COMPLETE_TO = Field(
+    description="all that was received before this is in the journal; null: not known"
+)
+_KEPT_FROM = Field(
+    description="from here on every single reading and event is kept; null: not known"
+)
+
 
 class Stretch(Contract):
     """A stretch of time, `from` <= t < `to`."""
@@ -37,6 +44,8 @@ class History(Stretch):
     gaps: list[Stretch] = Field(
         description="no reading for longer than three times what is usual here: draw no line"
     )
+    complete_to: Time | None = _COMPLETE_TO
+    kept_from: Time | None = _KEPT_FROM
 
 
 class TimelineBucket(Contract):
@@ -66,3 +75,5 @@ class Timeline(Stretch):
     )
     silences: list[Stretch] = Field(description="stretches in which nothing was tried")
     runs: list[ClockRun] = Field(description="the runs of the clock that meet this period")
+    complete_to: Time | None = _COMPLETE_TO
+    kept_from: Time | None = _KEPT_FROM

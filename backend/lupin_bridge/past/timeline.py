@@ -7,9 +7,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from lupin_bridge.past import complete
 from lupin_bridge.past.history import stretch
 from lupin_bridge.past.query import TimelineQuery
 from lupin_bridge.stream.state_json import stamp
+from lupin_twin.journal.condition import UNKNOWN, Condition
 from lupin_twin.past import Event, Grid, SeriesPast, grid
 from lupin_twin.state import NANOSECONDS_PER_SECOND
 
@@ -52,7 +54,7 @@ def coarsest(period: Grid, counted: Iterable[SeriesPast]) -> Grid:
     return max((period, *came), key=lambda told: told.bucket_ns)
 
 
-def body(parts: Parts) -> dict[str, Any]:
+def body(parts: Parts, journal: Condition = UNKNOWN) -> dict[str, Any]:
     """`schema.Timeline`.
 
     Of silences that come in buckets, being too many, the longest of each is told, as if it began
@@ -84,6 +86,7 @@ def body(parts: Parts) -> dict[str, Any]:
             )
             if at_ns < told.end_ns and told.start_ns <= (until_ns := at_ns + _nanoseconds(length_s))
         ],
+        **complete.body(journal, told.start_ns, told.end_ns),
     }
 
 

@@ -12,6 +12,7 @@ from fastapi import Request, Response
 
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.past import complete
 from lupin_bridge.past.as_of import Written
 from lupin_bridge.past.asked import Answered, Answering, Asked, AsOf, OfState
 from lupin_bridge.routes.computing import (
@@ -41,9 +42,13 @@ async def response_as_of(request: Request, at_ns: int | None, of: OfState) -> Re
         Exception: what the source or the question raised.
 
     """
-    if at_ns is not None:
-        return await response_of_past(request, AsOf(at_ns, of), "state")
     bridge = bridge_of(request)
+    if at_ns is not None:
+        # Beside the answer, which stays as it is when what is older is deleted; and of before it.
+        headers = complete.of_moment(bridge.source.journal(), at_ns)
+        response = await response_of_past(request, AsOf(at_ns, of), "state")
+        response.headers.update(headers)
+        return response
 
     async def work() -> Answer | Response:
         if bridge.latest is None:

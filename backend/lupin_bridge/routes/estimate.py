@@ -11,6 +11,7 @@ from lupin_bridge.field import estimate_formats
 from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import PNG, FieldFormat
 from lupin_bridge.field.query import FieldQuery
+from lupin_bridge.past import complete
 from lupin_bridge.past import query as past_query
 from lupin_bridge.routes.computing import (
     far_off,
@@ -61,12 +62,15 @@ async def _answer(request: Request, field_format: FieldFormat) -> Response:
     field_query.check_scale(query, field_format, width * height, max_cells)
     revision = bridge.source.estimate_revision(asked)
     key = (bridge.source.revision(), asked, field_format.name, query.layer, query.scale)
-    return await unless_known(
+    journal = bridge.source.journal()
+    response = await unless_known(
         request,
         revision and _etag(revision, asked, query, field_format),
         key,
         lambda: _computed(request, asked, query, field_format),
     )
+    response.headers.update(complete.of_moment(journal, at_ns) if at_ns else {})
+    return response
 
 
 async def _computed(

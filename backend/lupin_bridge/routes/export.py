@@ -14,7 +14,7 @@ from starlette.types import Message, Receive, Scope, Send
 
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.past import query, table
+from lupin_bridge.past import complete, query, table
 from lupin_bridge.past.moments import MAX_SECONDS
 from lupin_bridge.routes.computing import (
     CLIENT_GONE,
@@ -65,13 +65,14 @@ async def _export(request: Request) -> Response:
     bridge = bridge_of(request)
     now_ns = bridge.ros_time_ns
     asked = query.export(request.query_params.multi_items(), now_ns)
+    end_ns = asked.end_ns or now_ns or MAX_SECONDS * NANOSECONDS_PER_SECOND
     headers = {
         **NEVER_KEEP,
+        **complete.headers(bridge.source.journal(), asked.start_ns, end_ns),
         "Content-Disposition": f'attachment; filename="{table.file_name(asked, now_ns)}"',
     }
     if request.method == "HEAD":
         return Response(headers=headers, media_type=table.MEDIA_TYPE)
-    end_ns = asked.end_ns or now_ns or MAX_SECONDS * NANOSECONDS_PER_SECOND
     client, connection = client_of(request), request.scope["state"][CONNECTION_KEY]
 
     def end() -> None:

@@ -61,10 +61,11 @@ async def _history(request: Request) -> Response:
     now_ns = bridge.ros_time_ns
     asked = query.history(request.query_params.multi_items(), now_ns)
     sensors = bridge.criteria.sensors
-    return await response_of_past(request, History(asked, now_ns, sensors), "history")
+    question = History(asked, now_ns, sensors, bridge.source.journal())
+    return await response_of_past(request, question, "history")
 
 
 async def _timeline(request: Request) -> Response:
     bridge = bridge_of(request)
     asked = query.timeline(request.query_params.multi_items(), bridge.ros_time_ns)
-    return await response_of_past(request, Timeline(asked), "timeline")
+    return await response_of_past(request, Timeline(asked, bridge.source.journal()), "timeline")

@@ -10,6 +10,7 @@ from fastapi import APIRouter, Request, Response, WebSocket
 
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.past import complete
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.asked import NoSuchTag, OneTag, WholeState
 from lupin_bridge.routes.as_of import response_as_of
@@ -180,12 +181,15 @@ async def _tag_as_of(request: Request, tag_id: str, at_ns: int) -> Response:
     try:
         return await response_as_of(request, at_ns, OneTag(tag_id))
     except NoSuchTag as error:
-        return _no_such_tag(tag_id, error.known)
+        journal = bridge_of(request).source.journal()
+        response = _no_such_tag(tag_id, error.known, complete.why_not(journal, at_ns))
+        response.headers.update(complete.of_moment(journal, at_ns))
+        return response
 
 
 class _NoSuchTagError(KeyError):
     """The twin knows no tag of that id."""
 
 
-def _no_such_tag(tag_id: str, known: int) -> Response:
-    return error_response(f"no tag {tag_id[:64]!r} is known ({known} others are)", 404)
+def _no_such_tag(tag_id: str, known: int, more: str = "") -> Response:
+    return error_response(f"no tag {tag_id[:64]!r} is known ({known} others are){more}", 404)

@@ -95,6 +95,9 @@ function Values({
       return (
         <Event row={row} isBucketed={isBucketed} text={S.chartGap(ageText(row.to - row.at))} />
       );
+    case 'not_kept':
+    case 'not_recorded':
+      return <Event row={row} isBucketed={isBucketed} text={S.missing[row.kind]} />;
     case 'failure':
       return <Event row={row} isBucketed={isBucketed} text={S.chartFailures(row.count)} />;
     case 'look':

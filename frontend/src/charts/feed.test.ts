@@ -40,6 +40,8 @@ function answer(url: URL): Response {
       readings: [{ stamp: time(from + 10), value: 600 }],
       buckets: [],
       gaps: [],
+      complete_to: null,
+      kept_from: null,
     });
   }
   const bucket = { start: time(from), scans: 1, failures: 1, looks: 0 };
@@ -50,6 +52,8 @@ function answer(url: URL): Response {
     buckets: [{ ...bucket, pests_seen: 0, pests_cleared: 0 }],
     silences: [],
     runs: [],
+    complete_to: null,
+    kept_from: null,
   });
 }
 
@@ -111,6 +115,8 @@ test('what comes later than was asked is in no bucket, however late the period e
     readings: [],
     buckets: [{ start: time(1_000), n: 1, mean: 600, min: 600, max: 600 }],
     gaps: [],
+    complete_to: null,
+    kept_from: null,
   });
   feed.want(wanted({ nowS: 2_000 }));
   await settled();

@@ -112,7 +112,7 @@ async function fetchAll(
     series: new Map(
       all.map((wire) => [
         pairKey({ tagId: wire.tag_id, sensor: wire.sensor_type }),
-        seriesOf(wire),
+        seriesOf(wire, nowS),
       ]),
     ),
     marks: new Map(timelines.map((timeline, index) => [tagIds[index] ?? '', marksOf(timeline)])),

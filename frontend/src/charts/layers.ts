@@ -1,4 +1,5 @@
 /** What a chart has below and above its lines: drawn by functions that keep no state. */
+import type { Span } from '../domain/period';
 import { toShown } from '../domain/units';
 import { isStroked, lookOf, markerPath } from './looks';
 import { pointsOf, type Line, type PlotModel } from './model';
@@ -24,7 +25,7 @@ export interface Frame {
 const MARKER_ROOM = 9;
 const MARKER_SIZE = 6;
 
-/** Gaps, ideal range and what buckets range over. */
+/** Gaps, what is missing, ideal range and what buckets range over. */
 export function drawBelow(frame: Frame, model: PlotModel, palette: ChartPalette): void {
   const { context, box } = frame;
   context.save();
@@ -59,16 +60,18 @@ function drawIdeal(frame: Frame, { sensor, unit }: PlotModel, palette: ChartPale
 }
 
 /** Hatched, so that an empty stretch is seen to be told and not forgotten. */
-function drawGaps(
-  { context, box, ratio, x }: Frame,
-  { series }: Line,
-  palette: ChartPalette,
-): void {
-  context.strokeStyle = palette.gap;
-  context.lineWidth = ratio;
-  for (const gap of series.gaps) {
-    const left = Math.max(box.left, x(gap.from));
-    const right = Math.min(box.left + box.width, x(gap.to));
+function drawGaps(frame: Frame, { series }: Line, palette: ChartPalette): void {
+  frame.context.strokeStyle = palette.gap;
+  frame.context.lineWidth = frame.ratio;
+  hatch(frame, series.gaps, 1);
+  // Leaning to the other side: of these nobody knows whether anything came.
+  hatch(frame, series.missing, -1);
+}
+
+function hatch({ context, box, ratio, x }: Frame, spans: readonly Span[], slant: 1 | -1): void {
+  for (const { from, to } of spans) {
+    const left = Math.max(box.left, x(from));
+    const right = Math.min(box.left + box.width, x(to));
     if (right - left < 3 * ratio) continue;
     context.save();
     context.beginPath();
@@ -77,8 +80,8 @@ function drawGaps(
     context.beginPath();
     const step = 9 * ratio;
     for (let at = left - box.height - ((left - box.height) % step); at < right; at += step) {
-      context.moveTo(at, box.top + box.height);
-      context.lineTo(at + box.height, box.top);
+      context.moveTo(at, slant > 0 ? box.top + box.height : box.top);
+      context.lineTo(at + box.height, slant > 0 ? box.top : box.top + box.height);
     }
     context.stroke();
     context.restore();

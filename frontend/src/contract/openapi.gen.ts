@@ -342,6 +342,10 @@ export interface components {
              * @description no reading for longer than three times what is usual here: draw no line
              */
             readonly gaps: readonly components["schemas"]["lupin_bridge__past__schema__Stretch"][];
+            /** @description all that was received before this is in the journal; null: not known */
+            readonly complete_to: components["schemas"]["Time"] | null;
+            /** @description from here on every single reading and event is kept; null: not known */
+            readonly kept_from: components["schemas"]["Time"] | null;
         };
         /**
          * HistoryReading
@@ -715,6 +719,10 @@ export interface components {
              * @description the runs of the clock that meet this period
              */
             readonly runs: readonly components["schemas"]["ClockRun"][];
+            /** @description all that was received before this is in the journal; null: not known */
+            readonly complete_to: components["schemas"]["Time"] | null;
+            /** @description from here on every single reading and event is kept; null: not known */
+            readonly kept_from: components["schemas"]["Time"] | null;
         };
         /**
          * TimelineBucket

@@ -38,6 +38,18 @@ describe('the state of a moment', () => {
     );
   });
 
+  test.each([
+    [{}, true],
+    [{ 'X-Complete-To': '12.500000000', 'X-Kept-From': '12.500000000' }, true],
+    [{ 'X-Complete-To': '12.4', 'X-Kept-From': '1' }, false],
+    [{ 'X-Complete-To': '12.5', 'X-Kept-From': '12.6' }, false],
+  ])('is whole if the journal has all that leads up to it: %o', async (headers, isWhole) => {
+    vi.stubGlobal('fetch', (url: URL) =>
+      Promise.resolve(Response.json(url.pathname === '/api/health' ? NOBODY : half, { headers })),
+    );
+    await expect(fetchStateAt(12.5, signal)).resolves.toMatchObject({ isWhole });
+  });
+
   test('is checked to the last field', async () => {
     answering({ header: state.header, tags: [{}] });
     await expect(fetchStateAt(1_794_000_000, signal)).rejects.toThrow('state.tags[0].tag_id');

@@ -32,6 +32,8 @@ export const TIMELINE = object({
   ),
   silences: list(STRETCH, MAX_POINTS),
   runs: list(object({ from: TIME, to: TIME, is_simulated: boolean }), MAX_POINTS),
+  complete_to: orNull(TIME),
+  kept_from: orNull(TIME),
 });
 
 /** A moment as the routes read it: never with an exponent. */
@@ -43,9 +45,13 @@ export const momentParameter = (at: number): string => Math.max(0, at).toFixed(3
  */
 export async function fetchStateAt(at: number, signal: AbortSignal): Promise<Latest> {
   const query = `at=${momentParameter(at)}`;
+  let isWhole = true;
   // Both or none: no moment has the verdicts of another one.
   const [state, health] = await Promise.all([
-    get(`api/state?${query}`, signal).then((it) => read<TwinState>('state', STATE, it)),
+    get(`api/state?${query}`, signal).then((it) => {
+      isWhole = holdsAll(it, at);
+      return read<TwinState>('state', STATE, it);
+    }),
     get(`api/health?${query}`, signal).then((it) => read<Judgement>('health', HEALTH, it)),
   ]);
   const { sec, nanosec } = state.header.stamp;
@@ -58,7 +64,18 @@ export async function fetchStateAt(at: number, signal: AbortSignal): Promise<Lat
     revision: `at ${sec}.${nanosec}`,
     state: { ...state, tags: state.tags.map(filledTag) },
     health: filledHealth(health),
+    isWhole,
   };
+}
+
+/** Whether all is in the journal that leads up to a moment; a server that does not say has it. */
+function holdsAll({ headers }: Response, at: number): boolean {
+  const complete = headers.get('X-Complete-To');
+  const kept = headers.get('X-Kept-From');
+  return (
+    (complete === null || Number(complete) >= at - SAME_MOMENT_S) &&
+    (kept === null || Number(kept) <= at + SAME_MOMENT_S)
+  );
 }
 
 /**

@@ -24,6 +24,8 @@ export const SERIES = object({
     MAX_POINTS,
   ),
   gaps: list(STRETCH, MAX_POINTS + 1),
+  complete_to: orNull(TIME),
+  kept_from: orNull(TIME),
 });
 
 /** Times are ROS seconds. */

@@ -91,7 +91,10 @@ export interface SensorsFile {
 }
 
 /** The newest state, put together from full frames and deltas. */
-export type Latest = Omit<StateFrame, 'type'>;
+export type Latest = Omit<StateFrame, 'type'> & {
+  /** False: of what leads up to this moment the journal does not have all. */
+  readonly isWhole?: boolean;
+};
 
 /** How sure each cell of a field is; the nearest readings alone do not tell. */
 export interface Sureness {

@@ -3,6 +3,7 @@
  * to show. All times are ROS seconds. Where the robot was away is a gap, and nothing bridges it.
  */
 import type { History, Timeline, WireTime } from '../contract/types';
+import { missingOf, type Missing } from './missing';
 import type { Span } from './period';
 import { secondsOf } from './rostime';
 
@@ -38,6 +39,7 @@ export interface Series extends Span {
   readonly readings: readonly Reading[];
   readonly buckets: readonly Bucket[];
   readonly gaps: readonly Span[];
+  readonly missing: readonly Missing[];
 }
 
 const spanOf = (span: { readonly from: WireTime; readonly to: WireTime }): Span => ({
@@ -45,8 +47,8 @@ const spanOf = (span: { readonly from: WireTime; readonly to: WireTime }): Span 
   to: secondsOf(span.to),
 });
 
-/** The series that the bridge told. */
-export const seriesOf = (wire: History): Series => ({
+/** The series that the bridge told, at `nowS` of the twin's time, ROS seconds. */
+export const seriesOf = (wire: History, nowS: number): Series => ({
   ...spanOf(wire),
   tagId: wire.tag_id,
   sensor: wire.sensor_type,
@@ -54,6 +56,7 @@ export const seriesOf = (wire: History): Series => ({
   readings: wire.readings.map(({ stamp, value }) => ({ at: secondsOf(stamp), value })),
   buckets: wire.buckets.map((bucket) => ({ ...bucket, start: secondsOf(bucket.start) })),
   gaps: wire.gaps.map(spanOf),
+  missing: missingOf(wire, nowS),
 });
 
 /** What a tag's timeline tells of tries and looks; scans are told by the readings themselves. */

@@ -19,6 +19,7 @@ const series: Series = {
   ],
   buckets: [],
   gaps: [{ from: NOON + 10.5, to: NOON + 100 }],
+  missing: [{ from: NOON + 150, to: NOON + 200, why: 'not_recorded' }],
 };
 const bucketed = (from: number): Series => ({
   ...series,
@@ -28,6 +29,7 @@ const bucketed = (from: number): Series => ({
   readings: [],
   buckets: [{ start: from, n: 4, mean: 21, min: 20, max: 23 }],
   gaps: [],
+  missing: [],
 });
 const failure = (at: number): Mark => ({ at, widthS: 10, kind: 'failure', count: 2 });
 
@@ -38,6 +40,7 @@ describe('the rows of a chart', () => {
       { kind: 'failure', at: NOON, to: NOON + 10, count: 2 },
       { kind: 'gap', at: NOON + 10.5, to: NOON + 100 },
       { kind: 'reading', at: NOON + 10.5, value: null },
+      { kind: 'not_recorded', at: NOON + 150, to: NOON + 200 },
     ]);
   });
 
@@ -64,6 +67,7 @@ describe('as CSV', () => {
       `2026-11-21T12:00:00.000Z,${NOON},${NOON + 10},'=2+5,temperature,°C,failure,2,,,`,
       `2026-11-21T12:00:10.500Z,${NOON + 10.5},${NOON + 100},'=2+5,temperature,°C,gap,0,,,`,
       `2026-11-21T12:00:10.500Z,${NOON + 10.5},,'=2+5,temperature,°C,reading,1,,,`,
+      `2026-11-21T12:02:30.000Z,${NOON + 150},${NOON + 200},'=2+5,temperature,°C,not_recorded,,,,`,
     ]);
   });
 

@@ -18,7 +18,11 @@ export type SeriesRow =
       readonly min: number;
       readonly max: number;
     }
-  | { readonly kind: 'gap'; readonly at: number; readonly to: number }
+  | {
+      readonly kind: 'gap' | 'not_kept' | 'not_recorded';
+      readonly at: number;
+      readonly to: number;
+    }
   | {
       readonly kind: 'failure' | 'look';
       readonly at: number;
@@ -26,10 +30,11 @@ export type SeriesRow =
       readonly count: number;
     };
 
-/** By their time; what begins at one moment: gap, values, marks. */
+/** By their time; what begins at one moment: what is missing, gap, values, marks. */
 export function rowsOfSeries(series: Series, marks: readonly Mark[]): SeriesRow[] {
   const width = series.bucketS ?? 0;
   const rows: SeriesRow[] = [
+    ...series.missing.map(({ from, to, why }) => ({ kind: why, at: from, to })),
     ...series.gaps.map(({ from, to }) => ({ kind: 'gap' as const, at: from, to })),
     ...series.readings.map((reading) => ({ kind: 'reading' as const, ...reading })),
     ...series.buckets.map(({ start, ...bucket }) => ({
@@ -85,6 +90,9 @@ function valuesOf(row: SeriesRow, shown: (value: number | null) => Cell): Cell[]
       return [row.n, shown(row.mean), shown(row.min), shown(row.max)];
     case 'gap':
       return [0, null, null, null];
+    case 'not_kept':
+    case 'not_recorded':
+      return [null, null, null, null];
     case 'failure':
     case 'look':
       return [row.count, null, null, null];

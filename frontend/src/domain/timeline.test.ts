@@ -21,7 +21,7 @@ test('a timeline has its times in seconds', () => {
     silences: [wireStretch(110, 120)],
     runs: [{ ...wireStretch(20, 340), is_simulated: true }],
   });
-  expect(timelineOf(wire)).toEqual({
+  expect(timelineOf({ ...wire, kept_from: wireTime(105) }, 400)).toEqual({
     from: 100,
     to: 340,
     bucketS: 1,
@@ -29,6 +29,7 @@ test('a timeline has its times in seconds', () => {
     buckets: [{ start: 101.5, scans: 5, failures: 1, looks: 2, pestsSeen: 3, pestsCleared: 4 }],
     silences: [{ from: 110, to: 120 }],
     runs: [{ from: 20, to: 340, isSimulated: true }],
+    missing: [{ from: 100, to: 105, why: 'not_kept' }],
   });
-  expect(timelineOf({ ...wire, reach: null }).reach).toBeNull();
+  expect(timelineOf({ ...wire, reach: null }, 400).reach).toBeNull();
 });

@@ -1,5 +1,6 @@
 /** What happened when, and how far back anything is remembered. Times are ROS seconds. */
 import type { Timeline as WireTimeline } from '../contract/types';
+import { missingOf, type Missing } from './missing';
 import type { Span } from './period';
 import { secondsOf } from './rostime';
 
@@ -27,13 +28,15 @@ export interface Timeline extends Span {
   readonly buckets: readonly Happened[];
   readonly silences: readonly Span[];
   readonly runs: readonly ClockRun[];
+  readonly missing: readonly Missing[];
 }
 
 type WireSpan = WireTimeline['silences'][number];
 
 const spanOfWire = ({ from, to }: WireSpan): Span => ({ from: secondsOf(from), to: secondsOf(to) });
 
-export function timelineOf(wire: WireTimeline): Timeline {
+/** `nowS`: the twin's time, ROS seconds, as it was told. */
+export function timelineOf(wire: WireTimeline, nowS: number): Timeline {
   return {
     ...spanOfWire(wire),
     bucketS: wire.bucket_s,
@@ -48,5 +51,6 @@ export function timelineOf(wire: WireTimeline): Timeline {
     })),
     silences: wire.silences.map(spanOfWire),
     runs: wire.runs.map((run) => ({ ...spanOfWire(run), isSimulated: run.is_simulated })),
+    missing: missingOf(wire, nowS),
   };
 }

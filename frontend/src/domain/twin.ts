@@ -65,6 +65,8 @@ export interface Snapshot {
   readonly takenAt: number;
   /** Tags observed since the snapshot before. */
   readonly fresh: readonly string[];
+  /** Whether what is not in it never was; else the journal does not have all of then. */
+  readonly isWhole: boolean;
 }
 
 const timeKey = (time: WireTime): string => `${time.sec}.${time.nanosec}`;
@@ -222,6 +224,7 @@ export function snapshotOf(latest: Latest, arrivedAt: number, before: Snapshot |
     at: state.at,
     takenAt,
     fresh: before && tags !== before.tags ? freshTags(known, tags) : [],
+    isWhole: latest.isWhole ?? true,
   };
 }
 

@@ -15,7 +15,7 @@ let stop: () => void;
 
 const remember = (seconds: number | null): void => {
   const reach = seconds === null ? null : wireStretch(NOW - seconds, NOW);
-  const value = timelineOf(wireTimeline({ from: NOW - 86_400, to: NOW, reach }));
+  const value = timelineOf(wireTimeline({ from: NOW - 86_400, to: NOW, reach }), NOW);
   receive({ type: 'remembered', remembered: { value, state: 'ready', message: '' } });
 };
 const follow = (fragment: string): void => {

@@ -69,7 +69,7 @@ export function startRemembered(): () => void {
       group,
       run: (signal) =>
         fetchTimeline(askedSpan(period, nowS), BUCKETS, signal).then(
-          (wire): Remembered => ({ value: timelineOf(wire), state: 'ready', message: '' }),
+          (wire): Remembered => ({ value: timelineOf(wire, nowS), state: 'ready', message: '' }),
           (error: unknown): Remembered => {
             if (!(error instanceof Refusal) || error.status !== 404) throw error;
             offSince = epoch;

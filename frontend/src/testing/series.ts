@@ -11,5 +11,6 @@ export const seriesWith = (over: Partial<Series> = {}): Series => ({
   readings: [],
   buckets: [],
   gaps: [],
+  missing: [],
   ...over,
 });

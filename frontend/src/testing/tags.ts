@@ -56,4 +56,5 @@ export const snapshot = (tags: readonly Tag[]): Snapshot => ({
   at: { sec: 1000, nanosec: 0 },
   takenAt: 0,
   fresh: [],
+  isWhole: true,
 });

@@ -11,6 +11,7 @@ export const timelineWith = (over: Partial<Timeline>): Timeline => ({
   buckets: [],
   silences: [],
   runs: [],
+  missing: [],
   ...over,
 });
 
@@ -39,6 +40,8 @@ export function wireTimeline({
     buckets: [],
     silences: [],
     runs: [],
+    complete_to: wireTime(to),
+    kept_from: wireTime(from),
     ...over,
   };
 }

@@ -16,7 +16,7 @@ const remember = (from: number, to: number): void => {
   const buckets = [
     { start: wireTime(9_000), scans: 3, failures: 1, looks: 0, pests_seen: 1, pests_cleared: 0 },
   ];
-  const value = timelineOf(wireTimeline({ from, to, bucket_s: 15, buckets }));
+  const value = timelineOf(wireTimeline({ from, to, bucket_s: 15, buckets }), NOW);
   receive({ type: 'remembered', remembered: { value, state: 'ready', message: '' } });
 };
 

@@ -67,6 +67,23 @@ test('silence and what is not remembered lean to different sides', () => {
   expect([...silence][0]).not.toBe([...before][0]);
 });
 
+test('what is no longer kept, or was not recorded, is hatched as what is not remembered', () => {
+  const lines = (missing: Timeline['missing']): unknown[] =>
+    drawn({ missing }, [])
+      .named('rect')
+      .map(({ args }) => [args[0], args[2]]);
+  expect(lines([])).toEqual([]);
+  expect(
+    lines([
+      { from: 100, to: 120, why: 'not_kept' },
+      { from: 190, to: 200, why: 'not_recorded' },
+    ]),
+  ).toEqual([
+    [0, 200],
+    [900, 100],
+  ]);
+});
+
 test('a clock that began anew is a dashed line', () => {
   const run = { isSimulated: true };
   const runs = [

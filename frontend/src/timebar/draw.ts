@@ -44,6 +44,9 @@ export function drawBar(surface: Surface, bar: Bar, palette: BarPalette): void {
   context.save();
   const before = timeline && beforeMemory(timeline, axis);
   if (before) hatch(context, before, palette.line, 1);
+  for (const missing of stretchesOf(timeline?.missing ?? [], axis)) {
+    hatch(context, missing, palette.line, 1);
+  }
   for (const silence of stretchesOf(timeline?.silences ?? [], axis)) {
     hatch(context, silence, palette.silence, -1);
   }

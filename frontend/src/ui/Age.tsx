@@ -30,10 +30,11 @@ export function useAgeStep(when: When): ReturnType<typeof ageStep> {
 /** Seconds tick here alone, so that a table of hundreds is not rendered anew each second. */
 export function Age({ when, format = ageText }: { when: When; format?: Format }): JSX.Element {
   const text = useAgeText(when, format);
+  const isWhole = useApp((state) => selectShown(state).snapshot?.isWhole ?? true);
   if (when === 'never') {
     return (
-      <span className="age faint" title={S.neverObservedLong}>
-        {S.neverObserved}
+      <span className="age faint" title={isWhole ? S.neverObservedLong : S.notKnownThenLong}>
+        {isWhole ? S.neverObserved : S.notKnownThen}
       </span>
     );
   }

@@ -96,9 +96,18 @@ describe('of a moment in the past', () => {
       id: 'past-nothing',
       hint: 'Nothing is remembered yet.',
     });
-    const value = timelineOf(wireTimeline({ from: 7_200, to: 9_000 }));
+    const value = timelineOf(wireTimeline({ from: 7_200, to: 9_000 }), 9_000);
     receive({ type: 'remembered', remembered: { value, state: 'ready', message: '' } });
     expect(noticeFor(store.get())?.hint).toBe('What is remembered begins at sim 02:00:00.');
+  });
+
+  test('that the journal does not have all of is not said to have been empty', () => {
+    come({ ...NO_HOUSE, snapshot: { ...snapshot([]), isWhole: false } });
+    const value = timelineOf(wireTimeline({ from: 0, to: 9_000 }), 9_000);
+    receive({ type: 'remembered', remembered: { value, state: 'ready', message: '' } });
+    expect(noticeFor(store.get())?.hint).toBe(
+      'What the twin received then is no longer kept, or not recorded yet.',
+    );
   });
 
   test('with tags there is nothing to say', () => {

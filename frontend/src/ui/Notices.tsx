@@ -2,6 +2,7 @@ import type { JSX } from 'react';
 
 import { rosText } from '../domain/rostime';
 import { shown } from '../domain/text';
+import type { Snapshot } from '../domain/twin';
 import { useApp, type AppState } from '../store/app';
 import { selectSensor } from '../store/derived';
 import { selectShown, selectTags } from '../store/moment';
@@ -31,7 +32,7 @@ export function noticeFor(state: AppState): Notice | null {
     large: true,
   };
   if (moment !== null && !snapshot?.tags.length) {
-    return pastNotice(state, moment, snapshot !== null);
+    return pastNotice(state, moment, snapshot);
   }
   if (!snapshot) {
     if (phase === 'offline') return offline;
@@ -75,12 +76,14 @@ export function noticeFor(state: AppState): Notice | null {
 }
 
 /** Of a moment in the past there is nothing to show: not yet, not at all, or because it was so. */
-function pastNotice({ twin }: AppState, moment: number, hasCome: boolean): Notice {
+function pastNotice({ twin }: AppState, moment: number, came: Snapshot | null): Notice {
   const { pastFault, remembered } = twin;
   const when = rosText(moment);
-  if (hasCome) {
+  if (came) {
     const reach = remembered.value?.reach;
-    const hint = reach ? S.pastReach(rosText(reach.from)) : S.pastReachNothing;
+    const begins = reach ? S.pastReach(rosText(reach.from)) : S.pastReachNothing;
+    const isBefore = !reach || moment < reach.from;
+    const hint = came.isWhole || isBefore ? begins : S.notKnownThenLong;
     return { id: 'past-nothing', title: S.pastNothing(when), hint, large: true };
   }
   if (pastFault) {

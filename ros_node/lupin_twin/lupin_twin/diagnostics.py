@@ -191,8 +191,10 @@ def findings(health: Health) -> Iterator[Finding]:
             "lost": str(journal.lost),
             "refused": str(journal.refused),
             "set aside": journal.set_aside,
-            # Start and end of what no robot observed, ns of ROS time.
-            "simulated": " ".join(map(str, journal.simulated_ns or ())),
+            # Start and end of what no robot observed, ns of ROS time; so are those that follow.
+            "simulated": _stretches((journal.simulated_ns,) if journal.simulated_ns else ()),
+            "complete to": "" if journal.complete_ns is None else str(journal.complete_ns),
+            "kept": _stretches(journal.kept_ns),
         },
     )
     several = health.twins > 1
@@ -305,7 +307,8 @@ def _journal(said: Finding) -> Condition:
     state = next((state for state in JournalState if state == values.get("state")), None)
     if state is None:
         return UNKNOWN_JOURNAL
-    start, _, end = values.get("simulated", "").partition(" ")
+    simulated = _read_stretches(values.get("simulated", ""))
+    complete = values.get("complete to", "")
     return Condition(
         state,
         _shown(said.message),
@@ -315,8 +318,23 @@ def _journal(said: Finding) -> Condition:
         lost=_number(values, "lost"),
         refused=_number(values, "refused"),
         set_aside=_shown(values.get("set aside", "")),
-        simulated_ns=(int(start), int(end)) if _are_stamps(start, end) else None,
+        simulated_ns=simulated[0] if len(simulated) == 1 else None,
+        complete_ns=int(complete) if _are_stamps(complete) else None,
+        kept_ns=_read_stretches(values.get("kept", "")),
     )
+
+
+def _stretches(stretches: Iterable[tuple[int, int]]) -> str:
+    return " ".join(str(stamp_ns) for stretch in stretches for stamp_ns in stretch)
+
+
+def _read_stretches(text: str) -> tuple[tuple[int, int], ...]:
+    """Pairs of stamps; none where the text is anything else."""
+    words = text.split(" ") if len(text) <= MAX_SHOWN * 2 else []
+    if len(words) % 2 or not _are_stamps(*words):
+        return ()
+    stamps = [int(word) for word in words]
+    return tuple(zip(stamps[::2], stamps[1::2], strict=True))
 
 
 def _are_stamps(*texts: str) -> bool:

@@ -188,9 +188,12 @@ class Memory:
     def condition(self) -> Condition:
         """How the journal is doing."""
         condition, early = self._journal.condition, self._early
+        if condition.complete_ns is None and self._clock is not None:
+            condition = replace(condition, complete_ns=self._clock.stamp_ns)
         if self._doubt is None or early is None:
             return condition
-        return replace(condition, waiting=len(early), lost=self._lost)
+        last_ns = self._doubt.last_ns
+        return replace(condition, waiting=len(early), lost=self._lost, complete_ns=last_ns)
 
     def heal(self, damage: str) -> None:
         """Have a journal in which somebody has met damage set aside; from any thread."""
@@ -209,17 +212,17 @@ class Memory:
         return True
 
     def _hand_over(self, write: ingest.Write, arrival_ns: int, mission: str) -> None:
+        now_ns = 0 if self._clock is None else self._clock.stamp_ns
         if write.pose is not None:
-            now_ns = 0 if self._clock is None else self._clock.stamp_ns
             # A place belongs to the moment of the scan that brought it, as its readings do.
             stamp_ns = now_ns if isinstance(write, Pin) else write.stamp_ns
             pose = self._store.pose_of(write.tag_id)
             placed_ns = self._placed_ns.get(write.tag_id)
             if pose is not None and (placed_ns is None or stamp_ns < placed_ns):
                 self._placed_ns[write.tag_id] = stamp_ns
-                self._journal.write(PinRow(write.tag_id, stamp_ns, arrival_ns, pose))
+                self._journal.write(PinRow(write.tag_id, stamp_ns, arrival_ns, pose), now_ns)
         if not isinstance(write, Pin):
-            self._journal.write(_row(write, arrival_ns, mission[:MAX_TEXT_LENGTH]))
+            self._journal.write(_row(write, arrival_ns, mission[:MAX_TEXT_LENGTH]), now_ns)
 
     def _hold_places(self, now: Clock) -> None:
         self._placed_ns = {

@@ -28,6 +28,7 @@ from lupin_bridge.past.asked import (
 from lupin_bridge.past.query import TimelineQuery
 from lupin_bridge.settings import Settings
 from lupin_twin.idw import never
+from lupin_twin.journal.condition import UNKNOWN
 from lupin_twin.past import Event, SeriesPast, SeriesRequest
 from lupin_twin.workers import SMALL_S
 from tests.bridge.past.test_as_of import HOUSE, NS, asked
@@ -39,8 +40,8 @@ QUESTIONS: tuple[Asked, ...] = (
     AsOf(5 * NS, Health(CRITERIA, {"a": NS})),
     AsOf(5 * NS, Field(asked(), PNG)),
     AsOf(5 * NS, Field(asked(), None)),
-    History(SeriesRequest("a", "co2"), 9 * NS, own_sensors()),
-    Timeline(TimelineQuery(0, 9 * NS, 5, None)),
+    History(SeriesRequest("a", "co2"), 9 * NS, own_sensors(), UNKNOWN),
+    Timeline(TimelineQuery(0, 9 * NS, 5, None), UNKNOWN),
 )
 
 
@@ -70,7 +71,7 @@ def test_it_crosses_and_its_answer_is_the_same_there(question: Asked) -> None:
 
 
 def test_a_timeline_asks_for_its_parts_one_by_one() -> None:
-    looking = Timeline(TimelineQuery(0, 9 * NS, 5, None)).look()
+    looking = Timeline(TimelineQuery(0, 9 * NS, 5, None), UNKNOWN).look()
     needs = [next(looking)]
     with contextlib.suppress(StopIteration):
         while True:
@@ -103,7 +104,8 @@ def test_a_large_house_and_a_large_field_cost_more_than_small_ones() -> None:
     fine = AsOf(0, Field(asked(resolution=0.001), PNG))
     assert fine.cost_s(30) > SMALL_S, "one that will be refused is no small one"
     # All that is looked up counts, and not the first of it alone.
-    assert History(SeriesRequest("a", "co2"), None, own_sensors()).cost_s(30) < SMALL_S
-    assert Timeline(TimelineQuery(0, 0, 1, "a")).cost_s(30) > SMALL_S
+    history = History(SeriesRequest("a", "co2"), None, own_sensors(), UNKNOWN)
+    assert history.cost_s(30) < SMALL_S
+    assert Timeline(TimelineQuery(0, 0, 1, "a"), UNKNOWN).cost_s(30) > SMALL_S
     for question in QUESTIONS[:5]:
         assert json.dumps(question.cost_s(0))

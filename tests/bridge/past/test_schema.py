@@ -28,12 +28,13 @@ def test_a_stretch_is_from_and_to() -> None:
         (
             schema.History,
             {"tag_id", "sensor_type", "unit", "from", "to", "is_bucketed", "bucket_s"}
-            | {"readings", "buckets", "gaps"},
+            | {"readings", "buckets", "gaps", "complete_to", "kept_from"},
         ),
         (schema.Bucket, {"start", "n", "mean", "min", "max"}),
         (
             schema.Timeline,
-            {"from", "to", "bucket_s", "reach", "buckets", "silences", "runs"},
+            {"from", "to", "bucket_s", "reach", "buckets", "silences", "runs"}
+            | {"complete_to", "kept_from"},
         ),
         (
             schema.TimelineBucket,

@@ -65,10 +65,9 @@ def test_every_route_answers_as_of_a_moment(domain: int) -> None:
             assert (health.house.verdict, health.tags["a/b"].verdict) == ("healthy", "healthy")
             assert set(past.asked) == {9 * NS, 19 * NS // 2}
             answer = await it.http.get("/api/tags/c?at=9")
-            assert (answer.status_code, answer.json()) == (
-                404,
-                {"detail": "no tag 'c' is known (1 others are)"},
-            )
+            assert answer.status_code == 404
+            # Of before the log began, nobody knows.
+            assert "no tag 'c' is known (1 others are); what was received" in answer.text
 
     run(domain, test())
 

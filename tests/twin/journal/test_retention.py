@@ -6,17 +6,20 @@ from pathlib import Path
 
 import pytest
 
+from lupin_twin.journal import retention
 from lupin_twin.journal.retention import (
     Limits,
     horizon_ns,
+    note_lost,
     purge_step,
     purged_ns,
     shrink_step,
     used_bytes,
 )
+from lupin_twin.journal.runs import FOREVER_NS, Carries, Clock
 from lupin_twin.journal.schema import open_reader, open_writer, transaction
 from lupin_twin.past import HOUR_NS
-from tests.support.journal import NOW, SECOND, kept, look, pin, restored, scan
+from tests.support.journal import CLOCK, NOW, SECOND, kept, look, opened, pin, restored, scan
 
 DAY = 24 * HOUR_NS
 ENOUGH = 10**12
@@ -116,6 +119,33 @@ def test_where_scans_were_given_up_is_known(file: sqlite3.Connection) -> None:
     assert purged_ns(file, 1) == -1
     purge(file, Limits(1.0, ENOUGH), NOW + DAY + 10 * 60 * SECOND)
     assert purged_ns(file, 1) == scans(file)[0] - 60 * SECOND
+
+
+def test_what_is_kept_begins_with_the_log_and_behind_what_was_deleted_or_lost(
+    path: Path, file: sqlite3.Connection
+) -> None:
+    assert retention.kept(file) == ((NOW, FOREVER_NS),)
+    with transaction(file):
+        note_lost(file, 1, NOW + 5)
+        note_lost(file, 1, NOW + 3)
+    assert retention.kept(file) == ((NOW + 6, FOREVER_NS),)
+    purge(file, Limits(1.0, ENOUGH), NOW + 2 * DAY)
+    assert retention.kept(file) == ((purged_ns(file, 1) + 1, FOREVER_NS),)
+    # Another run holds what lies before the end of the first, and has lost nothing.
+    file.close()
+    with opened(path) as again:
+        first = again.start(CLOCK, 1, is_believed=True).run
+        back = Clock(NOW - 9, NOW + DAY, is_simulated=False)
+        again.begin(back, first, Carries.ALL, ended_ns=NOW + 2 * DAY)
+        assert again.kept() == ((NOW - 9, FOREVER_NS),)
+
+
+def test_what_is_of_before_the_log_is_kept_from_there(path: Path) -> None:
+    with opened(path) as file:
+        run = file.start(CLOCK, 1, is_believed=True).run
+        assert file.kept()[0][0] == NOW
+        file.append([(run, scan("late", NOW - HOUR_NS))])
+        assert file.kept()[0][0] == NOW - HOUR_NS
 
 
 def test_a_clock_that_is_a_year_ahead_gives_nothing_up_at_once(file: sqlite3.Connection) -> None:

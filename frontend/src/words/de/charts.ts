@@ -51,6 +51,7 @@ export const CHARTS: In<typeof ENGLISH> = {
     event: 'Ereignis',
   },
   chartGap: (length) => `${length} lang kam nichts`,
+  missing: { not_kept: 'nicht mehr aufbewahrt', not_recorded: 'nicht aufgezeichnet' },
   chartFailures: (count) => counted(count, 'fehlgeschlagener Versuch', 'fehlgeschlagene Versuche'),
   chartLooks: (count) => counted(count, 'Blütenkontrolle', 'Blütenkontrollen'),
 };

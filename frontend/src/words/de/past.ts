@@ -54,7 +54,7 @@ export const PAST: In<typeof ENGLISH> = {
     pest: 'volles Dreieck: Schädling gesehen',
     cleared: 'leerer Ring: Schädling weg',
     silence: 'schräge Linien: es wurde nichts versucht',
-    before: 'andersherum schräg: nicht aufgezeichnet',
+    before: 'andersherum schräg: nicht aufgezeichnet oder nicht mehr aufbewahrt',
     run: 'gestrichelte Linie: die Uhr begann von vorn',
   },
   timebarCounts: (scans, failures, seen, cleared) =>

@@ -33,6 +33,9 @@ export const TAGS: In<typeof ENGLISH> = {
   ageUnknownLong: 'Wie alt das ist, weiß niemand, bis der Zwilling wieder seine Zeit nennt.',
   neverObserved: 'nie',
   neverObservedLong: 'Noch keine Messung hat einen Wert gebracht.',
+  notKnownThen: 'nicht bekannt',
+  notKnownThenLong:
+    'Was der Zwilling damals empfing, ist nicht mehr oder noch nicht aufgezeichnet.',
   ageUntoldLong: 'Dieser Zwilling sagt nicht, von wann seine Messwerte sind.',
   tried: {
     ok: 'OK',

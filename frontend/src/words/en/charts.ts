@@ -56,6 +56,7 @@ export const CHARTS = {
     event: 'Event',
   },
   chartGap: (length: string): string => `nothing came for ${length}`,
+  missing: { not_kept: 'no longer kept', not_recorded: 'not recorded' },
   chartFailures: (count: number): string => counted(count, 'failed try', 'failed tries'),
   chartLooks: (count: number): string =>
     counted(count, 'look at the flowers', 'looks at the flowers'),

@@ -53,7 +53,7 @@ export const PAST = {
     pest: 'full triangle: a pest was seen',
     cleared: 'empty ring: a pest was gone',
     silence: 'slanted lines: nothing was tried',
-    before: 'slanted the other way: not remembered',
+    before: 'slanted the other way: not recorded, or no longer kept',
     run: 'dashed line: the clock began anew',
   },
   timebarCounts: (scans: number, failures: number, seen: number, cleared: number): string =>

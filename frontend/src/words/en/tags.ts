@@ -29,6 +29,8 @@ export const TAGS = {
   ageUnknownLong: 'How old this is nobody knows until the twin tells its time anew.',
   neverObserved: 'never',
   neverObservedLong: 'No scan has brought a reading yet.',
+  notKnownThen: 'not known',
+  notKnownThenLong: 'What the twin received then is no longer kept, or not recorded yet.',
   ageUntoldLong: 'This twin does not tell when its readings were made.',
   tried: {
     ok: 'OK',

@@ -51,6 +51,7 @@ export const CHARTS: In<typeof ENGLISH> = {
     event: 'Suceso',
   },
   chartGap: (length) => `no llegó nada durante ${length}`,
+  missing: { not_kept: 'ya no se conserva', not_recorded: 'sin registro' },
   chartFailures: (count) => counted(count, 'intento fallido', 'intentos fallidos'),
   chartLooks: (count) => counted(count, 'revisión de flores', 'revisiones de flores'),
 };

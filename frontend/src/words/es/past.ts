@@ -54,7 +54,7 @@ export const PAST: In<typeof ENGLISH> = {
     pest: 'triángulo lleno: plaga vista',
     cleared: 'anillo vacío: plaga desaparecida',
     silence: 'líneas inclinadas: no se intentó nada',
-    before: 'inclinadas al revés: sin registro',
+    before: 'inclinadas al revés: sin registro, o ya no se conserva',
     run: 'línea discontinua: el reloj empezó de nuevo',
   },
   timebarCounts: (scans, failures, seen, cleared) =>

@@ -33,6 +33,8 @@ export const TAGS: In<typeof ENGLISH> = {
   ageUnknownLong: 'Nadie sabe su antigüedad hasta que el gemelo vuelva a dar su hora.',
   neverObserved: 'nunca',
   neverObservedLong: 'Ninguna medición ha dado todavía una lectura.',
+  notKnownThen: 'no se sabe',
+  notKnownThenLong: 'Lo que el gemelo recibió entonces ya no se conserva o aún no está registrado.',
   ageUntoldLong: 'Este gemelo no dice de cuándo son sus lecturas.',
   tried: {
     ok: 'OK',

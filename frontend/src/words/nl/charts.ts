@@ -51,6 +51,7 @@ export const CHARTS: In<typeof ENGLISH> = {
     event: 'Gebeurtenis',
   },
   chartGap: (length) => `${length} lang kwam er niets`,
+  missing: { not_kept: 'niet meer bewaard', not_recorded: 'niet vastgelegd' },
   chartFailures: (count) => counted(count, 'mislukte poging', 'mislukte pogingen'),
   chartLooks: (count) => counted(count, 'bloemcontrole', 'bloemcontroles'),
 };

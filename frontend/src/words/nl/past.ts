@@ -54,7 +54,7 @@ export const PAST: In<typeof ENGLISH> = {
     pest: 'volle driehoek: plaag gezien',
     cleared: 'lege ring: plaag weg',
     silence: 'schuine lijnen: er is niets geprobeerd',
-    before: 'andersom schuin: niet vastgelegd',
+    before: 'andersom schuin: niet vastgelegd of niet meer bewaard',
     run: 'streepjeslijn: de klok begon opnieuw',
   },
   timebarCounts: (scans, failures, seen, cleared) =>

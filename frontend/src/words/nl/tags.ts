@@ -33,6 +33,9 @@ export const TAGS: In<typeof ENGLISH> = {
   ageUnknownLong: 'Hoe oud dit is, weet niemand tot de tweeling weer zijn tijd meldt.',
   neverObserved: 'nooit',
   neverObservedLong: 'Nog geen meting heeft een waarde opgeleverd.',
+  notKnownThen: 'niet bekend',
+  notKnownThenLong:
+    'Wat de tweeling toen ontving, wordt niet meer bewaard of is nog niet vastgelegd.',
   ageUntoldLong: 'Deze tweeling zegt niet van wanneer zijn meetwaarden zijn.',
   tried: {
     ok: 'OK',

@@ -33,6 +33,10 @@ class Condition:
     their own fault, `repeated` ones were there already. `set_aside` names the last damaged file.
     `simulated_ns` is the stretch of ROS time, start and end, that a simulation filled in and no
     robot observed, None if there is none.
+
+    All that was received up to `complete_ns`, ROS time, is written; None: it is not known. Within
+    `kept_ns`, stretches of ROS time in their order, all of that is still there: what lies before
+    was deleted, or nobody recorded.
     """
 
     state: JournalState
@@ -47,6 +51,8 @@ class Condition:
     file_bytes: int = 0
     set_aside: str = ""
     simulated_ns: tuple[int, int] | None = None
+    complete_ns: int | None = None
+    kept_ns: tuple[tuple[int, int], ...] = ()
 
     @property
     def is_well(self) -> bool:

@@ -17,8 +17,11 @@ from lupin_twin.journal.prefilling import Stretch, simulated
 from lupin_twin.journal.reading import newest_rows
 from lupin_twin.journal.retention import (
     Limits,
+    Stretches,
     horizon_ns,
+    kept,
     note_limits,
+    note_lost,
     purge_hours,
     purge_step,
     shrink_step,
@@ -131,6 +134,7 @@ class JournalFile:
             self._hours_purged_s = time.monotonic()
             self._purges_before_ns: int | None = None
             self._is_shrinking = False
+            self._kept: Stretches | None = None
             self._syncing = Syncing(self._path)
         except BaseException:  # whatever it was: nobody has this object, and could close it
             self._connection.close()
@@ -151,7 +155,10 @@ class JournalFile:
 
     def _salvage_step(self) -> bool:
         if self._salvaging is not None and next(self._salvaging, self) is self:
-            self._salvaging = None
+            self._salvaging = self._kept = None
+            # What could not be read nobody knows.
+            for run in self._runs():
+                note_lost(self._connection, run.root, self._last(run).stamp_ns)
             self._connection.execute("DELETE FROM meta WHERE key = ?", (_SALVAGE,))
         return self._salvaging is not None
 
@@ -263,6 +270,7 @@ class JournalFile:
     def keep_run(self, run: Run) -> None:
         """Have the run in the file, as it was in another one that is gone."""
         if all(known.id != run.root for known in self._runs()):
+            self._kept = None
             with self._transaction():
                 self._connection.execute(
                     "INSERT INTO run VALUES (?, ?, ?, ?, ?, ?, NULL, NULL)",
@@ -275,6 +283,8 @@ class JournalFile:
                         self._appender.last_seq + 1,
                     ),
                 )
+                since_ns = time.time_ns() - run.begun.arrival_ns
+                note_lost(self._connection, run.root, run.begun.stamp_ns + since_ns)
 
     def _runs(self) -> list[Run]:
         return runs(self._connection.execute)
@@ -291,6 +301,7 @@ class JournalFile:
 
     def _go_on_with(self, run: int) -> None:
         """One run goes on; another, whose end nobody saw, ended with the last heard in it."""
+        self._kept = None
         execute = self._connection.execute
         execute("UPDATE run SET ended_stamp_ns = NULL WHERE run = ?", (run,))
         for other in self._runs():
@@ -326,7 +337,22 @@ class JournalFile:
         with self._transaction():
             written = sum(self._appender.append(run.root, (row,)) for run, row in rows)
             self._appender.flush()
+        # What comes late may be of before the log.
+        if self._kept and any(row.stamp_ns < self._kept[0][0] for _, row in rows):
+            self._kept = None
         return written
+
+    def note_lost(self, run: Run, at_ns: int) -> None:
+        """Have it in the file that some of what was received up to a moment never came here."""
+        self._kept = None
+        with self._transaction():
+            note_lost(self._connection, run.root, at_ns)
+
+    def kept(self) -> Stretches:
+        """Of which stretches of ROS time all is here; none are while a damaged file is read."""
+        if self._kept is None:
+            self._kept = () if self._salvaging is not None else kept(self._connection)
+        return self._kept
 
     def size(self) -> int:
         """Bytes on the disk, the log included."""
@@ -370,6 +396,7 @@ class JournalFile:
             with self._transaction():
                 if not purge_step(self._connection, self._limits, self._purges_before_ns):
                     self._purges_before_ns = None
+                self._kept = None
             self._is_shrinking = True
         else:
             self._is_shrinking = shrink_step(self._connection)

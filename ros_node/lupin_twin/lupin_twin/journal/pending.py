@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Sequence
+from itertools import islice
 from typing import Final, NamedTuple
 
 from lupin_twin.journal.rows import Row, weight
@@ -14,11 +15,12 @@ MAX_WEIGHT: Final = 200_000
 
 
 class Entry(NamedTuple):
-    """A row, the clock it was heard by (1 is the first), and when it came, by the steady clock."""
+    """A row, the clock it was heard by (1 is the first), and when: steady clock, and ROS time."""
 
     era: int
     row: Row
     handed_over_s: float
+    at_ns: int
 
 
 class Pending:
@@ -34,7 +36,8 @@ class Pending:
         self._entries: deque[Entry] = deque()
         self._weight = 0
         self._lost = 0
-        self._taken = 0
+        self._lost_ns: tuple[int, int] | None = None
+        self._taken: list[Entry] = []
 
     def put(self, entry: Entry) -> None:
         """Hand over; takes microseconds, whatever the disk does."""
@@ -52,7 +55,7 @@ class Pending:
         with self._lock:
             taken = [self._entries.popleft() for _ in range(min(count, len(self._entries)))]
             self._weight -= sum(weight(entry.row) for entry in taken)
-            self._taken = len(taken)
+            self._taken = taken
             if self._entries:
                 self.arrived.set()
         return taken
@@ -60,7 +63,7 @@ class Pending:
     def put_back(self, entries: Sequence[Entry]) -> None:
         """What was taken and could not be written is the oldest again; the rest is done with."""
         with self._lock:
-            self._taken = 0
+            self._taken = []
             self._entries.extendleft(reversed(entries))
             self._weight += sum(weight(entry.row) for entry in entries)
             if self._weight > self._max_weight:
@@ -68,11 +71,28 @@ class Pending:
 
     def _shed(self) -> None:
         while self._weight > self._max_weight and len(self._entries) > 1:
-            self._weight -= weight(self._entries.popleft().row)
+            lost = self._entries.popleft()
+            self._weight -= weight(lost.row)
             self._lost += 1
+            first_ns, last_ns = self._lost_ns or (lost.at_ns, lost.at_ns)
+            self._lost_ns = min(first_ns, lost.at_ns), max(last_ns, lost.at_ns)
 
     def counts(self) -> tuple[int, int, float | None]:
         """(waiting, lost, when the oldest that waits was handed over)."""
         with self._lock:
             oldest = self._entries[0].handed_over_s if self._entries else None
-            return len(self._entries) + self._taken, self._lost, oldest
+            return len(self._entries) + len(self._taken), self._lost, oldest
+
+    @property
+    def complete_ns(self) -> int | None:
+        """When the first was received that waits or was lost, ROS time; None: there is none."""
+        with self._lock:
+            found = [entry.at_ns for entry in (*self._taken[:1], *islice(self._entries, 1))]
+            found += (self._lost_ns or ())[:1]
+            return min(found, default=None)
+
+    def take_lost(self) -> int | None:
+        """When the last of those was received that were lost since this was asked; None: none."""
+        with self._lock:
+            lost_ns, self._lost_ns = self._lost_ns, None
+        return None if lost_ns is None else lost_ns[1]

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from lupin_twin.journal.appending import PURGED_SEQ
-from lupin_twin.journal.hours import delete_before
-from lupin_twin.journal.runs import runs
+from lupin_twin.journal.hours import delete_before, extent
+from lupin_twin.journal.runs import runs, spans
 from lupin_twin.journal.schema import LOCAL_SITE, get_meta, set_meta
 from lupin_twin.journal.site_log import SiteLog
 from lupin_twin.past import HOUR_NS
@@ -31,6 +31,12 @@ KEPT_NS: Final = "kept_ns"
 KEPT_BYTES: Final = "kept_bytes"
 # With the number of a run behind it: see `purged_ns`.
 _HORIZON: Final = "purged_ns:"
+_LOST: Final = "lost_ns:"
+# Stretches that are reported at most, the last ones.
+_MAX_STRETCHES: Final = 16
+
+# Of ROS time, `start <= stamp < end`, ns.
+Stretches = tuple[tuple[int, int], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +64,34 @@ def purged_ns(connection: sqlite3.Connection, run: int, site: str = LOCAL_SITE) 
     """The last stamp of a run of which something was given up; -1 if nothing was."""
     found = get_meta(connection, f"{_HORIZON}{run}", site)
     return -1 if found is None else int(found)
+
+
+def note_lost(connection: sqlite3.Connection, run: int, at_ns: int) -> None:
+    """Have it in the file that some of what a run received up to a moment was never written."""
+    before_ns = int(get_meta(connection, f"{_LOST}{run}") or -1)
+    set_meta(connection, f"{_LOST}{run}", max(at_ns, before_ns))
+
+
+def kept(connection: sqlite3.Connection) -> Stretches:
+    """The stretches of ROS time of which all is here that their run has received.
+
+    The first begins with the log, or with the first attempt in it, if that is of earlier.
+    """
+    log = SiteLog(connection)
+    every = runs(connection.execute)
+    found: list[tuple[int, int]] = []
+    for number, span in enumerate(spans(every)):
+        run = span.run.id
+        lost_ns = int(get_meta(connection, f"{_LOST}{run}") or -1)
+        start_ns = max(span.start_ns, purged_ns(connection, run) + 1, lost_ns + 1)
+        if number == 0 and start_ns == 0:
+            begun = [each.begun.stamp_ns for each in every if each.root == run]
+            start_ns = min(*begun, *(extent(log, run) or begun))
+        if found and found[-1][1] == start_ns:
+            found[-1] = found[-1][0], span.end_ns
+        elif start_ns < span.end_ns:
+            found.append((start_ns, span.end_ns))
+    return tuple(found[-_MAX_STRETCHES:])
 
 
 def horizon_ns(connection: sqlite3.Connection, limits: Limits, now_ns: int) -> int:

@@ -20,7 +20,7 @@ from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.lock import InUse, Lock
 from lupin_twin.journal.pending import MAX_WEIGHT, Entry, Pending
 from lupin_twin.journal.prefilling import Stretch
-from lupin_twin.journal.retention import Limits
+from lupin_twin.journal.retention import Limits, Stretches
 from lupin_twin.journal.rows import Row
 from lupin_twin.journal.runs import Carries, Clock, Run, Turn
 from lupin_twin.journal.schema import DamagedFile, Foreign, says_damaged
@@ -93,6 +93,7 @@ class Journal:
         # What was heard last, as the log has it, where the clock contradicts that.
         self._doubted_ns: int | None = None
         self._simulated: Stretch | None = None
+        self._kept: Stretches = ()
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
         self._thread.start()
 
@@ -114,9 +115,13 @@ class Journal:
         self._eras.append(_Era(clock, turn, scans_per_series, before_ns))
         self._pending.arrived.set()
 
-    def write(self, row: Row) -> None:
-        """Hand a row over; it is safe from a killed process within 100 ms."""
-        self._pending.put(Entry(len(self._eras), row, time.monotonic()))
+    def write(self, row: Row, at_ns: int | None = None) -> None:
+        """Hand a row over that was received at `at_ns`, ROS time; None: as it was stamped.
+
+        It is safe from a killed process within 100 ms.
+        """
+        at_ns = row.stamp_ns if at_ns is None else at_ns
+        self._pending.put(Entry(len(self._eras), row, time.monotonic(), at_ns))
 
     def take_restored(self, wait_s: float = 0.0) -> Restored | None:
         """What was known before, once; None if that is not there (yet).
@@ -130,7 +135,7 @@ class Journal:
 
     @property
     def condition(self) -> Condition:
-        """How it is doing; for any thread."""
+        """How it is doing; for any thread. Where nothing waits, it is complete up to now."""
         waiting, lost, oldest_s = self._pending.counts()
         behind_s = 0.0 if oldest_s is None else time.monotonic() - oldest_s
         told = self._told
@@ -153,6 +158,8 @@ class Journal:
             file_bytes=told.file_bytes,
             set_aside=told.set_aside,
             simulated_ns=told.simulated_ns,
+            complete_ns=self._pending.complete_ns,
+            kept_ns=told.kept_ns,
         )
 
     def heal(self, damage: str) -> None:
@@ -213,6 +220,7 @@ class Journal:
                 self._catch_up(file)
                 self._write(file, all_that_waits=is_last)
                 has_more = not is_last and file.look_after(may_purge=bool(self._runs))
+                self._kept = file.kept()
                 self._tell_well(file.size())
                 if not is_last and not self._pending.arrived.wait(0.0 if has_more else _IDLE_S):
                     continue
@@ -281,6 +289,9 @@ class Journal:
             self._written += written
             self._refused += refused
             self._repeated += len(known) - written - refused
+            lost_ns = self._pending.take_lost()
+            if lost_ns is not None:
+                file.note_lost(self._runs[-1], lost_ns)
             self._pending.put_back(later)
             if later or not all_that_waits:
                 return
@@ -321,6 +332,7 @@ class Journal:
             file_bytes=self._told.file_bytes if file_bytes is None else file_bytes,
             set_aside=self._set_aside,
             simulated_ns=self._simulated,
+            kept_ns=self._kept,
         )
 
     def _tell_failure(self, error: Exception) -> None:

@@ -1,0 +1,195 @@
+"""What the journal does not hold, yet or no more, is marked in every answer, and not denied."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from lupin_twin.journal.rows import Row
+from tests.support.disk import Disk, build
+from tests.support.domains import own_domain, ros_env
+from tests.support.journal import SECOND, kept, pin, select
+from tests.support.journal import scan as row
+from tests.support.live import attached, wait_until_ready
+from tests.support.messages import scan
+from tests.support.processes import OFTEN, Process, lupin_twin, patrols_of
+from tests.support.ros import Peer
+from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.web import Bridge, bridge
+
+DAY_S = 86_400
+PATIENT = ("--field-timeout-s", str(PATIENCE_S), "--field-rate-hz", "10000")
+TO, FROM = "x-complete-to", "x-kept-from"
+ROUTES = ("/api/state", "/api/tags/a", "/api/health", "/api/field.json", "/api/field/quality")
+
+
+@contextmanager
+def both(
+    journal: Path, *options: str, env: dict[str, Any] | None = None
+) -> Iterator[tuple[Bridge, Bridge]]:
+    """`serve` with a journal, and a `web` of it that has heard of that."""
+    arguments = (*PATIENT, *OFTEN, "-p", f"journal:={journal}", *options)
+    with (
+        own_domain() as domain,
+        bridge(*arguments, domain=domain, **(env or {})) as it,
+        lupin_twin(domain, "web", *PATIENT) as process,
+        attached(process, it.peer) as apart,
+    ):
+        for live in (it, apart):
+            wait_for(lambda live=live: journal_of(live) == "recording", "a journal")  # type: ignore[misc]
+        yield it, apart
+
+
+def journal_of(live: Bridge) -> str:
+    answer = live.get("/readyz")
+    return str(answer.json()["journal"]["state"]) if answer.status_code == 200 else ""
+
+
+def as_of(live: Bridge, path: str, at_s: float) -> httpx.Response:
+    more: dict[str, Any] = {"sensor_type": "co2"} if "field" in path else {}
+    return live.get(path, at=f"{at_s:.3f}", **more)
+
+
+def seconds(time_: dict[str, int]) -> float:
+    return time_["sec"] + time_["nanosec"] / 1e9
+
+
+def now_s(live: Bridge) -> float:
+    return seconds(live.json("/api/state")["header"]["stamp"])
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build(tmp_path_factory.mktemp("disk"))
+
+
+def test_with_a_full_disk_answers_say_up_to_when_they_are_complete(
+    library: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    disk = Disk(folder, library, tmp_path / "control")
+    env = {name: value for name, value in disk.env.items() if os.environ.get(name) != value}
+    journal = folder / "j.sqlite"
+    with both(journal, env={"afresh": True, **env}) as lives:
+        serve, _ = lives
+        serve.peer.observe(scan("a", {"co2": 400.0}, (1.0, 1.0)))
+        wait_for(lambda: len(select(journal, "SELECT 1 FROM scan")) == 1, "it in the journal")
+        disk.be("full")
+        before_s = now_s(serve)
+        serve.peer.observe(scan("a", {"co2": 999.0}))
+        for live in lives:
+            wait_for(lambda live=live: journal_of(live) == "failing", "the full disk")  # type: ignore[misc]
+        at_s = wait_for(lambda: at if (at := now_s(serve)) > before_s + 3.0 else None, "3 s later")
+        assert at_s is not None
+        for live in lives:
+            told = wait_for(lambda live=live: as_of(live, "/api/state", at_s - 0.5), "an answer")  # type: ignore[misc]
+            assert told is not None
+            # The value from before is no news, and is not sold as one.
+            [reading] = told.json()["tags"][0]["readings"]
+            assert reading["value"] == 400.0
+            for path in ROUTES:
+                headers = as_of(live, path, at_s - 0.5).headers
+                assert before_s - 1.5 <= float(headers[TO]) <= before_s + 1.0, path
+                assert float(headers[FROM]) < before_s
+                # Of before nothing is missing.
+                assert float(as_of(live, path, before_s - 1.5).headers[TO]) == pytest.approx(
+                    before_s - 1.5, abs=0.001
+                )
+            period: dict[str, Any] = {"from": before_s - 10.0, "to": at_s - 0.5}
+            for path, more in (
+                ("/api/history", {"tag_id": "a", "sensor_type": "co2"}),
+                ("/api/timeline", {}),
+            ):
+                body = live.json(path, **more, **period)
+                complete_s = seconds(body["complete_to"])
+                assert before_s - 1.5 <= complete_s <= before_s + 1.0
+                for stretch in body.get("gaps", []) + body.get("silences", []):
+                    assert seconds(stretch["to"]) <= complete_s
+            export = live.get("/api/export.csv", **period)
+            assert before_s - 1.5 <= float(export.headers[TO]) <= before_s + 1.0
+        disk.be("well")
+        for live in lives:
+            wait_for(
+                lambda live=live: (  # type: ignore[misc]
+                    float(as_of(live, "/api/state", at_s).headers.get(TO, 0)) == round(at_s, 3)
+                ),
+                "all of it",
+            )
+            [reading] = as_of(live, "/api/state", at_s).json()["tags"][0]["readings"]
+            assert reading["value"] == 999.0
+
+
+def test_of_what_was_deleted_it_is_said_since_when_it_is_kept(tmp_path: Path) -> None:
+    journal = tmp_path / "j.sqlite"
+    last_s = int(time.time()) - 3_600
+    stamps_s = [last_s - DAY_S // 4 * number for number in range(20)][::-1]
+    rows: list[Row] = [pin("a", stamps_s[0] * SECOND), row("gone", stamps_s[0] * SECOND, co2=1.0)]
+    rows += [row("a", at_s * SECOND, co2=float(n)) for n, at_s in enumerate(stamps_s)]
+    kept(journal, rows)
+    with both(journal, "-p", "journal_days:=2.0") as lives:
+        kept_s = 0.0
+        for live in lives:
+
+            def deleted(live: Bridge = live) -> bool:
+                headers = as_of(live, "/api/state", last_s).headers
+                return float(headers.get(FROM, 0)) > stamps_s[0]
+
+            wait_for(deleted, "some that is deleted")
+            for path in ROUTES:
+                answer = as_of(live, path, stamps_s[0] + 1)
+                kept_s = float(answer.headers[FROM])
+                assert stamps_s[0] < kept_s <= last_s
+            never = as_of(live, "/api/tags/gone", stamps_s[0] + 1)
+            assert never.status_code == 404
+            assert "is not kept" in never.json()["detail"]
+            assert float(never.headers[FROM]) == kept_s
+            # Whoever has the answer already is told, too.
+            answer = as_of(live, "/api/state", last_s)
+            again = live.get("/api/state", {"If-None-Match": answer.headers["etag"]}, at=last_s)
+            assert (again.status_code, float(again.headers[FROM])) == (304, kept_s)
+            for path, more in (
+                ("/api/history", {"tag_id": "a", "sensor_type": "co2"}),
+                ("/api/timeline", {}),
+            ):
+                whole: Any = {"from": stamps_s[0], "to": last_s}
+                body = live.json(path, **more, **whole)
+                assert seconds(body["kept_from"]) == pytest.approx(kept_s, abs=1.0)
+                assert seconds(body["complete_to"]) == seconds(body["to"])
+                late = live.json(path, **more, **{"from": kept_s + 3_600, "to": last_s})
+                assert late["kept_from"] == late["from"]
+
+
+MODULES = ("lupin_twin", "lupin_bridge", "lupin_patrol", "greenhouse_sim", "numpy", "orjson")
+
+
+def test_no_process_imports_a_module_of_the_working_folder(tmp_path: Path) -> None:
+    """That which looks back, that which fills a demo's journal, and the patrol."""
+    imported = tmp_path / "imported.txt"
+    noted = f"open({str(imported)!r}, 'a').write(__name__ + repr(sys.argv))"
+    for name in (*MODULES, "json", "pickle", "sqlite3"):
+        (tmp_path / f"{name}.py").write_text(f"import sys\n{noted}\nsys.exit(9)")
+    program = Path(sys.executable).with_name("lupin-twin")
+    command = ["env", "-C", str(tmp_path), str(program), "demo", "--port", "0"]
+    with (
+        own_domain() as domain,
+        Process(command, ros_env(domain)) as process,
+        Peer(domain) as peer,
+        attached(process, peer) as live,
+    ):
+        wait_for(lambda: patrols_of(process.pid), "the patrol")
+        wait_until_ready(live)
+        at_s = now_s(live) - 600
+        wait_for(lambda: as_of(live, "/api/state", at_s).status_code == 200, "a look back")
+        told = imported.read_text() if imported.exists() else ""
+        assert told == ""
+        assert as_of(live, "/api/state", at_s).json()["tags"], "the past that was filled in"
+        assert patrols_of(process.pid)

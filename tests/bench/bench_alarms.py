@@ -18,10 +18,10 @@ from random import Random
 
 from lupin_bridge.alarms.board import AlarmBoard
 from lupin_bridge.alarms.feed import LOT, REACH_COUNT
-from lupin_bridge.alarms.ledger import Ledger
+from lupin_bridge.alarms.ledger import change_between, page_of
 from lupin_bridge.judge.choosing import own_sensors
 from lupin_bridge.judge.daylight import Day, Light
-from lupin_bridge.judge.following import Follower, Found
+from lupin_bridge.judge.following import Follower
 from lupin_bridge.judge.judging import Judge
 from lupin_bridge.outward.mirror import Mirror
 from lupin_bridge.outward.names import Topics
@@ -84,7 +84,7 @@ def alarms_of(tags: int) -> None:
     start = time.thread_time()
     found = follower.found(now_ns)
     row(tags, f"start: {len(heard):,} scans", sum(lots) + ms_since(start), max(lots))
-    row(tags, f"start: all {len(found.changed):,} alarms told", ms_since(start))
+    row(tags, f"start: all {len(found.alarms):,} alarms told", ms_since(start))
     print(f"{'':>7}  memory of that, without the scans heard: {resident_mb() - before_mb:.0f} MB")
     took = []
     for change in range(CHANGES):
@@ -95,6 +95,15 @@ def alarms_of(tags: int) -> None:
         follower.found(now_ns)
         took.append(ms_since(start))
     row(tags, "alarms: one scan", statistics.median(took), max(took))
+    took = []
+    for change in range(CHANGES):
+        late_ns = heard[-1].stamp_ns - (change + 1) * (heard[-1].stamp_ns // 100)
+        one = write(2 * len(heard) + change, str(change), late_ns, [*MIDDLE.values()])
+        start = time.thread_time()
+        follower.take([one])
+        follower.found(now_ns)
+        took.append(ms_since(start))
+    row(tags, "alarms: one scan, hours to days late", statistics.median(took), max(took))
 
 
 def verdicts_of(tags: int) -> None:
@@ -131,18 +140,20 @@ def loop_of(tags: int) -> None:
         replace(alarm(str(number % tags), raised_ns=number), id=f"{number:06x}")
         for number in range(ALARMS)
     ]
-    ledger, board = Ledger(), AlarmBoard()
+    board = AlarmBoard()
     start = time.thread_time()
-    page, change = ledger.take(Found(tuple(many)))
+    page = page_of(many)
+    change = change_between(board.now.page, page)
     row(tags, f"{ALARMS:,} alarms: put in order", ms_since(start))
     start = time.thread_time()
     board.put(page, change, "journal", 1)
     row(tags, "loop: to take them over", ms_since(start))
     ordered, taken = [], []
     for number in range(CHANGES):
-        worse = Found((replace(many[number], worst=99.0 + number),), is_whole=False)
+        many[number] = replace(many[number], worst=99.0 + number)
         start = time.thread_time()
-        page, change = ledger.take(worse)
+        page = page_of(many)
+        change = change_between(board.now.page, page)
         ordered.append(ms_since(start))
         start = time.thread_time()
         board.put(page, change, "journal", 1)
@@ -177,7 +188,7 @@ def ordinary() -> None:
     heard = ordinary_days()
     follower = Follower(own_sensors(), lambda light, _: bool(light), SPANS)
     follower.take(heard)
-    raised = follower.found(heard[-1].stamp_ns).changed
+    raised = follower.found(heard[-1].stamp_ns).alarms
     spells = (heard[-1].stamp_ns - heard[0].stamp_ns) / (600 * S)
     kinds = Counter(alarm.reason.kind.value for alarm in raised)
     told = ", ".join(f"{kind} {count}" for kind, count in kinds.most_common())

@@ -7,8 +7,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from lupin_bridge.alarms.ledger import Ledger
-from lupin_bridge.judge.following import Found
+from lupin_bridge.alarms.ledger import Page, change_between, page_of
 from lupin_bridge.outward.channels import Channels
 from lupin_bridge.outward.choosing import Targets
 from lupin_bridge.settings import Secrets, Settings
@@ -37,7 +36,8 @@ def test_neither_a_hanging_broker_nor_a_hanging_receiver_delays_a_frame(tmp_path
             # The alarms are the test's alone: of what it hears, the feed makes none, and takes this
             # one back.
             await stage.bridge._alarm_feed.stop()
-            page, change = Ledger().take(Found((alarm("a"),)))
+            page = page_of((alarm("a"),))
+            change = change_between(Page(), page)
             stage.bridge.alarms.put(page, change, "heard", 1)
             # The post waits until it is known where observations come from.
             stage.script.tell(replace(state(1), origin="robot"))

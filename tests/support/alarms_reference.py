@@ -290,7 +290,7 @@ def _overdue(tag_id: str, of_run: list[PastWrite], *, is_on: bool) -> Iterator[P
         # So long as anybody is at work, time passes; in a pause it stands.
         due = start + holds
         for first, last in _pauses(of_run):
-            if last > start and first < due:
+            if last > start and first <= due:
                 due += last - max(first, start)
         due += 1
         if due <= last_ns and (end is None or due < end):

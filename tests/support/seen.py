@@ -6,11 +6,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, Board
-from lupin_bridge.alarms.ledger import Ledger, Page
+from lupin_bridge.alarms.ledger import Page, change_between, page_of
 from lupin_bridge.judge.alarm import Alarm, alarm_id
 from lupin_bridge.judge.choosing import own_sensors
 from lupin_bridge.judge.daylight import Day
-from lupin_bridge.judge.following import Found
 from lupin_bridge.judge.judging import judge_once
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_bridge.outward.payloads import Seen
@@ -71,10 +70,6 @@ def alarm(
 class Alarms(AlarmBoard):
     """A board that a test writes on: all alarms at once, as a feed would find them."""
 
-    def __init__(self) -> None:
-        super().__init__()
-        self._ledger = Ledger()
-
     def show(
         self,
         alarms: Iterable[Alarm],
@@ -84,5 +79,7 @@ class Alarms(AlarmBoard):
         is_past: bool = False,
     ) -> bool:
         """Take these for the alarms as they stand."""
-        page, change = self._ledger.take(Found(tuple(alarms)))
+        before, page = self.now.page, page_of(alarms)
+        change = change_between(before, page)
+        page = before if page == before else page
         return self.put(page, replace(change, is_past=is_past), source, since_ns)

@@ -119,6 +119,29 @@ def test_a_stamp_from_the_future_is_held_to_when_it_was_first_received(path: Pat
     assert select(path, "SELECT stamp_ns, own_stamp_ns FROM scan") == [(NOW, NOW + 60 * S)]
 
 
+def test_it_stays_known_however_much_else_was_tried_meanwhile(path: Path) -> None:
+    with twin(path) as life:
+        life.hear(60, t=20.0)
+        for second in range(1, 12):  # more than a tag's history has
+            life.at(second, passed_s=1)
+            life.hear(second, h=float(second))
+        life.at(100, passed_s=80)
+        life.hear(60, t=20.0)
+        assert life.says("t") == (20.0, 100.0)
+        assert count(path) == 12
+
+
+def test_within_one_tick_of_the_clock_what_has_no_stamp_is_one_write(path: Path) -> None:
+    with twin(path, is_simulated=True) as life:
+        life.at(50)
+        life.hear(None, t=20.0)
+        life.hear(None, t=25.0, h=60.0)
+        assert life.says("t") == (20.0, 0.0)
+        assert life.says("h") == (60.0, 0.0)
+        life.hear(None, source="b", t=25.0)
+        assert life.says("t") == (25.0, 0.0)
+
+
 # --- 3: runs and steps ----------------------------------------------------------------------------
 
 

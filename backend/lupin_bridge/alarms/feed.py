@@ -15,10 +15,10 @@ from typing import Final, TypeVar
 
 from lupin_bridge.alarms.board import AlarmBoard, AlarmSource
 from lupin_bridge.alarms.hearing import RUN, writes_between
-from lupin_bridge.alarms.ledger import Change, Ledger, Page
+from lupin_bridge.alarms.ledger import Change, Page, change_between, page_of
 from lupin_bridge.judge.alarm import HOUSE, Alarm, alarm_id
 from lupin_bridge.judge.choosing import Criteria
-from lupin_bridge.judge.following import Follower, Found
+from lupin_bridge.judge.following import FORGET_EVERY_NS, Follower
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_bridge.twin.source import Told, TwinSource, TwinUnavailableError
 from lupin_twin.journal.condition import JournalState
@@ -40,14 +40,14 @@ AGAIN_S: Final = 1.5
 RETRY_S: Final = 5.0
 # A journal that has not answered for so long says nothing of now, although the twin is there.
 UNANSWERED_S: Final = 30.0
-# All is read again no oftener than this, whatever comes late.
-OVER_AGAIN_S: Final = 30.0
 _NOT_KEPT: Final = frozenset({JournalState.FAILING, JournalState.IN_USE, JournalState.FOREIGN})
 # Numbers of what is heard here: beyond those of any journal.
 _FIRST_HEARD: Final = 2**62
 _ALL_TIME: Final = (RunSpan(RUN, 0, 2**63 - 1),)
 _SILENCES: Final = 100
-_AS_BEFORE: Final = Found((), is_whole=False)
+
+# What a page is of: alarms of the log, those beside them, and the moment since when they are told.
+_NO_PAGE: Final[tuple[tuple[Alarm, ...], tuple[Alarm, ...], int]] = ((), (), 0)
 
 ResultT = TypeVar("ResultT")
 
@@ -80,17 +80,14 @@ class AlarmFeed:
         self._due_ns = 2**63 - 1
         self._is_caught_up = False
         self._generation = 0
-        self._over_again_s = -OVER_AGAIN_S
-        # Tags of which something came too late, and those of which that was so before.
-        self._late: frozenset[str] = frozenset()
-        self._wide: frozenset[str] = frozenset()
         self.missed = 0
         self._says: AlarmSource = "journal"
         self._seen: Snapshot | None = None
         self._heard: list[PastWrite] = []
         self._heard_number = _FIRST_HEARD
         self._silences: list[Alarm] = []
-        self._ledger = Ledger()
+        self._alarms: tuple[Alarm, ...] = ()
+        self._page, self._page_of = Page(), _NO_PAGE
         self._again: asyncio.TimerHandle | None = None
         self._task: asyncio.Task[None] | None = None
 
@@ -162,7 +159,6 @@ class AlarmFeed:
         self._follower, self._last, self._journal = None, 0, ""
         self._heard, self._seen = [], None
         self._since_ns, self._is_caught_up = None, False
-        self._late = frozenset()
 
     async def _run(self) -> None:
         loop = asyncio.get_running_loop()
@@ -230,18 +226,10 @@ class AlarmFeed:
             await self._take(past.writes)
             if generation != self._generation:
                 return
-            if self._late and loop.time() >= self._over_again_s + OVER_AGAIN_S:
-                # What came late belongs to what is no longer kept as it was.
-                self._over_again_s = loop.time()
-                self._wide |= self._late
-                self._begin("journal")
-                continue
             if past.is_all:
                 break
         await self._tell()
-        if self._late:
-            self._ask_again(loop, max(AGAIN_S, self._over_again_s + OVER_AGAIN_S - loop.time()))
-        elif self._last != had:
+        if self._last != had:
             self._ask_again(loop, AGAIN_S)
 
     def _is_another(self, past: PastWrites) -> bool:
@@ -252,9 +240,7 @@ class AlarmFeed:
 
     def _new(self, spans: Sequence[RunSpan]) -> Follower:
         criteria = self._criteria
-        return Follower(
-            criteria.sensors, criteria.is_day, spans, criteria.recent_s, wide=self._wide
-        )
+        return Follower(criteria.sensors, criteria.is_day, spans, criteria.recent_s)
 
     async def _take(self, lot: Sequence[PastWrite]) -> None:
         follower = self._follower
@@ -264,11 +250,8 @@ class AlarmFeed:
         if self._since_ns is None or oldest_ns < self._since_ns:
             self._since_ns = oldest_ns
         missed = follower.missed
-        late = await self._on_worker(lambda _: follower.take(lot))
-        # A journal is read again for those tags, and more of them is kept; once more is no use.
-        is_lost = follower.wide if self._says == "journal" else late
-        self._late |= late - is_lost
-        self._missed(follower.missed - missed + len(late & is_lost))
+        await self._on_worker(lambda _: follower.take(lot))
+        self._missed(follower.missed - missed)
 
     def _missed(self, count: int) -> None:
         if count and not self.missed:
@@ -287,7 +270,8 @@ class AlarmFeed:
 
         def find(_: object) -> tuple[Page, Change, int]:
             found = follower.found(moment_ns, since_ns)
-            return *self._ledger.take(found, beside, since_ns), found.due_ns
+            self._alarms = found.alarms
+            return *self._newest(beside, since_ns), found.due_ns
 
         page, change, due_ns = await self._on_worker(find)
         self._due_ns = due_ns
@@ -302,11 +286,23 @@ class AlarmFeed:
         is.
         """
         now, beside = self._board.now, tuple(self._silences)
-        page, change = await self._on_worker(lambda _: self._ledger.take(_AS_BEFORE, beside))
+        page, change = await self._on_worker(lambda _: self._newest(beside, self._page_of[2]))
         is_gone = any(alarm.is_active for alarm in beside)
         is_old = unanswered_s >= UNANSWERED_S and not is_gone
         source: AlarmSource = "starting" if is_old else now.source
         self._board.put(page, change, source, now.since_ns)
+
+    def _newest(self, beside: tuple[Alarm, ...], since_ns: int) -> tuple[Page, Change]:
+        """The page as it is now, the very same where nothing is another; on a worker."""
+        alarms, before = self._alarms, self._page
+        known, known_beside, known_ns = self._page_of
+        # What falls out for its age does so by the hour.
+        since_ns -= since_ns % FORGET_EVERY_NS
+        if alarms is known and (beside, since_ns) == (known_beside, known_ns):
+            return before, Change(())
+        self._page = page_of((*alarms, *beside), since_ns)
+        self._page_of = alarms, beside, since_ns
+        return self._page, change_between(before, self._page, since_ns)
 
     async def _on_worker(self, work: Callable[[object], ResultT]) -> ResultT:
         """Done where it holds up nobody; the loop only takes over what comes of it."""

@@ -1,20 +1,20 @@
-"""From what was heard, write by write, to the alarms of all tags and of the house. Pure.
+"""From the log, write by write, to the alarms of all tags and of the house. Pure.
 
-The alarms are the same whatever the order of hearing, however often anything was heard, and however
-the hearing was divided: they follow from what was heard, the ranges, and the moment.
+The alarms are the same whatever the order of receiving, however often anything was received, and
+however that was divided: they follow from the log, the ranges, and the moment.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from heapq import heappop, heappush
+from itertools import chain
 from statistics import median
 from typing import Final
 
 from lupin_bridge.judge.alarm import HOUSE, Alarm, alarm_id
 from lupin_bridge.judge.day_line import DayLine
-from lupin_bridge.judge.episodes import MAX_EPISODES, TagEpisodes
+from lupin_bridge.judge.episodes import TagEpisodes
 from lupin_bridge.judge.pauses import Stretches
 from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.judge.rhythm import LONGEST_NS, SHORTEST_NS
@@ -22,11 +22,8 @@ from lupin_bridge.judge.tag_past import Gap, TagPast, is_long
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_twin.past_writes import PastWrite, RunSpan
 
-# Writes that are kept as they are: of a tag at most, and of all tags about.
-KEPT_OF_TAG: Final = 32
+# Writes that are kept, of all tags about; of a tag its share of these.
 KEPT: Final = 100_000
-# And of a tag of which something came later than that, where there are few of these.
-WIDE_OF_TAG: Final = 4_096
 # What is over and not told any more is dropped as often as that.
 FORGET_EVERY_NS: Final = 3600 * 1_000_000_000
 _NEVER: Final = 2**63 - 1
@@ -36,17 +33,13 @@ DayOf = Callable[[bool | None, int], bool]
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What is not as it was when it was last asked for; `is_whole`: these are all alarms.
+    """All alarms, in no order, the very same tuple where none is another than before.
 
-    By their ids, those that are `withdrawn`, for they never were, and those that are `forgotten`,
-    for they are old. At `due_ns` alarms may be others by themselves.
+    At `due_ns` they may be others by themselves.
     """
 
-    changed: tuple[Alarm, ...]
-    withdrawn: tuple[str, ...] = ()
-    forgotten: tuple[str, ...] = ()
+    alarms: tuple[Alarm, ...]
     due_ns: int = _NEVER
-    is_whole: bool = True
 
 
 @dataclass(slots=True)
@@ -64,19 +57,18 @@ class _Run:
     house: tuple[Alarm, ...] = ()
     # Whether the pauses of before are others, and with them what was overdue.
     is_late: bool = False
-    # When tags may be overdue: one entry a tag whose gap is open, never later than its time.
-    due: list[tuple[int, str]] = field(default_factory=list)
-    reminded: dict[str, int] = field(default_factory=dict)
+    # When the tags whose gap is open will be overdue.
+    due: dict[str, int] = field(default_factory=dict)
 
 
 class Follower:
     """Belongs to one thread at a time.
 
     `recent_s` fixes how long readings hold, None: it is learnt. `day_of` says whether it was day.
-    `spans` are the runs of the clock; of other ones another follower has to be made. `keep` is how
-    many writes of a tag are kept as they are, about; of the tags that are `wide` it is more.
+    `spans` are the runs of the clock; of other ones another follower has to be made. `kept` is how
+    many writes are kept, about.
 
-    `missed` counts what was older than anything that is told; it was not taken in.
+    `missed` counts what was older than what is kept of its tag; it was not taken in.
     """
 
     def __init__(
@@ -86,11 +78,9 @@ class Follower:
         spans: Sequence[RunSpan],
         recent_s: float | None = None,
         *,
-        keep: int = KEPT_OF_TAG,
-        wide: frozenset[str] = frozenset(),
+        kept: int = KEPT,
     ) -> None:
-        self._keep = keep
-        self.wide = wide
+        self._kept = kept
         self.missed = 0
         self._forgotten_ns = 0
         self.spans = tuple(spans)
@@ -102,14 +92,11 @@ class Follower:
         self._recent_ns = None if recent_s is None else int(recent_s * 1e9)
         self._runs: dict[int, _Run] = {}
         self._tags = 0
-        self._was_asked = False
+        self._is_other = True
+        self._alarms: tuple[Alarm, ...] = ()
 
-    def take(self, writes: Iterable[PastWrite]) -> frozenset[str]:
-        """Take in what was heard; returns the tags that can only be told from the beginning on.
-
-        That is so where something is later than what is kept as it was.
-        """
-        late: set[str] = set()
+    def take(self, writes: Iterable[PastWrite]) -> None:
+        """Take in what was received."""
         for write in writes:
             if write.stamp_ns < self._forgotten_ns:
                 self.missed += 1
@@ -119,41 +106,41 @@ class Follower:
             run = self._runs.get(write.run)
             if run is None:
                 run = self._runs[write.run] = _Run(self._spans_of[write.run][0].start_ns)
-            if not self._take(run, write):
-                late.add(write.tag_id)
+            self._take(run, write)
         for run in self._runs.values():
-            late.update(self._settle(run))
-        return frozenset(late)
+            self._settle(run)
 
     def found(self, now_ns: int, since_ns: int = 0) -> Found:
-        """What the alarms at `now_ns` are that they were not when this was last asked.
+        """The alarms at `now_ns`.
 
         Those that were over before `since_ns` may be among them; they are forgotten by and by.
         """
-        news = _News()
         if since_ns > self._forgotten_ns + FORGET_EVERY_NS:
             self._forget(since_ns)
         due_ns = _NEVER
         newest = self.spans[-1].run if self.spans else None
         for number, run in self._runs.items():
             is_on = number == newest
-            self._judge(run, news, is_on=is_on)
+            self._judge(run, is_on=is_on)
             house, due = self._stops(run, now_ns if is_on else None, since_ns)
-            news.put(run.house, house)
+            self._is_other |= run.house != house
             run.house = house
             due_ns = min(due_ns, due)
-        is_whole, self._was_asked = not self._was_asked, True
-        gone, old = tuple(news.withdrawn), tuple(news.forgotten)
-        return Found(tuple(news.changed), gone, old, due_ns, is_whole)
+        if self._is_other:
+            self._is_other = False
+            self._alarms = tuple(chain.from_iterable(map(_all_of, self._runs.values())))
+        return Found(self._alarms, due_ns)
 
     # --- taking in -----------------------------------------------------------------------------
 
-    def _take(self, run: _Run, write: PastWrite) -> bool:
+    def _take(self, run: _Run, write: PastWrite) -> None:
         tag = run.tags.get(write.tag_id)
         if tag is None:
             self._tags += 1
             episodes = TagEpisodes(write.tag_id, run.begun_ns, self._sensors, self._recent_ns)
-            tag = run.tags[write.tag_id] = TagPast(episodes, self._recent_ns, _matters(run))
+            tag = run.tags[write.tag_id] = TagPast(
+                episodes, self._recent_ns, _matters(run), self._is_day(run)
+            )
         newest_ns = run.stretches.newest_ns
         if newest_ns is not None and write.stamp_ns <= newest_ns:
             # How long a pause may be follows from the scans before it: of earlier ones it stands.
@@ -162,28 +149,23 @@ class Follower:
         else:
             run.stretches.add(write.stamp_ns)
         run.news[write.tag_id] = None
-        return tag.add(write)
+        if not tag.add(write):
+            self.missed += 1
 
-    def _settle(self, run: _Run) -> Iterator[str]:
-        """Work out what each tag's news are, and forget what nobody needs any more."""
+    def _settle(self, run: _Run) -> None:
+        """Work out what each tag's news say of the day, and forget what there is no room for."""
         changed_ns = _NEVER
         for tag_id in run.news:
-            tag = run.tags[tag_id]
-            tag.follow()
-            at_ns = run.days.put(tag_id, tag.trail.turns)
+            at_ns = run.days.put(tag_id, run.tags[tag_id].trail.turns)
             changed_ns = changed_ns if at_ns is None else min(changed_ns, at_ns)
         if changed_ns != _NEVER:
             for tag_id, tag in run.tags.items():
                 if tag.last_ns >= changed_ns:
                     run.news[tag_id] = None
-                    tag.judge_anew()
-                if tag.settled_ns >= changed_ns:
-                    yield tag_id
-        keep = max(1, min(self._keep, KEPT // max(1, self._tags)))
-        wide = max(keep, min(WIDE_OF_TAG, KEPT // max(1, len(self.wide))))
-        is_day = self._is_day(run)
+                    tag.judge_anew(changed_ns)
+        keep = max(1, self._kept // max(1, self._tags))
         for tag_id in run.news:
-            run.tags[tag_id].settle(wide if tag_id in self.wide else keep, is_day)
+            run.tags[tag_id].keep(keep)
 
     def _forget(self, before_ns: int) -> None:
         """What was over before is told to nobody, and must not grow for as long as this runs."""
@@ -192,10 +174,10 @@ class Follower:
             newest_ns = run.stretches.newest_ns
             if number != self.spans[-1].run and newest_ns is not None and newest_ns < before_ns:
                 self._tags -= len(run.tags)
+                self._is_other = True
                 del self._runs[number]
                 continue
-            is_day = self._is_day(run)
-            oldest_ns = min(tag.forget(before_ns, is_day) for tag in run.tags.values())
+            oldest_ns = min(tag.forget(before_ns) for tag in run.tags.values())
             known_ns = run.stretches.forget(min(before_ns, oldest_ns))
             self._forgotten_ns = max(self._forgotten_ns, known_ns)
             run.days.forget(before_ns, {name: tag.trail.turns for name, tag in run.tags.items()})
@@ -211,38 +193,37 @@ class Follower:
 
     # --- telling -------------------------------------------------------------------------------
 
-    def _judge(self, run: _Run, news: _News, *, is_on: bool) -> None:
-        is_day = self._is_day(run)
+    def _judge(self, run: _Run, *, is_on: bool) -> None:
         last_ns = run.stretches.newest_ns or 0
-        # Of a run that is over, what is overdue ends with the last that was heard in it.
+        # Of a run that is over, what is overdue ends with the last that was received in it.
         is_all = run.is_late or (run.news and not is_on)
-        ask = dict.fromkeys(run.tags) if is_all else run.news | _due(run, last_ns)
+        due = [tag_id for tag_id, due_ns in run.due.items() if due_ns <= last_ns]
+        ask = dict.fromkeys(run.tags) if is_all else run.news | dict.fromkeys(due)
         for tag_id in run.news:
             tag = run.tags[tag_id]
             ended_ns = None if is_on else tag.last_ns
-            alarms = tuple(tag.episodes(is_day).alarms(ended_ns))
-            _put(run.alarms, tag_id, alarms, news)
+            self._put(run.alarms, tag_id, tuple(tag.episodes.alarms(ended_ns)))
         for tag_id in ask:
-            _put(
-                run.overdue,
-                tag_id,
-                tuple(self._overdue(run, tag_id, last_ns, is_on=is_on)),
-                news,
-            )
+            self._put(run.overdue, tag_id, tuple(self._overdue(run, tag_id, last_ns, is_on=is_on)))
         run.is_late = False
         run.news = {}
 
+    def _put(
+        self, table: dict[str, tuple[Alarm, ...]], tag_id: str, alarms: tuple[Alarm, ...]
+    ) -> None:
+        if table.get(tag_id, ()) != alarms:
+            self._is_other = True
+            table[tag_id] = alarms
+
     def _overdue(self, run: _Run, tag_id: str, last_ns: int, *, is_on: bool) -> Iterator[Alarm]:
         """Of a tag that is not scanned, while others are: pauses of the house do not count."""
-        tag = run.tags[tag_id]
-        open_gap = tag.open_gap
-        gaps = tag.trail.gaps if open_gap is None else (*tag.trail.gaps, open_gap)
-        for gap in gaps:
+        run.due.pop(tag_id, None)
+        for gap in run.tags[tag_id].gaps:
             due_ns = run.stretches.overdue_ns(gap.start_ns, gap.may_last_ns) + 1
             end_ns = gap.end_ns
             if due_ns > last_ns or (end_ns is not None and due_ns >= end_ns):
                 if end_ns is None:
-                    _remind(run, tag_id, due_ns)
+                    run.due[tag_id] = due_ns
                 continue
             reason = Reason(
                 Kind.OLD,
@@ -306,16 +287,19 @@ def _matters(run: _Run) -> Callable[[int, int, int], bool]:
     return matters
 
 
+def _all_of(run: _Run) -> Iterator[Alarm]:
+    yield from chain.from_iterable(run.alarms.values())
+    yield from chain.from_iterable(run.overdue.values())
+    yield from run.house
+
+
 def _gap_at(tag: TagPast, at_ns: int) -> Gap | None:
     """The gap between scans that a moment lies in, its start included."""
-    gap = tag.open_gap
-    if gap is not None and gap.start_ns <= at_ns:
-        return gap
     return next(
         (
             gap
-            for gap in reversed(tag.trail.gaps)
-            if gap.start_ns <= at_ns and gap.end_ns is not None and at_ns < gap.end_ns
+            for gap in reversed(tag.gaps)
+            if gap.start_ns <= at_ns and (gap.end_ns is None or at_ns < gap.end_ns)
         ),
         None,
     )
@@ -329,46 +313,3 @@ def _stop(run: _Run, start_ns: int, end_ns: int | None, limit_ns: int) -> Alarm:
         start_ns + limit_ns + 1,
         end_ns,
     )
-
-
-def _remind(run: _Run, tag_id: str, due_ns: int) -> None:
-    if due_ns < run.reminded.get(tag_id, _NEVER):
-        run.reminded[tag_id] = due_ns
-        heappush(run.due, (due_ns, tag_id))
-
-
-def _due(run: _Run, last_ns: int) -> dict[str, None]:
-    """The tags that may have become overdue by now."""
-    found: dict[str, None] = {}
-    while run.due and run.due[0][0] <= last_ns:
-        _, tag_id = heappop(run.due)
-        run.reminded.pop(tag_id, None)
-        found[tag_id] = None
-    return found
-
-
-@dataclass(slots=True)
-class _News:
-    changed: list[Alarm] = field(default_factory=list)
-    withdrawn: list[str] = field(default_factory=list)
-    forgotten: list[str] = field(default_factory=list)
-
-    def put(self, before: Sequence[Alarm], now: Sequence[Alarm]) -> None:
-        """What the one has that the other has not; of what was dropped for its age, that it was."""
-        known = {alarm.id: alarm for alarm in before}
-        self.changed += [alarm for alarm in now if known.pop(alarm.id, None) != alarm]
-        over = [alarm.cleared_at_ns for alarm in now if alarm.cleared_at_ns is not None]
-        before_ns = min(over) if len(over) >= MAX_EPISODES else -1
-        for alarm in known.values():
-            is_old = alarm.cleared_at_ns is not None and alarm.cleared_at_ns <= before_ns
-            (self.forgotten if is_old else self.withdrawn).append(alarm.id)
-
-
-def _put(
-    table: dict[str, tuple[Alarm, ...]], tag_id: str, alarms: tuple[Alarm, ...], news: _News
-) -> None:
-    news.put(table.get(tag_id, ()), alarms)
-    if alarms:
-        table[tag_id] = alarms
-    else:
-        table.pop(tag_id, None)

@@ -71,10 +71,14 @@ class Stretches:
         )
 
     def overdue_ns(self, since_ns: int, holds_ns: int) -> int:
-        """When what was scanned at `since_ns` has not been for `holds_ns`; pauses do not count."""
+        """When what was scanned at `since_ns` has not been for `holds_ns`; pauses do not count.
+
+        What runs out as a pause begins does so as it ends: it is overdue a moment later, and in a
+        pause no moment is later.
+        """
         due_ns = since_ns + holds_ns
         for first, last in self.pauses(since_ns):
-            if first >= due_ns:
+            if first > due_ns:
                 break
             due_ns += last - max(first, since_ns)
         return due_ns

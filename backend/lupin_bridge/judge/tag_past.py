@@ -1,22 +1,28 @@
-"""What was heard of one tag in one run of the clock, and what follows of it by itself. Pure.
+"""One tag's log in one run of the clock, and what follows of it by itself. Pure.
 
-The newest writes are kept as they are, so that one that comes late finds its place. What lies
-behind them is kept as what it led to; a write that belongs there needs all to be read again.
+What comes in order is added to what is known. What comes late finds its place, and all behind it
+is worked out again. What the log has no room for any more is kept as what it led to.
 """
 
 from __future__ import annotations
 
 import math
-from bisect import bisect_left, bisect_right
+from array import array
+from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
+from typing import Final, Generic, TypeVar
 
 from lupin_bridge.judge.day_line import Turn
 from lupin_bridge.judge.daylight import DAY_FROM_LX, LEFT_OUT_NS, LIGHT
 from lupin_bridge.judge.episodes import IsDay, TagEpisodes, readings_of
 from lupin_bridge.judge.rhythm import INTERVALS, LONGEST_NS, SHORTEST_NS, holds_ns, interval_ns
 from lupin_twin.past_writes import PastWrite
+
+# So many occasions lie between two states of a tag that are kept to begin again from.
+MARK: Final = 64
+StateT = TypeVar("StateT")
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,102 +94,218 @@ class Trail:
         return Gap(self.scans_ns[-1], end_ns, holds, holds if is_known else LONGEST_NS)
 
 
+class TagLog:
+    """The writes of one tag, ordered by stamp and number; a hundred bytes each."""
+
+    def __init__(self) -> None:
+        self._stamps_ns = array("q")
+        self._numbers = array("q")
+        self._values: list[bytes] = []
+        # All else of a write is most often as it was before.
+        self._others: list[PastWrite] = []
+        self._known: dict[PastWrite, PastWrite] = {}
+
+    def __len__(self) -> int:
+        return len(self._stamps_ns)
+
+    @property
+    def last_ns(self) -> int:
+        """The stamp of the newest; -1: there is none."""
+        return self._stamps_ns[-1] if self._stamps_ns else -1
+
+    def put(self, write: PastWrite) -> bool:
+        """Put a write where it belongs; False: it is there already."""
+        stamp_ns, number = write.stamp_ns, write.number
+        at = bisect_right(self._stamps_ns, stamp_ns)
+        while at and self._stamps_ns[at - 1] == stamp_ns and self._numbers[at - 1] >= number:
+            if self._numbers[at - 1] == number:
+                return False
+            at -= 1
+        other = PastWrite(
+            0,
+            write.run,
+            write.tag_id,
+            0,
+            write.kind,
+            write.status,
+            write.sensors,
+            (),
+            write.has_seen,
+            write.species,
+            write.anomaly,
+            write.bug_count,
+        )
+        self._stamps_ns.insert(at, stamp_ns)
+        self._numbers.insert(at, number)
+        self._values.insert(at, array("d", write.values).tobytes())
+        self._others.insert(at, self._known.setdefault(other, other))
+        return True
+
+    def occasions(self, after_ns: int, until_ns: int | None = None) -> Iterator[list[PastWrite]]:
+        """The writes of each stamp, oldest first."""
+        first = bisect_right(self._stamps_ns, after_ns)
+        end = len(self) if until_ns is None else bisect_right(self._stamps_ns, until_ns)
+        for _, group in groupby(range(first, end), key=self._stamps_ns.__getitem__):
+            yield [self._write(index) for index in group]
+
+    def newest(self, count: int) -> int:
+        """A stamp behind which lie about so many writes."""
+        return self._stamps_ns[-count - 1] if count < len(self) else -1
+
+    def drop(self, until_ns: int) -> None:
+        """Without what is not later."""
+        count = bisect_right(self._stamps_ns, until_ns)
+        del self._stamps_ns[:count], self._numbers[:count]
+        del self._values[:count], self._others[:count]
+        if len(self._known) > len(self._others):
+            self._known = {other: other for other in self._others}
+
+    def _write(self, index: int) -> PastWrite:
+        other = self._others[index]
+        return PastWrite(
+            self._numbers[index],
+            other.run,
+            other.tag_id,
+            self._stamps_ns[index],
+            other.kind,
+            other.status,
+            other.sensors,
+            tuple(array("d", self._values[index])),
+            other.has_seen,
+            other.species,
+            other.anomaly,
+            other.bug_count,
+        )
+
+
+class Replay(Generic[StateT]):
+    """What a log leads to, occasion by occasion: `step` makes one state of another.
+
+    The first of the states that are kept is what the log has no room for any more.
+    """
+
+    def __init__(
+        self,
+        state: StateT,
+        step: Callable[[StateT, Sequence[PastWrite]], StateT],
+        copy: Callable[[StateT], StateT],
+    ) -> None:
+        self._step, self._copy = step, copy
+        self._marks = [(-1, copy(state))]
+        self._at_ns, self._state, self._since_mark = -1, state, 0
+
+    def state(self, log: TagLog) -> StateT:
+        """The state behind all of the log; the caller only looks at it."""
+        for group in log.occasions(self._at_ns):
+            self._state = self._step(self._state, group)
+            self._at_ns = group[0].stamp_ns
+            self._since_mark += 1
+            if self._since_mark >= MARK:
+                self._since_mark = 0
+                mark = self._at_ns, self._copy(self._state)
+                self._marks = [self._marks[0], *self._marks[1:][-1:], mark]
+        return self._state
+
+    def back_to(self, before_ns: int) -> None:
+        """What is not earlier is worked out again."""
+        if before_ns > self._at_ns:
+            return
+        while len(self._marks) > 1 and self._marks[-1][0] >= before_ns:
+            self._marks.pop()
+        self._at_ns, state = self._marks[-1]
+        self._state, self._since_mark = self._copy(state), 0
+
+    def each(self, change: Callable[[StateT], StateT]) -> None:
+        """Change every state that is kept."""
+        self._marks = [(at_ns, change(state)) for at_ns, state in self._marks]
+        self._state = change(self._state)
+
+    def settle(self, log: TagLog, until_ns: int) -> None:
+        """The log will be without what is not later than `until_ns`."""
+        at_ns, state = self._marks[0]
+        for group in log.occasions(at_ns, until_ns):
+            state = self._step(state, group)
+        self._marks = [(until_ns, state), *(m for m in self._marks[1:] if m[0] > until_ns)]
+        if self._at_ns < until_ns:
+            self.back_to(self._at_ns)
+
+
 class TagPast:
     """One tag in one run. `recent_ns` fixes how long readings hold; None: it is learnt."""
 
-    def __init__(self, episodes: TagEpisodes, recent_ns: int | None, matters: Matters) -> None:
+    def __init__(
+        self, episodes: TagEpisodes, recent_ns: int | None, matters: Matters, is_day: IsDay
+    ) -> None:
         self._recent_ns = recent_ns
-        self._matters = matters
-        self._base, self._base_trail, self._base_ns = episodes, Trail(), -1
-        self._newest: list[PastWrite] = []
-        # The same, gone on with up to the newest, as far as nothing came late.
-        self._ahead: TagEpisodes | None = None
-        self._ahead_ns = -1
-        self.trail, self._trail_ns = Trail(), -1
-        self.last_ns = -1
+        self._log = TagLog()
+        self._settled_ns = -1
+
+        def stepped(before: TagEpisodes, group: Sequence[PastWrite]) -> TagEpisodes:
+            before.step(group, is_day)
+            return before
+
+        self._trail: Replay[Trail] = Replay(
+            Trail(), lambda trail, group: trail.after(group, recent_ns, matters), lambda it: it
+        )
+        self._episodes: Replay[TagEpisodes] = Replay(episodes, stepped, TagEpisodes.copy)
+
+    @property
+    def last_ns(self) -> int:
+        """The stamp of its newest write; -1: none is kept."""
+        return self._log.last_ns
+
+    @property
+    def trail(self) -> Trail:
+        """What its scans say of its rhythm and of its light."""
+        return self._trail.state(self._log)
+
+    @property
+    def episodes(self) -> TagEpisodes:
+        """What was wrong with it when; the caller only looks at it."""
+        return self._episodes.state(self._log)
 
     def add(self, write: PastWrite) -> bool:
-        """Take a write in; False: it belongs to what is no longer kept as it was."""
-        if write.stamp_ns <= self._base_ns:
+        """Take a write in; False: it belongs to what the log has no room for any more."""
+        if write.stamp_ns <= self._settled_ns:
             return False
-        at = bisect_left(self._newest, _order(write), key=_order)
-        is_known = at < len(self._newest) and self._newest[at].number == write.number
-        if not is_known:
-            self._newest.insert(at, write)
-            self.last_ns = max(self.last_ns, write.stamp_ns)
-            if write.stamp_ns <= self._trail_ns:
-                self.trail, self._trail_ns = self._base_trail, self._base_ns
-            if write.stamp_ns <= self._ahead_ns:
-                self._ahead = None
+        if self._log.put(write):
+            self._trail.back_to(write.stamp_ns)
+            self._episodes.back_to(write.stamp_ns)
         return True
 
-    def settle(self, keep: int, is_day: IsDay) -> None:
-        """Keep only about so many writes as they are, once there are twice as many."""
-        if len(self._newest) <= 2 * keep:
-            return
-        groups = list(_occasions(self._newest))
-        while len(groups) > 1 and len(self._newest) - len(groups[0]) >= keep:
-            self._settle(groups.pop(0), is_day)
+    def judge_anew(self, from_ns: int) -> None:
+        """What was day is night from a moment on."""
+        self._episodes.back_to(from_ns)
 
-    def _settle(self, group: Sequence[PastWrite], is_day: IsDay) -> None:
-        del self._newest[: len(group)]
-        self._base.step(group, is_day)
-        self._base_trail = self._base_trail.after(group, self._recent_ns, self._matters)
-        self._base_ns = group[0].stamp_ns
-        if self._ahead_ns < self._base_ns:
-            self._ahead = None
+    def keep(self, count: int) -> None:
+        """Have the log keep about so many writes, once there are a quarter more."""
+        if len(self._log) > count + max(1, count // 4):
+            self._settle(self._log.newest(count))
 
-    def forget(self, before_ns: int, is_day: IsDay) -> int:
+    def forget(self, before_ns: int) -> int:
         """Drop what was over before; returns when the oldest gap begins that is kept."""
-        count = bisect_left(self._newest, before_ns, key=lambda write: write.stamp_ns)
-        for group in list(_occasions(self._newest[:count])):
-            self._settle(group, is_day)
-        self.trail = self.trail.since(before_ns)
-        self._base_trail = self._base_trail.since(before_ns)
-        gaps = self.trail.gaps if self.open_gap is None else (*self.trail.gaps, self.open_gap)
-        return min((gap.start_ns for gap in gaps), default=before_ns)
-
-    def follow(self) -> None:
-        """Bring `trail` up to what was heard: what is late has it worked out anew."""
-        after = bisect_right(self._newest, self._trail_ns, key=lambda write: write.stamp_ns)
-        for group in _occasions(self._newest[after:]):
-            self.trail = self.trail.after(group, self._recent_ns, self._matters)
-        self._trail_ns = max(self._trail_ns, self.last_ns)
-
-    def judge_anew(self) -> None:
-        """What was day is night: of what is kept as it was, all is gone through again."""
-        self._ahead = None
-
-    def episodes(self, is_day: IsDay) -> TagEpisodes:
-        """What was wrong with it when; the caller only looks at it."""
-        if self._ahead is None:
-            self._ahead, self._ahead_ns = self._base.copy(), self._base_ns
-        after = bisect_right(self._newest, self._ahead_ns, key=lambda write: write.stamp_ns)
-        for group in _occasions(self._newest[after:]):
-            self._ahead.step(group, is_day)
-        self._ahead_ns = max(self._ahead_ns, self.last_ns)
-        return self._ahead
+        self._trail.state(self._log)
+        self._settle(before_ns - 1)
+        self._trail.each(lambda trail: trail.since(before_ns))
+        return min((gap.start_ns for gap in self.gaps), default=before_ns)
 
     @property
-    def settled_ns(self) -> int:
-        """Up to when nothing can be judged again without reading it again; -1: nothing is."""
-        return self._base_ns
+    def gaps(self) -> Sequence[Gap]:
+        """Those that matter, and the one since the last scan."""
+        trail = self.trail
+        last = trail.open_gap(self._recent_ns)
+        return trail.gaps if last is None else (*trail.gaps, last)
 
-    @property
-    def open_gap(self) -> Gap | None:
-        """The gap since the last scan; None: there was none."""
-        return self.trail.open_gap(self._recent_ns)
+    def _settle(self, until_ns: int) -> None:
+        until_ns = min(until_ns, self._log.last_ns)
+        if until_ns <= self._settled_ns:
+            return
+        self._trail.settle(self._log, until_ns)
+        self._episodes.settle(self._log, until_ns)
+        self._settled_ns = until_ns
+        self._log.drop(until_ns)
 
 
 def is_long(start_ns: int, end_ns: int) -> bool:
     """Whether it is longer than readings hold at least."""
     return end_ns - start_ns > SHORTEST_NS
-
-
-def _occasions(writes: Sequence[PastWrite]) -> Iterator[list[PastWrite]]:
-    for _, group in groupby(writes, key=lambda write: write.stamp_ns):
-        yield list(group)
-
-
-def _order(write: PastWrite) -> tuple[int, int]:
-    return write.stamp_ns, write.number

@@ -5,7 +5,8 @@ Pure: no clock, no ROS, no lock. One class keeps it for a twin, which hears ever
 time.
 
 An observation is known by its kind, the stamp that its producer gave it, and its source: heard
-again, it is nothing new. Readings that come in parts, with one stamp, are one scan.
+again, it is nothing new (`journal.appending` has the same rule). Readings that come in parts, with
+one stamp, are one scan.
 """
 
 from __future__ import annotations
@@ -67,6 +68,8 @@ PastT = TypeVar("PastT", bound=_Past)
 # In the place of the stamp that was sent: what a clock that went back has moved, and no observation
 # that is received again is taken for.
 KNOWN_BY_NOTHING: Final = -1
+# So many observations with a stamp from the future are known for longer than their tag's history.
+MAX_AHEAD: Final = 1_000
 # What an observation is known by: its kind, its producer's stamp (ns), its source.
 Key = tuple[int | None, int, str]
 
@@ -127,6 +130,8 @@ class History:
         self._buffer_len = buffer_len
         self._tags: dict[str, _Tag] = {}
         self._items = 0
+        # What had a stamp from the future, in the order of receiving.
+        self._ahead: dict[tuple[str, Key], None] = {}
 
     def of(self, tag_id: str) -> TagHistory:
         """What is kept of a tag: nothing of one that was never tried."""
@@ -156,7 +161,7 @@ class History:
         tag, key = self._tags.get(write.tag_id), _key(write)
         index = None if tag is None else tag.tries.find(key)
         if tag is None or index is None:
-            return write
+            return None if (write.tag_id, key) in self._ahead else write
         if not isinstance(write, Scan):
             return None
         found = tag.scans.find(key)
@@ -170,6 +175,10 @@ class History:
     def add(self, write: Scan | Look) -> None:
         """Keep an observation, or add to what is kept of it."""
         what = Try(write.stamp_ns, write.status, write.status_detail)
+        if write.own_stamp_ns > write.stamp_ns:
+            self._ahead[write.tag_id, _key(write)] = None
+            if len(self._ahead) > MAX_AHEAD:
+                del self._ahead[next(iter(self._ahead))]
         readings = write.readings if isinstance(write, Scan) else ()
         self._add(write.tag_id, _key(write), what, readings)
 
@@ -178,12 +187,15 @@ class History:
 
         `keeps_keys`: what was later is still the same, received again; else it comes as new.
         """
+        if not keeps_keys:
+            self._ahead.clear()
         for tag in self._tags.values():
             _hold(tag, now_ns, keeps_keys=keeps_keys)
 
     def clear(self) -> None:
         """Forget everything."""
         self._tags.clear()
+        self._ahead.clear()
         self._items = 0
 
     # --- of a twin elsewhere: its states, one by one -------------------------------------------

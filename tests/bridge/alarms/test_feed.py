@@ -10,7 +10,7 @@ import pytest
 
 from lupin_bridge.alarms import feed as feed_module
 from lupin_bridge.alarms.board import AlarmBoard
-from lupin_bridge.alarms.feed import LOT, AlarmFeed
+from lupin_bridge.alarms.feed import AlarmFeed
 from lupin_bridge.alarms.ledger import Change
 from lupin_bridge.judge import following
 from lupin_bridge.judge.choosing import Criteria
@@ -130,11 +130,11 @@ def test_what_is_written_is_read_also_where_the_state_stays_as_it_is() -> None:
     follow(test)
 
 
-def test_what_comes_later_than_what_is_kept_has_its_tags_past_read_again(
+def test_what_comes_late_finds_its_place_however_late_it_is(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """Hundreds of looks later, one comes that saw the pest earlier; then one of another tag."""
-    for name in ("OVER_AGAIN_S", "AGAIN_S", "JOURNAL_S"):
+    for name in ("AGAIN_S", "JOURNAL_S"):
         monkeypatch.setattr(feed_module, name, 0.01)
 
     def look(number: int, tag_id: str, at: int, bugs: int) -> PastWrite:
@@ -164,19 +164,18 @@ def test_what_comes_later_than_what_is_kept_has_its_tags_past_read_again(
     assert "so late" not in caplog.text
 
 
-def test_what_comes_later_still_is_counted_and_told(
+def test_what_is_older_than_what_is_kept_is_counted_and_told(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(feed_module, "OVER_AGAIN_S", 0.0)
-    monkeypatch.setattr(following, "WIDE_OF_TAG", 1)
+    monkeypatch.setattr(following.Follower.__init__, "__kwdefaults__", {"kept": 8})
 
     async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
         source.writes_now = [
-            replace(pest(number, 1), stamp_ns=NOW - 1_000 + number) for number in range(1, LOT + 70)
+            replace(pest(number, 1), stamp_ns=NOW - 1_000 + number) for number in range(1, 70)
         ]
         feed.on_state(told(1))
         await changed(board)
-        source.writes_now.append(replace(pest(LOT + 99, 1), stamp_ns=NOW - 1_000))
+        source.writes_now.append(replace(pest(99, 1), stamp_ns=NOW - 1_000))
         feed.on_state(told(2))
         await until(lambda: feed.missed == 1, "that it was missed")
         assert len(board.now.active) == 1

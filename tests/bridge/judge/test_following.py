@@ -5,17 +5,17 @@ import random
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from unittest.mock import patch
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lupin_bridge.alarms.ledger import Ledger
-from lupin_bridge.judge import following
+from lupin_bridge.alarms.ledger import page_of
+from lupin_bridge.judge import following, tag_past
 from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.judge.choosing import own_sensors
 from lupin_bridge.judge.following import Follower
-from lupin_bridge.judge.tag_past import Gap, TagPast
 from lupin_bridge.judge.verdict import Kind
 from lupin_twin.past_writes import PastWrite, RunSpan
 from tests.support.alarms_reference import Plain, S, alarms
@@ -88,26 +88,15 @@ def plain(alarm: Alarm) -> Plain:
 
 
 def follow(
-    lots: Iterable[Sequence[PastWrite]],
-    spans: Sequence[RunSpan],
-    now_ns: int,
-    keep: int = following.KEPT_OF_TAG,
+    lots: Iterable[Sequence[PastWrite]], spans: Sequence[RunSpan], now_ns: int
 ) -> tuple[Alarm, ...]:
-    """What a bridge does that is asked now and then, and reads all again where it has to."""
-    follower, heard = Follower(SENSORS, day_of, spans, keep=keep), list[PastWrite]()
-    ledger = Ledger()
+    """What a bridge does that is asked now and then."""
+    follower = Follower(SENSORS, day_of, spans)
     for lot in lots:
-        heard += lot
-        if late := follower.take(lot):
-            wide = follower.wide | late
-            follower = Follower(SENSORS, day_of, spans, keep=keep, wide=wide)
-            for write in heard:
-                wide |= follower.take([write])
-            if wide != follower.wide:
-                follower = Follower(SENSORS, day_of, spans, keep=len(heard))
-                assert not follower.take(heard)
-        ledger.take(follower.found(now_ns))
-    return ledger.take(follower.found(now_ns))[0].alarms
+        follower.take(lot)
+        follower.found(now_ns)
+    assert follower.missed == 0
+    return page_of(follower.found(now_ns).alarms).alarms
 
 
 @settings(max_examples=150)
@@ -128,61 +117,60 @@ def test_alarms_are_those_of_the_plainest_way_in_any_order_and_however_often_hea
         count = chance.randint(1, 9)
         lots.append(arrived[:count])
         del arrived[:count]
-    found = follow(lots, spans, now_ns, keep=chance.choice([1, 3, following.KEPT_OF_TAG]))
+    with patch.object(tag_past, "MARK", chance.choice([1, 3, 64])):
+        found = follow(lots, spans, now_ns)
     assert {plain(alarm) for alarm in found} == expected
     assert len({alarm.id for alarm in found}) == len(found)
     at_once = follow([heard], spans, now_ns)
     assert at_once == found
     in_order = sorted(heard, key=lambda write: write.stamp_ns)
-    one_by_one = follow([[write] for write in in_order], spans, now_ns, keep=1)
+    one_by_one = follow([[write] for write in in_order], spans, now_ns)
     assert one_by_one == found
 
 
-@settings(max_examples=80)
+@settings(max_examples=150)
 @given(st.integers(0, 2**32))
 def test_what_is_old_is_forgotten_and_changes_nothing_of_what_is_told(seed: int) -> None:
     chance = random.Random(seed)
     heard = [some_write(chance, number) for number in range(chance.randint(1, 60))]
     heard.sort(key=lambda write: write.stamp_ns)
     spans, now_ns = chance.choice(SPANS), heard[-1].stamp_ns + chance.randint(0, 300) * MINUTE
-    follower, ledger = Follower(SENSORS, day_of, spans, keep=chance.choice([2, 8, 99])), Ledger()
+    expected = alarms(heard, spans, now_ns, SENSORS, day_of)
+    # What there is no room for is kept as what it led to.
+    follower = Follower(SENSORS, day_of, spans, kept=chance.choice([3, 24, 300]))
     since_ns = 0
-    late = frozenset[str]()
     while heard:
         # Late, but not as late as that.
         count = min(len(heard), chance.randint(1, 9))
         lot, heard = heard[:count], heard[count:]
-        later = chance.randint(0, min(3, len(heard)))
-        lot += heard[:later] if chance.random() < 0.5 else []
         chance.shuffle(lot)
-        late |= follower.take([write for write in lot if write.stamp_ns >= since_ns])
-        follower._forget(since_ns)
-        ledger.take(follower.found(now_ns, since_ns), (), since_ns)
+        follower.take(lot)
+        with patch.object(following, "FORGET_EVERY_NS", 0):
+            follower.found(now_ns, since_ns)
         since_ns = max(since_ns, lot[0].stamp_ns - chance.randint(0, 60) * MINUTE)
         since_ns = min(since_ns, heard[0].stamp_ns) if heard else since_ns
-    page, _ = ledger.take(follower.found(now_ns, since_ns), (), since_ns)
-    assert follower.missed == 0
-    if late:
+    page = page_of(follower.found(now_ns, since_ns).alarms, since_ns)
+    if follower.missed:
         return
-    chance = random.Random(seed)
-    everything = [some_write(chance, number) for number in range(chance.randint(1, 60))]
-    expected = {
-        one
-        for one in alarms(everything, spans, now_ns, SENSORS, day_of)
-        if one.cleared_ns is None or one.cleared_ns >= since_ns
-    }
+    expected = {one for one in expected if one.cleared_ns is None or one.cleared_ns >= since_ns}
     assert {plain(alarm) for alarm in page.alarms} == expected
 
 
-def test_what_is_older_than_anything_that_is_told_is_not_taken_in_and_counted() -> None:
-    follower, heard = Follower(SENSORS, day_of, SPANS[0]), scans([22] * 9)
-    follower.take(heard)
+def test_what_is_older_than_what_is_kept_is_not_taken_in_and_counted() -> None:
+    follower, heard = Follower(SENSORS, day_of, SPANS[0], kept=4), scans([22] * 9)
+    follower.take(heard[:5])
+    follower.take(heard[5:])
+    late = [replace(one, number=90 + one.number, stamp_ns=one.stamp_ns + S) for one in heard]
+    follower.take(late[5:8])
+    assert follower.missed == 0
+    follower.take(late[3:4])
+    assert follower.missed == 1
     since_ns = START + 2 * following.FORGET_EVERY_NS
     follower.found(since_ns, since_ns)
-    assert follower.take([replace(heard[0], number=99, stamp_ns=since_ns - 1)]) == frozenset()
-    assert follower.missed == 1
-    assert follower.take([replace(heard[0], number=100, stamp_ns=since_ns)]) == frozenset()
-    assert follower.missed == 1
+    follower.take([replace(heard[0], number=99, stamp_ns=since_ns - 1)])
+    assert follower.missed == 2
+    follower.take([replace(heard[0], number=100, stamp_ns=since_ns)])
+    assert follower.missed == 2
 
 
 def test_nothing_grows_with_the_days() -> None:
@@ -297,28 +285,26 @@ def test_a_silent_patrol_is_one_alarm_of_the_house_and_none_of_its_tags() -> Non
     assert (over.id, over.cleared_at_ns) == (alarm.id, again.stamp_ns)
 
 
-def test_a_look_at_the_moment_of_a_scan_has_no_pause_of_before_worked_out_again(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(("holds_minutes", "is_overdue"), [(9, True), (10, False), (11, False)])
+def test_in_a_pause_time_stands_from_its_first_moment_on(
+    holds_minutes: int, is_overdue: bool
 ) -> None:
-    follower = Follower(SENSORS, day_of, SPANS[0])
-    heard = [
-        replace(one, stamp_ns=START + number * 60 * MINUTE)
-        for number, one in enumerate(scans([22] * 20))
-    ]
+    """A tag whose limit runs out exactly as a pause begins is not overdue if it ends the pause."""
+    mine = scans([22])
+    other = [replace(one, number=50 + one.number) for one in scans([22] * 11, tag="b")]
+    first = START + 40 * MINUTE
+    again = replace(mine[0], number=99, stamp_ns=first)
+    heard = [*mine, *other, again]
+    follower = Follower(SENSORS, day_of, SPANS[0], recent_s=holds_minutes * 60.0)
     follower.take(heard)
-    last_ns = heard[-1].stamp_ns
-    follower.found(last_ns)
-    asked: list[int] = []
-    known = following._gap_at
-
-    def gap_at(tag: TagPast, at_ns: int) -> Gap | None:
-        asked.append(at_ns)
-        return known(tag, at_ns)
-
-    monkeypatch.setattr(following, "_gap_at", gap_at)
-    follower.take([replace(heard[-1], number=99, kind=LOOK, sensors=(), values=(), has_seen=True)])
-    follower.found(last_ns)
-    assert asked == []
+    found = [one for one in follower.found(first).alarms if one.tag_id == "a"]
+    assert [one.reason.kind for one in found] == ["old"] * is_overdue
+    # Another tag ends the pause: from then on time passes.
+    follower = Follower(SENSORS, day_of, SPANS[0], recent_s=600.0)
+    follower.take([*mine, *other, *(replace(again, number=99 + n, tag_id="b", stamp_ns=first + n)
+                                    for n in (0, 1))])  # fmt: skip
+    (late,) = (one for one in follower.found(first + 1).alarms if one.tag_id == "a")
+    assert late.raised_at_ns == first + 1
 
 
 def test_a_tag_that_is_passed_by_is_overdue_until_it_is_scanned() -> None:
@@ -338,26 +324,25 @@ def test_it_says_when_it_will_be_another_by_itself() -> None:
     follower.take(heard)
     last_ns = heard[-1].stamp_ns
     due_ns = follower.found(last_ns).due_ns
-    assert follower.found(due_ns - 1).changed == ()
-    assert [one.reason.kind for one in follower.found(due_ns).changed] == ["stopped"]
+    assert follower.found(due_ns - 1).alarms == ()
+    assert [one.reason.kind for one in follower.found(due_ns).alarms] == ["stopped"]
     assert follower.found(due_ns).due_ns == FOREVER
 
 
-def test_what_stays_as_it_is_is_found_once() -> None:
+def test_what_stays_as_it_is_is_the_very_same() -> None:
     follower = Follower(SENSORS, day_of, SPANS[0])
     heard = scans([17, 17, 16, 22, 22])
     follower.take(heard[:2])
     now_ns = heard[-1].stamp_ns
-    first = follower.found(now_ns)
-    assert (len(first.changed), first.is_whole) == (1, True)
-    again = follower.found(now_ns)
-    assert (again.changed, again.withdrawn, again.is_whole) == ((), (), False)
+    first = follower.found(now_ns).alarms
+    assert [one.worst for one in first] == [17]
+    assert follower.found(now_ns).alarms is first
     follower.take(heard[2:])
-    assert [one.worst for one in follower.found(now_ns).changed] == [16]
+    assert [one.worst for one in follower.found(now_ns).alarms] == [16]
     # It was warm between the two.
     late = [replace(heard[0], number=90 + n, stamp_ns=START + n, values=(900, 22)) for n in (1, 2)]
     follower.take(late)
-    assert follower.found(now_ns).withdrawn == (first.changed[0].id,)
+    assert first[0].id not in {one.id for one in follower.found(now_ns).alarms}
 
 
 def test_ordinary_days_raise_less_than_an_alarm_in_ten_minutes_and_none_is_false() -> None:

@@ -29,7 +29,9 @@ def test_a_pause_does_not_count_for_what_is_overdue() -> None:
     assert stretches.newest_ns is None
     for quarter in (0, 2, 4, 20, 22):
         stretches.add(quarter * SHORTEST_NS // 4)
-    assert stretches.overdue_ns(0, SHORTEST_NS) == SHORTEST_NS
+    assert stretches.overdue_ns(0, SHORTEST_NS - 1) == SHORTEST_NS - 1
+    # What runs out as the pause begins does so as it ends.
+    assert stretches.overdue_ns(0, SHORTEST_NS) == 5 * SHORTEST_NS
     assert stretches.overdue_ns(0, SHORTEST_NS + 1) == 5 * SHORTEST_NS + 1
     assert stretches.has_pause_within(SHORTEST_NS, 5 * SHORTEST_NS)
     assert not stretches.has_pause_within(SHORTEST_NS, 5 * SHORTEST_NS - 1)

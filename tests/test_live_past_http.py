@@ -36,7 +36,7 @@ PATHS = (
 )
 # And no machine is too busy for an answer: the process that looks back gives way to all others.
 EAGER = ("--field-rate-hz", "10000", "--field-timeout-s", str(PATIENCE_S))
-CLIPPED = (*EAGER, "--ros-args", "-p", "clip_to_explored:=true", *OFTEN[1:])
+CLIPPED = (*EAGER, *OFTEN)
 
 
 class House:

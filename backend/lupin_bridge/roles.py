@@ -37,7 +37,7 @@ from lupin_bridge.twin.local_twin import LocalTwin
 from lupin_bridge.twin.ros_thread import RosStartError
 from lupin_bridge.twin.source import ailment
 from lupin_bridge.twin.web_twin import WebTwin
-from lupin_twin.parameters import ParameterError
+from lupin_twin.parameters import ParameterError, World
 
 log = logging.getLogger("lupin_bridge")
 
@@ -129,7 +129,8 @@ async def _run(
         source = WebTwin(ros_args=ros_args, timeout_s=timeout_s, stale_after_s=STALE_AFTER_S)
     else:
         all_args = [*own_args, *ros_args]
-        source = LocalTwin(ros_args=all_args, timeout_s=timeout_s, expects=Answering)
+        world = World() if feed is None else feed.world
+        source = LocalTwin(ros_args=all_args, timeout_s=timeout_s, expects=Answering, world=world)
     bridge = Bridge(source, settings, criteria=criteria, outward=Channels(targets))
     app = create_app(bridge, access=access, entrance=entrance)
 

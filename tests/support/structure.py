@@ -148,6 +148,7 @@ LIBRARIES: Mapping[str, Mapping[str, set[str] | None]] = {
         (
             "PIL",
             "aiomqtt",
+            "annotated_types",
             "fastapi",
             "h11",
             "lupin_twin",

@@ -38,7 +38,7 @@ class Criteria:
                 hours that are none.
 
         """
-        return cls(_sensors(settings), settings.recent_s or None, _clock(settings))
+        return cls(_sensors(settings), settings.reading_validity_s or None, _clock(settings))
 
     def judge_day(self, stamp_ns: int) -> Callable[[Light], Day]:
         """What says whether it was day at a moment of ROS time, by the light of then."""

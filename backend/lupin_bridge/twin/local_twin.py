@@ -304,7 +304,7 @@ class LocalTwin:
                 return await answer
         except TimeoutError:
             raise TwinTimeoutError(
-                f"the twin did not answer within {self._timeout_s:g} s (field_timeout_s)"
+                f"the twin did not answer within {self._timeout_s:g} s"
             ) from None
         except NotRemembered as error:
             damage = error.damage

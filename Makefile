@@ -103,10 +103,11 @@ test: setup $(DONE)/tools ## every check: lint, types, unit, real ROS, browser
 # for `make check`, whose lint looks at changed files only; `make test` looks at all.
 LINT := lint
 
-lint: setup ## ruff, ESLint, Prettier
+lint: setup ## ruff, who may import whom, ESLint, Prettier
 	$(say) 'lint'
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
+	@$(BIN)/lint-imports | tail -n +10
 	@npm run --silent $(LINT)
 	@npm run --silent format:check
 

@@ -15,7 +15,7 @@ from lupin_patrol import cli as patrol_cli
 from lupin_twin.estimates import ESTIMATE_SERVICE
 from lupin_twin.layers import LAYERS_BELOW
 from lupin_twin.marks import PLANTERS_TOPIC, TAGS_TOPIC
-from lupin_twin.parameters import TwinParameters, describe
+from lupin_twin.parameters import TIMES_TOPIC, TwinParameters, describe
 from lupin_twin.past import HISTORY_SERVICE, STATE_AT_SERVICE
 from tests.support.structure import PACKAGES, ROOMS
 
@@ -86,7 +86,7 @@ def test_every_topic_is_named_with_its_qos() -> None:
         (parameters.state_topic, 1),
     ):
         assert f"reliable, transient local, depth {depth}" in str(rows_by_name(f"/{topic}"))
-    assert "with the same stamp" in str(rows_by_name(f"/{parameters.times_topic}"))
+    assert "with the same stamp" in str(rows_by_name(f"/{TIMES_TOPIC}"))
     for topic in (f"{LAYERS_BELOW}<sensor>", TAGS_TOPIC, PLANTERS_TOPIC):
         assert "depth 1: while somebody subscribes" in str(rows_by_name(f"/{topic}"))
     for service in (

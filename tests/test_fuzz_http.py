@@ -21,10 +21,11 @@ from lupin_bridge.access.middleware import MAX_TARGET_BYTES
 from lupin_bridge.openapi import document
 from tests.support.messages import look, occupancy_grid, scan
 from tests.support.proc_stat import open_files, peak_mb, reset_peak, resident_mb
+from tests.support.processes import limits
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import ROUTES, Bridge, bridge
 
-NO_LIMITS = ("--field-rate-hz", "10000", "--field-concurrency", "1000")
+NO_LIMITS = limits(answers_per_s=10_000, concurrency=1_000)
 BROKEN_REQUESTS = 3_000
 MEMORY_MB = 5.0
 

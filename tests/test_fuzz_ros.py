@@ -30,7 +30,7 @@ from tests.support.hostile import (
 from tests.support.live import attached, field_of, wait_until_ready
 from tests.support.messages import discovered, look, pose, scan
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
-from tests.support.processes import lupin_twin
+from tests.support.processes import limits, lupin_twin
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
@@ -41,7 +41,7 @@ from tests.support.web import Bridge, bridge
 MEMORY_MB = 40.0
 KEPT_MB = 150.0
 ONE_ARENA = {"MALLOC_ARENA_MAX": "1"}
-NO_LIMITS = ("--field-rate-hz", "10000")
+NO_LIMITS = limits(answers_per_s=10_000)
 # Often enough that a lot has not to wait for a state, which is large here, and is told twice over.
 RATE = ("--ros-args", "-p", "state_publish_rate_hz:=10.0")
 # A topic holds 50 messages; a lot that was waited for has lost none.

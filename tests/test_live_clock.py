@@ -14,12 +14,12 @@ from rosgraph_msgs.msg import Clock
 from tests.support.domains import own_domain
 from tests.support.live import attached
 from tests.support.messages import scan
-from tests.support.processes import lupin_twin
+from tests.support.processes import limits, lupin_twin
 from tests.support.waiting import PATIENCE_S
 from tests.support.web import Bridge, bridge
 
 # No machine is too busy for an answer: the process that looks back gives way to all others.
-PATIENT = ("--field-timeout-s", str(PATIENCE_S))
+PATIENT = limits(answer_timeout_s=PATIENCE_S)
 SIM_TIME = ("--ros-args", "-p", "use_sim_time:=true", "-p", "state_publish_rate_hz:=10.0")
 
 

@@ -14,6 +14,7 @@ from lupin_bridge.serving.http_protocol import MAX_HEAD_BYTES, MAX_HEADERS
 from tests.support import raw_http
 from tests.support.access import TOKEN, Served, served
 from tests.support.proc_stat import cpu_s, open_files, peak_mb, reset_peak, resident_mb
+from tests.support.processes import limits
 from tests.support.raw_http import UPGRADE, status
 from tests.support.tls import certificate
 from tests.support.waiting import wait_for
@@ -26,7 +27,7 @@ MEMORY_MB = 15.0
 
 @pytest.fixture(scope="module")
 def plain() -> Iterator[Served]:
-    with served("--client-timeout-s", str(TIMEOUT_S), afresh=True) as running:
+    with served(*limits(client_timeout_s=TIMEOUT_S), afresh=True) as running:
         yield running
         assert "Traceback" not in running.process.output
 
@@ -35,7 +36,7 @@ def plain() -> Iterator[Served]:
 def secret(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     """With a token, and over TLS."""
     files = certificate(tmp_path_factory.mktemp("tls"))
-    options = ("--client-timeout-s", str(TIMEOUT_S), *files.options)
+    options = (*limits(client_timeout_s=TIMEOUT_S), *files.options)
     with served(*options, trust=files.trust, afresh=True, LUPIN_TOKEN=TOKEN) as running:
         yield running
         assert "Traceback" not in running.process.output

@@ -10,10 +10,10 @@ from contextlib import AsyncExitStack
 import httpx
 import pytest
 
-from lupin_bridge.settings import Settings
+from lupin_bridge.serving.limits import Limits
 from tests.support.domains import own_domain
 from tests.support.journal import NOW, SECOND, kept, scan
-from tests.support.processes import OFTEN, Process, lupin_twin, url_of
+from tests.support.processes import OFTEN, Process, limits, lupin_twin, url_of
 from tests.support.waiting import PATIENCE_S, until
 
 TAGS, SCANS = 30, 1_000
@@ -33,7 +33,7 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Process]:
             for tag in range(TAGS)
         ],
     )
-    patient = ("--field-timeout-s", "600")
+    patient = limits(answer_timeout_s=600)
     with (
         own_domain() as domain,
         lupin_twin(domain, "serve", *patient, *OFTEN, "-p", f"journal:={journal}") as process,
@@ -68,7 +68,7 @@ def test_a_tiny_question_and_the_state_pass_all_that_six_clients_may_ask(house: 
             clients = Clients(url_of(house), stack)
             modest = await clients.new()
             assert (await modest.get(TINY)).status_code == 200  # the process that looks back is up
-            each = Settings().field_concurrency
+            each = Limits().concurrency
             asked = {
                 asyncio.create_task(client.get(timeline(each * number + n))): number
                 for number in range(6)

@@ -16,7 +16,7 @@ from tests.support.domains import own_domain
 from tests.support.journal import select
 from tests.support.live import attached
 from tests.support.messages import look, occupancy_grid, scan
-from tests.support.processes import OFTEN, lupin_twin
+from tests.support.processes import OFTEN, limits, lupin_twin
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, without_ages
@@ -35,8 +35,8 @@ PATHS = (
     f"/api/history?tag_id=a&sensor_type=co2&from={T}&to={T + 400}",
 )
 # And no machine is too busy for an answer: the process that looks back gives way to all others.
-EAGER = ("--field-rate-hz", "10000", "--field-timeout-s", str(PATIENCE_S))
-CLIPPED = (*EAGER, "--ros-args", "-p", "clip_to_explored:=true", *OFTEN[1:])
+EAGER = limits(answers_per_s=10_000, answer_timeout_s=PATIENCE_S)
+CLIPPED = (*EAGER, *OFTEN)
 
 
 class House:

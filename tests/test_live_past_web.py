@@ -16,7 +16,7 @@ from tests.support.domains import own_domain
 from tests.support.journal import select
 from tests.support.live import attached, field_of, wait_until_ready
 from tests.support.messages import look, scan
-from tests.support.processes import OFTEN, Process, lupin_twin, twin_node
+from tests.support.processes import OFTEN, Process, limits, lupin_twin, twin_node
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, filled
@@ -47,7 +47,7 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Both]:
         peer.tag("b")
         replicas = []
         for _ in range(2):
-            process = stack.enter_context(lupin_twin(domain, "web", "--field-timeout-s", "2"))
+            process = stack.enter_context(lupin_twin(domain, "web", *limits(answer_timeout_s=2)))
             replicas.append(stack.enter_context(attached(process, peer)))
         for replica in replicas:
             wait_until_ready(replica)
@@ -150,7 +150,7 @@ def test_a_killed_twin_is_asked_nothing_and_who_asked_it_before_is_told(domain: 
     """DDS takes twenty seconds to miss it; so long it offers its services."""
     past: dict[str, Any] = {"tag_id": "a", "sensor_type": "co2"}
     with (
-        lupin_twin(domain, "web", "--field-timeout-s", str(PATIENCE_S)) as process,
+        lupin_twin(domain, "web", *limits(answer_timeout_s=PATIENCE_S)) as process,
         Peer(domain) as robot,
         twin_node(domain, "--ros-args", "-p", "journal:=off") as twin,
         attached(process, robot) as live,

@@ -23,6 +23,7 @@ from lupin_bridge.serving.ws_protocol import FRAMES_AT_ONCE, FRAMES_PER_S, MAX_P
 from tests.bench.live_parts import Server, serving
 from tests.support import raw_http
 from tests.support.proc_stat import open_files, peak_mb, reset_peak, resident_mb
+from tests.support.processes import limits
 from tests.support.raw_ws import CLOSE, CONT, TEXT, RawClient, masked
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Listener, bridge, deaf_client, listener
@@ -41,7 +42,7 @@ EMPTY_TEXT = b"\x81\x80abcd"
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:
-    with serving(30, 50.0, "--client-timeout-s", str(TIMEOUT_S)) as running:
+    with serving(30, 50.0, *limits(client_timeout_s=TIMEOUT_S)) as running:
         yield running
 
 

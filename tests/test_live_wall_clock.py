@@ -20,7 +20,7 @@ from tests.support.journal import SECOND, kept, pin, select
 from tests.support.journal import scan as row
 from tests.support.live import attached
 from tests.support.messages import scan
-from tests.support.processes import OFTEN, lupin_twin
+from tests.support.processes import OFTEN, limits, lupin_twin
 from tests.support.waiting import PATIENCE_S
 from tests.support.wall_clock import WallClock
 from tests.support.web import Bridge, bridge
@@ -51,7 +51,7 @@ class Year:
     def options(self, days: int = 400) -> tuple[str, ...]:
         parameters = {"journal": self.path, "journal_days": float(days)}
         given = [word for item in parameters.items() for word in ("-p", "{}:={}".format(*item))]
-        return ("--field-timeout-s", str(PATIENCE_S), *OFTEN, *given)
+        return (*limits(answer_timeout_s=PATIENCE_S), *OFTEN, *given)
 
     def scans(self) -> int:
         [(count,)] = select(self.path, "SELECT count(*) FROM scan WHERE is_copy = 0")
@@ -70,7 +70,7 @@ def both(year: Year, clock: WallClock, days: int = 400) -> Iterator[tuple[Bridge
     with (
         own_domain() as domain,
         bridge(*year.options(days), domain=domain, afresh=True, **clock.env) as twin,
-        lupin_twin(domain, "web", "--field-timeout-s", str(PATIENCE_S)) as process,
+        lupin_twin(domain, "web", *limits(answer_timeout_s=PATIENCE_S)) as process,
         attached(process, twin.peer) as apart,
     ):
         twin.peer.until(lambda: apart.get("/api/state").status_code == 200, "a twin at web")

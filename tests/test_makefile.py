@@ -28,6 +28,7 @@ def told(target: str) -> str:
     [
         "ruff check",
         "ruff format --check",
+        "lint-imports",
         "npm run --silent lint\n",  # of all files
         "npm run --silent format:check",
         "mypy",

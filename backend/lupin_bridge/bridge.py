@@ -27,6 +27,7 @@ from lupin_bridge.past.rhythms import learn_rhythms
 from lupin_bridge.serving.admission import Admission
 from lupin_bridge.serving.goodbye import Goodbye
 from lupin_bridge.serving.kept import Answer, Kept
+from lupin_bridge.serving.limits import Limits
 from lupin_bridge.serving.metering import route_class
 from lupin_bridge.serving.rate_limit import RateLimit
 from lupin_bridge.settings import Settings
@@ -75,14 +76,16 @@ class Bridge:
         clock: Callable[[], float] = time.monotonic,
         criteria: Criteria | None = None,
         outward: Channels | None = None,
+        *,
+        limits: Limits = Limits(),  # noqa: B008  # a value
     ) -> None:
         self._clock = clock
         self.source = source
-        self.settings = settings
+        self.limits = limits
         self._liveness = Liveness()
-        self.hub = Hub(settings.max_clients, settings.client_timeout_s, self._liveness.status)
+        self.hub = Hub(settings.max_clients, limits.client_timeout_s, self._liveness.status)
         self.admission = Admission(
-            settings.field_rate_hz, settings.field_concurrency, settings.field_total_concurrency
+            limits.answers_per_s, limits.concurrency, limits.total_concurrency
         )
         self.kept = Kept()
         self.answering: Shared[Answer] = Shared()
@@ -103,7 +106,7 @@ class Bridge:
         self.alarms = AlarmBoard()
         self.alarms.subscribe(self._on_alarms)
         self._alarm_feed = AlarmFeed(
-            source, self.criteria, self.alarms, lambda: self.ros_time_ns, settings.alarm_days
+            source, self.criteria, self.alarms, lambda: self.ros_time_ns, limits.alarm_days
         )
         self.outward = outward or Channels()
         self.http_answers: Counter[str] = Counter()
@@ -115,7 +118,7 @@ class Bridge:
         self._told: Status | None = None
         self._pushed: Told | None = None
         self._pushed_s = 0.0
-        self._pace = RateLimit(settings.max_rate_hz, PACE_BURST)
+        self._pace = RateLimit(limits.frames_per_s, PACE_BURST)
         self._push_timer: asyncio.TimerHandle | None = None
         self._watch: asyncio.Task[None] | None = None
         self._learning: asyncio.Task[None] | None = None

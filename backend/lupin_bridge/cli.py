@@ -10,8 +10,7 @@ import signal
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import Field
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from lupin_bridge import __version__, journal_command, logs
 from lupin_bridge.configuration import (
@@ -20,7 +19,7 @@ from lupin_bridge.configuration import (
     strange_variables,
     take_secrets,
 )
-from lupin_bridge.settings import SettingError, Settings, one_of, option, table
+from lupin_bridge.settings import SettingError, Settings, limits_of, option, table
 from lupin_twin.leaving import leave_after
 from lupin_twin.one_core import use_one_core
 
@@ -158,18 +157,20 @@ def _parser() -> argparse.ArgumentParser:
         help=f"TOML file with any of these settings, by their names with _ "
         f"(default: {CONFIG_VARIABLE}, or none)",
     )
-    for spec in table():
-        default: Any = spec.default
-        repeatable = isinstance(default, tuple)
-        common.add_argument(
-            option(spec.name),
-            type=str if repeatable else type(default),
-            action="append" if repeatable else "store",
-            # None: not given here, and so for the environment or the file to say.
-            default=None,
-            metavar=spec.name.rpartition("_")[2].upper(),
-            help=f"{_described(spec)} (default: {default or 'none'})",
-        )
+    for group in dict.fromkeys(spec.metadata["group"] for spec in table()):
+        arguments = common.add_argument_group(group)
+        for spec in table():
+            if spec.metadata["group"] == group:
+                limits = limits_of(spec.name)
+                arguments.add_argument(
+                    option(spec.name),
+                    action="append" if spec.default == () else "store",
+                    # None: not given here, and so for the environment or the file to say.
+                    default=None,
+                    metavar=spec.name.rpartition("_")[2].upper(),
+                    help=f"{spec.metadata['help']}{limits and f', {limits}'} "
+                    f"(default: {spec.default or 'none'})",
+                )
     for role, text in ROLES.items():
         # No abbreviations: what one means would change with the next setting.
         own = roles.add_parser(
@@ -214,12 +215,6 @@ def _seconds(text: str) -> float:
     if not 0.0 <= value <= 1e9:
         raise argparse.ArgumentTypeError(f"{text!r} must be a number from 0 to 1e9")
     return value
-
-
-def _described(spec: Field[Any]) -> str:
-    low, high, choices = (spec.metadata[name] for name in ("low", "high", "choices"))
-    limits = f", from {low:.15g} to {high:.15g}" if low is not None else ""
-    return f"{spec.metadata['help']}{limits}{f': {one_of(choices)}' if choices else ''}"
 
 
 def _prepare_process() -> None:

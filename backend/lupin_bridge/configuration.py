@@ -1,8 +1,7 @@
 """Where settings come from: the command line, the environment, a file, in this order.
 
-All three are read by the table in `settings`, and so is each one's mistake: what it names is the
-option, the variable, or the file's line and key. A library for settings would bring its own words
-for a mistake and a second table beside the command line's; TOML is in the standard library.
+pydantic says what is wrong with a value, and here is known what its operator called it: the option,
+the variable, or the file's line and key.
 """
 
 from __future__ import annotations
@@ -12,8 +11,8 @@ import logging
 import re
 import stat
 import tomllib
-from collections.abc import Iterable, Mapping, MutableMapping
-from dataclasses import Field, fields
+from collections.abc import Iterable, Iterator, Mapping, MutableMapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,8 +21,9 @@ from lupin_bridge.settings import (
     Secrets,
     SettingError,
     Settings,
-    check,
+    option,
     table,
+    types,
     variable,
 )
 
@@ -37,12 +37,8 @@ _BARE: Final = re.compile(r"[A-Za-z0-9_-]{1,64}")
 # Nobody writes this much; a device or a disk image given by mistake is not read to its end.
 MAX_FILE_BYTES: Final = 65_536
 
-_KINDS: Final = {
-    int: "a whole number",
-    float: "a number",
-    str: "a text",
-    tuple: "a list of texts",
-}
+# The setting, what its operator called it, and the value.
+_Given = tuple[str, str, Any]
 
 
 def settings_from(
@@ -50,31 +46,56 @@ def settings_from(
 ) -> Settings:
     """The settings, each from the first place that has it.
 
-    `options` are those that were given on the command line, by their names; `config` is --config's.
+    `options` are those that were given on the command line, as text, by their names; `config` is
+    --config's.
 
     Raises:
         SettingError: a value that cannot be, a key that is no setting, a file that cannot be read.
 
     """
-    values: dict[str, Any] = {}
-    given_as: dict[str, str] = {}
-    path, path_called = (
+    path, called = (
         (config, "--config")
         if config is not None
         else (environment.get(CONFIG_VARIABLE), CONFIG_VARIABLE)
     )
-    if path is not None:
-        _take_file(path, path_called, values, given_as)
+    values: dict[str, Any] = {}
+    given_as: dict[str, str] = {}
+
+    def take(given: Iterable[_Given], *, is_text: bool) -> None:
+        for name, called, value in given:
+            values[name], given_as[name] = _checked(name, called, value, is_text=is_text), called
+
+    take(() if path is None else _of_file(path, called), is_text=False)
+    take(_of_environment(environment), is_text=True)
+    take(((name, option(name), value) for name, value in options.items()), is_text=True)
+    settings = Settings(**values, given_as=given_as)
+    if bool(settings.tls_cert) != bool(settings.tls_key):
+        given, other = ("tls_cert", "tls_key") if settings.tls_cert else ("tls_key", "tls_cert")
+        raise SettingError(
+            f"{settings.called(given)} is given without {option(other)}, TLS needs both"
+        )
+    return settings
+
+
+def _checked(name: str, called: str, value: Any, *, is_text: bool) -> Any:
+    from pydantic import TypeAdapter, ValidationError  # noqa: PLC0415  # `--help` has no use for it
+
+    try:
+        return TypeAdapter(types()[name]).validate_python(
+            tuple(value) if isinstance(value, list) else value, strict=not is_text
+        )
+    except ValidationError as error:
+        why = error.errors(include_url=False)[0]["msg"]
+        raise SettingError(f"{called} is {str(value)[:128]!r}: {why[0].lower()}{why[1:]}") from None
+
+
+def _of_environment(environment: Mapping[str, str]) -> Iterator[_Given]:
     for spec in table():
         called = variable(spec.name)
         if called in environment:
-            value = _from_text(spec, environment[called], called)
-            check(spec, value, called)
-            values[spec.name], given_as[spec.name] = value, called
-    for name, value in options.items():
-        values[name] = tuple(value) if isinstance(value, list) else value
-        given_as.pop(name, None)
-    return Settings(**values, given_as=given_as)
+            text = environment[called]
+            parts = [part for word in text.split(",") if (part := word.strip())]
+            yield spec.name, called, parts if spec.default == () else text
 
 
 def take_secrets(settings: Settings, environment: MutableMapping[str, str]) -> Secrets:
@@ -125,13 +146,13 @@ def strange_variables(environment: Iterable[str]) -> list[str]:
     ]
 
 
-def _take_file(path: str, called: str, values: dict[str, Any], given_as: dict[str, str]) -> None:
+def _of_file(path: str, called: str) -> Iterator[_Given]:
     text = read_text(path, called)
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise SettingError(f"{path} is not TOML: {error}") from None
-    specs = {spec.name: spec for spec in table()}
+    names = [spec.name for spec in table()]
     for key, value in content.items():
         place = f"{path}{_line_of(key, text)}: {key if _BARE.fullmatch(key) else repr(key[:64])}"
         if key in SECRETS:
@@ -139,11 +160,9 @@ def _take_file(path: str, called: str, values: dict[str, Any], given_as: dict[st
                 f"{place} is no setting: put the {key.rpartition('_')[2]} into a file of its own, "
                 f"and name that with {key}_file"
             )
-        if key not in specs:
-            raise SettingError(f"{place} is no setting of the bridge{_meant(key, specs)}")
-        values[key] = _from_toml(specs[key], value, place)
-        check(specs[key], values[key], place)
-        given_as[key] = place
+        if key not in names:
+            raise SettingError(f"{place} is no setting of the bridge{_meant(key, names)}")
+        yield key, place, value
 
 
 def read_text(path: str, called: str) -> str:
@@ -164,27 +183,6 @@ def read_text(path: str, called: str) -> str:
         return content.decode()
     except UnicodeDecodeError:
         raise SettingError(f"{called} {path} is no text (UTF-8)") from None
-
-
-def _from_text(spec: Field[Any], text: str, called: str) -> Any:
-    kind: Any = type(spec.default)
-    if kind is tuple:
-        return tuple(filter(None, (part.strip() for part in text.split(","))))
-    try:
-        return kind(text)
-    except ValueError:
-        raise SettingError(f"{called} is {text[:128]!r}, must be {_KINDS[kind]}") from None
-
-
-def _from_toml(spec: Field[Any], value: Any, called: str) -> Any:
-    kind = type(spec.default)
-    if kind is tuple and isinstance(value, list) and all(isinstance(part, str) for part in value):
-        return tuple(value)
-    if kind is float and type(value) is int:
-        return float(value)
-    if type(value) is not kind:  # a bool is an int to Python alone
-        raise SettingError(f"{called} is {str(value)[:128]!r}, must be {_KINDS[kind]}")
-    return value
 
 
 def _line_of(key: str, text: str) -> str:

@@ -9,17 +9,18 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from lupin_bridge.bags.recording import INPUTS, MAP_TYPE, Recording
+from lupin_bridge.bags.recording import INPUTS, Recording
 from lupin_twin.journal.lock import InUse
 from lupin_twin.journal.prefilling import is_empty, prefill, simulated
 from lupin_twin.journal.rows import LookRow, PinRow, Row, ScanRow
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign, open_reader
 from lupin_twin.memory import demo_journal_path
+from lupin_twin.parameters import World
 from lupin_twin.state import Bloom, Flower, Pose, Reading
 
 log = logging.getLogger(__name__)
@@ -35,13 +36,14 @@ _TIMEOUT_S: Final = 30.0
 class Feed:
     """Who feeds a demo's twin: a module to run with its arguments, in a process of its own.
 
-    `twin_args` are arguments of ROS for the twin alone. `journal` is the file that a past is to be
-    filled into, None where none is.
+    `twin_args` are arguments of ROS for the twin alone, and `world` is what it then observes.
+    `journal` is the file that a past is to be filled into, None where none is.
     """
 
     what: str
     command: list[str]
     twin_args: list[str]
+    world: World
     journal: Path | None = None
 
 
@@ -53,6 +55,7 @@ def patrolled(
         "patrol",
         ["lupin_patrol", "--end-with-parent", *patrol_args, *ros_args],
         own_args(environ, patrol_args),
+        World("simulated", DAY_S / _speed(patrol_args)),
         journal_of(environ, patrol_args, ros_args),
     )
 
@@ -73,10 +76,7 @@ def recorded(
         inputs = recording.inputs
     journal = folder / "journal.sqlite"
     values = {INPUTS[kind]: json.dumps(name) for name, kind in inputs.items()}
-    values |= {"journal": json.dumps(str(journal)), "use_sim_time": "true", "origin": "recorded"}
-    if MAP_TYPE in inputs.values():
-        # As with the patrol: no field is painted outside of the walls.
-        values["clip_to_explored"] = "true"
+    values |= {"journal": json.dumps(str(journal)), "use_sim_time": "true"}
     return Feed(
         "player",
         ["lupin_bridge.bags.player", *files, *play_args, *ros_args],
@@ -85,21 +85,20 @@ def recorded(
             *(word for name, value in values.items() for word in ("-p", f"{name}:={value}")),
             "--",
         ],
+        World("recorded"),
     )
 
 
 def own_args(environ: Mapping[str, str], patrol_args: Sequence[str]) -> list[str]:
     """ROS arguments of the demo's own; whatever is given after them counts instead.
 
-    Its journal is apart from a real twin's, and seeds from each other. The patrol maps the house:
-    no field is painted outside of its walls. Its days are short, and the shorter the faster it is.
+    Its journal is apart from a real twin's, and seeds from each other.
     """
-    args = ["--ros-args", "-p", "origin:=simulated", "-p", "clip_to_explored:=true"]
-    args += ["-p", f"day_length_s:={DAY_S / _speed(patrol_args)!r}"]
-    with suppress(RuntimeError):
+    try:
         path = demo_journal_path(environ, _seed(patrol_args))
-        args += ["-p", f"journal:={json.dumps(str(path))}"]
-    return [*args, "--"]
+    except RuntimeError:
+        return []
+    return ["--ros-args", "-p", f"journal:={json.dumps(str(path))}", "--"]
 
 
 def journal_of(

@@ -12,11 +12,6 @@ from collections.abc import Hashable
 from datetime import UTC, datetime
 from typing import Final
 
-TEXT: Final = "text"
-JSON: Final = "json"
-FORMATS: Final = (TEXT, JSON)
-LEVELS: Final = ("debug", "info", "warning", "error")
-
 # Of what is said again and again: so many at once of our own, and one a period from then on.
 AT_ONCE: Final = 20
 PERIOD_S: Final = 5.0
@@ -116,7 +111,7 @@ def set_up(log_format: str, level: str = "info") -> None:
     handler.setLevel(least)
     # Here, and not at the root logger: what passes through others does not meet its filters.
     handler.addFilter(OnceInAWhile())
-    if log_format == JSON:
+    if log_format == "json":
         handler.setFormatter(JsonFormatter())
     else:
         handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))

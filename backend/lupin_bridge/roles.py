@@ -29,6 +29,7 @@ from lupin_bridge.outward.channels import Channels
 from lupin_bridge.outward.choosing import Targets
 from lupin_bridge.past.asked import Answering
 from lupin_bridge.routes import no_page
+from lupin_bridge.serving.limits import Limits
 from lupin_bridge.serving.server import BridgeServer, address_of, allow_connections, listen
 from lupin_bridge.settings import Secrets, SettingError, Settings
 from lupin_bridge.stream.status import STALE_AFTER_S
@@ -37,7 +38,7 @@ from lupin_bridge.twin.local_twin import LocalTwin
 from lupin_bridge.twin.ros_thread import RosStartError
 from lupin_bridge.twin.source import ailment
 from lupin_bridge.twin.web_twin import WebTwin
-from lupin_twin.parameters import ParameterError
+from lupin_twin.parameters import ParameterError, World
 
 log = logging.getLogger("lupin_bridge")
 
@@ -124,20 +125,22 @@ async def _run(
     if feed is not None and feed.journal is not None:
         feed = await asyncio.to_thread(demo.with_past, feed, feed.journal, patrol_args)
     source: LocalTwin | WebTwin
-    timeout_s = settings.field_timeout_s
+    limits = Limits()
+    timeout_s = limits.answer_timeout_s
     if role == "web":
         source = WebTwin(ros_args=ros_args, timeout_s=timeout_s, stale_after_s=STALE_AFTER_S)
     else:
         all_args = [*own_args, *ros_args]
-        source = LocalTwin(ros_args=all_args, timeout_s=timeout_s, expects=Answering)
-    bridge = Bridge(source, settings, criteria=criteria, outward=Channels(targets))
+        world = World() if feed is None else feed.world
+        source = LocalTwin(ros_args=all_args, timeout_s=timeout_s, expects=Answering, world=world)
+    bridge = Bridge(source, settings, criteria=criteria, outward=Channels(targets), limits=limits)
     app = create_app(bridge, access=access, entrance=entrance)
 
     def say_goodbye() -> None:
         supervisor.stopping()
         bridge.say_goodbye()
 
-    server = BridgeServer(app, settings, say_goodbye)
+    server = BridgeServer(app, settings, say_goodbye, limits)
     await bridge.start()
     # The 100,000 objects of all modules are here to stay. Each full collection would walk through
     # them, 30 to 50 ms during which nobody is served.

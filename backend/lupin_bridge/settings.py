@@ -1,127 +1,127 @@
-"""The bridge's settings: one table for the command line, environment, file, checks and docs."""
+"""The bridge's settings: one table for the command line, environment, file, checks and docs.
+
+A type here says what a value may be; `configuration` has pydantic check it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import Field, dataclass, field, fields
-from typing import Any, Final
+from functools import cache
+from typing import Annotated, Any, Final, Literal, get_args, get_origin, get_type_hints
 
-from lupin_bridge.logs import FORMATS, LEVELS, TEXT
+from annotated_types import Interval, MinLen
 
 
 class SettingError(ValueError):
     """A setting that cannot be; the message names it, its value and the limit."""
 
 
-def _setting(
-    default: Any,
-    help_text: str,
-    low: float | None = None,
-    high: float = 0.0,
-    choices: Iterable[str] = (),
-) -> Any:
-    metadata = {"help": help_text, "low": low, "high": high, "choices": tuple(choices)}
-    return field(default=default, metadata=metadata)
+def _setting(default: Any, group: str, help_text: str) -> Any:
+    return field(default=default, metadata={"group": group, "help": help_text})
+
+
+LISTENING: Final = "listening"
+ACCESS: Final = "access"
+PROXY: Final = "behind a proxy"
+JUDGEMENT: Final = "judgement"
+MQTT: Final = "MQTT"
+WEBHOOK: Final = "webhook"
+LOG: Final = "log"
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How the bridge serves. Ranges are closed; times are seconds.
+    """How the bridge serves, as `configuration.settings_from` found it right. Times are seconds."""
 
-    Raises:
-        SettingError: a value out of its range.
-
-    """
-
-    host: str = _setting("127.0.0.1", "address to listen on; other machines need 0.0.0.0 or ::")
-    port: int = _setting(8000, "port to listen on; 0: any free one", 0, 65_535)
-    max_rate_hz: float = _setting(
-        10.0, "state frames a second on average at most, however fast the twin changes", 0.1, 100.0
+    host: Annotated[str, MinLen(1)] = _setting(
+        "127.0.0.1", LISTENING, "address to listen on; other machines need 0.0.0.0 or ::"
     )
-    max_clients: int = _setting(5_000, "WebSocket clients at most", 1, 100_000)
-    client_timeout_s: float = _setting(
-        30.0, "a client that takes nothing for this long is closed", 1.0, 3_600.0
+    port: Annotated[int, Interval(ge=0, le=65_535)] = _setting(
+        8000, LISTENING, "port to listen on; 0: any free one"
     )
-    field_timeout_s: float = _setting(
-        10.0, "a computed answer that takes longer ends in 504, and its work with it", 0.1, 600.0
+    tls_cert: str = _setting(
+        "", LISTENING, "PEM file with the certificate chain: serve https and wss"
     )
-    # A page that is dragged through the past asks for ten moments a second, each for a state and a
-    # field or two; and behind one address there may be two such pages.
-    field_rate_hz: float = _setting(
-        50.0,
-        "fields and other answers computed a second and client; two seconds' worth at once",
-        0.01,
-        10_000.0,
+    tls_key: str = _setting(
+        "", LISTENING, "PEM file with the certificate's private key, not encrypted"
     )
-    field_concurrency: int = _setting(
-        8, "such requests in flight for one client; a browser makes six", 1, 1_000
+    max_clients: Annotated[int, Interval(ge=1, le=100_000)] = _setting(
+        5_000, LISTENING, "WebSocket clients at most"
     )
-    field_total_concurrency: int = _setting(
-        32,
-        "answers being computed for all clients together; large ones take three quarters at most",
-        1,
-        10_000,
+    token_file: str = _setting(
+        "", ACCESS, "file with the token that readers have to know, a line of text"
     )
     allow_host: tuple[str, ...] = _setting(
-        (), "another name of the bridge, such as twin.example; may be given more than once"
+        (), ACCESS, "another name of the bridge, such as twin.example; may be given more than once"
     )
     allow_origin: tuple[str, ...] = _setting(
         (),
+        ACCESS,
         "origin whose pages may read the bridge too, and whose host is a name of the bridge, such "
         "as https://panel.example; may be given more than once",
     )
     trusted_proxy: tuple[str, ...] = _setting(
         (),
+        PROXY,
         "address or network of a reverse proxy whose X-Forwarded-For and X-Forwarded-Proto are "
         "believed, such as 127.0.0.1 or 10.0.0.0/24; may be given more than once",
     )
-    path_prefix: str = _setting("", "path that a proxy serves the bridge below, such as /gh1")
-    tls_cert: str = _setting("", "PEM file with the certificate chain: serve https and wss")
-    tls_key: str = _setting("", "PEM file with the certificate's private key, not encrypted")
-    token_file: str = _setting("", "file with the token that readers have to know, a line of text")
+    path_prefix: str = _setting(
+        "", PROXY, "path that a proxy serves the bridge below, such as /gh1"
+    )
     sensors: str = _setting(
-        "", "JSON file with every sensor's label, unit, colour and ranges, instead of our own"
+        "",
+        JUDGEMENT,
+        "JSON file with every sensor's label, unit, colour and ranges, instead of our own",
     )
-    recent_s: float = _setting(
-        0.0, "how long a reading holds; 0: three times the tag's own usual interval", 0.0, 604_800.0
-    )
-    time_zone: str = _setting(
-        "", "such as Europe/Amsterdam: for the hours of the day; empty: this machine's"
+    reading_validity_s: Annotated[float, Interval(ge=0.0, le=604_800.0)] = _setting(
+        0.0,
+        JUDGEMENT,
+        "how long a reading is valid, s; 0: three times the tag's own usual interval",
     )
     day_hours: str = _setting(
-        "06:00-20:00", "from when to when it is day where no light is measured; 00:00-00:00: always"
+        "06:00-20:00",
+        JUDGEMENT,
+        "from when to when it is day where no light is measured; 00:00-00:00: always",
     )
-    alarm_days: float = _setting(7.0, "how far back alarms are worked out, in days", 0.01, 3_652.0)
+    time_zone: str = _setting(
+        "",
+        JUDGEMENT,
+        "such as Europe/Amsterdam: for the hours of the day; empty: this machine's",
+    )
     mqtt_url: str = _setting(
         "",
+        MQTT,
         "MQTT broker, such as mqtt://broker.lan or mqtts://broker.lan:8883: readings, verdicts and "
         "alarms go there",
     )
-    mqtt_user: str = _setting("", "who the bridge is to the broker")
-    mqtt_password_file: str = _setting("", "file with that user's password, a line of text")
-    mqtt_ca: str = _setting("", "PEM file with who signs the broker's certificate")
-    mqtt_prefix: str = _setting("lupin-twin", "what the topics begin with, such as farm/gh1")
+    mqtt_user: str = _setting("", MQTT, "who the bridge is to the broker")
+    mqtt_password_file: str = _setting("", MQTT, "file with that user's password, a line of text")
+    mqtt_ca: str = _setting("", MQTT, "PEM file with who signs the broker's certificate")
+    mqtt_prefix: str = _setting("lupin-twin", MQTT, "what the topics begin with, such as farm/gh1")
     mqtt_discovery_prefix: str = _setting(
-        "homeassistant", "where Home Assistant looks for devices; empty: they are not announced"
+        "homeassistant",
+        MQTT,
+        "where Home Assistant looks for devices; empty: they are not announced",
     )
-    webhook_url: str = _setting("", "http or https address that changes of alarms are posted to")
-    webhook_secret_file: str = _setting("", "file with the secret that signs them, a line of text")
-    webhook_ca: str = _setting("", "PEM file with who signs the receiver's certificate")
-    log_format: str = _setting(TEXT, "lines for people, or JSON for a collector", choices=FORMATS)
-    log_level: str = _setting("info", "the least that is logged", choices=LEVELS)
-    # What the operator called a setting, where it is not the option: a variable, a file's line.
+    webhook_url: str = _setting(
+        "", WEBHOOK, "http or https address that changes of alarms are posted to"
+    )
+    webhook_secret_file: str = _setting(
+        "", WEBHOOK, "file with the secret that signs them, a line of text"
+    )
+    webhook_ca: str = _setting("", WEBHOOK, "PEM file with who signs the receiver's certificate")
+    log_format: Literal["text", "json"] = _setting(
+        "text", LOG, "lines for people, or JSON for a collector"
+    )
+    log_level: Literal["debug", "info", "warning", "error"] = _setting(
+        "info", LOG, "the least that is logged"
+    )
+    # What the operator called a setting: the option, a variable, a file's line.
     given_as: Mapping[str, str] = field(
         default_factory=dict, repr=False, compare=False, kw_only=True
     )
-
-    def __post_init__(self) -> None:
-        for spec in table():
-            check(spec, getattr(self, spec.name), self.called(spec.name))
-        if bool(self.tls_cert) != bool(self.tls_key):
-            given, missing = ("tls_cert", "tls_key") if self.tls_cert else ("tls_key", "tls_cert")
-            raise SettingError(
-                f"{self.called(given)} is given without {option(missing)}, TLS needs both"
-            )
 
     def called(self, name: str) -> str:
         """What a message should call a setting: as its operator gave it."""
@@ -142,24 +142,23 @@ class Secrets:
 
 
 def table() -> tuple[Field[Any], ...]:
-    """The settings themselves."""
+    """The settings themselves; of each the metadata has `group` and `help`."""
     return tuple(spec for spec in fields(Settings) if spec.metadata)
 
 
-def check(spec: Field[Any], value: Any, called: str) -> None:
-    """Refuse a value out of its range.
+@cache
+def types() -> Mapping[str, Any]:
+    """What each setting may be."""
+    return get_type_hints(Settings, include_extras=True)
 
-    Raises:
-        SettingError: it is, or it is empty where there has to be something.
 
-    """
-    low, high, choices = (spec.metadata[name] for name in ("low", "high", "choices"))
-    if low is not None and not low <= value <= high:
-        raise SettingError(f"{called} is {value}, must be from {low:.15g} to {high:.15g}")
-    if choices and value not in choices:
-        raise SettingError(f"{called} is {value!r}, must be {one_of(choices)}")
-    if spec.name == "host" and not value:
-        raise SettingError(f"{called} is empty, must be an address")
+def limits_of(name: str) -> str:
+    """What a setting may be, in words; empty: any text."""
+    hint = types()[name]
+    for limit in getattr(hint, "__metadata__", ()):
+        if isinstance(limit, Interval):
+            return f"from {limit.ge:.15g} to {limit.le:.15g}"
+    return one_of(get_args(hint)) if get_origin(hint) is Literal else ""
 
 
 def one_of(names: Iterable[str]) -> str:

@@ -19,7 +19,7 @@ from websockets.sync.client import connect
 
 from tests.support.domains import own_domain
 from tests.support.messages import scan
-from tests.support.processes import Process, lupin_twin, url_of
+from tests.support.processes import Process, limits, lupin_twin, url_of
 from tests.support.ros import Peer
 
 TAGS = 30
@@ -148,7 +148,7 @@ def end() -> None:
 def main() -> None:
     print(f"\n{'The bridge, ' + str(TAGS) + ' tags':<52}{'median':>12}{'p95':>12}")
     # The bounds on field requests are for strangers; here they would be what is measured.
-    unbounded = ("--field-rate-hz", "10000")
+    unbounded = limits(answers_per_s=10_000)
     silent = (*unbounded, "--ros-args", "-p", "state_publish_rate_hz:=0.01")
     with (
         own_domain() as domain,

@@ -233,7 +233,6 @@ def engine() -> FieldEngine:
         idw_power=2.0,
         falloff_radius_m=REACH_M,
         max_distance_m=REACH_M,
-        clip_to_explored=False,
         max_grid_cells=1_000_000,
     )
     return FieldEngine(rules, FieldCache(max_bytes=64_000_000))

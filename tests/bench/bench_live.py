@@ -30,6 +30,7 @@ from tests.bench.live_outages import measure_outages
 from tests.bench.live_parts import HEAD_START_S, Clients, Seen, Server, serving
 from tests.bench.live_past import measure_past
 from tests.support.proc_stat import cpu_s, resident_mb, tcp_buffers_mb
+from tests.support.processes import limits
 from tests.support.state_home import use_own
 
 # Between joining, which is not measured, and what is: the load goes on meanwhile.
@@ -88,7 +89,7 @@ def measure_stuck(stuck: int, seconds: float, timeout_s: float) -> str:
     """Clients that never read, beside healthy ones; returns lines of text."""
     rate_hz, healthy_clients = 50.0, 10
     with (
-        serving(30, rate_hz, "--client-timeout-s", str(timeout_s)) as server,
+        serving(30, rate_hz, *limits(client_timeout_s=timeout_s)) as server,
         Clients(server.port, healthy_clients) as healthy,
     ):
         healthy.joined_s()
@@ -108,7 +109,7 @@ def measure_stuck(stuck: int, seconds: float, timeout_s: float) -> str:
     when = f", {closed[0]:.1f} to {closed[-1]:.1f} s after they connected" if closed else ""
     lines = (
         f"{stuck} clients that never read, at {rate_hz:g} Hz for {seconds:g} s,",
-        f"beside {healthy_clients} that do; client_timeout_s {timeout_s:g}:",
+        f"beside {healthy_clients} that do; cut off after {timeout_s:g}:",
         f"- closed by the server: {len(closed)} of {stuck}{when}",
         f"- server's memory: {memory:.1f} MB before, {peak - memory:+.1f} MB at most",
         f"- TCP buffers, both ends: {kernel:.1f} MB before, {kernel_peak - kernel:+.1f} MB at most",

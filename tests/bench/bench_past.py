@@ -30,14 +30,14 @@ from tests.bench.journal_double import (
 )
 from tests.support.domains import own_domain
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
-from tests.support.processes import lupin_twin, url_of
+from tests.support.processes import limits, lupin_twin, url_of
 from tests.support.state_home import use_own
 from tests.support.waiting import wait_for
 
 # The export's: more than ten million rows. 5,000 tags, whose readings come one in a message.
 MANY = House(tags=5_000, days=28.0, every_s=6_000.0)
 QUICK_MANY = House(tags=5_000, days=2.0, every_s=6_000.0)
-UNBOUNDED = ("--field-rate-hz", "10000", "--field-timeout-s", "60")
+UNBOUNDED = limits(answers_per_s=10_000, answer_timeout_s=60)
 KEPT = ("-p", "journal_days:=36500.0", "-p", "journal_max_mb:=1000000.0")
 FIELD = "sensor_type=co2&bbox_min_x=0&bbox_min_y=0&bbox_max_x=10&bbox_max_y=10&resolution=0.05"
 

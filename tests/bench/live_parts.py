@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 
 from tests.support.domains import own_domain, ros_env
 from tests.support.proc_stat import cpu_s
-from tests.support.processes import Process, lupin_twin, url_of
+from tests.support.processes import Process, limits, lupin_twin, url_of
 
 CLIENTS_A_PROCESS = 1_250
 # Python starts and imports; then all clients connect at once.
@@ -135,7 +135,7 @@ def serving(tags: int, rate_hz: float, *options: str) -> Iterator[Server]:
     """A server and its robot, once the twin has all tags."""
     with ExitStack() as stack:
         domain = stack.enter_context(own_domain())
-        pace = ("--max-rate-hz", str(rate_hz * HEADROOM))
+        pace = limits(frames_per_s=rate_hz * HEADROOM)
         server = stack.enter_context(
             lupin_twin(domain, "serve", *pace, *options, afresh=True, **AS_IN_USE)
         )

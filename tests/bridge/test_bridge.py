@@ -20,6 +20,7 @@ from websockets.asyncio.client import connect
 
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.field import formats as field_formats
+from lupin_bridge.serving.limits import Limits
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.hub import Client
 from lupin_bridge.twin.relay import Relay
@@ -101,9 +102,9 @@ def state(number: int) -> Told:
 class Stage:
     """A bridge between a script and an ear."""
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic, **settings: Any) -> None:
+    def __init__(self, clock: Callable[[], float] = time.monotonic, **limits: Any) -> None:
         self.script, self.ear = Script(), Ear()
-        self.bridge = Bridge(self.script, Settings(**settings), clock)  # type: ignore[arg-type]
+        self.bridge = Bridge(self.script, Settings(), clock, limits=Limits(**limits))  # type: ignore[arg-type]
 
     async def __aenter__(self) -> Self:
         await self.bridge.start()
@@ -157,7 +158,7 @@ def test_two_changes_go_out_at_once_and_the_next_by_the_rate(
 ) -> None:
     async def test() -> None:
         beat = Beat(monkeypatch)
-        async with Stage(clock=lambda: beat.now_s, max_rate_hz=20.0) as stage:
+        async with Stage(clock=lambda: beat.now_s, frames_per_s=20.0) as stage:
             beat.hold(stage)
             waits = [beat.change(at_s) for at_s in (100.0, 100.01, 100.02, 100.08, 200.0, 200.01)]
             assert waits == pytest.approx([0.0, 0.0, 0.03, 0.02, 0.0, 0.0])
@@ -174,7 +175,7 @@ def test_of_a_producer_that_keeps_to_the_rate_no_change_waits(
     async def test() -> None:
         beat = Beat(monkeypatch)
         late_s = [0.0, 0.09, 0.0, 0.03, 0.0, 0.099, 0.0, 0.0] * 20
-        async with Stage(clock=lambda: beat.now_s, max_rate_hz=10.0) as stage:
+        async with Stage(clock=lambda: beat.now_s, frames_per_s=10.0) as stage:
             beat.hold(stage)
             waits = [beat.change(100.0 + n / 10 + late) for n, late in enumerate(late_s)]
             assert waits == [0.0] * len(late_s)
@@ -189,7 +190,7 @@ def test_the_mean_rate_is_kept_whatever_the_producer_does(
 ) -> None:
     async def test() -> None:
         beat, sent_s = Beat(monkeypatch), list[float]()
-        async with Stage(clock=lambda: beat.now_s, max_rate_hz=10.0) as stage:
+        async with Stage(clock=lambda: beat.now_s, frames_per_s=10.0) as stage:
             beat.hold(stage)
             at_s = 100.0
             for pause_s in pauses_s:
@@ -205,7 +206,7 @@ def test_the_mean_rate_is_kept_whatever_the_producer_does(
 
 def test_what_a_frame_carries_is_the_newest_of_all_that_came_since_the_last() -> None:
     async def test() -> None:
-        async with Stage(max_rate_hz=50.0) as stage:
+        async with Stage(frames_per_s=50.0) as stage:
             for number in range(1, 101):
                 stage.script.tell(state(number))
             await until(lambda: stage.ear.states[-1]["revision"] == "r100", "the newest")
@@ -218,7 +219,7 @@ def test_what_a_frame_carries_is_the_newest_of_all_that_came_since_the_last() ->
 
 def test_a_heartbeat_right_after_a_frame_tells_nobody_anything_and_is_spared() -> None:
     async def test() -> None:
-        async with Stage(max_rate_hz=100.0) as stage:
+        async with Stage(frames_per_s=100.0) as stage:
             stage.script.tell(state(1))
             for _ in range(3):
                 stage.script.tell(Told(state(1).snapshot, "r1"))
@@ -330,7 +331,7 @@ def test_who_asked_for_a_low_rate_gets_the_newest_although_nothing_more_happens(
 
     async def test() -> None:
         nonlocal now_s
-        async with Stage(clock=lambda: now_s, max_rate_hz=100.0) as stage:
+        async with Stage(clock=lambda: now_s, frames_per_s=100.0) as stage:
             stage.bridge._liveness.stale_after_s = math.inf  # no status takes it along
             rare = Ear()
             stage.bridge.join(Client(rare, min_interval_s=0.3))
@@ -392,7 +393,7 @@ def test_while_a_field_is_made_states_are_answered_and_frames_keep_coming(
         assert (answer.status_code, answer.headers["x-field-width"]) == (200, "1000")
 
     async def with_twin() -> None:
-        async with running(Settings(field_timeout_s=PATIENCE_S)) as served:
+        async with running() as served:
             with Peer(domain) as peer:
                 try:
                     await test(served, peer)

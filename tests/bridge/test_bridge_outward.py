@@ -30,7 +30,7 @@ def test_neither_a_hanging_broker_nor_a_hanging_receiver_delays_a_frame(tmp_path
 
     async def run(server: Receiver) -> None:
         settings = Settings(mqtt_url=broker.url, webhook_url=f"http://127.0.0.1:{server.port}")
-        stage = Stage(max_rate_hz=100.0)
+        stage = Stage(frames_per_s=100.0)
         stage.bridge.outward = Channels(Targets.of(settings, Secrets(webhook_secret="s" * 16)))
         async with stage:
             # The alarms are the test's alone: of what it hears, the feed makes none, and takes this

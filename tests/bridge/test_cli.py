@@ -65,13 +65,15 @@ def test_no_argument_is_lost_but_for_what_ends_a_ros_part(arguments: list[str]) 
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (["serve", "--port", "70000"], "--port is 70000, must be from 0 to 65535"),
-        (["web", "--max-rate-hz", "0"], "--max-rate-hz is 0.0, must be from 0.1 to 100"),
-        (["demo", "--max-rate-hz", "nan"], "--max-rate-hz is nan, must be from 0.1 to 100"),
-        (["serve", "--client-timeout-s", "0.5"], "--client-timeout-s is 0.5, must be from 1 to"),
-        (["serve", "--host", ""], "--host is empty, must be an address"),
-        (["serve", "--port", "http"], "argument --port: invalid int value: 'http'"),
-        (["serve", "--max-rate", "5"], "unrecognized arguments: --max-rate 5"),
+        (
+            ["serve", "--port", "70000"],
+            "--port is '70000': input should be less than or equal",
+        ),
+        (["web", "--max-clients", "0"], "--max-clients is '0': input should be greater than or"),
+        (["demo", "--reading-validity-s", "nan"], "--reading-validity-s is 'nan': input should"),
+        (["serve", "--host", ""], "--host is '': string should have at least 1 char"),
+        (["serve", "--port", "http"], "--port is 'http': input should be a valid integer"),
+        (["serve", "--max-client", "5"], "unrecognized arguments: --max-client 5"),
         (["demo", "--speed", "abc"], "argument --speed: invalid float value: 'abc'"),
         (["demo", "--seed", "x"], "argument --seed: invalid int value: 'x'"),
         (["fly"], "invalid choice: 'fly'"),

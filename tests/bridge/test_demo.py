@@ -16,6 +16,7 @@ from lupin_bridge.demo import (
     fill_past,
     journal_of,
     own_args,
+    patrolled,
     rows,
     since_morning_s,
     with_past,
@@ -23,6 +24,7 @@ from lupin_bridge.demo import (
 from lupin_patrol.cli import parse as patrol_options
 from lupin_patrol.climate import SECONDS_PER_DAY
 from lupin_twin.journal.rows import LookRow, PinRow, ScanRow
+from lupin_twin.parameters import World
 from lupin_twin.state import Bloom, Pose, Reading
 from tests.support.journal import CLOCK, NOW, SECOND, is_whole, kept, scan, select
 
@@ -33,9 +35,7 @@ SHORT = ["--speed=50"]
 def test_a_demo_keeps_a_journal_of_its_own_by_seed() -> None:
     for patrol_args, name in (([], "demo-seed-0"), (["--seed=3"], "demo-seed-3")):
         path = f"/state/lupin-twin/{name}.sqlite"
-        own = ["-p", "origin:=simulated", "-p", "clip_to_explored:=true"]
-        own += ["-p", "day_length_s:=1440.0"]
-        args = ["--ros-args", *own, "-p", f'journal:="{path}"', "--"]
+        args = ["--ros-args", "-p", f'journal:="{path}"', "--"]
         assert own_args(ENV, patrol_args) == args
         assert journal_of(ENV, patrol_args, ["--ros-args", "-p", "idw_power:=3.0"]) == Path(path)
 
@@ -44,12 +44,12 @@ def test_a_demo_keeps_a_journal_of_its_own_by_seed() -> None:
 def test_a_demo_s_twin_knows_how_long_its_patrol_s_day_takes(patrol_args: list[str]) -> None:
     patrol = patrol_options(patrol_args)
     day_s = SECONDS_PER_DAY / patrol.day_speed / patrol.speed
-    assert f"day_length_s:={day_s!r}" in own_args(ENV, patrol_args)
+    assert patrolled(ENV, patrol_args, []).world == World("simulated", day_s)
 
 
 @pytest.mark.parametrize("speed", ["0", "nan", "inf", "-1"])
 def test_what_is_no_speed_is_left_for_the_patrol_to_refuse(speed: str) -> None:
-    assert "day_length_s:=1440.0" in own_args(ENV, [f"--speed={speed}"])
+    assert patrolled(ENV, [f"--speed={speed}"], []).world.day_length_s == 1440.0
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_an_empty_journal_is_filled_once(tmp_path: Path) -> None:
 
 def test_started_again_it_goes_on_with_the_day(tmp_path: Path) -> None:
     path = tmp_path / "demo.sqlite"
-    feed = Feed("patrol", ["lupin_patrol", "--end-with-parent", *SHORT], [], path)
+    feed = Feed("patrol", ["lupin_patrol", "--end-with-parent", *SHORT], [], World(), path)
     assert with_past(feed, path, SHORT) == feed, "the first time it is nine"
     [(until_ns,)] = select(path, "SELECT value FROM meta WHERE key = 'simulated_until_ns'")
     # Fifty times as fast, a day takes 28.8 s.

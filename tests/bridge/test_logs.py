@@ -11,6 +11,8 @@ import pytest
 
 from lupin_bridge import logs
 
+LEVELS = ["debug", "info", "warning", "error"]
+
 
 @pytest.fixture(autouse=True)
 def untouched_root(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
@@ -23,7 +25,7 @@ def untouched_root(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def test_json_is_one_object_a_line_with_the_error(capsys: pytest.CaptureFixture[str]) -> None:
-    logs.set_up(logs.JSON)
+    logs.set_up("json")
     log = logging.getLogger("lupin_bridge.test")
     log.info("tag %s\nsecond line", "7°")
     log.error("failed", exc_info=ValueError("broken"))
@@ -36,28 +38,28 @@ def test_json_is_one_object_a_line_with_the_error(capsys: pytest.CaptureFixture[
 
 
 def test_text_is_a_line_for_people(capsys: pytest.CaptureFixture[str]) -> None:
-    logs.set_up(logs.TEXT)
+    logs.set_up("text")
     logging.getLogger("lupin_bridge.test").warning("hello")
     assert capsys.readouterr().err.endswith(" WARNING lupin_bridge.test: hello\n")
 
 
-@pytest.mark.parametrize("level", logs.LEVELS)
+@pytest.mark.parametrize("level", LEVELS)
 def test_what_is_below_the_level_stays_out(level: str, capsys: pytest.CaptureFixture[str]) -> None:
-    logs.set_up(logs.TEXT, level)
-    for least in logs.LEVELS:
+    logs.set_up("text", level)
+    for least in LEVELS:
         logging.getLogger("lupin_bridge.test").log(getattr(logging, least.upper()), "ours")
         # As the nodes' lines come: past every logger.
         record = logging.LogRecord("ros", getattr(logging, least.upper()), "", 0, "ros", (), None)
         logging.root.handle(record)
         logging.getLogger("asyncio").debug("a library's")
     said = capsys.readouterr().err
-    expected = len(logs.LEVELS) - logs.LEVELS.index(level)
+    expected = len(LEVELS) - LEVELS.index(level)
     assert (said.count(": ours"), said.count(": ros")) == (expected, expected)
     assert "library" not in said
 
 
 def test_the_web_servers_own_news_stay_out(capsys: pytest.CaptureFixture[str]) -> None:
-    logs.set_up(logs.TEXT)
+    logs.set_up("text")
     logging.getLogger("uvicorn.error").info("Started server process")
     logging.getLogger("uvicorn.error").warning("something is wrong")
     assert capsys.readouterr().err.count("\n") == 1
@@ -68,7 +70,7 @@ def test_what_strangers_cause_is_logged_once_in_a_while(
 ) -> None:
     now_s = [100.0]
     monkeypatch.setattr(time, "monotonic", lambda: now_s[0])
-    logs.set_up(logs.TEXT)
+    logs.set_up("text")
     web_server = logging.getLogger("uvicorn.error")
     for _ in range(1_000):
         web_server.warning("Invalid HTTP request received.")
@@ -86,7 +88,7 @@ def test_what_strangers_cause_is_logged_once_in_a_while(
 def test_each_of_our_own_errors_leaves_its_trace_and_a_strangers_bytes_leave_none(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    logs.set_up(logs.TEXT)
+    logs.set_up("text")
     web_server = logging.getLogger("uvicorn.error")
     for error in (ValueError("ours"), KeyError("ours too")):
         web_server.error("Exception in ASGI application", exc_info=error)
@@ -111,7 +113,7 @@ def test_of_our_own_some_are_said_at_once(
 ) -> None:
     now_s = [100.0]
     monkeypatch.setattr(time, "monotonic", lambda: now_s[0])
-    logs.set_up(logs.TEXT)
+    logs.set_up("text")
     log = logging.getLogger(name)
     for number in range(logs.AT_ONCE + 7):
         log.warning("wrong token from %s", f"10.0.0.{number}")
@@ -127,7 +129,7 @@ def test_of_our_own_some_are_said_at_once(
 def test_every_librarys_traces_are_rationed_whatever_numbers_stand_in_them(
     name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    logs.set_up(logs.TEXT)
+    logs.set_up("text")
     for number in range(1_000):
         text = f"Fatal error on <Transport fd={number} at {number * 7919:#x}>\nprotocol: {number}"
         logging.getLogger(name).error(text, exc_info=ValueError(str(number)))
@@ -138,7 +140,7 @@ def test_one_logger_has_an_end_whatever_it_thinks_of(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(time, "monotonic", lambda: 100.0)
-    logs.set_up(logs.TEXT)
+    logs.set_up("text")
     for number in range(10 * logs.LOGGER_AT_ONCE):
         logging.getLogger("lupin_twin").warning("%s", "x" * number)
     logging.getLogger("lupin_bridge").warning("is heard")

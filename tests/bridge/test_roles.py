@@ -68,7 +68,7 @@ def test_a_bad_ros_argument_is_named(domain: int, arguments: list[str], named: s
 
 def test_ros_arguments_reach_the_twin() -> None:
     arguments = ("--ros-args", "-p", "idw_max_distance_m:=0.5", "-r", "/map:=/floor")
-    with bridge(*arguments, "--", "--max-rate-hz", "5") as live:
+    with bridge(*arguments, "--", "--max-clients", "5") as live:
         live.peer.observe(scan("1", {"co2": 400.0}, at=(0, 0)))
         live.tag("1")
         field = live.json("/api/field", sensor_type="co2")

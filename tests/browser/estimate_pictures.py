@@ -68,8 +68,8 @@ def taken(browser: Browser, folder: Path) -> None:
         known = [row for row in told if row.stamp_ns <= end_ns]
         robot = Robot(row for row in told if isinstance(row, ScanRow) and row.stamp_ns > end_ns)
         kept(journal, known, Clock(now_ns, now_ns, is_simulated=False))
-        options = [f"journal:={journal}", f"day_length_s:={DAY_S}.0", "clip_to_explored:=true"]
-        with bridge("--ros-args", *(word for each in options for word in ("-p", each))) as running:
+        world = ("--world", f"day_length_s={DAY_S}")
+        with bridge(*world, "--ros-args", "-p", f"journal:={journal}") as running:
             running.peer.publish_map(house_map())
             wait_for(lambda: is_fitted(running), "a model, and the map", READY_S)
             for name, before_s in PAST.items():

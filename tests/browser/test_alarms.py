@@ -131,7 +131,7 @@ def test_a_row_has_the_value_of_now_with_its_trend_beside_the_worst(
 
 
 def test_a_value_that_is_too_old_is_not_that_of_now(domain: int, open_page: OpenPage) -> None:
-    with bridge("--recent-s", "2", domain=domain) as running:
+    with bridge("--reading-validity-s", "2", domain=domain) as running:
         running.peer.observe(*[warm("a", value, at=(1, 1)) for value in (41.0, 43.5)])
         hmi = open_page(running.url)
         hmi.page.keyboard.press("a")

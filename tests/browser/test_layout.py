@@ -15,6 +15,7 @@ from playwright.sync_api import Browser, Locator, expect
 from tests.browser.hmi import PHONE, Box, Hmi, OpenPage, Pixel, open_hmi
 from tests.browser.places import expect_in_reach, place, places
 from tests.support.messages import scan
+from tests.support.processes import limits
 from tests.support.web import Bridge, bridge
 
 Size = tuple[int, int]
@@ -51,7 +52,7 @@ def open_at(house: Bridge, open_page: OpenPage) -> Callable[..., Hmi]:
 @pytest.fixture
 def running(domain: int) -> Iterator[Bridge]:
     """A server with a house that is empty at first, for pages of many sizes at once."""
-    with bridge("--field-concurrency", "1000", domain=domain) as empty:
+    with bridge(*limits(concurrency=1_000), domain=domain) as empty:
         yield empty
 
 

@@ -18,7 +18,7 @@ import httpx
 
 from tests.support.domains import own_domain
 from tests.support.live import attached, wait_until_ready
-from tests.support.processes import OFTEN, lupin_twin
+from tests.support.processes import OFTEN, limits, lupin_twin
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge
@@ -39,7 +39,7 @@ def bridges(journal: Path) -> Iterator[tuple[Bridge, Bridge]]:
         domain = stack.enter_context(own_domain())
         options = (
             *("--time-zone", "UTC", "--day-hours", "06:00-20:00"),
-            *("--alarm-days", "3652", "--field-rate-hz", "10000"),
+            *limits(alarm_days=3_652, answers_per_s=10_000),
         )
         serve = stack.enter_context(
             lupin_twin(domain, "serve", *options, *OFTEN, "-p", f"journal:={journal}", *_KEPT)

@@ -14,6 +14,7 @@ import httpx
 
 from lupin_bridge.app import create_app
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.serving.limits import Limits
 from lupin_bridge.serving.server import BridgeServer, address_of, listen
 from lupin_bridge.settings import Settings
 from lupin_bridge.twin.local_twin import LocalTwin
@@ -72,13 +73,16 @@ class Running:
 
 @asynccontextmanager
 async def running(
-    settings: Settings | None = None, ros_args: Sequence[str] = ()
+    limits: Limits | None = None,
+    ros_args: Sequence[str] = (),
+    settings: Settings | None = None,
 ) -> AsyncIterator[Running]:
     """Serve on a free port, as `lupin-twin serve` does; no machine is too busy for an answer."""
-    settings = settings or Settings(field_timeout_s=PATIENCE_S)
-    twin = LocalTwin(ros_args=ros_args, timeout_s=settings.field_timeout_s)
-    bridge = Bridge(twin, settings)
-    server = BridgeServer(create_app(bridge), bridge.settings, bridge.say_goodbye)
+    settings = settings or Settings()
+    limits = limits or Limits(answer_timeout_s=PATIENCE_S)
+    twin = LocalTwin(ros_args=ros_args, timeout_s=limits.answer_timeout_s)
+    bridge = Bridge(twin, settings, limits=limits)
+    server = BridgeServer(create_app(bridge), settings, bridge.say_goodbye, limits)
     listener = listen("127.0.0.1", 0)
     url = address_of(listener)
     await bridge.start()

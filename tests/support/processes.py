@@ -145,8 +145,15 @@ def twin_node(domain: int, *ros_args: str, afresh: bool = False, **env: str) -> 
 
 def lupin_twin(domain: int, role: str, *args: str, afresh: bool = False, **env: str) -> Process:
     """`lupin-twin ROLE` on a free port; ask `url_of` for its address."""
-    command = [sys.executable, "-m", "lupin_bridge.cli", role, "--port", "0", *args]
+    module = "tests.support.limited" if {"--limit", "--world"} & {*args} else "lupin_bridge.cli"
+    command = [sys.executable, "-m", module, role, "--port", "0", *args]
     return Process(command, ros_env(domain, **env), afresh=afresh)
+
+
+def limits(**values: float) -> tuple[str, ...]:
+    """Arguments of `lupin_twin` for other `Limits` than a bridge has."""
+    pairs = [f"{name}={value!r}" for name, value in values.items()]
+    return tuple(word for pair in pairs for word in ("--limit", pair))
 
 
 def patrols_of(pid: int) -> list[int]:

@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import IO, Any, Final
 
 # The programs that it can be, by the module that `python -m` would run.
-PROGRAMS: Final = ("lupin_bridge.cli", "lupin_twin.cli")
+PROGRAMS: Final = ("lupin_bridge.cli", "lupin_twin.cli", "tests.support.limited")
 # What they import once they run.
 IMPORTED: Final = (
     "lupin_bridge.roles",

@@ -53,7 +53,6 @@ def rules_of(**changes: Any) -> FieldRules:
         "idw_power": 2.0,
         "falloff_radius_m": 1.5,
         "max_distance_m": 1.5,
-        "clip_to_explored": False,
         "max_grid_cells": MAX_CELLS,
     }
     return FieldRules(**{**given, **changes})
@@ -292,7 +291,7 @@ def test_field_that_comes_late_is_no_answer_to_a_newer_request(store: TwinStore)
 
 
 def test_any_thread_may_compute(store: TwinStore) -> None:
-    engine = engine_of(clip_to_explored=True)
+    engine = engine_of()
     jobs = [
         engine.lookup(request_of(resolution=0.01 * step), store, map_of([[0] * 4] * 2))
         for step in range(1, 9)
@@ -358,10 +357,10 @@ def test_sliding_box_keeps_the_cache_within_its_bounds(store: TwinStore) -> None
 # --- explored --------------------------------------------------------------------------------
 
 
-def test_map_clips_only_where_the_rules_say_so(store: TwinStore) -> None:
+def test_a_map_clips_to_what_it_knows(store: TwinStore) -> None:
     occupancy = map_of([[0, -1, 0, 0], [0, 0, 0, -1]])
-    unclipped = answer(engine_of(), request_of(), store, occupancy)
-    clipped = answer(engine_of(clip_to_explored=True), request_of(), store, occupancy)
+    unclipped = answer(engine_of(), request_of(), store, None)
+    clipped = answer(engine_of(), request_of(), store, occupancy)
     known = np.array([1, 0, 1, 1, 1, 1, 1, 0], dtype=np.bool_)
     np.testing.assert_array_equal(
         clipped.values, np.where(known, unclipped.values, np.float32(np.nan))
@@ -369,37 +368,28 @@ def test_map_clips_only_where_the_rules_say_so(store: TwinStore) -> None:
     assert not np.isnan(unclipped.values[1])
 
 
-def test_nothing_is_explored_before_a_map_came(store: TwinStore) -> None:
-    engine = engine_of(clip_to_explored=True)
+def test_before_a_map_came_nothing_is_clipped_and_its_first_one_makes_fields_anew(
+    store: TwinStore,
+) -> None:
+    engine = engine_of()
     grid = answer(engine, request_of(), store, None)
-    assert np.isnan(grid.values).all()
-    assert (grid.sample_count, grid.value_min, grid.value_max) == (2, 0.0, 0.0)
-    clipped = answer(engine, request_of(), store, map_of([[0] * 4] * 2, revision=0))
-    assert not np.isnan(clipped.values).all()
+    assert not np.isnan(grid.values).any()
+    clipped = answer(engine, request_of(), store, map_of([[-1] * 4] * 2, revision=0))
+    assert np.isnan(clipped.values).all()
+    assert (clipped.sample_count, clipped.value_min, clipped.value_max) == (2, 0.0, 0.0)
 
 
-def test_new_map_makes_fields_anew_only_where_it_clips(store: TwinStore) -> None:
+def test_a_new_map_makes_fields_anew(store: TwinStore) -> None:
     first, second = map_of([[0] * 4] * 2, revision=1), map_of([[-1] * 4] * 2, revision=2)
-    clipping = engine_of(clip_to_explored=True)
+    clipping = engine_of()
     assert not np.isnan(answer(clipping, request_of(), store, first).values).all()
     assert np.isnan(answer(clipping, request_of(), store, second).values).all()
     assert clipping.cache.hits == 0
-    plain = engine_of()
-    grid = answer(plain, request_of(), store, first)
-    assert plain.lookup(request_of(), store, second) is grid
-    assert plain.lookup(request_of(), store, None) is grid
-
-
-def test_job_holds_no_map_that_it_does_not_need(store: TwinStore) -> None:
-    occupancy = map_of([[0] * 4] * 2)
-    job = engine_of().lookup(request_of(), store, occupancy)
-    assert isinstance(job, FieldJob)
-    assert job.occupancy is None
 
 
 def test_mask_has_the_fields_own_grid(store: TwinStore) -> None:
     """1.1 m at 0.1 m, in float32: both count 11 columns, or the mask would not fit."""
-    engine = engine_of(clip_to_explored=True)
+    engine = engine_of()
     request = request_of(resolution=0.1, bbox_max_x=1.1, bbox_max_y=2.3)
     grid = answer(engine, request, store, map_of([[0] * 4] * 4))
     assert (grid.width, grid.height) == (11, 23)

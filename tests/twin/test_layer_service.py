@@ -101,7 +101,6 @@ class Stage:
         self.sent: list[bytes] = []
         self.kept: list[Any] = []
         self.keep, self.publish = lambda *field: self.kept.append(field), self.sent.append
-        self.rate_hz = lambda: 2.0
         self.fields = self
         anything: Any = self
         monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now_s))
@@ -160,11 +159,11 @@ def test_what_has_changed_is_made_at_its_rate_and_not_twice_at_once(stage: Stage
     stage.is_free.set()
     wait_for(stage.is_delivered, "the first")
     assert (stage.sent, stage.kept) == ([b"made"], [("job", "grid")])
-    assert stage.look(10.499) == 1
+    assert stage.look(10.999) == 1
     stage.is_behind = True
-    assert stage.look(10.5) == 1, "the node is behind"
+    assert stage.look(11.0) == 1, "the node is behind"
     stage.is_behind = False
-    assert stage.look(10.5) == 2
+    assert stage.look(11.0) == 2
     wait_for(stage.is_delivered, "the second")
     assert stage.look(30.0) == 2, "nothing has changed"
 
@@ -216,9 +215,8 @@ def test_marks_that_are_as_before_are_not_sent_again() -> None:
 
 def test_a_layer_is_another_when_the_map_is_or_a_minute_of_its_day_has_passed(stage: Stage) -> None:
     now_ns, revision, model = 0, 1, object()
-    rules = SimpleNamespace(clip_to_explored=True)
     shown: Any = SimpleNamespace(
-        fields=SimpleNamespace(rules=rules),
+        fields=SimpleNamespace(rules=0),
         occupancy=lambda: SimpleNamespace(revision=revision),
         estimates=SimpleNamespace(
             models=SimpleNamespace(of=lambda _: SimpleNamespace(model=model, at_ns=1))
@@ -243,15 +241,11 @@ def test_a_layer_is_another_when_the_map_is_or_a_minute_of_its_day_has_passed(st
     unknown = key()
     revision = 3
     assert key() != unknown, "also without an estimate"
-    rules.clip_to_explored = False
-    before = key()
-    revision = 4
-    assert key() == before, "where the map clips nothing"
 
 
 @pytest.fixture(scope="module")
 def house() -> Iterator[tuple[int, Process, Viewer]]:
-    args = ("--ros-args", "-r", "__ns:=/gh1", "-p", LAYERS, "-p", "layer_rate_hz:=5.0")
+    args = ("--ros-args", "-r", "__ns:=/gh1", "-p", LAYERS)
     with (
         own_domain() as domain,
         twin_node(domain, *args) as process,

@@ -83,8 +83,7 @@ def test_a_tag_past_its_bounds_is_refused_with_the_value_and_the_limit(twin: Twi
 
 
 def test_a_malformed_map_is_refused_and_the_last_good_one_stays(domain: int) -> None:
-    clip = (*OFTEN, "-p", "clip_to_explored:=true")
-    with twin_node(domain, *clip) as process, Peer(domain) as peer:
+    with twin_node(domain, *OFTEN) as process, Peer(domain) as peer:
         peer.wait_for_twin()
         twin = Twin(process, peer)
         peer.observe(scan("1", {"co2": 500.0}, at=(0.5, 0.5)))

@@ -12,13 +12,11 @@ import yaml
 
 from lupin_twin.parameters import MAX_NAMES, ParameterError, TwinParameters, changed, describe
 
-# DESIGN's table, and field_cache_mb.
 DEFAULTS = {
     "observations_topic": "floranova/observations",
     "discovered_tags_topic": "perception/discovered_tags",
     "map_topic": "map",
     "state_topic": "twin/state",
-    "times_topic": "twin/times",
     "field_service_name": "twin/get_field",
     "state_publish_rate_hz": 1.0,
     "frame_id": "map",
@@ -27,13 +25,8 @@ DEFAULTS = {
     "idw_power": 2.0,
     "idw_falloff_radius_m": 1.5,
     "idw_max_distance_m": 1.5,
-    "clip_to_explored": False,
     "max_grid_cells": 1_000_000,
-    "field_cache_mb": 64.0,
-    "day_length_s": 86_400.0,
-    "origin": "robot",
     "layers": (),
-    "layer_rate_hz": 1.0,
     "journal": "",
     "journal_days": 90.0,
     "journal_max_mb": 4000.0,
@@ -72,16 +65,12 @@ def test_the_shipped_file_holds_every_parameter_at_its_default() -> None:
         ("buffer_len", 1.5),
         ("buffer_len", True),
         ("max_grid_cells", 0),
-        ("field_cache_mb", -1.0),
-        ("clip_to_explored", 1),
         ("frame_id", ""),
         ("frame_id", 7),
         ("map_topic", ""),
         ("observations_topic", None),
         ("layers", ["co2", 7]),
         ("layers", 7),
-        ("origin", "gazebo"),
-        ("origin", ""),
     ],
 )
 def test_a_bad_value_is_refused_by_name_with_the_value(name: str, value: Any) -> None:
@@ -129,8 +118,7 @@ def test_every_parameter_is_described() -> None:
     for spec in fields(TwinParameters):
         told = describe(spec.name)
         assert told.description
-        assert bool(told.range) == (type(spec.default) in (int, float) or spec.name == "origin")
-    assert describe("origin").range == "robot, simulated or recorded"
+        assert bool(told.range) == (type(spec.default) in (int, float))
 
 
 CHANGEABLE = {
@@ -138,8 +126,6 @@ CHANGEABLE = {
     "idw_power": 3.0,
     "idw_falloff_radius_m": 2.0,
     "idw_max_distance_m": 2.0,
-    "clip_to_explored": True,
-    "layer_rate_hz": 0.5,
     "max_pose_m": 2000.0,
 }
 

@@ -66,14 +66,14 @@ def test_a_change_is_told_once_with_all_parameters(domain: int) -> None:
     with node_with(domain, made=AdjustableNode) as node:
         node.parameters = declare(node)
         node.adjust_by(told.append)
-        wanted = [Parameter("idw_power", value=3), Parameter("clip_to_explored", value=True)]
+        wanted = [Parameter("idw_power", value=3), Parameter("idw_max_distance_m", value=2.5)]
         assert node.set_parameters_atomically(wanted).successful
         assert node.set_parameters_atomically(wanted).successful, "and nothing is new"
         assert node.get_parameter("idw_power").value == 3
         # ROS's own, and those of whoever else.
         [result] = node.set_parameters([Parameter("use_sim_time", value=False)])
         assert result.successful
-    assert told == [TwinParameters(idw_power=3.0, clip_to_explored=True)]
+    assert told == [TwinParameters(idw_power=3.0, idw_max_distance_m=2.5)]
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from typing import Final
 from zoneinfo import ZoneInfo
 
 from lupin_bridge.judge.daylight import ClockDay, Day, Light, judge_day
-from lupin_bridge.judge.ranges import Sensors, SensorsError, parse
+from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.settings import SettingError, Settings
 
 # Nobody writes this much; a device given by mistake is not read to its end.
@@ -38,7 +38,7 @@ class Criteria:
                 hours that are none.
 
         """
-        return cls(_sensors(settings), settings.recent_s or None, _clock(settings))
+        return cls(_sensors(settings), settings.reading_validity_s or None, _clock(settings))
 
     def judge_day(self, stamp_ns: int) -> Callable[[Light], Day]:
         """What says whether it was day at a moment of ROS time, by the light of then."""
@@ -55,12 +55,16 @@ class Criteria:
 
 def own_sensors() -> Sensors:
     """The file that comes with the bridge."""
+    from lupin_bridge.judge.sensors_file import parse  # noqa: PLC0415  # what looks back has no use
+
     return parse(files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8"))
 
 
 def _sensors(settings: Settings) -> Sensors:
     if not settings.sensors:
         return own_sensors()
+    from lupin_bridge.judge.sensors_file import SensorsError, parse  # noqa: PLC0415  # as above
+
     called = f"{settings.called('sensors')} {settings.sensors}"
     try:
         with Path(settings.sensors).open("rb") as file:

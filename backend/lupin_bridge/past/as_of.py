@@ -197,8 +197,7 @@ def _json(body: bytes) -> Written:
 
 def _conditions(asked: FieldAsked) -> tuple[Any, ...]:
     """What a field depends on beside its samples, by content: a revision is a process's own."""
-    occupancy = asked.occupancy if asked.rules.clip_to_explored else None
-    digest_of_map = None if occupancy is None else _digest_of_map(occupancy)
+    digest_of_map = None if asked.occupancy is None else _digest_of_map(asked.occupancy)
     return asked.rules, digest_of_map, asked.sensors.text
 
 

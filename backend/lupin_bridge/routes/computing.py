@@ -149,20 +149,18 @@ def _response(answer: Answer, give_back: Callable[[], None]) -> LentResponse:
 
 
 async def within_time(bridge: Bridge, work: Awaitable[ResultT]) -> ResultT:
-    """What `work` gives, within `field_timeout_s`.
+    """What `work` gives, within `Limits.answer_timeout_s`.
 
     Raises:
         TwinTimeoutError: it took longer; it is cancelled.
 
     """
-    limit_s = bridge.settings.field_timeout_s
+    limit_s = bridge.limits.answer_timeout_s
     try:
         async with asyncio.timeout(limit_s):
             return await work
     except TimeoutError:
-        raise TwinTimeoutError(
-            f"the answer was not there within {limit_s:g} s (field_timeout_s)"
-        ) from None
+        raise TwinTimeoutError(f"the answer was not there within {limit_s:g} s") from None
 
 
 async def while_client_waits(

@@ -95,9 +95,8 @@ async def _as_of(
 ) -> Response:
     """The field as of a moment, or now, in a format; None: its quality."""
     source = bridge_of(request).source
-    rules = source.rules()
-    occupancy = source.occupancy_map() if rules.clip_to_explored else None
-    asked = FieldAsked(query, rules, occupancy, bridge_of(request).criteria.sensors)
+    sensors = bridge_of(request).criteria.sensors
+    asked = FieldAsked(query, source.rules(), source.occupancy_map(), sensors)
     asked.check(field_format or JSON)
     return await response_as_of(request, at_ns, Field(asked, field_format))
 

@@ -1,8 +1,8 @@
 """`/foxglove`: Foxglove and Lichtblick read the twin's topics here, as ROS has them on the wire.
 
 What is spoken stands in `foxglove`. A client that does not read as fast as messages come gets of
-each channel the newest, and after `client_timeout_s` without taking anything it is closed, as any
-other client. Nothing more is read from one that has not taken the answer to what it said.
+each channel the newest, and after `Limits.client_timeout_s` without taking anything it is closed,
+as any other client. Nothing more is read from one that has not taken the answer to what it said.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class _Conversation:
     async def _begin(self, key: int, channel: Channel) -> None:
         try:
             topic = self._offer.topics[channel.id]
-            async with asyncio.timeout(self._bridge.settings.field_timeout_s):
+            async with asyncio.timeout(self._bridge.limits.answer_timeout_s):
                 listening = await self._bridge.source.relay.listen(topic, partial(self._hear, key))
         except (KeyError, NotRelayedError, TwinUnavailableError, TimeoutError) as error:
             self._session.give_up(key)

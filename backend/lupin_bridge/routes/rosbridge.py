@@ -2,10 +2,10 @@
 
 What is served and what is refused stands in `rosbridge`. Of one connection there are at most
 `MAX_OPEN_CALLS` calls under way, `MAX_RUNNING_CALLS` of them with the twin; the others wait. One
-that takes longer than `field_timeout_s`, or than its own `timeout`, ends with `result` false, and
-so does one past `field_rate_hz` or the other limits of fields, which hold here as over HTTP.
+that takes longer than `Limits.answer_timeout_s`, or than its own `timeout`, ends with `result`
+false, and so does one past the limits of computed answers, which hold here as over HTTP.
 Replies wait for a slow client, at most one for each running call, and nothing more is read from
-it meanwhile; after `client_timeout_s` it is closed, as any other client.
+it meanwhile; after `Limits.client_timeout_s` it is closed, as any other client.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ class _Conversation:
             text = f"{MAX_OPEN_CALLS} calls are under way, the limit for one client"
             await self._send(service_failure(call.id, call.service, text))
             return
-        limit_s = self._bridge.settings.field_timeout_s
+        limit_s = self._bridge.limits.answer_timeout_s
         if call.timeout_s is not None:
             limit_s = min(limit_s, call.timeout_s)
         task = asyncio.create_task(self._answer(field_call, limit_s))

@@ -19,7 +19,7 @@ from typing import Final
 
 from lupin_bridge.serving.rate_limit import RateLimit
 
-# A page that opens asks for several fields at once; seconds' worth of field_rate_hz.
+# A page that opens asks for several fields at once; seconds' worth of the rate.
 BURST_S: Final = 2.0
 # An export goes on for as long as its reader takes: one a client, and few that share the disk. Who
 # takes no more than 100 kB/s of it may go on until somebody else wants the place.
@@ -38,7 +38,7 @@ REASONS: Final = (IN_FLIGHT, RATE, LARGE, TOTAL, CLIENT_EXPORTS, ALL_EXPORTS)
 
 
 class AdmissionError(RuntimeError):
-    """One request too many; the message names the limit and its setting."""
+    """One request too many; the message names the limit."""
 
     def __init__(self, message: str, retry_after_s: float) -> None:
         super().__init__(message)
@@ -106,7 +106,7 @@ class Admission:
             self.refused[IN_FLIGHT] += 1
             raise ClientLimitError(
                 f"{client} has {self._concurrency} requests for computed answers in flight, the "
-                "limit (field_concurrency)",
+                "limit",
                 1.0,
             )
         wait_s = self._rate.take(client, now_s)
@@ -114,7 +114,7 @@ class Admission:
             self.refused[RATE] += 1
             raise ClientLimitError(
                 f"{client} asks for more than {self._rate_hz:g} computed answers a second, the "
-                "limit (field_rate_hz)",
+                "limit",
                 wait_s,
             )
         self._in_flight[client] += 1
@@ -167,13 +167,10 @@ class Admission:
         """
         if self._computing.is_full_for(client):
             self.refused[TOTAL] += 1
-            raise BusyError(
-                self._computing.why_not(client, "answers", "field_total_concurrency"), 1.0
-            )
+            raise BusyError(self._computing.why_not(client, "answers"), 1.0)
         if is_large and self._large.is_full_for(client):
             self.refused[LARGE] += 1
-            limit = "three quarters of field_total_concurrency"
-            raise BusyError(self._large.why_not(client, "large answers", limit), 1.0)
+            raise BusyError(self._large.why_not(client, "large answers"), 1.0)
         taken = (self._computing, self._large) if is_large else (self._computing,)
         for places in taken:
             places.taken[client] += 1
@@ -194,10 +191,10 @@ class _Places:
     def is_full_for(self, client: str) -> bool:
         return self.taken[client] >= self.limit - self.taken.total()
 
-    def why_not(self, client: str, what: str, limit: str) -> str:
+    def why_not(self, client: str, what: str) -> str:
         return (
             f"{self.taken.total()} {what} are being computed, {self.taken[client]} of them for "
-            f"{client}: the limit is {self.limit} ({limit}), and no client takes more than it "
+            f"{client}: the limit is {self.limit}, and no client takes more than it "
             "leaves free"
         )
 

@@ -7,7 +7,7 @@ from typing import Final
 from lupin_bridge.serving.rate_limit import RateLimit
 
 # A page subscribes a few times as it opens, a layout with twenty panels twenty times, and both
-# hardly ever from then on; more fields than `field_rate_hz` (50 a second) nobody gets anyway.
+# hardly ever from then on; more fields than 50 a second nobody gets anyway.
 MAX_MESSAGES_PER_S: Final = 100
 MAX_BURST: Final = 500
 

@@ -19,6 +19,7 @@ from uvicorn.server import HANDLED_SIGNALS
 
 from lupin_bridge.serving.acceptor import Acceptor, room_for_connections
 from lupin_bridge.serving.http_protocol import HttpConnection
+from lupin_bridge.serving.limits import Limits
 from lupin_bridge.serving.transports import tear_down
 from lupin_bridge.serving.ws_protocol import Connection
 from lupin_bridge.settings import Settings
@@ -46,7 +47,13 @@ TICKS_PER_S = 10
 class BridgeServer(uvicorn.Server):
     """uvicorn's server, that says good-bye first and does not raise the signal once more."""
 
-    def __init__(self, app: FastAPI, settings: Settings, say_goodbye: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        app: FastAPI,
+        settings: Settings,
+        say_goodbye: Callable[[], None],
+        limits: Limits = Limits(),  # noqa: B008  # a value
+    ) -> None:
         super().__init__(
             uvicorn.Config(
                 app,
@@ -56,7 +63,7 @@ class BridgeServer(uvicorn.Server):
                 ws_max_size=MAX_INBOUND_BYTES,
                 ws_ping_interval=PING_PERIOD_S,
                 ws_ping_timeout=PING_PERIOD_S,
-                timeout_keep_alive=math.ceil(settings.client_timeout_s),
+                timeout_keep_alive=math.ceil(limits.client_timeout_s),
                 access_log=False,
                 log_config=None,
                 server_header=False,

@@ -3,7 +3,7 @@
 The policy for slow clients, in full: a frame is written to a client whose socket has taken all of
 the one before. To any other client nothing is written and nothing queued; when its socket is free
 again it gets the newest frame there is, and sees from `seq` what it skipped. A client that cannot
-take a frame for `client_timeout_s` is closed.
+take a frame for `Limits.client_timeout_s` is closed.
 
 No input or output here and no clock: connections and times (seconds of a clock that never jumps)
 are arguments.

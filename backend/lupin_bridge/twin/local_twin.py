@@ -31,6 +31,7 @@ from lupin_twin.journal.condition import Condition
 from lupin_twin.journal.queries import SERIES_S
 from lupin_twin.journal.writes import WRITES_S
 from lupin_twin.node import TwinNode
+from lupin_twin.parameters import World
 from lupin_twin.past import NotRemembered, PastRow, SeriesPast, SeriesRequest
 from lupin_twin.past_writes import PastWrites, WritesRequest
 from lupin_twin.state import NANOSECONDS_PER_SECOND, Snapshot
@@ -47,9 +48,15 @@ class LocalTwin:
     """`TwinSource` over a `TwinNode` of this process; see `PastProcess` for what it `expects`."""
 
     def __init__(
-        self, *, ros_args: Sequence[str], timeout_s: float, expects: type | None = None
+        self,
+        *,
+        ros_args: Sequence[str],
+        timeout_s: float,
+        expects: type | None = None,
+        world: World = World(),  # noqa: B008  # a value
     ) -> None:
         self._ros_args = ros_args
+        self._world = world
         self._timeout_s = timeout_s
         # A restarted server must never match an ETag of its predecessor, whose counts it repeats.
         self._identity = uuid.uuid4().hex[:12]
@@ -73,7 +80,7 @@ class LocalTwin:
         """Start the ROS thread with its node; see `TwinSource.start`."""
 
         def make_node(context: Any, post: Callable[[Told], None]) -> TwinNode:
-            node = TwinNode(context=context)
+            node = TwinNode(context=context, world=self._world)
 
             def tell(snapshot: Snapshot) -> None:
                 post(
@@ -297,7 +304,7 @@ class LocalTwin:
                 return await answer
         except TimeoutError:
             raise TwinTimeoutError(
-                f"the twin did not answer within {self._timeout_s:g} s (field_timeout_s)"
+                f"the twin did not answer within {self._timeout_s:g} s"
             ) from None
         except NotRemembered as error:
             damage = error.damage

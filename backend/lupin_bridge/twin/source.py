@@ -36,7 +36,7 @@ class TwinUnavailableError(RuntimeError):
 
 
 class TwinTimeoutError(TwinUnavailableError):
-    """The twin took longer than `field_timeout_s`."""
+    """The twin took too long for an answer."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,11 +32,11 @@ from lupin_twin.drops import Drop, Reason
 from lupin_twin.estimate_report import REPORT_SERVICE
 from lupin_twin.estimates import ESTIMATE_SERVICE
 from lupin_twin.explored import OccupancyMap
-from lupin_twin.field_rules import field_rules
+from lupin_twin.fields import FieldRules
 from lupin_twin.habits import SERVICE_QOS, Habits
 from lupin_twin.history import History, TagHistory
 from lupin_twin.journal.condition import Condition
-from lupin_twin.parameters import TwinParameters
+from lupin_twin.parameters import TIMES_TOPIC, TwinParameters
 from lupin_twin.past import HISTORY_SERVICE, STATE_AT_SERVICE
 from lupin_twin.past_writes import WRITES_SERVICE
 from lupin_twin.ros_parameters import (
@@ -77,7 +77,6 @@ REPORT_HOLDS_S: Final = 5.0
 # are not the defaults, give both the same parameter file.
 SHARED_PARAMETERS: Final = (
     "state_topic",
-    "times_topic",
     "field_service_name",
     "observations_topic",
     "discovered_tags_topic",
@@ -87,7 +86,6 @@ SHARED_PARAMETERS: Final = (
     "idw_power",
     "idw_falloff_radius_m",
     "idw_max_distance_m",
-    "clip_to_explored",
     "max_grid_cells",
 )
 
@@ -139,7 +137,7 @@ class WebNode(AdjustableNode):
         self.habits = Habits(self)
         self.report = self.habits.report
         self.parameters = declare(self, SHARED_PARAMETERS)
-        self.rules = field_rules(self.parameters)
+        self.rules = FieldRules.of(self.parameters)
         self.adjust_by(self._adjust)
         self.twins = TwinCount()
         self.occupancy_map: OccupancyMap | None = None
@@ -161,14 +159,14 @@ class WebNode(AdjustableNode):
         group = MutuallyExclusiveCallbackGroup()
         p = self.parameters
         self._history = History(p.buffer_len)
-        for parameter, shape, callback, on_number in (
-            ("state_topic", shapes.STATE, self._take_state, self.twins.hear),
-            ("times_topic", shapes.TIMES, self._take_times, None),
-            ("map_topic", shapes.MAP, self._take_map, None),
+        for parameter, topic, shape, callback, on_number in (
+            ("state_topic", p.state_topic, shapes.STATE, self._take_state, self.twins.hear),
+            ("times", TIMES_TOPIC, shapes.TIMES, self._take_times, None),
+            ("map_topic", p.map_topic, shapes.MAP, self._take_map, None),
         ):
             self._topics[parameter] = self.habits.subscribe(
                 parameter,
-                getattr(p, parameter),
+                topic,
                 shape,
                 depth=1,
                 group=group,
@@ -283,7 +281,7 @@ class WebNode(AdjustableNode):
         times = self._pairing.take_state(convert.nanoseconds(msg.header.stamp), msg)
         if times is not None:
             self._show(msg, times)
-        elif not self.count_publishers(self._topics["times_topic"]):
+        elif not self.count_publishers(self._topics["times"]):
             self._show_without_times()
         elif self._patience.is_canceled():
             self._patience.reset()
@@ -365,7 +363,7 @@ class WebNode(AdjustableNode):
 
     def _adjust(self, now: TwinParameters) -> None:
         # A twin's own are not on the wire: they are set here as there.
-        self.rules = field_rules(now)
+        self.rules = FieldRules.of(now)
         self._changes += 1
         self.epoch += 1
         self._on_map()

@@ -312,7 +312,7 @@ class WebTwin:
                 )
         except TimeoutError:
             raise TwinTimeoutError(
-                f"the twin did not answer within {self._timeout_s:g} s (field_timeout_s)"
+                f"the twin did not answer within {self._timeout_s:g} s"
             ) from None
 
     def _check_heard(self) -> None:

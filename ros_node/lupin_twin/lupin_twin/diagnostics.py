@@ -62,7 +62,7 @@ _ORIGIN: Final[Mapping[Origin, str]] = {
 
 
 def origin_of(said: str, *, is_simulated: bool) -> Origin:
-    """What the parameter says; and by a clock that is simulated (`is_simulated`) no robot works."""
+    """What is said of it; and by a clock that is simulated (`is_simulated`) no robot works."""
     origin: Origin = next((one for one in get_args(Origin) if one == said), "unknown")
     return "sim_time" if is_simulated and origin == "robot" else origin
 
@@ -208,10 +208,7 @@ def findings(health: Health) -> Iterator[Finding]:
 
 def _estimates(said: Estimates) -> Finding:
     wrong = [f"{sensor}: {why}" for sensor, why in said.problems.items()]
-    wrong += [
-        f"{sensor}: the model is wrong, by what it foretold; is day_length_s right?"
-        for sensor in said.distrusted
-    ]
+    wrong += [f"{sensor}: the model is wrong, by what it foretold" for sensor in said.distrusted]
     return Finding(
         "estimates",
         WARN if wrong else OK,

@@ -12,13 +12,14 @@ from typing import Final, NamedTuple
 from lupin_twin.grid import FieldGrid
 
 MAX_ENTRIES: Final = 64
+MAX_BYTES: Final = 64_000_000
 
 
 class FieldKey(NamedTuple):
     """Everything that a field depends on; `rules` are those by which it is made.
 
-    `observation_count` stands for the store's whole content. `map_revision` is None where the map
-    has no say, so that a new map then leaves the cache as it is.
+    `observation_count` stands for the store's whole content. `map_revision` is None where no map
+    has come.
     """
 
     sensor_type: str
@@ -35,7 +36,7 @@ class FieldKey(NamedTuple):
 class FieldCache:
     """An LRU of at most `max_entries` fields whose values take at most `max_bytes` together."""
 
-    def __init__(self, max_bytes: int, max_entries: int = MAX_ENTRIES) -> None:
+    def __init__(self, max_bytes: int = MAX_BYTES, max_entries: int = MAX_ENTRIES) -> None:
         """Raises ValueError for a bound below 0."""
         if max_bytes < 0:
             raise ValueError(f"max_bytes is {max_bytes}, must not be less than 0")

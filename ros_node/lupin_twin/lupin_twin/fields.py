@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
 
@@ -19,12 +19,11 @@ from lupin_twin.far_off import reach_of
 from lupin_twin.field_cache import FieldCache, FieldKey
 from lupin_twin.grid import FieldGrid, grid_dimensions
 from lupin_twin.idw import compute_idw_field, never
+from lupin_twin.parameters import TwinParameters
 from lupin_twin.state import TwinStore
 
 # m, of who asks for none.
 DEFAULT_RESOLUTION_M: Final = 0.1
-# The revision of a map that has not come yet; a real one is never negative.
-_NO_MAP_REVISION = -1
 
 # What computing takes, roughly and at worst: for each cell, and for each pair of a cell and a
 # sample that reaches it, at power 2 or any other.
@@ -77,8 +76,17 @@ class FieldRules:
     idw_power: float
     falloff_radius_m: float
     max_distance_m: float
-    clip_to_explored: bool
     max_grid_cells: int
+
+    @classmethod
+    def of(cls, parameters: TwinParameters) -> Self:
+        """As the parameters have them."""
+        return cls(
+            idw_power=parameters.idw_power,
+            falloff_radius_m=parameters.idw_falloff_radius_m,
+            max_distance_m=parameters.idw_max_distance_m,
+            max_grid_cells=parameters.max_grid_cells,
+        )
 
     def __post_init__(self) -> None:
         for name in ("idw_power", "falloff_radius_m", "max_distance_m"):
@@ -157,7 +165,7 @@ def compute_field(
     rules: FieldRules,
     should_stop: Callable[[], bool] = never,
 ) -> FieldGrid:
-    """The field of `samples`; unexplored cells are NaN where the rules clip (all, without a map).
+    """The field of `samples`; with a map, cells that it does not know are NaN.
 
     Raises:
         FieldRefused: see `check_request`.
@@ -165,19 +173,16 @@ def compute_field(
 
     """
     mask = None
-    if rules.clip_to_explored:
+    if occupancy is not None:
         width, height = check_request(request, rules.max_grid_cells)
-        if occupancy is None:
-            mask = np.zeros((height, width), dtype=np.bool_)
-        else:
-            mask = explored_mask(
-                occupancy,
-                width=width,
-                height=height,
-                origin_x=request.bbox_min_x,
-                origin_y=request.bbox_min_y,
-                resolution=request.resolution,
-            )
+        mask = explored_mask(
+            occupancy,
+            width=width,
+            height=height,
+            origin_x=request.bbox_min_x,
+            origin_y=request.bbox_min_y,
+            resolution=request.resolution,
+        )
     return compute_idw_field(
         samples,
         bbox_min_x=request.bbox_min_x,
@@ -197,7 +202,7 @@ def compute_field(
 class FieldJob:
     """A field to be computed: all it depends on, immutable, so that any thread may do it.
 
-    `occupancy` is the map to clip to, and None where the rules do not clip or no map has come.
+    `occupancy` is the map to clip to, and None before one has come.
     """
 
     request: FieldRequest
@@ -245,7 +250,7 @@ class FieldEngine:
             request=request,
             key=key,
             samples=store.samples_for_sensor(request.sensor_type),
-            occupancy=occupancy if self.rules.clip_to_explored else None,
+            occupancy=occupancy,
             rules=self.rules,
         )
 
@@ -256,9 +261,6 @@ class FieldEngine:
     def _key(
         self, request: FieldRequest, observation_count: int, occupancy: OccupancyMap | None
     ) -> FieldKey:
-        map_revision = None
-        if self.rules.clip_to_explored:
-            map_revision = _NO_MAP_REVISION if occupancy is None else occupancy.revision
         return FieldKey(
             sensor_type=request.sensor_type,
             observation_count=observation_count,
@@ -267,7 +269,7 @@ class FieldEngine:
             bbox_min_y=request.bbox_min_y,
             bbox_max_x=request.bbox_max_x,
             bbox_max_y=request.bbox_max_y,
-            map_revision=map_revision,
+            map_revision=None if occupancy is None else occupancy.revision,
             rules=self.rules,
         )
 

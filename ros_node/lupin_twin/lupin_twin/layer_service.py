@@ -37,6 +37,8 @@ from lupin_twin.workers import ShouldStop, Workers
 
 # How often it is looked at whether somebody subscribes, and whether something has changed, s.
 LAYER_LOOK_S: Final = 0.2
+# A topic is published no more often than this, s, and only when something has changed.
+PERIOD_S: Final = 1.0
 # All of it is taken to be large, s of one core: then one is made after the other.
 _COST_S: Final = 1.0
 
@@ -45,8 +47,7 @@ _COST_S: Final = 1.0
 class Shown:
     """What is shown: the twin's own parts, on its thread.
 
-    `now_ns` tells ROS time, `rate_hz` how often each topic may be published; `day_length_s` is the
-    estimate's.
+    `now_ns` tells ROS time; `day_length_s` is the estimate's.
     """
 
     store: TwinStore
@@ -55,7 +56,6 @@ class Shown:
     occupancy: Callable[[], OccupancyMap | None]
     snapshot: Callable[[], Snapshot]
     now_ns: Callable[[], int]
-    rate_hz: Callable[[], float]
     day_length_s: float
 
 
@@ -172,7 +172,7 @@ class LayerService:
                 continue
             if not topic.is_wanted:
                 topic.forget()
-            elif now_s - topic.begun_s >= 1.0 / self.shown.rate_hz():
+            elif now_s - topic.begun_s >= PERIOD_S:
                 self._begin(topic, now_s)
 
     def _begin(self, topic: _Topic, now_s: float) -> None:
@@ -224,7 +224,7 @@ class LayerService:
     def _key_of_layer(self, sensor: str) -> object:
         shown = self.shown
         rules, occupancy = shown.fields.rules, shown.occupancy()
-        revision = occupancy.revision if occupancy is not None and rules.clip_to_explored else None
+        revision = None if occupancy is None else occupancy.revision
         fit = shown.estimates.models.of(sensor)
         if fit.model is None:
             return shown.store.observation_count, rules, revision

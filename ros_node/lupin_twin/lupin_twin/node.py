@@ -29,8 +29,7 @@ from lupin_twin.estimate_service import EstimateRules, EstimateService, Known
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.field_cache import FieldCache
 from lupin_twin.field_desk import FieldDesk
-from lupin_twin.field_rules import field_rules
-from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused
+from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused, FieldRules
 from lupin_twin.grid import FieldGrid
 from lupin_twin.habits import SERVICE_QOS, Habits, latched, waker
 from lupin_twin.history import History, TagHistory, kind_of
@@ -39,7 +38,7 @@ from lupin_twin.lateness import LATCHED_AFTER_S, Lateness
 from lupin_twin.layer_service import LAYER_LOOK_S, LayerService, Shown
 from lupin_twin.memory import Memory, journal_path, open_journal
 from lupin_twin.other_twins import OtherTwins
-from lupin_twin.parameters import ParameterError, TwinParameters
+from lupin_twin.parameters import TIMES_TOPIC, ParameterError, TwinParameters, World
 from lupin_twin.past_desk import PastDesk
 from lupin_twin.past_service import JournalPast, PastService
 from lupin_twin.resending import TRY_EVERY_S, Resending
@@ -64,20 +63,24 @@ class TwinNode(AdjustableNode):
 
     """
 
-    def __init__(self, *, context: Any = None, cli_args: Sequence[str] | None = None) -> None:
+    def __init__(
+        self,
+        *,
+        context: Any = None,
+        cli_args: Sequence[str] | None = None,
+        world: World = World(),  # noqa: B008  # a value
+    ) -> None:
         with naming_own_parameters():
             super().__init__(NODE_NAME, context=context, cli_args=cli_args)
         self.habits = Habits(self)
         self.report = self.habits.report
         self.parameters = declare(self)
+        self._world = world
         self.store = TwinStore()
         self.history = History(self.parameters.buffer_len)
         self.memory = self._memory()
         self.lateness = Lateness()
-        self.fields = FieldEngine(
-            field_rules(self.parameters),
-            FieldCache(max_bytes=int(self.parameters.field_cache_mb * 1e6)),
-        )
+        self.fields = FieldEngine(FieldRules.of(self.parameters), FieldCache())
         self.occupancy_map: OccupancyMap | None = None
         self.twins = TwinCount()
         self._clock_watch = ClockWatch()
@@ -103,7 +106,7 @@ class TwinNode(AdjustableNode):
         self.estimates = EstimateService(
             self.habits,
             Known(self.store, self.history, self.memory.recall, lambda: self.occupancy_map),
-            EstimateRules(self.parameters.day_length_s, self.parameters.max_grid_cells),
+            EstimateRules(world.day_length_s, self.parameters.max_grid_cells),
             self._now_ns,
             waker(found),
         )
@@ -116,8 +119,7 @@ class TwinNode(AdjustableNode):
                 lambda: self.occupancy_map,
                 self.snapshot,
                 self._now_ns,
-                lambda: self.parameters.layer_rate_hz,
-                self.parameters.day_length_s,
+                world.day_length_s,
             ),
             waker(found),
         )
@@ -187,8 +189,7 @@ class TwinNode(AdjustableNode):
             )
         with naming("state_topic", p.state_topic):
             self._state_publisher = self.create_publisher(TwinState, p.state_topic, latched(1))
-        with naming("times_topic", p.times_topic):
-            self._times_publisher = self.create_publisher(TwinTimes, p.times_topic, latched(1))
+        self._times_publisher = self.create_publisher(TwinTimes, TIMES_TOPIC, latched(1))
         kind, name, answer = GetField, p.field_service_name, self._on_get_field
         with naming("field_service_name", name):
             self.create_service(kind, name, answer, qos_profile=SERVICE_QOS, callback_group=group)
@@ -224,7 +225,7 @@ class TwinNode(AdjustableNode):
         if self._state_timer.timer_period_ns != int(1e9 / now.state_publish_rate_hz):
             self.destroy_timer(self._state_timer)
             self._state_timer = self._publish_at(now.state_publish_rate_hz)
-        if (rules := field_rules(now)) != self.fields.rules:
+        if (rules := FieldRules.of(now)) != self.fields.rules:
             self.fields.rules = rules
             self._rules_revision += 1
             self._tell_listeners()
@@ -374,7 +375,7 @@ class TwinNode(AdjustableNode):
     @property
     def origin(self) -> Origin:
         """Where what is observed comes from."""
-        return origin_of(self.parameters.origin, is_simulated=self.get_clock().ros_time_is_active)
+        return origin_of(self._world.origin, is_simulated=self.get_clock().ros_time_is_active)
 
     # --- small parts ------------------------------------------------------------------------
 

@@ -7,14 +7,26 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Final
 
+from lupin_twin.diagnostics import Origin
 from lupin_twin.far_off import FARTHEST_M
 
-# Of the parameter of that name, see `diagnostics.Origin`.
-ORIGINS: Final = ("robot", "simulated", "recorded")
+# Where the times are published, right behind the state with the same stamp.
+TIMES_TOPIC: Final = "twin/times"
 # Of a parameter that is a list.
 MAX_NAMES: Final = 16
 # Characters of a value that a complaint repeats.
 MAX_SHOWN: Final = 80
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """What is observed: a robot's greenhouse, or what a demo makes of one. No user chooses it.
+
+    `day_length_s` is how long a day takes, s of ROS time: what comes daily is estimated by it.
+    """
+
+    origin: Origin = "robot"
+    day_length_s: float = 86_400.0
 
 
 class ParameterError(ValueError):
@@ -28,7 +40,6 @@ def _parameter(
     high: float = math.inf,
     *,
     may_be_empty: bool = False,
-    choices: tuple[str, ...] = (),
     fixed: str = "",
 ) -> Any:
     return field(
@@ -38,7 +49,6 @@ def _parameter(
             "low": low,
             "high": high,
             "may_be_empty": may_be_empty,
-            "choices": choices,
             "fixed": fixed,
         },
     )
@@ -77,11 +87,6 @@ class TwinParameters:
     state_topic: str = _parameter(
         "twin/state", "topic of lupin_msgs/TwinState to publish", fixed=_NAMED
     )
-    times_topic: str = _parameter(
-        "twin/times",
-        "topic of lupin_msgs/TwinTimes to publish right behind the state",
-        fixed=_NAMED,
-    )
     field_service_name: str = _parameter(
         "twin/get_field", "name of the GetField service", fixed=_NAMED
     )
@@ -103,35 +108,12 @@ class TwinParameters:
     idw_max_distance_m: float = _parameter(
         1.5, "a cell whose nearest tag is farther is NaN, m", 0.001, 10_000.0
     )
-    clip_to_explored: bool = _parameter(
-        False, "NaN wherever the latest map does not know the floor"
-    )
     max_grid_cells: int = _parameter(
         1_000_000, "largest field served, cells", 1, 100_000_000, fixed=_MADE
-    )
-    field_cache_mb: float = _parameter(
-        64.0, "memory for computed fields, MB", 0.0, 100_000.0, fixed=_MADE
-    )
-    day_length_s: float = _parameter(
-        86_400.0,
-        "how long a day takes, s of ROS time: what comes daily is estimated by it",
-        1.0,
-        1e7,
-        fixed=_MEANING,
-    )
-
-    origin: str = _parameter(
-        "robot",
-        "where observations come from; whoever looks at the twin is told",
-        choices=ORIGINS,
-        fixed=_MEANING,
     )
 
     layers: tuple[str, ...] = _parameter(
         (), "sensors whose fields are published as points for viewers such as RViz", fixed=_NAMED
-    )
-    layer_rate_hz: float = _parameter(
-        1.0, "how often layers and markers are published at most, while they change", 0.01, 5.0
     )
 
     journal: str = _parameter(
@@ -169,11 +151,7 @@ def _checked(name: str, value: object, default: object, metadata: Any) -> object
         )
     if isinstance(value, str) and not value and not metadata["may_be_empty"]:
         raise ParameterError(f"parameter {name} is empty, expected a name")
-    if metadata["choices"] and value not in metadata["choices"]:
-        raise ParameterError(
-            f"parameter {name} is {_shown(value)}, expected {_one_of(metadata['choices'])}"
-        )
-    if isinstance(value, int | float) and not isinstance(value, bool):
+    if isinstance(value, int | float):
         low, high = metadata["low"], metadata["high"]
         if not low <= value <= high:  # false for NaN too
             raise ParameterError(f"parameter {name} is {value}, expected {low} to {high}")
@@ -199,28 +177,18 @@ def _shown(value: object) -> str:
     return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}…"
 
 
-def _one_of(choices: tuple[str, ...]) -> str:
-    return f"{', '.join(choices[:-1])} or {choices[-1]}"
-
-
 @dataclass(frozen=True, slots=True)
 class Described:
-    """What is told of a parameter; `low` None: it has no range. `fixed` empty: it may change.
-
-    `choices` empty: any name.
-    """
+    """What is told of a parameter; `low` None: it has no range. `fixed` empty: it may change."""
 
     description: str
     low: float | None
     high: float
     fixed: str
-    choices: tuple[str, ...] = ()
 
     @property
     def range(self) -> str:
         """The allowed range in words; empty, where there is none."""
-        if self.choices:
-            return _one_of(self.choices)
         return "" if self.low is None else f"{self.low} to {self.high}"
 
 
@@ -228,7 +196,7 @@ def describe(name: str) -> Described:
     """What `ros2 param describe` and the README tell of a parameter."""
     spec = next(spec for spec in fields(TwinParameters) if spec.name == name)
     told = spec.metadata
-    return Described(told["description"], told["low"], told["high"], told["fixed"], told["choices"])
+    return Described(told["description"], told["low"], told["high"], told["fixed"])
 
 
 def changed(now: TwinParameters, wanted: Mapping[str, object]) -> TwinParameters:

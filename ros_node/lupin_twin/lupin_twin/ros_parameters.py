@@ -62,9 +62,7 @@ def _descriptor(name: str, default: object) -> ParameterDescriptor:
     told = describe(name)
     descriptor = ParameterDescriptor(
         description=told.description,
-        additional_constraints="; ".join(
-            filter(None, (" | ".join(told.choices), told.fixed and f"read only: {told.fixed}"))
-        ),
+        additional_constraints=told.fixed and f"read only: {told.fixed}",
         read_only=bool(told.fixed),
         # `idw_power: 2` is an integer to YAML; our own check takes it.
         dynamic_typing=True,

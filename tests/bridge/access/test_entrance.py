@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from lupin_bridge.access.entrance import ComesIn, Entrance, path_of
 from lupin_bridge.settings import SettingError, Settings
 from tests.support.access import BEARER, OWN, TOKEN, Served, refused_start, served
+from tests.support.processes import limits
 from tests.support.waiting import wait_for
 
 BEHIND_TWO = Entrance.of(Settings(trusted_proxy=("10.0.0.7", "192.168.0.0/24", "fd00::/64")))
@@ -197,7 +198,7 @@ def test_fields_are_limited_for_whom_the_proxy_names() -> None:
         box = f"bbox_min_x=0&bbox_min_y=0&bbox_max_x={right}&bbox_max_y=1"
         return f"/api/field?sensor_type=co2&{box}"
 
-    with served("--trusted-proxy", PROXY, "--field-rate-hz", "0.01") as live:
+    with served("--trusted-proxy", PROXY, *limits(answers_per_s=0.01)) as live:
         assert status(live, PROXY, path(1), X_Forwarded_For=one) == 200
         assert status(live, PROXY, path(2), X_Forwarded_For=one) == 429
         assert status(live, PROXY, path(2), X_Forwarded_For=f"6.6.6.6, {one}") == 429

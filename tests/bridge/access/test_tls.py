@@ -20,6 +20,7 @@ from cryptography.hazmat.primitives.serialization import (
 
 from lupin_bridge.access.tls import TlsError, check_pair
 from tests.support.access import BEARER, TOKEN, Served, refused_start, served
+from tests.support.processes import limits
 from tests.support.raw_ws import frames_of, handshake_request
 from tests.support.tls import Certificate, certificate
 from tests.support.waiting import PATIENCE_S, wait_for
@@ -123,7 +124,7 @@ def test_who_asks_in_one_piece_with_the_end_of_the_handshake_is_not_cut_off(
     ours: Certificate,
 ) -> None:
     """As a quick client does: the server's tickets are still unsent when the request comes."""
-    with served(*ours.options, "--client-timeout-s", "2", trust=ours.trust) as live:
+    with served(*ours.options, *limits(client_timeout_s=2), trust=ours.trust) as live:
         address = urlsplit(live.url)
         incoming, outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
         tls = ours.trust.wrap_bio(incoming, outgoing, server_hostname=address.hostname)

@@ -19,7 +19,7 @@ def test_without_a_choice_it_is_our_own_file_and_the_patrols_rhythm() -> None:
     chosen = criteria()
     assert chosen.sensors == own_sensors()
     assert chosen.recent_s is None
-    assert criteria(recent_s=900.0).recent_s == 900.0
+    assert criteria(reading_validity_s=900.0).recent_s == 900.0
 
 
 def test_an_operators_file_replaces_ours(tmp_path: Path) -> None:
@@ -31,7 +31,7 @@ def test_an_operators_file_replaces_ours(tmp_path: Path) -> None:
 def test_what_is_wrong_with_the_file_is_told_with_its_line(tmp_path: Path) -> None:
     file = tmp_path / "mine.json"
     file.write_text(own_sensors().text.replace('"ideal": [18, 26]', '"ideal": [26, 18]'), "utf-8")
-    says = f"--sensors {file}: line 8: sensors.temperature.ideal is [26, 18], and low must be"
+    says = f"--sensors {file}: sensors.temperature: ideal is [26.0, 18.0], and low must be"
     with pytest.raises(SettingError, match=re.escape(says)):
         criteria(sensors=str(file))
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from lupin_bridge.judge.daylight import Day, Light, judge_day
 from lupin_bridge.judge.judging import MAX_AT_ONCE, Judge, Judged, judge_once
 from lupin_bridge.judge.patrol import Patrol
-from lupin_bridge.judge.ranges import parse
 from lupin_bridge.judge.rhythm import Rhythm, holds_ns
+from lupin_bridge.judge.sensors_file import parse
 from lupin_bridge.judge.verdict import Health, Kind, Reason, Verdict, judge_house, judge_tag
 from lupin_twin.state import Reading, Snapshot, TagState
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.judge.ranges import parse
+from lupin_bridge.judge.sensors_file import parse
 from lupin_bridge.judge.verdict import Health, Kind, Verdict, judge_house, judge_tag, worst
 from lupin_twin.state import NO_FLOWER, Flower, Reading, TagState, Try
 

@@ -26,7 +26,7 @@ from lupin_twin.state import Pose, Reading, Snapshot, TagState
 from lupin_twin.workers import SMALL_S
 
 NS = 10**9
-RULES = FieldRules(2.0, 1.5, 1.5, clip_to_explored=False, max_grid_cells=10_000)
+RULES = FieldRules(2.0, 1.5, 1.5, max_grid_cells=10_000)
 
 
 def tag(tag_id: str, x: float, value: float, at_ns: int = NS) -> TagState:
@@ -114,11 +114,9 @@ def test_before_there_was_anything_there_is_an_empty_state_and_an_empty_field() 
 
 
 def test_a_field_is_clipped_to_the_map_of_now() -> None:
-    rules = replace(RULES, clip_to_explored=True)
     box = {"bbox_min_x": 0, "bbox_min_y": 0, "bbox_max_x": 1, "bbox_max_y": 0.5, "resolution": 0.5}
-    found = body(as_of.field(HOUSE, asked(rules, a_map(1), **box), JSON))
+    found = body(as_of.field(HOUSE, asked(RULES, a_map(1), **box), JSON))
     assert [value is None for value in found["values"]] == [False, True]
-    assert set(body(as_of.field(HOUSE, asked(rules, None, **box), JSON))["values"]) == {None}
 
 
 def judged_at(at_s: float, *tags: TagState, holds: dict[str, int] | None = None) -> Plan:
@@ -210,8 +208,7 @@ def plans(house: Snapshot, field: FieldAsked) -> list[str]:
 
 def test_the_same_content_has_the_same_etags_whoever_made_it() -> None:
     again = Snapshot(5 * NS, "map", (tag("a", 0.0, 400.0), tag("b", 1.0, 500.0)))
-    clipped = replace(RULES, clip_to_explored=True)
-    for one, other in ((asked(), asked()), (asked(clipped, a_map(1)), asked(clipped, a_map(7)))):
+    for one, other in ((asked(), asked()), (asked(RULES, a_map(1)), asked(RULES, a_map(7)))):
         assert plans(again, other) == plans(HOUSE, one)
         assert len(set(plans(HOUSE, one))) == 7
 
@@ -254,9 +251,8 @@ def test_what_changes_an_answer_changes_its_etag(
         asked(resolution=0.2),
         asked(bbox_min_x=0, bbox_min_y=0, bbox_max_x=1, bbox_max_y=1),
         asked(replace(RULES, idw_power=3.0)),
-        asked(replace(RULES, clip_to_explored=True)),
-        asked(replace(RULES, clip_to_explored=True), a_map(1)),
-        asked(replace(RULES, clip_to_explored=True), a_map(1, free=-1)),
+        asked(RULES, a_map(1)),
+        asked(RULES, a_map(1, free=-1)),
     ],
 )
 def test_another_field_has_another_etag(other: FieldAsked) -> None:

@@ -16,6 +16,7 @@ from PIL import Image
 
 from lupin_bridge.stream.estimate_schema import GetEstimateResponse
 from tests.support.messages import scan
+from tests.support.processes import limits
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
 
@@ -33,7 +34,7 @@ def now_s() -> int:
 @pytest.fixture(scope="module")
 def live() -> Iterator[Bridge]:
     """A bridge whose twin has read three tags for six hours."""
-    with bridge("--field-rate-hz", "10000") as running:
+    with bridge(*limits(answers_per_s=10_000)) as running:
         for hour in range(6, 0, -1):
             for number, (tag_id, at) in enumerate(PLACES.items()):
                 stamp_s = now_s() - 3600 * hour + 60 * number

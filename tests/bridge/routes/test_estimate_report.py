@@ -12,6 +12,7 @@ import pytest
 
 from lupin_bridge.stream.estimate_schema import Advice, EstimateQualities, ExpectedTags
 from tests.support.messages import scan
+from tests.support.processes import limits
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
 
@@ -34,7 +35,7 @@ def temperature(tag_id: str, half_hours_ago: int) -> float:
 @pytest.fixture(scope="module")
 def live() -> Iterator[Bridge]:
     """A bridge whose twin has read four tags for ten hours; one has read 9 K too much since two."""
-    with bridge("--field-rate-hz", "10000") as running:
+    with bridge(*limits(answers_per_s=10_000)) as running:
         running.peer.wait_for_twin()
         for hour in range(20, 0, -1):
             for number, (tag_id, at) in enumerate(PLACES.items()):

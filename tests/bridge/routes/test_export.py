@@ -14,7 +14,7 @@ import pytest
 from lupin_bridge.judge.choosing import own_sensors
 from lupin_bridge.past import table
 from lupin_bridge.serving.admission import EXPORTS
-from lupin_bridge.settings import Settings
+from lupin_bridge.serving.limits import Limits
 from lupin_twin.past import PastRow
 from tests.bridge.routes.test_past import remembering
 from tests.support import raw_http
@@ -83,7 +83,7 @@ def test_a_reader_that_does_not_read_stops_it_and_is_cut_off(domain: int) -> Non
     past = MadeUp(lots=[lot] * MANY)
 
     async def test() -> None:
-        async with remembering(past, Settings(client_timeout_s=1.0)) as it:
+        async with remembering(past, Limits(client_timeout_s=1.0)) as it:
             with deaf_client(it.url, PATH) as client:
                 await until(lambda: it.bridge.admission.exporting == 1, "the export")
                 server = it.server.server_state.connections
@@ -142,7 +142,7 @@ def test_slow_readers_keep_nobody_waiting_for_long(
     past = MadeUp(lots=[rows(1_000)] * MANY)
 
     async def test() -> None:
-        async with remembering(past, Settings(client_timeout_s=3_600.0)) as it:
+        async with remembering(past, Limits(client_timeout_s=3_600.0)) as it:
             with ExitStack() as stack:
                 slow = [
                     stack.enter_context(raw_http.connect(it.url, f"127.0.9.{number}", room=4_096))

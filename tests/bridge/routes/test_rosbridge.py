@@ -14,6 +14,7 @@ from websockets.exceptions import ConnectionClosed
 from lupin_bridge.serving.client_pace import MAX_BURST
 from tests.support import messages
 from tests.support.proc_stat import resident_mb
+from tests.support.processes import limits
 from tests.support.rosbridge import FIELD, FIELD_ARGS, TOPIC, Message, Ros, ros_at, tags
 from tests.support.web import Bridge, bridge
 
@@ -301,13 +302,13 @@ def test_one_client_too_many_is_turned_away_and_told_so() -> None:
 
 
 def test_the_limits_of_fields_hold_here_too() -> None:
-    with bridge("--field-rate-hz", "0.01") as house, ros_at(house.url) as ros:
+    with bridge(*limits(answers_per_s=0.01)) as house, ros_at(house.url) as ros:
         assert ros.call(FIELD, args=FIELD_ARGS)["result"] is True
         assert ros.call(FIELD, args=FIELD_ARGS)["result"] is True, "what is kept costs nothing"
         other = {**FIELD_ARGS, "resolution": 0.125}
         response = ros.call(FIELD, args=other)
         assert response["result"] is False
         assert response["values"] == (
-            "127.0.0.1 asks for more than 0.01 computed answers a second, the limit (field_rate_hz)"
+            "127.0.0.1 asks for more than 0.01 computed answers a second, the limit"
         )
         assert house.get("/api/field", **other).status_code == 429, "of one client, together"

@@ -11,7 +11,7 @@ import pytest
 
 from lupin_bridge.rosbridge.session import Reaction, Session
 from lupin_bridge.routes.rosbridge import MAX_OPEN_CALLS
-from lupin_bridge.settings import Settings
+from lupin_bridge.serving.limits import Limits
 from lupin_bridge.stream.frames import StateFrame
 from lupin_bridge.twin.source import TwinUnavailableError
 from lupin_twin.fields import FieldRequest
@@ -97,7 +97,7 @@ def test_a_twin_that_does_not_answer_ends_a_call(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def test() -> None:
-        async with inprocess.running(Settings(field_timeout_s=0.1)) as here:
+        async with inprocess.running(Limits(answer_timeout_s=0.1)) as here:
 
             async def no_field(_request: FieldRequest) -> Any:
                 await asyncio.Event().wait()
@@ -257,7 +257,7 @@ def test_a_client_that_takes_no_reply_is_closed_and_meanwhile_holds_little(
     domain: int, monkeypatch: pytest.MonkeyPatch, is_subscribed: bool
 ) -> None:
     async def test() -> None:
-        async with inprocess.running(Settings(client_timeout_s=1.0)) as here:
+        async with inprocess.running(Limits(client_timeout_s=1.0)) as here:
             # A reader that is let go of would be emptied by asyncio.
             _reader, writer = await deaf(here.url, "/rosbridge")
             hub = here.bridge.hub

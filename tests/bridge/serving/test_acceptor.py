@@ -23,7 +23,7 @@ from tests.support import raw_http
 from tests.support.access import Served
 from tests.support.domains import own_domain, ros_env
 from tests.support.proc_stat import open_files
-from tests.support.processes import Process, url_of
+from tests.support.processes import Process, limits, url_of
 from tests.support.waiting import PATIENCE_S, until, wait_for
 from tests.support.web import deaf_client
 
@@ -36,7 +36,7 @@ GET = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n"
 def frugal(*options: str) -> Iterator[Served]:
     """`lupin-twin serve` that may open no more than `FILES` files."""
     shell = ["/bin/sh", "-c", f'ulimit -n {FILES} && exec "$@"', "sh"]
-    command = [sys.executable, "-m", "lupin_bridge.cli", "serve", "--port", "0", *options]
+    command = [sys.executable, "-m", "tests.support.limited", "serve", "--port", "0", *options]
     # Without a journal, no process that looks back, which would want files too.
     command += ["--ros-args", "-p", "journal:=off"]
     with own_domain() as domain, Process([*shell, *command], ros_env(domain)) as process:
@@ -58,7 +58,7 @@ def frugal(*options: str) -> Iterator[Served]:
 )
 def test_who_asks_for_nothing_makes_room_for_who_does(said: bytes) -> None:
     # No deadline ends them: they wait for an hour.
-    with frugal("--client-timeout-s", "3600") as live, ExitStack() as stack:
+    with frugal(*limits(client_timeout_s=3_600)) as live, ExitStack() as stack:
         kept = open_files(live.process.pid)
         for _ in range(STUCK):
             stack.enter_context(raw_http.connect(live.url)).sendall(said)
@@ -71,7 +71,7 @@ def test_who_asks_for_nothing_makes_room_for_who_does(said: bytes) -> None:
 
 
 def test_one_address_crowds_out_none_but_itself() -> None:
-    with frugal("--client-timeout-s", "3600") as live, ExitStack() as stack:
+    with frugal(*limits(client_timeout_s=3_600)) as live, ExitStack() as stack:
         quiet = stack.enter_context(raw_http.connect(live.url, "127.0.7.1"))
         quiet.sendall(GET[:-2])
         for _ in range(2 * STUCK):
@@ -103,7 +103,7 @@ def test_websockets_leave_room_for_requests_and_stay() -> None:
 
 
 def test_out_of_files_it_waits_says_so_once_and_recovers() -> None:
-    with frugal("--client-timeout-s", "3600") as live, ExitStack() as stack:
+    with frugal(*limits(client_timeout_s=3_600)) as live, ExitStack() as stack:
         pid = live.process.pid
         # All files that it may have are open, as far as it can tell, and no connection among them.
         resource.prlimit(pid, resource.RLIMIT_NOFILE, (open_files(pid) - 1, FILES))

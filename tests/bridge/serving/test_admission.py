@@ -24,10 +24,11 @@ from lupin_bridge.serving.admission import (
     ClientLimitError,
     Export,
 )
-from lupin_bridge.settings import Settings
+from lupin_bridge.serving.limits import Limits
 from lupin_bridge.stream import schema
 from tests.support.access import Served, served
 from tests.support.inprocess import run, running
+from tests.support.processes import limits
 from tests.support.waiting import until
 
 ROUTES = ("/api/field", "/api/field.json", "/api/field.png", "/api/field.npy", "/api/field/quality")
@@ -45,7 +46,7 @@ def test_a_client_has_its_number_in_flight_and_the_next_is_refused_by_name() -> 
             with pytest.raises(ClientLimitError) as refused, admission.request("a", 0.0):
                 pytest.fail("let in")
             assert str(refused.value) == (
-                "a has 2 requests for computed answers in flight, the limit (field_concurrency)"
+                "a has 2 requests for computed answers in flight, the limit"
             )
             assert refused.value.headers == {"Retry-After": "1"}
         with admission.request("a", 0.0):
@@ -65,10 +66,8 @@ def test_a_request_that_fails_gives_its_place_back() -> None:
 
 def admitted(rate_hz: float, seconds: float) -> int:
     """How many requests of a client get in that come evenly, by the limits as they are set."""
-    settings = Settings()
-    admission = Admission(
-        settings.field_rate_hz, settings.field_concurrency, settings.field_total_concurrency
-    )
+    limits = Limits()
+    admission = Admission(limits.answers_per_s, limits.concurrency, limits.total_concurrency)
     count = 0
     for number in range(round(rate_hz * seconds)):
         with suppress(ClientLimitError), admission.request("page", number / rate_hz):
@@ -80,7 +79,7 @@ def test_a_page_that_is_dragged_through_the_past_is_let_in_and_a_flood_is_not() 
     moments_hz, seconds = 10.0, 60.0
     # A state, a field, and the field that is compared with it.
     assert admitted(3 * moments_hz, seconds) == 3 * moments_hz * seconds
-    allowed = Settings().field_rate_hz * (seconds + BURST_S)
+    allowed = Limits().answers_per_s * (seconds + BURST_S)
     assert admitted(1_000.0, seconds) == pytest.approx(allowed, abs=1)
 
 
@@ -132,10 +131,7 @@ def test_a_client_has_its_rate_and_is_told_when_to_come_back() -> None:
         pass
     with pytest.raises(ClientLimitError) as refused, admission.request("a", 0.25):
         pytest.fail("let in")
-    assert (
-        str(refused.value)
-        == "a asks for more than 0.5 computed answers a second, the limit (field_rate_hz)"
-    )
+    assert str(refused.value) == "a asks for more than 0.5 computed answers a second, the limit"
     assert refused.value.retry_after_s == pytest.approx(1.75)
     assert refused.value.headers == {"Retry-After": "2"}
     with admission.request("b", 0.25), admission.request("a", 2.0):
@@ -162,8 +158,8 @@ def test_all_together_have_a_number_too() -> None:
         ):
             pytest.fail("let in")
         assert str(refused.value) == (
-            "2 answers are being computed, 0 of them for c: the limit is 2 "
-            "(field_total_concurrency), and no client takes more than it leaves free"
+            "2 answers are being computed, 0 of them for c: the limit is 2, "
+            "and no client takes more than it leaves free"
         )
         with admission.computing("b"):
             pass
@@ -177,8 +173,8 @@ def test_large_computations_leave_a_quarter_of_the_places_to_small_ones() -> Non
         with pytest.raises(BusyError) as refused, admission.computing("new", is_large=True):
             pytest.fail("let in")
         assert str(refused.value) == (
-            "6 large answers are being computed, 0 of them for new: the limit is 6 (three quarters "
-            "of field_total_concurrency), and no client takes more than it leaves free"
+            "6 large answers are being computed, 0 of them for new: the limit is 6, "
+            "and no client takes more than it leaves free"
         )
         for client in range(2):
             taken.enter_context(admission.computing(f"small {client}"))
@@ -199,18 +195,16 @@ def test_few_places_are_for_large_computations_too(total: int) -> None:
 
 @pytest.mark.parametrize("is_large", [False, True])
 def test_of_six_clients_that_ask_for_all_they_may_each_has_a_place(is_large: bool) -> None:
-    settings = Settings()
-    admission = Admission(
-        settings.field_rate_hz, settings.field_concurrency, settings.field_total_concurrency
-    )
+    limits = Limits()
+    admission = Admission(limits.answers_per_s, limits.concurrency, limits.total_concurrency)
     places: Counter[str] = Counter()
     with ExitStack() as taken:
         for client in "abcdef":
-            for _ in range(settings.field_concurrency):
+            for _ in range(limits.concurrency):
                 with suppress(BusyError):
                     taken.enter_context(admission.computing(client, is_large=is_large))
                     places[client] += 1
-        assert places["a"] == settings.field_concurrency, "who is alone has all that he may have"
+        assert places["a"] == limits.concurrency, "who is alone has all that he may have"
         assert min(places[client] for client in "abcdef") >= 1
     assert admission.being_computed == 0
 
@@ -241,7 +235,7 @@ BURST = max(1, math.floor(RATE_HZ * BURST_S))
 
 @pytest.fixture(scope="module")
 def slow() -> Iterator[Served]:
-    with served("--field-rate-hz", str(RATE_HZ)) as running_bridge:
+    with served(*limits(answers_per_s=RATE_HZ)) as running_bridge:
         yield running_bridge
 
 
@@ -258,9 +252,7 @@ def test_every_route_of_a_field_has_the_limit(slow: Served, route: str) -> None:
         refusal = schema.GetFieldResponse.model_validate_json(second.content)
         assert not refusal.ok
         assert (refusal.values, refusal.width, refusal.sample_count) == ([], 0, 0)
-        assert "for more than 0.01 computed answers a second, the limit (field_rate_hz)" in (
-            refusal.error_message
-        )
+        assert "for more than 0.01 computed answers a second, the limit" in (refusal.error_message)
 
 
 def test_what_needs_no_computing_costs_no_turn(slow: Served) -> None:
@@ -285,7 +277,6 @@ def test_every_other_answer_that_is_computed_has_it_too(slow: Served, route: str
         detail = schema.ErrorMessage.model_validate_json(answer.content).detail
         assert detail == (
             f"{address} asks for more than {RATE_HZ} computed answers a second, the limit"
-            " (field_rate_hz)"
         )
 
 
@@ -305,7 +296,7 @@ def test_a_client_past_its_limit_holds_up_no_other(slow: Served) -> None:
 
 def test_with_all_places_taken_it_is_503_until_one_is_free(domain: int) -> None:
     async def test() -> None:
-        async with running(Settings(field_total_concurrency=2)) as it:
+        async with running(Limits(total_concurrency=2)) as it:
             with ExitStack() as taken:
                 for client in "ab":
                     taken.enter_context(it.bridge.admission.computing(client))
@@ -313,7 +304,7 @@ def test_with_all_places_taken_it_is_503_until_one_is_free(domain: int) -> None:
                 assert it.bridge.admission.refused == {TOTAL: 1}
                 assert busy.status_code == 503
                 assert busy.headers["retry-after"] == "1"
-                assert "2 (field_total_concurrency)" in busy.json()["detail"]
+                assert "the limit is 2" in busy.json()["detail"]
                 # What is live and cheap takes no place.
                 for live in ("/api/state", "/api/health"):
                     assert (await it.http.get(live)).status_code == 200
@@ -333,7 +324,7 @@ def test_a_place_is_held_until_the_twin_has_answered_and_then_given_back(domain:
             await time_is_up.wait()
             raise TimeoutError
 
-        async with running(Settings(field_concurrency=3)) as it:
+        async with running(Limits(concurrency=3)) as it:
             it.twin._thread.call = never  # type: ignore[method-assign, assignment]
             fields = [f"/api/field{QUERY.replace('co2', f'{n}')}" for n in range(8)]
             asked = [asyncio.create_task(it.http.get(field)) for field in fields]

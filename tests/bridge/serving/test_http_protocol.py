@@ -12,6 +12,7 @@ import pytest
 
 from lupin_bridge.serving.http_protocol import PIECE_BYTES, PieceByPiece
 from tests.support.access import Served, served
+from tests.support.processes import limits
 from tests.support.waiting import PATIENCE_S, wait_for
 
 # 1,000,000 cells, 5 MB of JSON: more than two sockets hold between them.
@@ -97,7 +98,7 @@ def test_websockets_pass_through() -> None:
 
 @pytest.fixture(scope="module")
 def live() -> Iterator[Served]:
-    options = ("--client-timeout-s", str(TIMEOUT_S), "--field-concurrency", str(CONCURRENCY))
+    options = limits(client_timeout_s=TIMEOUT_S, concurrency=CONCURRENCY)
     with served(*options) as running:
         yield running
 
@@ -135,9 +136,7 @@ def test_a_large_field_arrives_whole(live: Served) -> None:
 
 
 def test_deaf_readers_keep_their_own_places_and_are_cut_off(live: Served) -> None:
-    refused = (
-        f"has {CONCURRENCY} requests for computed answers in flight, the limit (field_concurrency)"
-    )
+    refused = f"has {CONCURRENCY} requests for computed answers in flight, the limit"
     with contextlib.ExitStack() as readers:
         # Of one kept field, as many readers as there are might be deaf.
         large = [LARGE_FIELD.replace("co2", f"co2_{number}") for number in range(CONCURRENCY)]

@@ -6,6 +6,7 @@ import pytest
 
 from lupin_bridge.serving.metering import route_class
 from tests.support.access import BEARER, TOKEN, served
+from tests.support.processes import limits
 
 
 @pytest.mark.parametrize(
@@ -33,7 +34,7 @@ def test_a_path_is_of_one_of_a_few_kinds(path: str, expected: str) -> None:
 
 
 def test_answers_are_counted_by_status_and_timed_by_route() -> None:
-    with served("--field-rate-hz", "0.01", LUPIN_TOKEN=TOKEN) as bridge:
+    with served(*limits(answers_per_s=0.01), LUPIN_TOKEN=TOKEN) as bridge:
         query = "&resolution=1&bbox_min_x=0&bbox_min_y=0&bbox_max_x=4&bbox_max_y=4"
         assert bridge.get("/api/state").status_code == 401
         assert bridge.get("/api/state", {"Host": "evil.example"}).status_code == 403

@@ -19,6 +19,7 @@ from lupin_bridge.serving.ws_protocol import Connection
 from lupin_bridge.settings import Settings
 from tests.support.inprocess import Running, run, running
 from tests.support.messages import scan
+from tests.support.processes import limits
 from tests.support.raw_ws import BINARY, CLOSE, PING, TEXT, RawClient, frames_of, masked
 from tests.support.waiting import PATIENCE_S, until, wait_for
 from tests.support.web import bridge, deaf_client, overfill
@@ -152,7 +153,7 @@ def drain(client: socket.socket, freed: list[bool]) -> None:
 
 def test_a_client_that_takes_nothing_is_closed_and_told_why_and_the_others_are_not() -> None:
     with (
-        bridge("--client-timeout-s", "5", *SILENT) as live,
+        bridge(*limits(client_timeout_s=5), *SILENT) as live,
         live.listen() as healthy,
         deaf_client(live.url) as reads_at_last,
         deaf_client(live.url) as never_reads,
@@ -183,7 +184,7 @@ def test_who_is_told_to_go_waits_from_then_on_and_a_client_does_not(
     monkeypatch.setattr(ws_protocol, "CLOSE_GRACE_S", PATIENCE_S)
 
     async def test() -> None:
-        async with running(Settings(max_clients=1), SILENT) as served:
+        async with running(None, SILENT, Settings(max_clients=1)) as served:
             with deaf_client(served.url), deaf_client(served.url):
 
                 def both() -> list[Connection] | None:

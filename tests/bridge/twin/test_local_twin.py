@@ -270,7 +270,7 @@ def test_what_takes_too_long_ends_by_the_setting_that_says_so(
                 await until(busy.is_set, "the thread to be held")
                 with pytest.raises(TwinTimeoutError):
                     await stage.twin.history("1")
-            with pytest.raises(TwinTimeoutError, match=r"within 0\.2 s \(field_timeout_s\)"):
+            with pytest.raises(TwinTimeoutError, match=r"within 0\.2 s"):
                 await stage.twin.field(REQUEST)
             stage.gate.set()
             if what == "ROS thread":

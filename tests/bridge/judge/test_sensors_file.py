@@ -4,20 +4,13 @@ import itertools
 import json
 import re
 from importlib.resources import files
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 
 from lupin_bridge.judge.episodes import TagEpisodes
-from lupin_bridge.judge.ranges import (
-    LANGUAGES,
-    MAX_SENSORS,
-    MAX_TEXT,
-    Ranges,
-    SensorsError,
-    Span,
-    parse,
-)
+from lupin_bridge.judge.ranges import Ranges, Span
+from lupin_bridge.judge.sensors_file import MAX_SENSORS, MAX_TEXT, Language, SensorsError, parse
 from lupin_twin.past_writes import PastWrite
 
 GOOD: dict[str, Any] = {
@@ -63,12 +56,12 @@ def test_the_file_that_comes_with_the_bridge_is_good() -> None:
 
 def test_the_file_says_what_is_derived() -> None:
     vpd = {"label": "", "unit": "kPa", "hue": 1, "lightness": 50, "ideal": None}
-    with pytest.raises(SensorsError, match=r"sensors\.vpd\.derived is false, not true: vpd is"):
+    with pytest.raises(SensorsError, match=r"sensors\.vpd\.derived is False; computed here"):
         parse(text_with("sensors/vpd", vpd))
     assert parse(text_with("sensors/vpd", vpd | {"derived": True})).named("vpd").unit == "kPa"
-    with pytest.raises(SensorsError, match=r"derived is true, not false: computed are dew_point, "):
+    with pytest.raises(SensorsError, match=r"derived is True; computed here are dew_point "):
         parse(text_with("sensors/temperature/derived", True))
-    with pytest.raises(SensorsError, match=r"derived is 1, not true"):
+    with pytest.raises(SensorsError, match=r"derived: Input should be a valid boolean, not 1"):
         parse(text_with("sensors/vpd", vpd | {"derived": 1}))
 
 
@@ -107,40 +100,50 @@ def test_a_sensor_that_nobody_declared_is_never_judged() -> None:
 @pytest.mark.parametrize(
     ("path", "value", "says"),
     [
-        ("ramp", ..., "line 1: the file has no 'ramp'"),
-        ("ramp/max_alpha", 1.1, "line 4: ramp.max_alpha is 1.1, not a number from 0 to 1"),
-        ("sensors/temperature/hue", 361, "temperature.hue is 361, not a number from 0 to 360"),
-        ("sensors/temperature/hue", True, "temperature.hue is true, not a number"),
-        ("sensors/temperature/label", ..., "temperature has no 'label'"),
-        ("sensors/temperature/label", "x" * (MAX_TEXT + 1), "not a text of at most 64"),
-        ("sensors/temperature/unit", 5, "temperature.unit is 5, not a text"),
-        ("sensors/temperature/ideal", [26, 18], "ideal is [26, 18], and low must be less than"),
-        ("sensors/temperature/ideal", [18, 18], "ideal is [18, 18], and low must be less than"),
-        ("sensors/temperature/ideal", [18], "ideal is [18], not [low, high] or null"),
-        ("sensors/temperature/ideal", "warm", 'ideal is "warm", not [low, high] or null'),
-        ("sensors/temperature/critical", [19, 35], "is [19, 35], inside ideal [18, 26]"),
-        ("sensors/temperature/critical", [19, 1e7], "is [19, 10000000], inside ideal [18, 26]"),
-        ("sensors/temperature/critical", [10, 25], "is [10, 25], inside ideal [18, 26]"),
-        ("sensors/temperature/ideal", None, "critical is given, but no ideal range"),
-        ("sensors/temperature/night", [1, 2], "night is [1, 2], not an object"),
-        ("sensors/temperature/night", {}, "night has no 'ideal'"),
-        ("sensors/temperature/ideals", [1, 2], "temperature.ideals is not known here"),
-        ("sensors/temperature/species/Orchid/ideal", [3, 1], "Orchid.ideal is [3, 1]"),
-        ("sensors/temperature/species/orchid", {"ideal": None}, "orchid is given more than once"),
+        ("ramp", ..., "ramp: Field required"),
+        ("ramp/max_alpha", 1.1, "ramp.max_alpha: Input should be less than or equal to 1, not 1.1"),
         (
-            "sensors/temperature/ideal",
-            [-1e9, 1.1e9],
-            "is 1100000000.0, not a number from -1000000000 to",
+            "sensors/temperature/hue",
+            361,
+            "temperature.hue: Input should be less than or equal to 360",
         ),
-        ("sensors/temperature/labels", ["Kas"], 'labels is ["Kas"], not an object'),
-        ("sensors/temperature/labels", {"xx": "?"}, "xx is not known here; known are de, es, nl"),
-        ("sensors/temperature/labels", {"de": 7}, "labels.de is 7, not a text"),
-        ("sensors/temperature/labels", {"de": "x" * (MAX_TEXT + 1)}, "not a text of at most 64"),
-        ("sensors/temperature/labels", {"nl": ""}, "labels.nl is empty"),
-        ("sensors", [], "sensors is [], not an object"),
-        ("sensors/temperature/unit", "\ud83c", 'temperature.unit is "\\ud83c", with half a'),
-        ("sensors/\ud83c", GOOD["sensors"]["temperature"], "sensors.\\ud83c is a name with half"),
-        ("\ud83c", 1, "\\ud83c is not known here"),
+        ("sensors/temperature/hue", True, "hue: Input should be a valid number, not True"),
+        ("sensors/temperature/label", ..., "temperature.label: Field required"),
+        ("sensors/temperature/label", "x" * (MAX_TEXT + 1), "should have at most 64 characters"),
+        ("sensors/temperature/unit", 5, "unit: Input should be a valid string, not 5"),
+        ("sensors/temperature/ideal", [26, 18], "ideal is [26.0, 18.0], and low must be less than"),
+        ("sensors/temperature/ideal", [18, 18], "ideal is [18.0, 18.0], and low must be less than"),
+        ("sensors/temperature/ideal", [18], "temperature.ideal.1: Field required"),
+        ("sensors/temperature/ideal", "warm", "temperature.ideal: Input should be a valid array"),
+        ("sensors/temperature/critical", [19, 35], "is [19.0, 35.0], inside ideal [18.0, 26.0]"),
+        ("sensors/temperature/critical", [10, 25], "is [10.0, 25.0], inside ideal [18.0, 26.0]"),
+        ("sensors/temperature/ideal", None, "critical is given, but no ideal range"),
+        ("sensors/temperature/night", [1, 2], "night: Input should be an object, not [1, 2]"),
+        ("sensors/temperature/night", {}, "night.ideal: Field required"),
+        (
+            "sensors/temperature/ideals",
+            [1, 2],
+            "temperature.ideals: Extra inputs are not permitted",
+        ),
+        ("sensors/temperature/species/Orchid/ideal", [3, 1], "Orchid: ideal is [3.0, 1.0]"),
+        ("sensors/temperature/species/orchid", {"ideal": None}, "species is given more than once"),
+        ("sensors/temperature/ideal", [-1e9, 1.1e9], "less than or equal to 1000000000, not 11000"),
+        ("sensors/temperature/labels", ["Kas"], "labels: Input should be an object, not ['Kas']"),
+        ("sensors/temperature/labels", {"xx": "?"}, "Input should be 'de', 'es' or 'nl'"),
+        (
+            "sensors/temperature/labels",
+            {"de": 7},
+            "labels.de: Input should be a valid string, not 7",
+        ),
+        ("sensors/temperature/labels", {"de": "x" * (MAX_TEXT + 1)}, "at most 64 characters"),
+        ("sensors/temperature/labels", {"nl": ""}, "labels.nl: String should have at least 1 char"),
+        ("sensors", [], "sensors: Input should be an object, not []"),
+        (
+            "sensors/temperature/unit",
+            "\ud83c",
+            "Invalid JSON: unexpected end of hex escape at line",
+        ),
+        ("sensors/\ud83c", GOOD["sensors"]["temperature"], "end of hex escape at line"),
     ],
 )
 def test_what_cannot_be_is_refused_by_name(path: str, value: Any, says: str) -> None:
@@ -168,46 +171,36 @@ def test_labels_in_other_languages_may_be_given(labels: dict[str, str]) -> None:
 def test_the_file_that_comes_with_the_bridge_speaks_all_languages() -> None:
     text = files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8")
     sensors = json.loads(text)["sensors"]
-    silent = {name for name, told in sensors.items() if told.get("labels", {}).keys() != LANGUAGES}
+    silent = {
+        name
+        for name, told in sensors.items()
+        if told.get("labels", {}).keys() != set(get_args(Language))
+    }
     assert silent == {"co2"}  # a formula
-
-
-def test_an_error_names_the_line_of_the_value() -> None:
-    text = text_with("sensors/temperature/night/ideal", [9, 9])
-    line = 1 + text[: text.rindex("9,")].count("\n")
-    with pytest.raises(SensorsError) as caught:
-        parse(text)
-    # The value may begin on the key's own line or below it.
-    assert str(caught.value).startswith(f"line {line - 1}: sensors.temperature.night.ideal")
 
 
 @pytest.mark.parametrize("text", ["", "{", '{"ramp": }', "[", "\ufeff{}"])
 def test_what_is_no_json_is_refused_with_its_line(text: str) -> None:
-    with pytest.raises(SensorsError, match=r"^line 1: "):
+    with pytest.raises(SensorsError, match=r"Invalid JSON: .* at line 1 column"):
         parse(text)
 
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity"])
 def test_numbers_are_those_of_json(number: str) -> None:
-    with pytest.raises(SensorsError, match="is no number of JSON"):
+    with pytest.raises(SensorsError, match=r"fallback\.hue: Input should be a finite number"):
         parse(json.dumps(GOOD).replace("265", number))
 
 
 def test_a_number_of_any_length_is_refused_by_name() -> None:
     text = json.dumps(GOOD, indent=1).replace("265", "9" * 5_000)
-    with pytest.raises(SensorsError, match=r"^line \d+: fallback.hue is Infinity, not a number"):
+    with pytest.raises(SensorsError, match=r"Invalid JSON: number out of range at line \d+"):
         parse(text)
 
 
 @pytest.mark.parametrize("opening", ["[", '{"ramp":'])
 def test_what_is_nested_without_end_is_refused(opening: str) -> None:
-    with pytest.raises(SensorsError, match="nested too deeply"):
+    with pytest.raises(SensorsError, match="recursion limit exceeded"):
         parse(opening * 100_000)
-
-
-def test_a_key_that_is_given_twice_is_refused() -> None:
-    with pytest.raises(SensorsError, match="sensors is given more than once"):
-        parse(json.dumps(GOOD).replace('"ramp"', '"sensors": {}, "ramp"'))
 
 
 def test_there_is_a_limit_to_the_sensors() -> None:
@@ -216,5 +209,5 @@ def test_there_is_a_limit_to_the_sensors() -> None:
     table["sensors"] = {f"s{i}": entry for i in range(MAX_SENSORS)}
     assert len(parse(json.dumps(table)).by_name) == MAX_SENSORS
     table["sensors"]["one_more"] = entry
-    with pytest.raises(SensorsError, match="sensors has 65 entries, the limit is 64"):
+    with pytest.raises(SensorsError, match="sensors: Dictionary should have at most 64 items"):
         parse(json.dumps(table))

@@ -1,0 +1,135 @@
+"""The file of sensors, checked by pydantic before anything starts: text in, `Sensors` out. Pure.
+
+Nobody needs it where no file is read: pydantic is 6 MB.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from lupin_bridge.judge.derived import DERIVED
+from lupin_bridge.judge.ranges import Ranges, Sensor, Sensors, Span
+
+MAX_SENSORS = 64
+MAX_SPECIES = 64
+MAX_TEXT = 64
+
+_Name = Annotated[str, Field(max_length=MAX_TEXT)]
+_Limit = Annotated[float, Field(ge=-1e9, le=1e9)]
+_Share = Annotated[float, Field(ge=0, le=100)]
+# Those that the page speaks beside English, which is the `label` itself.
+Language = Literal["de", "es", "nl"]
+
+
+class SensorsError(ValueError):
+    """What is wrong with a file of sensors; the message names field, limit and value."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class _Ranges(_Part):
+    ideal: tuple[_Limit, _Limit] | None
+    critical: tuple[_Limit, _Limit] | None = None
+
+    @model_validator(mode="after")
+    def _lie_inside(self) -> Self:
+        for name in ("ideal", "critical"):
+            span = getattr(self, name)
+            if span is not None and not span[0] < span[1]:
+                raise ValueError(f"{name} is {list(span)}, and low must be less than high")
+        if self.critical is not None:
+            if self.ideal is None:
+                raise ValueError("critical is given, but no ideal range")
+            if not (self.critical[0] <= self.ideal[0] and self.ideal[1] <= self.critical[1]):
+                raise ValueError(
+                    f"critical is {list(self.critical)}, inside ideal {list(self.ideal)}"
+                )
+        return self
+
+    def made(self) -> Ranges:
+        return Ranges(
+            None if self.ideal is None else Span(*self.ideal),
+            None if self.critical is None else Span(*self.critical),
+        )
+
+
+class _DayAndNight(_Ranges):
+    night: _Ranges | None = None
+
+    def by_day_and_night(self) -> tuple[Ranges, Ranges]:
+        """Of a night that says nothing, what holds by day."""
+        return self.made(), (self.night or self).made()
+
+
+class _Sensor(_DayAndNight):
+    label: _Name
+    unit: _Name
+    hue: Annotated[float, Field(ge=0, le=360)]
+    lightness: _Share
+    # For who reads the file: what it is called in other languages, and whether it is computed here.
+    labels: dict[Language, Annotated[_Name, Field(min_length=1)]] = {}
+    derived: bool = False
+    species: Annotated[dict[str, _DayAndNight], Field(max_length=MAX_SPECIES)] = {}
+
+    @model_validator(mode="after")
+    def _names_each_species_once(self) -> Self:
+        if len({kind.lower() for kind in self.species}) < len(self.species):
+            raise ValueError("a species is given more than once: case does not count")
+        return self
+
+    def named(self, name: str) -> Sensor:
+        day, night = self.by_day_and_night()
+        species = {kind.lower(): it.by_day_and_night() for kind, it in self.species.items()}
+        return Sensor(name, self.label, self.unit, self.hue, self.lightness, day, night, species)
+
+
+class _Ramp(_Part):
+    saturation: _Share
+    max_alpha: Annotated[float, Field(ge=0, le=1)]
+
+
+class _File(_Part):
+    ramp: _Ramp
+    fallback: _Sensor
+    sensors: Annotated[dict[str, _Sensor], Field(max_length=MAX_SENSORS)]
+
+    @model_validator(mode="after")
+    def _says_what_is_derived(self) -> Self:
+        for name, sensor in self.sensors.items():
+            if sensor.derived is not (name in DERIVED):
+                raise ValueError(
+                    f"sensors.{name}.derived is {sensor.derived}; computed here are "
+                    f"{' and '.join(sorted(DERIVED))} alone"
+                )
+        return self
+
+
+def parse(text: str) -> Sensors:
+    """The sensors of a file's text.
+
+    Raises:
+        SensorsError: it is no JSON, or says what cannot be.
+
+    """
+    try:
+        file = _File.model_validate_json(text)
+    except ValidationError as error:
+        raise SensorsError(_said(error)) from None
+    return Sensors(
+        by_name={name: sensor.named(name) for name, sensor in file.sensors.items()},
+        fallback=file.fallback.named(""),
+        saturation=file.ramp.saturation,
+        max_alpha=file.ramp.max_alpha,
+        text=text,
+    )
+
+
+def _said(error: ValidationError) -> str:
+    first = error.errors(include_url=False)[0]
+    where = ".".join(str(part)[:MAX_TEXT] for part in first["loc"])
+    shown = "" if isinstance(first["input"], dict | str) else f", not {first['input']!r:.60}"
+    return f"{where or 'the file'}: {first['msg'].removeprefix('Value error, ')}{shown}"

@@ -1,0 +1,39 @@
+"""`lupin-twin` with other limits than it has, or of another world: what a test cannot wait for.
+
+`python -m tests.support.limited [--limit NAME=VALUE] [--world NAME=VALUE] ROLE ...`, each as often
+as wanted, is the command `lupin-twin ROLE ...`, whose `Limits` and `World` have these values.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+from lupin_bridge import cli
+from lupin_twin.one_core import use_one_core
+
+
+def _values(pairs: Sequence[str]) -> dict[str, Any]:
+    return {name: json.loads(value) for name, _, value in (pair.partition("=") for pair in pairs)}
+
+
+def command() -> None:
+    parser = argparse.ArgumentParser(allow_abbrev=False)
+    parser.add_argument("--limit", action="append", default=[])
+    parser.add_argument("--world", action="append", default=[])
+    options, rest = parser.parse_known_args()
+    sys.argv[1:] = rest
+    use_one_core()
+    from lupin_bridge import roles
+
+    roles.Limits = partial(roles.Limits, **_values(options.limit))  # type: ignore[assignment, misc]
+    roles.World = partial(roles.World, **_values(options.world))  # type: ignore[assignment, misc]
+    cli.command()
+
+
+if __name__ == "__main__":
+    command()

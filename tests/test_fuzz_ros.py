@@ -36,8 +36,8 @@ from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
 
 # Of the process with the twin: for one lot at any time, and kept of all that is sent here (which is
-# bounded tag by tag, and there are some 30): twice what lies in caches of fields, and in DDS. In one
-# arena, for what the C library keeps of more of them grows with the threads, not with what is sent.
+# bounded tag by tag, and there are some 30), caches of fields included. In one arena: what the C
+# library keeps of more of them grows with the threads, not with what is sent.
 MEMORY_MB = 40.0
 KEPT_MB = 150.0
 ONE_ARENA = {"MALLOC_ARENA_MAX": "1"}

@@ -13,8 +13,7 @@ from lupin_bridge.cli import ROLES
 from lupin_bridge.settings import option, table
 from lupin_patrol import cli as patrol_cli
 from lupin_twin.estimates import ESTIMATE_SERVICE
-from lupin_twin.layers import LAYERS_BELOW
-from lupin_twin.marks import PLANTERS_TOPIC, TAGS_TOPIC
+from lupin_twin.layers import LAYERS_BELOW, PLANTERS_TOPIC, TAGS_TOPIC
 from lupin_twin.parameters import TIMES_TOPIC, TwinParameters, describe
 from lupin_twin.past import HISTORY_SERVICE, STATE_AT_SERVICE
 from tests.support.structure import PACKAGES, ROOMS

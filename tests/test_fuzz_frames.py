@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from lupin_bridge.serving.client_pace import MAX_BURST
+from lupin_bridge.serving.client_messages import MAX_BURST
 from lupin_bridge.serving.ws_protocol import FRAMES_AT_ONCE
 from tests.support.messages import scan
 from tests.support.proc_stat import open_files, peak_mb, reset_peak, resident_mb

@@ -37,9 +37,8 @@ from lupin_bridge.stream.hub import Client, Hub
 from lupin_bridge.stream.status import Liveness, Status
 from lupin_bridge.twin.shared import Shared
 from lupin_bridge.twin.source import Told, TwinSource
-from lupin_twin.counts import LATE, LOST
 from lupin_twin.diagnostics import Origin
-from lupin_twin.drops import Reason
+from lupin_twin.drops import LATE, LOST, Reason
 from lupin_twin.state import NANOSECONDS_PER_SECOND
 
 log = logging.getLogger(__name__)

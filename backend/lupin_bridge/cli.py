@@ -20,8 +20,7 @@ from lupin_bridge.configuration import (
     take_secrets,
 )
 from lupin_bridge.settings import SettingError, Settings, limits_of, option, table
-from lupin_twin.leaving import leave_after
-from lupin_twin.one_core import use_one_core
+from lupin_twin.process import leave_after, use_one_core
 
 log = logging.getLogger(__name__)
 

@@ -17,8 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from lupin_bridge.bags.topics import SUFFIX
-from lupin_bridge.journal_backup import backup
-from lupin_bridge.journal_output import CannotWrite, Write, standard, writing
+from lupin_bridge.journal_output import CannotWrite, Write, backup, standard, writing
 from lupin_bridge.judge.choosing import own_sensors
 from lupin_bridge.past import table
 from lupin_bridge.past.moments import MAX_SECONDS, moment
@@ -30,9 +29,9 @@ from lupin_twin.journal.lock import InUse, holder_of
 from lupin_twin.journal.overview import Overview, RunExtent, overview
 from lupin_twin.journal.schema import FILE_ERRORS, Empty, Foreign, open_named, says_damaged
 from lupin_twin.journal.vacuuming import NotPossible, hear_interrupts, vacuum
-from lupin_twin.leaving import INTERRUPTED
 from lupin_twin.memory import demo_journal_path, journal_path
 from lupin_twin.past import NotRemembered, PastRefused, PastRow, seconds
+from lupin_twin.process import INTERRUPTED
 
 ACTIONS: Final[Mapping[str, str]] = {
     "info": "what is in it: size, rows, tags, sensors, how far back, runs of the clock",

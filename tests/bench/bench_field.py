@@ -23,9 +23,14 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "ros_node" / "lupin_twin")]
 
 from lupin_twin.explored import explored_mask, occupancy_map  # noqa: E402
-from lupin_twin.field_cache import FieldCache  # noqa: E402
 from lupin_twin.field_quality import leave_one_out  # noqa: E402
-from lupin_twin.fields import FieldEngine, FieldJob, FieldRequest, FieldRules  # noqa: E402
+from lupin_twin.fields import (  # noqa: E402
+    FieldCache,
+    FieldEngine,
+    FieldJob,
+    FieldRequest,
+    FieldRules,
+)
 from lupin_twin.grid import FieldGrid, cell_centres  # noqa: E402
 from lupin_twin.idw import FieldSample, compute_idw_field  # noqa: E402
 from lupin_twin.state import Pose, Reading, Scan, TagState, TwinStore  # noqa: E402

@@ -20,10 +20,9 @@ from lupin_patrol.events import FlowersSeen, PassCompleted, TagScanned, TagsDisc
 from lupin_patrol.mission import Mission
 from lupin_twin import convert, ingest
 from lupin_twin.drops import Drop
-from lupin_twin.field_cache import FieldCache
 from lupin_twin.field_quality import leave_one_out, painted_share
 from lupin_twin.field_rules import field_rules
-from lupin_twin.fields import FieldEngine, FieldJob, FieldRequest
+from lupin_twin.fields import FieldCache, FieldEngine, FieldJob, FieldRequest
 from lupin_twin.grid import FieldGrid, cell_centres
 from lupin_twin.history import History
 from lupin_twin.parameters import TwinParameters

@@ -12,7 +12,7 @@ import httpx
 import pytest
 
 from lupin_bridge.cli import main
-from lupin_bridge.journal_backup import backup
+from lupin_bridge.journal_output import backup
 from tests.support.journal import NOW, kept
 from tests.support.journal import scan as row
 from tests.support.messages import scan

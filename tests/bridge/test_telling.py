@@ -14,7 +14,7 @@ from tests.support.waiting import PATIENCE_S
 SCRIPT = """
 import os, sys
 from lupin_bridge.telling import say, tell
-from lupin_twin.leaving import open_standard_files
+from lupin_twin.process import open_standard_files
 open_standard_files()
 file = os.open(sys.argv[1], os.O_WRONLY | os.O_CREAT)
 say("one")

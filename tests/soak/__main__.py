@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-from lupin_twin.leaving import leave_after
+from lupin_twin.process import leave_after
 from tests.support.state_home import use_own
 
 SOAKS = ("kills", "hours")

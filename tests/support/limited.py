@@ -14,7 +14,7 @@ from functools import partial
 from typing import Any
 
 from lupin_bridge import cli
-from lupin_twin.one_core import use_one_core
+from lupin_twin.process import use_one_core
 
 
 def _values(pairs: Sequence[str]) -> dict[str, Any]:

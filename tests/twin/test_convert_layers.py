@@ -19,7 +19,7 @@ from lupin_twin.convert_layers import (
     planter_markers,
     tag_markers,
 )
-from lupin_twin.marks import PlanterMark, TagMark
+from lupin_twin.layers import PlanterMark, TagMark
 
 
 @pytest.mark.parametrize("count", [0, 1, 1_000])

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
-from lupin_twin.counts import RECENT_S, Recent, Tally
-from lupin_twin.drops import Drop, Reason
+from lupin_twin.drops import RECENT_S, Drop, Reason, Recent, Tally
 
 FRAME = Drop(Reason.FRAME, "its frame is 'odom', expected 'map'")
 

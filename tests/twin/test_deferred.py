@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from lupin_twin.deferred import Later, allow_later
+from lupin_twin.responses import Later, allow_later
 
 
 class Service:

@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 
-from lupin_twin.counts import Counts, Recent
 from lupin_twin.diagnostics import (
     ERROR,
     MAX_PROBLEMS,
@@ -22,6 +21,7 @@ from lupin_twin.diagnostics import (
     findings,
     self_report,
 )
+from lupin_twin.drops import Counts, Recent
 from lupin_twin.journal.condition import UNKNOWN, Condition, JournalState
 from lupin_twin.state import ClockState
 

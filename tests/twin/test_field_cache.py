@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from lupin_twin.field_cache import MAX_ENTRIES, FieldCache, FieldKey
+from lupin_twin.fields import MAX_ENTRIES, FieldCache, FieldKey
 from lupin_twin.grid import FieldGrid
 from lupin_twin.idw import compute_idw_field
 

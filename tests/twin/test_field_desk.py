@@ -7,9 +7,15 @@ from typing import Any
 
 import pytest
 
-from lupin_twin.field_cache import FieldCache
 from lupin_twin.field_desk import MAX_FIELDS, MAX_WAITING, FieldDesk
-from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused, FieldRequest, FieldRules
+from lupin_twin.fields import (
+    FieldCache,
+    FieldEngine,
+    FieldJob,
+    FieldRefused,
+    FieldRequest,
+    FieldRules,
+)
 from lupin_twin.grid import FieldGrid
 from lupin_twin.state import TwinStore
 from lupin_twin.workers import Workers

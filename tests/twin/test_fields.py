@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from lupin_twin import idw
 from lupin_twin.bounds import MAX_TEXT_LENGTH
 from lupin_twin.explored import OccupancyMap, occupancy_map
-from lupin_twin.field_cache import FieldCache
 from lupin_twin.fields import (
+    FieldCache,
     FieldEngine,
     FieldJob,
     FieldRefused,

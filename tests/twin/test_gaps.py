@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_twin.gaps import MAX_WRITERS, Gaps
+from lupin_twin.numbering import MAX_WRITERS, Gaps
 
 
 def lost(numbers: Iterable[int], writers: int = 1) -> list[int]:

@@ -15,8 +15,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 
 from lupin_twin.cdr import MessageShape
-from lupin_twin.counts import LOST
-from lupin_twin.drops import Drop, Reason
+from lupin_twin.drops import LOST, Drop, Reason
 from lupin_twin.habits import (
     BEHIND_S,
     BELIEVED_S,

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.leaving import INTERRUPTED, NOT_WRITTEN
+from lupin_twin.process import INTERRUPTED, NOT_WRITTEN
 from tests.support.waiting import PATIENCE_S
 
 LEAVE = """
 import sys, threading
-from lupin_twin.leaving import leave_after
+from lupin_twin.process import leave_after
 how, end = sys.argv[1:]
 if how == "busy":
     threading.Thread(target=threading.Event().wait).start()
@@ -86,7 +86,7 @@ def test_what_cannot_be_said_does_not_change_how_it_ends(how: str) -> None:
 
 OPEN = """
 import os, subprocess, sys
-from lupin_twin.leaving import leave_after
+from lupin_twin.process import leave_after
 
 def main():
     # Also those that read and write are there.

@@ -5,7 +5,7 @@ from itertools import repeat
 
 import pytest
 
-from lupin_twin.making import make_many
+from lupin_twin.journal.fold import make_many
 from lupin_twin.state import Pose, Reading, TagState, Try
 
 

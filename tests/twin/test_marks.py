@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from lupin_twin.marks import (
+from lupin_twin.layers import (
     FRESH_S,
     OLD_S,
     PlanterMark,

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from lupin_twin.one_core import use_one_core
+from lupin_twin.process import use_one_core
 
 
 def test_whoever_says_otherwise_has_it_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 
+from lupin_twin.numbering import TwinCount
 from lupin_twin.other_twins import OtherTwins
-from lupin_twin.twin_count import TwinCount
 from tests.support.ros import Peer
 
 

@@ -12,8 +12,8 @@ from lupin_msgs.srv import GetField
 from rcl_interfaces.srv import GetParameters
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from lupin_twin import resending as module
-from lupin_twin.resending import (
+from lupin_twin import responses as module
+from lupin_twin.responses import (
     MAX_UNSENT,
     PATIENCE_S,
     TRY_EVERY_S,

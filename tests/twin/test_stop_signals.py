@@ -12,11 +12,11 @@ import pytest
 from tests.support.waiting import PATIENCE_S
 
 SCRIPT = """
-from lupin_twin import stop_signals
-stop_signals.block()
+from lupin_twin import process
+process.block()
 print("blocked", flush=True)
 input()
-stop_signals.wait()
+process.wait()
 print("asked", flush=True)
 """
 
@@ -38,11 +38,11 @@ def test_a_signal_waits_until_it_is_asked_for(stop: signal.Signals) -> None:
 
 HANG_UP = """
 import signal
-from lupin_twin import stop_signals
-stop_signals.block(stop_signals.with_hang_up())
+from lupin_twin import process
+process.block(process.with_hang_up())
 signal.raise_signal(signal.SIGHUP)
 print("held" if signal.SIGHUP in signal.sigpending() else "dropped", flush=True)
-stop_signals.wait(signals=stop_signals.with_hang_up())
+process.wait(signals=process.with_hang_up())
 print("asked", flush=True)
 """
 
@@ -70,10 +70,10 @@ HANGS = {
 }
 HANG = """
 import ctypes
-from lupin_twin import stop_signals
-stop_signals.block()
+from lupin_twin import process
+process.block()
 print("blocked", flush=True)
-stop_signals.wait(1)
+process.wait(1)
 """
 
 

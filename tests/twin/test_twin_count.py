@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_twin.twin_count import MAX_ROWS, TwinCount
+from lupin_twin.numbering import MAX_ROWS, TwinCount
 
 
 def heard(*numbers: Iterable[int]) -> TwinCount:

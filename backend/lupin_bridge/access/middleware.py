@@ -16,13 +16,16 @@ from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from websockets.frames import CloseCode
 
-from lupin_bridge.access import cookies
-from lupin_bridge.access.cookies import CookieTooLong
-from lupin_bridge.access.credentials import BrowserSession, Credentials
+from lupin_bridge.access.credentials import (
+    BrowserSession,
+    CookieTooLong,
+    Credentials,
+    Sessions,
+    cookies_of,
+)
 from lupin_bridge.access.entrance import path_of
 from lupin_bridge.access.policy import AccessPolicy, Asked, HostError, OriginError
 from lupin_bridge.access.security import with_security_headers
-from lupin_bridge.access.sessions import Sessions
 from lupin_bridge.serving.rate_limit import RateLimit, client_key
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.settings import SettingError, Settings
@@ -153,7 +156,7 @@ class AccessControl:
             return self._check_header(credentials, header, client_of(request))
         # A cookie is no guess: it cannot be made without the token, however often one tries.
         try:
-            values = cookies.values_of(credentials.cookie_name, request.scope["headers"])
+            values = cookies_of(credentials.cookie_name, request.scope["headers"])
         except CookieTooLong as error:
             return _Refusal(431, str(error))
         for value in values:

@@ -36,7 +36,7 @@ from lupin_bridge.bags.recording import (
     clock_ns,
 )
 from lupin_bridge.telling import say
-from lupin_twin import stop_signals
+from lupin_twin import process
 from lupin_twin.convert import time_msg
 from lupin_twin.half_made import remove_half_made
 
@@ -79,7 +79,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         at = words.index("--ros-args")
         own, ros_args = words[:at], words[at:]
     options = parser().parse_args(own)
-    stop_signals.end_with_parent()
+    process.end_with_parent()
     stopped = _stop_asked()
     try:
         with Recording(options.files) as recording:
@@ -324,12 +324,12 @@ def _stop_asked() -> Callable[[], bool]:
 
     def note(number: int, _frame: object) -> None:
         if not asked:
-            stop_signals.must_end()
+            process.must_end()
         asked.append(number)
 
-    for number in stop_signals.STOP_SIGNALS:
+    for number in process.STOP_SIGNALS:
         signal.signal(number, note)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, stop_signals.STOP_SIGNALS)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, process.STOP_SIGNALS)
     return lambda: bool(asked)
 
 

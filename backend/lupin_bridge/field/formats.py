@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import colorsys
 import io
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -11,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 import orjson
 
-from lupin_bridge.field.colour import rgb
 from lupin_bridge.judge.ranges import Sensor, Sensors
 from lupin_twin.estimate import EstimateGrid
 from lupin_twin.far_off import far_off_tags
@@ -20,6 +20,14 @@ from lupin_twin.fields import FieldRules
 from lupin_twin.grid import FieldGrid
 from lupin_twin.idw import never
 from lupin_twin.state import TagState
+
+
+def rgb(hue: float, saturation: float, lightness: float) -> tuple[int, int, int]:
+    """A colour of degrees, percent, percent as 0 to 255 a channel (CSS Color 4, section 7)."""
+    channels = colorsys.hls_to_rgb(hue / 360, lightness / 100, saturation / 100)
+    red, green, blue = (round(channel * 255) for channel in channels)
+    return red, green, blue
+
 
 # Palette index 0 is "not known"; the ramp has the other 255.
 _RAMP_STEPS: Final = 255

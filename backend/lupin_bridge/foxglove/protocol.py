@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import orjson
 
-from lupin_bridge.serving.client_json import members_of, shown
+from lupin_bridge.serving.client_messages import members_of, shown
 
 # Of the same content. The newer one is what Foxglove asks for today, the older one what Lichtblick
 # does; a client that offers both gets the first that it names.

@@ -12,8 +12,7 @@ from typing import Final
 
 from lupin_bridge.foxglove import protocol
 from lupin_bridge.foxglove.protocol import MAX_SUBSCRIPTIONS, Channel, Refused, Subscribe
-from lupin_bridge.serving.client_json import shown
-from lupin_bridge.serving.client_pace import ClientPace
+from lupin_bridge.serving.client_messages import ClientPace, shown
 
 # The largest message that one client is sent: a map of 4,000 × 4,000 cells has 16 MB, a layer of a
 # million points 20. What waits for one that does not read is one such message.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from typing import Protocol
 
 from lupin_bridge.alarms.board import AlarmBoard
@@ -12,10 +13,21 @@ from lupin_bridge.outward.choosing import Targets
 from lupin_bridge.outward.mirror import Mirror
 from lupin_bridge.outward.mqtt import Mqtt
 from lupin_bridge.outward.payloads import Seen
-from lupin_bridge.outward.threads import LeftAlone
 from lupin_bridge.outward.webhook import Webhook
 from lupin_bridge.stream.status import Outward
 from lupin_twin.diagnostics import Origin
+
+
+class LeftAlone(ThreadPoolExecutor):
+    """Threads whose work is not waited for at the end.
+
+    A name server that does not answer holds a thread for half a minute, and asyncio waits for all
+    of them as it ends. Here it goes on; what is left ends with the process (`lupin_twin.process`).
+    """
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: ARG002
+        """End the idle threads, and wait for none."""
+        super().shutdown(wait=False, cancel_futures=True)
 
 
 class House(Protocol):

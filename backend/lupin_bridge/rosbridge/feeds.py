@@ -18,7 +18,7 @@ from typing import Final
 from lupin_bridge.rosbridge import protocol
 from lupin_bridge.rosbridge.session import Feed
 from lupin_bridge.rosbridge.values import json_of
-from lupin_bridge.serving.client_json import shown
+from lupin_bridge.serving.client_messages import shown
 from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.twin.relay import Bounded, NotRelayedError, Relay, Sample
 from lupin_bridge.twin.shared import Shared

@@ -27,7 +27,7 @@ from typing import Any, Final, Literal
 
 import orjson
 
-from lupin_bridge.serving.client_json import members_of, shown
+from lupin_bridge.serving.client_messages import members_of, shown
 
 MAX_NAME_LENGTH: Final = 256
 MAX_THROTTLE_RATE_MS: Final = 3_600_000.0

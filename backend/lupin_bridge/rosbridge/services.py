@@ -16,7 +16,7 @@ import orjson
 
 from lupin_bridge.field.query import BOX_NAMES
 from lupin_bridge.rosbridge.protocol import CallService, Refused
-from lupin_bridge.serving.client_json import shown
+from lupin_bridge.serving.client_messages import shown
 from lupin_bridge.twin.names import TwinNames, topics_of
 from lupin_twin.fields import FieldRequest
 

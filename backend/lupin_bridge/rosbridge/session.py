@@ -22,8 +22,7 @@ from lupin_bridge.rosbridge.protocol import (
     Unsubscribe,
 )
 from lupin_bridge.rosbridge.services import FieldCall
-from lupin_bridge.serving.client_json import shown
-from lupin_bridge.serving.client_pace import ClientPace
+from lupin_bridge.serving.client_messages import ClientPace, shown
 from lupin_bridge.stream.frames import StateFrame
 from lupin_bridge.twin.names import Topic, TwinNames, topics_of
 

@@ -8,7 +8,7 @@ import time
 from fastapi import WebSocket
 
 from lupin_bridge.access.middleware import client_of
-from lupin_bridge.serving.client_pace import TooManyMessages
+from lupin_bridge.serving.client_messages import TooManyMessages
 from lupin_bridge.serving.ws_protocol import Connection
 from lupin_bridge.stream.hub import CLOSE_POLICY, CLOSE_TRY_AGAIN_LATER, Client, Hub
 

@@ -22,7 +22,7 @@ from lupin_bridge.foxglove.protocol import SUBPROTOCOLS, Channel
 from lupin_bridge.foxglove.session import Message, Reaction, Session
 from lupin_bridge.routes.clients import dismiss, has_place, next_message, write_when_free
 from lupin_bridge.routes.tools import error_response
-from lupin_bridge.serving.client_pace import TooManyMessages
+from lupin_bridge.serving.client_messages import TooManyMessages
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.stream.frames import binary_head, text_frame
 from lupin_bridge.stream.hub import Client

@@ -30,7 +30,7 @@ from lupin_bridge.rosbridge.session import Session
 from lupin_bridge.routes.clients import dismiss, has_place, next_message, write_when_free
 from lupin_bridge.routes.computing import field_answer
 from lupin_bridge.serving.admission import AdmissionError
-from lupin_bridge.serving.client_pace import TooManyMessages
+from lupin_bridge.serving.client_messages import TooManyMessages
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.stream.hub import Client

@@ -24,8 +24,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
 
 from lupin_bridge.serving.rate_limit import client_key
-from lupin_bridge.serving.refusal import refusal
-from lupin_bridge.serving.transports import CLOSE_GRACE_S, bound_unsent, reset, tear_down
+from lupin_bridge.serving.transports import CLOSE_GRACE_S, bound_unsent, refusal, reset, tear_down
 
 log = logging.getLogger(__name__)
 

@@ -23,7 +23,7 @@ from lupin_bridge.serving.limits import Limits
 from lupin_bridge.serving.transports import tear_down
 from lupin_bridge.serving.ws_protocol import Connection
 from lupin_bridge.settings import Settings
-from lupin_twin import stop_signals
+from lupin_twin import process
 
 log = logging.getLogger(__name__)
 
@@ -132,7 +132,7 @@ class BridgeServer(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """A stop signal has come: end, soon, and whatever hangs, a stuck loop included."""
-        stop_signals.must_end()
+        process.must_end()
         super().handle_exit(sig, frame)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:

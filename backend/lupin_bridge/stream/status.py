@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from lupin_twin.counts import Recent
 from lupin_twin.diagnostics import Origin
+from lupin_twin.drops import Recent
 from lupin_twin.journal.condition import UNKNOWN, Condition, JournalState
 from lupin_twin.state import NANOSECONDS_PER_SECOND, ClockState
 

@@ -18,8 +18,7 @@ from lupin_bridge.twin.relay import RosTime, Sample
 from lupin_twin import diagnostics, shapes
 from lupin_twin.drops import Drop
 from lupin_twin.habits import latched, read_message
-from lupin_twin.layers import LAYERS_BELOW
-from lupin_twin.marks import PLANTERS_TOPIC, TAGS_TOPIC
+from lupin_twin.layers import LAYERS_BELOW, PLANTERS_TOPIC, TAGS_TOPIC
 
 # A name that comes from outside imports nothing.
 _PACKAGES: Final[Mapping[str, Any]] = {

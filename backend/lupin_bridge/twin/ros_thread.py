@@ -10,17 +10,40 @@ import asyncio
 import logging
 import threading
 from collections.abc import Callable, Sequence
-from typing import Any, Generic, Protocol, TypeVar
+from functools import cache
+from typing import Any, Final, Generic, Protocol, TypeVar
 
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
 
-from lupin_bridge.twin import ros_logs
 from lupin_bridge.twin.source import TwinUnavailableError
 from lupin_twin.half_made import remove_half_made
 from lupin_twin.spinning import end_spinning, spin_until_shutdown
+
+# rcl would write lines of its own to standard error, between those that a log collector reads. Its
+# log file and `/rosout` stay as they are.
+QUIET: Final = ("--ros-args", "--disable-stdout-logs")
+
+
+@cache
+def forward() -> None:
+    """From now on, hand on what rclpy's loggers log: the place that all of it passes, filtered."""
+    write = rclpy_implementation.rclpy_logging_rcutils_log
+
+    def write_and_hand_on(severity: Any, name: str, message: str, *place: Any) -> None:
+        write(severity, name, message, *place)
+        function, file, line = place
+        # ROS's severities are Python's numbers, and ROS has decided already that it is to be told.
+        record = logging.LogRecord(
+            name, int(severity), file, line, "%s", (message,), None, function
+        )
+        logging.root.handle(record)
+
+    rclpy_implementation.rclpy_logging_rcutils_log = write_and_hand_on
+
 
 log = logging.getLogger(__name__)
 
@@ -245,10 +268,10 @@ class RosThread(Generic[NodeT, EventT]):
         self._require_node().report(what, error)
 
     def _init_ros(self) -> None:
-        ros_logs.forward()
+        forward()
         try:
             rclpy.init(
-                args=[*self._ros_args, *ros_logs.QUIET],
+                args=[*self._ros_args, *QUIET],
                 context=self._context,
                 # The web server owns the signals.
                 signal_handler_options=SignalHandlerOptions.NO,

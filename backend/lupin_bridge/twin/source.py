@@ -11,8 +11,8 @@ from lupin_bridge.twin.looking import Question
 from lupin_bridge.twin.names import TwinNames
 from lupin_bridge.twin.relay import Relay
 from lupin_bridge.twin.trust import RevisedEstimate
-from lupin_twin.counts import Counts, Recent
 from lupin_twin.diagnostics import Origin
+from lupin_twin.drops import Counts, Recent
 from lupin_twin.estimate_report import Report, ReportRequest
 from lupin_twin.estimates import EstimateRequest
 from lupin_twin.explored import OccupancyMap

@@ -25,10 +25,9 @@ from rclpy.clock import Clock, ClockType
 from lupin_bridge.twin.pairing import Pairing
 from lupin_twin import convert, diagnostics, ingest, shapes
 from lupin_twin.clock_watch import StampWatch
-from lupin_twin.counts import Counts
 from lupin_twin.diagnostic_messages import findings_of
 from lupin_twin.diagnostics import Origin, SelfReport, self_report
-from lupin_twin.drops import Drop, Reason
+from lupin_twin.drops import Counts, Drop, Reason
 from lupin_twin.estimate_report import REPORT_SERVICE
 from lupin_twin.estimates import ESTIMATE_SERVICE
 from lupin_twin.explored import OccupancyMap
@@ -36,6 +35,7 @@ from lupin_twin.fields import FieldRules
 from lupin_twin.habits import SERVICE_QOS, Habits
 from lupin_twin.history import History, TagHistory
 from lupin_twin.journal.condition import Condition
+from lupin_twin.numbering import TwinCount
 from lupin_twin.parameters import TIMES_TOPIC, TwinParameters
 from lupin_twin.past import HISTORY_SERVICE, STATE_AT_SERVICE
 from lupin_twin.past_writes import WRITES_SERVICE
@@ -46,7 +46,6 @@ from lupin_twin.ros_parameters import (
     naming_own_parameters,
 )
 from lupin_twin.state import Snapshot, TagState
-from lupin_twin.twin_count import TwinCount
 
 NODE_NAME: Final = "lupin_web"
 

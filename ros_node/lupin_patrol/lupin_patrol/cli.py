@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import NoReturn
 
-from lupin_twin import stop_signals
+from lupin_twin import process
 
 SPEED_LIMITS = (0.1, 50.0)
 DAY_SPEED_LIMITS = (0.0, 3600.0)
@@ -66,7 +66,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 def main() -> int:
     """Run the node until it is stopped or done; returns the exit code."""
-    stop_signals.block()  # before anything slow is imported
+    process.block()  # before anything slow is imported
     try:
         from greenhouse_sim.simulator import GreenhouseSimulator  # noqa: PLC0415  # see above
     except ModuleNotFoundError as error:
@@ -85,7 +85,7 @@ def main() -> int:
     except RuntimeError as error:  # what rclpy raises for ROS arguments that it cannot parse
         return _refuse(f"cannot use these ROS arguments: {error}")
     if options.end_with_parent:
-        stop_signals.end_with_parent()
+        process.end_with_parent()
     begin_s = options.since_morning
     mission = Mission(GreenhouseSimulator(), options.seed, options.day_speed, begin_s=begin_s)
     try:

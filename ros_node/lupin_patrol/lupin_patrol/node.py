@@ -37,7 +37,7 @@ from lupin_patrol.events import (
     TagsDiscovered,
 )
 from lupin_patrol.messages import discovered_tags, flower, occupancy_grid, tag_reading
-from lupin_twin import stop_signals
+from lupin_twin import process
 from lupin_twin.habits import Habits, latched
 from lupin_twin.half_made import remove_half_made
 from lupin_twin.spinning import end_spinning, spin_until_shutdown
@@ -177,7 +177,7 @@ def _stop_flag() -> Flag:
     flag = Flag()
 
     def wait() -> None:
-        stop_signals.wait()
+        process.wait()
         flag.set()
 
     Thread(target=wait, name="signals", daemon=True).start()

@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from threading import Event, Thread, main_thread
 from typing import NoReturn
 
-from lupin_twin import stop_signals
+from lupin_twin import process
 from lupin_twin.half_made import remove_half_made
-from lupin_twin.leaving import leave_after
-from lupin_twin.one_core import use_one_core
+from lupin_twin.process import leave_after, use_one_core
 
 USAGE_ERROR = 2
 
@@ -19,7 +18,7 @@ USAGE_ERROR = 2
 def main(args: Sequence[str] | None = None) -> int:
     """Run the twin until a signal ends it; returns the exit code, 1 if its thread has died."""
     use_one_core()
-    stop_signals.block()  # before anything slow is imported
+    process.block()  # before anything slow is imported
     import rclpy  # noqa: PLC0415  # see above
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
 
@@ -63,7 +62,7 @@ def _run() -> int:
 
     thread = Thread(target=spin, name="ros")
     thread.start()
-    stop_signals.wait()
+    process.wait()
     exit_code = 1 if ended.is_set() else 0
     end_spinning(executor)
     thread.join()

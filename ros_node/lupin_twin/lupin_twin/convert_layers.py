@@ -17,8 +17,7 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from lupin_twin.convert import time_msg
-from lupin_twin.layers import COLUMNS, PointArray
-from lupin_twin.marks import Look, PlanterMark, TagMark
+from lupin_twin.layers import COLUMNS, Look, PlanterMark, PointArray, TagMark
 from lupin_twin.workers import in_turns
 
 _FLOAT32_BYTES: Final = 4

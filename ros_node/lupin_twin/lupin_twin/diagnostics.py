@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final, Literal, get_args
 
-from lupin_twin.counts import LATE, LOST, Counts, Recent
-from lupin_twin.drops import Reason
+from lupin_twin.drops import LATE, LOST, Counts, Reason, Recent
 from lupin_twin.journal.condition import UNKNOWN as UNKNOWN_JOURNAL
 from lupin_twin.journal.condition import Condition, JournalState
 from lupin_twin.state import ClockState

@@ -18,7 +18,6 @@ import numpy as np
 from lupin_msgs.srv import GetEstimate, GetEstimateReport
 
 from lupin_twin import convert_estimate
-from lupin_twin.deferred import Later
 from lupin_twin.diagnostics import Estimates
 from lupin_twin.estimate import MAX_PER_TAG, NOTHING, FitFailed, Model, Place
 from lupin_twin.estimate_report import ADVICE_S, REPORT_SERVICE, Report, ReportRequest, advice
@@ -50,6 +49,7 @@ from lupin_twin.journal.queries import SERIES_S
 from lupin_twin.past import NotRemembered, PastRefused, message_of
 from lupin_twin.past_desk import PastDesk, Question
 from lupin_twin.recall import Recall
+from lupin_twin.responses import Later
 from lupin_twin.state import NANOSECONDS_PER_SECOND, Scan, TwinStore
 from lupin_twin.workers import ShouldStop, Workers, in_turns
 

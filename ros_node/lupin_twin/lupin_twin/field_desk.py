@@ -12,8 +12,7 @@ from concurrent.futures import Future
 from queue import Empty, SimpleQueue
 from typing import Any, Final
 
-from lupin_twin.field_cache import FieldKey
-from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused
+from lupin_twin.fields import FieldEngine, FieldJob, FieldKey, FieldRefused
 from lupin_twin.grid import FieldGrid
 from lupin_twin.refusals import passing
 from lupin_twin.workers import Workers

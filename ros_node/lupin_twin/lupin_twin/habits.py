@@ -20,9 +20,8 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.serialization import deserialize_message
 
 from lupin_twin.cdr import MessageShape, TooManyError
-from lupin_twin.counts import Counts, Tally
 from lupin_twin.diagnostics import MAX_PROBLEMS
-from lupin_twin.drops import Drop, Reason
+from lupin_twin.drops import Counts, Drop, Reason, Tally
 from lupin_twin.inputs import Input
 from lupin_twin.lateness import Late
 from lupin_twin.ros_parameters import naming

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from lupin_twin.gaps import Gaps
+from lupin_twin.numbering import Gaps
 
 # What rclpy calls a node whose name DDS has not told (rmw_dds_common, graph_cache.cpp).
 _NO_NAME: Final = "_NODE_NAME_UNKNOWN_"

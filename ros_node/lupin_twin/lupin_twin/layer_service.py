@@ -28,8 +28,15 @@ from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused, FieldRequest
 from lupin_twin.grid import FieldGrid
 from lupin_twin.habits import Habits, latched
 from lupin_twin.idw import Abandoned
-from lupin_twin.layers import layer_request, points, topics_of
-from lupin_twin.marks import PLANTERS_TOPIC, TAGS_TOPIC, planter_marks, tag_marks
+from lupin_twin.layers import (
+    PLANTERS_TOPIC,
+    TAGS_TOPIC,
+    layer_request,
+    planter_marks,
+    points,
+    tag_marks,
+    topics_of,
+)
 from lupin_twin.past_desk import PastDesk, Question
 from lupin_twin.ros_parameters import naming
 from lupin_twin.state import NANOSECONDS_PER_SECOND, Snapshot, TwinStore

@@ -21,15 +21,13 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 
 from lupin_twin import convert, convert_field, ingest, shapes
 from lupin_twin.clock_watch import CLOCK_SAYS, ClockWatch
-from lupin_twin.deferred import Later, allow_later
 from lupin_twin.diagnostic_messages import diagnostics
 from lupin_twin.diagnostics import TOPIC, Health, Origin, findings, origin_of
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.estimate_service import EstimateRules, EstimateService, Known
 from lupin_twin.explored import OccupancyMap
-from lupin_twin.field_cache import FieldCache
 from lupin_twin.field_desk import FieldDesk
-from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused, FieldRules
+from lupin_twin.fields import FieldCache, FieldEngine, FieldJob, FieldRefused, FieldRules
 from lupin_twin.grid import FieldGrid
 from lupin_twin.habits import SERVICE_QOS, Habits, latched, waker
 from lupin_twin.history import History, TagHistory, kind_of
@@ -37,14 +35,14 @@ from lupin_twin.journal.runs import Clock as RunClock
 from lupin_twin.lateness import LATCHED_AFTER_S, Lateness
 from lupin_twin.layer_service import LAYER_LOOK_S, LayerService, Shown
 from lupin_twin.memory import Memory, journal_path, open_journal
+from lupin_twin.numbering import TwinCount
 from lupin_twin.other_twins import OtherTwins
 from lupin_twin.parameters import TIMES_TOPIC, ParameterError, TwinParameters, World
 from lupin_twin.past_desk import PastDesk
 from lupin_twin.past_service import JournalPast, PastService
-from lupin_twin.resending import TRY_EVERY_S, Resending
+from lupin_twin.responses import TRY_EVERY_S, Later, Resending, allow_later
 from lupin_twin.ros_parameters import AdjustableNode, declare, naming, naming_own_parameters
 from lupin_twin.state import ClockState, Look, Scan, Snapshot, TwinStore
-from lupin_twin.twin_count import TwinCount
 from lupin_twin.workers import Workers
 
 NODE_NAME: Final = "lupin_twin"

@@ -9,7 +9,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from lupin_twin.habits import Habits
-from lupin_twin.twin_count import TwinCount
+from lupin_twin.numbering import TwinCount
 
 
 class OtherTwins:

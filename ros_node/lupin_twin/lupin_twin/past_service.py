@@ -9,7 +9,6 @@ from typing import Any, Final, Protocol
 from lupin_msgs.srv import GetHistory, GetStateAt, GetWrites
 
 from lupin_twin import convert, convert_past, convert_writes
-from lupin_twin.deferred import Later
 from lupin_twin.habits import SERVICE_QOS, Habits
 from lupin_twin.journal.fold import STATE_S_PER_TAG, state_at
 from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG, series
@@ -27,6 +26,7 @@ from lupin_twin.past import (
 from lupin_twin.past_desk import PastDesk, Question
 from lupin_twin.past_writes import WRITES_SERVICE, PastWrites, WritesRequest
 from lupin_twin.recall import Recall
+from lupin_twin.responses import Later
 from lupin_twin.state import Snapshot, TwinStore
 from lupin_twin.workers import SMALL_S
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from lupin_bridge.access.cookies import MAX_COOKIE_BYTES, CookieTooLong, values_of
+from lupin_bridge.access.credentials import MAX_COOKIE_BYTES, CookieTooLong, cookies_of
 from lupin_bridge.serving.http_protocol import MAX_HEAD_BYTES
 from tests.support.access import BEARER, TOKEN, Served, served
 from tests.support.proc_stat import cpu_s
@@ -32,13 +32,13 @@ NAME = "lupin_session_0011aabb"
     ],
 )
 def test_every_value_of_the_name_and_nothing_else(header: str, values: list[str]) -> None:
-    assert values_of(NAME, [(b"host", b"x"), (b"cookie", header.encode())]) == values
+    assert cookies_of(NAME, [(b"host", b"x"), (b"cookie", header.encode())]) == values
 
 
 def test_all_lines_count_and_what_is_no_text_does_no_harm() -> None:
     lines = [(b"cookie", f"{NAME}=a".encode()), (b"cookie", f"{NAME}=\xff".encode("latin-1"))]
-    assert values_of(NAME, lines) == ["a", "\xff"]
-    assert values_of(NAME, [(b"set-cookie", f"{NAME}=a".encode())]) == []
+    assert cookies_of(NAME, lines) == ["a", "\xff"]
+    assert cookies_of(NAME, [(b"set-cookie", f"{NAME}=a".encode())]) == []
 
 
 @pytest.mark.parametrize("lines", [1, 2])
@@ -47,9 +47,9 @@ def test_as_long_as_the_limit_and_no_longer(lines: int) -> None:
     fill = (MAX_COOKIE_BYTES - lines * len(own)) // lines
     headers = [(b"cookie", own + b";" * fill) for _ in range(lines)]
     assert sum(len(value) for _, value in headers) == MAX_COOKIE_BYTES
-    assert values_of(NAME, headers) == ["a"] * lines
+    assert cookies_of(NAME, headers) == ["a"] * lines
     with pytest.raises(CookieTooLong, match=f"Cookie has {MAX_COOKIE_BYTES + 1} bytes, the limit"):
-        values_of(NAME, [*headers, (b"cookie", b";")])
+        cookies_of(NAME, [*headers, (b"cookie", b";")])
 
 
 # --- served -------------------------------------------------------------------------------------

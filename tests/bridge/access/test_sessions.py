@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from lupin_bridge.access.credentials import BrowserSession
-from lupin_bridge.access.sessions import Sessions
+from lupin_bridge.access.credentials import BrowserSession, Sessions
 
 NOW_S = 1_700_000_000.0
 

@@ -9,8 +9,7 @@ from lupin_msgs.msg import DiscoveredTags, Observation
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from lupin_bridge.bags.journal_export import Exported, export
-from lupin_bridge.bags.journal_rows import LOT
+from lupin_bridge.bags.journal_export import LOT, Exported, export
 from lupin_twin import convert, ingest
 from lupin_twin.drops import Drop
 from lupin_twin.history import History

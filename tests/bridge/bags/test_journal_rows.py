@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from lupin_bridge.bags import journal_rows
-from lupin_bridge.bags.journal_rows import JournalRows
+from lupin_bridge.bags import journal_export
+from lupin_bridge.bags.journal_export import JournalRows
 from lupin_twin.journal.rows import PinRow, Row
 from lupin_twin.journal.runs import Carries, Clock
 from lupin_twin.journal.schema import open_reader
@@ -38,7 +38,7 @@ def test_all_of_it_in_the_order_of_hearing(tmp_path: Path, monkeypatch: pytest.M
     path = tmp_path / "j.sqlite"
     kept(path, ROWS)
     for lot in (1, 2, 3, 2_000):
-        monkeypatch.setattr(journal_rows, "LOT", lot)
+        monkeypatch.setattr(journal_export, "LOT", lot)
         assert held(path) == (ROWS, [])
 
 
@@ -59,7 +59,7 @@ def test_what_comes_while_it_is_read_is_read_too(
 ) -> None:
     path, later = tmp_path / "j.sqlite", scan("10", NOW + 4 * SECOND, light=1.0)
     kept(path, ROWS)
-    monkeypatch.setattr(journal_rows, "LOT", 1)
+    monkeypatch.setattr(journal_export, "LOT", 1)
     with closing(open_reader(path)) as connection:
         rows = JournalRows(connection, 0, 2**62)
         reading = iter(rows)

@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from lupin_bridge.bags.spool import Spool
+from lupin_bridge.bags.bag_file import Spool
 
 
 def test_what_the_file_does_not_take_waits_and_goes_on_where_it_stopped() -> None:

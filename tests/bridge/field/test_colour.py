@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from lupin_bridge.field import colour
+from lupin_bridge.field import formats as colour
 
 
 @pytest.mark.parametrize(

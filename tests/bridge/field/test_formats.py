@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from lupin_bridge.field import formats as field_formats
-from lupin_bridge.field.colour import rgb
-from lupin_bridge.field.formats import FORMATS, JSON, NPY, PNG
+from lupin_bridge.field.formats import FORMATS, JSON, NPY, PNG, rgb
 from lupin_bridge.judge.choosing import own_sensors
 from lupin_bridge.stream import schema
 from lupin_twin.grid import FieldGrid

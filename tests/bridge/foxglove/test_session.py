@@ -9,7 +9,7 @@ import pytest
 
 from lupin_bridge.foxglove.protocol import MAX_SUBSCRIPTIONS, Channel
 from lupin_bridge.foxglove.session import MAX_MESSAGE_BYTES, Counts, Message, Reaction, Session
-from lupin_bridge.serving.client_pace import MAX_BURST, MAX_MESSAGES_PER_S, TooManyMessages
+from lupin_bridge.serving.client_messages import MAX_BURST, MAX_MESSAGES_PER_S, TooManyMessages
 
 CHANNELS = {n: Channel(n, f"/topic{n}", "a/msg/B", "int32 x\n") for n in range(1, 201)}
 WIRES = {n: channel.json() for n, channel in CHANNELS.items()}

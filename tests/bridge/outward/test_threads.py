@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 
-from lupin_bridge.outward.threads import LeftAlone
+from lupin_bridge.outward.channels import LeftAlone
 from tests.support.waiting import PATIENCE_S, wait_for
 
 

@@ -19,7 +19,7 @@ from lupin_bridge.rosbridge.protocol import (
     Unsubscribe,
     parse,
 )
-from lupin_bridge.serving.client_json import MAX_MESSAGE_LENGTH
+from lupin_bridge.serving.client_messages import MAX_MESSAGE_LENGTH
 
 TOPIC = "/twin/state"
 SERVICE = "/twin/get_field"

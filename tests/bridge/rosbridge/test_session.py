@@ -14,7 +14,7 @@ from websockets.protocol import State
 from websockets.uri import parse_uri
 
 from lupin_bridge.rosbridge.session import MAX_SUBSCRIPTIONS, Reaction, Session
-from lupin_bridge.serving.client_pace import MAX_BURST, MAX_MESSAGES_PER_S, TooManyMessages
+from lupin_bridge.serving.client_messages import MAX_BURST, MAX_MESSAGES_PER_S, TooManyMessages
 from lupin_bridge.stream.frames import FrameWriter, StateFrame
 from lupin_bridge.stream.hub import Client, Hub
 from lupin_bridge.stream.status import Liveness

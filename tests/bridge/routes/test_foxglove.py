@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from lupin_bridge.serving.client_pace import MAX_BURST
+from lupin_bridge.serving.client_messages import MAX_BURST
 from tests.support import messages
 from tests.support.domains import ros_env
 from tests.support.foxglove import SDK, WEBSOCKET, Viewer, reader_of, viewer

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from lupin_bridge.serving.client_pace import (
+from lupin_bridge.serving.client_messages import (
     MAX_BURST,
     MAX_MESSAGES_PER_S,
     ClientPace,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from lupin_bridge.serving.crowd import whom_to_turn_out
+from lupin_bridge.serving.acceptor import whom_to_turn_out
 
 
 @dataclass(eq=False)

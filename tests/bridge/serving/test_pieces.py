@@ -7,7 +7,7 @@ from websockets.frames import Frame, Opcode
 from websockets.protocol import CLIENT, State
 from websockets.protocol import Protocol as Reader
 
-from lupin_bridge.serving.pieces import PIECE_BYTES, pieces
+from lupin_bridge.serving.ws_protocol import PIECE_BYTES, pieces
 from lupin_bridge.stream.frames import binary_frame, binary_head, text_frame
 
 

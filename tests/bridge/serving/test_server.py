@@ -29,8 +29,7 @@ from lupin_bridge.serving.server import (
 )
 from lupin_bridge.settings import Settings
 from lupin_bridge.twin.ros_thread import STOP_TIMEOUT_S
-from lupin_twin.leaving import IDLE_WORKERS_END_S
-from lupin_twin.stop_signals import END_S
+from lupin_twin.process import END_S, IDLE_WORKERS_END_S
 from tests.support.inprocess import run, running
 from tests.support.live import attached, wait_until_ready
 from tests.support.processes import Process, lupin_twin, twin_node, url_of

@@ -8,18 +8,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.stream.listen_query import MIN_RATE_HZ, ListenQuery, ListenRefused, parse
+from lupin_bridge.routes.state import MIN_RATE_HZ, ListenQuery, ListenRefused, listen_query
 
 MAX_REASON_BYTES = 123  # RFC 6455, section 5.5, less the two of the code
 
 
 def test_who_asks_for_nothing_gets_every_state_whole() -> None:
-    assert parse([]) == ListenQuery(delta=False, max_rate_hz=math.inf)
-    assert parse([]).min_interval_s == 0.0
+    assert listen_query([]) == ListenQuery(delta=False, max_rate_hz=math.inf)
+    assert listen_query([]).min_interval_s == 0.0
 
 
 def test_a_full_query() -> None:
-    query = parse([("delta", "1"), ("max_rate_hz", "0.5")])
+    query = listen_query([("delta", "1"), ("max_rate_hz", "0.5")])
     assert query == ListenQuery(delta=True, max_rate_hz=0.5)
     assert query.min_interval_s == 2.0
 
@@ -43,7 +43,7 @@ def test_a_full_query() -> None:
 )
 def test_what_cannot_be_served_is_named(query: list[tuple[str, str]], named: list[str]) -> None:
     with pytest.raises(ListenRefused) as refused:
-        parse(query)
+        listen_query(query)
     for words in named:
         assert words in str(refused.value)
 
@@ -60,15 +60,15 @@ def test_what_cannot_be_served_is_named(query: list[tuple[str, str]], named: lis
 def test_every_refusal_fits_into_a_close_frame(query: list[tuple[str, str]]) -> None:
     reason = ""
     try:
-        parse(query)
+        listen_query(query)
     except ListenRefused as refused:
         reason = str(refused)
     assert len(reason.encode()) <= MAX_REASON_BYTES
 
 
 def test_the_lowest_rate_is_one_and_anything_lower_is_not() -> None:
-    assert parse([("max_rate_hz", "0.01")]).max_rate_hz == MIN_RATE_HZ
+    assert listen_query([("max_rate_hz", "0.01")]).max_rate_hz == MIN_RATE_HZ
     with pytest.raises(
         ListenRefused, match=r"max_rate_hz is '0.00999', expected a number from 0.01"
     ):
-        parse([("max_rate_hz", "0.00999")])
+        listen_query([("max_rate_hz", "0.00999")])

@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
+from lupin_bridge.routes.map import map_json, map_png
 from lupin_bridge.stream import schema
-from lupin_bridge.stream.map_picture import map_json, map_png
 from lupin_twin.explored import OccupancyMap, occupancy_map
 
 FREE, OCCUPIED = 236, 70

@@ -9,7 +9,7 @@ import pytest
 from lupin_bridge.bridge import WATCH_PERIOD_S
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.status import STALE_AFTER_S, Liveness, Outward, Reason, Status
-from lupin_twin.counts import Recent
+from lupin_twin.drops import Recent
 from lupin_twin.journal.condition import Condition, JournalState
 from lupin_twin.state import ClockState
 

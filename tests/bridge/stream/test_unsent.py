@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lupin_bridge.stream.unsent import Unsent
+from lupin_bridge.stream.hub import Unsent
 
 
 def message(size: int) -> bytes:

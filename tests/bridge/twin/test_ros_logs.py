@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from rclpy.logging import get_logger
 
-from lupin_bridge.twin import ros_logs
+from lupin_bridge.twin.ros_thread import forward
 from tests.support.messages import scan
 from tests.support.processes import url_of
 from tests.support.ros import Peer
@@ -44,8 +44,8 @@ def test_of_a_bridge_that_logs_json_every_line_is_an_object(domain: int) -> None
 def test_all_severities_are_handed_on_once_and_as_they_are(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    ros_logs.forward()
-    ros_logs.forward()
+    forward()
+    forward()
     logger = get_logger("probe")
     logger.info("100 %s")
     logger.warning("careful")

@@ -15,12 +15,12 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 
-from lupin_bridge.twin import ros_logs
+from lupin_bridge.twin.ros_thread import forward
 from lupin_bridge.twin.web_node import WebNode
 from lupin_twin import convert
-from lupin_twin.counts import Counts, Recent
 from lupin_twin.diagnostic_messages import diagnostics
 from lupin_twin.diagnostics import Finding
+from lupin_twin.drops import Counts, Recent
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.history import TagHistory
 from lupin_twin.parameters import ParameterError
@@ -393,7 +393,7 @@ def test_a_state_that_breaks_the_callback_is_counted_and_the_next_one_is_taken(
 def test_a_message_past_the_limit_is_dropped_before_it_is_read(
     stage: Stage, caplog: pytest.LogCaptureFixture, topic: str, limit: int
 ) -> None:
-    ros_logs.forward()
+    forward()
     (subscription,) = [s for s in stage.node.subscriptions if s.topic_name == topic]
     for size in (limit, limit + 1):
         subscription.callback(bytes(size), INFO)

@@ -1,4 +1,4 @@
-"""Messages that a full queue has lost, told by the gaps in their writers' numbers. Pure.
+"""What the numbers tell that DDS gives to messages: which were lost, how many publishers. Pure.
 
 Fast DDS says nothing when a queue overruns: its event for lost messages stays silent. But each
 writer numbers what it writes. Which writer a message is from is not told, so numbers are matched to
@@ -9,6 +9,42 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Final
+
+# More publishers than this on one topic are told as what the graph shows, all the same.
+MAX_ROWS: Final = 8
+
+
+class TwinCount:
+    """Believes in a second twin as soon as two have been heard by turns."""
+
+    def __init__(self) -> None:
+        self.value = 1
+        # The last number of each row, in the order in which the rows began.
+        self._rows: list[int] = []
+        self._by_turns = False
+
+    def hear(self, number: int) -> None:
+        """Note the number that its publisher gave to a state, counted from 1."""
+        # The newest first: a twin that was started anew passes the number at which the last ended.
+        for index in reversed(range(len(self._rows))):
+            if self._rows[index] == number - 1:
+                self._rows[index] = number
+                self._by_turns |= index < len(self._rows) - 1
+                return
+        self._rows = [*self._rows[1 - MAX_ROWS :], number]
+
+    def see(self, publishers: int) -> bool:
+        """Note how many publishers the graph shows; returns whether there are several twins.
+
+        `value` is the count to believe in.
+        """
+        if publishers <= 1:
+            self._rows = self._rows[-1:]
+            self._by_turns = False
+        is_several = publishers > 1 and self._by_turns
+        self.value = publishers if is_several else 1
+        return is_several
+
 
 # Writers followed at once; with more, the one that was heard longest ago is forgotten.
 MAX_WRITERS: Final = 16

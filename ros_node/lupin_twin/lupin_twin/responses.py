@@ -1,4 +1,6 @@
-"""Answers that DDS cannot deliver yet are sent again, until it can.
+"""A service's answers that are sent later than rclpy would: made elsewhere, or not delivered yet.
+
+Answers that DDS cannot deliver yet are sent again, until it can.
 
 A service may hear a request before its middleware has found the reader of the answer: where a
 machine is busy that takes seconds. The middleware waits 0.1 s, then drops the answer; rclpy says so
@@ -15,6 +17,41 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
+
+
+class Later:
+    """What a callback returns in place of its response. Belongs to the executor's thread."""
+
+    def __init__(self) -> None:
+        self._send: Callable[[Any], None] | None = None
+        self._response: Any = None
+
+    def answer(self, response: Any) -> None:
+        """Send the response: now, or as soon as rclpy has told whom to."""
+        if self._send is None:
+            self._response = response
+        else:
+            self._send(response)
+
+    def goes_to(self, send: Callable[[Any], None]) -> None:
+        """Have the response sent by `send(response)`."""
+        self._send = send
+        if self._response is not None:
+            send(self._response)
+
+
+def allow_later(service: Any) -> None:
+    """Let the callback of an rclpy Service return a `Later`."""
+    send_now = service.send_response
+
+    def send_response(response: Any, header: Any) -> None:
+        if isinstance(response, Later):
+            response.goes_to(lambda answer: send_now(answer, header))
+        else:
+            send_now(response, header)
+
+    service.send_response = send_response
+
 
 # How rclpy's warning begins (7.1.6), that the middleware has dropped an answer.
 UNSENT: Final = "failed to send response (timeout)"

@@ -19,14 +19,14 @@ import numpy as np
 
 from lupin_bridge.judge.choosing import own_sensors
 from lupin_twin.estimate import Readings, fit
-from lupin_twin.field_rules import field_rules
+from lupin_twin.fields import FieldRules
 from lupin_twin.idw import compute_idw_field
 from lupin_twin.parameters import TwinParameters
 from tests.bench.worlds import HEIGHT_M, HOUR_S, PASS_S, WIDTH_M, Floats, World, others, own
 
 CELL_M = 0.25
 INTERVAL_SDS = 1.645
-RULES = field_rules(TwinParameters())
+RULES = FieldRules.of(TwinParameters())
 # How long the patrol has driven, and how long it has stood since, s.
 PHASES = {
     "10 scans": (9 * PASS_S / 30, 0.0),

@@ -20,7 +20,7 @@ from lupin_twin.estimate.kernel import HOURS, UNKNOWN_MEAN, daily, matern, nearn
 from lupin_twin.estimate.model import Model
 from lupin_twin.estimate.triangle import root_of_inverse
 from lupin_twin.estimates import PER_MANY_TAGS, fitted
-from lupin_twin.field_rules import field_rules
+from lupin_twin.fields import FieldRules
 from lupin_twin.idw import compute_idw_field
 from lupin_twin.parameters import TwinParameters
 from tests.bench.bench_estimate import INTERVAL_SDS, rmse
@@ -41,7 +41,7 @@ PHASES = {
 NOISE = 0.2
 _WAVES = 16
 _CLOUD_HOURS = 3.0
-RULES = field_rules(TwinParameters())
+RULES = FieldRules.of(TwinParameters())
 
 Truth = Callable[[Floats, Floats], Floats]
 

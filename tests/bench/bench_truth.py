@@ -21,15 +21,14 @@ from lupin_patrol.mission import Mission
 from lupin_twin import convert, ingest
 from lupin_twin.drops import Drop
 from lupin_twin.field_quality import leave_one_out, painted_share
-from lupin_twin.field_rules import field_rules
-from lupin_twin.fields import FieldCache, FieldEngine, FieldJob, FieldRequest
+from lupin_twin.fields import FieldCache, FieldEngine, FieldJob, FieldRequest, FieldRules
 from lupin_twin.grid import FieldGrid, cell_centres
 from lupin_twin.history import History
 from lupin_twin.parameters import TwinParameters
 from lupin_twin.state import TwinStore
 
 WIDTH_M, HEIGHT_M, CELL_M = 4.0, 8.0, 0.05
-RULES = field_rules(TwinParameters())
+RULES = FieldRules.of(TwinParameters())
 
 
 def after_one_pass(day_speed: float) -> tuple[TwinStore, float]:

@@ -36,34 +36,7 @@ def test_a_signal_waits_until_it_is_asked_for(stop: signal.Signals) -> None:
         assert process.wait(PATIENCE_S) == 0
 
 
-HANG_UP = """
-import signal
-from lupin_twin import process
-process.block(process.with_hang_up())
-signal.raise_signal(signal.SIGHUP)
-print("held" if signal.SIGHUP in signal.sigpending() else "dropped", flush=True)
-process.wait(signals=process.with_hang_up())
-print("asked", flush=True)
-"""
-
-
-@pytest.mark.parametrize("is_ignored", [False, True])
-def test_a_terminal_that_is_closed_is_a_stop_unless_it_is_ignored(is_ignored: bool) -> None:
-    # Whoever runs the tests may ignore it already.
-    how = "SIG_IGN" if is_ignored else "SIG_DFL"
-    before = f"import signal; signal.signal(signal.SIGHUP, signal.{how})"
-    with subprocess.Popen(
-        [sys.executable, "-c", before + HANG_UP], stdout=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == ("dropped\n" if is_ignored else "held\n")
-        if is_ignored:  # it waits for another
-            process.send_signal(signal.SIGTERM)
-        assert process.stdout.readline() == "asked\n"
-        assert process.wait(PATIENCE_S) == 0
-
-
-# Each holds on to the interpreter, or comes after it, as a call of the middleware may.
+# Before the process ends: one keeps Python's lock, the other comes behind Python.
 HANGS = {
     "a call that keeps the interpreter": "ctypes.PyDLL(None).sleep(60)",
     "what runs after Python": "ctypes.CDLL(None).on_exit(ctypes.CDLL(None).pause, None)",

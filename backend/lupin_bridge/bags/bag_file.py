@@ -133,10 +133,6 @@ class BagFile:
         self._writer.flush()  # type: ignore[no-untyped-call]
         self._spool.drain()
 
-    def duplicate(self) -> int:
-        """Another descriptor of the file, to be synced and closed by who asks."""
-        return os.dup(self._file)
-
     def finish(self) -> None:
         """Write the index; from now on there is nothing to do but `flush_rest` and `close`."""
         self._writer.finish()  # type: ignore[no-untyped-call]

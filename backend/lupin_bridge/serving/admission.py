@@ -34,7 +34,6 @@ LARGE: Final = "large_in_flight"
 TOTAL: Final = "total_in_flight"
 CLIENT_EXPORTS: Final = "client_exports"
 ALL_EXPORTS: Final = "total_exports"
-REASONS: Final = (IN_FLIGHT, RATE, LARGE, TOTAL, CLIENT_EXPORTS, ALL_EXPORTS)
 
 
 class AdmissionError(RuntimeError):

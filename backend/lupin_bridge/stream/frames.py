@@ -24,11 +24,6 @@ def text_frame(payload: bytes) -> bytes:
     return Frame(Opcode.TEXT, payload).serialize(mask=False)
 
 
-def binary_frame(payload: bytes) -> bytes:
-    """Bytes as one WebSocket binary frame."""
-    return Frame(Opcode.BINARY, payload).serialize(mask=False)
-
-
 def binary_head(length: int) -> bytes:
     """What stands before so many bytes of a binary frame: they need not be copied for it."""
     frame = Frame(Opcode.BINARY, b"").serialize(mask=False)[:1]

@@ -39,8 +39,6 @@ from lupin_twin.workers import SMALL_S, Workers
 
 # A third of what counts as silence (`status.STALE_AFTER_S`).
 HEARTBEAT_S = 1.0
-# What looking through the history in memory takes, about, s of one core for each tag.
-RECENT_S_PER_TAG = 50e-6
 ResultT = TypeVar("ResultT")
 
 

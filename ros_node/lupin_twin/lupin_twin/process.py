@@ -15,7 +15,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from collections.abc import Set as AbstractSet
 from contextlib import suppress
 from typing import Final, NoReturn, TextIO
 
@@ -127,26 +126,20 @@ _STDERR: Final = 2
 _PR_SET_PDEATHSIG: Final = 1
 
 
-def with_hang_up() -> frozenset[signal.Signals]:
-    """The stop signals and SIGHUP: the terminal was closed. Not under nohup, which ignores it."""
-    is_ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
-    return STOP_SIGNALS if is_ignored else STOP_SIGNALS | {signal.SIGHUP}
-
-
-def block(signals: AbstractSet[signal.Signals] = STOP_SIGNALS) -> None:
+def block() -> None:
     """Hold the stop signals back until `wait` asks for them.
 
     To be called first of all, before ROS starts its threads: they inherit this.
     """
-    signal.pthread_sigmask(signal.SIG_BLOCK, signals)
+    signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
 
 
-def wait(end_within_s: int = END_S, signals: AbstractSet[signal.Signals] = STOP_SIGNALS) -> None:
+def wait(end_within_s: int = END_S) -> None:
     """Return when a stop signal has come; from then on the process has to end (`must_end`).
 
     Not by sigtimedwait: after a SIGSTOP and a SIGCONT, CPython returns from it without a signal.
     """
-    signal.sigwait(signals)
+    signal.sigwait(STOP_SIGNALS)
     must_end(end_within_s)
 
 

@@ -179,7 +179,7 @@ def test_field_requests_to_a_twin_that_does_not_answer_are_bounded_and_forgotten
         source = WebTwin(ros_args=(), timeout_s=PATIENCE_S)
         states: list[Told] = []
         await source.start(states.append, lambda: None)
-        node = source._thread._require_node()
+        node = source.thread.require_node()
         pending: dict[Any, Any] = node.clients_of_twin[Service.FIELD]._pending_requests
         try:
             await until(lambda: states, "a state of the twin")
@@ -195,14 +195,14 @@ def test_field_requests_to_a_twin_that_does_not_answer_are_bounded_and_forgotten
             for each in asked:
                 each.cancel()
             await until(lambda: not pending, "the requests of who has left to be forgotten")
-            source._timeout_s = 0.5
+            source.timeout_s = 0.5
             answers = await asyncio.gather(*ask(), return_exceptions=True)
             assert {type(answer) for answer in answers} == {TwinTimeoutError}
             await until(lambda: not pending, "all requests to be forgotten")
             assert not source._asking
 
             twin.thaw()
-            source._timeout_s = PATIENCE_S
+            source.timeout_s = PATIENCE_S
             grid = await source.field(FieldRequest("co2", 1.0, 0.0, 0.0, 1.0, 1.0))
             assert grid.grid.sample_count == 0
             await until(lambda: not pending, "this one to be forgotten too")

@@ -78,7 +78,7 @@ async def shows(live: Running, tag_id: str, value: float) -> None:
     await until(
         lambda: any(
             tag.tag_id == tag_id and tag.readings[0].value == value
-            for tag in live.twin._told.snapshot.tags
+            for tag in live.twin.told.snapshot.tags
         ),
         f"{value} at tag {tag_id}",
     )
@@ -99,7 +99,7 @@ def test_a_damaged_file_is_set_aside_read_as_far_as_it_goes_and_named(
                 aside = Path(journal["set_aside"])
                 assert aside.name.startswith("j.sqlite.damaged-")
                 assert aside.read_bytes() == broken
-                known = {tag.tag_id for tag in live.twin._told.snapshot.tags}
+                known = {tag.tag_id for tag in live.twin.told.snapshot.tags}
                 assert known == ({"7"} if damage is not no_database else set())
                 robot.observe(observation("8", {"co2": 1.0}))
                 await shows(live, "8", 1.0)

@@ -81,8 +81,8 @@ class Bridge:
         self._clock = clock
         self.source = source
         self.limits = limits
-        self._liveness = Liveness()
-        self.hub = Hub(settings.max_clients, limits.client_timeout_s, self._liveness.status)
+        self.liveness = Liveness()
+        self.hub = Hub(settings.max_clients, limits.client_timeout_s, self.liveness.status)
         self.admission = Admission(
             limits.answers_per_s, limits.concurrency, limits.total_concurrency
         )
@@ -154,7 +154,7 @@ class Bridge:
 
     def say_goodbye(self) -> None:
         """Tell every client that the bridge is about to go, those who wait for an answer too."""
-        self._liveness.shutting_down = True
+        self.liveness.shutting_down = True
         self._tell_status()
         self.goodbye.say()
 
@@ -168,22 +168,22 @@ class Bridge:
     @property
     def status(self) -> Status:
         """The status now."""
-        return self._liveness.status(self._clock())
+        return self.liveness.status(self._clock())
 
     @property
     def origin(self) -> Origin:
         """Where observations come from, as the twin says."""
-        return self._liveness.origin
+        return self.liveness.origin
 
     @property
     def ros_time_ns(self) -> int | None:
         """ROS time now: the newest state's, and the time since it came; None: it is not known."""
-        if self._latest is None or self._liveness.last_state_s is None:
+        if self._latest is None or self.liveness.last_state_s is None:
             return None
         snapshot = self._latest.snapshot
         if snapshot.clock != "running":  # paused: it stands
             return snapshot.now_ns
-        since_s = self._clock() - self._liveness.last_state_s
+        since_s = self._clock() - self.liveness.last_state_s
         return self._latest.snapshot.stamp_ns + int(since_s * NANOSECONDS_PER_SECOND)
 
     @property
@@ -298,14 +298,14 @@ class Bridge:
         self._latest = state
         self.state_number += 1
         now_s = self._clock()
-        self._liveness.last_state_s = now_s
-        self._liveness.twin_count = state.twin_count
-        self._liveness.has_map = state.occupancy_map is not None
-        self._liveness.clock = state.snapshot.clock
-        self._liveness.drops = state.drops
-        self._liveness.journal = state.journal
-        self._liveness.origin = state.origin
-        self._liveness.input_problems = state.input_problems
+        self.liveness.last_state_s = now_s
+        self.liveness.twin_count = state.twin_count
+        self.liveness.has_map = state.occupancy_map is not None
+        self.liveness.clock = state.snapshot.clock
+        self.liveness.drops = state.drops
+        self.liveness.journal = state.journal
+        self.liveness.origin = state.origin
+        self.liveness.input_problems = state.input_problems
         self._alarm_feed.on_state(state)
         if self._push_timer is not None:
             return  # it will take this state along
@@ -377,13 +377,13 @@ class Bridge:
             await asyncio.sleep(len(wire) / ALARM_BYTES_PER_S)
 
     def _on_death(self) -> None:
-        self._liveness.thread_dead = True
+        self.liveness.thread_dead = True
         self._tell_status()
 
     # --- the watch ----------------------------------------------------------------------------
 
     def _tell_status(self) -> None:
-        self._liveness.outward = self.outward.status()
+        self.liveness.outward = self.outward.status()
         status = self.status
         if not status.is_news_after(self._told):
             return

@@ -237,7 +237,7 @@ def test_a_status_goes_out_when_it_changes_and_only_then() -> None:
     async def test() -> None:
         now_s = 100.0
         async with Stage(lambda: now_s) as stage:
-            stage.bridge._liveness.stale_after_s = 0.3
+            stage.bridge.liveness.stale_after_s = 0.3
             assert stage.ear.reasons == ["never_seen"]
             stage.script.tell(state(1))
             assert stage.ear.reasons == ["never_seen", "live"]
@@ -332,7 +332,7 @@ def test_who_asked_for_a_low_rate_gets_the_newest_although_nothing_more_happens(
     async def test() -> None:
         nonlocal now_s
         async with Stage(clock=lambda: now_s, frames_per_s=100.0) as stage:
-            stage.bridge._liveness.stale_after_s = math.inf  # no status takes it along
+            stage.bridge.liveness.stale_after_s = math.inf  # no status takes it along
             rare = Ear()
             stage.bridge.join(Client(rare, min_interval_s=0.3))
             for number in range(1, 6):

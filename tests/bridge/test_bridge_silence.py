@@ -32,7 +32,7 @@ def test_while_the_twin_is_silent_its_status_comes_again_and_again() -> None:
 def test_a_twin_without_a_clock_has_not_been_silent_since_the_year_1970() -> None:
     async def test() -> None:
         async with Stage() as stage:
-            stage.bridge._liveness.stale_after_s = 0.3
+            stage.bridge.liveness.stale_after_s = 0.3
             clockless = replace(state(0).snapshot, clock="none")
             stage.script.tell(replace(state(0), snapshot=clockless))
             await until(lambda: "no_clock" in stage.ear.reasons, "that to be told")

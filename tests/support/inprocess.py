@@ -68,7 +68,7 @@ class Running:
 
     async def in_ros_thread(self, work: Callable[[TwinNode], T]) -> T:
         """Run `work(node)` in the ROS thread and return its result."""
-        return await self.twin._thread.call(work)
+        return await self.twin.thread.call(work)
 
 
 @asynccontextmanager

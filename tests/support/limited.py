@@ -14,6 +14,8 @@ from functools import partial
 from typing import Any
 
 from lupin_bridge import cli
+from lupin_bridge.serving.limits import Limits
+from lupin_twin.parameters import World
 from lupin_twin.process import use_one_core
 
 
@@ -30,8 +32,10 @@ def command() -> None:
     use_one_core()
     from lupin_bridge import roles
 
-    roles.Limits = partial(roles.Limits, **_values(options.limit))  # type: ignore[assignment, misc]
-    roles.World = partial(roles.World, **_values(options.world))  # type: ignore[assignment, misc]
+    vars(roles).update(
+        Limits=partial(Limits, **_values(options.limit)),
+        World=partial(World, **_values(options.world)),
+    )
     cli.command()
 
 

@@ -21,7 +21,7 @@ from lupin_twin.state import TwinStore
 from lupin_twin.workers import Workers
 from tests.support.waiting import wait_for
 
-RULES = FieldRules(2.0, 1.5, 1.5, False, 1_000)
+RULES = FieldRules(2.0, 1.5, 1.5, 1_000)
 
 
 class Desk:

@@ -107,7 +107,7 @@ def test_a_subscription_hands_on_messages_and_tells_of_the_others(
         callback=taken.append,
     )
     assert topic == "/some/observations"
-    [subscription] = [s for s in habits._node.subscriptions if s.topic_name == topic]
+    [subscription] = [s for s in habits.node.subscriptions if s.topic_name == topic]
     subscription.callback(serialize_message(scan("1")), INFO)
     subscription.callback(bytes(1_001), INFO | {"received_timestamp": 1_500_000_000})
     assert habits.published_ago_s == 1.5
@@ -118,7 +118,7 @@ def test_a_subscription_hands_on_messages_and_tells_of_the_others(
 
 
 def test_who_wakes_a_node_that_is_gone_wakes_nobody(habits: Habits) -> None:
-    node = habits._node
+    node = habits.node
     condition = node.create_guard_condition(lambda: None)
     wake = waker(condition)
     wake()
@@ -165,7 +165,7 @@ def test_of_a_shared_topic_only_what_is_wanted_is_read_and_nothing_else_counted(
         callback=lambda msg: taken.append(msg.tag_reading.tag_id),
         is_wanted=lambda data: b"ours" in data,
     )
-    (subscription,) = [s for s in habits._node.subscriptions if s.topic_name == "/shared"]
+    (subscription,) = [s for s in habits.node.subscriptions if s.topic_name == "/shared"]
     assert subscription.qos_profile.durability == DurabilityPolicy.VOLATILE
     for number, tag_id in ((1, "ours"), (9, "theirs"), (20, "ours")):
         info = {**INFO, "publication_sequence_number": number}
@@ -183,7 +183,7 @@ def test_messages_that_wait_are_taken_one_right_behind_the_other(
     """In one round of the executor, whatever else is due in it; and before what takes its time."""
     heard: list[float] = []
     large = MessageShape(Observation, PACKAGES, max_bytes=10_000)
-    group = habits._node.default_callback_group
+    group = habits.node.default_callback_group
     habits.subscribe(
         "topic",
         "many",
@@ -192,11 +192,11 @@ def test_messages_that_wait_are_taken_one_right_behind_the_other(
         group=group,
         callback=lambda message: heard.append(message.tag_reading.readings[0].value),
     )
-    executor = SingleThreadedExecutor(context=habits._node.context)
-    executor.add_node(habits._node)
+    executor = SingleThreadedExecutor(context=habits.node.context)
+    executor.add_node(habits.node)
     with Peer(domain) as peer:
         publisher = peer.publisher("/many", Observation)
-        peer.until(lambda: habits._node.count_publishers("/many"), "the publisher")
+        peer.until(lambda: habits.node.count_publishers("/many"), "the publisher")
 
         def publish(values: range) -> None:
             for value in values:
@@ -225,9 +225,9 @@ def test_those_that_wait_keep_nobody_waiting_for_long(
         heard.append(message)
         logged.now_s += DRAIN_S / 2 + 0.001
 
-    group = habits._node.default_callback_group
+    group = habits.node.default_callback_group
     habits.subscribe("topic", "many", SHAPE, depth=5, group=group, callback=hear)
-    (subscription,) = [s for s in habits._node.subscriptions if s.topic_name == "/many"]
+    (subscription,) = [s for s in habits.node.subscriptions if s.topic_name == "/many"]
     with Peer(domain) as peer:
         publisher = peer.publisher("/many", Observation)
         peer.until(publisher.get_subscription_count, "the subscription")
@@ -251,9 +251,9 @@ def test_those_that_wait_keep_nobody_waiting_for_long(
 def test_a_message_that_waited_long_tells_that_the_thread_is_behind_for_a_while(
     habits: Habits, logged: Logged, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    group = habits._node.default_callback_group
+    group = habits.node.default_callback_group
     habits.subscribe("topic", "many", SHAPE, depth=5, group=group, callback=lambda _: None)
-    (subscription,) = [s for s in habits._node.subscriptions if s.topic_name == "/many"]
+    (subscription,) = [s for s in habits.node.subscriptions if s.topic_name == "/many"]
     monkeypatch.setattr("lupin_twin.habits.time.time_ns", lambda: 10**18)
     one = serialize_message(scan("1"))
     for waited_s, is_behind in ((0.0, False), (BEHIND_S, False), (BEHIND_S + 0.001, True)):

@@ -83,7 +83,7 @@ class Admission:
         self._rate_hz = rate_hz
         self._concurrency = concurrency
         self._rate = RateLimit(rate_hz, rate_hz * BURST_S)
-        self._in_flight: Counter[str] = Counter()
+        self.in_flight: Counter[str] = Counter()
         self._exports: dict[str, Export] = {}
         self._computing = _Places(total_concurrency)
         self._large = _Places(total_concurrency - total_concurrency // 4)
@@ -101,7 +101,7 @@ class Admission:
             ClientLimitError: one more than the client may have at once, or too soon.
 
         """
-        if self._in_flight[client] >= self._concurrency:
+        if self.in_flight[client] >= self._concurrency:
             self.refused[IN_FLIGHT] += 1
             raise ClientLimitError(
                 f"{client} has {self._concurrency} requests for computed answers in flight, the "
@@ -116,11 +116,11 @@ class Admission:
                 "limit",
                 wait_s,
             )
-        self._in_flight[client] += 1
+        self.in_flight[client] += 1
         try:
             yield
         finally:
-            _give_back(self._in_flight, client)
+            _give_back(self.in_flight, client)
 
     @property
     def exporting(self) -> int:

@@ -36,7 +36,7 @@ class Unsent(Generic[HolderT]):
 
     def __init__(self, max_bytes: int = MAX_BYTES) -> None:
         self.bytes = 0
-        self._max_bytes = max_bytes
+        self.max_bytes = max_bytes
         # In the order in which they began to wait; of each the messages by their ids.
         self._holders: dict[HolderT, dict[int, bytes]] = {}
         self._shares: Counter[int] = Counter()
@@ -51,7 +51,7 @@ class Unsent(Generic[HolderT]):
             if self._shares[key] == 1:
                 self.bytes += len(message)
         gone = []
-        while self.bytes > self._max_bytes:
+        while self.bytes > self.max_bytes:
             longest = next(iter(self._holders))
             self.let_go(longest)
             gone.append(longest)
@@ -151,7 +151,7 @@ class Hub:
         self.frames_skipped = 0
         self.bytes_sent = 0
         self.clients_dismissed = 0
-        self._client_timeout_s = client_timeout_s
+        self.client_timeout_s = client_timeout_s
         # In the order in which they came.
         self._clients: dict[Client, None] = {}
         self.unsent: Unsent[Client] = Unsent()
@@ -296,12 +296,12 @@ class Hub:
             client
             for client in self._clients
             if client.blocked_since_s is not None
-            and now_s - client.blocked_since_s >= self._client_timeout_s
+            and now_s - client.blocked_since_s >= self.client_timeout_s
         ]
         for client in stuck:
             self.leave(client)
             client.connection.dismiss(
-                CLOSE_POLICY, f"took no frame for {self._client_timeout_s:g} s"
+                CLOSE_POLICY, f"took no frame for {self.client_timeout_s:g} s"
             )
         self.clients_dismissed += len(stuck)
         return len(stuck)

@@ -55,19 +55,19 @@ class LocalTwin:
     ) -> None:
         self._ros_args = ros_args
         self._world = world
-        self._timeout_s = timeout_s
+        self.timeout_s = timeout_s
         # A restarted server must never match an ETag of its predecessor, whose counts it repeats.
         self._identity = uuid.uuid4().hex[:12]
-        self._thread: RosThread[TwinNode, Told]
-        self._told: Told
+        self.thread: RosThread[TwinNode, Told]
+        self.told: Told
         self._cache = CacheCounts()
         self._rules: FieldRules
         # The same for as long as the node lives.
         self._names: TwinNames
-        self.past = PastProcess(expects, lambda: self._now() if self._told_number else None)
+        self.past = PastProcess(expects, lambda: self.now() if self._told_number else None)
         self._told_number = 0
         self.workers = Workers("work")
-        self.relay = Relay(lambda: self._thread, RelayRos())
+        self.relay = Relay(lambda: self.thread, RelayRos())
         self._computing: Shared[FieldGrid] = Shared()
         self._estimating: Shared[RevisedEstimate] = Shared()
         self._trust = Trust()
@@ -100,18 +100,18 @@ class LocalTwin:
             return node
 
         def on_told(told: Told) -> None:
-            self._told = told
+            self.told = told
             self._told_number += 1
             self._note_cache(told.cache)
             if told.rules is not None:
                 self._rules = told.rules
             on_state(told)
 
-        self._thread = RosThread(
+        self.thread = RosThread(
             make_node, ros_args=self._ros_args, on_event=on_told, on_death=on_death
         )
-        await self._thread.start()
-        self._rules, self._names = await self._thread.call(
+        await self.thread.start()
+        self._rules, self._names = await self.thread.call(
             lambda node: (node.fields.rules, names_of(node))
         )
         self.past.start()
@@ -119,7 +119,7 @@ class LocalTwin:
     async def stop(self) -> None:
         """Stop the ROS thread, the workers and the process that looks back."""
         self.workers.close()
-        await asyncio.gather(self.past.stop(), self._thread.stop())
+        await asyncio.gather(self.past.stop(), self.thread.stop())
 
     @property
     def identity(self) -> str:
@@ -129,33 +129,33 @@ class LocalTwin:
     @property
     def is_alive(self) -> bool:
         """Whether the ROS thread runs."""
-        return self._thread.is_alive
+        return self.thread.is_alive
 
     @property
     def stuck_s(self) -> float:
         """How long the ROS thread has not answered a heartbeat, s."""
-        return self._thread.stuck_s
+        return self.thread.stuck_s
 
     @property
     def calls_waiting(self) -> int:
         """Calls that wait for the ROS thread now."""
-        return self._thread.calls_waiting
+        return self.thread.calls_waiting
 
     @property
     def callback_errors(self) -> int:
         """Errors met by the node's callbacks, as of the last heartbeat."""
-        return self._thread.callback_errors
+        return self.thread.callback_errors
 
     def revision(self) -> str:
         """The process's identity, the observation count and the map's revision, as told last.
 
         What a call brings from the ROS thread is never newer: what has changed is told at once.
         """
-        return self._told.revision
+        return self.told.revision
 
     def field_revision(self, request: FieldRequest) -> str | None:  # noqa: ARG002  # all alike
         """The revision now: here every field is made of the store as it stands."""
-        return self._told.revision
+        return self.told.revision
 
     def rules(self) -> FieldRules:
         """The node's parameters for fields."""
@@ -167,7 +167,7 @@ class LocalTwin:
 
     def journal(self) -> Condition:
         """The node's journal."""
-        return self._told.journal
+        return self.told.journal
 
     def cache_counts(self) -> CacheCounts:
         """The node's cache of fields."""
@@ -175,7 +175,7 @@ class LocalTwin:
 
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map that the node accepted."""
-        return self._told.occupancy_map
+        return self.told.occupancy_map
 
     async def field(self, request: FieldRequest) -> RevisedGrid:
         """A hit from the node's cache, or the field computed on a worker and handed back to it."""
@@ -183,11 +183,11 @@ class LocalTwin:
 
     def estimate_revision(self, request: EstimateRequest) -> str | None:
         """That of the last answer, as long as nothing was told that could have changed it."""
-        return self._trust.revision(request, self._told.revision)
+        return self._trust.revision(request, self.told.revision)
 
     async def estimate(self, request: EstimateRequest) -> RevisedEstimate:
         """The node says of what, and by which model; it is computed on a worker."""
-        key = (self._told.revision, request)
+        key = (self.told.revision, request)
         return await self._in_time(self._estimating.get(key, lambda: self._estimate(request)))
 
     async def estimate_report(self, request: ReportRequest) -> Report:
@@ -196,14 +196,14 @@ class LocalTwin:
 
     async def history(self, tag_id: str) -> TagHistory | None:
         """The last `buffer_len` scans, and as many tries, of a tag."""
-        return await self._in_time(self._thread.call(lambda node: node.history_of(tag_id)))
+        return await self._in_time(self.thread.call(lambda node: node.history_of(tag_id)))
 
     async def ask(self, question: Question[ResultT], cost_s: float) -> ResultT:
         """Answered in a process of its own.
 
         What is observed within the journal's 100 ms may be missing.
         """
-        return await self._in_time(self.past.ask(question, self._now(), cost_s))
+        return await self._in_time(self.past.ask(question, self.now(), cost_s))
 
     async def state_at(self, at_ns: int) -> Snapshot:
         """The journal's answer."""
@@ -227,7 +227,7 @@ class LocalTwin:
     ) -> AsyncIterator[ResultT]:
         """Read a stretch when the last one was taken; what nobody takes is not read."""
         query = start_ns, end_ns, tag_id, sensor_type
-        async with aclosing(self.past.rows(query, write, self._now)) as lots:
+        async with aclosing(self.past.rows(query, write, self.now)) as lots:
             while True:
                 try:
                     lot = await self._in_time(anext(lots))
@@ -236,23 +236,24 @@ class LocalTwin:
                 yield lot
 
     @property
-    def _now_ns(self) -> int:
+    def now_ns(self) -> int:
         """ROS time now: what was told last may be a heartbeat old."""
-        now = self._told.snapshot
+        now = self.told.snapshot
         if now.clock != "running":
             return now.stamp_ns
-        return now.stamp_ns + int((time.monotonic() - self._told.made_s) * NANOSECONDS_PER_SECOND)
+        return now.stamp_ns + int((time.monotonic() - self.told.made_s) * NANOSECONDS_PER_SECOND)
 
-    def _now(self) -> Now:
-        told = self._told
-        return Now(self._now_ns, told.snapshot.frame_id, told.journal, self._told_number)
+    def now(self) -> Now:
+        """What who looks back has to know of now."""
+        told = self.told
+        return Now(self.now_ns, told.snapshot.frame_id, told.journal, self._told_number)
 
     async def _field(self, request: FieldRequest) -> RevisedGrid:
         def look_up(node: TwinNode) -> tuple[FieldGrid | FieldJob, str, CacheCounts]:
             answer = node.fields.lookup(request, node.store, node.occupancy_map)
             return answer, self._revision_of(node), _cache_counts(node)
 
-        answer, revision, cache = await self._thread.call(look_up)
+        answer, revision, cache = await self.thread.call(look_up)
         self._note_cache(cache)
         if isinstance(answer, FieldJob):
             job = answer
@@ -266,7 +267,7 @@ class LocalTwin:
             node.fields.keep(job, grid)
             return _cache_counts(node)
 
-        self._note_cache(await self._thread.call(keep))
+        self._note_cache(await self.thread.call(keep))
         return grid
 
     async def _estimate(self, request: EstimateRequest) -> RevisedEstimate:
@@ -274,8 +275,8 @@ class LocalTwin:
             task = node.estimates.prepare(request)
             return task, task.look_up()
 
-        epoch = self._told.revision
-        task, looking_up = await self._thread.call(begin)
+        epoch = self.told.revision
+        task, looking_up = await self.thread.call(begin)
         found = await asyncio.wrap_future(looking_up)
         async with self._large_estimate if task.cost_s > SMALL_S else nullcontext():
             result = await asyncio.wrap_future(
@@ -283,12 +284,12 @@ class LocalTwin:
                     lambda should_stop: revised(task.make(found, should_stop)), task.cost_s
                 )
             )
-        if epoch == self._told.revision:
+        if epoch == self.told.revision:
             self._trust.put(request, epoch, result.revision)
         return result
 
     async def _report(self, request: ReportRequest) -> Report:
-        work = await self._thread.call(lambda node: node.estimates.report(request))
+        work = await self.thread.call(lambda node: node.estimates.report(request))
         return await asyncio.wrap_future(self.workers.submit(lambda _: work(), ADVICE_S))
 
     def _note_cache(self, cache: CacheCounts) -> None:
@@ -298,16 +299,14 @@ class LocalTwin:
 
     async def _in_time(self, answer: Awaitable[ResultT]) -> ResultT:
         try:
-            async with asyncio.timeout(self._timeout_s):
+            async with asyncio.timeout(self.timeout_s):
                 return await answer
         except TimeoutError:
-            raise TwinTimeoutError(
-                f"the twin did not answer within {self._timeout_s:g} s"
-            ) from None
+            raise TwinTimeoutError(f"the twin did not answer within {self.timeout_s:g} s") from None
         except NotRemembered as error:
             damage = error.damage
             if damage:
-                await self._thread.call(lambda node: node.memory.heal(damage))
+                await self.thread.call(lambda node: node.memory.heal(damage))
             raise
 
     def _revision_of(self, node: TwinNode) -> str:

@@ -77,11 +77,11 @@ class PastProcess:
         self._expects = expects
         self._now = now
         self._is_time_to_load = False
-        self._asked: dict[int, asyncio.Future[Any]] = {}
+        self.asked: dict[int, asyncio.Future[Any]] = {}
         self._unsent: dict[int, Callable[[_Life], None]] = {}
         self._numbers = itertools.count(1)
         self._wanted = asyncio.Event()
-        self._why_down = ""
+        self.why_down = ""
         self._life: _Life | None = None
         self._tasks: list[asyncio.Task[None]] = []
 
@@ -93,7 +93,7 @@ class PastProcess:
 
     async def stop(self) -> None:
         """End it; what is being asked has no answer."""
-        self._why_down = "the process that looks back is ending"
+        self.why_down = "the process that looks back is ending"
         for task in self._tasks:
             task.cancel()
             with contextlib.suppress(asyncio.CancelledError):
@@ -108,12 +108,12 @@ class PastProcess:
             Exception: whatever was met there.
 
         """
-        if self._why_down:
-            raise _passing(self._why_down)
-        if len(self._asked) >= MAX_ASKED:
+        if self.why_down:
+            raise _passing(self.why_down)
+        if len(self.asked) >= MAX_ASKED:
             raise _passing(f"{MAX_ASKED} questions about the past are under way, the limit")
         number = next(self._numbers)
-        answer = self._asked[number] = asyncio.get_running_loop().create_future()
+        answer = self.asked[number] = asyncio.get_running_loop().create_future()
         try:
             if self._life is None:
                 self._unsent[number] = lambda life: life.ask(number, question, now, cost_s)
@@ -126,7 +126,7 @@ class PastProcess:
                 self._life.write(Cancel(number))  # to another one it says nothing
             raise
         finally:
-            del self._asked[number]
+            del self.asked[number]
             self._unsent.pop(number, None)
 
     async def rows(
@@ -154,7 +154,7 @@ class PastProcess:
                 self._life.write(EndExport(export))
 
     def _on_told(self, told: Told) -> None:
-        answer = self._asked.get(told.number)
+        answer = self.asked.get(told.number)
         if answer is None or answer.done():
             return  # nobody waits any more
         if told.is_error:
@@ -190,17 +190,17 @@ class PastProcess:
             if loop.time() - begun_s >= SOUND_S:
                 wait_s = FIRST_WAIT_S
             log.error("the process that looks back %s; it is started in %g s", ended, wait_s)
-            self._why_down = f"the process that looks back {ended}; it is about to be started again"
+            self.why_down = f"the process that looks back {ended}; it is about to be started again"
             self._refuse_all()
             await asyncio.sleep(wait_s)
-            self._why_down = ""
+            self.why_down = ""
             wait_s = min(2.0 * wait_s, MAX_WAIT_S)
 
     def _refuse_all(self) -> None:
         self._unsent.clear()
-        for answer in self._asked.values():
+        for answer in self.asked.values():
             if not answer.done():
-                answer.set_exception(_passing(self._why_down))
+                answer.set_exception(_passing(self.why_down))
 
     async def _live(self) -> str:
         """Start it and wait for its end, which is told."""
@@ -231,8 +231,8 @@ class PastProcess:
                 try:
                     send(life)
                 except Exception as error:  # noqa: BLE001  # told to who asked
-                    if not self._asked[number].done():
-                        self._asked[number].set_exception(error)
+                    if not self.asked[number].done():
+                        self.asked[number].set_exception(error)
             self._unsent.clear()
             await life.ended
         finally:

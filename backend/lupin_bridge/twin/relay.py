@@ -211,7 +211,7 @@ class Relay:
     def __init__(self, thread: Callable[[], RosSide], ros: Ros, linger_s: float = LINGER_S) -> None:
         self._thread = thread
         self._ros = ros
-        self._linger_s = linger_s
+        self.linger_s = linger_s
         self._topics: dict[Topic, _Heard] = {}
         self._lock = threading.Lock()
         self._is_waking = False
@@ -324,7 +324,7 @@ class Relay:
         heard.users -= 1
         if not heard.users and self._topics.get(heard.topic) is heard:
             loop = asyncio.get_running_loop()
-            heard.ending = loop.call_later(self._linger_s, self._end, heard)
+            heard.ending = loop.call_later(self.linger_s, self._end, heard)
 
     def _end(self, heard: _Heard) -> None:
         if heard.ending is not None:

@@ -172,7 +172,7 @@ class RosThread(Generic[NodeT, EventT]):
 
         def run() -> None:
             try:
-                value = work(self._require_node())
+                value = work(self.require_node())
             except Exception as error:  # noqa: BLE001  # handed to the caller
                 self.to_loop(_settle, result, None, error)
             else:
@@ -218,7 +218,7 @@ class RosThread(Generic[NodeT, EventT]):
             nonlocal is_given_up
             is_given_up = True
             if future is not None:
-                give_up(self._require_node(), future)
+                give_up(self.require_node(), future)
 
         try:
             await self.call(begin)
@@ -237,7 +237,8 @@ class RosThread(Generic[NodeT, EventT]):
             self._beat_sent_s = None
             await asyncio.sleep(BEAT_PERIOD_S)
 
-    def _require_node(self) -> NodeT:
+    def require_node(self) -> NodeT:
+        """The node, on its own thread alone."""
         if self._node is None:
             raise TwinUnavailableError("the ROS thread has no node")
         return self._node
@@ -262,10 +263,10 @@ class RosThread(Generic[NodeT, EventT]):
             self._end(error)
 
     def _bring_back(self, beat: asyncio.Future[int]) -> None:
-        self.to_loop(_settle, beat, self._require_node().callback_errors, None)
+        self.to_loop(_settle, beat, self.require_node().callback_errors, None)
 
     def _report(self, what: str, error: Exception) -> None:
-        self._require_node().report(what, error)
+        self.require_node().report(what, error)
 
     def _init_ros(self) -> None:
         forward()

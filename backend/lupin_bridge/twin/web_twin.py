@@ -69,15 +69,15 @@ class WebTwin:
         self, *, ros_args: Sequence[str], timeout_s: float, stale_after_s: float = math.inf
     ) -> None:
         self._ros_args = ros_args
-        self._timeout_s = timeout_s
+        self.timeout_s = timeout_s
         self._stale_after_s = stale_after_s
-        self._thread: RosThread[WebNode, _Heard]
+        self.thread: RosThread[WebNode, _Heard]
         self._heard = _Heard()
         self._rules: FieldRules
         # The same for as long as the node lives.
         self._names: TwinNames
         self.workers = Workers("work")
-        self.relay = Relay(lambda: self._thread, RelayRos())
+        self.relay = Relay(lambda: self.thread, RelayRos())
         self._asking: Shared[RevisedGrid] = Shared()
         self._past = WebPast(
             lambda request: self._ask(Service.STATE_AT, request, self._tags * TAG_S),
@@ -130,11 +130,11 @@ class WebTwin:
             if heard.told is not None and heard.told is not before:
                 on_state(heard.told)
 
-        self._thread = RosThread(
+        self.thread = RosThread(
             make_node, ros_args=self._ros_args, on_event=on_heard, on_death=on_death
         )
-        await self._thread.start()
-        self._rules, self._names = await self._thread.call(
+        await self.thread.start()
+        self._rules, self._names = await self.thread.call(
             lambda node: (
                 node.rules,
                 names_of(node),
@@ -144,7 +144,7 @@ class WebTwin:
     async def stop(self) -> None:
         """Stop the ROS thread and the workers."""
         self.workers.close()
-        await self._thread.stop()
+        await self.thread.stop()
 
     @property
     def identity(self) -> str:
@@ -154,22 +154,22 @@ class WebTwin:
     @property
     def is_alive(self) -> bool:
         """Whether the ROS thread runs."""
-        return self._thread.is_alive
+        return self.thread.is_alive
 
     @property
     def stuck_s(self) -> float:
         """How long the ROS thread has not answered a heartbeat, s."""
-        return self._thread.stuck_s
+        return self.thread.stuck_s
 
     @property
     def calls_waiting(self) -> int:
         """Calls that wait for the ROS thread now."""
-        return self._thread.calls_waiting
+        return self.thread.calls_waiting
 
     @property
     def callback_errors(self) -> int:
         """Errors met by the node's callbacks, as of the last heartbeat."""
-        return self._thread.callback_errors
+        return self.thread.callback_errors
 
     def revision(self) -> str:
         """A digest of poses and readings, and the map's revision."""
@@ -198,7 +198,7 @@ class WebTwin:
 
     async def history(self, tag_id: str) -> TagHistory | None:
         """The last scans and tries of a tag, as far as they were seen from here."""
-        return await self._thread.call(lambda node: node.history_of(tag_id))
+        return await self.thread.call(lambda node: node.history_of(tag_id))
 
     async def ask(self, question: Question[ResultT], cost_s: float) -> ResultT:
         """Answered here, of the answers of the twin's services; the same are asked once."""
@@ -284,11 +284,11 @@ class WebTwin:
     async def _find(self, service: Service) -> None:
         # From here on too: a twin that comes and goes would be a new one for ever.
         until_s = time.monotonic() + web_node.NEW_TWIN_S
-        while not await self._thread.call(lambda node: node.offers(service)):
-            is_new = await self._thread.call(lambda node: node.has_new_twin)
+        while not await self.thread.call(lambda node: node.offers(service)):
+            is_new = await self.thread.call(lambda node: node.has_new_twin)
             if not is_new or time.monotonic() > until_s:
                 raise TwinUnavailableError(
-                    await self._thread.call(lambda node: node.why_not(service))
+                    await self.thread.call(lambda node: node.why_not(service))
                 )
             await asyncio.sleep(SERVICE_LOOK_S)
 
@@ -301,19 +301,17 @@ class WebTwin:
         """
         lane = self._large_slots if cost_s > SMALL_S else nullcontext()
         try:
-            async with asyncio.timeout(self._timeout_s), lane, self._slots:
+            async with asyncio.timeout(self.timeout_s), lane, self._slots:
                 self._check_heard()
                 await self._find(service)
                 return await self._while_heard(
-                    self._thread.ask(
+                    self.thread.ask(
                         lambda node: node.ask(service, request),
                         lambda node, future: node.forget(service, future),
                     )
                 )
         except TimeoutError:
-            raise TwinTimeoutError(
-                f"the twin did not answer within {self._timeout_s:g} s"
-            ) from None
+            raise TwinTimeoutError(f"the twin did not answer within {self.timeout_s:g} s") from None
 
     def _check_heard(self) -> None:
         # DDS offers the services of a twin that was killed for another twenty seconds.

@@ -88,7 +88,7 @@ class Habits:
         self.tally = Tally()
         # How long before it was received the message in hand was published, s, by the two clocks.
         self.published_ago_s = 0.0
-        self._node = node
+        self.node = node
         self._inputs: list[Input] = []
         # As it was looked at last.
         self.input_problems: tuple[str, ...] = ()
@@ -137,7 +137,7 @@ class Habits:
                 on_number(number)
             # Of depth 1, the newest is wanted and nothing else.
             if depth > 1 and number is not None and is_wanted is None:
-                lost = heard.gaps.see(number, lambda: int(self._node.count_publishers(name)))
+                lost = heard.gaps.see(number, lambda: int(self.node.count_publishers(name)))
                 if lost:
                     self.lose(lost, name)
             message = read_message(data, shape)
@@ -147,7 +147,7 @@ class Habits:
                 self.guarded(name, callback)(message)
 
         def listen(qos: QoSProfile, events: SubscriptionEventCallbacks | None) -> str:
-            subscription = self._node.create_subscription(
+            subscription = self.node.create_subscription(
                 shape.message_type,
                 topic,
                 read,
@@ -185,12 +185,12 @@ class Habits:
     def look_at_inputs(self) -> tuple[str, ...]:
         """What is wrong with what publishes on latched topics; what is new of it is logged."""
         before, now_s = self.input_problems, time.monotonic()
-        domain = self._node.context.get_domain_id()
+        domain = self.node.context.get_domain_id()
         self.input_problems = tuple(
             problem
             for each in self._inputs
             for problem in each.look(
-                self._node.get_publishers_info_by_topic(each.topic), domain, now_s
+                self.node.get_publishers_info_by_topic(each.topic), domain, now_s
             )
         )[:MAX_PROBLEMS]
         for problem in self.input_problems:
@@ -276,7 +276,7 @@ class Habits:
         held_back = self._throttle.ask(key, time.monotonic())
         if held_back is not None:
             more = f" ({held_back} more since the last warning)" if held_back else ""
-            self._node.get_logger().warning(text + more)
+            self.node.get_logger().warning(text + more)
 
     def guarded(self, what: str, callback: Callable[..., None]) -> Callable[..., None]:
         """`callback`, whose errors are reported: one bad message must not end the node."""
@@ -294,6 +294,6 @@ class Habits:
         self.tally.callback_errors += 1
         if self._throttle.ask(("error", what), time.monotonic()) is not None:
             trace = "".join(traceback.format_exception(error))
-            self._node.get_logger().error(
+            self.node.get_logger().error(
                 f"error number {self.callback_errors}, in {what}:\n{trace}"
             )

@@ -105,7 +105,7 @@ class TwinNode(AdjustableNode):
             self.habits,
             Known(self.store, self.history, self.memory.recall, lambda: self.occupancy_map),
             EstimateRules(world.day_length_s, self.parameters.max_grid_cells),
-            self._now_ns,
+            self.now_ns,
             waker(found),
         )
         self.layers = LayerService(
@@ -116,7 +116,7 @@ class TwinNode(AdjustableNode):
                 self.estimates,
                 lambda: self.occupancy_map,
                 self.snapshot,
-                self._now_ns,
+                self.now_ns,
                 world.day_length_s,
             ),
             waker(found),
@@ -149,7 +149,7 @@ class TwinNode(AdjustableNode):
 
     def snapshot(self) -> Snapshot:
         """Every tag, now by ROS time, and whether that runs."""
-        snapshot = self.store.snapshot(self._now_ns(), self.parameters.frame_id)
+        snapshot = self.store.snapshot(self.now_ns(), self.parameters.frame_id)
         return replace(snapshot, clock=self._clock_state)
 
     def history_of(self, tag_id: str) -> TagHistory | None:
@@ -192,7 +192,7 @@ class TwinNode(AdjustableNode):
         with naming("field_service_name", name):
             self.create_service(kind, name, answer, qos_profile=SERVICE_QOS, callback_group=group)
         past = JournalPast(self.memory.recall, self.store, p.frame_id)
-        PastService(self.habits, self._past_desk, past, self.store, self._now_ns).offer(self, group)
+        PastService(self.habits, self._past_desk, past, self.store, self.now_ns).offer(self, group)
         self.estimates.offer(self, group)
         self.layers.offer(self, p.layers, p.frame_id)
         for service in self.services:  # those of its parameters too
@@ -226,7 +226,7 @@ class TwinNode(AdjustableNode):
         if (rules := FieldRules.of(now)) != self.fields.rules:
             self.fields.rules = rules
             self._rules_revision += 1
-            self._tell_listeners()
+            self.tell_listeners()
 
     def _every(self, period_s: float, what: str, callback: Callable[[], None]) -> Any:
         # The steady clock: a paused simulation is no reason to look dead. Stamps and ages in the
@@ -242,7 +242,7 @@ class TwinNode(AdjustableNode):
 
     def _on_observation(self, msg: Any) -> None:
         topic = self._topics["observations_topic"]
-        write = ingest.observation(convert.heard(msg), self.parameters.frame_id, self._now_ns())
+        write = ingest.observation(convert.heard(msg), self.parameters.frame_id, self.now_ns())
         if isinstance(write, Drop):
             self.habits.drop(write, topic)
             return
@@ -251,7 +251,7 @@ class TwinNode(AdjustableNode):
             self._observed_s = time.monotonic()
             if is_news:
                 self._look_at_stamp(write, topic)
-            self._tell_listeners()
+            self.tell_listeners()
 
     def _look_at_stamp(self, write: Scan | Look, topic: str) -> None:
         late = self.lateness.see(
@@ -272,7 +272,7 @@ class TwinNode(AdjustableNode):
         ):
             self._apply(write, topic)
         if self.store.observation_count != before:
-            self._tell_listeners()
+            self.tell_listeners()
 
     def _on_map(self, msg: Any) -> None:
         topic = self._topics["map_topic"]
@@ -288,7 +288,7 @@ class TwinNode(AdjustableNode):
             return
         self.occupancy_map = new
         self._map_revision += 1
-        self._tell_listeners()
+        self.tell_listeners()
 
     def _on_get_field(self, request: Any, response: Any) -> Any:
         try:
@@ -354,7 +354,7 @@ class TwinNode(AdjustableNode):
             input_problems=self.habits.look_at_inputs(),
         )
         self._diagnostics.publish(
-            diagnostics(findings(health), self.get_fully_qualified_name(), self._now_ns())
+            diagnostics(findings(health), self.get_fully_qualified_name(), self.now_ns())
         )
 
     def _publish_state(self) -> None:
@@ -387,7 +387,8 @@ class TwinNode(AdjustableNode):
         self.estimates.hear(near)
         return True
 
-    def _tell_listeners(self) -> None:
+    def tell_listeners(self) -> None:
+        """Give all of them the state as it is."""
         if self._listeners:
             snapshot = self.snapshot()
             for listener in self._listeners:
@@ -396,9 +397,9 @@ class TwinNode(AdjustableNode):
     def _look_at_clock(self) -> None:
         self._past_desk.go_on()
         before = self._clock_watch.state
-        self._now_ns()
+        self.now_ns()
         if self._clock_watch.state != before:
-            self._tell_listeners()
+            self.tell_listeners()
 
     def _watch_clock(self, now_ns: int, *, is_simulated: bool) -> None:
         watch = self._clock_watch
@@ -424,7 +425,8 @@ class TwinNode(AdjustableNode):
             self.destroy_subscription(self._clock_subscription)
             self._clock_subscription = None
 
-    def _now_ns(self) -> int:
+    def now_ns(self) -> int:
+        """ROS time; what follows from a clock that has gone back is done."""
         clock = self.get_clock()
         now_ns = int(clock.now().nanoseconds)
         self._watch_clock(now_ns, is_simulated=bool(clock.ros_time_is_active))

@@ -139,7 +139,7 @@ def test_who_asks_the_same_at_once_asks_once(domain: int) -> None:
             it.twin.state_at = held  # type: ignore[method-assign]
             number = it.bridge.state_number
             asking = [asyncio.create_task(it.http.get(f"{PATHS[0]}&at=9")) for _ in range(5)]
-            in_flight = it.bridge.admission._in_flight
+            in_flight = it.bridge.admission.in_flight
             await until(lambda: in_flight["127.0.0.1"] == 5, "all of them")
             gate.set()
             assert {(await task).status_code for task in asking} == {200}

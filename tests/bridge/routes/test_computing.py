@@ -165,7 +165,7 @@ def test_a_client_that_leaves_takes_its_work_along(domain: int, held: Held) -> N
             await until(lambda: fields_at(workers)[0] == 6 - LARGE_THREADS, "the rest behind it")
             at_work = list(held.begun)
             (staying,) = ask(it, field(at_work[0], LARGE))
-            await until(lambda: it.bridge.admission._in_flight["127.0.0.1"] == 7, "who stays")
+            await until(lambda: it.bridge.admission.in_flight["127.0.0.1"] == 7, "who stays")
             for task in leaving:
                 task.cancel()
             await until(lambda: fields_at(workers) == (0, 1), "the others' end")
@@ -212,7 +212,7 @@ def test_identical_requests_take_one_place_and_one_computation(domain: int, held
     async def test() -> None:
         async with house() as it:
             asked = ask(it, *[field("co2", LARGE)] * 30, field("co2", LARGE, "npy"))
-            await until(lambda: it.bridge.admission._in_flight["127.0.0.1"] == 31, "all of them")
+            await until(lambda: it.bridge.admission.in_flight["127.0.0.1"] == 31, "all of them")
             await until(lambda: it.bridge.admission.being_computed == 2, "a body each")
             held.gate.set()
             answers = await asyncio.gather(*asked)

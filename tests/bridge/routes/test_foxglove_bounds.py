@@ -73,17 +73,17 @@ def test_a_slow_client_gets_the_newest_and_one_that_never_reads_is_closed(domain
                     got += await slow[0].read(1 << 20)
                 assert b"seen 18." not in got, "and none of those before"
                 await until(lambda: hub.blocked == 1, "the one that reads")
-                hub._client_timeout_s = 0.1
+                hub.client_timeout_s = 0.1
                 await until(lambda: hub.clients_dismissed == 1, "the other's end")
                 await until(lambda: len(here.server.server_state.connections) == 1, "its going")
-                hub._client_timeout_s = PATIENCE_S
+                hub.client_timeout_s = PATIENCE_S
                 peer.observe(messages.scan("after.", {"co2": 1.0}))
                 while b"after." not in got[-100_000:]:
                     got += await slow[0].read(1 << 20)
                 # All together hold less than two maps: one that holds the older goes.
                 unsent = hub.unsent
                 await until(lambda: unsent.bytes == 0, "nothing to wait for")
-                unsent._max_bytes = 15_000_000
+                unsent.max_bytes = 15_000_000
                 stuck = await deaf(here.url, "/foxglove")
                 await until(lambda: len(hub) == 2, "a third")
                 stuck[1].write(subscribing(offer, "/map"))
@@ -93,7 +93,7 @@ def test_a_slow_client_gets_the_newest_and_one_that_never_reads_is_closed(domain
                 await until(lambda: hub.clients_dismissed == 2, "its end")
                 await until(lambda: hub.blocked == 1, "the one that comes to hold the newer")
                 assert 9_000_000 < unsent.bytes < 9_001_000
-            here.bridge.source.relay._linger_s = 0.0
+            here.bridge.source.relay.linger_s = 0.0
             for _, writer in (slow, never, stuck):
                 writer.transport.abort()
             await until(lambda: len(hub) == 0, "nobody")

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from lupin_bridge.past import schema
-from lupin_bridge.settings import Settings
+from lupin_bridge.serving.limits import Limits
 from lupin_bridge.twin.looking import Question, look_up
 from lupin_bridge.twin.source import TwinTimeoutError, TwinUnavailableError
 from lupin_twin.past import (
@@ -29,9 +29,9 @@ HISTORY = "/api/history?tag_id=7&sensor_type=co2"
 
 
 @asynccontextmanager
-async def remembering(past: MadeUp, settings: Settings | None = None) -> AsyncIterator[Running]:
+async def remembering(past: MadeUp, limits: Limits | None = None) -> AsyncIterator[Running]:
     """A bridge whose twin has this past."""
-    async with running(settings) as it:
+    async with running(limits) as it:
         twin = it.twin
         twin.state_at, twin.series = past.state_at, past.series  # type: ignore[method-assign]
         twin.rows = past.rows  # type: ignore[method-assign]

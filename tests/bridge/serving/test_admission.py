@@ -223,8 +223,8 @@ def test_clients_that_are_gone_leave_nothing_behind() -> None:
     admission = Admission(rate_hz=1000.0, concurrency=1, total_concurrency=1)
     for number in range(100):
         with admission.request(f"client {number}", 0.0):
-            assert len(admission._in_flight) == 1
-    assert not admission._in_flight
+            assert len(admission.in_flight) == 1
+    assert not admission.in_flight
 
 
 # --- at the routes ------------------------------------------------------------------------------
@@ -325,13 +325,13 @@ def test_a_place_is_held_until_the_twin_has_answered_and_then_given_back(domain:
             raise TimeoutError
 
         async with running(Limits(concurrency=3)) as it:
-            it.twin._thread.call = never  # type: ignore[method-assign, assignment]
+            it.twin.thread.call = never  # type: ignore[method-assign, assignment]
             fields = [f"/api/field{QUERY.replace('co2', f'{n}')}" for n in range(8)]
             asked = [asyncio.create_task(it.http.get(field)) for field in fields]
             await until(lambda: sum(each.done() for each in asked) == 5, "the refusals")
             time_is_up.set()
             answers = await asyncio.gather(*asked)
             assert sorted(answer.status_code for answer in answers) == [429] * 5 + [504] * 3
-            assert not it.bridge.admission._in_flight
+            assert not it.bridge.admission.in_flight
 
     run(domain, test())

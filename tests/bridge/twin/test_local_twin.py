@@ -51,9 +51,9 @@ class Stage:
 
         def take(node: TwinNode) -> None:
             node.store.record(scan)
-            node._tell_listeners()
+            node.tell_listeners()
 
-        await self.twin._thread.call(take)
+        await self.twin.thread.call(take)
 
     async def waiting(self, *requests: FieldRequest) -> list[asyncio.Task[Any]]:
         """Ask for fields that wait at the gate; returns when all of them do."""
@@ -266,7 +266,7 @@ def test_what_takes_too_long_ends_by_the_setting_that_says_so(
                     busy.set()
                     return bool(stage.gate.wait(20.0))
 
-                held = asyncio.create_task(stage.twin._thread.call(hold))
+                held = asyncio.create_task(stage.twin.thread.call(hold))
                 await until(busy.is_set, "the thread to be held")
                 with pytest.raises(TwinTimeoutError):
                     await stage.twin.history("1")
@@ -276,7 +276,7 @@ def test_what_takes_too_long_ends_by_the_setting_that_says_so(
             if what == "ROS thread":
                 await held
             await until(lambda: not stage.twin._computing, "the end of the computation")
-            stage.twin._timeout_s = PATIENCE_S
+            stage.twin.timeout_s = PATIENCE_S
             assert (await stage.twin.field(REQUEST)).grid.width == 4
 
     run(domain, test())
@@ -318,7 +318,7 @@ def test_parameters_come_from_the_ros_arguments(domain: int, stage_of: Callable[
             assert stage.twin.names().field_service == "/twin/get_field"
             revision = stage.twin.revision()
             wanted = [Parameter("idw_max_distance_m", value=0.25)]
-            await stage.twin._thread.call(lambda node: node.set_parameters(wanted))
+            await stage.twin.thread.call(lambda node: node.set_parameters(wanted))
             await until(lambda: stage.twin.rules().max_distance_m == 0.25, "the new rules")
             assert stage.twin.revision() != revision
 

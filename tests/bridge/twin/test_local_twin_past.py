@@ -40,14 +40,14 @@ def test_a_state_as_of_then_is_the_journals(domain: int, stage_of: Callable[...,
         async with stage_of() as stage:
 
             def take(node: TwinNode) -> int:
-                now_ns = node._now_ns()
+                now_ns = node.now_ns()
                 for at_ns, value in ((now_ns - 9, 400.0), (now_ns - 4, 500.0)):
                     scan = Scan("1", at_ns, (Reading("co2", value),))
                     assert node.memory.apply(scan, at_ns) is None
-                node._tell_listeners()
+                node.tell_listeners()
                 return now_ns
 
-            now_ns = await stage.twin._thread.call(take)
+            now_ns = await stage.twin.thread.call(take)
             await until(lambda: stage.twin.journal().written == 2, "both in the journal")
             past = await stage.twin.state_at(now_ns - 5)
             assert past.stamp_ns == now_ns - 5
@@ -67,11 +67,11 @@ def test_series_and_rows_are_the_journals(domain: int, stage_of: Callable[..., A
             values = tuple(map(float, range(20)))
 
             def take(node: TwinNode) -> None:
-                for at_ns, value in enumerate(values, node._now_ns() - 9_000):
+                for at_ns, value in enumerate(values, node.now_ns() - 9_000):
                     node.memory.apply(Scan("1", at_ns, (Reading("co2", value),)), at_ns)
-                node._tell_listeners()
+                node.tell_listeners()
 
-            await twin._thread.call(take)
+            await twin.thread.call(take)
             await until(lambda: twin.journal().written == 20, "all in the journal")
             past = await twin.series(SeriesRequest("1", "co2"))
             assert past.means == values
@@ -114,10 +114,10 @@ def test_damage_that_is_met_looking_back_has_the_file_set_aside(
 def test_the_future_is_refused(domain: int, stage_of: Callable[..., Any]) -> None:
     async def test() -> None:
         async with stage_of(*SILENT) as stage:
-            now_ns = stage.twin._told.snapshot.stamp_ns
+            now_ns = stage.twin.told.snapshot.stamp_ns
             assert (await stage.twin.state_at(now_ns)).stamp_ns == now_ns
             # Time goes on between two heartbeats.
-            between_ns = stage.twin._now_ns
+            between_ns = stage.twin.now_ns
             assert (await stage.twin.state_at(between_ns)).stamp_ns == between_ns > now_ns
             later_ns = now_ns + 3600 * 10**9
             with pytest.raises(PastRefused, match=f"at is {seconds(later_ns)} s, later than now"):
@@ -135,11 +135,11 @@ def test_a_journal_that_is_off_remembers_for_as_long_as_the_twin_lives(
             folder = Path(stage.twin.journal().path).parent
 
             def take(node: TwinNode) -> None:
-                at_ns = node._now_ns()
+                at_ns = node.now_ns()
                 node.memory.apply(Scan("1", at_ns, (Reading("co2", 400.0),)), at_ns)
 
-            await stage.twin._thread.call(take)
-            now_ns = stage.twin._now_ns
+            await stage.twin.thread.call(take)
+            now_ns = stage.twin.now_ns
             await until(lambda: stage.twin.journal().written, "the scan")
             [tag] = (await stage.twin.state_at(now_ns)).tags
             assert tag.readings[0].value == 400.0
@@ -157,16 +157,16 @@ def test_an_answer_that_takes_too_long_ends_and_delays_no_observation(
     async def test() -> None:
         async with stage_of() as stage:
             await until(lambda: stage.twin.journal().state == "recording", "the journal")
-            await stage.twin.past.ask(Itself(0), stage.twin._now(), 0.0)
+            await stage.twin.past.ask(Itself(0), stage.twin.now(), 0.0)
             waiting = asyncio.create_task(stage.twin.ask(Endless(), 0.0))
-            await until(lambda: len(stage.twin.past._asked) == 1, "the question")
+            await until(lambda: len(stage.twin.past.asked) == 1, "the question")
             await stage.record("1", 400.0)
             assert not waiting.done()
-            stage.twin._timeout_s = 0.1
+            stage.twin.timeout_s = 0.1
             with pytest.raises(TwinTimeoutError, match=r"within 0\.1 s"):
                 await stage.twin.ask(Endless(), 0.0)
-            assert len(stage.twin.past._asked) == 1
+            assert len(stage.twin.past.asked) == 1
             waiting.cancel()
-            await until(lambda: stage.twin.past._asked == {}, "the end of both")
+            await until(lambda: stage.twin.past.asked == {}, "the end of both")
 
     run(domain, test())

@@ -125,18 +125,18 @@ def test_what_nobody_waits_for_any_more_ends_there(path: Path) -> None:
             asking = [
                 asyncio.create_task(past.ask(Endless(), now(path), 0.0)) for _ in range(MAX_ASKED)
             ]
-            await until(lambda: len(past._asked) == MAX_ASKED, "all of them")
+            await until(lambda: len(past.asked) == MAX_ASKED, "all of them")
             with pytest.raises(NotRemembered, match=f"{MAX_ASKED} questions .* the limit"):
                 await past.ask(Running(), now(path), 0.0)
             asking.pop().cancel()
-            await until(lambda: len(past._asked) < MAX_ASKED, "one to go")
+            await until(lambda: len(past.asked) < MAX_ASKED, "one to go")
             running, _ = await past.ask(Running(), now(path), 0.0)
             assert running <= 3, "those that no thread has taken wait"
             for asked in asking:
                 asked.cancel()
             while (await past.ask(Running(), now(path), 0.0))[0]:
                 pass
-            assert past._asked == {}
+            assert past.asked == {}
 
     asyncio.run(test())
 
@@ -150,7 +150,7 @@ def test_one_that_dies_is_told_of_and_started_again(
         async with looking_back() as past:
             assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
             waiting = asyncio.create_task(past.ask(Endless(), now(path), 0.0))
-            await until(lambda: len(past._asked) == 1, "a question")
+            await until(lambda: len(past.asked) == 1, "a question")
             assert past.pid is not None
             os.kill(past.pid, signal.SIGKILL)
             with pytest.raises(NotRemembered, match="was killed by SIGKILL") as caught:
@@ -158,14 +158,14 @@ def test_one_that_dies_is_told_of_and_started_again(
             assert not caught.value.is_lasting
             with pytest.raises(NotRemembered, match="is about to be started again"):
                 await past.ask(Count(NOW_NS), now(path), 0.0)
-            await until(lambda: not past._why_down, "the next one")
+            await until(lambda: not past.why_down, "the next one")
             assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
             with pytest.raises(NotRemembered, match="was killed by SIGABRT"):
                 await past.ask(Dying(), now(path), 0.0)
             await until(lambda: past._life is not None, "another one")
             assert past.pid is not None
             os.kill(past.pid, signal.SIGRTMIN + 6)
-            await until(lambda: bool(past._why_down), "its end")
+            await until(lambda: bool(past.why_down), "its end")
             told = [r.getMessage() for r in caplog.records if r.levelno == logging.ERROR]
             assert told == [
                 "the process that looks back was killed by SIGKILL; it is started in 0.2 s",
@@ -188,7 +188,7 @@ def test_one_that_cannot_be_started_is_tried_again(
                 await past.ask(Count(NOW_NS), now(path), 0.0)
             await until(lambda: len(caplog.records) > 2, "other tries")
             monkeypatch.undo()
-            await until(lambda: not past._why_down and past._life is not None, "one that can")
+            await until(lambda: not past.why_down and past._life is not None, "one that can")
             assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
 
     asyncio.run(test())
@@ -265,7 +265,7 @@ def test_an_export_is_read_as_it_is_taken(path: Path) -> None:
         async with looking_back() as past:
             rows = past.rows((0, NOW_NS, None, None), len, lambda: now(path))
             assert await anext(rows) == 1_000
-            assert past._asked == {}, "nobody reads on"
+            assert past.asked == {}, "nobody reads on"
             assert [count async for count in rows] == [1_000, 500]
             # One that is given up in the middle, and one that the process does not outlive.
             broken = past.rows((0, NOW_NS, None, None), len, lambda: now(path))

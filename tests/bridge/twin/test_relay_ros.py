@@ -51,7 +51,7 @@ def test_a_twins_topics_come_as_they_are_on_the_wire(domain: int, source_type: t
     async def test() -> None:
         async with stage_of(source_type, domain) as stage:
             relay: Relay = stage.source.relay
-            relay._linger_s = 0.0
+            relay.linger_s = 0.0
             state, observations, discovered, map_, diagnostics = topics_of(stage.source.names())
             grid, seen = occupancy_grid([[0, 100]]), scan("1", {"co2": 400.0}, stamp_s=5.0)
             stage.peer.publish_map(grid)

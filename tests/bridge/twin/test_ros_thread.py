@@ -74,7 +74,7 @@ def test_a_call_runs_in_the_nodes_thread_and_its_result_comes_back(domain: int) 
     async def test() -> None:
         async with Stage() as stage:
             thread = await stage.ros.call(lambda _: threading.current_thread())
-            assert thread is stage.ros._require_node().thread
+            assert thread is stage.ros.require_node().thread
             assert thread is not threading.current_thread()
             results = [stage.ros.call(lambda _, n=n: n * n) for n in range(50)]  # type: ignore[misc]
             assert await asyncio.gather(*results) == [n * n for n in range(50)]
@@ -170,7 +170,7 @@ def test_an_event_from_a_nodes_first_moment_finds_a_node_to_look_at(domain: int)
         ros: RosThread[Probe, int] = RosThread(
             make_node,
             ros_args=(),
-            on_event=lambda event: seen.append(event + ros._require_node().ticks),
+            on_event=lambda event: seen.append(event + ros.require_node().ticks),
             on_death=lambda: None,
         )
         await ros.start()
@@ -188,8 +188,8 @@ def test_events_of_a_node_whose_loop_is_gone_do_no_harm(domain: int) -> None:
             runner.run(stage.ros.call(lambda node: node.create_timer(0.01, node.tick)))
 
         async def end() -> None:
-            ticks = stage.ros._require_node().ticks
-            await until(lambda: stage.ros._require_node().ticks > ticks + 3, "more ticks")
+            ticks = stage.ros.require_node().ticks
+            await until(lambda: stage.ros.require_node().ticks > ticks + 3, "more ticks")
             assert (stage.ros.is_alive, stage.ros.callback_errors) == (True, 0)
             await stage.ros.stop()
             await until(lambda: not stage.ros.is_alive, "the end of the thread")
@@ -238,7 +238,7 @@ def test_who_waits_no_longer_gives_the_future_up_in_the_nodes_thread(domain: int
             await until(lambda: stage.ros.calls_waiting == 0, "the question to be asked")
             waiting.cancel()
             await until(lambda: given_up, "the future to be given up")
-            assert given_up == [(asked, stage.ros._require_node().thread)]
+            assert given_up == [(asked, stage.ros.require_node().thread)]
 
     run(domain, test())
 

@@ -91,13 +91,13 @@ async def started(timeout_s: float = 20.0) -> AsyncIterator[tuple[WebTwin, list[
 
 async def found(twin: WebTwin) -> None:
     """Wait until the service is there to be asked."""
-    client = await twin._thread.call(lambda node: node.clients_of_twin[Asked.FIELD])
+    client = await twin.thread.call(lambda node: node.clients_of_twin[Asked.FIELD])
     await until(client.service_is_ready, "the service")
 
 
 def pending(twin: WebTwin) -> int:
     """Requests that the ROS client still keeps."""
-    return len(twin._thread._require_node().clients_of_twin[Asked.FIELD]._pending_requests)
+    return len(twin.thread.require_node().clients_of_twin[Asked.FIELD]._pending_requests)
 
 
 def test_without_a_twin_a_field_is_refused_at_once_by_the_services_name(domain: int) -> None:

@@ -58,9 +58,7 @@ def test_questions_about_the_past_go_the_same_bounded_way(domain: int) -> None:
                 lambda request, _: answers.append(request),
             )
             async with started() as (twin, _):
-                client = await twin._thread.call(
-                    lambda node: node.clients_of_twin[Service.STATE_AT]
-                )
+                client = await twin.thread.call(lambda node: node.clients_of_twin[Service.STATE_AT])
                 await until(client.service_is_ready, "the service")
 
                 def ask() -> list[asyncio.Task[Any]]:
@@ -71,7 +69,7 @@ def test_questions_about_the_past_go_the_same_bounded_way(domain: int) -> None:
                 for each in asked:
                     each.cancel()
                 await until(lambda: not client._pending_requests, "the questions to be forgotten")
-                twin._timeout_s = 0.2
+                twin.timeout_s = 0.2
                 for each in ask():
                     with pytest.raises(TwinTimeoutError, match=r"within 0\.2 s"):
                         await each

@@ -31,7 +31,7 @@ def test_a_field_of_a_twin_that_has_just_come_waits_for_its_service(
                 early = asyncio.create_task(twin.field(REQUEST))
                 # Refused, it would have been by then.
                 for _ in range(3):
-                    await twin._thread.call(lambda _: None)
+                    await twin.thread.call(lambda _: None)
                 assert not early.done()
                 async with Service(peer).answering():
                     assert (await early).grid.width == 2
@@ -82,7 +82,7 @@ def test_an_answer_is_not_lost_among_those_to_all_others(domain: int) -> None:
                 await found(twin)
                 early = asyncio.create_task(twin.field(REQUEST))
                 await until(lambda: pending(twin), "the question")
-                holding = asyncio.create_task(twin._thread.call(hold))
+                holding = asyncio.create_task(twin.thread.call(hold))
                 await until(held.is_set, "a thread that is busy")
                 async with service.answering():
                     await until(lambda: service.asked, "its answer")

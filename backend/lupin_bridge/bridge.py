@@ -76,7 +76,7 @@ class Bridge:
         criteria: Criteria | None = None,
         outward: Channels | None = None,
         *,
-        limits: Limits = Limits(),  # noqa: B008  # a value
+        limits: Limits = Limits(),
     ) -> None:
         self._clock = clock
         self.source = source

@@ -1,31 +1,129 @@
-"""The values of a query string."""
+"""The values of a query string, read by a dataclass; and OpenAPI is told of just these."""
 
 from __future__ import annotations
 
-import pytest
+import json
+from contextlib import suppress
+from dataclasses import dataclass, fields
+from typing import Annotated, Any, Literal
 
-from lupin_bridge.query_string import values_of
+import pytest
+from annotated_types import Interval
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lupin_bridge.field.query import EstimateQuery, FieldQuery
+from lupin_bridge.openapi import document
+from lupin_bridge.past import query
+from lupin_bridge.query_string import Name, needed, parameter, parameters_of, read
+from lupin_bridge.routes.state import ListenQuery, ListenRefused
+
+PATHS: dict[str, Any] = json.loads(document())["paths"]
 
 
 class Refused(Exception):
     pass
 
 
+@dataclass(frozen=True, slots=True)
+class Some:
+    a: Name = needed("one")
+    from_: Annotated[int, Interval(ge=1, le=5)] = parameter("another", 2)
+    c: Literal["x", "y"] | None = parameter("a third")
+
+
+def refusal(*pairs: tuple[str, str]) -> str:
+    with pytest.raises(Refused) as refused:
+        read(Some, pairs, Refused)
+    return str(refused.value)
+
+
 def test_each_name_has_its_value() -> None:
-    assert values_of([("b", "2"), ("a", "")], ("a", "b", "c"), Refused) == {"a": "", "b": "2"}
+    assert read(Some, [("from", "5"), ("a", "7")], Refused) == Some("7", 5)
+    assert read(Some, [("a", "7"), ("c", "y")], Refused) == Some("7", 2, "y")
 
 
 @pytest.mark.parametrize(
     ("parameters", "why"),
     [
-        ([("d", "1")], "parameter 'd' is unknown, expected a, b"),
-        ([("x" * 65, "1")], f"parameter '{'x' * 64}' is unknown, expected a, b"),
+        ([("d", "1")], "parameter 'd' is unknown, expected a, from, c"),
+        ([("from_", "1")], "parameter 'from_' is unknown, expected a, from, c"),
+        ([("x" * 65, "1")], f"parameter '{'x' * 64}' is unknown, expected a, from, c"),
         ([("a", "1"), ("a", "1")], "a is given more than once, expected one value"),
+        ([], "a: field required"),
+        ([("a", "")], "a is '': string should have at least 1 character"),
+        ([("a", "1"), ("from", "6")], "from is '6': input should be less than or equal to 5"),
+        ([("a", "1"), ("from", "two")], "from is 'two': input should be a valid integer"),
+        ([("a", "1"), ("from", "9" * 5_000)], f"from is '{'9' * 64}': "),
+        ([("a", "1"), ("c", "z")], "c is 'z': input should be 'x' or 'y'"),
     ],
 )
-def test_what_is_unknown_or_repeated_is_refused_in_the_callers_way(
+def test_what_cannot_be_is_refused_in_the_callers_way_by_name(
     parameters: list[tuple[str, str]], why: str
 ) -> None:
-    with pytest.raises(Refused) as refused:
-        values_of(parameters, ("a", "b"), Refused)
-    assert str(refused.value) == why
+    assert refusal(*parameters).startswith(why)
+
+
+@given(st.lists(st.tuples(st.sampled_from(["a", "from", "c"]) | st.text(), st.text()), max_size=3))
+def test_any_query_string_is_read_or_refused(pairs: list[tuple[str, str]]) -> None:
+    with suppress(Refused):
+        read(Some, pairs, Refused)
+
+
+def test_parameters_are_told_as_openapi_has_them() -> None:
+    assert parameters_of(Some) == [
+        {
+            "name": "a",
+            "in": "query",
+            "required": True,
+            "schema": {"type": "string", "minLength": 1, "maxLength": 256},
+            "description": "one",
+        },
+        {
+            "name": "from",
+            "in": "query",
+            "required": False,
+            "schema": {"type": "integer", "minimum": 1, "maximum": 5, "default": 2},
+            "description": "another",
+        },
+        {
+            "name": "c",
+            "in": "query",
+            "required": False,
+            "schema": {"type": "string", "enum": ["x", "y"]},
+            "description": "a third",
+        },
+    ]
+
+
+@pytest.mark.parametrize(
+    ("path", "kind"),
+    [
+        ("/api/field", FieldQuery),
+        ("/api/estimate", EstimateQuery),
+        ("/api/history", query.OfHistory),
+        ("/api/timeline", query.OfTimeline),
+        ("/api/alarms", query.OfAlarms),
+        ("/api/export.csv", query.OfExport),
+        ("/api/state", query.OfMoment),
+    ],
+)
+def test_what_is_read_is_described_and_nothing_else(path: str, kind: Any) -> None:
+    described = {told["name"] for told in PATHS[path]["get"]["parameters"]}
+    assert described == {spec.name.rstrip("_") for spec in fields(kind)}
+
+
+# --- what a WebSocket client may ask for ----------------------------------------------------------
+
+
+def test_who_asks_for_nothing_gets_every_state_whole() -> None:
+    asked = read(ListenQuery, [], ListenRefused)
+    assert (asked.delta, asked.min_interval_s) == (False, 0.0)
+
+
+def test_the_lowest_rate_is_one_and_anything_lower_is_not() -> None:
+    asked = read(ListenQuery, [("delta", "1"), ("max_rate_hz", "0.01")], ListenRefused)
+    assert (asked.delta, asked.min_interval_s) == (True, 100.0)
+    for value in ("0.0099", "0", "-1", "nan", "fast", ""):
+        with pytest.raises(ListenRefused, match=f"max_rate_hz is '{value}': input should be"):
+            read(ListenQuery, [("max_rate_hz", value)], ListenRefused)

@@ -1,21 +1,18 @@
-"""A field's query string and headers: what was asked, in which format, and under which ETag.
-
-Pure. A query is refused, never guessed at: an unknown or repeated parameter is a typing error that
-would otherwise go unseen.
-"""
+"""A field's query string and headers: what was asked, in which format, under which ETag. Pure."""
 
 from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final, Literal
 from urllib.parse import quote
 
+from annotated_types import Gt, Interval
+
 from lupin_bridge.field.formats import FORMATS, JSON, PNG, FieldFormat
-from lupin_bridge.query_string import values_of
+from lupin_bridge.query_string import AT, Name, needed, parameter
 from lupin_twin.fields import (
     DEFAULT_RESOLUTION_M,
     FieldRefused,
@@ -24,95 +21,64 @@ from lupin_twin.fields import (
 )
 
 BOX_NAMES: Final = ("bbox_min_x", "bbox_min_y", "bbox_max_x", "bbox_max_y")
-NAMES: Final = ("sensor_type", "resolution", *BOX_NAMES, "scale", "at")
-# An estimate is two numbers a cell, a picture shows one of them.
-LAYERS: Final = ("mean", "sd")
-ESTIMATE_NAMES: Final = (*NAMES, "layer")
-_PLAIN: Final = re.compile(r"[0-9A-Za-z+.-]+")
+_BOX: Final = "m, map frame; without a box: all pinned tags but those far off, and their reach"
 
 Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class FieldQuery:
-    """What a query string asks for; `resolution` and `box` are None where left to the server.
+    """What is asked of a field; `resolution` and the box are None where left to the server."""
 
-    `at` is a moment as it was sent, None for now; `layer`, of an estimate's picture, one of
-    `LAYERS`.
-    """
+    sensor_type: Name = needed("name of a sensor, as in a reading")
+    resolution: Annotated[float, Gt(0)] | None = parameter(
+        "m, side of a square cell; without a box either: doubled until the field is small enough; "
+        f"default: {DEFAULT_RESOLUTION_M}"
+    )
+    bbox_min_x: float | None = parameter(_BOX)
+    bbox_min_y: float | None = parameter(_BOX)
+    bbox_max_x: float | None = parameter(_BOX)
+    bbox_max_y: float | None = parameter(_BOX)
+    scale: Annotated[int, Interval(ge=1, le=1000)] = parameter(
+        "PNG only: pixels a cell along each side", 1
+    )
+    at: str | None = parameter(AT)
 
-    sensor_type: str
-    resolution: float | None
-    box: Box | None
-    scale: int
-    at: str | None = None
-    layer: str = LAYERS[0]
+    @property
+    def box(self) -> Box | None:
+        """The box, where one is given.
+
+        Raises:
+            FieldRefused: not all of it is.
+
+        """
+        box = self.bbox_min_x, self.bbox_min_y, self.bbox_max_x, self.bbox_max_y
+        missing = [name for name, value in zip(BOX_NAMES, box, strict=True) if value is None]
+        if missing and len(missing) < len(box):
+            raise FieldRefused(f"the box is incomplete: {', '.join(missing)} is missing")
+        return None if missing else box  # type: ignore[return-value]  # all of it is there
 
     def request(self, default_box: Box, max_cells: int) -> FieldRequest:
-        """The query as GetField's request; one that asks for neither has `max_cells` at most."""
-        if self.box is None and self.resolution is None:
+        """The query as GetField's request; one that asks for neither has `max_cells` at most.
+
+        Raises:
+            FieldRefused: see `box`.
+
+        """
+        box = self.box
+        if box is None and self.resolution is None:
             return default_request(self.sensor_type, default_box, max_cells)
         resolution = DEFAULT_RESOLUTION_M if self.resolution is None else self.resolution
-        return FieldRequest(self.sensor_type, resolution, *(self.box or default_box))
+        return FieldRequest(self.sensor_type, resolution, *(box or default_box))
 
 
-def parse(parameters: Sequence[tuple[str, str]], names: Sequence[str] = NAMES) -> FieldQuery:
-    """Read a query string's (name, value) pairs; `names` are those that it may have.
+@dataclass(frozen=True, slots=True)
+class EstimateQuery(FieldQuery):
+    """What is asked of an estimate: it is two numbers a cell, and a picture shows one of them."""
 
-    Raises:
-        FieldRefused: an unknown or repeated parameter, an incomplete box, not a number, no layer.
-
-    """
-    values = values_of(parameters, names, FieldRefused)
-    given = [name for name in BOX_NAMES if name in values]
-    box: Box | None = None
-    if given:
-        missing = [name for name in BOX_NAMES if name not in values]
-        if missing:
-            raise FieldRefused(f"the box is incomplete: {', '.join(missing)} is missing")
-        min_x, min_y, max_x, max_y = (_number(name, values[name]) for name in BOX_NAMES)
-        box = (min_x, min_y, max_x, max_y)
-    return FieldQuery(
-        sensor_type=values.get("sensor_type", ""),
-        resolution=(
-            _number("resolution", values["resolution"]) if "resolution" in values else None
-        ),
-        box=box,
-        scale=_scale(values.get("scale", "1")),
-        at=values.get("at"),
-        layer=_layer(values.get("layer", LAYERS[0])),
+    layer: Literal["mean", "sd"] = parameter(
+        "PNG only: which of the two numbers; transparent where the estimate is not known", "mean"
     )
-
-
-def plain_number(text: str) -> float | None:
-    """A number in a query string; None: it is none.
-
-    float() takes more than plain numbers: `1_000`, and the digits of every script. Blanks around
-    are fine: in a query string, `+2` reads ` 2`.
-    """
-    if _PLAIN.fullmatch(text.strip(" ")):
-        with suppress(ValueError):
-            return float(text)
-    return None
-
-
-def _number(name: str, text: str) -> float:
-    number = plain_number(text)
-    if number is None:
-        raise FieldRefused(f"{name} is {text[:64]!r}, expected a number")
-    return number
-
-
-def _scale(text: str) -> int:
-    if not (text.isascii() and text.isdigit() and 1 <= int(text[:6]) <= 1000 and len(text) <= 6):
-        raise FieldRefused(f"scale is {text[:64]!r}, expected a whole number from 1 to 1000")
-    return int(text)
-
-
-def _layer(text: str) -> str:
-    if text not in LAYERS:
-        raise FieldRefused(f"layer is {text[:64]!r}, expected one of {', '.join(LAYERS)}")
-    return text
 
 
 def check_scale(query: FieldQuery, field_format: FieldFormat, cells: int, max_cells: int) -> None:
@@ -150,10 +116,10 @@ def negotiate(accept: str | None) -> FieldFormat | None:
 
 
 def _media_range(text: str) -> tuple[str, float]:
-    media_type, *parameters = (part.strip().lower() for part in text.split(";"))
+    media_type, *options = (part.strip().lower() for part in text.split(";"))
     weight = 1.0
-    for parameter in parameters:
-        name, _, value = parameter.partition("=")
+    for option in options:
+        name, _, value = option.partition("=")
         if name.strip() == "q":
             try:
                 weight = min(1.0, max(0.0, float(value)))

@@ -6,12 +6,12 @@ import re
 from datetime import UTC, date, datetime
 from typing import Final
 
+from lupin_bridge.query_string import MOMENT
 from lupin_twin.past import PastRefused
 from lupin_twin.state import NANOSECONDS_PER_SECOND
 
 # builtin_interfaces/Time has its seconds as int32.
 MAX_SECONDS: Final = 2**31 - 1
-EXPECTED: Final = "ROS seconds as a decimal number, or ISO 8601 with an offset"
 
 _SECONDS: Final = re.compile(r"([0-9]+)(?:\.([0-9]+))?", re.ASCII)
 # In a query string, `+01:00` reads ` 01:00`.
@@ -39,7 +39,7 @@ def moment(name: str, text: str) -> int:
     elif iso := _ISO.fullmatch(text):
         seconds, fraction = _unix_seconds(name, text, iso), iso.group(7)
     else:
-        raise PastRefused(f"{name} is {text[:64]!r}, expected {EXPECTED}")
+        raise PastRefused(f"{name} is {text[:64]!r}, expected {MOMENT}")
     if seconds is None or seconds > MAX_SECONDS:
         raise PastRefused(f"{name} is {text[:64]!r}, the limit is {MAX_SECONDS} s of ROS time")
     if seconds < 0:

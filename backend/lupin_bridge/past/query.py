@@ -1,34 +1,85 @@
-"""What a query string asks of the past. Pure.
-
-A query is refused, never guessed at: an unknown or repeated parameter is a typing error that would
-otherwise go unseen.
-"""
+"""What a query string asks of the past. Pure."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final, Literal
+
+from annotated_types import Interval
 
 from lupin_bridge.past.moments import moment
-from lupin_bridge.query_string import values_of
-from lupin_twin.bounds import MAX_TEXT_LENGTH
+from lupin_bridge.query_string import AT, MOMENT, Name, needed, parameter, read
 from lupin_twin.past import (
     DEFAULT_POINTS,
     MAX_POINTS,
+    Event,
     PastRefused,
     SeriesRequest,
     check_moment,
     seconds,
 )
 
-AT: Final = "at"
-HISTORY_NAMES: Final = ("tag_id", "sensor_type", "from", "to", "points")
-TIMELINE_NAMES: Final = ("from", "to", "points", "tag_id")
-ALARMS_NAMES: Final = ("from", "to", "active")
-EXPORT_NAMES: Final = ("from", "to", "tag_id", "sensor_type")
-
 Parameters = Sequence[tuple[str, str]]
+
+_FROM: Final = f"{MOMENT}; default: the oldest that is kept"
+_TO: Final = "as `from`; this moment itself is not in the period; default: now"
+_POINTS: Final = "at most so many readings or buckets"
+_ONE_TAG: Final = "one tag alone; default: all"
+Points = Annotated[int, Interval(ge=1, le=MAX_POINTS)]
+
+
+@dataclass(frozen=True, slots=True)
+class OfMoment:
+    """A query string that has a moment alone."""
+
+    at: str | None = parameter(AT)
+
+
+@dataclass(frozen=True, slots=True)
+class OfPeriod:
+    """The parameters of a period."""
+
+    from_: str | None = parameter(_FROM)
+    to: str | None = parameter(_TO)
+
+
+@dataclass(frozen=True, slots=True)
+class OfHistory:
+    """The parameters of `/api/history`."""
+
+    tag_id: Name = needed("one tag; for events, `*` is the whole house")
+    sensor_type: Name = needed(
+        f"name of a sensor, as in a reading; or an event: {', '.join(Event)}"
+    )
+    from_: str | None = parameter(_FROM)
+    to: str | None = parameter(_TO)
+    points: Points = parameter(_POINTS, DEFAULT_POINTS)
+
+
+@dataclass(frozen=True, slots=True)
+class OfTimeline(OfPeriod):
+    """The parameters of `/api/timeline`."""
+
+    points: Points = parameter(_POINTS, DEFAULT_POINTS)
+    tag_id: Name | None = parameter(_ONE_TAG)
+
+
+@dataclass(frozen=True, slots=True)
+class OfAlarms(OfPeriod):
+    """The parameters of `/api/alarms`."""
+
+    active: Literal["0", "1"] | None = parameter(
+        "1: only those that have not been cleared, 0: only the others; default: all"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class OfExport(OfPeriod):
+    """The parameters of `/api/export.csv`."""
+
+    tag_id: Name | None = parameter(_ONE_TAG)
+    sensor_type: Name | None = parameter("one sensor alone; default: all")
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,11 +118,9 @@ def alarms(parameters: Parameters, now_ns: int | None) -> AlarmsQuery:
         PastRefused: see `history`.
 
     """
-    values = values_of(parameters, ALARMS_NAMES, PastRefused)
-    active = values.get("active")
-    if active not in (None, "0", "1"):
-        raise PastRefused(f"active is {active[:64]!r}, not 0 or 1")
-    return AlarmsQuery(*_period(values, now_ns), None if active is None else active == "1")
+    given = read(OfAlarms, parameters, PastRefused)
+    active = None if given.active is None else given.active == "1"
+    return AlarmsQuery(*_period(given, now_ns), active)
 
 
 def at(parameters: Parameters, now_ns: int | None) -> int | None:
@@ -81,7 +130,7 @@ def at(parameters: Parameters, now_ns: int | None) -> int | None:
         PastRefused: anything but one `at`, or a moment that has not come.
 
     """
-    return at_of(values_of(parameters, (AT,), PastRefused).get(AT), now_ns)
+    return at_of(read(OfMoment, parameters, PastRefused).at, now_ns)
 
 
 def at_of(text: str | None, now_ns: int | None) -> int | None:
@@ -93,7 +142,7 @@ def at_of(text: str | None, now_ns: int | None) -> int | None:
     """
     if text is None:
         return None
-    at_ns = moment(AT, text)
+    at_ns = moment("at", text)
     if now_ns is not None:
         check_moment(at_ns, now_ns)
     return at_ns
@@ -106,15 +155,8 @@ def history(parameters: Parameters, now_ns: int | None) -> SeriesRequest:
         PastRefused: an unknown or repeated parameter, or a value that cannot be.
 
     """
-    values = values_of(parameters, HISTORY_NAMES, PastRefused)
-    start_ns, end_ns = _period(values, now_ns)
-    return SeriesRequest(
-        _text(values, "tag_id") or "",
-        _text(values, "sensor_type") or "",
-        start_ns,
-        end_ns,
-        _points(values),
-    )
+    given = read(OfHistory, parameters, PastRefused)
+    return SeriesRequest(given.tag_id, given.sensor_type, *_period(given, now_ns), given.points)
 
 
 def timeline(parameters: Parameters, now_ns: int | None) -> TimelineQuery:
@@ -124,8 +166,8 @@ def timeline(parameters: Parameters, now_ns: int | None) -> TimelineQuery:
         PastRefused: see `history`.
 
     """
-    values = values_of(parameters, TIMELINE_NAMES, PastRefused)
-    return TimelineQuery(*_period(values, now_ns), _points(values), _named(values, "tag_id"))
+    given = read(OfTimeline, parameters, PastRefused)
+    return TimelineQuery(*_period(given, now_ns), given.points, given.tag_id)
 
 
 def export(parameters: Parameters, now_ns: int | None) -> ExportQuery:
@@ -135,16 +177,14 @@ def export(parameters: Parameters, now_ns: int | None) -> ExportQuery:
         PastRefused: see `history`.
 
     """
-    values = values_of(parameters, EXPORT_NAMES, PastRefused)
-    return ExportQuery(
-        *_period(values, now_ns), _named(values, "tag_id"), _named(values, "sensor_type")
-    )
+    given = read(OfExport, parameters, PastRefused)
+    return ExportQuery(*_period(given, now_ns), given.tag_id, given.sensor_type)
 
 
-def _period(values: Mapping[str, str], now_ns: int | None) -> tuple[int, int]:
-    start_ns = moment("from", values["from"]) if "from" in values else 0
-    if "to" in values:
-        end_ns = moment("to", values["to"])
+def _period(given: OfPeriod | OfHistory, now_ns: int | None) -> tuple[int, int]:
+    start_ns = 0 if given.from_ is None else moment("from", given.from_)
+    if given.to is not None:
+        end_ns = moment("to", given.to)
         if end_ns == 0:
             raise PastRefused("to is 0 s of ROS time, must be later")
         if end_ns < start_ns:
@@ -153,28 +193,3 @@ def _period(values: Mapping[str, str], now_ns: int | None) -> tuple[int, int]:
     if now_ns is not None and start_ns > now_ns:
         raise PastRefused(f"from is {seconds(start_ns)} s, later than now, {seconds(now_ns)} s")
     return start_ns, 0
-
-
-def _points(values: Mapping[str, str]) -> int:
-    text = values.get("points", str(DEFAULT_POINTS))
-    if not (text.isascii() and text.isdigit() and len(text) <= 9 and 1 <= int(text) <= MAX_POINTS):
-        raise PastRefused(
-            f"points is {text[:64]!r}, expected a whole number from 1 to {MAX_POINTS}"
-        )
-    return int(text)
-
-
-def _named(values: Mapping[str, str], name: str) -> str | None:
-    text = _text(values, name)
-    if text == "":
-        raise PastRefused(f"{name} is empty")
-    return text
-
-
-def _text(values: Mapping[str, str], name: str) -> str | None:
-    text = values.get(name)
-    if text is not None and len(text) > MAX_TEXT_LENGTH:
-        raise PastRefused(
-            f"{name} {text[:24]!r}… has {len(text)} characters, the limit is {MAX_TEXT_LENGTH}"
-        )
-    return text

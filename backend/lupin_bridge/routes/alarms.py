@@ -13,8 +13,9 @@ from lupin_bridge.access.middleware import client_of
 from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.past import query
 from lupin_bridge.past.query import AlarmsQuery
+from lupin_bridge.query_string import parameters_of
 from lupin_bridge.routes.computing import kept_or_computed, on_worker, or_refusal
-from lupin_bridge.routes.documented import NOT_REMEMBERED, PERIOD, parameter
+from lupin_bridge.routes.documented import NOT_REMEMBERED
 from lupin_bridge.routes.tools import JSON_TYPE, NEVER_KEEP, bridge_of, read_route
 from lupin_bridge.serving.kept import Answer
 from lupin_bridge.stream import schema
@@ -32,16 +33,7 @@ _WRITE_ALARM_S: Final = 10e-6
     "/api/alarms",
     summary="What was wrong, where, from when to when, and how bad at worst",
     responses={200: {"model": schema.Alarms}, **NOT_REMEMBERED},
-    openapi_extra={
-        "parameters": [
-            *PERIOD,
-            parameter(
-                "active",
-                {"type": "string", "enum": ["0", "1"]},
-                "1: only those that have not been cleared, 0: only the others; default: all",
-            ),
-        ]
-    },
+    openapi_extra={"parameters": parameters_of(query.OfAlarms)},
 )
 async def alarms_route(request: Request) -> Response:
     """Alarms that were active at any time of the period, the newest first and 2,000 at most.

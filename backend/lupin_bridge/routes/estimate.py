@@ -10,9 +10,10 @@ from lupin_bridge.access.middleware import client_of
 from lupin_bridge.field import estimate_formats
 from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import PNG, FieldFormat
-from lupin_bridge.field.query import FieldQuery
+from lupin_bridge.field.query import EstimateQuery
 from lupin_bridge.past import complete
 from lupin_bridge.past import query as past_query
+from lupin_bridge.query_string import parameters_of, read
 from lupin_bridge.routes.computing import (
     far_off,
     on_worker,
@@ -20,7 +21,6 @@ from lupin_bridge.routes.computing import (
     unless_known,
     write_s,
 )
-from lupin_bridge.routes.documented import AT, FIELD, parameter
 from lupin_bridge.routes.in_formats import InFormats
 from lupin_bridge.routes.tools import REVALIDATE, bridge_of
 from lupin_bridge.serving.kept import Answer
@@ -31,11 +31,6 @@ from lupin_twin.workers import SMALL_S
 
 router = APIRouter()
 
-_LAYER = parameter(
-    "layer",
-    {"type": "string", "enum": list(field_query.LAYERS), "default": field_query.LAYERS[0]},
-    "PNG only: which of the two numbers; transparent where the estimate is not known",
-)
 ESTIMATE: Final = InFormats(
     name="estimate",
     summary="The estimate of one sensor",
@@ -44,7 +39,7 @@ ESTIMATE: Final = InFormats(
 That of now is made for the newest reading or the last whole minute of the day, whichever is
 later: until then its ETag holds, unless something is heard, or a model fitted anew. Of a moment
 that has passed it is made by the model of now.""",
-    parameters=[*FIELD, AT, _LAYER],
+    parameters=parameters_of(EstimateQuery),
     model=GetEstimateResponse,
     refusal_json=estimate_formats.refusal_json,
 )
@@ -52,8 +47,8 @@ that has passed it is made by the model of now.""",
 
 async def _answer(request: Request, field_format: FieldFormat) -> Response:
     bridge = bridge_of(request)
-    query = field_query.parse(request.query_params.multi_items(), field_query.ESTIMATE_NAMES)
-    if query.layer != field_query.LAYERS[0] and field_format != PNG:
+    query = read(EstimateQuery, request.query_params.multi_items(), FieldRefused)
+    if query.layer != "mean" and field_format != PNG:
         raise FieldRefused(f"layer is {query.layer!r}, but only a PNG has one")
     at_ns = past_query.at_of(query.at, bridge.ros_time_ns) or 0
     asked = EstimateRequest(request_of(bridge, query), at_ns)
@@ -74,7 +69,7 @@ async def _answer(request: Request, field_format: FieldFormat) -> Response:
 
 
 async def _computed(
-    request: Request, asked: EstimateRequest, query: FieldQuery, field_format: FieldFormat
+    request: Request, asked: EstimateRequest, query: EstimateQuery, field_format: FieldFormat
 ) -> Answer:
     """The estimate in a format, with its ETag; it is kept."""
     bridge = bridge_of(request)
@@ -116,7 +111,7 @@ async def _computed(
 
 
 def _etag(
-    revision: str, asked: EstimateRequest, query: FieldQuery, field_format: FieldFormat
+    revision: str, asked: EstimateRequest, query: EstimateQuery, field_format: FieldFormat
 ) -> str:
     kind = f"estimate {field_format.name} {query.layer} {asked.at_ns}"
     return field_query.etag(revision, asked.box, kind, query.scale)

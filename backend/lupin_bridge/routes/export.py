@@ -16,6 +16,7 @@ from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.past import complete, query, table
 from lupin_bridge.past.moments import MAX_SECONDS
+from lupin_bridge.query_string import parameters_of
 from lupin_bridge.routes.computing import (
     CLIENT_GONE,
     client_left,
@@ -23,18 +24,16 @@ from lupin_bridge.routes.computing import (
     while_client_waits,
     within_time,
 )
-from lupin_bridge.routes.documented import NOT_REMEMBERED, PERIOD, parameter
+from lupin_bridge.routes.documented import NOT_REMEMBERED
 from lupin_bridge.routes.tools import NEVER_KEEP, bridge_of, read_route
 from lupin_bridge.serving.admission import Export
 from lupin_bridge.serving.http_protocol import CONNECTION_KEY, HttpConnection
-from lupin_twin.bounds import MAX_TEXT_LENGTH
 from lupin_twin.state import NANOSECONDS_PER_SECOND
 
 log = logging.getLogger(__name__)
 
 router = APIRouter()
 
-_NAME = {"type": "string", "minLength": 1, "maxLength": MAX_TEXT_LENGTH}
 _ANSWERS = {status: what for status, what in NOT_REMEMBERED.items() if status != 304}
 
 Lots = AsyncIterator[bytes]
@@ -45,13 +44,7 @@ Lots = AsyncIterator[bytes]
     "/api/export.csv",
     summary="Every reading and failed try of a period, as CSV",
     responses={200: {"content": {"text/csv": {"schema": {"type": "string"}}}}, **_ANSWERS},
-    openapi_extra={
-        "parameters": [
-            *PERIOD,
-            parameter("tag_id", _NAME, "one tag alone; default: all"),
-            parameter("sensor_type", _NAME, "one sensor alone; default: all"),
-        ]
-    },
+    openapi_extra={"parameters": parameters_of(query.OfExport)},
 )
 async def export_route(request: Request) -> Response:
     """A row for each reading, and one without a sensor for each try that brought none.

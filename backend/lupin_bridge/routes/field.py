@@ -15,6 +15,7 @@ from lupin_bridge.judge.derived import DERIVED
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.as_of import FieldAsked
 from lupin_bridge.past.asked import Field
+from lupin_bridge.query_string import parameters_of, read
 from lupin_bridge.routes.as_of import response_as_of
 from lupin_bridge.routes.computing import (
     field_answer,
@@ -23,13 +24,12 @@ from lupin_bridge.routes.computing import (
     request_of,
     unless_known,
 )
-from lupin_bridge.routes.documented import AT, FIELD
 from lupin_bridge.routes.in_formats import InFormats
 from lupin_bridge.routes.tools import JSON_TYPE, REVALIDATE, bridge_of, read_route
 from lupin_bridge.serving.kept import Answer
 from lupin_bridge.stream import schema
 from lupin_bridge.twin.source import Told
-from lupin_twin.fields import FieldRequest, check_request
+from lupin_twin.fields import FieldRefused, FieldRequest, check_request
 
 router = APIRouter()
 
@@ -44,7 +44,7 @@ FIELDS: Final = InFormats(
 
 As of a moment that has passed: of the tags as they were then, by the rules and on the map of
 now.""",
-    parameters=[*FIELD, AT],
+    parameters=parameters_of(FieldQuery),
     model=schema.GetFieldResponse,
     refusal_json=field_formats.refusal_json,
 )
@@ -52,7 +52,7 @@ now.""",
 
 async def _quality(request: Request) -> Response:
     bridge = bridge_of(request)
-    query = field_query.parse(request.query_params.multi_items())
+    query = read(FieldQuery, request.query_params.multi_items(), FieldRefused)
     at_ns = past_query.at_of(query.at, bridge.ros_time_ns)
     if at_ns is not None or query.sensor_type in DERIVED:
         return await _as_of(request, at_ns, query, None)
@@ -70,7 +70,7 @@ async def _quality(request: Request) -> Response:
 async def _answer(request: Request, field_format: FieldFormat) -> Response:
     bridge = bridge_of(request)
     source = bridge.source
-    query = field_query.parse(request.query_params.multi_items())
+    query = read(FieldQuery, request.query_params.multi_items(), FieldRefused)
     at_ns = past_query.at_of(query.at, bridge.ros_time_ns)
     # What is derived, no twin knows: it is made here, of the newest state.
     if at_ns is not None or query.sensor_type in DERIVED:

@@ -9,9 +9,10 @@ from fastapi import APIRouter, Request, Response
 from lupin_bridge.field import query as field_query
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.asked import Health
+from lupin_bridge.query_string import parameters_of
 from lupin_bridge.routes.as_of import response_as_of
 from lupin_bridge.routes.computing import kept_or_computed, or_refusal
-from lupin_bridge.routes.documented import AT, NOT_REMEMBERED
+from lupin_bridge.routes.documented import NOT_REMEMBERED
 from lupin_bridge.routes.tools import (
     JSON_TYPE,
     NEVER_KEEP,
@@ -37,7 +38,7 @@ router = APIRouter()
         200: {"model": schema.Judgement},
         503: {"model": schema.ErrorMessage, "description": "no twin was heard yet, or it is busy"},
     },
-    openapi_extra={"parameters": [AT]},
+    openapi_extra={"parameters": parameters_of(past_query.OfMoment)},
 )
 async def health(request: Request) -> Response:
     """The verdicts that stand in the frames of `/ws/state`, with the reasons for each.

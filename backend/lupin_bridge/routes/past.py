@@ -6,16 +6,13 @@ from fastapi import APIRouter, Request, Response
 
 from lupin_bridge.past import query, schema
 from lupin_bridge.past.asked import History, Timeline
+from lupin_bridge.query_string import parameters_of
 from lupin_bridge.routes.as_of import response_of_past
 from lupin_bridge.routes.computing import or_refusal
-from lupin_bridge.routes.documented import NOT_REMEMBERED, PERIOD, POINTS, parameter
+from lupin_bridge.routes.documented import NOT_REMEMBERED
 from lupin_bridge.routes.tools import bridge_of, read_route
-from lupin_twin.bounds import MAX_TEXT_LENGTH
-from lupin_twin.past import Event
 
 router = APIRouter()
-
-_NAME = {"type": "string", "minLength": 1, "maxLength": MAX_TEXT_LENGTH}
 
 
 @read_route(
@@ -23,19 +20,7 @@ _NAME = {"type": "string", "minLength": 1, "maxLength": MAX_TEXT_LENGTH}
     "/api/history",
     summary="The readings of one sensor of one tag over a period",
     responses={200: {"model": schema.History}, **NOT_REMEMBERED},
-    openapi_extra={
-        "parameters": [
-            parameter("tag_id", _NAME, "one tag; for events, `*` is the whole house", True),
-            parameter(
-                "sensor_type",
-                _NAME,
-                f"name of a sensor, as in a reading; or an event: {', '.join(Event)}",
-                True,
-            ),
-            *PERIOD,
-            POINTS,
-        ]
-    },
+    openapi_extra={"parameters": parameters_of(query.OfHistory)},
 )
 async def history_route(request: Request) -> Response:
     """Readings, or buckets of equal length where there are more than `points`; gaps are told."""
@@ -47,9 +32,7 @@ async def history_route(request: Request) -> Response:
     "/api/timeline",
     summary="What happened when: scans, failures, looks, pests, silences, runs of the clock",
     responses={200: {"model": schema.Timeline}, **NOT_REMEMBERED},
-    openapi_extra={
-        "parameters": [*PERIOD, POINTS, parameter("tag_id", _NAME, "one tag alone; default: all")]
-    },
+    openapi_extra={"parameters": parameters_of(query.OfTimeline)},
 )
 async def timeline_route(request: Request) -> Response:
     """Events counted in buckets of equal length, and how far back anything is remembered."""

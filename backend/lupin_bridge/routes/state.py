@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final
 
 import orjson
+from annotated_types import Ge
 from fastapi import APIRouter, Request, Response, WebSocket
 
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.field.query import plain_number
 from lupin_bridge.past import complete
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.asked import NoSuchTag, OneTag, WholeState
+from lupin_bridge.query_string import parameter, parameters_of, read
 from lupin_bridge.routes.as_of import response_as_of
 from lupin_bridge.routes.clients import has_place, next_message
 from lupin_bridge.routes.computing import (
@@ -25,7 +25,7 @@ from lupin_bridge.routes.computing import (
     on_worker,
     or_refusal,
 )
-from lupin_bridge.routes.documented import AT, NOT_REMEMBERED
+from lupin_bridge.routes.documented import NOT_REMEMBERED
 from lupin_bridge.routes.tools import (
     JSON_TYPE,
     NEVER_KEEP,
@@ -39,63 +39,25 @@ from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.stream import schema, state_json
 from lupin_bridge.stream.hub import CLOSE_POLICY, Client
 
-_SWITCH: Final = {"0": False, "1": True}
-MIN_RATE_HZ: Final = 0.01
+# Of the reason in a close frame (RFC 6455, section 5.5).
+MAX_REASON_BYTES: Final = 123
 
 
 class ListenRefused(ValueError):
-    """A query that cannot be served; the message names the parameter, the value and the limit.
-
-    It goes into a close frame, which has room for 123 bytes (RFC 6455, section 5.5).
-    """
+    """A query that cannot be served; the message names the parameter, the value and the limit."""
 
 
 @dataclass(frozen=True, slots=True)
 class ListenQuery:
     """How a client wants its frames."""
 
-    delta: bool = False
-    max_rate_hz: float = math.inf
+    delta: bool = parameter("1: only what has changed, to who has the frame before", False)
+    max_rate_hz: Annotated[float, Ge(0.01)] = parameter("frames a second at most", math.inf)
 
     @property
     def min_interval_s(self) -> float:
         """The least time between two frames, s."""
         return 1.0 / self.max_rate_hz
-
-
-def listen_query(parameters: Sequence[tuple[str, str]]) -> ListenQuery:
-    """Read the query string's (name, value) pairs.
-
-    Raises:
-        ListenRefused: an unknown or repeated parameter, or a value out of its range.
-
-    """
-    values: dict[str, str] = {}
-    for name, value in parameters:
-        if name not in ("delta", "max_rate_hz"):
-            raise ListenRefused(
-                f"parameter {_shown(name)} is unknown, expected delta or max_rate_hz"
-            )
-        if name in values:
-            raise ListenRefused(f"{name} is given more than once, expected one value")
-        values[name] = value
-    delta = values.get("delta", "0")
-    if delta not in _SWITCH:
-        raise ListenRefused(f"delta is {_shown(delta)}, expected 0 or 1")
-    return ListenQuery(_SWITCH[delta], _rate(values.get("max_rate_hz")))
-
-
-def _rate(text: str | None) -> float:
-    if text is None:
-        return math.inf
-    rate = plain_number(text)
-    if rate is None or not rate >= MIN_RATE_HZ:  # false for NaN too
-        raise ListenRefused(f"max_rate_hz is {_shown(text)}, expected a number from {MIN_RATE_HZ}")
-    return rate
-
-
-def _shown(text: str) -> str:
-    return f"{text!a:.40}"
 
 
 router = APIRouter()
@@ -119,9 +81,10 @@ async def ws_state(websocket: WebSocket) -> None:
     bridge: Bridge = websocket.app.state.bridge
     await websocket.accept()
     try:
-        query = listen_query(websocket.query_params.multi_items())
+        query = read(ListenQuery, websocket.query_params.multi_items(), ListenRefused)
     except ListenRefused as error:
-        await websocket.close(CLOSE_POLICY, str(error))
+        reason = str(error).encode("ascii", "backslashreplace")[:MAX_REASON_BYTES].decode()
+        await websocket.close(CLOSE_POLICY, reason)
         return
     if not await has_place(websocket, bridge.hub):
         return
@@ -147,7 +110,7 @@ async def ws_state(websocket: WebSocket) -> None:
     "/api/state",
     summary="The current state of every tag",
     responses={200: {"model": schema.TwinState}, **NOT_REMEMBERED},
-    openapi_extra={"parameters": [AT]},
+    openapi_extra={"parameters": parameters_of(past_query.OfMoment)},
 )
 async def state(request: Request) -> Response:
     """TwinState with the message's own field names; the newest, with ages as of this answer.
@@ -218,7 +181,7 @@ async def history(request: Request, tag_id: str) -> Response:
     "/api/tags/{tag_id:path}",
     summary="One tag",
     responses={200: {"model": schema.TwinTagState}, **NOT_REMEMBERED, **_NO_TAG},
-    openapi_extra={"parameters": [AT]},
+    openapi_extra={"parameters": parameters_of(past_query.OfMoment)},
 )
 async def tag(request: Request, tag_id: str) -> Response:
     """Everything that the twin knows about one tag, or knew at a moment."""

@@ -52,7 +52,7 @@ class BridgeServer(uvicorn.Server):
         app: FastAPI,
         settings: Settings,
         say_goodbye: Callable[[], None],
-        limits: Limits = Limits(),  # noqa: B008  # a value
+        limits: Limits = Limits(),
     ) -> None:
         super().__init__(
             uvicorn.Config(

@@ -51,7 +51,7 @@ class LocalTwin:
         ros_args: Sequence[str],
         timeout_s: float,
         expects: type | None = None,
-        world: World = World(),  # noqa: B008  # a value
+        world: World = World(),
     ) -> None:
         self._ros_args = ros_args
         self._world = world

@@ -66,7 +66,7 @@ class TwinNode(AdjustableNode):
         *,
         context: Any = None,
         cli_args: Sequence[str] | None = None,
-        world: World = World(),  # noqa: B008  # a value
+        world: World = World(),
     ) -> None:
         with naming_own_parameters():
             super().__init__(NODE_NAME, context=context, cli_args=cli_args)

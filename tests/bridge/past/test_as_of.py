@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 
 from lupin_bridge.field.formats import FORMATS, JSON, PNG, FieldFormat
-from lupin_bridge.field.query import parse
+from lupin_bridge.field.query import FieldQuery
 from lupin_bridge.judge.choosing import Criteria, own_sensors
 from lupin_bridge.judge.daylight import ClockDay
 from lupin_bridge.judge.derived import vapour_pressure_deficit_kpa
 from lupin_bridge.past import as_of
 from lupin_bridge.past.as_of import FieldAsked, Plan
+from lupin_bridge.query_string import read
 from lupin_bridge.stream import schema
 from lupin_twin.explored import OccupancyMap, occupancy_map
 from lupin_twin.fields import FieldRefused, FieldRules
@@ -56,7 +57,7 @@ def asked(
     rules: FieldRules = RULES, occupancy: OccupancyMap | None = None, **parameters: Any
 ) -> FieldAsked:
     values = {"sensor_type": "co2", **parameters}
-    query = parse([(name, str(value)) for name, value in values.items()])
+    query = read(FieldQuery, [(name, str(value)) for name, value in values.items()], FieldRefused)
     return FieldAsked(query, rules, occupancy, own_sensors())
 
 
@@ -167,7 +168,7 @@ def test_the_etag_of_a_judgement_is_that_of_what_is_said() -> None:
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"sensor_type": ""}, "sensor_type is empty"),
+        ({"sensor_type": ""}, "sensor_type is ''"),
         ({"resolution": 0}, "resolution"),
         ({"scale": 2}, "only a PNG"),
     ],

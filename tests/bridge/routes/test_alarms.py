@@ -59,7 +59,7 @@ def test_it_tells_of_the_journal_and_says_so(live: Bridge) -> None:
 @pytest.mark.parametrize(
     ("query", "says"),
     [
-        ({"active": "yes"}, "active is 'yes', not 0 or 1"),
+        ({"active": "yes"}, "active is 'yes': input should be '0' or '1'"),
         ({"from": "x"}, "from"),
         ({"from": 2, "to": 1}, "from"),
         ({"tag_id": "a"}, "tag_id"),

@@ -104,12 +104,12 @@ def test_who_has_the_answer_gets_none_until_something_is_heard(live: Bridge) -> 
 @pytest.mark.parametrize(
     ("changes", "complaint"),
     [
-        ({"sensor_type": ""}, "sensor_type is empty"),
-        ({"resolution": 0}, "resolution is 0.0"),
+        ({"sensor_type": ""}, "sensor_type is '': string should have at least 1"),
+        ({"resolution": 0}, "resolution is '0': input should be greater than 0"),
         ({"resolution": 0.0001}, "limit is 1000000 in all"),
         ({"sensor_type": "ph"}, "no tag has a reading of the 86400 s before that moment"),
         ({"at": 2**31 - 1}, "at is 2147483647.000000000 s, later than now"),
-        ({"layer": "median"}, "layer is 'median', expected one of mean, sd"),
+        ({"layer": "median"}, "layer is 'median': input should be 'mean' or 'sd'"),
         ({"layer": "sd"}, "layer is 'sd', but only a PNG has one"),
         ({"scale": 2}, "only a PNG can be scaled"),
         ({"lair": "sd"}, "parameter 'lair' is unknown, expected sensor_type, "),

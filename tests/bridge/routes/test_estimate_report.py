@@ -120,12 +120,16 @@ def test_where_another_tag_helps_is_told_with_by_how_much(live: Bridge) -> None:
 @pytest.mark.parametrize(
     ("path", "query", "complaint"),
     [
-        ("advice", {**SENSOR, "places": 21}, "places is 21, the limits are 1 and 20"),
-        ("advice", {**SENSOR, "places": "x"}, "places is 'x', expected a whole number"),
-        ("advice", {}, "sensor_type is empty"),
-        ("tags", {}, "sensor_type is empty"),
+        (
+            "advice",
+            {**SENSOR, "places": 21},
+            "places is '21': input should be less than or equal to 20",
+        ),
+        ("advice", {**SENSOR, "places": "x"}, "places is 'x': input should be a valid integer"),
+        ("advice", {}, "sensor_type: field required"),
+        ("tags", {}, "sensor_type: field required"),
         ("tags", {**SENSOR, "at": 1}, "parameter 'at' is unknown"),
-        ("quality", {"sensor_type": ""}, "sensor_type is empty"),
+        ("quality", {"sensor_type": ""}, "sensor_type is '': string should have"),
     ],
 )
 def test_a_refusal_names_what_is_wrong(

@@ -171,7 +171,7 @@ def test_what_cannot_be_asked_is_refused_before_anybody_is_asked(domain: int) ->
     async def test() -> None:
         async with remembering(past) as it:
             for path, part in (
-                ("/api/history", "tag_id is empty"),
+                ("/api/history", "tag_id: field required"),
                 (f"{HISTORY}&points=0", "points is '0'"),
                 (f"{HISTORY}&from=2000-01-01T00:00:00", "from is '2000-01-01T00:00:00', expected"),
                 (f"{HISTORY}&from=2147483647", "later than now"),

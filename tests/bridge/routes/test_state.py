@@ -125,7 +125,7 @@ def test_what_cannot_be_served_is_refused_with_the_reason(live: Bridge) -> None:
             assert closed.value.rcvd is not None
             assert closed.value.rcvd.code == 1008
             assert closed.value.rcvd.reason == (
-                f"parameter {name!r} is unknown, expected delta or max_rate_hz"
+                f"parameter {name!r} is unknown, expected delta, max_rate_hz"
             )
 
 

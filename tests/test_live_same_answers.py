@@ -5,12 +5,14 @@ from __future__ import annotations
 import gzip
 import json
 import shutil
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.support.http_answers import ask, bridges
+from tests.support.http_answers import HOUR, T0, ask, bridges
 from tests.support.journal_answers import JOURNALS, same
 
 
@@ -25,6 +27,26 @@ def test_serve_answers_as_the_old_build_did(name: str, tmp_path: Path) -> None:
             if not same(known(plain(found), plain(right)), plain(right)):
                 different.append(path)
     assert [path for path in different if not is_another(name, path)] == []
+
+
+def test_a_moment_is_judged_by_the_log_up_to_then_in_serve_in_web_and_after_a_restart(
+    tmp_path: Path,
+) -> None:
+    """By no interval, day or plants of later."""
+    journal = Path(shutil.copy(JOURNALS / "day.sqlite", tmp_path / "j.sqlite"))
+    asked = [f"/api/health?at={T0 + minutes * 60 + 0.5}" for minutes in range(-30, 14 * 60, 31)]
+    found = []
+    for _ in range(2):
+        with bridges(journal) as both:
+            found += [[ask(bridge, path) for path in asked] for bridge in both]
+        # As if nothing had come after that.
+        with closing(sqlite3.connect(journal)) as log, log:
+            for table in ("scan", "look"):
+                log.execute(f"DELETE FROM {table} WHERE stamp_ns > ?", ((T0 + 15 * HOUR) * 10**9,))
+    assert {answer[0] for answer in found[0]} == {200}
+    assert len({answer[2] for answer in found[0]}) > 10
+    for other in found[1:]:
+        assert other == found[0]
 
 
 def plain(answer: list[Any]) -> list[Any]:
@@ -73,8 +95,9 @@ def known(found: Any, right: Any) -> Any:
 def is_another(name: str, path: str) -> bool:
     """Whether another answer is right: of deleted attempts counts are kept by the hour now.
 
-    And an estimate is another one on every processor.
+    And an estimate is another one on every processor. Health as of a moment went by the scan
+    intervals of the old build's last moment, and by the day of then for readings of hours before.
     """
-    if path.startswith("/api/estimate"):
+    if path.startswith(("/api/estimate", "/api/health?at=")):
         return True
     return name == "purged" and (path.startswith("/api/timeline?from") or "tag_id=%2A" in path)

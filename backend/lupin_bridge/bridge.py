@@ -23,7 +23,7 @@ from lupin_bridge.metrics import Metrics, Sample
 from lupin_bridge.outward.channels import Channels
 from lupin_bridge.outward.payloads import Seen
 from lupin_bridge.past.asked import Answered
-from lupin_bridge.past.rhythms import learn_rhythms
+from lupin_bridge.past.learning import learn_recent
 from lupin_bridge.serving.admission import Admission
 from lupin_bridge.serving.goodbye import Goodbye
 from lupin_bridge.serving.kept import Answer, Kept
@@ -93,7 +93,7 @@ class Bridge:
         self.frames = FrameWriter()
         self.offer = Offer(source)
         self.criteria = criteria or Criteria.of(settings)
-        self._judge = Judge(self.criteria.sensors, self.criteria.recent_s)
+        self._judge = Judge(self.criteria.sensors, self.criteria.day, self.criteria.recent_s)
         self._judged = NOTHING_JUDGED
         self.reports = Reports(source)
         self._estimates = EstimateFollower(
@@ -344,10 +344,9 @@ class Bridge:
         self._tell_status()
         # A source answers once it has started, which it may not have as it tells its first state.
         if self._watch is not None and self._learning is None and state.snapshot.tags:
-            work = learn_rhythms(self.source, self._judge, state.snapshot)
-            self._learning = asyncio.create_task(work, name="rhythms")
-        judge_day = self.criteria.judge_day(state.snapshot.stamp_ns)
-        self._judged = self._judge.see(state.snapshot, judge_day)
+            work = learn_recent(self.source, self._judge, state.snapshot)
+            self._learning = asyncio.create_task(work, name="recent")
+        self._judged = self._judge.see(state.snapshot)
         self.hub.publish(self.frames.state(state.snapshot, state.revision, self._judged), now_s)
         self.metrics.push_seconds.observe(time.monotonic() - state.made_s)
 

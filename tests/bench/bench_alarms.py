@@ -20,7 +20,6 @@ from lupin_bridge.alarms.board import AlarmBoard
 from lupin_bridge.alarms.feed import LOT, REACH_COUNT
 from lupin_bridge.alarms.ledger import change_between, page_of
 from lupin_bridge.judge.choosing import own_sensors
-from lupin_bridge.judge.daylight import Day, Light
 from lupin_bridge.judge.following import Follower
 from lupin_bridge.judge.judging import Judge
 from lupin_bridge.outward.mirror import Mirror
@@ -29,7 +28,7 @@ from lupin_bridge.outward.payloads import Seen
 from lupin_twin.past_writes import PastWrite, RunSpan
 from lupin_twin.state import Reading, Snapshot, TagState
 from tests.support.ordinary_day import DAY_NS, S, ordinary_days
-from tests.support.seen import alarm
+from tests.support.seen import alarm, by_light
 
 DAYS = 7
 SIZES = (1_000, 10_000)
@@ -111,15 +110,12 @@ def verdicts_of(tags: int) -> None:
         readings = tuple(Reading(name, value, at_ns) for name, value in MIDDLE.items())
         return TagState(tag_id=str(index), readings=readings, last_observed_ns=at_ns)
 
-    def judge_day(_: Light) -> Day:
-        return Day(True, "light")
-
     now_ns = DAY_NS
     house = [tag(index, now_ns) for index in range(tags)]
-    judge = Judge(own_sensors(), recent_s=3_600.0)
+    judge = Judge(own_sensors(), by_light, recent_s=3_600.0)
     snapshot = Snapshot(now_ns, "map", tuple(house))
     for _ in range(tags // 500 + 2):  # so many at once
-        judge.see(snapshot, judge_day)
+        judge.see(snapshot)
     for name, changes in (("verdicts: nothing new", 0), ("verdicts: one scan", 1)):
         took = []
         for turn in range(CHANGES):
@@ -129,7 +125,7 @@ def verdicts_of(tags: int) -> None:
             states = tuple(house) if changes else snapshot.tags
             snapshot = Snapshot(now_ns, "map", states)
             start = time.thread_time()
-            judge.see(snapshot, judge_day)
+            judge.see(snapshot)
             took.append(ms_since(start))
         row(tags, name, statistics.median(took), max(took))
 
@@ -161,15 +157,18 @@ def loop_of(tags: int) -> None:
     row(tags, "one of them worse: put in its place", statistics.median(ordered), max(ordered))
     row(tags, "loop: one of them worse", statistics.median(taken), max(taken))
 
-    judge, mirror = Judge(own_sensors(), recent_s=3_600.0), Mirror(Topics("lt", ""), own_sensors())
-    now_ns, day = DAY_NS, Day(True, "light")
+    judge, mirror = (
+        Judge(own_sensors(), by_light, recent_s=3_600.0),
+        Mirror(Topics("lt", ""), own_sensors()),
+    )
+    now_ns = DAY_NS
     readings = tuple(Reading(name, value, now_ns) for name, value in MIDDLE.items())
     house = tuple(TagState(str(n), readings=readings, last_observed_ns=now_ns) for n in range(tags))
     took = []
     for second in range(CHANGES):
         snapshot = Snapshot(now_ns + second * S, "map", house)
         start = time.process_time()
-        judged = judge.see(snapshot, lambda _: day)
+        judged = judge.see(snapshot)
         seen = Seen(snapshot, judged, board.now, judge.holds_ns(), snapshot.stamp_ns, is_live=True)
         mirror.see(seen)
         for _ in mirror.messages():

@@ -14,7 +14,6 @@ from itertools import count
 from pathlib import Path
 
 from lupin_bridge.judge.choosing import own_sensors
-from lupin_bridge.judge.daylight import Day
 from lupin_bridge.judge.judging import Judge
 from lupin_bridge.outward.choosing import Targets
 from lupin_bridge.outward.mirror import Mirror
@@ -23,6 +22,7 @@ from lupin_bridge.outward.payloads import Seen
 from lupin_bridge.settings import Secrets, Settings
 from lupin_twin.state import Reading, Snapshot, TagState
 from tests.support.mosquitto import Broker
+from tests.support.seen import by_light
 from tests.support.waiting import until
 
 TAGS = 10_000
@@ -44,7 +44,7 @@ LISTEN_S = 10.0
 class House:
     """Ten thousand tags, of whom some are scanned."""
 
-    judge: Judge = field(default_factory=lambda: Judge(own_sensors(), recent_s=3_600.0))
+    judge: Judge = field(default_factory=lambda: Judge(own_sensors(), by_light, recent_s=3_600.0))
     now_ns: int = NOW_NS
     scanned: Iterator[int] = field(default_factory=count)
 
@@ -63,7 +63,7 @@ class House:
 
     def look(self) -> Seen:
         snapshot = Snapshot(self.now_ns, "map", tuple(self.tags))
-        judged = self.judge.see(snapshot, lambda _: Day(True, "light"))
+        judged = self.judge.see(snapshot)
         seen = Seen(snapshot, judged, now_ns=self.now_ns, is_live=True)
         return replace(seen, holds_ns=self.judge.holds_ns())
 

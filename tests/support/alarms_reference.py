@@ -124,7 +124,8 @@ def _of_tag(
     species = ""
     for occasion in occasions:
         at = occasion[0].stamp_ns
-        species = next((w.species for w in reversed(occasion) if w.has_seen), species)
+        seen = (w.species for w in reversed(occasion) if w.has_seen and w.species)
+        species = next(seen, species)
         is_day = day_of(_light(of_run, at), at)
         for key, said in (
             *_of_readings(occasion),

@@ -48,7 +48,9 @@ def failure(tag: str = "7", at_ns: int = BEGUN, status: int = 2, kind: int = 0) 
 
 def look(tag: str = "7", at_ns: int = BEGUN, *, anomaly: bool = False) -> LookRow:
     """A look at flowers."""
-    flower = replace(NO_FLOWER, species="lupin", anomaly=anomaly, bug_count=int(anomaly))
+    flower = replace(
+        NO_FLOWER, species="lupin", confidence=0.9, anomaly=anomaly, bug_count=int(anomaly)
+    )
     return LookRow(tag, at_ns, at_ns + 2000, flower, source="robot", mission="m1")
 
 

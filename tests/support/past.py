@@ -9,6 +9,7 @@ from statistics import fmean
 from typing import Any
 
 from lupin_twin.past import Event, PastRow, SeriesPast, SeriesRequest
+from lupin_twin.past_writes import PastWrite, RecentRequest
 from lupin_twin.state import Snapshot
 
 NS = 10**9
@@ -34,6 +35,11 @@ class MadeUp:
         """The one state, as if it were of any moment."""
         self._note(at_ns)
         return replace(self.snapshot, stamp_ns=at_ns)
+
+    async def recent(self, request: RecentRequest) -> tuple[PastWrite, ...]:
+        """Nothing: what the state has is all there is."""
+        self._note(request.at_ns)
+        return ()
 
     async def series(self, request: SeriesRequest) -> SeriesPast:
         """The points of a period, or as many buckets as are asked for."""

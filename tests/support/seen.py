@@ -9,7 +9,7 @@ from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, Board
 from lupin_bridge.alarms.ledger import Page, change_between, page_of
 from lupin_bridge.judge.alarm import Alarm, alarm_id
 from lupin_bridge.judge.choosing import own_sensors
-from lupin_bridge.judge.daylight import Day
+from lupin_bridge.judge.daylight import Day, judge_day
 from lupin_bridge.judge.judging import judge_once
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_bridge.outward.payloads import Seen
@@ -21,6 +21,11 @@ S = 1_000_000_000
 # 2026-11-21T14:15:00Z.
 NOW_NS = 1_795_270_500 * S
 HOLDS_NS = 600 * S
+
+
+def by_light(light: bool | None, _: int) -> Day:
+    """Whether it is day, by the light alone."""
+    return judge_day(light, None, None)
 
 
 def tag(tag_id: str, at_ns: int = NOW_NS, **values: float) -> TagState:
@@ -44,7 +49,7 @@ def seen(
     holds = dict.fromkeys((it.tag_id for it in tags), HOLDS_NS) | dict(holds_ns or {})
     return Seen(
         snapshot=snapshot,
-        judged=judge_once(snapshot, SENSORS, holds, lambda _: Day(True, "assumed")),
+        judged=judge_once(snapshot, (), SENSORS, lambda *_: Day(True, "assumed")),
         board=Board(Page.of(alarms), "heard", NOW_NS, 1),
         holds_ns=holds,
         now_ns=now_ns,

@@ -240,7 +240,11 @@ class AlarmFeed:
 
     def _new(self, spans: Sequence[RunSpan]) -> Follower:
         criteria = self._criteria
-        return Follower(criteria.sensors, criteria.is_day, spans, criteria.recent_s)
+
+        def is_day(light: bool | None, at_ns: int) -> bool:
+            return criteria.day(light, at_ns).is_day
+
+        return Follower(criteria.sensors, is_day, spans, criteria.recent_s)
 
     async def _take(self, lot: Sequence[PastWrite]) -> None:
         follower = self._follower

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from lupin_twin.history import KIND_FLOWER, KIND_TAG_READING
 from lupin_twin.past_writes import PastWrite
-from lupin_twin.state import STATUS_OK, Snapshot, TagState
+from lupin_twin.state import STATUS_OK, Snapshot, TagState, sure_species
 
 # The one run of the clock that is told of here.
 RUN = 0
@@ -45,7 +45,8 @@ def _of_tag(before: TagState, tag: TagState) -> list[PastWrite]:
     at_ns = tag.looked_at_ns
     if at_ns is not None and (at_ns, tag.flower) != (before.looked_at_ns, before.flower):
         flower = tag.flower
-        seen = (True, flower.species, flower.anomaly, flower.bug_count)
+        species = sure_species(flower.species, flower.confidence)
+        seen = (True, species, flower.anomaly, flower.bug_count)
         look = PastWrite(0, RUN, tag.tag_id, at_ns, KIND_FLOWER, STATUS_OK, (), (), *seen)
         found.append(look)
     last = tag.last_try

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import time, tzinfo
 from importlib.resources import files
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import Final
 from zoneinfo import ZoneInfo
 
-from lupin_bridge.judge.daylight import ClockDay, Day, Light, judge_day
+from lupin_bridge.judge.daylight import ClockDay, Day, judge_day
 from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.settings import SettingError, Settings
 
@@ -40,17 +39,9 @@ class Criteria:
         """
         return cls(_sensors(settings), settings.reading_validity_s or None, _clock(settings))
 
-    def judge_day(self, stamp_ns: int) -> Callable[[Light], Day]:
-        """What says whether it was day at a moment of ROS time, by the light of then."""
-        now_s = unix_s(stamp_ns)
-        return lambda light: judge_day(light, self.clock, now_s)
-
-    def is_day(self, light: bool | None, stamp_ns: int) -> bool:
-        """Whether it was day at a moment at which the house's light said so, or None: nothing."""
-        if light is not None:
-            return light
-        now_s = unix_s(stamp_ns)
-        return now_s is None or self.clock.is_day(now_s)
+    def day(self, light: bool | None, stamp_ns: int) -> Day:
+        """Whether it was day at a moment of ROS time at which the light said so, or None."""
+        return judge_day(light, self.clock, unix_s(stamp_ns))
 
 
 def own_sensors() -> Sensors:

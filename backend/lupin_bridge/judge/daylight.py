@@ -67,10 +67,10 @@ class Light:
         return 2 * self._bright >= len(self._is_bright) if self._is_bright else None
 
 
-def judge_day(light: Light, clock: ClockDay | None, now_s: float | None) -> Day:
-    """By the light; where it is not measured, by the clock at `now_s` (Unix time; None: none)."""
-    if light.is_day is not None:
-        return Day(light.is_day, "light")
+def judge_day(light: bool | None, clock: ClockDay | None, now_s: float | None) -> Day:
+    """By what the light says; where that is nothing, by the clock at `now_s` (Unix time)."""
+    if light is not None:
+        return Day(light, "light")
     if clock is not None and now_s is not None:
         return Day(clock.is_day(now_s), "clock")
     return Day(True, "assumed")

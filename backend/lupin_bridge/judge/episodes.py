@@ -117,7 +117,7 @@ class TagEpisodes:
         """The next occasion: `writes` of one stamp, in the order of hearing."""
         stamp_ns = writes[0].stamp_ns
         for write in writes:
-            if write.has_seen:
+            if write.has_seen and write.species:
                 self._species = write.species
         readings = readings_of(writes)
         if readings:

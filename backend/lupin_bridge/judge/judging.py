@@ -1,22 +1,23 @@
 """Snapshot by snapshot: who has changed is judged again, and who was right only until now.
 
-Pure. What is kept from one snapshot to the next is each tag's rhythm and its last verdict, and
-since when each of its reasons holds.
+Pure. What is kept from one snapshot to the next is each tag's recent scans and its last verdict,
+and since when each of its reasons holds.
 """
 
 from __future__ import annotations
 
 import heapq
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Final
 
-from lupin_bridge.judge.daylight import LEFT_OUT_NS, LIGHT, Day, Light
-from lupin_bridge.judge.patrol import NO_PATROL, Patrol, Scans, is_overdue, stamps_of
+from lupin_bridge.judge.daylight import Day
+from lupin_bridge.judge.patrol import NO_PATROL, Patrol, Scans, is_overdue
 from lupin_bridge.judge.ranges import Sensors
-from lupin_bridge.judge.rhythm import SHORTEST_NS, Rhythm, holds_ns
+from lupin_bridge.judge.rhythm import SHORTEST_NS, holds_ns, interval_ns
+from lupin_bridge.judge.scanned import DayOf, Recent, RecentScans
 from lupin_bridge.judge.verdict import (
     FORGOTTEN_NS,
     NOTHING_CHANGED,
@@ -26,6 +27,7 @@ from lupin_bridge.judge.verdict import (
     judge_house,
     judge_tag,
 )
+from lupin_twin.past_writes import PastWrite
 from lupin_twin.state import Snapshot, TagState
 
 _NEVER: Final = 2**63 - 1
@@ -57,20 +59,19 @@ def silenced(judged: Judged) -> Judged:
     return replace(judged, house=judge_house({}, is_silent=True))
 
 
-DayJudge = Callable[[Light], Day]
-
-
 def judge_once(
-    snapshot: Snapshot, sensors: Sensors, holds: Mapping[str, int], judge_day: DayJudge
+    snapshot: Snapshot,
+    writes: Iterable[PastWrite],
+    sensors: Sensors,
+    day_of: DayOf,
+    recent_s: float | None = None,
 ) -> Judged:
-    """What is to be said of one snapshot by itself; `holds` is for how long readings do, ns.
+    """What is to be said of one snapshot, given what was recent in the log then.
 
     Nobody knows since when a reason holds: told is the observation that says so.
     """
-    light = Light()
-    for tag in snapshot.tags:
-        light.put(tag.tag_id, _light_of(tag))
-    day, now_ns = judge_day(light), snapshot.now_ns
+    now_ns = snapshot.now_ns
+    recent = RecentScans.of(snapshot.tags, writes, day_of)
     healths = {
         tag.tag_id: _UNKNOWN
         if now_ns is None
@@ -78,85 +79,74 @@ def judge_once(
             tag,
             now_ns,
             sensors,
-            holds_ns=holds.get(tag.tag_id, SHORTEST_NS),
-            is_day=day.is_day,
+            recent.tag(tag.tag_id),
+            holds_ns=_holds_ns(recent.tag(tag.tag_id), recent_s),
         )
         for tag in snapshot.tags
     }
     counts = Counter(health.verdict for health in healths.values())
     house = judge_house(counts, is_silent=now_ns is None)
     scans = Scans()
-    scans.heard((stamp for tag in snapshot.tags for stamp in stamps_of(tag)), now_ns)
+    scans.heard(recent.stamps_ns(), now_ns)
     patrol = scans.patrol(sum(map(is_overdue, healths.values())))
+    day = recent.day(snapshot.stamp_ns)
     return Judged(house, healths, frozenset(healths), day, patrol=patrol)
 
 
-def _light_of(tag: TagState) -> float | None:
-    """What a tag's sensor reads, None where its scans have left that out for long."""
-    light = next((reading for reading in tag.readings if reading.name == LIGHT), None)
-    if light is None:
-        return None
-    at_ns = light.observed_at_ns
-    if at_ns is not None and max(stamps_of(tag), default=at_ns) - at_ns > LEFT_OUT_NS:
-        return None
-    return light.value
+def _holds_ns(recent: Recent, recent_s: float | None) -> int:
+    """For how long readings hold; a fixed time goes before what is learnt."""
+    return holds_ns(interval_ns(recent.stamps_ns)) if recent_s is None else int(recent_s * 1e9)
 
 
 @dataclass(slots=True)
 class _Tag:
     state: TagState
-    rhythm: Rhythm = field(default_factory=Rhythm)
     until_ns: int = _NEVER
     due_ns: int = _NEVER
-
-
-def _note_scan(kept: _Tag) -> None:
-    """Count a tag's last scan; what older readings say of others is what scans have left out."""
-    newest_ns = max(stamps_of(kept.state), default=None)
-    if newest_ns is not None:
-        kept.rhythm.scanned(newest_ns)
 
 
 class Judge:
     """Belongs to one thread. `recent_s` fixes how long readings hold; None: it is learnt.
 
-    At nightfall everybody is judged anew: so many at once as nobody has to wait for, and the others
-    with the next snapshots.
+    Where many are judged anew, it is so many at once as nobody has to wait for, and the others with
+    the next snapshots.
     """
 
-    def __init__(self, sensors: Sensors, recent_s: float | None = None) -> None:
+    def __init__(self, sensors: Sensors, day_of: DayOf, recent_s: float | None = None) -> None:
         self._sensors = sensors
-        self._recent_ns = None if recent_s is None else int(recent_s * 1e9)
+        self._day_of = day_of
+        self._recent_s = recent_s
         self._tags: dict[str, _Tag] = {}
+        self._recent = RecentScans(day_of)
         self._holds: dict[str, int] = {}
         self._seen: tuple[TagState, ...] = ()
         self._due: list[tuple[int, str]] = []
         self._now_ns: int | None = None
         self._waiting: dict[str, None] = {}
-        self._light = Light()
         self._counts = Counter[Verdict]()
         self._scans = Scans()
         self._overdue = 0
         self._judged = NOTHING_JUDGED
         self._changed: Mapping[str, Mapping[str, int]] = {}
 
-    def see(self, snapshot: Snapshot, judge_day: DayJudge, *, is_silent: bool = False) -> Judged:
+    def see(self, snapshot: Snapshot, *, is_silent: bool = False) -> Judged:
         """What is to be said now; the very same object where nothing has changed."""
         before, now_ns = self._judged, snapshot.now_ns
         is_back = now_ns is not None and self._now_ns is not None and now_ns < self._now_ns
         if is_back:
+            # What was before is no part of any interval.
             self._scans.forget()
+            self._recent = RecentScans(self._day_of)
+            _, stamps_ns = self._recent.see(snapshot.tags)
+            self._scans.heard(stamps_ns, now_ns)
         news, gone = self._news(snapshot)
-        day = judge_day(self._light)
-        is_other_time = now_ns is None or self._now_ns is None or is_back
-        if is_other_time or day.is_day != before.day.is_day:
-            # All ages are others, or all ranges.
+        day = self._recent.day(snapshot.stamp_ns)
+        if now_ns is None or self._now_ns is None or is_back:
+            # All ages are others.
             news = dict.fromkeys(self._tags)
         self._now_ns = now_ns
         self._waiting |= news | self._grown_old(now_ns)
-        healths = {
-            tag_id: self._judge(tag_id, now_ns, is_day=day.is_day) for tag_id in self._turn()
-        }
+        healths = {tag_id: self._judge(tag_id, now_ns) for tag_id in self._turn()}
         changed = {
             tag_id: health
             for tag_id, health in healths.items()
@@ -164,17 +154,11 @@ class Judge:
         }
         return self._tell(changed, gone, day, is_silent=is_silent or now_ns is None)
 
-    def learn(self, tag_id: str, scans_ns: Iterable[int]) -> None:
-        """When a tag was scanned before the first snapshot, as far as somebody remembers."""
-        kept = self._tags.get(tag_id)
-        if kept is None or kept.rhythm.interval_ns is not None:
-            return
-        rhythm = Rhythm()
-        for stamp_ns in scans_ns:
-            rhythm.scanned(stamp_ns)
-        kept.rhythm = rhythm
-        _note_scan(kept)
-        self._waiting[tag_id] = None
+    def learn(self, writes: Iterable[PastWrite]) -> None:
+        """What was recent before the first snapshot, as far as the log has it."""
+        tags = [kept.state for kept in self._tags.values()]
+        self._recent = RecentScans.of(tags, writes, self._day_of)
+        self._waiting |= dict.fromkeys(self._tags)
 
     def note_changed(self, changed: Mapping[str, Mapping[str, int]]) -> None:
         """By tag, the sensors that do not read as everything else foretells, and since when.
@@ -195,7 +179,7 @@ class Judge:
         if snapshot.tags == self._seen:
             return {}, []
         news: dict[str, None] = {}
-        stamps_ns: list[int] = []
+        states: list[TagState] = []
         for tag in snapshot.tags:
             kept = self._tags.get(tag.tag_id)
             if kept is None:
@@ -205,9 +189,9 @@ class Judge:
                 continue
             kept.state = tag
             news[tag.tag_id] = None
-            _note_scan(kept)
-            stamps_ns += stamps_of(tag)
-            self._light.put(tag.tag_id, _light_of(tag))
+            states.append(tag)
+        others, stamps_ns = self._recent.see(states)
+        news |= dict.fromkeys(others)
         self._scans.heard(stamps_ns, snapshot.now_ns)
         gone: list[str] = []
         if len(self._tags) != len(snapshot.tags):
@@ -215,7 +199,7 @@ class Judge:
             gone = [tag_id for tag_id in self._tags if tag_id not in there]
         for tag_id in gone:
             del self._tags[tag_id], self._holds[tag_id]
-            self._light.put(tag_id, None)
+            self._recent.forget(tag_id)
         self._seen = snapshot.tags
         return news, gone
 
@@ -255,17 +239,18 @@ class Judge:
             kept.due_ns = kept.until_ns
             heapq.heappush(self._due, (kept.due_ns, kept.state.tag_id))
 
-    def _judge(self, tag_id: str, now_ns: int | None, *, is_day: bool) -> Health:
+    def _judge(self, tag_id: str, now_ns: int | None) -> Health:
         kept = self._tags[tag_id]
         if now_ns is None:
             return _UNKNOWN
-        holds = self._holds[tag_id] = self._recent_ns or holds_ns(kept.rhythm.interval_ns)
+        recent = self._recent.tag(tag_id)
+        holds = self._holds[tag_id] = _holds_ns(recent, self._recent_s)
         health = judge_tag(
             kept.state,
             now_ns,
             self._sensors,
+            recent,
             holds_ns=holds,
-            is_day=is_day,
             changed=self._changed.get(tag_id, NOTHING_CHANGED),
         )
         kept.until_ns = min(

@@ -13,7 +13,6 @@ from statistics import median
 from typing import Final
 
 from lupin_bridge.judge.verdict import Health, Kind
-from lupin_twin.state import TagState
 
 # Intervals that count: about a lap of a house, so that the way back to its beginning does too.
 INTERVALS: Final = 30
@@ -61,11 +60,6 @@ class Scans:
             return Patrol(overdue=overdue)
         intervals = [after - before for before, after in pairwise(scans)]
         return Patrol(int(median(intervals)) if intervals else None, scans[-1], overdue)
-
-
-def stamps_of(tag: TagState) -> Iterable[int]:
-    """When the readings of a tag were made."""
-    return (r.observed_at_ns for r in tag.readings if r.observed_at_ns is not None)
 
 
 def is_overdue(health: Health) -> bool:

@@ -6,7 +6,6 @@ has not. What holds is three times the median of a tag's own last intervals.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
 from itertools import pairwise
 from statistics import median
@@ -18,30 +17,6 @@ LONGEST_NS: Final = 24 * 3600 * _S
 TIMES_MEDIAN: Final = 3
 # Intervals that count: a patrol may change its rhythm.
 INTERVALS: Final = 8
-
-
-class Rhythm:
-    """The last scans of one tag."""
-
-    __slots__ = ("_scans_ns",)
-
-    def __init__(self) -> None:
-        self._scans_ns: deque[int] = deque(maxlen=INTERVALS + 1)
-
-    def scanned(self, stamp_ns: int) -> None:
-        """Count a scan; one that is no later than the last one known says nothing of the rhythm."""
-        if self._scans_ns and stamp_ns < self._scans_ns[-1]:
-            # The clock has gone back: intervals across that are none.
-            if not any(known == stamp_ns for known in self._scans_ns):
-                self._scans_ns.clear()
-                self._scans_ns.append(stamp_ns)
-        elif not self._scans_ns or stamp_ns > self._scans_ns[-1]:
-            self._scans_ns.append(stamp_ns)
-
-    @property
-    def interval_ns(self) -> int | None:
-        """The median of the last intervals; None before two scans are known."""
-        return interval_ns(tuple(self._scans_ns))
 
 
 def interval_ns(scans_ns: Sequence[int]) -> int | None:

@@ -15,6 +15,7 @@ from typing import Final
 
 from lupin_bridge.judge.derived import DERIVED
 from lupin_bridge.judge.ranges import Ranges, Sensors
+from lupin_bridge.judge.scanned import Recent, Scanned
 from lupin_twin.state import NO_FLOWER, STATUS_OK, Reading, TagState
 
 # Readings that do not hold any more say nothing about now, but until then nobody may forget that
@@ -82,21 +83,23 @@ def judge_tag(
     tag: TagState,
     now_ns: int,
     sensors: Sensors,
+    recent: Recent,
     *,
     holds_ns: int,
-    is_day: bool,
     changed: Mapping[str, int] = NOTHING_CHANGED,
 ) -> Health:
     """What is to be said of a tag at `now_ns`, where its readings hold for `holds_ns`.
 
+    Each reading is judged by the day and the plants of its own time, which `recent` has.
     `changed` are the sensors that do not read as everything else foretells, and since when.
     """
     reasons: list[Reason] = []
     was_judged = False
-    species = tag.flower.species
+    scans = {scan.stamp_ns: scan for scan in recent.scans}
     readings = (*tag.readings, *derive(tag.readings))
     for reading in readings:
-        ranges = sensors.named(reading.name).ranges(is_day=is_day, species=species)
+        scan = scans.get(reading.observed_at_ns or 0) or Scanned(0, {})
+        ranges = sensors.named(reading.name).ranges(is_day=scan.is_day, species=scan.species)
         age_ns = _age_ns(reading.observed_at_ns, now_ns)
         if age_ns is not None and age_ns > FORGOTTEN_NS:
             continue

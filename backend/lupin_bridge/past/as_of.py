@@ -7,7 +7,7 @@ change both.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 from functools import lru_cache
@@ -18,7 +18,8 @@ import orjson
 
 from lupin_bridge.field import formats, query
 from lupin_bridge.field.formats import FieldFormat
-from lupin_bridge.judge.judging import DayJudge, judge_once
+from lupin_bridge.judge.choosing import Criteria
+from lupin_bridge.judge.judging import judge_once
 from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.judge.verdict import with_derived
 from lupin_bridge.stream.health_json import HealthJson
@@ -33,14 +34,16 @@ from lupin_twin.fields import (
     cost_s,
     default_box,
 )
+from lupin_twin.past_writes import PastWrite
 from lupin_twin.state import Snapshot, TagState, samples_of
 from lupin_twin.workers import ShouldStop
 
 # What writing takes, roughly and at worst: a tag of a state, a cell or pixel of a field, and
-# judging a tag by its neighbours.
+# judging a tag by its neighbours, or by what was recent of it.
 WRITE_TAG_S: Final = 20e-6
 _WRITE_CELL_S: Final = 50e-9
 JUDGE_TAG_S: Final = 20e-6
+HEALTH_TAG_S: Final = 200e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,11 +118,10 @@ def tag(snapshot: Snapshot, tag_id: str) -> Plan | None:
     return Plan(_etag("tag", (snapshot.stamp_ns, found)), WRITE_TAG_S, write)
 
 
-def health(
-    snapshot: Snapshot, sensors: Sensors, holds: Mapping[str, int], judge_day: DayJudge
-) -> Plan:
-    """`schema.Judgement` by the day of then; how long readings hold (ns) nobody keeps a past of."""
-    body = HealthJson().whole(judge_once(snapshot, sensors, holds, judge_day))
+def health(snapshot: Snapshot, recent: Sequence[PastWrite], criteria: Criteria) -> Plan:
+    """`schema.Judgement` of the state, by what was recent in the log then."""
+    judged = judge_once(snapshot, recent, criteria.sensors, criteria.day, criteria.recent_s)
+    body = HealthJson().whole(judged)
     return Plan(_etag("health", (snapshot.stamp_ns, body.decode())), 0.0, lambda _: _json(body))
 
 

@@ -37,6 +37,7 @@ from lupin_twin.past import (
     SeriesPast,
     SeriesRequest,
 )
+from lupin_twin.past_writes import PastWrite, RecentRequest
 from lupin_twin.state import Snapshot
 
 # A larger body goes by itself, and is not copied.
@@ -168,19 +169,20 @@ class OneTag:
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """The verdicts, by these criteria and by how long readings hold now, ns."""
+    """The verdicts as of a moment, by these criteria."""
 
+    at_ns: int
     criteria: Criteria = field(compare=False)
-    holds: Mapping[str, int] = field(compare=False)
 
-    def write_s(self, tags: int) -> float:
-        """See `OfState`."""
-        return tags * as_of.JUDGE_TAG_S
+    def cost_s(self, tags: int) -> float:
+        """See `Asked`."""
+        return tags * (STATE_S_PER_TAG + as_of.HEALTH_TAG_S)
 
-    def plan(self, snapshot: Snapshot) -> Plan:
-        """See `OfState`."""
-        judge_day = self.criteria.judge_day(snapshot.stamp_ns)
-        return as_of.health(snapshot, self.criteria.sensors, self.holds, judge_day)
+    def look(self) -> Generator[Need, Found, Plan]:
+        """See `Asked`: the state, and what was recent in the log then."""
+        snapshot: Snapshot = yield self.at_ns
+        recent: tuple[PastWrite, ...] = yield RecentRequest(self.at_ns)
+        return as_of.health(snapshot, recent, self.criteria)
 
 
 @dataclass(frozen=True, slots=True)

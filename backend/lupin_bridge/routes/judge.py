@@ -10,7 +10,7 @@ from lupin_bridge.field import query as field_query
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.asked import Health
 from lupin_bridge.query_string import parameters_of
-from lupin_bridge.routes.as_of import response_as_of
+from lupin_bridge.routes.as_of import response_of_past
 from lupin_bridge.routes.computing import kept_or_computed, or_refusal
 from lupin_bridge.routes.documented import NOT_REMEMBERED
 from lupin_bridge.routes.tools import (
@@ -43,8 +43,8 @@ router = APIRouter()
 async def health(request: Request) -> Response:
     """The verdicts that stand in the frames of `/ws/state`, with the reasons for each.
 
-    As of a moment that has passed, what was known then is judged by the ranges of now, and by how
-    long readings hold now; a reason's `since` is the observation of then that says so.
+    As of a moment that has passed, what was known then is judged by the ranges of now, and by the
+    scans of each tag up to then; a reason's `since` is the observation of then that says so.
     """
     return await or_refusal(_health(request))
 
@@ -53,8 +53,7 @@ async def _health(request: Request) -> Response:
     bridge = bridge_of(request)
     at_ns = past_query.at(request.query_params.multi_items(), bridge.ros_time_ns)
     if at_ns is not None:
-        asked = Health(bridge.criteria, bridge.readings_hold_ns())
-        return await response_as_of(request, at_ns, asked)
+        return await response_of_past(request, Health(at_ns, bridge.criteria), "state")
     if bridge.latest is None:
         return error_response("no twin has been heard yet", 503)
     judged = bridge.judged

@@ -33,7 +33,7 @@ from lupin_twin.journal.writes import WRITES_S
 from lupin_twin.node import TwinNode
 from lupin_twin.parameters import World
 from lupin_twin.past import NotRemembered, PastRow, SeriesPast, SeriesRequest
-from lupin_twin.past_writes import PastWrites, WritesRequest
+from lupin_twin.past_writes import PastWrite, PastWrites, RecentRequest, WritesRequest
 from lupin_twin.state import NANOSECONDS_PER_SECOND, Snapshot
 from lupin_twin.workers import SMALL_S, Workers
 
@@ -212,6 +212,10 @@ class LocalTwin:
     async def series(self, request: SeriesRequest) -> SeriesPast:
         """The journal's answer, as of now."""
         return await self.ask(Itself(request), SERIES_S)
+
+    async def recent(self, request: RecentRequest) -> tuple[PastWrite, ...]:
+        """The journal's answer."""
+        return await self.ask(Itself(request), WRITES_S)
 
     async def writes(self, request: WritesRequest) -> PastWrites:
         """The journal's rows; what was heard within its 100 ms may be missing."""

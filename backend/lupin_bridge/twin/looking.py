@@ -12,15 +12,16 @@ from dataclasses import dataclass
 from typing import Any, Final, Generic, Protocol, TypeVar
 
 from lupin_twin.past import NotRemembered, SeriesPast, SeriesRequest
-from lupin_twin.past_writes import WritesRequest
+from lupin_twin.past_writes import PastWrite, RecentRequest, WritesRequest
 from lupin_twin.state import Snapshot
 from lupin_twin.workers import ShouldStop, Workers
 
 ResultT = TypeVar("ResultT")
 
-# A moment, ns of ROS time, which `Snapshot` answers; a series, which `SeriesPast` does; or what was
-# heard, which `PastWrites` does: only a journal knows that.
-Need = int | SeriesRequest | WritesRequest
+# A moment, ns of ROS time, which `Snapshot` answers; a series, which `SeriesPast` does; what was
+# recent at a moment, which a tuple of `PastWrite` does; or what was received, which `PastWrites`
+# does: only a journal knows that.
+Need = int | SeriesRequest | RecentRequest | WritesRequest
 # What is known as of then crosses by itself, so it is of any type.
 Found = Any
 # What writing a row of an export takes, roughly and at worst, s.
@@ -51,6 +52,9 @@ class Past(Protocol):
     async def series(self, request: SeriesRequest) -> SeriesPast:
         """Readings of one sensor of one tag, or events."""
 
+    async def recent(self, request: RecentRequest) -> tuple[PastWrite, ...]:
+        """What was recent at a moment."""
+
 
 @dataclass(frozen=True, slots=True)
 class Itself:
@@ -74,6 +78,8 @@ async def look_up(question: Question[ResultT], past: Past, workers: Workers) -> 
         while True:
             if isinstance(need, SeriesRequest):
                 need = looking.send(await past.series(need))
+            elif isinstance(need, RecentRequest):
+                need = looking.send(await past.recent(need))
             elif isinstance(need, WritesRequest):
                 raise NotRemembered("what was heard is asked of the journal", is_lasting=True)
             else:

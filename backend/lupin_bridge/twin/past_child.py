@@ -28,9 +28,9 @@ from lupin_twin.journal.condition import UNKNOWN, Condition
 from lupin_twin.journal.export import Export, lots
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import series
-from lupin_twin.journal.writes import writes
+from lupin_twin.journal.writes import recent, writes
 from lupin_twin.past import NotRemembered, PastRow, SeriesRequest, check_moment
-from lupin_twin.past_writes import WritesRequest
+from lupin_twin.past_writes import RecentRequest, WritesRequest
 from lupin_twin.recall import Recall
 from lupin_twin.state import Snapshot
 from lupin_twin.workers import SMALL_S, ShouldStop, Workers
@@ -293,6 +293,10 @@ class Child:
                     continue
                 if isinstance(need, WritesRequest):
                     need = looking.send(writes(connection, need))
+                    continue
+                if isinstance(need, RecentRequest):
+                    check_moment(need.at_ns, now.stamp_ns)
+                    need = looking.send(recent(connection, need))
                     continue
                 at_ns = need
                 check_moment(at_ns, now.stamp_ns)

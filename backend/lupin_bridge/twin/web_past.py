@@ -7,6 +7,7 @@ What GetHistory does not say is worked out here: the period that its buckets div
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from typing import Any, Final, TypeVar
@@ -21,11 +22,20 @@ from lupin_twin.past import (
     MAX_POINTS,
     Event,
     Grid,
+    NotRemembered,
     SeriesPast,
     SeriesRequest,
     grid,
 )
-from lupin_twin.past_writes import PastWrites, WritesRequest
+from lupin_twin.past_writes import (
+    MAX_WRITES,
+    RECENT_NS,
+    PastWrite,
+    PastWrites,
+    RecentRequest,
+    WritesRequest,
+    recent_of,
+)
 from lupin_twin.state import Snapshot
 from lupin_twin.workers import Workers
 
@@ -33,6 +43,9 @@ from lupin_twin.workers import Workers
 _NARROWINGS: Final = 6
 _READ_SERIES_S: Final = 0.01
 _READ_WRITES_S: Final = 0.02
+# What is recent is looked for in so many answers; and clocks that are so little apart agree.
+_RECENT_LOTS: Final = 100
+_RIGHT_NS: Final = 60 * 1_000_000_000
 
 ResultT = TypeVar("ResultT")
 
@@ -90,6 +103,27 @@ class WebPast:
         response = await self._ask_writes(convert_writes.writes_request_message(request))
         return await self._read(
             lambda: convert_writes.writes_of(response, request), cost_s=_READ_WRITES_S
+        )
+
+    async def recent(self, request: RecentRequest) -> tuple[PastWrite, ...]:
+        """What was recent at a moment, out of all that was received since what can be."""
+        at_ns, now_ns = request.at_ns, self.now_ns()
+        # By a clock that is right, nothing arrives before its stamp.
+        is_right = abs(time.time_ns() - now_ns) < _RIGHT_NS
+        reach_s = (now_ns - at_ns + RECENT_NS + _RIGHT_NS) / 1e9 if is_right else 0.0
+        after, found = 0, list[PastWrite]()
+        for _ in range(_RECENT_LOTS):
+            part = await self.writes(WritesRequest(after, max(0.0, reach_s), 0, MAX_WRITES))
+            run = next((s.run for s in part.spans if s.start_ns <= at_ns < s.end_ns), None)
+            found += [write for write in part.writes if write.run == run]
+            found = list(recent_of(found, at_ns))
+            if part.is_all:
+                return tuple(found)
+            after = part.last
+        raise NotRemembered(
+            f"the twin has received more than {_RECENT_LOTS * MAX_WRITES:,} scans since then, the "
+            "limit; ask where its journal is",
+            is_lasting=False,
         )
 
     async def first_ns(self, asked: SeriesRequest) -> int | None:

@@ -6,6 +6,7 @@ too, and nothing twice. Times are nanoseconds of ROS time.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -15,6 +16,9 @@ DEFAULT_WRITES: Final = 1_000
 MAX_WRITES: Final = 2_000
 # The largest that SQLite counts to.
 MAX_NUMBER: Final = 2**63 - 1
+# Of each tag, what is recent at a moment: its last scans and looks, so many of each, and no older.
+RECENT_COUNT: Final = 9
+RECENT_NS: Final = 3 * 86_400 * 1_000_000_000
 # The service's name, relative to the node's namespace.
 WRITES_SERVICE: Final = "twin/get_writes"
 
@@ -49,11 +53,22 @@ class WritesRequest:
 
 
 @dataclass(frozen=True, slots=True)
+class RecentRequest:
+    """What was recent at a moment, ns of ROS time: see `RECENT_COUNT`.
+
+    Of the run that has the moment, without the copies that a run begins with. The answer is a tuple
+    of `PastWrite`, by stamp and number: scans that brought readings, looks that saw flowers.
+    """
+
+    at_ns: int
+
+
+@dataclass(frozen=True, slots=True)
 class PastWrite:
     """One scan or look, or the try of one; `kind` and `status` as in lupin_msgs/Observation.
 
     `sensors` and `values` have one length. `has_seen`: a look that saw the flowers; the last three
-    are what it saw.
+    are what it saw. A species that the camera was not sure of is left out.
     """
 
     number: int
@@ -77,6 +92,25 @@ class RunSpan:
     run: int
     start_ns: int
     end_ns: int
+
+
+def recent_of(writes: Iterable[PastWrite], at_ns: int) -> tuple[PastWrite, ...]:
+    """What is recent at a moment, of writes of one run in any order."""
+    kept: dict[tuple[str, int], list[PastWrite]] = {}
+    for write in writes:
+        is_in_time = at_ns - RECENT_NS <= write.stamp_ns <= at_ns
+        if is_in_time and (write.values or write.has_seen):
+            kept.setdefault((write.tag_id, write.kind), []).append(write)
+    found: list[PastWrite] = []
+    for mine in kept.values():
+        mine.sort(key=_in_time)
+        stamps = sorted({write.stamp_ns for write in mine})[-RECENT_COUNT:]
+        found += [write for write in mine if write.stamp_ns >= stamps[0]]
+    return tuple(sorted(found, key=_in_time))
+
+
+def _in_time(write: PastWrite) -> tuple[int, int]:
+    return write.stamp_ns, write.number
 
 
 @dataclass(frozen=True, slots=True)

@@ -97,6 +97,15 @@ class Flower:
 
 NO_FLOWER = Flower()
 
+# A camera that is less sure of a species, 0 to 1, has not told which it is.
+SURE_OF_SPECIES = 0.5
+
+
+def sure_species(species: str, confidence: float | None) -> str:
+    """The species where the camera was sure of it, else an empty text."""
+    is_sure = confidence is not None and confidence >= SURE_OF_SPECIES
+    return species if is_sure else ""
+
 
 @dataclass(frozen=True, slots=True)
 class Scan:

@@ -19,7 +19,7 @@ def after(store: TwinStore, *writes: Scan | Look) -> Snapshot:
 
 def test_what_is_new_is_told_once_in_the_order_of_time_and_numbered() -> None:
     store = TwinStore()
-    pest = Flower(species="tulip", anomaly=True, bug_count=3)
+    pest = Flower(species="tulip", confidence=0.9, anomaly=True, bug_count=3)
     first = after(
         store,
         Scan("a", 5, (Reading("co2", 400.0), Reading("light", 1.0))),

@@ -11,11 +11,15 @@ MIDNIGHT_S = datetime(2026, 6, 1, tzinfo=UTC).timestamp()
 CLOCK = ClockDay(UTC)
 
 
-def light_of(*readings_lx: float) -> Light:
+def lights(*readings_lx: float) -> Light:
     light = Light()
     for number, reading in enumerate(readings_lx):
         light.put(f"tag_{number}", reading)
     return light
+
+
+def light_of(*readings_lx: float) -> bool | None:
+    return lights(*readings_lx).is_day
 
 
 def test_light_goes_before_the_clock() -> None:
@@ -71,7 +75,7 @@ def test_from_an_hour_to_the_same_it_is_always_day(hour: time) -> None:
 
 
 def test_a_tag_has_one_say_its_last() -> None:
-    light = light_of(0.0, 900.0, 0.0)
+    light = lights(0.0, 900.0, 0.0)
     told = [light.is_day]
     for tag_id, reading in (("tag_0", 900.0), ("tag_0", None), ("tag_1", None), ("tag_2", None)):
         light.put(tag_id, reading)

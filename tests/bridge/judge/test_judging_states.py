@@ -80,7 +80,7 @@ def of_tag(state: dict[str, Any], tag_id: str, tag: dict[str, Any]) -> Iterator[
         yield at_ns, tag_id, Scan(tag_id, at_ns, (), status=status)
     if "species" in tag or "pest" in tag:
         at_ns, bugs = now - tag.get("looked_s", 90) * S, tag.get("pest", 0)
-        flower = Flower(species=tag.get("species", ""), anomaly=bugs > 0, bug_count=bugs)
+        flower = Flower(tag.get("species", ""), 0.9, anomaly=bugs > 0, bug_count=bugs)
         yield at_ns, tag_id, Look(tag_id, at_ns, flower)
 
 
@@ -112,18 +112,18 @@ def criteria() -> Criteria:
 
 
 def judged(state: dict[str, Any]) -> Judged:
-    store, judge, by = TwinStore(), Judge(SENSORS), criteria()
+    store, judge = TwinStore(), Judge(SENSORS, criteria().day)
     for at_ns, _, write in writes_of(state):
         if isinstance(write, Scan):
             store.record(write)
         else:
             store.record_look(write)
-        judge.see(store.snapshot(at_ns, "map"), by.judge_day(at_ns))
+        judge.see(store.snapshot(at_ns, "map"))
     for tag_id, tag in tags_of(state).items():
         if not tag["readings"]:
             store.pin(tag_id, Pose(1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0))
     moment_ns = now_ns(state)
-    said = judge.see(store.snapshot(moment_ns, "map"), by.judge_day(moment_ns))
+    said = judge.see(store.snapshot(moment_ns, "map"))
     return silenced(said) if state.get("twin", "live") != "live" else said
 
 

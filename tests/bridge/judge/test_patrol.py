@@ -3,9 +3,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.judge.patrol import INTERVALS, NO_PATROL, Patrol, Scans, is_overdue, stamps_of
+from lupin_bridge.judge.patrol import INTERVALS, NO_PATROL, Patrol, Scans, is_overdue
 from lupin_bridge.judge.verdict import Health, Kind, Reason, Verdict
-from lupin_twin.state import Reading, TagState
 
 S = 1_000_000_000
 
@@ -69,8 +68,3 @@ def test_overdue_is_a_tag_of_which_no_reading_holds() -> None:
     )
     assert not is_overdue(judged(Reason(Kind.OLD, Verdict.UNKNOWN, "co2")))
     assert not is_overdue(judged())
-
-
-def test_a_tags_stamps_are_those_of_its_readings() -> None:
-    tag = TagState("a", readings=(Reading("co2", 1.0, 5), Reading("light", 1.0, None)))
-    assert list(stamps_of(tag)) == [5]

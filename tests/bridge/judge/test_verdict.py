@@ -11,6 +11,8 @@ from typing import Any
 
 import pytest
 
+from lupin_bridge.judge.daylight import Day
+from lupin_bridge.judge.scanned import RecentScans
 from lupin_bridge.judge.sensors_file import parse
 from lupin_bridge.judge.verdict import Health, Kind, Verdict, judge_house, judge_tag, worst
 from lupin_twin.state import NO_FLOWER, Flower, Reading, TagState, Try
@@ -45,9 +47,13 @@ def tag_of(case: dict[str, Any]) -> TagState:
 
 
 def judge(case: dict[str, Any], now_ns: int = NOW_NS) -> Health:
-    return judge_tag(
-        tag_of(case), now_ns, SENSORS, holds_ns=HOLDS_NS, is_day=case.get("is_day", True)
-    )
+    tag = tag_of(case)
+
+    def day_of(*_: object) -> Day:
+        return Day(case.get("is_day", True), "light")
+
+    recent = RecentScans.of([tag], (), day_of).tag(tag.tag_id)
+    return judge_tag(tag, now_ns, SENSORS, recent, holds_ns=HOLDS_NS)
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case["name"] for case in CASES])

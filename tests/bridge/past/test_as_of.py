@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC
 from typing import Any
@@ -23,6 +23,7 @@ from lupin_bridge.query_string import read
 from lupin_bridge.stream import schema
 from lupin_twin.explored import OccupancyMap, occupancy_map
 from lupin_twin.fields import FieldRefused, FieldRules
+from lupin_twin.past_writes import PastWrite
 from lupin_twin.state import Pose, Reading, Snapshot, TagState
 from lupin_twin.workers import SMALL_S
 
@@ -120,11 +121,15 @@ def test_a_field_is_clipped_to_the_map_of_now() -> None:
     assert [value is None for value in found["values"]] == [False, True]
 
 
-def judged_at(at_s: float, *tags: TagState, holds: dict[str, int] | None = None) -> Plan:
+def judged_at(at_s: float, *tags: TagState, before_s: Sequence[float] = ()) -> Plan:
+    """Where tag a was also scanned some seconds before its own second."""
     criteria = Criteria(own_sensors(), None, ClockDay(UTC))
     at_ns = int(at_s * NS)
-    judge_day = criteria.judge_day(at_ns)
-    return as_of.health(Snapshot(at_ns, "map", tags), criteria.sensors, holds or {}, judge_day)
+    recent = [
+        PastWrite(number, 1, "a", int((1 - second) * NS), 0, 0, ("temperature",), (22.0,))
+        for number, second in enumerate(before_s)
+    ]
+    return as_of.health(Snapshot(at_ns, "map", tags), recent, criteria)
 
 
 def verdict_of(plan: Plan) -> tuple[str, str]:
@@ -147,17 +152,17 @@ def test_a_moment_is_judged_by_the_light_of_then_else_by_its_clock() -> None:
     assert verdict_of(cool_at(100.0)) == ("stressed", "assumed"), "a simulation has no hours"
 
 
-def test_readings_held_as_long_as_those_of_the_tag_do_now() -> None:
+def test_readings_held_as_long_as_the_scans_up_to_then_say() -> None:
     old = TagState("a", readings=(Reading("temperature", 22.0, NS),))
     assert verdict_of(judged_at(601, old))[0] == "healthy"
     assert verdict_of(judged_at(602, old))[0] == "unknown"
-    assert verdict_of(judged_at(602, old, holds={"a": 700 * NS}))[0] == "healthy"
+    assert verdict_of(judged_at(602, old, before_s=[240.0]))[0] == "healthy"
 
 
 def test_the_etag_of_a_judgement_is_that_of_what_is_said() -> None:
     old = TagState("a", readings=(Reading("temperature", 22.0, NS),))
-    first = judged_at(602, old, holds={"a": 700 * NS}).etag
-    assert judged_at(602, old, holds={"a": 800 * NS}).etag == first
+    first = judged_at(602, old, before_s=[240.0]).etag
+    assert judged_at(602, old, before_s=[240.0]).etag == first
     assert judged_at(602, old).etag != first
     assert judged_at(601, old).etag != first
 

@@ -30,6 +30,7 @@ from lupin_bridge.settings import Settings
 from lupin_twin.idw import never
 from lupin_twin.journal.condition import UNKNOWN
 from lupin_twin.past import Event, SeriesPast, SeriesRequest
+from lupin_twin.past_writes import RecentRequest
 from lupin_twin.workers import SMALL_S
 from tests.bridge.past.test_as_of import HOUSE, NS, asked
 
@@ -37,7 +38,7 @@ CRITERIA = Criteria.of(Settings(time_zone="Europe/Amsterdam"))
 QUESTIONS: tuple[Asked, ...] = (
     AsOf(5 * NS, WholeState()),
     AsOf(5 * NS, OneTag("b")),
-    AsOf(5 * NS, Health(CRITERIA, {"a": NS})),
+    Health(5 * NS, CRITERIA),
     AsOf(5 * NS, Field(asked(), PNG)),
     AsOf(5 * NS, Field(asked(), None)),
     History(SeriesRequest("a", "co2"), 9 * NS, own_sensors(), UNKNOWN),
@@ -52,7 +53,10 @@ def answer(question: Asked, has: str = "") -> Answered:
     try:
         while True:
             need = looking.send(found)
-            found = SeriesPast(0, 9 * NS) if isinstance(need, SeriesRequest) else HOUSE
+            if isinstance(need, SeriesRequest):
+                found = SeriesPast(0, 9 * NS)
+            else:
+                found = () if isinstance(need, RecentRequest) else HOUSE
     except StopIteration as end:
         answered: Answered = end.value.do(never)
         return answered

@@ -34,6 +34,7 @@ async def remembering(past: MadeUp, limits: Limits | None = None) -> AsyncIterat
     async with running(limits) as it:
         twin = it.twin
         twin.state_at, twin.series = past.state_at, past.series  # type: ignore[method-assign]
+        twin.recent = past.recent  # type: ignore[method-assign]
         twin.rows = past.rows  # type: ignore[method-assign]
 
         async def ask(question: Question[Any], cost_s: float) -> Any:  # all alike

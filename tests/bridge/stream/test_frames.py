@@ -13,7 +13,6 @@ from websockets.frames import Frame, Opcode
 from websockets.streams import StreamReader
 
 from lupin_bridge.judge.choosing import own_sensors
-from lupin_bridge.judge.daylight import judge_day
 from lupin_bridge.judge.judging import Judge
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.frames import (
@@ -25,6 +24,7 @@ from lupin_bridge.stream.frames import (
 )
 from lupin_bridge.stream.status import Status
 from lupin_twin.state import Pose, Reading, Snapshot, TagState, Try
+from tests.support.seen import by_light
 
 
 def received(wire: bytes) -> Frame:
@@ -211,9 +211,7 @@ def house() -> Snapshot:
 
 def test_a_frame_of_a_house_is_within_its_budget_of_bytes() -> None:
     scanned = house()
-    judged = Judge(own_sensors(), recent_s=3600.0).see(
-        scanned, lambda light: judge_day(light, None, None)
-    )
+    judged = Judge(own_sensors(), by_light, recent_s=3600.0).see(scanned)
     verdicts = Counter(health.verdict for health in judged.tags.values())
     assert verdicts == {"healthy": 27, "critical": 3}
     frame = FrameWriter().state(scanned, "0123456789abcdef-1234-5", judged)

@@ -9,20 +9,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lupin_bridge.judge.choosing import own_sensors
-from lupin_bridge.judge.daylight import judge_day
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.health_json import HealthJson
 from lupin_twin.state import Reading, Snapshot, TagState
+from tests.support.seen import by_light
 
 SENSORS = own_sensors()
 START = 1_000_000_000_000
 
 
 def see(judge: Judge, at_ns: int, tags: Sequence[TagState]) -> Judged:
-    return judge.see(
-        Snapshot(at_ns, "map", tuple(tags)), lambda light: judge_day(light, None, None)
-    )
+    return judge.see(Snapshot(at_ns, "map", tuple(tags)))
 
 
 def tag(tag_id: str, value: float, at_ns: int = START) -> TagState:
@@ -30,7 +28,7 @@ def tag(tag_id: str, value: float, at_ns: int = START) -> TagState:
 
 
 def test_it_is_of_the_contracts_type_to_the_last_field() -> None:
-    judged = see(Judge(SENSORS), START, [tag("a", 6.0), tag('"b"', 22.0)])
+    judged = see(Judge(SENSORS, by_light), START, [tag("a", 6.0), tag('"b"', 22.0)])
     text = HealthJson().whole(judged)
     body = schema.Judgement.model_validate_json(text, strict=True)
     assert (body.house.verdict, body.house.day.source) == ("critical", "assumed")
@@ -55,7 +53,7 @@ def test_it_is_of_the_contracts_type_to_the_last_field() -> None:
 
 
 def test_of_a_silent_house_it_says_so() -> None:
-    judged = silenced(see(Judge(SENSORS), START, [tag("a", 22.0)]))
+    judged = silenced(see(Judge(SENSORS, by_light), START, [tag("a", 22.0)]))
     body = schema.Judgement.model_validate_json(HealthJson().whole(judged), strict=True)
     assert (body.house.verdict, body.house.reasons[0].kind) == ("unknown", "silent")
     assert body.tags["a"].verdict == "healthy"
@@ -73,7 +71,7 @@ STEPS = st.lists(st.dictionaries(st.sampled_from("abc"), st.sampled_from([6.0, 1
 def test_whole_and_deltas_together_are_always_what_was_judged(
     steps: list[dict[str, float]], skipped: set[int]
 ) -> None:
-    writer, judge = HealthJson(), Judge(SENSORS)
+    writer, judge = HealthJson(), Judge(SENSORS, by_light)
     told, shown = NOTHING_JUDGED, json.loads(writer.whole(NOTHING_JUDGED))["tags"]
     kept: dict[str, TagState] = {}
     for number, values in enumerate(steps):
@@ -95,7 +93,7 @@ def test_whole_and_deltas_together_are_always_what_was_judged(
 
 
 def test_a_delta_holds_only_what_is_another() -> None:
-    writer, judge = HealthJson(), Judge(SENSORS)
+    writer, judge = HealthJson(), Judge(SENSORS, by_light)
     calm = tag("a", 22.0)
     before = see(judge, START, [calm, tag("b", 22.0)])
     now = see(judge, START + 1, [calm, tag("b", 6.0, START + 1)])

@@ -1,11 +1,18 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lupin_twin.journal.writes import writes
-from lupin_twin.past_writes import PastWrite, PastWrites, WritesRequest
+from lupin_twin.journal.writes import recent, writes
+from lupin_twin.past_writes import (
+    PastWrite,
+    PastWrites,
+    RecentRequest,
+    WritesRequest,
+    recent_of,
+)
 from tests.support.log_life import BEGUN, SECOND, Life, failure, lived, look, pin, scan
 from tests.twin.journal.conftest import Copied
 
@@ -77,3 +84,43 @@ def test_from_the_beginning_only_so_far_back(tmp_path: Path) -> None:
     with lived(tmp_path / "empty.sqlite") as life:
         empty = asked(life.connection)
         assert (empty.writes, empty.is_all) == ((), True)
+
+
+def test_what_was_recent_are_the_last_nine_scans_and_looks_of_each_tag(
+    tmp_path: Path, copied: Copied
+) -> None:
+    with lived(tmp_path / "j.sqlite") as life:
+        life.write(scan("7", BEGUN + n, t=float(n)) for n in range(0, 40, 2))
+        # Two sets of sensors, and two scans of one moment: these are one of the nine.
+        life.write(scan("7", BEGUN + n, h=float(n)) for n in range(1, 20, 2))
+        life.write([scan("7", BEGUN + 17, source="b", h=5.0), failure("7", BEGUN + 16)])
+        life.write([scan("8", BEGUN - 3 * DAY + 16, t=1.0), scan("8", BEGUN - 3 * DAY + 17, t=2.0)])
+        life.write(look("8", BEGUN + n, anomaly=bool(n % 2)) for n in range(20))
+        then = RecentRequest(BEGUN + 17)
+        found = recent(life.connection, then)
+        stamps = {
+            (tag, kind): [w.stamp_ns - BEGUN for w in found if (w.tag_id, w.kind) == (tag, kind)]
+            for tag in "78"
+            for kind in (0, 1)
+        }
+        assert stamps == {
+            ("7", 0): [9, 10, 11, 12, 13, 14, 15, 16, 17, 17],
+            ("7", 1): [],
+            ("8", 0): [17 - 3 * DAY],
+            ("8", 1): [9, 10, 11, 12, 13, 14, 15, 16, 17],
+        }
+        archive, site = copied(life.connection)
+        assert recent(archive, then, site) == found
+        assert recent_of(asked(life.connection).writes, then.at_ns) == found
+        assert recent(life.connection, RecentRequest(BEGUN - 9 * DAY)) == ()
+
+
+def test_a_species_that_the_camera_was_not_sure_of_is_left_out(tmp_path: Path) -> None:
+    with lived(tmp_path / "j.sqlite") as life:
+        for number, confidence in enumerate((0.05, 0.49, 0.5, 1.0)):
+            one = look("7", BEGUN + number)
+            flower = replace(one.flower, confidence=confidence)
+            life.write([replace(one, flower=flower)])
+        assert [write.species for write in asked(life.connection).writes] == (
+            ["", "", "lupin", "lupin"]
+        )

@@ -8,10 +8,19 @@ from typing import Any, Final
 
 from lupin_twin.journal.reading import numbers_of, sensor_names
 from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK
-from lupin_twin.journal.runs import runs, spans
+from lupin_twin.journal.runs import runs, span_at, spans
 from lupin_twin.journal.schema import LOCAL_SITE
 from lupin_twin.journal.site_log import SiteLog
-from lupin_twin.past_writes import PastWrite, PastWrites, RunSpan, WritesRequest
+from lupin_twin.past_writes import (
+    RECENT_COUNT,
+    PastWrite,
+    PastWrites,
+    RecentRequest,
+    RunSpan,
+    WritesRequest,
+    recent_of,
+)
+from lupin_twin.state import sure_species
 
 # What an answer of so many writes takes, about, s.
 WRITES_S: Final = 0.05
@@ -26,9 +35,50 @@ _SCANS: Final = (
     " WHERE scan.site = :site AND seq > :after AND is_copy = 0 ORDER BY seq LIMIT :count"
 )
 _LOOKS: Final = (
-    "SELECT seq, run, tag, stamp_ns, species, anomaly, bug_count FROM look"
+    "SELECT seq, run, tag, stamp_ns, species, confidence, anomaly, bug_count FROM look"
     " WHERE site = :site AND seq > :after AND is_copy = 0 ORDER BY seq LIMIT :count"
 )
+# Of each series, or tag, from the stamp on of the last that is recent.
+_FIRST_RECENT: Final = (
+    "coalesce((SELECT DISTINCT stamp_ns FROM {table} WHERE site = s.site AND {which}"
+    " AND stamp_ns <= :at AND is_copy = 0 ORDER BY stamp_ns DESC LIMIT 1 OFFSET :more), 0)"
+)
+_FIRST_SCAN: Final = _FIRST_RECENT.format(table="scan", which="series = s.series")
+_FIRST_LOOK: Final = _FIRST_RECENT.format(table="look", which="run = s.run AND tag = s.tag")
+_IN_TIME: Final = "r.is_copy = 0 AND r.stamp_ns <= :at AND r.stamp_ns >="
+_RECENT_SCANS: Final = (
+    "SELECT r.seq, s.run, s.tag, r.stamp_ns, s.kind,"  # noqa: S608
+    " r.status, s.sensors, r.readings FROM series AS s CROSS JOIN scan AS r"
+    " WHERE s.site = :site AND s.run = :run AND s.kind = 0"
+    " AND s.sensors != '[]' AND r.site = s.site"
+    f" AND r.series = s.series AND {_IN_TIME} {_FIRST_SCAN}"
+)
+_RECENT_LOOKS: Final = (
+    "SELECT r.seq, r.run, r.tag, r.stamp_ns, r.species, r.confidence,"  # noqa: S608
+    " r.anomaly, r.bug_count FROM series AS s CROSS JOIN look AS r"
+    " WHERE s.site = :site AND s.run = :run AND s.kind = 1"
+    " AND r.site = s.site AND r.run = s.run AND r.tag = s.tag"
+    f" AND {_IN_TIME} {_FIRST_LOOK}"
+)
+
+
+def recent(
+    connection: Any, request: RecentRequest, site: str = LOCAL_SITE
+) -> tuple[PastWrite, ...]:
+    """What was recent at a moment."""
+    log = SiteLog(connection, site)
+    with log.one_view():
+        span = span_at(runs(log.execute, log.site), request.at_ns)
+        if span is None:
+            return ()
+        asked = {
+            "run": span.run.id,
+            "at": request.at_ns,
+            "more": RECENT_COUNT - 1,
+        }
+        scans = log.execute(_RECENT_SCANS, asked).fetchall()
+        looks = log.execute(_RECENT_LOOKS, asked).fetchall()
+        return recent_of([*_of_scans(scans), *_of_looks(looks)], request.at_ns)
 
 
 def writes(connection: Any, request: WritesRequest, site: str = LOCAL_SITE) -> PastWrites:
@@ -79,8 +129,8 @@ def _of_scans(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:
 
 
 def _of_looks(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:
-    for seq, run, tag, stamp_ns, species, anomaly, bug_count in rows:
-        seen = (species, bool(anomaly), bug_count)
+    for seq, run, tag, stamp_ns, species, confidence, anomaly, bug_count in rows:
+        seen = (sure_species(species, confidence), bool(anomaly), bug_count)
         yield PastWrite(seq, run, tag, stamp_ns, KIND_FLOWER, STATUS_OK, (), (), True, *seen)
 
 

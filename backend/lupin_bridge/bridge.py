@@ -14,8 +14,7 @@ from typing import Final
 from lupin_bridge.alarms.board import AlarmBoard, Board
 from lupin_bridge.alarms.feed import AlarmFeed
 from lupin_bridge.alarms.ledger import Change
-from lupin_bridge.estimates.following import EstimateFollower
-from lupin_bridge.estimates.reports import Reports
+from lupin_bridge.estimates.following import EstimateFollower, Reports
 from lupin_bridge.foxglove.offer import Offer
 from lupin_bridge.judge.choosing import Criteria
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced
@@ -31,8 +30,8 @@ from lupin_bridge.serving.limits import Limits
 from lupin_bridge.serving.metering import route_class
 from lupin_bridge.serving.rate_limit import RateLimit
 from lupin_bridge.settings import Settings
-from lupin_bridge.stream.alarms_json import alarms_frame, told_of
 from lupin_bridge.stream.frames import FrameWriter, text_frame
+from lupin_bridge.stream.health_json import alarms_frame, told_of
 from lupin_bridge.stream.hub import Client, Hub
 from lupin_bridge.stream.status import Liveness, Status
 from lupin_bridge.twin.shared import Shared

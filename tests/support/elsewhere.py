@@ -11,7 +11,7 @@ from lupin_msgs.srv import GetHistory
 from rclpy.serialization import deserialize_message, serialize_message
 
 from lupin_bridge.twin.web_past import WebPast
-from lupin_twin import convert, convert_past, convert_writes
+from lupin_twin import convert, convert_past
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import series
 from lupin_twin.journal.writes import writes
@@ -87,8 +87,8 @@ class Elsewhere:
         )
 
     async def _writes(self, request: Any) -> Any:
-        asked = convert_writes.writes_request(self._heard(request))
-        return self._told(convert_writes.writes_response(writes(self._connection, asked)))
+        asked = convert_past.writes_request(self._heard(request))
+        return self._told(convert_past.writes_response(writes(self._connection, asked)))
 
     def _heard(self, request: Any) -> Any:
         self.asked.append(request)

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from lupin_twin.convert_past import NotAnAnswerError
-from lupin_twin.convert_writes import (
+from lupin_twin.convert_past import (
+    NotAnAnswerError,
     writes_of,
     writes_request,
     writes_request_message,

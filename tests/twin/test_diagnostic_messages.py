@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from lupin_twin.diagnostic_messages import diagnostics, findings_of
+from lupin_twin.convert import diagnostics, findings_of
 from lupin_twin.diagnostics import ERROR, OK, Finding
 
 SAID = [

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from lupin_twin.refusals import lasting, lasts, may_pass, passing
+from lupin_twin.past import lasting, lasts, may_pass, passing
 
 
 def test_what_passes_says_so_once() -> None:

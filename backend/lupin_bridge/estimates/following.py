@@ -10,16 +10,52 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
+import time
+from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from lupin_bridge.estimates.reports import Reports
+from lupin_bridge.twin.shared import Shared
 from lupin_bridge.twin.source import TwinSource, TwinUnavailableError
 from lupin_twin.estimate_report import Report, ReportRequest
 from lupin_twin.fields import FieldRefused
 from lupin_twin.past import NotRemembered
 from lupin_twin.state import Snapshot
 from lupin_twin.workers import in_turns
+
+# A twin's next round comes no sooner.
+FRESH_S: Final = 2.0
+MAX_KEPT: Final = 64
+
+
+class Reports:
+    """The reports of a source. Belongs to the event loop."""
+
+    def __init__(self, source: TwinSource) -> None:
+        self._source = source
+        self._asking: Shared[Report] = Shared()
+        self._kept: OrderedDict[ReportRequest, tuple[float, Report]] = OrderedDict()
+
+    async def of(self, request: ReportRequest) -> Report:
+        """What is known of a sensor's estimates.
+
+        Raises:
+            Exception: see `TwinSource.estimate_report`.
+
+        """
+        kept = self._kept.get(request)
+        if kept is not None and time.monotonic() - kept[0] < FRESH_S:
+            return kept[1]
+        return await self._asking.get(request, lambda: self._ask(request))
+
+    async def _ask(self, request: ReportRequest) -> Report:
+        report = await self._source.estimate_report(request)
+        self._kept[request] = time.monotonic(), report
+        self._kept.move_to_end(request)
+        if len(self._kept) > MAX_KEPT:
+            self._kept.popitem(last=False)
+        return report
+
 
 log = logging.getLogger(__name__)
 

@@ -18,7 +18,7 @@ import orjson
 
 from lupin_bridge.alarms.ledger import Change, happened_ns
 from lupin_bridge.judge.alarm import Alarm
-from lupin_bridge.stream.alarms_json import alarm_json
+from lupin_bridge.stream.health_json import alarm_json
 from lupin_twin.diagnostics import Origin
 
 MAX_WAITING: Final = 1_000

@@ -17,8 +17,7 @@ from lupin_bridge.judge.judging import NOTHING_JUDGED, Judged
 from lupin_bridge.judge.ranges import Sensor
 from lupin_bridge.judge.verdict import Health
 from lupin_bridge.past.moments import iso
-from lupin_bridge.stream.alarms_json import alarm_json
-from lupin_bridge.stream.health_json import reason_json
+from lupin_bridge.stream.health_json import alarm_json, reason_json
 from lupin_bridge.stream.state_json import moment
 from lupin_twin.diagnostics import Origin
 from lupin_twin.state import Reading, Snapshot

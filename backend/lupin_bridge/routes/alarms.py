@@ -15,11 +15,10 @@ from lupin_bridge.past import query
 from lupin_bridge.past.query import AlarmsQuery
 from lupin_bridge.query_string import parameters_of
 from lupin_bridge.routes.computing import kept_or_computed, on_worker, or_refusal
-from lupin_bridge.routes.documented import NOT_REMEMBERED
-from lupin_bridge.routes.tools import JSON_TYPE, NEVER_KEEP, bridge_of, read_route
+from lupin_bridge.routes.tools import JSON_TYPE, NEVER_KEEP, NOT_REMEMBERED, bridge_of, read_route
 from lupin_bridge.serving.kept import Answer
 from lupin_bridge.stream import schema
-from lupin_bridge.stream.alarms_json import alarms_body
+from lupin_bridge.stream.health_json import alarms_body
 
 router = APIRouter()
 

@@ -15,9 +15,9 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.estimates.following import MAX_SENSORS, newest_of
 from lupin_bridge.query_string import Name, needed, parameter, parameters_of, read
 from lupin_bridge.routes.computing import on_worker, or_refusal, unless_known
-from lupin_bridge.routes.documented import NOT_REMEMBERED
 from lupin_bridge.routes.tools import (
     JSON_TYPE,
+    NOT_REMEMBERED,
     REVALIDATE,
     bridge_of,
     error_response,

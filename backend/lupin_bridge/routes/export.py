@@ -24,8 +24,7 @@ from lupin_bridge.routes.computing import (
     while_client_waits,
     within_time,
 )
-from lupin_bridge.routes.documented import NOT_REMEMBERED
-from lupin_bridge.routes.tools import NEVER_KEEP, bridge_of, read_route
+from lupin_bridge.routes.tools import NEVER_KEEP, NOT_REMEMBERED, bridge_of, read_route
 from lupin_bridge.serving.admission import Export
 from lupin_bridge.serving.http_protocol import CONNECTION_KEY, HttpConnection
 from lupin_twin.state import NANOSECONDS_PER_SECOND

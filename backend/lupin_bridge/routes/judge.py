@@ -12,10 +12,10 @@ from lupin_bridge.past.asked import Health
 from lupin_bridge.query_string import parameters_of
 from lupin_bridge.routes.as_of import response_of_past
 from lupin_bridge.routes.computing import kept_or_computed, or_refusal
-from lupin_bridge.routes.documented import NOT_REMEMBERED
 from lupin_bridge.routes.tools import (
     JSON_TYPE,
     NEVER_KEEP,
+    NOT_REMEMBERED,
     REVALIDATE,
     bridge_of,
     error_response,

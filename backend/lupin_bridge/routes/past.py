@@ -9,8 +9,7 @@ from lupin_bridge.past.asked import History, Timeline
 from lupin_bridge.query_string import parameters_of
 from lupin_bridge.routes.as_of import response_of_past
 from lupin_bridge.routes.computing import or_refusal
-from lupin_bridge.routes.documented import NOT_REMEMBERED
-from lupin_bridge.routes.tools import bridge_of, read_route
+from lupin_bridge.routes.tools import NOT_REMEMBERED, bridge_of, read_route
 
 router = APIRouter()
 

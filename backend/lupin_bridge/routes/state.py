@@ -25,10 +25,10 @@ from lupin_bridge.routes.computing import (
     on_worker,
     or_refusal,
 )
-from lupin_bridge.routes.documented import NOT_REMEMBERED
 from lupin_bridge.routes.tools import (
     JSON_TYPE,
     NEVER_KEEP,
+    NOT_REMEMBERED,
     bridge_of,
     error_response,
     json_response,

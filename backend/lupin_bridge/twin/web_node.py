@@ -25,7 +25,7 @@ from rclpy.clock import Clock, ClockType
 from lupin_bridge.twin.pairing import Pairing
 from lupin_twin import convert, diagnostics, ingest, shapes
 from lupin_twin.clock_watch import StampWatch
-from lupin_twin.diagnostic_messages import findings_of
+from lupin_twin.convert import findings_of
 from lupin_twin.diagnostics import Origin, SelfReport, self_report
 from lupin_twin.drops import Counts, Drop, Reason
 from lupin_twin.estimate_report import REPORT_SERVICE

@@ -14,7 +14,7 @@ from typing import Any, Final, TypeVar
 
 from lupin_bridge.twin.shared import Shared
 from lupin_bridge.twin.source import TwinUnavailableError
-from lupin_twin import convert_past, convert_writes
+from lupin_twin import convert_past
 from lupin_twin.convert_past import Entries, NotAnAnswerError
 from lupin_twin.past import (
     EVERY_TAG,
@@ -100,9 +100,9 @@ class WebPast:
 
     async def writes(self, request: WritesRequest) -> PastWrites:
         """What was heard, in the order of hearing."""
-        response = await self._ask_writes(convert_writes.writes_request_message(request))
+        response = await self._ask_writes(convert_past.writes_request_message(request))
         return await self._read(
-            lambda: convert_writes.writes_of(response, request), cost_s=_READ_WRITES_S
+            lambda: convert_past.writes_of(response, request), cost_s=_READ_WRITES_S
         )
 
     async def recent(self, request: RecentRequest) -> tuple[PastWrite, ...]:

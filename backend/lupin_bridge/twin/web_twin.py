@@ -38,9 +38,8 @@ from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRefused, FieldRequest, FieldRules, cost_s
 from lupin_twin.history import TagHistory
 from lupin_twin.journal.condition import UNKNOWN, Condition
-from lupin_twin.past import NotRemembered, PastRow, SeriesPast, SeriesRequest
+from lupin_twin.past import NotRemembered, PastRow, SeriesPast, SeriesRequest, lasts, may_pass
 from lupin_twin.past_writes import PastWrites, WritesRequest
-from lupin_twin.refusals import lasts, may_pass
 from lupin_twin.state import NANOSECONDS_PER_SECOND, Snapshot
 from lupin_twin.workers import SMALL_S, Workers
 

@@ -13,12 +13,13 @@ from __future__ import annotations
 import math
 import sys
 from array import array
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, Point32, Polygon, Quaternion
 from geometry_msgs.msg import Pose as PoseMsg
 from lupin_msgs.msg import (
@@ -32,6 +33,7 @@ from lupin_msgs.msg import (
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Header
 
+from lupin_twin.diagnostics import STATE_TOPIC, Finding
 from lupin_twin.explored import OccupancyMap, occupancy_map
 from lupin_twin.history import KIND_FLOWER, KIND_TAG_READING
 from lupin_twin.ingest import Heard, HeardLook, HeardReading, HeardTags, scanned_pose
@@ -45,6 +47,45 @@ from lupin_twin.state import (
     TagState,
     Try,
 )
+
+
+def diagnostics(findings: Iterable[Finding], node: str, now_ns: int) -> Any:
+    """Findings as diagnostic_msgs/DiagnosticArray; `node` is the node's full name."""
+    return DiagnosticArray(
+        header=Header(stamp=time_msg(now_ns)),
+        status=[
+            DiagnosticStatus(
+                level=bytes([finding.level]),
+                name=f"{node}: {finding.name}",
+                message=finding.message,
+                hardware_id=node,
+                values=[KeyValue(key=key, value=value) for key, value in finding.values.items()],
+            )
+            for finding in findings
+        ],
+    )
+
+
+def findings_of(msg: Any, state_topic: str) -> Iterator[Finding]:
+    """What the twin says of itself that publishes `state_topic`, by its name from the root on."""
+    node = _node_of(msg, state_topic)
+    begin = f"{node}: "
+    for status in msg.status:
+        if status.hardware_id == node and status.name.startswith(begin):
+            yield Finding(
+                name=status.name.removeprefix(begin),
+                level=status.level[0],
+                message=status.message,
+                values={each.key: each.value for each in status.values},
+            )
+
+
+def _node_of(msg: Any, state_topic: str) -> str | None:
+    for status in msg.status:
+        if any(each.key == STATE_TOPIC and each.value == state_topic for each in status.values):
+            return str(status.hardware_id)
+    return None
+
 
 UINT16_MAX: Final = 65_535
 INT32_MAX: Final = 2_147_483_647

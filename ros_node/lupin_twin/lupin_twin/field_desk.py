@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from lupin_twin.fields import FieldEngine, FieldJob, FieldKey, FieldRefused
 from lupin_twin.grid import FieldGrid
-from lupin_twin.refusals import passing
+from lupin_twin.past import passing
 from lupin_twin.workers import Workers
 
 # Fields that wait for a worker or are computed, each with all who wait for it.

@@ -21,7 +21,7 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 
 from lupin_twin import convert, convert_field, ingest, shapes
 from lupin_twin.clock_watch import CLOCK_SAYS, ClockWatch
-from lupin_twin.diagnostic_messages import diagnostics
+from lupin_twin.convert import diagnostics
 from lupin_twin.diagnostics import TOPIC, Health, Origin, findings, origin_of
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.estimate_service import EstimateRules, EstimateService, Known

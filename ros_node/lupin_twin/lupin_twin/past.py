@@ -11,9 +11,34 @@ from enum import StrEnum
 from functools import partial
 from typing import Any, Final
 
-from lupin_twin import refusals
 from lupin_twin.bounds import MAX_TEXT_LENGTH
 from lupin_twin.state import NANOSECONDS_PER_SECOND
+
+# How a message ends of what may be answered a little later, were the same asked again.
+ASK_AGAIN: Final = "ask again later"
+# How one begins of what stays so until a setting of the twin is changed.
+NOT_REMEMBERED: Final = "not remembered: "
+
+
+def passing(why: str) -> str:
+    """The message for what may be answered a little later."""
+    return why if may_pass(why) else f"{why}: {ASK_AGAIN}"
+
+
+def may_pass(message: str) -> bool:
+    """Whether a message says that the same may be asked again."""
+    return message.endswith(ASK_AGAIN)
+
+
+def lasting(why: str) -> str:
+    """The message for what nobody remembers, now or later."""
+    return NOT_REMEMBERED + why
+
+
+def lasts(message: str) -> str | None:
+    """Why nobody remembers it, of a message that says so; None: it does not."""
+    return message.removeprefix(NOT_REMEMBERED) if message.startswith(NOT_REMEMBERED) else None
+
 
 # The services' names, relative to the node's namespace.
 STATE_AT_SERVICE: Final = "twin/get_state_at"
@@ -86,16 +111,16 @@ def message_of(error: Exception) -> str:
     if isinstance(error, PastRefused):
         return str(error)
     if isinstance(error, NotRemembered):
-        return (refusals.lasting if error.is_lasting else refusals.passing)(str(error))
-    return refusals.passing(f"the twin failed to look back: {error}")
+        return (lasting if error.is_lasting else passing)(str(error))
+    return passing(f"the twin failed to look back: {error}")
 
 
 def error_of(message: str) -> PastRefused | NotRemembered:
     """What a service's `error_message` says: the other direction of `message_of`."""
-    why = refusals.lasts(message)
+    why = lasts(message)
     if why is not None:
         return NotRemembered(why, is_lasting=True)
-    if refusals.may_pass(message):
+    if may_pass(message):
         return NotRemembered(message, is_lasting=False)
     return PastRefused(message)
 

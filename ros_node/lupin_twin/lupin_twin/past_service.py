@@ -8,7 +8,7 @@ from typing import Any, Final, Protocol
 
 from lupin_msgs.srv import GetHistory, GetStateAt, GetWrites
 
-from lupin_twin import convert, convert_past, convert_writes
+from lupin_twin import convert, convert_past
 from lupin_twin.habits import SERVICE_QOS, Habits
 from lupin_twin.journal.fold import STATE_S_PER_TAG, state_at
 from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG, series
@@ -102,10 +102,10 @@ class PastService:
 
     def _on_get_writes(self, request: Any, response: Any) -> Any:
         def look_up() -> Callable[[], Future[PastWrites]]:
-            asked = convert_writes.writes_request(request)
+            asked = convert_past.writes_request(request)
             return lambda: self._memory.writes(asked)
 
-        return self._ask(response, look_up, convert_writes.writes_response, MESSAGE_S)
+        return self._ask(response, look_up, convert_past.writes_response, MESSAGE_S)
 
     def _ask(
         self,

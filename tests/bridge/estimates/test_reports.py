@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.estimates import reports
-from lupin_bridge.estimates.reports import FRESH_S, Reports
+from lupin_bridge.estimates import following
+from lupin_bridge.estimates.following import FRESH_S, Reports
 from lupin_twin.estimate_report import ReportRequest
 
 CO2, LIGHT = ReportRequest("co2"), ReportRequest("light")
@@ -54,7 +54,7 @@ def test_all_who_ask_at_once_and_soon_after_get_one_answer(
 
 
 def test_so_many_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reports, "MAX_KEPT", 1)
+    monkeypatch.setattr(following, "MAX_KEPT", 1)
     source: Any = Source()
 
     async def test() -> None:

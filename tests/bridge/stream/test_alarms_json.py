@@ -5,7 +5,7 @@ import json
 from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_bridge.stream import schema
-from lupin_bridge.stream.alarms_json import alarms_body, alarms_frame
+from lupin_bridge.stream.health_json import alarms_body, alarms_frame
 
 NIGHT_NS = 1_000_000_000_000
 COLD = Alarm(

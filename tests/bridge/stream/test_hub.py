@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.stream.alarms_json import alarms_frame
 from lupin_bridge.stream.frames import FrameWriter, text_frame
+from lupin_bridge.stream.health_json import alarms_frame
 from lupin_bridge.stream.hub import CLOSE_POLICY, Client, Hub
 from lupin_bridge.stream.status import Reason, Status
 from lupin_twin.state import Snapshot, TagState

@@ -18,7 +18,7 @@ from rclpy.serialization import deserialize_message
 from lupin_bridge.twin.ros_thread import forward
 from lupin_bridge.twin.web_node import WebNode
 from lupin_twin import convert
-from lupin_twin.diagnostic_messages import diagnostics
+from lupin_twin.convert import diagnostics
 from lupin_twin.diagnostics import Finding
 from lupin_twin.drops import Counts, Recent
 from lupin_twin.explored import OccupancyMap

@@ -96,7 +96,7 @@ def test_who_has_the_answer_is_told_so_and_nothing_is_written_for_him(
                     answer = await it.http.get(f"{path}&at=9", headers=has)
                     assert (answer.status_code, answer.content) == (304, b"")
                     assert answer.headers["etag"] == tag
-            past.snapshot = house(1200.0)  # observed before, heard late
+            past.snapshot = house(1600.0)  # observed before, heard late
             for path, tag in tags.items():
                 answer = await it.http.get(f"{path}&at=9", headers={"If-None-Match": tag})
                 assert answer.status_code == 200

@@ -60,6 +60,19 @@ class Derived:
     formula: Callable[[float, float], float]
 
 
+def condensation_margin_k(temperature_c: float, humidity_percent: float) -> float:
+    """By how much air may cool (K) before dew falls; NaN for what cannot be, and for dry air.
+
+    On a surface that is colder than the air by more than this, water condenses.
+    """
+    return temperature_c - dew_point_c(temperature_c, humidity_percent)
+
+
 VPD: Final = Derived("vpd", (TEMPERATURE, HUMIDITY), vapour_pressure_deficit_kpa)
 DEW_POINT: Final = Derived("dew_point", (TEMPERATURE, HUMIDITY), dew_point_c)
-DERIVED: Final[Mapping[str, Derived]] = {each.name: each for each in (VPD, DEW_POINT)}
+CONDENSATION_MARGIN: Final = Derived(
+    "condensation_margin", (TEMPERATURE, HUMIDITY), condensation_margin_k
+)
+DERIVED: Final[Mapping[str, Derived]] = {
+    each.name: each for each in (VPD, DEW_POINT, CONDENSATION_MARGIN)
+}

@@ -88,7 +88,9 @@ def test_the_file_says_what_is_derived() -> None:
     with pytest.raises(SensorsError, match=r"sensors\.vpd\.derived is False; computed here"):
         parse(text_with("sensors/vpd", vpd))
     assert parse(text_with("sensors/vpd", vpd | {"derived": True})).named("vpd").unit == "kPa"
-    with pytest.raises(SensorsError, match=r"derived is True; computed here are dew_point "):
+    with pytest.raises(
+        SensorsError, match=r"derived is True; computed here are condensation_margin "
+    ):
         parse(text_with("sensors/temperature/derived", True))
     with pytest.raises(SensorsError, match=r"derived: Input should be a valid boolean, not 1"):
         parse(text_with("sensors/vpd", vpd | {"derived": 1}))

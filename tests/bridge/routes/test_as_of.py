@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -68,6 +69,33 @@ def test_every_route_answers_as_of_a_moment(domain: int) -> None:
             assert answer.status_code == 404
             # Of before the log began, nobody knows.
             assert "no tag 'c' is known (1 others are); what was received" in answer.text
+
+    run(domain, test())
+
+
+def test_what_is_made_of_a_days_readings_is_asked_for_like_a_sensor(domain: int) -> None:
+    hour_ns = 3600 * NS
+    points = [(n * hour_ns, 54_000.0) for n in range(1, 40)]
+    state = house()
+    lit = replace(state.tags[0], readings=(Reading("light", 54_000.0, 39 * hour_ns),))
+    past = MadeUp(
+        points={("a/b", "light"): points},
+        snapshot=replace(state, tags=(lit,)),
+        now_ns=40 * hour_ns,
+    )
+
+    async def test() -> None:
+        async with remembering(past) as it:
+            path = "/api/field.json?sensor_type=daily_light_integral&resolution=0.5"
+            found = (await it.http.get(f"{path}&at={39 * 3600}")).json()
+            # 24 h of 1000 umol/m2/s.
+            assert (found["sample_count"], found["value_max"]) == (1, pytest.approx(86.4))
+            now = (await it.http.get(path)).json()
+            assert now["ok"]
+            asked = "tag_id=a%2Fb&sensor_type=daily_light_integral"
+            history = (await it.http.get(f"/api/history?{asked}&from=108000&to=144000")).json()
+            assert history["unit"] == "mol/m²/d"
+            assert [it["value"] for it in history["readings"]] == [pytest.approx(86.4)] * 10
 
     run(domain, test())
 

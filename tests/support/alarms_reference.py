@@ -128,7 +128,7 @@ def _of_tag(
         species = next(seen, species)
         is_day = day_of(_light(of_run, at), at)
         for key, said in (
-            *_of_readings(occasion),
+            *_of_readings(occasion, sensors),
             *_of_ranges(occasion, sensors, species, is_day=is_day),
             *_of_tries(occasion, [one for one in scans if one <= at]),
             *_of_silent_sensors(at, occasions, [one for one in scans if one <= at]),
@@ -144,11 +144,15 @@ def _of_tag(
 _Key = tuple[str, str, str]
 
 
-def _of_readings(occasion: list[PastWrite]) -> Iterator[tuple[_Key, _Said]]:
+def _of_readings(occasion: list[PastWrite], sensors: Sensors) -> Iterator[tuple[_Key, _Said]]:
     for name, value in _readings(occasion).items():
         if name not in ("vpd", "dew_point"):
-            bad = not math.isfinite(value)
-            yield ("reading_failed", name, ""), _Said(occasion[0].stamp_ns, bad, bad, "stressed")
+            bad, span = not sensors.named(name).is_plausible(value), sensors.named(name).plausible
+            numbers: tuple[float | None, float | None] = (None, None)
+            if math.isfinite(value) and span is not None:
+                numbers = value, span.low if value < span.low else span.high
+            at = occasion[0].stamp_ns
+            yield ("reading_failed", name, ""), _Said(at, bad, bad, "stressed", *numbers)
 
 
 def _of_ranges(
@@ -162,7 +166,7 @@ def _of_ranges(
         readings.setdefault("dew_point", dew_point_c(air[0], air[1]))
     for name, value in readings.items():
         ranges = sensors.named(name).ranges(is_day=is_day, species=species)
-        if not math.isfinite(value):
+        if not sensors.named(name).is_plausible(value):
             continue
         for side, sign in (("low", -1.0), ("high", 1.0)):
             key = ("range", name, side)
@@ -191,7 +195,7 @@ def _of_silent_sensors(
     if not scans or scans[-1] != at:
         return
     for name, every in told.items():
-        limit = max(_holds(scans), _may_last(every[-2:]))
+        limit = max(_holds(scans), _holds(every[-2:]))
         is_so = at - every[-1] > limit
         said = _Said(at, is_so, is_so, "unknown", None, limit / 1e9, since_ns=every[-1])
         yield ("old", name, ""), said
@@ -206,7 +210,8 @@ def _of_tries(occasion: list[PastWrite], scans: list[int]) -> Iterator[tuple[_Ke
     looks = [w for w in occasion if w.kind == FLOWER and w.has_seen]
     if looks:
         seen, bugs = looks[-1].anomaly, float(looks[-1].bug_count)
-        yield ("pest", "", ""), _Said(at, seen, seen, "critical", bugs)
+        verdict = "critical" if bugs else "stressed"
+        yield ("pest", "", ""), _Said(at, seen, seen, verdict, bugs)
 
 
 def _episodes(key: _Key, said: list[_Said], ended_ns: int | None) -> Iterator[Plain]:
@@ -265,13 +270,8 @@ def _usual(scans: tuple[int, ...], began: int) -> int:
 def _holds(scans: list[int]) -> int:
     intervals = [after - before for before, after in pairwise(scans[-9:])]
     if not intervals:
-        return SHORTEST
+        return LONGEST
     return min(LONGEST, max(SHORTEST, 3 * int(median(intervals))))
-
-
-def _may_last(scans: list[int]) -> int:
-    """Nobody knows yet when what has been scanned once should be scanned again."""
-    return _holds(scans) if len(scans) > 1 else LONGEST
 
 
 def _scans(tag_id: str, of_run: list[PastWrite]) -> list[int]:
@@ -287,7 +287,7 @@ def _overdue(tag_id: str, of_run: list[PastWrite], *, is_on: bool) -> Iterator[P
     scans, last_ns = _scans(tag_id, of_run), of_run[-1].stamp_ns
     for index, start in enumerate(scans):
         end = scans[index + 1] if index + 1 < len(scans) else None
-        holds = _may_last(scans[: index + 1])
+        holds = _holds(scans[: index + 1])
         # So long as anybody is at work, time passes; in a pause it stands.
         due = start + holds
         for first, last in _pauses(of_run):
@@ -309,7 +309,7 @@ def _of_house(of_run: list[PastWrite], now_ns: int | None) -> Iterator[Plain]:
         for tag_id in {write.tag_id for write in of_run}:
             before = [at for at in _scans(tag_id, of_run) if at <= start]
             if before:
-                holds.append(_may_last(before))
+                holds.append(_holds(before))
         limit = int(median(holds)) if holds else LONGEST
         raised = start + limit + 1
         until = now_ns if end is None else end

@@ -49,7 +49,7 @@ def seen(
     holds = dict.fromkeys((it.tag_id for it in tags), HOLDS_NS) | dict(holds_ns or {})
     return Seen(
         snapshot=snapshot,
-        judged=judge_once(snapshot, (), SENSORS, lambda *_: Day(True, "assumed")),
+        judged=judge_once(snapshot, (), SENSORS, lambda *_: Day(True, "assumed"), HOLDS_NS / 1e9),
         board=Board(Page.of(alarms), "heard", NOW_NS, 1),
         holds_ns=holds,
         now_ns=now_ns,

@@ -43,6 +43,10 @@ class Criteria:
         """Whether it was day at a moment of ROS time at which the light said so, or None."""
         return judge_day(light, self.clock, unix_s(stamp_ns))
 
+    def is_day(self, stamp_ns: int) -> bool:
+        """Whether it was day by the clock alone."""
+        return self.day(None, stamp_ns).is_day
+
 
 def own_sensors() -> Sensors:
     """The file that comes with the bridge."""

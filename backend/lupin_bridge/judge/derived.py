@@ -17,6 +17,8 @@ _B_C: Final = 237.3
 _E0_KPA: Final = 0.6108
 # Beyond this the formula means nothing, and no greenhouse is.
 _COLDEST_C, _HOTTEST_C = -40.0, 80.0
+# A sensor in saturated air reads up to this; it is taken for 100 %.
+_SATURATED_PERCENT: Final = 105.0
 
 TEMPERATURE: Final = "temperature"
 HUMIDITY: Final = "humidity"
@@ -28,22 +30,25 @@ def saturation_kpa(temperature_c: float) -> float:
 
 
 def vapour_pressure_deficit_kpa(temperature_c: float, humidity_percent: float) -> float:
-    """What the air could still take up, kPa; NaN for what cannot be (humidity outside 0 to 100)."""
+    """What the air could still take up, kPa; NaN for what cannot be (humidity outside 0 to 105)."""
     if not _is_air(temperature_c, humidity_percent):
         return math.nan
-    return saturation_kpa(temperature_c) * (1.0 - humidity_percent / 100.0)
+    return saturation_kpa(temperature_c) * (1.0 - min(humidity_percent, 100.0) / 100.0)
 
 
 def dew_point_c(temperature_c: float, humidity_percent: float) -> float:
     """The temperature (°C) at which dew falls; NaN for what cannot be, and for dry air."""
     if not _is_air(temperature_c, humidity_percent) or humidity_percent == 0.0:
         return math.nan
-    over = math.log(humidity_percent / 100.0) + _A * temperature_c / (temperature_c + _B_C)
+    over = math.log(min(humidity_percent, 100.0) / 100.0) + _A * temperature_c / (
+        temperature_c + _B_C
+    )
     return _B_C * over / (_A - over)
 
 
 def _is_air(temperature_c: float, humidity_percent: float) -> bool:
-    return _COLDEST_C <= temperature_c <= _HOTTEST_C and 0.0 <= humidity_percent <= 100.0
+    is_humid = 0.0 <= humidity_percent <= _SATURATED_PERCENT
+    return _COLDEST_C <= temperature_c <= _HOTTEST_C and is_humid
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +60,19 @@ class Derived:
     formula: Callable[[float, float], float]
 
 
+def condensation_margin_k(temperature_c: float, humidity_percent: float) -> float:
+    """By how much air may cool (K) before dew falls; NaN for what cannot be, and for dry air.
+
+    On a surface that is colder than the air by more than this, water condenses.
+    """
+    return temperature_c - dew_point_c(temperature_c, humidity_percent)
+
+
 VPD: Final = Derived("vpd", (TEMPERATURE, HUMIDITY), vapour_pressure_deficit_kpa)
 DEW_POINT: Final = Derived("dew_point", (TEMPERATURE, HUMIDITY), dew_point_c)
-DERIVED: Final[Mapping[str, Derived]] = {each.name: each for each in (VPD, DEW_POINT)}
+CONDENSATION_MARGIN: Final = Derived(
+    "condensation_margin", (TEMPERATURE, HUMIDITY), condensation_margin_k
+)
+DERIVED: Final[Mapping[str, Derived]] = {
+    each.name: each for each in (VPD, DEW_POINT, CONDENSATION_MARGIN)
+}

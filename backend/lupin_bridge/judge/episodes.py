@@ -13,7 +13,6 @@ about a limit is one episode.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -22,16 +21,24 @@ from lupin_bridge.judge.alarm import Alarm, alarm_id
 from lupin_bridge.judge.daylight import LIGHT
 from lupin_bridge.judge.derived import DERIVED
 from lupin_bridge.judge.ranges import Sensors
-from lupin_bridge.judge.rhythm import INTERVALS, LONGEST_NS, holds_ns, interval_ns
-from lupin_bridge.judge.verdict import Kind, Reason, Verdict, derive, judge_value, worst
+from lupin_bridge.judge.rhythm import INTERVALS, holds_ns, interval_ns
+from lupin_bridge.judge.verdict import (
+    DEADBAND,
+    Kind,
+    Reason,
+    Verdict,
+    derive,
+    failed,
+    judge_value,
+    pest,
+    worst,
+)
 from lupin_twin.history import KIND_FLOWER
 from lupin_twin.past_writes import PastWrite
 from lupin_twin.state import STATUS_OK, Reading
 
 # Occasions in a row that raise, and that clear.
 HOLD: Final = 2
-# Of a range's width: so far within it lies what is no longer out of it.
-DEADBAND: Final = 0.05
 # Dawn and dusk, and a cloud, are over by then.
 TWILIGHT_NS: Final = 2 * 3600 * 1_000_000_000
 # Episodes of a tag that are kept: a sensor that goes wild has no more.
@@ -140,12 +147,12 @@ class TagEpisodes:
         day: bool | None = None
         for reading in (*readings, *derive(readings)):
             name = reading.name
-            is_finite = math.isfinite(reading.value)
+            sensor = self._sensors.named(name)
+            is_good = sensor.is_plausible(reading.value)
             key = (Kind.READING_FAILED, name, "")
-            if name not in DERIVED and (not is_finite or key in self._watches):
-                failed = Reason(Kind.READING_FAILED, Verdict.STRESSED, name, since_ns=stamp_ns)
-                yield _Finding(key, not is_finite, not is_finite, failed)
-            if is_finite:
+            if name not in DERIVED and (not is_good or key in self._watches):
+                yield _Finding(key, not is_good, not is_good, failed(reading, sensor))
+            if is_good:
                 day = is_day(stamp_ns) if day is None else day
                 yield from self._of_range(reading, is_day=day)
         if readings:
@@ -159,9 +166,8 @@ class TagEpisodes:
                 yield _Finding(key, fails, fails, reason)
         look = next((w for w in reversed(writes) if w.kind == KIND_FLOWER and w.has_seen), None)
         if look is not None:
-            bugs = float(look.bug_count)
-            pest = Reason(Kind.PEST, Verdict.CRITICAL, value=bugs, since_ns=stamp_ns)
-            yield _Finding((Kind.PEST, "", ""), look.anomaly, look.anomaly, pest, max)
+            reason = pest(look.bug_count, stamp_ns)
+            yield _Finding((Kind.PEST, "", ""), look.anomaly, look.anomaly, reason, max)
 
     def _of_range(self, reading: Reading, *, is_day: bool) -> Iterator[_Finding]:
         ranges = self._sensors.named(reading.name).ranges(is_day=is_day, species=self._species)
@@ -190,7 +196,7 @@ class TagEpisodes:
                 continue
             if holds is None:
                 holds = holds_ns(interval_ns(self._scans_ns))
-            own = holds_ns(interval) if interval else LONGEST_NS
+            own = holds_ns(interval or None)
             limit_ns = self._recent_ns or max(holds, own)
             is_old = stamp_ns - last_ns > limit_ns
             old = Reason(Kind.OLD, Verdict.UNKNOWN, name, limit=limit_ns / 1e9, since_ns=last_ns)

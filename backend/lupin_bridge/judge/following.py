@@ -219,7 +219,7 @@ class Follower:
         """Of a tag that is not scanned, while others are: pauses of the house do not count."""
         run.due.pop(tag_id, None)
         for gap in run.tags[tag_id].gaps:
-            due_ns = run.stretches.overdue_ns(gap.start_ns, gap.may_last_ns) + 1
+            due_ns = run.stretches.overdue_ns(gap.start_ns, gap.holds_ns) + 1
             end_ns = gap.end_ns
             if due_ns > last_ns or (end_ns is not None and due_ns >= end_ns):
                 if end_ns is None:
@@ -228,7 +228,7 @@ class Follower:
             reason = Reason(
                 Kind.OLD,
                 Verdict.UNKNOWN,
-                limit=gap.may_last_ns / 1e9,
+                limit=gap.holds_ns / 1e9,
                 since_ns=gap.start_ns,
             )
             if end_ns is None and not is_on:
@@ -270,7 +270,7 @@ class Follower:
         limit_ns = run.limits.get(at_ns)
         if limit_ns is None:
             holds = [
-                gap.may_last_ns
+                gap.holds_ns
                 for tag in run.tags.values()
                 if (gap := _gap_at(tag, at_ns)) is not None
             ]

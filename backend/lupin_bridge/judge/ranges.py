@@ -32,7 +32,11 @@ class Ranges:
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """One sensor. Hue in degrees, lightness in percent (HSL); `unit` is empty where not known."""
+    """One sensor. Hue in degrees, lightness in percent (HSL); `unit` is empty where not known.
+
+    What lies outside `plausible` no sensor reads that works: it is no reading; None: anything may
+    be.
+    """
 
     name: str
     label: str
@@ -42,6 +46,13 @@ class Sensor:
     day: Ranges = Ranges()
     night: Ranges = Ranges()
     species: Mapping[str, tuple[Ranges, Ranges]] = field(default_factory=dict)
+    plausible: Span | None = None
+
+    def is_plausible(self, value: float) -> bool:
+        """Whether a sensor that works can read this: a finite number within `plausible`."""
+        span = self.plausible
+        is_finite = value - value == 0.0
+        return is_finite and (span is None or span.low <= value <= span.high)
 
     def ranges(self, *, is_day: bool, species: str = "") -> Ranges:
         """What holds at a tag with such plants; of an unknown species, what holds for all."""

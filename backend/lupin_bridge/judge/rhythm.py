@@ -27,7 +27,10 @@ def interval_ns(scans_ns: Sequence[int]) -> int | None:
 
 
 def holds_ns(interval_ns: int | None) -> int:
-    """How long readings hold at such an interval; without one, as short as is ever taken."""
+    """How long readings hold at such an interval.
+
+    Scanned once, a tag has none: nobody knows when it should be again, and it has the longest time.
+    """
     if interval_ns is None:
-        return SHORTEST_NS
+        return LONGEST_NS
     return min(LONGEST_NS, max(SHORTEST_NS, TIMES_MEDIAN * interval_ns))

@@ -15,6 +15,7 @@ from lupin_bridge.judge.ranges import Ranges, Sensor, Sensors, Span
 MAX_SENSORS = 64
 MAX_SPECIES = 64
 MAX_TEXT = 64
+MAX_SOURCE = 400
 
 _Name = Annotated[str, Field(max_length=MAX_TEXT)]
 _Limit = Annotated[float, Field(ge=-1e9, le=1e9)]
@@ -37,8 +38,8 @@ class _Ranges(_Part):
 
     @model_validator(mode="after")
     def _lie_inside(self) -> Self:
-        for name in ("ideal", "critical"):
-            span = getattr(self, name)
+        for name in ("ideal", "critical", "plausible"):
+            span = getattr(self, name, None)
             if span is not None and not span[0] < span[1]:
                 raise ValueError(f"{name} is {list(span)}, and low must be less than high")
         if self.critical is not None:
@@ -73,6 +74,9 @@ class _Sensor(_DayAndNight):
     # For who reads the file: what it is called in other languages, and whether it is computed here.
     labels: dict[Language, Annotated[_Name, Field(min_length=1)]] = {}
     derived: bool = False
+    # What a sensor that works can read; and where all of this is from.
+    plausible: tuple[_Limit, _Limit] | None = None
+    source: Annotated[str, Field(max_length=MAX_SOURCE)] = ""
     species: Annotated[dict[str, _DayAndNight], Field(max_length=MAX_SPECIES)] = {}
 
     @model_validator(mode="after")
@@ -84,7 +88,17 @@ class _Sensor(_DayAndNight):
     def named(self, name: str) -> Sensor:
         day, night = self.by_day_and_night()
         species = {kind.lower(): it.by_day_and_night() for kind, it in self.species.items()}
-        return Sensor(name, self.label, self.unit, self.hue, self.lightness, day, night, species)
+        return Sensor(
+            name,
+            self.label,
+            self.unit,
+            self.hue,
+            self.lightness,
+            day,
+            night,
+            species,
+            None if self.plausible is None else Span(*self.plausible),
+        )
 
 
 class _Ramp(_Part):

@@ -17,7 +17,7 @@ from typing import Final, Generic, TypeVar
 from lupin_bridge.judge.day_line import Turn
 from lupin_bridge.judge.daylight import DAY_FROM_LX, LEFT_OUT_NS, LIGHT
 from lupin_bridge.judge.episodes import IsDay, TagEpisodes, readings_of
-from lupin_bridge.judge.rhythm import INTERVALS, LONGEST_NS, SHORTEST_NS, holds_ns, interval_ns
+from lupin_bridge.judge.rhythm import INTERVALS, SHORTEST_NS, holds_ns, interval_ns
 from lupin_twin.past_writes import PastWrite
 
 # So many occasions lie between two states of a tag that are kept to begin again from.
@@ -27,16 +27,11 @@ StateT = TypeVar("StateT")
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """From one scan to the next, or to none yet; `holds_ns` is how long readings held then.
-
-    `may_last_ns` is how long it may last: of a tag that has been scanned once, nobody knows when
-    it should be again.
-    """
+    """From one scan to the next, or to none yet; `holds_ns` is how long readings held then."""
 
     start_ns: int
     end_ns: int | None
     holds_ns: int
-    may_last_ns: int
 
 
 # Whether a gap matters for ever: one that is too long, or in which the house paused.
@@ -89,9 +84,7 @@ class Trail:
         return self._gap(None, recent_ns)
 
     def _gap(self, end_ns: int | None, recent_ns: int | None) -> Gap:
-        holds = self.holds_ns(recent_ns)
-        is_known = recent_ns is not None or len(self.scans_ns) > 1
-        return Gap(self.scans_ns[-1], end_ns, holds, holds if is_known else LONGEST_NS)
+        return Gap(self.scans_ns[-1], end_ns, self.holds_ns(recent_ns))
 
 
 class TagLog:

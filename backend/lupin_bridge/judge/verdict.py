@@ -14,13 +14,15 @@ from types import MappingProxyType
 from typing import Final
 
 from lupin_bridge.judge.derived import DERIVED
-from lupin_bridge.judge.ranges import Ranges, Sensors
+from lupin_bridge.judge.ranges import Ranges, Sensor, Sensors
 from lupin_bridge.judge.scanned import Recent, Scanned
 from lupin_twin.state import NO_FLOWER, STATUS_OK, Reading, TagState
 
 # Readings that do not hold any more say nothing about now, but until then nobody may forget that
 # the last that was heard of a tag was alarming.
 FORGOTTEN_NS: Final = 24 * 3600 * 1_000_000_000
+# Of a range's width: what has been out of it is so until it lies so far within.
+DEADBAND: Final = 0.05
 
 
 class Verdict(StrEnum):
@@ -60,7 +62,8 @@ class Reason:
 
     `since_ns` is the observation that says so; None: there was none. Of `old`, `limit` is how long
     readings hold, s, and `since_ns` the last one: its age would change all the time. Of `pest`,
-    `value` is how many were counted, of `scan_failed` the status of the try.
+    `value` is how many were counted, of `scan_failed` the status of the try, of `reading_failed`
+    what no sensor reads that works, or None: no number.
     """
 
     kind: Kind
@@ -99,22 +102,20 @@ def judge_tag(
     readings = (*tag.readings, *derive(tag.readings))
     for reading in readings:
         scan = scans.get(reading.observed_at_ns or 0) or Scanned(0, {})
-        ranges = sensors.named(reading.name).ranges(is_day=scan.is_day, species=scan.species)
+        sensor = sensors.named(reading.name)
+        ranges = sensor.ranges(is_day=scan.is_day, species=scan.species)
         age_ns = _age_ns(reading.observed_at_ns, now_ns)
         if age_ns is not None and age_ns > FORGOTTEN_NS:
             continue
-        if not math.isfinite(reading.value):
+        if not sensor.is_plausible(reading.value):
             if reading.name not in DERIVED:
-                reasons.append(
-                    Reason(
-                        Kind.READING_FAILED,
-                        Verdict.STRESSED,
-                        reading.name,
-                        since_ns=reading.observed_at_ns,
-                    )
-                )
+                reasons.append(failed(reading, sensor))
             continue
         reason = judge_value(reading, ranges)
+        if reason is None or reason.verdict is not Verdict.CRITICAL:
+            still = _still_out(reading, ranges, sensor, recent)
+            if still is not None and (reason is None or still.verdict is Verdict.CRITICAL):
+                reason = still
         if reason is not None:
             reasons.append(reason)
         elif ranges.ideal is not None and age_ns is not None and age_ns <= holds_ns:
@@ -128,6 +129,78 @@ def judge_tag(
     if verdict is None:
         verdict = Verdict.HEALTHY if was_judged else Verdict.UNKNOWN
     return Health(verdict, tuple(reasons))
+
+
+def failed(reading: Reading, sensor: Sensor) -> Reason:
+    """That a sensor gives no number, or one that cannot be and the limit of what can."""
+    value, span = reading.value, sensor.plausible
+    is_number = math.isfinite(value) and span is not None
+    limit = None
+    if is_number and span is not None:
+        limit = span.low if value < span.low else span.high
+    return Reason(
+        Kind.READING_FAILED,
+        Verdict.STRESSED,
+        reading.name,
+        value if is_number else None,
+        limit,
+        reading.observed_at_ns,
+    )
+
+
+def _still_out(reading: Reading, ranges: Ranges, sensor: Sensor, recent: Recent) -> Reason | None:
+    """A value within its range by less than the deadband, of a tag that has been out of it.
+
+    That is so since the last scan that was out of it, of those that are recent, unless one since
+    was further within. The limit is that of the deadband.
+    """
+    if ranges.ideal is None:
+        return None
+    band = DEADBAND * ranges.ideal.width
+    for verdict, span in (
+        (Verdict.CRITICAL, ranges.critical),
+        (Verdict.STRESSED, ranges.ideal),
+    ):
+        if span is None:
+            continue
+        for sign, limit in ((-1.0, span.low + band), (1.0, span.high - band)):
+            is_near = (reading.value - limit) * sign > 0.0
+            if is_near and _was_out(reading, verdict, sign, sensor, recent):
+                since_ns = reading.observed_at_ns
+                return Reason(Kind.RANGE, verdict, reading.name, reading.value, limit, since_ns)
+    return None
+
+
+def _was_out(
+    reading: Reading, verdict: Verdict, sign: float, sensor: Sensor, recent: Recent
+) -> bool:
+    for scan in reversed(recent.scans):
+        if scan.stamp_ns >= (reading.observed_at_ns or 0):
+            continue
+        value = _value_of(scan, reading.name)
+        if value is None or not sensor.is_plausible(value):
+            continue
+        ranges = sensor.ranges(is_day=scan.is_day, species=scan.species)
+        span = ranges.critical if verdict is Verdict.CRITICAL else ranges.ideal
+        if span is None or ranges.ideal is None:
+            return False
+        band = DEADBAND * ranges.ideal.width
+        limit, within = (span.low, span.low + band) if sign < 0.0 else (span.high, span.high - band)
+        if (value - limit) * sign > 0.0:
+            return True
+        if (value - within) * sign <= 0.0:
+            return False
+    return False
+
+
+def _value_of(scan: Scanned, name: str) -> float | None:
+    """What a scan says of a sensor, measured or derived."""
+    if name in scan.values or name not in DERIVED:
+        return scan.values.get(name)
+    values = [scan.values.get(source) for source in DERIVED[name].sources]
+    if None in values:
+        return None
+    return DERIVED[name].formula(*(value for value in values if value is not None))
 
 
 def judge_value(reading: Reading, ranges: Ranges) -> Reason | None:
@@ -170,10 +243,12 @@ def with_derived(tags: Sequence[TagState], sensor_type: str) -> Sequence[TagStat
 def judge_house(tags: Mapping[Verdict, int], *, is_silent: bool) -> Health:
     """The house is its worst tag; unknown where more than half of its tags are, or none speaks.
 
-    `tags` is how many have each verdict.
+    What is critical goes before what is not known. `tags` is how many have each verdict.
     """
     if is_silent:
         return Health(Verdict.UNKNOWN, (Reason(Kind.SILENT, Verdict.UNKNOWN),))
+    if tags.get(Verdict.CRITICAL, 0):
+        return Health(Verdict.CRITICAL)
     if 2 * tags.get(Verdict.UNKNOWN, 0) > sum(tags.values()):
         return Health(Verdict.UNKNOWN)
     return Health(worst(v for v, count in tags.items() if count) or Verdict.UNKNOWN)
@@ -229,6 +304,10 @@ def _of_tries(tag: TagState) -> Iterable[Reason]:
 def _of_flowers(tag: TagState) -> Iterable[Reason]:
     flower = tag.flower
     if flower is not NO_FLOWER and flower.anomaly:
-        yield Reason(
-            Kind.PEST, Verdict.CRITICAL, value=float(flower.bug_count), since_ns=tag.looked_at_ns
-        )
+        yield pest(flower.bug_count, tag.looked_at_ns)
+
+
+def pest(bug_count: int, since_ns: int | None) -> Reason:
+    """That a look saw pests: critical if it counted any, else somebody should look."""
+    verdict = Verdict.CRITICAL if bug_count else Verdict.STRESSED
+    return Reason(Kind.PEST, verdict, value=float(bug_count), since_ns=since_ns)

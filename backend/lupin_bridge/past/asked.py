@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from hashlib import blake2b
 from pickle import PickleBuffer
 from typing import Any, Final, Protocol
@@ -18,8 +18,8 @@ import orjson
 from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import FieldFormat
 from lupin_bridge.judge.choosing import Criteria
+from lupin_bridge.judge.daily import DAILY
 from lupin_bridge.judge.derived import DERIVED
-from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.past import as_of, complete, derived, history, timeline
 from lupin_bridge.past.as_of import FieldAsked, Plan, Written
 from lupin_bridge.past.query import TimelineQuery
@@ -209,6 +209,27 @@ class Field:
         return as_of.field(snapshot, self.asked, self.field_format)
 
 
+@dataclass(frozen=True, slots=True)
+class DailyField:
+    """A field as of a moment of what is made of a day's readings; night is by the clock."""
+
+    at_ns: int
+    field: Field
+    criteria: Criteria = field(compare=False)
+
+    def cost_s(self, tags: int) -> float:
+        """See `Asked`: of each tag, a day's readings are read."""
+        series_s = tags * _series_s("", MAX_POINTS, tags)
+        return tags * (STATE_S_PER_TAG + _PLAN_TAG_S) + series_s + self.field.write_s(tags)
+
+    def look(self) -> Generator[Need, Found, Plan]:
+        """See `Asked`."""
+        snapshot: Snapshot = yield self.at_ns
+        daily = DAILY[self.field.asked.query.sensor_type]
+        tags = yield from derived.with_daily(snapshot.tags, daily, self.at_ns, self.criteria.is_day)
+        return self.field.plan(replace(snapshot, tags=tuple(tags)))
+
+
 # --- over a period --------------------------------------------------------------------------------
 
 
@@ -218,7 +239,7 @@ class History:
 
     request: SeriesRequest
     now_ns: int | None = field(compare=False)
-    sensors: Sensors = field(compare=False)
+    criteria: Criteria = field(compare=False)
     journal: Condition = field(compare=False)
 
     def cost_s(self, tags: int) -> float:
@@ -226,13 +247,14 @@ class History:
         asked = self.request
         # Of what is derived, both of its parts are read, and again for buckets.
         parts_s = 4 * _series_s(asked.tag_id, MAX_POINTS, tags)
-        is_derived = asked.sensor_type in DERIVED
+        is_derived = asked.sensor_type in DERIVED or asked.sensor_type in DAILY
         return _series_s(asked.tag_id, asked.max_points, tags) + (parts_s if is_derived else 0.0)
 
     def look(self) -> Generator[Need, Found, Plan]:
         """See `Asked`."""
-        past = yield from derived.series(self.request)
-        return _plan(history.body(self.request, past, self.now_ns, self.sensors, self.journal))
+        past = yield from derived.series(self.request, self.criteria.is_day)
+        sensors = self.criteria.sensors
+        return _plan(history.body(self.request, past, self.now_ns, sensors, self.journal))
 
 
 @dataclass(frozen=True, slots=True)

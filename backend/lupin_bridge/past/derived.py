@@ -6,19 +6,30 @@ A bucket is of such readings too: of means, no mean of what is derived can be ma
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import replace
+from functools import partial
 from statistics import fmean
 from typing import Any
 
+from lupin_bridge.judge.daily import DAILY, DAY_NS, Daily, IsDay
 from lupin_bridge.judge.derived import DERIVED, Derived
-from lupin_twin.past import MAX_POINTS, PastRefused, SeriesPast, SeriesRequest, grid, seconds
+from lupin_twin.past import (
+    HOUR_NS,
+    MAX_POINTS,
+    PastRefused,
+    SeriesPast,
+    SeriesRequest,
+    grid,
+    seconds,
+)
+from lupin_twin.state import Reading, TagState
 
 # (ns of ROS time, value), oldest first.
 Readings = list[tuple[int, float]]
 
 
-def series(request: SeriesRequest) -> Generator[SeriesRequest, Any, SeriesPast]:
+def series(request: SeriesRequest, is_day: IsDay) -> Generator[SeriesRequest, Any, SeriesPast]:
     """The series that is asked for; a derived one, unless a sensor has its name, of its parts.
 
     Raises:
@@ -26,14 +37,20 @@ def series(request: SeriesRequest) -> Generator[SeriesRequest, Any, SeriesPast]:
 
     """
     measured: SeriesPast = yield request
-    derived = DERIVED.get(request.sensor_type)
-    if derived is None or measured.stamps_ns:
+    derived, daily = DERIVED.get(request.sensor_type), DAILY.get(request.sensor_type)
+    if measured.stamps_ns:
         return measured
-    period, readings = yield from _readings(derived, request)
+    if derived is not None:
+        read = partial(_readings, derived)
+    elif daily is not None:
+        read = partial(_of_days, daily, is_day)
+    else:
+        return measured
+    period, readings = yield from read(request)
     if len(readings) > request.max_points:
         told = grid(period.start_ns, period.end_ns, request.max_points)
         wider = replace(request, start_ns=told.start_ns, end_ns=told.end_ns)
-        _, readings = yield from _readings(derived, wider)
+        _, readings = yield from read(wider)
         buckets: dict[int, list[float]] = {}
         for stamp_ns, value in readings:
             buckets.setdefault((stamp_ns - told.start_ns) // told.bucket_ns, []).append(value)
@@ -53,6 +70,62 @@ def series(request: SeriesRequest) -> Generator[SeriesRequest, Any, SeriesPast]:
     return replace(
         period, stamps_ns=stamps, counts=ones, means=values, minima=values, maxima=values
     )
+
+
+def with_daily(
+    tags: Sequence[TagState], daily: Daily, at_ns: int, is_day: IsDay
+) -> Generator[SeriesRequest, Any, list[TagState]]:
+    """The tags as of a moment, those of which it is known with a reading of the quantity too.
+
+    Raises:
+        PastRefused: more readings of a day than can be asked for at once.
+
+    """
+    found = []
+    for tag in tags:
+        names = {reading.name for reading in tag.readings}
+        if daily.sensor not in names or daily.name in names:
+            found.append(tag)
+            continue
+        start_ns = max(1, at_ns - DAY_NS)
+        asked = SeriesRequest(tag.tag_id, daily.sensor, start_ns, at_ns + 1, MAX_POINTS)
+        part: SeriesPast = yield asked
+        value = daily.at(at_ns, _finite(daily.name, daily.sensor, part), is_day)
+        if math.isfinite(value):
+            readings = (*tag.readings, Reading(daily.name, value, at_ns))
+            tag = replace(tag, readings=readings)  # noqa: PLW2901
+        found.append(tag)
+    return found
+
+
+def _of_days(
+    daily: Daily, is_day: IsDay, request: SeriesRequest
+) -> Generator[SeriesRequest, Any, tuple[SeriesPast, Readings]]:
+    """The period, empty, and a value at the last reading of each hour in it."""
+    first_ns = max(1, request.start_ns - DAY_NS) if request.start_ns else 0
+    asked = replace(request, sensor_type=daily.sensor, start_ns=first_ns, max_points=MAX_POINTS)
+    part: SeriesPast = yield asked
+    start_ns = request.start_ns or part.start_ns
+    every = _finite(daily.name, daily.sensor, part)
+    last = {at_ns // HOUR_NS: at_ns for at_ns, _ in every if at_ns >= start_ns}
+    readings = []
+    for at_ns in last.values():
+        value = daily.at(at_ns, every, is_day)
+        if math.isfinite(value):
+            readings.append((at_ns, value))
+    return SeriesPast(start_ns, part.end_ns), readings
+
+
+def _finite(name: str, sensor: str, part: SeriesPast) -> Readings:
+    """The readings of a series that came as they are."""
+    if part.is_bucketed:
+        raise PastRefused(
+            f"{name} is made of {sensor}, reading by reading, and from {seconds(part.start_ns)} s"
+            f" to {seconds(part.end_ns)} s there are more than {MAX_POINTS} of them, the limit, or"
+            " hours alone: ask for a shorter period"
+        )
+    pairs = zip(part.stamps_ns, part.means, strict=True)
+    return [(at_ns, value) for at_ns, value in pairs if math.isfinite(value)]
 
 
 def _readings(

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from itertools import accumulate, pairwise
 from typing import Any, Final
 
+from lupin_bridge.judge.daily import DAILY
 from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.past import complete
 from lupin_bridge.stream.state_json import stamp
@@ -58,7 +59,8 @@ def body(
 def unit(asked: SeriesRequest, sensors: Sensors) -> str:
     """The unit of what is asked for; events but the length of a silence have none."""
     if asked.event is None:
-        return sensors.named(asked.sensor_type).unit
+        daily = DAILY.get(asked.sensor_type)
+        return sensors.named(asked.sensor_type).unit or (daily.unit if daily else "")
     return "s" if asked.event is Event.SILENCES else ""
 
 

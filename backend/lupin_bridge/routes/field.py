@@ -11,12 +11,13 @@ from lupin_bridge.field import formats as field_formats
 from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import JSON, FieldFormat
 from lupin_bridge.field.query import FieldQuery
+from lupin_bridge.judge.daily import DAILY
 from lupin_bridge.judge.derived import DERIVED
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.as_of import FieldAsked
-from lupin_bridge.past.asked import Field
+from lupin_bridge.past.asked import DailyField, Field
 from lupin_bridge.query_string import parameters_of, read
-from lupin_bridge.routes.as_of import response_as_of
+from lupin_bridge.routes.as_of import response_as_of, response_of_past
 from lupin_bridge.routes.computing import (
     field_answer,
     is_large,
@@ -34,6 +35,8 @@ from lupin_twin.fields import FieldRefused, FieldRequest, check_request
 router = APIRouter()
 
 # What judging a tag by its neighbours takes, roughly and at worst.
+# What is made of a day's readings changes slowly: now is the last whole minute.
+_MINUTE_NS: Final = 60 * 1_000_000_000
 _JUDGE_TAG_S: Final = 20e-6
 
 
@@ -54,7 +57,7 @@ async def _quality(request: Request) -> Response:
     bridge = bridge_of(request)
     query = read(FieldQuery, request.query_params.multi_items(), FieldRefused)
     at_ns = past_query.at_of(query.at, bridge.ros_time_ns)
-    if at_ns is not None or query.sensor_type in DERIVED:
+    if at_ns is not None or query.sensor_type in DERIVED or query.sensor_type in DAILY:
         return await _as_of(request, at_ns, query, None)
     asked = request_of(bridge, query)
     check_request(asked, bridge.source.rules().max_grid_cells)
@@ -73,7 +76,7 @@ async def _answer(request: Request, field_format: FieldFormat) -> Response:
     query = read(FieldQuery, request.query_params.multi_items(), FieldRefused)
     at_ns = past_query.at_of(query.at, bridge.ros_time_ns)
     # What is derived, no twin knows: it is made here, of the newest state.
-    if at_ns is not None or query.sensor_type in DERIVED:
+    if at_ns is not None or query.sensor_type in DERIVED or query.sensor_type in DAILY:
         return await _as_of(request, at_ns, query, field_format)
     asked = request_of(bridge, query)
     max_cells = source.rules().max_grid_cells
@@ -98,7 +101,14 @@ async def _as_of(
     sensors = bridge_of(request).criteria.sensors
     asked = FieldAsked(query, source.rules(), source.occupancy_map(), sensors)
     asked.check(field_format or JSON)
-    return await response_as_of(request, at_ns, Field(asked, field_format))
+    of = Field(asked, field_format)
+    now_ns = bridge_of(request).ros_time_ns
+    if query.sensor_type in DAILY and (at_ns is not None or now_ns is not None):
+        if at_ns is None and now_ns is not None:
+            at_ns = now_ns - now_ns % _MINUTE_NS
+        question = DailyField(at_ns or 0, of, bridge_of(request).criteria)
+        return await response_of_past(request, question, "state")
+    return await response_as_of(request, at_ns, of)
 
 
 async def _quality_answer(request: Request, asked: FieldRequest) -> Answer:

@@ -42,8 +42,7 @@ async def _history(request: Request) -> Response:
     bridge = bridge_of(request)
     now_ns = bridge.ros_time_ns
     asked = query.history(request.query_params.multi_items(), now_ns)
-    sensors = bridge.criteria.sensors
-    question = History(asked, now_ns, sensors, bridge.source.journal())
+    question = History(asked, now_ns, bridge.criteria, bridge.source.journal())
     return await response_of_past(request, question, "history")
 
 

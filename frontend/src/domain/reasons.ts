@@ -39,7 +39,9 @@ export function reasonText(
       // Without its numbers it says no more than that.
       return R.other(S.reasons.outOfRange, label);
     case 'reading_failed':
-      return R.readingFailed(label);
+      return value === null
+        ? R.readingFailed(label)
+        : R.implausible(`${label} ${readingText(sensor, value, unit)}`);
     case 'scan_failed':
       return R.scanFailed(S.tried[tryKind(value ?? NaN)], age === null ? null : shortAgeText(age));
     case 'pest':

@@ -33,7 +33,7 @@ test('a sensor is called what the file calls it in that language, else its label
 
 test('the file says what is derived', () => {
   const derived = CATALOGUE.all.filter((sensor) => !isMeasured(sensor));
-  expect(derived.map(({ name }) => name)).toEqual(['vpd', 'dew_point']);
+  expect(derived.map(({ name }) => name)).toEqual(['vpd', 'dew_point', 'condensation_margin']);
 });
 
 describe('ranges', () => {

@@ -39,9 +39,9 @@ const WORDS: Readonly<Record<Verdict, string>> = {
 /** What has to be read in the words for each kind. */
 const SAYS: Readonly<Record<HealthReason['kind'], RegExp>> = {
   range: /, (below|above) [\d.]+( \(critical\))?$/,
-  reading_failed: /: the sensor gives no value$/,
+  reading_failed: /: (the sensor gives no value|no sensor that works reads this)$/,
   scan_failed: /^Last scan failed: (not reachable|not decoded)/,
-  pest: /^\d+ pests? seen$/,
+  pest: /^(\d+ pests?|Pest) seen$/,
   old: /(^Not scanned|^No scan|: no(t| reading) ).* \(readings hold 10\u00a0min\)$/,
   changed: /changed/,
   silent: /silent/,

@@ -38,7 +38,7 @@ def test_air_at_its_dew_point_is_saturated(temperature_c: float, humidity: float
 
 @pytest.mark.parametrize(
     ("temperature_c", "humidity"),
-    [(20.0, -0.1), (20.0, 100.1), (-40.1, 50.0), (80.1, 50.0), (math.nan, 50.0), (20.0, math.nan)],
+    [(20.0, -0.1), (20.0, 105.1), (-40.1, 50.0), (80.1, 50.0), (math.nan, 50.0), (20.0, math.nan)],
 )
 def test_of_what_cannot_be_nothing_is_derived(temperature_c: float, humidity: float) -> None:
     for derived in DERIVED.values():
@@ -47,3 +47,8 @@ def test_of_what_cannot_be_nothing_is_derived(temperature_c: float, humidity: fl
 
 def test_dry_air_has_no_dew_point() -> None:
     assert math.isnan(dew_point_c(20.0, 0.0))
+
+
+def test_a_sensor_that_reads_a_little_high_in_saturated_air_is_taken_for_saturated() -> None:
+    assert vapour_pressure_deficit_kpa(20.0, 100.4) == 0.0
+    assert dew_point_c(20.0, 105.0) == pytest.approx(20.0)

@@ -92,7 +92,7 @@ def test_dusk_is_no_alarm_and_a_dim_day_is() -> None:
     assert dim(110) == []
     (alarm,) = dim(120)
     assert (alarm.reason.sensor, alarm.raised_at_ns) == ("light", 120 * MINUTE)
-    (bright,) = alarms(scan(1, light=2000), scan(2, light=2000))
+    (bright,) = alarms(scan(1, light=60_000), scan(2, light=60_000))
     assert bright.raised_at_ns == 2
 
 

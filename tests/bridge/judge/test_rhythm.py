@@ -23,5 +23,5 @@ def test_before_two_scans_there_is_none() -> None:
 def test_readings_hold_for_three_intervals_within_bounds() -> None:
     assert holds_ns(30 * MINUTE) == 90 * MINUTE
     assert holds_ns(MINUTE) == SHORTEST_NS == 10 * MINUTE
-    assert holds_ns(None) == SHORTEST_NS
+    assert holds_ns(None) == LONGEST_NS
     assert holds_ns(24 * 60 * MINUTE) == LONGEST_NS == 24 * 60 * MINUTE

@@ -54,12 +54,43 @@ def test_the_file_that_comes_with_the_bridge_is_good() -> None:
     assert {"vpd", "dew_point"} <= sensors.by_name.keys()
 
 
+def test_every_judged_sensor_of_it_has_a_source_and_what_is_measured_can_be_plausible() -> None:
+    text = files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8")
+    for name, entry in json.loads(text)["sensors"].items():
+        assert re.search(r"(19|20)\d\d", entry["source"]), name
+        assert ("plausible" in entry) is not entry.get("derived", False), name
+    temperature = parse(text).named("temperature")
+    assert [temperature.is_plausible(value) for value in (-300.0, -40.0, 80.0, 80.1)] == (
+        [False, True, True, False]
+    )
+    nobody = parse(text).named("ph")
+    assert [nobody.is_plausible(value) for value in (1e9, float("nan"), float("-inf"))] == (
+        [True, False, False]
+    )
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "why"),
+    [
+        ("plausible", [80, -40], "low must be less than high"),
+        ("plausible", "any", "plausible: Input should be a valid array"),
+        ("source", 5, "source: Input should be a valid string"),
+        ("source", "x" * 401, "source: String should have at most 400 characters"),
+    ],
+)
+def test_what_is_wrong_with_limits_and_sources_is_told(path: str, value: Any, why: str) -> None:
+    with pytest.raises(SensorsError, match=re.escape(why)):
+        parse(text_with(f"sensors/temperature/{path}", value))
+
+
 def test_the_file_says_what_is_derived() -> None:
     vpd = {"label": "", "unit": "kPa", "hue": 1, "lightness": 50, "ideal": None}
     with pytest.raises(SensorsError, match=r"sensors\.vpd\.derived is False; computed here"):
         parse(text_with("sensors/vpd", vpd))
     assert parse(text_with("sensors/vpd", vpd | {"derived": True})).named("vpd").unit == "kPa"
-    with pytest.raises(SensorsError, match=r"derived is True; computed here are dew_point "):
+    with pytest.raises(
+        SensorsError, match=r"derived is True; computed here are condensation_margin "
+    ):
         parse(text_with("sensors/temperature/derived", True))
     with pytest.raises(SensorsError, match=r"derived: Input should be a valid boolean, not 1"):
         parse(text_with("sensors/vpd", vpd | {"derived": 1}))

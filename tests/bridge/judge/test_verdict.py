@@ -96,7 +96,8 @@ def test_what_was_observed_after_now_is_as_old_as_now() -> None:
         (["stressed", "critical", "healthy"], "critical"),
         (["unknown", "healthy"], "unknown"),
         (["unknown", "stressed", "healthy"], "stressed"),
-        (["unknown", "unknown", "critical"], "unknown"),
+        (["unknown", "unknown", "critical"], "critical"),
+        (["unknown", "unknown", "stressed"], "unknown"),
         ([], "unknown"),
     ],
 )

@@ -154,8 +154,8 @@ def test_a_moment_is_judged_by_the_light_of_then_else_by_its_clock() -> None:
 
 def test_readings_held_as_long_as_the_scans_up_to_then_say() -> None:
     old = TagState("a", readings=(Reading("temperature", 22.0, NS),))
-    assert verdict_of(judged_at(601, old))[0] == "healthy"
-    assert verdict_of(judged_at(602, old))[0] == "unknown"
+    assert verdict_of(judged_at(601, old, before_s=[1.0]))[0] == "healthy"
+    assert verdict_of(judged_at(602, old, before_s=[1.0]))[0] == "unknown"
     assert verdict_of(judged_at(602, old, before_s=[240.0]))[0] == "healthy"
 
 
@@ -163,8 +163,8 @@ def test_the_etag_of_a_judgement_is_that_of_what_is_said() -> None:
     old = TagState("a", readings=(Reading("temperature", 22.0, NS),))
     first = judged_at(602, old, before_s=[240.0]).etag
     assert judged_at(602, old, before_s=[240.0]).etag == first
-    assert judged_at(602, old).etag != first
-    assert judged_at(601, old).etag != first
+    assert judged_at(602, old, before_s=[1.0]).etag != first
+    assert judged_at(601, old, before_s=[240.0]).etag != first
 
 
 # --- refusals -------------------------------------------------------------------------------------

@@ -10,13 +10,14 @@ from typing import Any
 import pytest
 
 from lupin_bridge.field.formats import PNG
-from lupin_bridge.judge.choosing import Criteria, own_sensors
+from lupin_bridge.judge.choosing import Criteria
 from lupin_bridge.past.as_of import Written
 from lupin_bridge.past.asked import (
     Answered,
     Answering,
     Asked,
     AsOf,
+    DailyField,
     Field,
     Health,
     History,
@@ -39,9 +40,10 @@ QUESTIONS: tuple[Asked, ...] = (
     AsOf(5 * NS, WholeState()),
     AsOf(5 * NS, OneTag("b")),
     Health(5 * NS, CRITERIA),
+    DailyField(5 * NS, Field(asked(sensor_type="co2_dose"), PNG), CRITERIA),
     AsOf(5 * NS, Field(asked(), PNG)),
     AsOf(5 * NS, Field(asked(), None)),
-    History(SeriesRequest("a", "co2"), 9 * NS, own_sensors(), UNKNOWN),
+    History(SeriesRequest("a", "co2"), 9 * NS, CRITERIA, UNKNOWN),
     Timeline(TimelineQuery(0, 9 * NS, 5, None), UNKNOWN),
 )
 
@@ -108,7 +110,7 @@ def test_a_large_house_and_a_large_field_cost_more_than_small_ones() -> None:
     fine = AsOf(0, Field(asked(resolution=0.001), PNG))
     assert fine.cost_s(30) > SMALL_S, "one that will be refused is no small one"
     # All that is looked up counts, and not the first of it alone.
-    history = History(SeriesRequest("a", "co2"), None, own_sensors(), UNKNOWN)
+    history = History(SeriesRequest("a", "co2"), None, CRITERIA, UNKNOWN)
     assert history.cost_s(30) < SMALL_S
     assert Timeline(TimelineQuery(0, 0, 1, "a"), UNKNOWN).cost_s(30) > SMALL_S
     for question in QUESTIONS[:5]:

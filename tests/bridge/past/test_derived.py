@@ -8,9 +8,11 @@ from typing import Any
 
 import pytest
 
+from lupin_bridge.judge.daily import DAILY, DAY_NS
 from lupin_bridge.judge.derived import vapour_pressure_deficit_kpa as vpd
 from lupin_bridge.past import derived
 from lupin_twin.past import MAX_POINTS, PastRefused, SeriesPast, SeriesRequest
+from lupin_twin.state import Reading, TagState
 
 S = 10**9
 NOW_NS = 1_000 * S
@@ -23,9 +25,13 @@ HOUSE: Known = {
 ASKED = SeriesRequest("a", "vpd", 0, 0, 100)
 
 
+def is_day(at_ns: int) -> bool:
+    return at_ns % DAY_NS < DAY_NS // 2
+
+
 def answer(request: SeriesRequest, known: Known) -> tuple[SeriesPast, list[SeriesRequest]]:
     """What is made of a house that has these readings, and what was asked for."""
-    looking, asked = derived.series(request), list[SeriesRequest]()
+    looking, asked = derived.series(request, is_day), list[SeriesRequest]()
     found: Any = None
     try:
         while True:
@@ -88,3 +94,57 @@ def test_too_many_to_be_read_one_by_one_are_refused_by_name_and_limit() -> None:
         "1000.000000002 s temperature has more than 5000 of them, the limit, or hours alone: ask "
         "for a shorter period"
     )
+
+
+HOUR_NS = 3_600 * S
+COURSE: Known = {
+    "light": {n * HOUR_NS // 2: 1000.0 * is_day(n * HOUR_NS // 2) for n in range(1, 160)}
+}
+
+
+def test_a_quantity_of_a_day_has_a_value_an_hour_of_the_day_up_to_then() -> None:
+    request = SeriesRequest("a", "daily_light_integral", 30 * HOUR_NS, 60 * HOUR_NS, 100)
+    past, asked = answer(request, COURSE)
+    assert [(it.sensor_type, it.start_ns // HOUR_NS) for it in asked] == [
+        ("daily_light_integral", 30),
+        ("light", 6),
+    ]
+    assert [at_ns / HOUR_NS for at_ns in past.stamps_ns] == [hour + 0.5 for hour in range(30, 60)]
+    assert (past.start_ns, past.end_ns) == (30 * HOUR_NS, 60 * HOUR_NS)
+    readings = list(COURSE["light"].items())
+    daily = DAILY["daily_light_integral"]
+    assert past.means[5] == daily.at(past.stamps_ns[5], readings, is_day)
+    few, _ = answer(replace(request, max_points=4), COURSE)
+    assert (few.is_bucketed, sum(few.counts)) == (True, 30)
+
+
+def test_of_the_first_hours_and_of_too_much_there_is_no_quantity_of_a_day() -> None:
+    request = SeriesRequest("a", "daily_light_integral", 0, 0, 500)
+    past, _ = answer(replace(request, end_ns=80 * HOUR_NS), COURSE)
+    assert past.stamps_ns[0] / HOUR_NS == 20.5
+    many: Known = {"light": {n * S: 1.0 for n in range(1, MAX_POINTS + 2)}}
+    with pytest.raises(PastRefused, match="daily_light_integral is made of light, reading by"):
+        answer(replace(request, end_ns=10_000 * S), many)
+
+
+def test_tags_as_of_a_moment_get_the_quantity_of_the_day_up_to_then() -> None:
+    at_ns = 60 * HOUR_NS
+    lit = TagState("a", readings=(Reading("light", 0.0, at_ns), Reading("co2", 1.0, at_ns)))
+    other = TagState("b", readings=(Reading("co2", 1.0, at_ns),))
+    own = TagState("c", readings=(Reading("light", 1.0, 1), Reading("daily_light_integral", 7.0)))
+    looking = derived.with_daily((lit, other, own), DAILY["daily_light_integral"], at_ns, is_day)
+    need = next(looking)
+    assert (need.tag_id, need.sensor_type, need.start_ns) == ("a", "light", 36 * HOUR_NS)
+    points = [(at, value) for at, value in COURSE["light"].items() if need.start_ns <= at <= at_ns]
+    stamps, values = zip(*points, strict=True)
+    with pytest.raises(StopIteration) as end:
+        looking.send(
+            SeriesPast(
+                need.start_ns, need.end_ns, None, stamps, (1,) * len(points), values, values, values
+            )
+        )
+    found = end.value.value
+    assert found[1:] == [other, own]
+    reading = found[0].readings[-1]
+    expected = DAILY["daily_light_integral"].at(at_ns, points, is_day)
+    assert reading == Reading("daily_light_integral", expected, at_ns)

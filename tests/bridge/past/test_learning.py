@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from lupin_bridge.judge.judging import Judge
+from lupin_bridge.judge.rhythm import LONGEST_NS
 from lupin_bridge.past import learning
 from lupin_bridge.past.learning import learn_recent
 from lupin_bridge.twin.looking import Itself
@@ -16,7 +17,7 @@ from lupin_bridge.twin.source import TwinUnavailableError
 from lupin_twin.past import NotRemembered
 from lupin_twin.past_writes import PastWrite, RecentRequest
 from lupin_twin.state import Snapshot
-from tests.support.seen import HOLDS_NS, NOW_NS, SENSORS, S, by_light, tag
+from tests.support.seen import NOW_NS, SENSORS, S, by_light, tag
 
 TAGS = ("a", "b")
 HOUR_NS = 3_600 * S
@@ -73,7 +74,7 @@ def test_a_past_that_will_not_be_told_is_no_more_than_a_line_in_the_log(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     caplog.set_level(logging.INFO, learning.__name__)
-    assert learnt(Hesitant(error), monkeypatch) == dict.fromkeys(TAGS, HOLDS_NS)
+    assert learnt(Hesitant(error), monkeypatch) == dict.fromkeys(TAGS, LONGEST_NS)
     assert [record.levelno for record in caplog.records if record.name == learning.__name__] == [
         level
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -72,6 +73,33 @@ def test_every_route_answers_as_of_a_moment(domain: int) -> None:
     run(domain, test())
 
 
+def test_what_is_made_of_a_days_readings_is_asked_for_like_a_sensor(domain: int) -> None:
+    hour_ns = 3600 * NS
+    points = [(n * hour_ns, 54_000.0) for n in range(1, 40)]
+    state = house()
+    lit = replace(state.tags[0], readings=(Reading("light", 54_000.0, 39 * hour_ns),))
+    past = MadeUp(
+        points={("a/b", "light"): points},
+        snapshot=replace(state, tags=(lit,)),
+        now_ns=40 * hour_ns,
+    )
+
+    async def test() -> None:
+        async with remembering(past) as it:
+            path = "/api/field.json?sensor_type=daily_light_integral&resolution=0.5"
+            found = (await it.http.get(f"{path}&at={39 * 3600}")).json()
+            # 24 h of 1000 umol/m2/s.
+            assert (found["sample_count"], found["value_max"]) == (1, pytest.approx(86.4))
+            now = (await it.http.get(path)).json()
+            assert now["ok"]
+            asked = "tag_id=a%2Fb&sensor_type=daily_light_integral"
+            history = (await it.http.get(f"/api/history?{asked}&from=108000&to=144000")).json()
+            assert history["unit"] == "mol/m²/d"
+            assert [it["value"] for it in history["readings"]] == [pytest.approx(86.4)] * 10
+
+    run(domain, test())
+
+
 def test_who_has_the_answer_is_told_so_and_nothing_is_written_for_him(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -96,7 +124,7 @@ def test_who_has_the_answer_is_told_so_and_nothing_is_written_for_him(
                     answer = await it.http.get(f"{path}&at=9", headers=has)
                     assert (answer.status_code, answer.content) == (304, b"")
                     assert answer.headers["etag"] == tag
-            past.snapshot = house(1200.0)  # observed before, heard late
+            past.snapshot = house(1600.0)  # observed before, heard late
             for path, tag in tags.items():
                 answer = await it.http.get(f"{path}&at=9", headers={"If-None-Match": tag})
                 assert answer.status_code == 200

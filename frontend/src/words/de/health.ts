@@ -16,6 +16,7 @@ export const HEALTH: In<typeof ENGLISH> = {
       `${reading}, ${side} ${limit}${isCritical ? ' (kritisch)' : ''}`,
     beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
     readingFailed: (sensor) => `${sensor}: Der Sensor liefert keinen Wert`,
+    implausible: (reading) => `${reading}: Das misst kein heiler Sensor`,
     scanFailed: (outcome, age) =>
       `Letzte Messung gescheitert: ${outcome}${age === null ? '' : `, vor ${age}`}`,
     pest: (count) =>

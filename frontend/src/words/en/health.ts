@@ -16,6 +16,7 @@ export const HEALTH = {
     /** What is wrong, whatever the value is by now. */
     beyond: (sensor: string, side: string, limit: string): string => `${sensor} ${side} ${limit}`,
     readingFailed: (sensor: string): string => `${sensor}: the sensor gives no value`,
+    implausible: (reading: string): string => `${reading}: no sensor that works reads this`,
     scanFailed: (outcome: string, age: string | null): string =>
       `Last scan failed: ${outcome}${age === null ? '' : `, ${age} ago`}`,
     pest: (count: number): string =>

@@ -16,6 +16,7 @@ export const HEALTH: In<typeof ENGLISH> = {
       `${reading}, ${side} ${limit}${isCritical ? ' (kritiek)' : ''}`,
     beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
     readingFailed: (sensor) => `${sensor}: de sensor geeft geen waarde`,
+    implausible: (reading) => `${reading}: dat meet geen goede sensor`,
     scanFailed: (outcome, age) =>
       `Laatste meting mislukt: ${outcome}${age === null ? '' : `, ${age} geleden`}`,
     pest: (count) =>

@@ -441,6 +441,7 @@ class TwinNode(AdjustableNode):
             self.estimates.restore()
         if self.memory.hold_to(now):
             self.lateness.hold_to(now_ns)
+            self.estimates.hold_to(now_ns)
             self.habits.warn(
                 ("clock", 0),
                 "ROS time has gone back: all observations from later than now age from here on",

@@ -1,4 +1,4 @@
-"""Rounds: models, scans held against their neighbours, sensors that have changed; whose turn it is."""
+"""Rounds: models, scans held against other tags, sensors that have changed; whose turn it is."""
 
 from __future__ import annotations
 

@@ -44,8 +44,8 @@ class EstimateQuality(Contract):
     share_day: float | None = Field(description="inside of scans; null: there are none")
     share_week: float | None
     is_trusted: bool | None = Field(
-        description="false: a share is under 0.8, the intervals are too narrow; null: fewer than 40 "
-        "scans could be held against other tags, so nothing is said"
+        description="false: a share is under 0.8, the intervals are too narrow; null: fewer than "
+        "40 scans could be held against other tags, so nothing is said"
     )
 
 

@@ -19,7 +19,7 @@ from lupin_twin.grid import FloatArray
 # A tag has changed if its readings since some moment, at least so many, are off by so many sds
 # together, and in multiples of how far the other tags are; and the newest alone by as many.
 LEAST_READINGS: Final = 2
-CHANGE_Z: Final = 4.0
+CHANGE_Z: Final = 3.0
 NEWEST_Z: Final = 2.0
 # Left out of an unchanged tag, to say what was expected of the newest.
 _LAST: Final = 4

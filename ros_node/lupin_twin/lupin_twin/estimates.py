@@ -38,7 +38,7 @@ PARTS_A_DAY: Final = 24
 # What answers take, roughly and at worst, s of one core: for each pair of readings or, of many
 # tags, for each of these; and for each cell.
 _PAIR_S: Final = 0.3e-6
-_TAG_S: Final = 600e-6
+_TAG_S: Final = 500e-6
 _CELL_S: Final = 0.1e-6
 
 

@@ -24,7 +24,7 @@ PER_TAG: Final = 6
 NEAREST: Final = 32
 EVERYWHERE: Final = 64
 # Places between so many tags share their neighbours.
-_TOGETHER: Final = 8
+_TOGETHER: Final = 12
 
 
 def shared_out(xy: FloatArray, places: FloatArray) -> Iterator[tuple[IntArray, IntArray]]:

@@ -220,8 +220,7 @@ class EstimateService:
             self._habits.warn(
                 ("trust", sensor),
                 f"the estimate of {sensor} is too sure of itself: of {record.week.scans} scans, "
-                f"{record.week.inside} came to lie where 9 of 10 were predicted; is day_length_s, "
-                f"{self._rules.day_length_s:g} s, how long a day takes?",
+                f"{record.week.inside} came to lie where 9 of 10 were predicted",
             )
         self.go_on()
 

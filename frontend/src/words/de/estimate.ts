@@ -27,7 +27,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   fitProblem: (reason) => `Das Haus kennenzulernen gelingt nicht recht: ${reason}`,
   notTrusted: (count) =>
     `Nicht auf das ± verlassen: Nur ${count} von 10 Messungen lagen dort, wo die anderen ` +
-    'Messpunkte sie erwarten ließen, nicht 9. Stimmt die eingestellte Länge des Tages?',
+    'Messpunkte sie erwarten ließen, nicht 9.',
   near: (count) =>
     count === 0
       ? 'kein Messpunkt in der Nähe'

@@ -25,8 +25,7 @@ export const ESTIMATE = {
     `last week: ${inside} of ${counted(scans, 'scan', 'scans')}`,
   fitProblem: (reason: string): string => `Learning the house is not going well: ${reason}`,
   notTrusted: (count: number): string =>
-    `Do not rely on the ±: only ${count} of 10 scans lay where the other tags put them, not 9. ` +
-    'Is the length of the day set right?',
+    `Do not rely on the ±: only ${count} of 10 scans lay where the other tags put them, not 9.`,
   near: (count: number): string =>
     count === 0 ? 'no tag near' : counted(count, 'tag near', 'tags near'),
   oldest: (age: string): string => `oldest reading ${age}`,

@@ -26,8 +26,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
     `última semana: ${inside} de ${counted(scans, 'medición', 'mediciones')}`,
   fitProblem: (reason) => `No se consigue conocer bien la casa: ${reason}`,
   notTrusted: (count) =>
-    `No se fíe del ±: solo ${count} de 10 mediciones estaban donde indicaban los otros puntos, no 9. ` +
-    '¿Es correcta la duración del día?',
+    `No se fíe del ±: solo ${count} de 10 mediciones estaban donde indicaban los otros puntos, no 9.`,
   near: (count) =>
     count === 0 ? 'ningún punto cerca' : counted(count, 'punto cerca', 'puntos cerca'),
   oldest: (age) => `lectura más antigua: ${age}`,

@@ -27,7 +27,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   fitProblem: (reason) => `De kas leren kennen lukt niet goed: ${reason}`,
   notTrusted: (count) =>
     `Vertrouw niet op de ±: maar ${count} van de 10 metingen lagen waar de andere ` +
-    'meetpunten ze verwachtten, geen 9. Is de lengte van de dag goed ingesteld?',
+    'meetpunten ze verwachtten, geen 9.',
   near: (count) =>
     count === 0
       ? 'geen meetpunt in de buurt'

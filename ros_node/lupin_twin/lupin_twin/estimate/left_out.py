@@ -72,12 +72,13 @@ class LeftOut:
         """Of readings that were solved."""
         return cls(factor.readings, wider, factor.root.T @ factor.root, factor.alpha)
 
-    def changed(self, tags: IntArray) -> dict[int, tuple[float, float, float | None]]:
-        """Of each of these tags: z, offset, and since when it has changed, s.
+    def changed(self) -> dict[int, tuple[float, float, float | None]]:
+        """Of each tag: z, offset, and since when it has changed, s.
 
         The clearest first; those that are left are judged without what it has read since then.
         """
         result: dict[int, tuple[float, float, float | None]] = {}
+        tags = np.unique(self.readings.tag)
         rest, left = self, tags.tolist()
         while left:
             found = {tag: rest._onset(tag) for tag in left}

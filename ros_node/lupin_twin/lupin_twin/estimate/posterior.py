@@ -95,7 +95,7 @@ class Posterior:
         result: list[Change | None] = [None] * len(self.readings.xy)
         of, spread = self._present, self.scale.spread
         for left_out, tags, judged in self._left_out():
-            found = left_out.changed(judged)
+            found = left_out.changed()
             for row in judged.tolist():
                 z, offset, since_s = found[row]
                 off = left_out.last(row, since_s)

@@ -78,7 +78,7 @@ def case_of(world: World, phase: str, seed: int) -> Case:
         falloff_radius_m=RULES.falloff_radius_m,
         max_distance_m=RULES.max_distance_m,
         power=RULES.idw_power,
-    ).values
+    ).values.astype(np.float64)
     truth = world.truth(places, np.full(len(places), at_s))
     return Case(world, thinned(all_read, at_s, 24.0 * HOUR_S), at_s, places, truth, idw)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -80,7 +81,8 @@ def judged(tags: int, metres: float, seed: int, phase: str) -> list[float]:
     truth, heard = house(tags, metres, seed, passes)
     readings = thinned(heard, silent_s, DAY_S)
     cell_m = metres / CELLS
-    box = {"bbox_min_x": 0.0, "bbox_min_y": 0.0, "bbox_max_x": metres, "bbox_max_y": metres}
+    box: dict[str, Any] = {"bbox_min_x": 0.0, "bbox_min_y": 0.0}
+    box |= {"bbox_max_x": metres, "bbox_max_y": metres}
     newest = {int(tag): row for row, tag in enumerate(heard.tag)}
     field = compute_idw_field(
         [(*heard.xy[tag].tolist(), float(heard.value[row])) for tag, row in newest.items()],

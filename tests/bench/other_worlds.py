@@ -53,7 +53,7 @@ class World:
         chance = np.random.default_rng([seed, 1])
         order = chance.permutation(len(self.xy))
         step_s = self.round_s / len(order)
-        time_s = np.arange(int(until_s / step_s) + 1) * step_s
+        time_s: Floats = np.arange(int(until_s / step_s) + 1, dtype=np.float64) * step_s
         tag = order[np.arange(len(time_s)) % len(order)]
         values = self.sensor(self.truth(self.xy[tag], time_s), tag, time_s, chance)
         return Readings(time_s, tag, values + chance.normal(0.0, self.noise, len(tag)), self.xy)

@@ -123,7 +123,7 @@ def done(model: Any = MODEL, scans: int = 4, inside: int = 3) -> Done:
 
 
 def heard(watch: Watch, sensor: str, times: int) -> bool:
-    return sum(watch.hear(scan(n * S, **{sensor: 20.0})) for n in range(times)) > 0
+    return sum(watch.hear(scan(n * S, "a", **{sensor: 20.0})) for n in range(times)) > 0
 
 
 def take_turn(watch: Watch, at_s: float, outcome: Done | Exception | None = None) -> Round:

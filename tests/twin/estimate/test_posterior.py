@@ -78,7 +78,8 @@ def test_a_fine_grid_is_interpolated_and_off_by_little(length: float) -> None:
 def beside(posterior: Posterior, grid: EstimateGrid) -> tuple[FloatArray, FloatArray, Any, Any]:
     """Mean and sd at the centres of some cells, and which."""
     chosen = np.random.default_rng(1).integers((grid.width, grid.height), size=(300, 2))
-    centres = (chosen + 0.5) * grid.resolution + (grid.origin_x, grid.origin_y)
+    centres = (chosen.astype(np.float64) + 0.5) * grid.resolution
+    centres += (grid.origin_x, grid.origin_y)
     x, y = chosen.T
     return (*posterior.points(centres), x, y)
 
@@ -116,7 +117,8 @@ def test_of_more_readings_than_can_be_solved_at_once_the_nearest_say_nearly_the_
 
 def test_tags_at_one_place_however_many_make_an_estimate() -> None:
     tag = np.arange(MAX_EXACT + 1)
-    same = Readings(tag * 10.0, tag, 20.0 + tag % 3, np.zeros((len(tag), 2)))
+    time_s = np.linspace(0.0, DAY_S, len(tag))
+    same = Readings(time_s, tag, 20.0 + np.sin(time_s), np.zeros((len(tag), 2)))
     mean, sd = fit(same).posterior(same, DAY_S).points(PLACES)
     assert np.isfinite(mean).all()
     assert (sd > 0.0).all()

@@ -71,5 +71,6 @@ def best_places(gains: Sequence[Gain], count: int) -> list[Place]:
         free[of][best] = False
         gains[of].take(best)
         ratio = (sum(gain.error for gain in gains) / at_first) ** 0.5 if at_first else 1.0
-        result.append(Place(*gains[of].candidates[best].tolist(), ratio))
+        x, y = gains[of].candidates[best]
+        result.append(Place(float(x), float(y), ratio))
     return result

@@ -91,7 +91,8 @@ class Cells:
         result = np.empty((len(self.y), len(self.x)))
         for cells, places, shares in _shares(self.x, x):
             result[:, cells] = down[:, places] @ shares.T
-        return np.maximum(result, values.min(), out=result)
+        np.maximum(result, values.min(), out=result)
+        return result
 
     def filled(self, mean: FloatArray, sd: FloatArray, sd_known: float) -> EstimateGrid:
         """With mean and sd (len(y), len(x)), in the sensor's unit."""

@@ -87,8 +87,8 @@ class Posterior:
         else:
             mean, sd = self.points(np.stack(np.meshgrid(x, y), axis=-1))
         self._go_on()
-        on_cells = (cells.spread(x, y, one.reshape(len(y), len(x))) for one in (mean, sd))
-        return cells.filled(*on_cells, self.sd_known)
+        mean, sd = (cells.spread(x, y, one.reshape(len(y), len(x))) for one in (mean, sd))
+        return cells.filled(mean, sd, self.sd_known)
 
     def changes(self) -> tuple[Change | None, ...]:
         """For each tag, how far its last readings are off; None for a tag without any."""

@@ -230,7 +230,11 @@ class Bridge:
         known = self._estimates.known
         yield (
             "lupin_estimate_trusted",
-            {name: report.record.is_trusted for name, report in known.items()},
+            {
+                name: trusted
+                for name, report in known.items()
+                if (trusted := report.record.is_trusted) is not None
+            },
         )
         yield (
             "lupin_estimate_fit_failing",

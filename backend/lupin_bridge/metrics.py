@@ -38,8 +38,11 @@ GAUGES: Final = {
 # The same, each with a label of its own.
 LABELLED_GAUGES: Final = {
     "lupin_outward_connected": ("channel", "1 while MQTT's broker, the webhook's receiver takes"),
-    "lupin_estimate_trusted": ("sensor", "1 while its estimates are as often right as they say"),
-    "lupin_estimate_fit_failing": ("sensor", "1 while a fit fails, is slow, or denies the day"),
+    "lupin_estimate_trusted": (
+        "sensor",
+        "1 while its estimates are about as often right as they say; absent while nobody knows",
+    ),
+    "lupin_estimate_fit_failing": ("sensor", "1 while its last round of learning came to nothing"),
     "lupin_outward_waiting": ("channel", "tags and the house, or changes of alarms, not told yet"),
 }
 # Written with `_total` behind the name, as Prometheus wants it.

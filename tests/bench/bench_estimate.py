@@ -1,11 +1,9 @@
-"""How sure the estimate may be: against the simulator's truth, beside IDW and kriging.
+"""How sure the estimate may be, by sorts of greenhouses that share nothing with the simulator.
 
-On houses and seeds that nothing was chosen on, and that were looked at once: priors were chosen on
-seeds 100 to 111, earlier versions held against 1,000 on. As in the node, fits are not told the
-ideal range. Of each field: the error (RMSE) as a ratio to that
-of IDW over the cells that IDW paints, and the share of all cells of the house whose truth lies in
-the 90 % interval. `worse` is the share of fields with a larger error than IDW's, `narrow` that of
-fields with a coverage under 0.7.
+Of each field: the error (RMSE) as a ratio to that of IDW over the cells that IDW paints; the share
+of all cells of the floor whose truth lies in the 90 % interval; the CRPS as a ratio to IDW's error.
+`narrow` is the share of fields with a coverage under 0.7, `worse` that of fields with a larger
+error than IDW's. Numbers were chosen on other seeds (`--choosing`) than these.
 """
 
 from __future__ import annotations
@@ -14,124 +12,126 @@ import argparse
 import sys
 from collections import defaultdict
 from collections.abc import Iterator
+from math import erf, exp, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
-from lupin_bridge.judge.choosing import own_sensors
-from lupin_twin.estimate import Readings, fit
+from lupin_twin.estimate import Model, Readings, fit
+from lupin_twin.estimates import thinned
 from lupin_twin.fields import FieldRules
 from lupin_twin.idw import compute_idw_field
 from lupin_twin.parameters import TwinParameters
-from tests.bench.worlds import HEIGHT_M, HOUR_S, PASS_S, WIDTH_M, Floats, World, others, own
+from tests.bench.other_worlds import CHOOSING, HOUR_S, JUDGING, SORTS, Floats, World, world_of
 
 CELL_M = 0.25
 INTERVAL_SDS = 1.645
 RULES = FieldRules.of(TwinParameters())
-# How long the patrol has driven, and how long it has stood since, s.
-PHASES = {
-    "10 scans": (9 * PASS_S / 30, 0.0),
-    "one pass": (PASS_S, 0.0),
-    "steady": (20 * HOUR_S, 0.0),
-    "dead 6 h, first day": (15 * HOUR_S, 6 * HOUR_S),
-    "dead 6 h, second day": (40 * HOUR_S, 6 * HOUR_S),
-}
+# How long the robot has driven, in rounds or hours, and how long it has stood since, h.
+PHASES = {"after one round": (None, 0.0), "steady": (20.0, 0.0), "silent for 6 h": (30.0, 6.0)}
 
 
-def cells() -> Floats:
-    xs = (np.arange(int(WIDTH_M / CELL_M)) + 0.5) * CELL_M
-    ys = (np.arange(int(HEIGHT_M / CELL_M)) + 0.5) * CELL_M
-    return np.array([(x, y) for y in ys for x in xs])
+class Field(NamedTuple):
+    """What one estimate came to; error and CRPS as ratios to IDW's error."""
+
+    error: float
+    covers: float
+    crps: float
 
 
-def latest(readings: Readings) -> Readings:
-    """The newest of each tag."""
-    newest = {int(tag): index for index, tag in enumerate(readings.tag)}
-    return readings.take(np.array(sorted(newest.values())))
+class Case(NamedTuple):
+    """A greenhouse at a moment: the readings that count, the cells' places, what is true there."""
+
+    world: World
+    readings: Readings
+    at_s: float
+    places: Floats
+    truth: Floats
+    idw: Floats
 
 
-def judged(
-    world: World, of_house: int, phase: str, *, knows_ideal: bool
-) -> Iterator[tuple[str, float, float]]:
-    """(method, RMSE over IDW's cells, coverage over all)."""
-    drives_s, stands_s = PHASES[phase]
-    at_s = drives_s + stands_s
-    heard = world.scans(of_house, drives_s).recent(at_s)
-    if len(heard) < 2:
-        return
-    places = cells()
-    truth = world.truth(places, at_s)
-    now = latest(heard)
-    field = compute_idw_field(
-        list(zip(*world.xy[now.tag].T, now.value, strict=True)),
+def cases(seeds: range, sorts: Iterator[str] | None = None) -> Iterator[tuple[str, str, Case]]:
+    """(sort, phase, case)."""
+    for sort in sorts or SORTS:
+        for seed in seeds:
+            world = world_of(sort, seed)
+            for phase in PHASES:
+                yield sort, phase, case_of(world, phase, seed)
+
+
+def case_of(world: World, phase: str, seed: int) -> Case:
+    hours, silent_h = PHASES[phase]
+    drives_s = world.round_s if hours is None else hours * HOUR_S
+    at_s = drives_s + silent_h * HOUR_S
+    all_read = world.read(drives_s, seed)
+    width, height = (int(side / CELL_M) for side in world.size_m)
+    x, y = (np.arange(width) + 0.5) * CELL_M, (np.arange(height) + 0.5) * CELL_M
+    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    newest = {int(tag): row for row, tag in enumerate(all_read.tag)}
+    idw = compute_idw_field(
+        [(*world.xy[tag].tolist(), float(all_read.value[row])) for tag, row in newest.items()],
         bbox_min_x=0.0,
         bbox_min_y=0.0,
-        bbox_max_x=WIDTH_M,
-        bbox_max_y=HEIGHT_M,
+        bbox_max_x=width * CELL_M,
+        bbox_max_y=height * CELL_M,
         resolution=CELL_M,
         falloff_radius_m=RULES.falloff_radius_m,
         max_distance_m=RULES.max_distance_m,
         power=RULES.idw_power,
-    ).values
-    painted = np.isfinite(field)
-    yield "idw", rmse(field[painted] - truth[painted]), float("nan")
-    ideal = own_sensors().named(world.sensor).ranges(is_day=True, species="").ideal
-    range_ = None if ideal is None or not knows_ideal else (ideal.low, ideal.high)
-    all_now = Readings(np.full(len(now), at_s), now.tag, now.value, now.xy)
-    for method, readings in (("estimate", heard), ("kriging", all_now)):
-        mean, sd = fit(readings, ideal=range_).posterior(readings, at_s).points(places)
-        inside = np.abs(mean - truth) <= INTERVAL_SDS * sd
-        yield method, rmse(mean[painted] - truth[painted]), float(inside.mean())
+    ).values.astype(np.float64)
+    truth = world.truth(places, np.full(len(places), at_s))
+    return Case(world, thinned(all_read, at_s, 24.0 * HOUR_S), at_s, places, truth, idw)
+
+
+def judged(case: Case, model: Model | None = None) -> Field:
+    model = fit(case.readings) if model is None else model
+    mean, sd = model.posterior(case.readings, case.at_s).points(case.places)
+    painted = np.isfinite(case.idw)
+    of_idw = rmse(case.idw[painted] - case.truth[painted])
+    off = case.truth - mean
+    inside = np.abs(off) <= INTERVAL_SDS * sd
+    return Field(
+        rmse(off[painted]) / of_idw, float(inside.mean()), float(crps(off, sd).mean()) / of_idw
+    )
+
+
+def crps(off: Floats, sd: Floats) -> Floats:
+    """Of normal distributions (Gneiting and Raftery, 2007, eq. 21)."""
+    z = off / sd
+    below = np.array([0.5 * (1.0 + erf(one / sqrt(2.0))) for one in z])
+    density = np.exp(-(z**2) / 2.0) / sqrt(2.0 * pi)
+    result: Floats = sd * (z * (2.0 * below - 1.0) + 2.0 * density - 1.0 / sqrt(pi))
+    return result
 
 
 def rmse(off: Floats) -> float:
     return float(np.sqrt(np.mean(off**2)))
 
 
+def line(name: str, fields: list[Field]) -> str:
+    """One row: the geometric mean of the errors' ratios, so that each field counts the same."""
+    error, covers, score = np.array(fields).T
+    means = exp(np.log(error).mean()), covers.mean(), exp(np.log(score).mean())
+    shares = (covers < 0.7).mean(), (error > 1.0).mean()
+    return (
+        f"{name:<26}{len(fields):>7}"
+        + "".join(f"{one:>9.2f}" for one in means)
+        + "".join(f"{one:>8.0%}" for one in shares)
+    )
+
+
 def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--first", type=int, default=2000, help="the first seed")
-    parser.add_argument("--count", type=int, default=8, help="houses of each of the three sorts")
-    parser.add_argument(
-        "--with-ideal", action="store_true", help="fits that are told the ideal ranges"
-    )
+    parser.add_argument("--choosing", action="store_true", help="the seeds that are for choosing")
     options = parser.parse_args([] if arguments is None else arguments)
-    seeds = range(options.first, options.first + options.count)
-    results: dict[tuple[str, str], list[tuple[float, float, float]]] = defaultdict(list)
-    groups = {
-        "own": own(seeds),
-        "houses": others(seeds),
-        "weather": others(seeds, has_weather=True),
-    }
-    for group, worlds in groups.items():
-        for world, of_house in worlds:
-            for phase in PHASES:
-                answers = judged(world, of_house, phase, knows_ideal=options.with_ideal)
-                found = {method: rest for method, *rest in answers}
-                if "idw" not in found or not found["idw"][0]:
-                    continue
-                for method in ("estimate", "kriging"):
-                    error, inside = found[method]
-                    for row in {"all", phase.partition(",")[0], phase, f"{phase}, {group}"}:
-                        results[row, method].append((error, found["idw"][0], inside))
-            print(".", end="", file=sys.stderr, flush=True)
-    print(f"\n{'':<34}{'fields':>7}{'to IDW':>8}{'covers':>8}{'worse':>7}{'narrow':>8}   kriging")
-    for phase, method in sorted(results):
-        if method != "estimate":
-            continue
-        rows = np.array(results[phase, method])
-        rival = np.array(results[phase, "kriging"])
-        ratios = rows[:, 0] / rows[:, 1]
-        print(
-            f"{phase:<34}{len(rows):>7}{ratio(rows):>8.2f}{rows[:, 2].mean():>8.3f}"
-            f"{(ratios > 1).mean():>7.0%}{(rows[:, 2] < 0.7).mean():>8.0%}"
-            f"   {ratio(rival):.2f} {rival[:, 2].mean():.2f}"
-        )
-
-
-def ratio(rows: Floats) -> float:
-    """The geometric mean of the errors' ratios: each field counts the same."""
-    kept = rows[(rows[:, 0] > 0) & (rows[:, 1] > 0)]
-    return float(np.exp(np.mean(np.log(kept[:, 0] / kept[:, 1]))))
+    rows: dict[str, list[Field]] = defaultdict(list)
+    for sort, phase, case in cases(CHOOSING if options.choosing else JUDGING):
+        field = judged(case)
+        for name in (sort, phase, "all"):
+            rows[name].append(field)
+    print(f"{'':<26}{'fields':>7}{'to IDW':>9}{'covers':>9}{'CRPS':>9}{'narrow':>8}{'worse':>8}")
+    for name in (*SORTS, *PHASES, "all"):
+        print(line(name, rows[name]))
 
 
 if __name__ == "__main__":

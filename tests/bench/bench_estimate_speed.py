@@ -10,10 +10,8 @@ from typing import TypeVar
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import numpy as np  # its threads are counted when it is loaded
-
-from lupin_twin.estimate import Posterior, TiledPosterior
-from lupin_twin.estimates import fitted
+from lupin_twin.estimate import Posterior, fit
+from lupin_twin.estimates import thinned
 from lupin_twin.idw import FieldSample, compute_idw_field
 from tests.support.estimates import DAY_S, many_tags
 
@@ -39,9 +37,10 @@ def best(make: Callable[[], Made], times: int = 7) -> tuple[float, Made]:
 
 
 def costs(tags: int, each: int, metres: float, side: int) -> list[float]:
-    """IDW; a fit; a posterior, until it tells something; a grid; a reading foretold."""
+    """IDW; a fit; a posterior, until it tells something; a grid; all tags checked."""
     readings = many_tags(tags, each, metres)
     at_s = float(readings.time_s.max())
+    readings = thinned(readings, at_s, DAY_S)
     resolution = metres / side
     box = {"bbox_min_x": 0.0, "bbox_min_y": 0.0, "bbox_max_x": metres, "bbox_max_y": metres}
     newest = [FieldSample(x, y, 20.0) for x, y in readings.xy.tolist()]
@@ -58,21 +57,22 @@ def costs(tags: int, each: int, metres: float, side: int) -> list[float]:
         power=2.0,
     )
     idw_ms, _ = best(idw, 3)
-    fit_ms, model = best(partial(fitted, readings, DAY_S), 2)
+    fit_ms, model = best(partial(fit, readings), 2)
 
-    def load() -> Posterior | TiledPosterior:
+    def load() -> Posterior:
         posterior = model.posterior(readings, at_s)
         posterior.points(readings.xy[:1])  # of many tags, the work begins when it is asked
         return posterior
 
-    load_ms, posterior = best(load)
-    grid_ms, _ = best(partial(posterior.grid, **box, resolution=resolution))
-    foretell_ms, _ = best(partial(posterior.foretell, readings.xy[:1], np.array([at_s])))
-    return [idw_ms, fit_ms, load_ms, grid_ms, foretell_ms]
+    load_ms, posterior = best(load, 3)
+    times = 7 if tags < 1_000 else 1
+    grid_ms, _ = best(partial(posterior.grid, **box, resolution=resolution), times)
+    checks_ms, _ = best(posterior.changes, 1)
+    return [idw_ms, fit_ms, load_ms, grid_ms, checks_ms]
 
 
 def main() -> None:
-    columns = ("IDW", "fit", "load", "grid", "foretell")
+    columns = ("IDW", "fit", "load", "grid", "checks")
     print(f"{'tags x readings, cells':<34}" + "".join(f"{name:>10}" for name in columns))
     for tags, each, metres, side in HOUSES:
         label = f"{tags} x {each}, {side} x {side} in {metres:g} m"

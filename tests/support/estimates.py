@@ -96,4 +96,5 @@ hypers = st.builds(
     sq=_about(0.4),
     l=_about(2.5),
     tau=_about(0.15),
+    half=_about(0.3),
 )

@@ -32,7 +32,7 @@ def matern(distance: float, length: float) -> float:
 def common(a: Spot, b: Spot, h: Hyper) -> float:
     """The covariance of what is true at two spots."""
     apart = a.hour - b.hour
-    day = cos(2.0 * pi * apart / 24.0)
+    day = cos(2.0 * pi * apart / 24.0) + h.half**2 * cos(4.0 * pi * apart / 24.0)
     near = matern(a.x - b.x, h.l) * matern(a.y - b.y, h.l)
     house = 100.0 + h.sg**2 * matern(apart, h.lg) + h.sp**2 * day
     return house + near * (h.sa**2 + h.sh**2 * matern(apart, h.lh) + h.sq**2 * day)
@@ -48,7 +48,7 @@ def of_readings(spots: Sequence[Spot], h: Hyper) -> FloatArray:
     )
 
 
-def foretold(spots: Sequence[Spot], y: FloatArray, spot: Spot, h: Hyper) -> tuple[float, float]:
+def predicted(spots: Sequence[Spot], y: FloatArray, spot: Spot, h: Hyper) -> tuple[float, float]:
     """Mean and variance of what is true at a spot, given standardised readings `y` at others."""
     covariance = of_readings(spots, h)
     shared = np.array([common(spot, other, h) for other in spots])

@@ -212,7 +212,7 @@ def test_a_long_word_is_told_up_to_a_limit() -> None:
 
 def test_estimates_that_are_wrong_are_named() -> None:
     assert found("estimates").message == "nothing is wrong"
-    wrong = found("estimates", estimates=Estimates({"co2": "singular"}, ("light",), 3, 7))
+    wrong = found("estimates", estimates=Estimates({"co2": "singular"}, ("light",), 3))
     assert wrong.level == WARN
-    assert wrong.message.startswith("co2: singular; light: the model is wrong")
-    assert wrong.values == {"fits failed": "3", "scans not graded": "7"}
+    assert wrong.message.startswith("co2: singular; light: too sure of itself")
+    assert wrong.values == {"fits failed": "3"}

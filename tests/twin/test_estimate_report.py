@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from lupin_twin.estimate_report import MAX_PLACES, ReportRequest, advice
-from lupin_twin.estimate_rounds import load
-from lupin_twin.estimates import TagPast, fitted, readings_of
+from lupin_twin.estimate_rounds import Round
+from lupin_twin.estimates import TagPast
 from lupin_twin.explored import occupancy_map
 from lupin_twin.fields import FieldRefused
 from tests.support.estimates import DAY_S, a_day
@@ -43,7 +43,7 @@ def test_advice_is_for_free_floor_and_the_best_first() -> None:
         for tag in range(5)
     ]
     at_ns = int(DAY_S * 1e9)
-    loaded = load(fitted(readings_of(pasts, at_ns, DAY_S), DAY_S), pasts, at_ns, {})
+    loaded = Round("t", DAY_S, None, {}, {}).run(pasts, at_ns).loaded
     places = advice(loaded, None, 3)
     ratios = [place.error_ratio for place in places]
     assert len(places) == 3

@@ -1,4 +1,4 @@
-"""Scans held against what was foretold for them; tags that have changed; whose turn it is."""
+"""Rounds: models, scans held against other tags, sensors that have changed; whose turn it is."""
 
 from __future__ import annotations
 
@@ -8,19 +8,20 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lupin_twin.estimate import FitFailed, fit
 from lupin_twin.estimate_rounds import (
-    HOLD_SHARE,
-    MAX_GRADED,
+    FIRST_FIT,
+    FIT_PERIOD_S,
     ROUND_REST_S,
     Done,
-    Heard,
+    Fit,
     Loaded,
     Round,
     Watch,
-    load,
 )
-from lupin_twin.estimates import TagPast, fitted, readings_of
+from lupin_twin.estimates import TagPast, readings_of
 from lupin_twin.grading import Tally
+from lupin_twin.idw import Abandoned
 from lupin_twin.state import NANOSECONDS_PER_SECOND, Reading, Scan
 from tests.support.estimates import DAY_S
 
@@ -30,16 +31,14 @@ MODEL: Any = object()
 OTHER_MODEL: Any = object()
 
 
-def house(
-    until_s: int, *, day_s: float = DAY_S, every_s: int = 300, tags: int = 6
-) -> list[TagPast]:
+def house(until_s: int, *, tags: int = 12, every_s: int = 150) -> list[TagPast]:
     """What was read of a warm and of a cool end until then, one tag after the other."""
     chance = np.random.default_rng(1)
     places = chance.uniform((0.0, 0.0), (4.0, 8.0), (tags, 2))
     read: list[list[tuple[int, float]]] = [[] for _ in range(tags)]
     for number, at_s in enumerate(range(0, until_s, every_s)):
         tag = number % tags
-        value = 21.0 + 4.0 * math.sin(2.0 * math.pi * at_s / day_s) + 0.4 * places[tag][1]
+        value = 21.0 + 4.0 * math.sin(2.0 * math.pi * at_s / DAY_S) + 0.4 * places[tag][1]
         read[tag].append((at_s * S, value + chance.normal(0.0, 0.2)))
     return [
         TagPast(f"tag-{tag}", float(places[tag][0]), float(places[tag][1]), tuple(read[tag]))
@@ -47,163 +46,172 @@ def house(
     ]
 
 
-def until(pasts: list[TagPast], at_ns: int) -> list[TagPast]:
-    return [
-        TagPast(one.tag_id, one.x, one.y, tuple(read for read in one.readings if read[0] <= at_ns))
-        for one in pasts
-    ]
+def newest(pasts: list[TagPast]) -> dict[str, int]:
+    return {past.tag_id: past.readings[-1][0] for past in pasts}
 
 
-def heard(pasts: list[TagPast], after_ns: int, until_ns: int) -> tuple[Heard, ...]:
-    found = [
-        Heard(one.tag_id, ns, value)
-        for one in pasts
-        for ns, value in one.readings
-        if after_ns < ns <= until_ns
-    ]
-    return tuple(sorted(found, key=lambda one: one.stamp_ns))
+def test_a_round_fits_a_model_where_it_has_none_and_keeps_one_that_it_has() -> None:
+    pasts = house(6 * 3600)
+    done = Round("t", DAY_S, None, {}, {}).run(pasts, 6 * HOUR_NS)
+    assert done.loaded.model == fit(readings_of(pasts, 6 * HOUR_NS, DAY_S), day_length_s=DAY_S)
+    assert done.graded == Tally(), "nothing new was heard"
+    again = Round("t", DAY_S, done.loaded.model, {}, {}).run(pasts, 6 * HOUR_NS)
+    assert again.loaded.model is done.loaded.model
+    assert [check.tag_id for check in again.loaded.checks] == [past.tag_id for past in pasts]
+    check = again.loaded.checks[3]
+    assert (check.observed_at_ns, check.measured) == pasts[3].readings[-1]
+    assert abs(check.measured - check.expected) < 4.0 * check.expected_sd
+    with pytest.raises(Abandoned):
+        Round("t", DAY_S, None, {}, {}).run(pasts, 6 * HOUR_NS, lambda: True)
 
 
-def graded(pasts: list[TagPast], told_day_s: float, begin_s: int, end_s: int) -> Tally:
-    """All scans of a time in rounds, as a twin that is told this day's length has them."""
-    begin_ns, hold_ns = begin_s * S, int(HOLD_SHARE * told_day_s * S)
-    model = fitted(readings_of(until(pasts, begin_ns), begin_ns, told_day_s), told_day_s)
-    before = Round("t", model, (), None, None).run(until(pasts, begin_ns), begin_ns)
+def test_nine_of_ten_scans_lie_where_other_tags_put_them() -> None:
     total = Tally()
-    for at_ns in range(begin_ns, end_s * S, hold_ns):
-        then_ns = at_ns + hold_ns
-        round_ = Round("t", model, heard(pasts, at_ns, then_ns), before.loaded, before.foretelling)
-        before = round_.run(until(pasts, then_ns), then_ns)
-        total = Tally(total.scans + before.graded.scans, total.inside + before.graded.inside)
-    return total
+    for hour in range(24, 30):
+        pasts = house(hour * 3600)
+        graded = Round("t", DAY_S, None, newest(pasts), {}).run(pasts, hour * HOUR_NS).graded
+        total = Tally(total.scans + graded.scans, total.inside + graded.inside)
+    assert total.scans == 6 * 12
+    assert 0.8 <= (total.share or 0.0) <= 1.0
 
 
-def test_nine_of_ten_scans_lie_where_they_were_foretold() -> None:
-    tally = graded(house(30 * 3600), DAY_S, 24 * 3600, 30 * 3600)
-    assert tally.scans >= 70
-    assert tally.is_credible, tally
+def test_only_what_is_new_is_graded_and_a_reading_that_is_off_is_not_inside() -> None:
+    pasts = house(26 * 3600)
+    stamp_ns = 26 * HOUR_NS - S
+    pasts[2] = TagPast("tag-2", pasts[2].x, pasts[2].y, (*pasts[2].readings, (stamp_ns, 60.0)))
+    round_ = Round("t", DAY_S, None, {"tag-2": stamp_ns, "gone": S}, {})
+    assert round_.run(pasts, 26 * HOUR_NS).graded == Tally(1, 0)
+    late = Round("t", DAY_S, None, {"tag-2": stamp_ns - S}, {})
+    assert late.run(pasts, 26 * HOUR_NS).graded == Tally(), "there is a newer one"
 
 
-def test_a_day_that_is_sixty_times_too_long_is_not_trusted() -> None:
-    """The simulated robot's day, taken for one of the sun's."""
-    day_s = DAY_S / 60.0
-    pasts = house(14 * int(day_s), day_s=day_s, every_s=10)
-    right = graded(pasts, day_s, 13 * int(day_s), 13 * int(day_s) + 500)
-    assert right.is_credible, right
-    wrong = graded(pasts, DAY_S, 7 * int(day_s), 14 * int(day_s))
-    assert not wrong.is_credible, wrong
+def test_of_too_few_tags_nothing_is_graded() -> None:
+    pasts = house(6 * 3600, tags=4)
+    assert Round("t", DAY_S, None, newest(pasts), {}).run(pasts, 6 * HOUR_NS).graded == Tally()
 
 
-def test_what_was_known_before_or_is_nobodys_is_not_graded() -> None:
-    at_ns = 12 * HOUR_NS
-    pasts = until(house(13 * 3600), at_ns)
-    loaded = load(fitted(readings_of(pasts, at_ns, DAY_S), DAY_S), pasts, at_ns, {})
-    places = {"tag-0": (pasts[0].x, pasts[0].y)}
-    newest_ns = max(ns for past in pasts for ns, _ in past.readings)
-    [expected] = [check.expected for check in loaded.checks if check.tag_id == "tag-0"]
-    near, far = Heard("tag-0", at_ns + S, expected), Heard("tag-0", at_ns + S, expected + 50.0)
-    assert loaded.grade([near, far], places) == Tally(2, 1)
-    assert loaded.grade([Heard("tag-0", newest_ns, expected)], places) == Tally()
-    assert loaded.grade([Heard("nobody", at_ns + S, expected)], places) == Tally()
-
-
-def test_a_tag_that_has_changed_is_left_out_and_told_since_when() -> None:
-    pasts = house(30 * 3600, tags=8)
-    at_ns = 29 * HOUR_NS
+def test_what_a_changed_sensor_reads_is_left_out_since_then_and_not_graded() -> None:
+    pasts = house(30 * 3600)
     odd = pasts[2]
     since_ns = next(ns for ns, _ in odd.readings if ns > 26 * HOUR_NS)
     moved = tuple((ns, value + (6.0 if ns >= since_ns else 0.0)) for ns, value in odd.readings)
     pasts[2] = TagPast(odd.tag_id, odd.x, odd.y, moved)
-    pasts = until(pasts, at_ns)
-    model = fitted(readings_of(until(pasts, 26 * HOUR_NS), 26 * HOUR_NS, DAY_S), DAY_S)
-    first = load(model, pasts, at_ns, {})
-    assert list(first.changed) == [odd.tag_id]
-    assert first.changed[odd.tag_id] >= since_ns
-    [check] = [check for check in first.checks if check.tag_id == odd.tag_id]
-    assert check.measured == pasts[2].readings[-1][1]
-    assert check.observed_at_ns == pasts[2].readings[-1][0]
-    assert check.offset == pytest.approx(6.0, abs=2.0)
-    assert abs(check.measured - check.expected) > 3.0
-    again = load(model, pasts, at_ns + 60 * S, first.changed)
-    assert again.changed == first.changed, "to the nanosecond"
-    is_off = [Heard(odd.tag_id, at_ns + S, check.measured)]
-    assert first.grade(is_off, {odd.tag_id: (odd.x, odd.y)}) == Tally(), "nothing is foretold"
+    first = Round("t", DAY_S, None, newest(pasts), {}).run(pasts, 30 * HOUR_NS)
+    assert first.loaded.changed == {odd.tag_id: since_ns}
+    assert first.graded.scans == 11
+    [check] = [one for one in first.loaded.checks if one.tag_id == odd.tag_id]
+    assert (check.observed_at_ns, check.measured) == moved[-1]
+    assert check.offset == pytest.approx(6.0, abs=1.0)
+    assert check.measured - check.expected == pytest.approx(6.0, abs=1.5)
+    at_s = (since_ns - 30 * HOUR_NS) / S
+    of_odd = first.loaded.posterior.readings
+    assert of_odd.time_s[of_odd.tag == 2].max() < at_s
+    anew = Round("t", DAY_S, None, {}, first.loaded.changed).run(pasts, 30 * HOUR_NS)
+    assert anew.loaded.changed == first.loaded.changed, "to the nanosecond"
 
 
 # --- whose turn it is ---------------------------------------------------------------------------
 
 
-def scan(stamp_ns: int = S, **values: float) -> Scan:
-    return Scan("a", stamp_ns, tuple(Reading(name, value) for name, value in values.items()))
+def scan(stamp_ns: int = S, tag_id: str = "a", **values: float) -> Scan:
+    return Scan(tag_id, stamp_ns, tuple(Reading(name, value) for name, value in values.items()))
 
 
-def done(model: Any, scans: int = 4, inside: int = 3) -> Done:
+def done(model: Any = MODEL, scans: int = 4, inside: int = 3) -> Done:
     loaded: Any = Loaded(0, model, None, ())  # type: ignore[arg-type]
-    return Done(Tally(scans, inside), loaded, loaded)
+    return Done(Tally(scans, inside), loaded)
 
 
-def test_a_round_comes_with_the_first_model_and_then_with_scans() -> None:
-    watch = Watch(DAY_S)
-    watch.hear(scan(co2=400.0))
-    assert watch.due({}, 0.0) is None
-    first = watch.due({"co2": MODEL}, 0.0)
-    assert first == Round("co2", MODEL, (), None, None), "nothing was foretold before"
-    assert watch.begin(first) == 0
-    assert watch.due({"co2": MODEL}, 0.0) is None, "one at a time"
-    watch.end(done(MODEL), 0.0625, S)
-    assert watch.loaded("co2") is not None
-    assert watch.record("co2", S).week == Tally(4, 3)
-    assert watch.due({"co2": MODEL}, 0.0625 + ROUND_REST_S) is None, "nothing was heard since"
-    watch.hear(scan(2 * S, co2=410.0, light=5.0))
-    watch.hear(scan(3 * S, co2=math.nan))
-    assert watch.due({"co2": MODEL}, ROUND_REST_S) is None, "too soon"
-    due = watch.due({"co2": MODEL}, 0.0625 + ROUND_REST_S)
+def heard(watch: Watch, sensor: str, times: int) -> bool:
+    return sum(watch.hear(scan(n * S, "a", **{sensor: 20.0})) for n in range(times)) > 0
+
+
+def take_turn(watch: Watch, at_s: float, outcome: Done | Exception | None = None) -> Round:
+    due = watch.due(at_s)
     assert due is not None
-    assert due.heard == (Heard("a", 2 * S, 410.0),)
-    assert due.before is watch.loaded("co2")
+    watch.begin(due, at_s)
+    watch.end(due, done() if outcome is None else outcome, at_s, int(at_s * S) + 1)
+    return due
 
 
-def test_another_model_is_a_reason_too_and_the_longest_waiting_comes_first() -> None:
+def test_the_first_round_comes_with_the_tenth_reading() -> None:
     watch = Watch(DAY_S)
-    for at_s in (0.0, 20.0):
-        due = watch.due({"a": MODEL, "b": MODEL}, at_s)
-        assert due is not None
-        assert due.sensor == ("a" if at_s == 0.0 else "b")
-        watch.begin(due)
-        watch.end(done(MODEL), at_s, S)
-    assert watch.due({"a": MODEL, "b": MODEL}, 90.0) is None
-    other = watch.due({"a": OTHER_MODEL, "b": OTHER_MODEL}, 90.0)
-    assert other is not None
-    assert (other.sensor, other.model) == ("a", OTHER_MODEL)
+    assert not heard(watch, "co2", FIRST_FIT - 1)
+    watch.hear(scan(co2=math.nan))
+    assert watch.due(0.0) is None
+    assert watch.hear(scan(co2=400.0, light=5.0)), "it need not be looked for"
+    assert watch.due(0.0) == Round("co2", DAY_S, None, {}, {})
+    assert watch.fit("co2") == watch.fit("light") == Fit()
 
 
-def test_a_flood_is_sampled_and_told() -> None:
+def test_later_rounds_come_with_scans_and_rest_in_between() -> None:
     watch = Watch(DAY_S)
-    due = watch.due({"co2": MODEL}, 0.0)
-    assert due is not None
-    watch.begin(due)
-    watch.end(done(MODEL), 0.0, S)
-    for number in range(MAX_GRADED + 3):
-        watch.hear(scan(number * S, co2=400.0))
-    due = watch.due({"co2": MODEL}, ROUND_REST_S)
-    assert due is not None
-    assert len(due.heard) == MAX_GRADED
-    assert watch.begin(due) == 3
-    assert watch.skipped == 3
+    heard(watch, "co2", 100)
+    take_turn(watch, 0.0)
+    assert watch.fit("co2") == Fit(MODEL, 1)
+    assert watch.due(1e9) is None, "nothing was heard since"
+    watch.hear(scan(7 * S, co2=1.0))
+    watch.hear(scan(5 * S, co2=1.0))
+    watch.hear(scan(6 * S, "b", co2=1.0))
+    assert watch.due(ROUND_REST_S - 0.1) is None
+    due = take_turn(watch, ROUND_REST_S)
+    assert due == Round("co2", DAY_S, MODEL, {"a": 7 * S, "b": 6 * S}, {})
+    assert watch.record("co2", S).week == Tally(8, 6)
+    assert watch.record("light", S).week == Tally()
 
 
-def test_a_round_that_fails_changes_nothing() -> None:
+def test_a_model_is_fitted_anew_after_five_minutes_or_when_much_was_heard() -> None:
     watch = Watch(DAY_S)
-    due = watch.due({"co2": MODEL}, 0.0)
+    heard(watch, "co2", 100)
+    assert take_turn(watch, 0.0).model is None
+    heard(watch, "co2", 49)
+    assert take_turn(watch, 10.0).model is MODEL
+    heard(watch, "co2", 1)
+    assert take_turn(watch, 20.0, done(OTHER_MODEL)).model is None
+    assert watch.fit("co2").model is OTHER_MODEL
+    heard(watch, "co2", 1)
+    assert take_turn(watch, 19.0 + FIT_PERIOD_S).model is OTHER_MODEL
+    heard(watch, "co2", 1)
+    assert take_turn(watch, 22.0 + FIT_PERIOD_S).model is None
+
+
+def test_one_round_at_a_time_and_the_longest_waiting_first() -> None:
+    watch = Watch(DAY_S)
+    heard(watch, "light", FIRST_FIT)
+    heard(watch, "co2", FIRST_FIT)
+    due = watch.due(0.0)
     assert due is not None
-    watch.begin(due)
-    watch.end(done(MODEL, 90, 10), 2.0, S)
+    watch.begin(due, 0.0)
+    assert watch.due(0.0) is None
+    watch.end(due, done(), 0.0, S)
+    assert {due.sensor, take_turn(watch, 5.0).sensor} == {"light", "co2"}
+    for sensor in ("light", "co2"):
+        heard(watch, sensor, 1)
+    assert take_turn(watch, 90.0).sensor == due.sensor
+
+
+def test_a_round_that_fails_keeps_what_was_and_says_why() -> None:
+    watch = Watch(DAY_S)
+    heard(watch, "co2", FIRST_FIT)
+    take_turn(watch, 0.0, done(MODEL, 90, 10))
     before = watch.loaded("co2")
     assert watch.distrusted(S) == ["co2"]
-    watch.hear(scan(co2=1.0))
-    due = watch.due({"co2": MODEL}, 2.0 + ROUND_REST_S)
-    assert due is not None
-    watch.begin(due)
-    watch.end(ValueError("why"), 100.0, S)
+    heard(watch, "co2", FIRST_FIT)
+    take_turn(watch, 100.0, FitFailed("singular"))
+    assert watch.fit("co2") == Fit(MODEL, 1, "singular")
+    assert (watch.failed, watch.problems()) == (1, {"co2": "singular"})
     assert watch.loaded("co2") is before
     assert watch.record("co2", S).week == Tally(90, 10)
+    heard(watch, "co2", 10)
+    take_turn(watch, 1_000.0)
+    assert watch.problems() == {}
+
+
+def test_what_is_restored_is_learnt_from_and_not_graded() -> None:
+    watch = Watch(DAY_S)
+    heard(watch, "co2", FIRST_FIT)
+    take_turn(watch, 0.0)
+    watch.hear(scan(99 * S, co2=1.0), is_new=False)
+    due = watch.due(100.0)
+    assert due is not None
+    assert due.heard == {}

@@ -219,7 +219,7 @@ def test_a_layer_is_another_when_the_map_is_or_a_minute_of_its_day_has_passed(st
         fields=SimpleNamespace(rules=0),
         occupancy=lambda: SimpleNamespace(revision=revision),
         estimates=SimpleNamespace(
-            models=SimpleNamespace(of=lambda _: SimpleNamespace(model=model, at_ns=1))
+            watch=SimpleNamespace(fit=lambda _: SimpleNamespace(model=model, at_ns=1))
         ),
         store=SimpleNamespace(observation_count=1),
         now_ns=lambda: now_ns,

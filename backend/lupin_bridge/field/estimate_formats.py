@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,7 @@ import orjson
 from lupin_bridge.field import formats
 from lupin_bridge.field.formats import NPY, PNG, FieldFormat
 from lupin_bridge.judge.ranges import Sensor, Sensors
+from lupin_twin.estimate import SDS_OF_IDEAL
 from lupin_twin.estimates import Estimate
 from lupin_twin.grid import FieldGrid
 
@@ -24,6 +27,16 @@ def metadata(estimate: Estimate, sensor: Sensor) -> dict[str, str]:
         "Sample-Count": str(estimate.sample_count),
         "Reading-Count": str(estimate.reading_count),
     }
+
+
+def within_ideal(estimate: Estimate, sensor: Sensor) -> Estimate:
+    """The estimate, known only where its interval for 9 of 10 is about half of the ideal range."""
+    spans = [ranges.ideal for ranges in (sensor.day, sensor.night) if ranges.ideal is not None]
+    limit = min((span.high - span.low for span in spans), default=math.inf) / SDS_OF_IDEAL
+    grid = estimate.grid
+    if not limit < grid.sd_known:
+        return estimate
+    return replace(estimate, grid=replace(grid, sd_known=limit, known=grid.sd < limit))
 
 
 def write(

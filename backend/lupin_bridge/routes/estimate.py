@@ -84,10 +84,11 @@ async def _computed(
         bridge.metrics.estimate_seconds.time(),
     ):
         result = await bridge.source.estimate(asked)
+        estimate = estimate_formats.within_ideal(result.estimate, sensors.named(sensor_type))
         body = await on_worker(
             bridge,
             lambda _: estimate_formats.write(
-                result.estimate,
+                estimate,
                 field_format,
                 sensor_type,
                 sensors,
@@ -99,7 +100,7 @@ async def _computed(
     tag = _etag(result.revision, asked, query, field_format)
     headers = field_query.headers(
         {
-            **estimate_formats.metadata(result.estimate, sensors.named(sensor_type)),
+            **estimate_formats.metadata(estimate, sensors.named(sensor_type)),
             **far_off(bridge),
         },
         f"{sensor_type}.{field_format.name}",

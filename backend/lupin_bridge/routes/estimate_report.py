@@ -70,10 +70,10 @@ _WRITE_TAG_S: Final = 10e-6
     openapi_extra={"parameters": parameters_of(QualityQuery)},
 )
 async def quality(request: Request) -> Response:
-    """Each new scan is held against what was foretold for it before it was heard.
+    """Each new scan is held against what all but its own tag, and those beside it, say of it.
 
-    9 of 10 are to lie inside. Counts are by the hour, over the last day and week, since the twin
-    was started.
+    So it tells how right the estimate is between tags: 9 of 10 are to lie inside. Counts are by
+    the hour, over the last day and week, since the twin was started.
     """
 
     async def body(bridge: Bridge, query: QualityQuery) -> bytes:

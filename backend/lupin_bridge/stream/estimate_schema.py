@@ -27,7 +27,7 @@ class GetEstimateResponse(Contract):
 
 
 class Graded(Contract):
-    """New scans that were foretold, and those of them within the interval for 9 of 10."""
+    """New scans that were predicted without their tag, and those in the interval for 9 of 10."""
 
     scans: int
     inside: int
@@ -37,18 +37,15 @@ class EstimateQuality(Contract):
     """How often a sensor's estimates were right; a day is one of the twin's `day_length_s`."""
 
     fitted_at: Time | None = Field(description="null: no model was fitted yet")
-    fit_problem: str = Field(
-        description="why the last fit came to nothing, or that the readings tell of a longer day "
-        "than day_length_s; empty: neither"
-    )
+    fit_problem: str = Field(description="why the last fit came to nothing; empty: it did not")
     graded_since: Time | None = Field(description="the counts are since then; null: none yet")
     day: Graded
     week: Graded
     share_day: float | None = Field(description="inside of scans; null: there are none")
     share_week: float | None
-    is_trusted: bool = Field(
-        description="false: chance does not explain how far a share is from 0.9; the model is "
-        "wrong, a day's length for one"
+    is_trusted: bool | None = Field(
+        description="false: a share is under 0.8, the intervals are too narrow; null: fewer than "
+        "40 scans could be held against other tags, so nothing is said"
     )
 
 
@@ -59,7 +56,7 @@ class EstimateQualities(Contract):
 
 
 class ExpectedReading(Contract):
-    """A tag's newest reading beside what all others foretell for it; sensor's unit."""
+    """A tag's newest reading beside what all others say of it; sensor's unit."""
 
     measured: float
     observed_at: Time
@@ -67,7 +64,9 @@ class ExpectedReading(Contract):
     expected_sd: float = Field(description="a reading's noise included")
     z: float = Field(description="how far its last readings are off together, in sds")
     offset: float = Field(description="by how much they are off")
-    left_out: bool = Field(description="it has changed: the estimate does without it")
+    left_out: bool = Field(
+        description="the sensor has changed: the estimate does without what it read since then"
+    )
 
 
 class ExpectedTags(Contract):

@@ -62,7 +62,7 @@ const GRADE = object({
   day: FORETOLD,
   week: FORETOLD,
   share_day: numberOrNull,
-  is_trusted: boolean,
+  is_trusted: orNull(boolean),
 });
 
 /** null: no tag has this sensor. */

@@ -137,7 +137,7 @@ export interface components {
             readonly fitted_at: components["schemas"]["Time"] | null;
             /**
              * Fit Problem
-             * @description why the last fit came to nothing, or that the readings tell of a longer day than day_length_s; empty: neither
+             * @description why the last fit came to nothing; empty: it did not
              */
             readonly fit_problem: string;
             /** @description the counts are since then; null: none yet */
@@ -153,13 +153,13 @@ export interface components {
             readonly share_week: number | null;
             /**
              * Is Trusted
-             * @description false: chance does not explain how far a share is from 0.9; the model is wrong, a day's length for one
+             * @description false: a share is under 0.8, the intervals are too narrow; null: fewer than 40 scans could be held against other tags, so nothing is said
              */
-            readonly is_trusted: boolean;
+            readonly is_trusted: boolean | null;
         };
         /**
          * ExpectedReading
-         * @description A tag's newest reading beside what all others foretell for it; sensor's unit.
+         * @description A tag's newest reading beside what all others say of it; sensor's unit.
          */
         readonly ExpectedReading: {
             /** Measured */
@@ -184,7 +184,7 @@ export interface components {
             readonly offset: number;
             /**
              * Left Out
-             * @description it has changed: the estimate does without it
+             * @description the sensor has changed: the estimate does without what it read since then
              */
             readonly left_out: boolean;
         };
@@ -254,7 +254,7 @@ export interface components {
         };
         /**
          * Graded
-         * @description New scans that were foretold, and those of them within the interval for 9 of 10.
+         * @description New scans that were predicted without their tag, and those in the interval for 9 of 10.
          */
         readonly Graded: {
             /** Scans */

@@ -61,8 +61,8 @@ function foretoldText({ day, share_day: share }: Grade): string {
 }
 
 function Foretold({ grade, isNow }: { grade: Grade; isNow: boolean }): JSX.Element {
-  const { day, week, share_day: share, is_trusted: isTrusted } = grade;
-  const ofTen = share === null ? null : Math.round(share * 10);
+  const { day, week } = grade;
+  const least = Math.min(grade.share_day ?? 1, grade.share_week ?? 1);
   const behind = [
     E.aboutText,
     `${E.foretoldDay(day.inside, day.scans)}, ${E.foretoldWeek(week.inside, week.scans)}.`,
@@ -70,9 +70,9 @@ function Foretold({ grade, isNow }: { grade: Grade; isNow: boolean }): JSX.Eleme
   ];
   return (
     <>
-      {!isTrusted && ofTen !== null && (
+      {grade.is_trusted === false && (
         <strong role="status" className="estimate-warning" data-testid="estimate-warning">
-          {ofTen < 9 ? E.notTrusted(ofTen) : E.tooWide}
+          {E.notTrusted(Math.floor(least * 10))}
         </strong>
       )}
       {/* Of now, whatever moment is shown: beside another one it would be taken for that of then. */}

@@ -94,7 +94,7 @@ describe('legend', () => {
     showField(estimated([22.4], [0.5]));
     render(<Legend kiosk={false} />);
     expect((await screen.findByTestId('foretold')).textContent).toBe(
-      '9 of 10 scans fell into the range foretold for them',
+      '9 of 10 scans lay where the other tags put them',
     );
     expect(text('estimate-key')).toContain(`off by more than ±1.6${NBSP}°C`);
     expect(text('legend')).toContain('Last day: 412 of 458 scans, last week: 2900 of 3200 scans.');
@@ -111,19 +111,24 @@ describe('legend', () => {
     showField(estimated([22.4], [0.5]));
     render(<EstimateFacts />);
     const told = await screen.findByTestId('foretold');
-    expect(told.textContent).toBe('7 of 9 scans fell into the range foretold for them');
+    expect(told.textContent).toBe('7 of 9 scans lay where the other tags put them');
   });
 
-  test.each([
-    [0.42, 'only 4 of 10 scans fell'],
-    [0.995, 'wider than need be'],
-  ])('warns where the shares do not fit the errors: %d', async (share, words) => {
-    grades = { temperature: grade({ share_day: share, is_trusted: false }) };
+  test('warns where too few scans lay inside', async () => {
+    grades = { temperature: grade({ share_day: 0.42, is_trusted: false }) };
     showField(estimated([22.4], [0.5]));
     render(<EstimateFacts />);
     const warning = await screen.findByTestId('estimate-warning');
     expect(warning.textContent).toContain('Do not rely on the ±');
-    expect(warning.textContent).toContain(words);
+    expect(warning.textContent).toContain('only 4 of 10 scans lay');
+  });
+
+  test('says neither where the twin cannot tell', async () => {
+    grades = { temperature: grade({ day: { scans: 12, inside: 3 }, is_trusted: null }) };
+    showField(estimated([22.4], [0.5]));
+    render(<EstimateFacts />);
+    await screen.findByTestId('foretold');
+    expect(screen.queryByTestId('estimate-warning')).toBeNull();
   });
 
   test.each([

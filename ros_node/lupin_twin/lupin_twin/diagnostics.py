@@ -68,15 +68,14 @@ def origin_of(said: str, *, is_simulated: bool) -> Origin:
 
 @dataclass(frozen=True, slots=True)
 class Estimates:
-    """How the estimates do: what is wrong with fits, by sensor, and whose share says a wrong model.
+    """How the estimates do: what is wrong with fits, by sensor, and whose intervals are too narrow.
 
-    `fits_failed` and `not_graded`, scans that came too fast for it, are since the start.
+    `fits_failed` is since the start.
     """
 
     problems: Mapping[str, str] = field(default_factory=dict)
     distrusted: tuple[str, ...] = ()
     fits_failed: int = 0
-    not_graded: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,12 +206,12 @@ def findings(health: Health) -> Iterator[Finding]:
 
 def _estimates(said: Estimates) -> Finding:
     wrong = [f"{sensor}: {why}" for sensor, why in said.problems.items()]
-    wrong += [f"{sensor}: the model is wrong, by what it foretold" for sensor in said.distrusted]
+    wrong += [f"{sensor}: too sure of itself, by what it predicted" for sensor in said.distrusted]
     return Finding(
         "estimates",
         WARN if wrong else OK,
         _shown("; ".join(wrong)) or "nothing is wrong",
-        {"fits failed": str(said.fits_failed), "scans not graded": str(said.not_graded)},
+        {"fits failed": str(said.fits_failed)},
     )
 
 

@@ -1,7 +1,7 @@
 """The services of the estimate: questions in, answers made off the node's thread.
 
-Models are kept fitted, and each new scan is held against what was foretold for it: one fit or round
-at a time, and then a rest, so that scans cost no more the more of them come.
+Scans are learnt from in rounds, one at a time, and behind each is a rest: so that they cost no more
+than a tenth of a core, however many come.
 """
 
 from __future__ import annotations
@@ -19,24 +19,20 @@ from lupin_msgs.srv import GetEstimate, GetEstimateReport
 
 from lupin_twin import convert_estimate
 from lupin_twin.diagnostics import Estimates
-from lupin_twin.estimate import MAX_PER_TAG, NOTHING, FitFailed, Model, Place
+from lupin_twin.estimate import MAX_PER_TAG, FitFailed, Place
 from lupin_twin.estimate_report import ADVICE_S, REPORT_SERVICE, Report, ReportRequest, advice
-from lupin_twin.estimate_rounds import MAX_GRADED, Done, Loaded, Watch
+from lupin_twin.estimate_rounds import Done, Loaded, Round, Watch
 from lupin_twin.estimates import (
     ESTIMATE_SERVICE,
-    FIRST_FITTED,
     MAX_TAGS,
+    Day,
     Estimate,
     EstimateJob,
     EstimateRequest,
-    Models,
     TagPast,
     cost_s,
-    fitted,
-    gains_of_longer_days,
     is_usable,
     past_of,
-    readings_of,
 )
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRefused
@@ -53,12 +49,14 @@ from lupin_twin.responses import Later
 from lupin_twin.state import NANOSECONDS_PER_SECOND, Scan, TwinStore
 from lupin_twin.workers import ShouldStop, Workers, in_turns
 
-# A fit, and a round, s of one core at worst: everything small passes it.
-_FIT_S: Final = 2.0
-# After a fit or a round, neither for so many times as long: all of them take a thirtieth of a core.
-REST_FACTOR: Final = 30.0
+# A round, s of one core at worst: everything small passes it.
+_ROUND_S: Final = 2.0
+# After a round none for so many times as long: all of them take a tenth of a core.
+REST_FACTOR: Final = 9.0
 # What gathering a tag's scans takes, roughly and at worst.
 _GATHER_TAG_S: Final = 50e-6
+# Readings that are looked up in the journal, of all tags together: of few tags all of a day.
+_LOOKED_UP: Final = 20_000
 # Places for other tags that are kept, each until its sensor's next round.
 _MAX_ADVISED: Final = 64
 
@@ -104,9 +102,9 @@ class Task:
 
 
 class EstimateService:
-    """The service of one node, and its models; belongs to the node's thread.
+    """The services of one node, and its models; belongs to the node's thread.
 
-    Its threads are its own: no field waits for a fit. `wake()` is called in one of them when
+    Its threads are its own: no field waits for a round. `wake()` is called in one of them when
     `deliver` has something to do.
     """
 
@@ -118,19 +116,18 @@ class EstimateService:
         now_ns: Callable[[], int],
         wake: Callable[[], None],
     ) -> None:
-        self.models = Models()
         self.watch = Watch(rules.day_length_s)
         self._habits = habits
         self._known = known
         self._rules = rules
         self._now_ns = now_ns
         self._workers = Workers("estimate")
-        # Fits are asked for at a desk of their own: no estimate waits behind one.
-        self._desk, self._fits = (
+        # Rounds have a desk of their own: no estimate waits behind one.
+        self._desk, self._rounds = (
             PastDesk(self._workers, wake, lambda: habits.is_behind) for _ in range(2)
         )
+        self._day = Day(rules.day_length_s)
         self._is_working = False
-        self._has_fitted_last = False
         self._rests_until_s = -math.inf
         self._gathered: Gather | None = None
         # Of these the log has said so, and nothing has been better since.
@@ -148,108 +145,82 @@ class EstimateService:
             node.create_service(kind, name, callback, qos_profile=SERVICE_QOS, callback_group=group)
 
     def restore(self) -> None:
-        """What the journal holds is known again: models can be fitted before a scan comes."""
+        """What the journal holds is known again: rounds can begin before a scan comes."""
         self._gathered = None
-        for past in self._known.history.all_later()().values():
+        sensors: set[str] = set()
+        for tag_id, past in self._known.history.all_later()().items():
             for scan in past.scans:
-                self.models.hear(scan.readings)
+                one = Scan(tag_id, scan.stamp_ns, scan.readings, None)
+                self.watch.hear(one, is_new=False)
+                self._day.hear(one)
+                sensors.update(reading.name for reading in scan.readings)
+        for sensor in sorted(sensors):
+            self._look_back(sensor)
         self.go_on()
+
+    def _look_back(self, sensor: str) -> None:
+        """A history is short: what was read throughout the day is in the journal."""
+
+        def remember(found: list[TagPast] | Exception) -> None:
+            if isinstance(found, Exception):
+                return  # without a journal that can be read, the history is all there is
+            for tag in found:
+                for stamp_ns, value in tag.readings:
+                    self._day.add(tag.tag_id, sensor, stamp_ns, value)
+            self._gathered = None
+
+        asked = self._from_journal(sensor, self._now_ns())
+        self._rounds.ask(Question(asked, lambda found: found, _ROUND_S, remember))
+
+    def hold_to(self, now_ns: int) -> None:
+        """Follow a clock that has gone back."""
+        self._day.hold_to(now_ns)
+        self._gathered = None
 
     def hear(self, write: object) -> None:
         """Something was observed and accepted."""
         self._gathered = None
         if isinstance(write, Scan):
-            is_enough = self.models.hear(write.readings)
-            self.watch.hear(write)
-            if is_enough:
+            self._day.hear(write)
+            if self.watch.hear(write):
                 self.go_on()
 
     def go_on(self) -> None:
-        """Begin the fit or the round whose turn it is, on a worker; to be called once a second.
+        """Begin the round whose turn it is, on a worker; to be called once a second.
 
-        A first model is awaited, and does not wait for the end of a rest. Otherwise fits and rounds
-        take turns: of a large house both are always due.
+        A first model is awaited, and does not wait for the end of a rest.
         """
         self._desk.go_on()
-        self._fits.go_on()
+        self._rounds.go_on()
         now_s = time.monotonic()
-        sensor = self.models.due(now_s)
-        is_first = sensor is not None and self.models.of(sensor).model is None
-        if self._is_working or (now_s < self._rests_until_s and not is_first):
+        due = None if self._is_working else self.watch.due(now_s)
+        if due is None:
             return
-        goes_round = sensor is None or (self._has_fitted_last and not is_first)
-        if goes_round and self._go_round(now_s):
-            self._has_fitted_last = False
-        elif sensor is not None:
-            self._fit(sensor, now_s)
-            self._has_fitted_last = True
+        if now_s < self._rests_until_s and self.watch.fit(due.sensor).model is not None:
+            return
+        gather, now_ns = self._gather(), self._now_ns()
+        self.watch.begin(due, now_s)
+        self._begin(
+            lambda stop: due.run(gather(due.sensor), now_ns, stop), partial(self._ended, due)
+        )
 
-    def _fit(self, sensor: str, now_s: float) -> None:
-        gather, now_ns, day_s = self._gather(), self._now_ns(), self._rules.day_length_s
-        most = self.models.begin(sensor, now_s)
-
-        def work(should_stop: ShouldStop) -> tuple[Model, tuple[float, ...]]:
-            pasts = gather(sensor)
-            model = fitted(readings_of(pasts, now_ns, day_s), day_s, should_stop, most)
-            if most == FIRST_FITTED:  # which somebody waits for
-                return model, NOTHING
-            return model, gains_of_longer_days(pasts, now_ns, day_s, should_stop)
-
-        self._begin(work, partial(self._fitted, sensor, now_ns))
-
-    def _fitted(
-        self, sensor: str, now_ns: int, outcome: tuple[Model, tuple[float, ...]] | Exception
-    ) -> None:
-        if isinstance(outcome, Exception):
-            self.models.end(sensor, outcome, now_ns)
-        else:
-            model, gains = outcome
-            self.models.weigh(sensor, gains)
-            self.models.end(sensor, model, now_ns)
-            if self.models.day_problem:
-                self._habits.warn(("day length", 0), self.models.day_problem)
-        if isinstance(outcome, FitFailed):
+    def _ended(self, round_: Round, outcome: Done | Exception) -> None:
+        now_ns, sensor = self._now_ns(), round_.sensor
+        self.watch.end(round_, outcome, time.monotonic(), now_ns)
+        if isinstance(outcome, FitFailed | np.linalg.LinAlgError):
             self._habits.warn(("estimate", sensor), f"no new model of {sensor}: {outcome}")
         elif isinstance(outcome, Exception) and not isinstance(outcome, FieldRefused):
-            self._habits.report("the estimate's fit", outcome)
-        self.go_on()
-
-    def _go_round(self, now_s: float) -> bool:
-        due = self.watch.due(self.models.serving(), now_s)
-        if due is None:
-            return False
-        gather, now_ns = self._gather(), self._now_ns()
-        self._begin(
-            lambda stop: due.run(gather(due.sensor), now_ns, stop),
-            partial(self._rounded, due.sensor),
-        )
-        left = self.watch.begin(due)
-        if left:
-            self._habits.warn(
-                ("grading", due.sensor),
-                f"{left} scans of {due.sensor} came too fast to be held against what was foretold "
-                f"for them: of each lot, {MAX_GRADED} are",
-            )
-        return True
-
-    def _rounded(self, sensor: str, outcome: Done | Exception) -> None:
-        now_ns = self._now_ns()
-        self.watch.end(outcome, time.monotonic(), now_ns)
-        if isinstance(outcome, Exception):
-            if not isinstance(outcome, FieldRefused | np.linalg.LinAlgError):
-                self._habits.report("the estimate's round", outcome)
-            return
+            self._habits.report("the estimate's round", outcome)
         record = self.watch.record(sensor, now_ns)
-        if record.is_trusted:
+        if record.is_trusted is not False:
             self._told_distrusted.discard(sensor)
         elif sensor not in self._told_distrusted:
             # Once: for as long as it lasts, /diagnostics and the page say so.
             self._told_distrusted.add(sensor)
             self._habits.warn(
                 ("trust", sensor),
-                f"the estimate of {sensor} is not to be trusted: of {record.week.scans} scans, "
-                f"{record.week.inside} came to lie where 9 of 10 were foretold; is day_length_s, "
-                f"{self._rules.day_length_s:g} s, how long a day takes?",
+                f"the estimate of {sensor} is too sure of itself: of {record.week.scans} scans, "
+                f"{record.week.inside} came to lie where 9 of 10 were predicted",
             )
         self.go_on()
 
@@ -270,8 +241,10 @@ class EstimateService:
             reply(outcome)
 
         self._is_working = True
-        self._fits.ask(
-            Question(lambda: self._workers.submit(timed, _FIT_S), lambda made: made, _FIT_S, rest)
+        self._rounds.ask(
+            Question(
+                lambda: self._workers.submit(timed, _ROUND_S), lambda made: made, _ROUND_S, rest
+            )
         )
 
     def _gather(self) -> Gather:
@@ -283,12 +256,18 @@ class EstimateService:
             tags = self._known.store.snapshot(self._now_ns(), "").tags
             kept = self._known.history.all_later()
             known: dict[str, list[TagPast]] = {}
+            day = self._day
 
             def gather(sensor: str) -> list[TagPast]:
                 if sensor not in known:
                     histories = kept()
                     found = (
-                        past_of(tag, histories.get(tag.tag_id, TagHistory()).scans, sensor)
+                        past_of(
+                            tag,
+                            histories.get(tag.tag_id, TagHistory()).scans,
+                            sensor,
+                            day.of(tag.tag_id, sensor),
+                        )
                         for tag in in_turns(tags)
                     )
                     pasts = [past for past in found if past is not None]
@@ -312,7 +291,7 @@ class EstimateService:
         sensor = asked.box.sensor_type
         loaded = self.watch.loaded(sensor)
         changed = {} if loaded is None else loaded.changed
-        job = EstimateJob(asked, self.models.of(sensor).model, self._rules.day_length_s, changed)
+        job = EstimateJob(asked, self.watch.fit(sensor).model, self._rules.day_length_s, changed)
         tags = min(MAX_TAGS, self._known.store.size[0])
         cost = cost_s(asked, tags, self._rules.max_grid_cells)
         return Task(job, now_ns, cost, self._look_up(asked))
@@ -320,7 +299,7 @@ class EstimateService:
     def report(self, asked: ReportRequest) -> Callable[[], Report]:
         """What makes the report, on a worker: working out places for other tags takes a while."""
         sensor, now_ns = asked.sensor_type, self._now_ns()
-        fit, loaded = self.models.of(sensor), self.watch.loaded(sensor)
+        fit, loaded = self.watch.fit(sensor), self.watch.loaded(sensor)
         record = self.watch.record(sensor, now_ns)
         if loaded is None:
             bare = Report(now_ns, fit.at_ns, fit.problem, record)
@@ -343,16 +322,15 @@ class EstimateService:
     def state(self) -> Estimates:
         """How they do, for the twin's diagnostics."""
         return Estimates(
-            self.models.problems(),
+            self.watch.problems(),
             tuple(self.watch.distrusted(self._now_ns())),
-            self.models.failed,
-            self.watch.skipped,
+            self.watch.failed,
         )
 
     def deliver(self) -> None:
         """Hand out what was made."""
         self._desk.deliver()
-        self._fits.deliver()
+        self._rounds.deliver()
 
     def close(self) -> None:
         """End the threads; what they make is for nobody then."""
@@ -390,7 +368,7 @@ class EstimateService:
             return self._answer(response, error)
         return later
 
-    def _look_up(self, asked: EstimateRequest) -> Callable[[], Future[Sequence[TagPast]]]:
+    def _look_up(self, asked: EstimateRequest) -> Callable[[], Future[Any]]:
         sensor, at_ns = asked.box.sensor_type, asked.at_ns
         tags = self._known.store.size[0]
         if not at_ns:
@@ -400,11 +378,16 @@ class EstimateService:
                 return self._workers.submit(lambda _: gather(sensor), tags * _GATHER_TAG_S)
 
             return from_memory
+        return self._from_journal(sensor, at_ns)
+
+    def _from_journal(self, sensor: str, at_ns: int) -> Callable[[], Future[list[TagPast]]]:
         reach_ns = int(self._rules.day_length_s * NANOSECONDS_PER_SECOND)
+        tags = self._known.store.size[0]
+        most = max(_LOOKED_UP, tags * MAX_PER_TAG)
         return lambda: self._known.recall.ask(
             lambda connection, _: [
                 TagPast(tag_id, x, y, tuple(one for one in found if is_usable(one[1])))
-                for tag_id, x, y, found in lately(connection, sensor, at_ns, reach_ns, MAX_PER_TAG)
+                for tag_id, x, y, found in lately(connection, sensor, at_ns, reach_ns, most)
             ],
             tags * (STATE_S_PER_TAG + SERIES_S),
         )

@@ -1,64 +1,45 @@
-"""GetEstimate without ROS: which readings count, when a model is fitted, and what an answer is.
+"""GetEstimate without ROS: which readings count, and what an answer is.
 
-Pure. `Models` belongs to the node's thread; an `EstimateJob` that was handed out is immutable, and
-any thread may compute it. Metres in the map frame, times ns of ROS time.
+Pure. An `EstimateJob` that was handed out is immutable, and any thread may compute it. Metres in
+the map frame, times ns of ROS time.
 """
 
 from __future__ import annotations
 
-import math
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
 from lupin_twin.estimate import (
-    LAST,
-    LONGER,
     MAX_EXACT,
-    NOTHING,
+    MAX_PER_TAG,
+    PER_TAG,
     EstimateGrid,
     FitFailed,
     Model,
-    Nearby,
     Readings,
     fit,
-    gains,
-    longer_by,
 )
 from lupin_twin.fields import FieldRefused, FieldRequest, check_request
 from lupin_twin.history import PastScan
 from lupin_twin.idw import Abandoned, never
-from lupin_twin.state import FLOAT32_MAX, NANOSECONDS_PER_SECOND, Reading, TagState
+from lupin_twin.state import FLOAT32_MAX, NANOSECONDS_PER_SECOND, Scan, TagState
 
 # The service's name, relative to the node's namespace.
 ESTIMATE_SERVICE: Final = "twin/get_estimate"
 MAX_TAGS: Final = 10_000
-# The readings of so few tags all hang together: what they cost grows with the third power of their
-# number. Of each of more tags, so many count.
-MAX_READINGS: Final = 640
-PER_MANY_TAGS: Final = LAST
-# The parameters of a house are as well known from these as from more.
-MAX_FITTED: Final = 400
-# With fewer there is little to learn: each answer is fitted by itself.
-FIRST_FIT: Final = 10
-# The first model of a sensor is waited for, after a restart those of all sensors: it is fitted to
-# so few, a tenth of the work, and serves until the next one.
-FIRST_FITTED: Final = 64
-# A model is fitted anew as often, s, where anything was heard since, and where this much was.
-FIT_PERIOD_S: Final = 300.0
-FIT_REST_S: Final = 10.0
-GROWN: Final = 1.5
-# A fit that takes so long is told of, s; it waits for the round of a house of 10,000 tags.
-FIT_SLOW_S: Final = 120.0
 # An estimate of now is one of the last whole minute of a day of so many, or of the newest reading.
 MINUTES_A_DAY: Final = 1_440
+# Of each of so many parts of a day, a tag's newest reading is remembered.
+PARTS_A_DAY: Final = 24
 # What answers take, roughly and at worst, s of one core: for each pair of readings or, of many
 # tags, for each of these; and for each cell.
-_PAIR_S: Final = 0.6e-6
-_TAG_S: Final = 150e-6
-_CELL_S: Final = 0.2e-6
+_PAIR_S: Final = 0.3e-6
+_TAG_S: Final = 500e-6
+_CELL_S: Final = 0.1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,10 +86,52 @@ def is_usable(value: float) -> bool:
     return abs(value) <= FLOAT32_MAX
 
 
-def past_of(tag: TagState, scans: Iterable[PastScan], sensor: str) -> TagPast | None:
+class Day:
+    """What each tag read in each part of the last day, for a history is shorter than that."""
+
+    def __init__(self, day_length_s: float) -> None:
+        self._part_ns = max(int(day_length_s * NANOSECONDS_PER_SECOND) // PARTS_A_DAY, 1)
+        # Of tag and sensor: immutable, so that any thread may read them.
+        self._read: dict[tuple[str, str], tuple[tuple[int, float], ...]] = {}
+
+    def hear(self, scan: Scan) -> None:
+        """Keep the readings of a scan."""
+        for reading in scan.readings:
+            self.add(scan.tag_id, reading.name, scan.stamp_ns, reading.value)
+
+    def add(self, tag_id: str, sensor: str, stamp_ns: int, value: float) -> None:
+        """Keep a reading: of each part of the day the newest."""
+        if not is_usable(value):
+            return
+        known = self.of(tag_id, sensor)
+        part = stamp_ns // self._part_ns
+        at = bisect_left(known, part, key=lambda one: one[0] // self._part_ns)
+        is_known = at < len(known) and known[at][0] // self._part_ns == part
+        if not is_known or known[at][0] <= stamp_ns:
+            kept = (*known[:at], (stamp_ns, value), *known[at + is_known :])
+            self._read[tag_id, sensor] = kept[-PARTS_A_DAY - 1 :]
+
+    def of(self, tag_id: str, sensor: str) -> tuple[tuple[int, float], ...]:
+        """What is kept of a tag and a sensor: (ns, value), in order."""
+        return self._read.get((tag_id, sensor), ())
+
+    def hold_to(self, now_ns: int) -> None:
+        """Follow a clock that has gone back: what is later is forgotten."""
+        self._read = {
+            key: tuple(one for one in known if one[0] <= now_ns)
+            for key, known in self._read.items()
+        }
+
+
+def past_of(
+    tag: TagState,
+    scans: Iterable[PastScan],
+    sensor: str,
+    day: Iterable[tuple[int, float]] = (),
+) -> TagPast | None:
     """What memory holds of a tag and a sensor; None without a place, or without a finite reading.
 
-    The newest is in the state: it may be older than any scan that is kept.
+    The newest is in the state: it may be older than any scan that is kept; `day` goes farther back.
     """
     if tag.pose is None:
         return None
@@ -123,13 +146,14 @@ def past_of(tag: TagState, scans: Iterable[PastScan], sensor: str) -> TagPast | 
         for stamp_ns, reading in read
         if reading.name == sensor and is_usable(reading.value)
     }
+    found.update(day)
     return TagPast(tag.tag_id, tag.pose.x, tag.pose.y, tuple(sorted(found))) if found else None
 
 
 def moment_of(tags: Sequence[TagPast], now_ns: int, day_length_s: float) -> int:
     """The moment that an estimate of now is made for, not later than `now_ns`.
 
-    A minute of the day changes nothing that anybody could tell; but of the same readings the same
+    A minute of the day changes nothing that anybody could see; but of the same readings the same
     estimate is made throughout it, to the last bit.
     """
     minute_ns = int(day_length_s / MINUTES_A_DAY * NANOSECONDS_PER_SECOND)
@@ -140,10 +164,10 @@ def moment_of(tags: Sequence[TagPast], now_ns: int, day_length_s: float) -> int:
 def readings_of(tags: Sequence[TagPast], at_ns: int, day_length_s: float) -> Readings:
     """Those that count as of `at_ns`, by seconds from then on (they are not greater than 0).
 
-    A day's, as many of each tag as all tags together may have: see `Readings.thinned`.
+    A day's, as many of each tag as all tags together may have; tag numbers are those of `tags`.
 
     Raises:
-        FieldRefused: no reading within a day, or more tags than can be reckoned with.
+        FieldRefused: no reading within a day, or more tags than can be computed with.
 
     """
     all_of = Readings(
@@ -152,72 +176,30 @@ def readings_of(tags: Sequence[TagPast], at_ns: int, day_length_s: float) -> Rea
         np.array([value for tag in tags for _, value in tag.readings]),
         np.array([(tag.x, tag.y) for tag in tags]).reshape(-1, 2),
     )
-    recent = all_of.recent(0.0, day_length_s=day_length_s)
-    present = np.unique(recent.tag)
-    if len(present) > MAX_TAGS:
+    those = thinned(all_of, 0.0, day_length_s)
+    present = len(np.unique(those.tag))
+    if present > MAX_TAGS:
         raise FieldRefused(
-            f"{len(present)} tags have this sensor, an estimate is made of {MAX_TAGS} at most"
+            f"{present} tags have this sensor, an estimate is made of {MAX_TAGS} at most"
         )
-    if not len(present):
+    if not present:
         raise FieldRefused(f"no tag has a reading of the {day_length_s:g} s before that moment")
-    index = np.searchsorted(present, recent.tag)
-    those = Readings(recent.time_s, index, recent.value, recent.xy[present])
-    is_few = len(present) <= MAX_EXACT
-    per_tag = MAX_READINGS // len(present) if is_few else PER_MANY_TAGS
-    return those.thinned(per_tag)
+    return those
 
 
-def fitted(
-    readings: Readings,
-    day_length_s: float,
-    should_stop: Callable[[], bool] = never,
-    most: int = MAX_FITTED,
-) -> Model:
-    """A model of readings that `readings_of` has chosen; of more than `most`, of some of them.
-
-    They lie anywhere; of many tags, they are of some groups of a dozen that are near each other.
-
-    Raises:
-        lupin_twin.estimate.FitFailed: they do not let themselves be fitted.
-        Abandoned: `should_stop`, asked every few milliseconds, said so.
-
-    """
-    return fit(_some(readings, most), day_length_s=day_length_s, should_stop=should_stop)
-
-
-def gains_of_longer_days(
-    tags: Sequence[TagPast],
-    at_ns: int,
-    day_length_s: float,
-    should_stop: Callable[[], bool] = never,
-) -> tuple[float, ...]:
-    """How much better longer days explain what was read over many: see `estimate.gains`.
-
-    Raises:
-        FieldRefused: see `readings_of`.
-        lupin_twin.estimate.FitFailed: they do not let themselves be fitted.
-        Abandoned: `should_stop`, asked every few milliseconds, said so.
-
-    """
-    readings = readings_of(tags, at_ns, max(LONGER) * day_length_s)
-    return gains(_some(readings, FIRST_FITTED), day_length_s, should_stop)
-
-
-def _some(readings: Readings, most: int) -> Readings:
-    """About so many of them, if they are more."""
-    if len(np.unique(readings.tag)) > MAX_EXACT:
-        return Nearby(readings).some(most)
-    if len(readings) <= most:
-        return readings
-    chosen = np.random.default_rng(len(readings)).permutation(len(readings))[:most]
-    return readings.take(np.sort(chosen))
+def thinned(readings: Readings, at_s: float, day_length_s: float) -> Readings:
+    """Those of a day that count: as many of each tag as can be solved at once, or a few of each."""
+    age_s = at_s - readings.time_s
+    tags = len(np.unique(readings.tag[(age_s >= 0.0) & (age_s <= day_length_s)]))
+    per_tag = max(MAX_EXACT // max(tags, 1), PER_TAG)
+    return readings.recent(at_s, day_length_s=day_length_s, per_tag=min(per_tag, MAX_PER_TAG))
 
 
 @dataclass(frozen=True, slots=True)
 class EstimateJob:
     """An estimate that is not computed yet; without a model, one is fitted for it alone.
 
-    `changed` are the tags that it does without, by since when.
+    `changed` are the tags whose sensor has changed: what they have read since then does not count.
     """
 
     request: EstimateRequest
@@ -237,16 +219,14 @@ class EstimateJob:
 
         """
         at_ns = self.request.at_ns or moment_of(tags, now_ns, self.day_length_s)
-        tags = [tag for tag in tags if self.changed.get(tag.tag_id, at_ns + 1) > at_ns]
-        readings = readings_of(tags, at_ns, self.day_length_s)
+        readings = readings_of(unchanged(tags, self.changed), at_ns, self.day_length_s)
         box = self.request.box
         try:
             model = self.model
             if model is None:
-                model = fitted(readings, self.day_length_s, should_stop)
-            posterior = model.posterior(readings, 0.0, should_stop)
+                model = fit(readings, day_length_s=self.day_length_s, should_stop=should_stop)
             _go_on_unless(should_stop)
-            grid = posterior.grid(
+            grid = model.posterior(readings, 0.0, should_stop).grid(
                 bbox_min_x=box.bbox_min_x,
                 bbox_min_y=box.bbox_min_y,
                 bbox_max_x=box.bbox_max_x,
@@ -254,8 +234,23 @@ class EstimateJob:
                 resolution=box.resolution,
             )
         except (FitFailed, np.linalg.LinAlgError) as error:
-            raise FieldRefused(f"these readings cannot be reckoned with: {error}") from error
-        return Estimate(grid, len(readings.xy), len(readings))
+            raise FieldRefused(f"these readings cannot be computed with: {error}") from error
+        return Estimate(grid, len(np.unique(readings.tag)), len(readings))
+
+
+def unchanged(tags: Sequence[TagPast], changed: Mapping[str, int]) -> list[TagPast]:
+    """The same tags without what was read since their sensor has changed, ns."""
+    return [
+        tag
+        if tag.tag_id not in changed
+        else TagPast(
+            tag.tag_id,
+            tag.x,
+            tag.y,
+            tuple(one for one in tag.readings if one[0] < changed[tag.tag_id]),
+        )
+        for tag in tags
+    ]
 
 
 def _go_on_unless(should_stop: Callable[[], bool]) -> None:
@@ -266,125 +261,6 @@ def _go_on_unless(should_stop: Callable[[], bool]) -> None:
 def cost_s(request: EstimateRequest, tags: int, max_grid_cells: int) -> float:
     """About how long an estimate of so many tags takes, s of one core."""
     width, height = check_request(request.box, max_grid_cells)
-    readings = min(MAX_READINGS, 32 * tags)
-    of_tags = readings**2 * _PAIR_S if tags <= MAX_EXACT else tags * _TAG_S
-    return of_tags + width * height * _CELL_S
-
-
-@dataclass(frozen=True, slots=True)
-class Fit:
-    """The model that serves, and when it was fitted, ns of ROS time; None: there is none.
-
-    `problem` is why the last fit came to nothing, that one takes long, or that the day's length is
-    wrong; empty: nothing is.
-    """
-
-    model: Model | None = None
-    at_ns: int | None = None
-    problem: str = ""
-
-
-@dataclass(slots=True)
-class _Sensor:
-    heard: int = 0
-    fitted_at: int = 0
-    fitted_s: float = -math.inf
-    fit: Fit = Fit()
-    gains: tuple[float, ...] = NOTHING
-
-
-@dataclass(slots=True)
-class Models:
-    """The newest model of each sensor, and whose turn it is. One fit at a time.
-
-    Seconds are of a clock that never jumps. Until a fit comes to something, the model before it
-    serves; `failed` counts those that came to nothing.
-    """
-
-    failed: int = 0
-    _sensors: dict[str, _Sensor] = field(default_factory=dict)
-    _fitting: str | None = None
-
-    def hear(self, readings: Iterable[Reading]) -> bool:
-        """Readings were accepted; whether a sensor has just got enough for its first model."""
-        is_enough = False
-        for reading in readings:
-            if is_usable(reading.value):
-                one = self._sensors.setdefault(reading.name, _Sensor())
-                one.heard += 1
-                is_enough = is_enough or one.heard == FIRST_FIT
-        return is_enough
-
-    def of(self, sensor: str) -> Fit:
-        """What serves; without a model, too little was heard, or nothing was fitted yet."""
-        known = self._sensors.get(sensor)
-        if known is None:
-            return Fit()
-        return replace(known.fit, problem=self._problem(known))
-
-    def serving(self) -> dict[str, Model]:
-        """The models that serve, by sensor."""
-        return {
-            name: one.fit.model for name, one in self._sensors.items() if one.fit.model is not None
-        }
-
-    def problems(self) -> dict[str, str]:
-        """What is wrong with fits, by sensor."""
-        told = {name: self._problem(one) for name, one in self._sensors.items()}
-        return {name: problem for name, problem in told.items() if problem}
-
-    @property
-    def day_problem(self) -> str:
-        """Why the day's length is wrong; empty: nothing says so."""
-        longer = longer_by([one.gains for one in self._sensors.values()])
-        if longer is None:
-            return ""
-        return f"by its readings, a day takes some {longer:g} times as long as day_length_s"
-
-    def weigh(self, sensor: str, gains: tuple[float, ...]) -> None:
-        """By how many nats longer days explain a sensor's readings better than the one told."""
-        self._sensors[sensor].gains = gains
-
-    def _problem(self, one: _Sensor) -> str:
-        return one.fit.problem or ("" if one.fit.model is None else self.day_problem)
-
-    def due(self, now_s: float) -> str | None:
-        """The sensor that is to be fitted now, the one that waits longest; None: nobody's turn."""
-        if self._fitting is not None:
-            self._tell_slowness(self._sensors[self._fitting], now_s)
-            return None
-        waiting = [
-            (one.fitted_s, name) for name, one in self._sensors.items() if _is_due(one, now_s)
-        ]
-        return min(waiting)[1] if waiting else None
-
-    def begin(self, sensor: str, now_s: float) -> int:
-        """A fit has begun, of so many readings at most."""
-        one = self._sensors[sensor]
-        one.fitted_s, one.fitted_at = now_s, one.heard
-        self._fitting = sensor
-        return FIRST_FITTED if one.fit.model is None else MAX_FITTED
-
-    def end(self, sensor: str, outcome: Model | Exception, now_ns: int) -> None:
-        """It has ended."""
-        self._fitting = None
-        one = self._sensors[sensor]
-        if isinstance(outcome, Exception):
-            self.failed += 1
-            one.fit = replace(one.fit, problem=str(outcome) or repr(outcome))
-        else:
-            if one.fit.model is None:  # what it was not fitted to is still to be learnt from
-                one.fitted_at = min(one.fitted_at, FIRST_FITTED)
-            one.fit = Fit(outcome, now_ns)
-
-    def _tell_slowness(self, one: _Sensor, now_s: float) -> None:
-        if now_s - one.fitted_s > FIT_SLOW_S:
-            one.fit = replace(one.fit, problem=f"a fit takes longer than {FIT_SLOW_S:g} s")
-
-
-def _is_due(one: _Sensor, now_s: float) -> bool:
-    if one.heard < FIRST_FIT or one.heard == one.fitted_at:
-        return False
-    since_s = now_s - one.fitted_s
-    has_grown = one.heard >= GROWN * one.fitted_at
-    return since_s >= FIT_PERIOD_S or (has_grown and since_s >= FIT_REST_S)
+    readings = min(MAX_EXACT, MAX_PER_TAG * tags)
+    is_exact = tags * PER_TAG <= MAX_EXACT
+    return (readings**2 * _PAIR_S if is_exact else tags * _TAG_S) + width * height * _CELL_S

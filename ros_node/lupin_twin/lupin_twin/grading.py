@@ -1,61 +1,37 @@
-"""Whether an estimate keeps its word: of what it foretold, how much came to lie in its intervals.
+"""Whether an estimate keeps its word: of what it predicted, how much came to lie in its intervals.
 
-Pure. Counted by the hour, a 24th of a day of the house's own length, over the last day and week.
-Times are ns of ROS time.
+Pure. Counted by the hour, a 24th of a day of the greenhouse's own length, over the last day and
+week. Times are ns of ROS time.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import Final
 
 from lupin_twin.state import NANOSECONDS_PER_SECOND
 
-# The interval foretold: 9 of 10 are to lie within mean +- so many sds.
+# The interval predicted: 9 of 10 are to lie within mean +- so many sds.
 HALF_WIDTH_SDS: Final = 1.645
 HOURS_A_DAY: Final = 24
 HOURS_A_WEEK: Final = 7 * HOURS_A_DAY
 # What may be of a share that is to be 0.9; a model that is wrong is soon farther off.
 LEAST_SHARE: Final = 0.8
-MOST_SHARE: Final = 0.98
 # Scans of one hour hang together: of fewer nothing is said.
-LEAST_SCANS: Final = 20
-# 95 % of a normal distribution lie within so many sds.
-_Z: Final = 1.96
+LEAST_SCANS: Final = 40
 
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """Scans that were foretold, and those of them that came to lie inside."""
+    """Scans that were predicted without their tag and its neighbours, and those that lay inside."""
 
     scans: int = 0
     inside: int = 0
 
     @property
     def share(self) -> float | None:
-        """Inside; None: nothing was foretold."""
+        """Inside; None: nothing was predicted."""
         return self.inside / self.scans if self.scans else None
-
-    @property
-    def is_credible(self) -> bool:
-        """Whether the share may be as it should; false: it is too small, or too large, for chance.
-
-        By Wilson's interval (Journal of the American Statistical Association 22, 1927, 209), once
-        there are `LEAST_SCANS`.
-        """
-        if self.scans < LEAST_SCANS:
-            return True
-        low, high = _wilson(self)
-        return high >= LEAST_SHARE and low <= MOST_SHARE
-
-
-def _wilson(tally: Tally) -> tuple[float, float]:
-    n = tally.scans
-    share, square = tally.inside / n, _Z**2
-    middle = (share + square / (2 * n)) / (1 + square / n)
-    half = _Z / (1 + square / n) * math.sqrt(share * (1 - share) / n + square / (4 * n**2))
-    return middle - half, middle + half
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,14 +43,15 @@ class Record:
     week: Tally
 
     @property
-    def is_trusted(self) -> bool:
-        """Whether neither the day nor the week says that the model is wrong."""
-        return self.day.is_credible and self.week.is_credible
+    def is_trusted(self) -> bool | None:
+        """Whether day and week lay inside often enough; None: too few scans to say."""
+        said = [one for one in (self.day, self.week) if one.scans >= LEAST_SCANS]
+        return all(one.inside >= LEAST_SHARE * one.scans for one in said) if said else None
 
 
 @dataclass(slots=True)
 class Grades:
-    """One sensor's, by the hour; `day_length_s` is a day of the house, s of ROS time."""
+    """One sensor's, by the hour; `day_length_s` is a day of the greenhouse, s of ROS time."""
 
     day_length_s: float
     _since_ns: int | None = None

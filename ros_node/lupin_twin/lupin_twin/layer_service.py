@@ -232,7 +232,7 @@ class LayerService:
         shown = self.shown
         rules, occupancy = shown.fields.rules, shown.occupancy()
         revision = None if occupancy is None else occupancy.revision
-        fit = shown.estimates.models.of(sensor)
+        fit = shown.estimates.watch.fit(sensor)
         if fit.model is None:
             return shown.store.observation_count, rules, revision
         # An estimate goes on from minute to minute, with nothing heard: its error grows.
@@ -245,7 +245,7 @@ class LayerService:
         request = self._request(sensor, snapshot)
         answer = shown.fields.lookup(request, shown.store, shown.occupancy())
         task: Task | None = None
-        if shown.estimates.models.of(sensor).model is not None:
+        if shown.estimates.watch.fit(sensor).model is not None:
             task = shown.estimates.prepare(EstimateRequest(request))
 
         def make(found: Sequence[TagPast], should_stop: ShouldStop) -> _Made:

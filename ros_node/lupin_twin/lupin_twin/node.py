@@ -435,12 +435,12 @@ class TwinNode(AdjustableNode):
 
     def _follow(self, now_ns: int, *, is_simulated: bool) -> None:
         now = RunClock(now_ns, time.time_ns(), is_simulated)
-        told = self.memory.follow(now)
-        if told is not None:
+        if told := self.memory.follow(now):
             self.get_logger().info(told)
             self.estimates.restore()
         if self.memory.hold_to(now):
             self.lateness.hold_to(now_ns)
+            self.estimates.hold_to(now_ns)
             self.habits.warn(
                 ("clock", 0),
                 "ROS time has gone back: all observations from later than now age from here on",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from PIL import Image
 from lupin_bridge.field import estimate_formats, formats
 from lupin_bridge.field.formats import JSON, NPY, PNG, FieldFormat
 from lupin_bridge.judge.choosing import Criteria
+from lupin_bridge.judge.ranges import Ranges, Span
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.estimate_schema import GetEstimateResponse
 from tests.support.estimates import an_estimate
@@ -84,3 +86,13 @@ def test_headers_say_what_an_array_cannot() -> None:
         "Sample-Count": "3",
         "Reading-Count": "7",
     }
+
+
+def test_known_is_only_what_is_sure_to_a_part_of_the_narrowest_ideal_range() -> None:
+    wide, narrow = (Ranges(ideal=Span(20.0, high)) for high in (60.0, 26.0))
+    sensor = replace(SENSORS.named("ph"), day=wide, night=narrow)
+    found = estimate_formats.within_ideal(ESTIMATE, sensor).grid
+    assert found.sd_known == 1.0
+    assert found.known.ravel().tolist() == [True, True, False, False, False, False]
+    for other in (replace(sensor, night=wide), SENSORS.named("ph")):
+        assert estimate_formats.within_ideal(ESTIMATE, other) is ESTIMATE

@@ -41,7 +41,7 @@ def test_how_often_they_were_right() -> None:
     }
     bare = body["sensors"]["ph"]
     assert (bare["fitted_at"], bare["graded_since"], bare["share_day"]) == (None, None, None)
-    assert bare["is_trusted"] is True
+    assert bare["is_trusted"] is None
 
 
 def test_what_was_expected_of_each_tag() -> None:

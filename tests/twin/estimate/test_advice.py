@@ -23,7 +23,7 @@ def error_by_the_textbook(readings: Readings, h: Hyper, more: list[int]) -> floa
     at_h = float(readings.time_s.max()) / 3600.0
     spots = spots_of(readings) + [spot_at(CANDIDATES[one], at_h) for one in more]
     nothing = np.zeros(len(spots))
-    each = [textbook_gp.foretold(spots, nothing, spot_at(place, at_h), h)[1] for place in TARGETS]
+    each = [textbook_gp.predicted(spots, nothing, spot_at(place, at_h), h)[1] for place in TARGETS]
     return sqrt(sum(each) / len(each))
 
 
@@ -32,7 +32,7 @@ def error_by_the_textbook(readings: Readings, h: Hyper, more: list[int]) -> floa
 def test_each_place_is_the_best_of_those_left_and_its_error_the_textbook_s(
     readings: Readings, h: Hyper
 ) -> None:
-    model = Model(Scale(20.0, 2.0), 2.0, DAY_S, h, (h,))
+    model = Model(Scale(20.0, 2.0), 2.0, DAY_S, h)
     posterior = model.posterior(readings, float(readings.time_s.max()))
     advice = posterior.advice(CANDIDATES, 3, over=TARGETS)
     at_first = error_by_the_textbook(readings, h, [])

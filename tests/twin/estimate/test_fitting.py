@@ -1,4 +1,4 @@
-"""The most probable parameters: the density and its gradient, what is found, and the draws."""
+"""The most probable parameters: the density and its gradient, and what is found."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import pytest
 from hypothesis import given, settings
 
 from lupin_twin.estimate import Readings
-from lupin_twin.estimate.fitting import DRAWS, FitFailed, draws, hyper_of, minimise, surprise
-from lupin_twin.estimate.kernel import PRIOR_LOG_SD, PRIOR_MEDIAN, Hyper, pairs_of
+from lupin_twin.estimate.fitting import FitFailed, hyper_of, minimise, surprise
+from lupin_twin.estimate.kernel import PRIOR_LOG_SD, PRIOR_MEDIAN, Hyper, Pairs
 from lupin_twin.estimate.readings import scale_of
 from tests.support import textbook_gp
-from tests.support.estimates import DAY_S, a_day, some_readings, spots_of
+from tests.support.estimates import DAY_S, a_day, hypers, some_readings, spots_of
 
 START = np.zeros(len(PRIOR_MEDIAN))
 
 
 def objective_of(readings: Readings) -> Any:
     y = scale_of(readings.value, (18.0, 26.0)).standardised(readings.value)
-    return surprise(pairs_of(readings, DAY_S), y)
+    return surprise(Pairs(readings, DAY_S), y)
 
 
 @given(some_readings())
@@ -52,6 +52,14 @@ def test_its_gradient_is_that_of_finite_differences(readings: Readings) -> None:
     assert objective(there)[1] == pytest.approx(expected, rel=1e-4, abs=1e-5 * scale)
 
 
+@given(some_readings(), hypers)
+def test_the_covariance_is_the_formula_pair_by_pair(readings: Readings, h: Hyper) -> None:
+    expected = textbook_gp.of_readings(spots_of(readings), h)
+    assert Pairs(readings, DAY_S).covariance(h) == pytest.approx(expected, rel=1e-12)
+    fast = Readings(readings.time_s / 60.0, readings.tag, readings.value, readings.xy)
+    assert Pairs(fast, DAY_S / 60.0).covariance(h) == pytest.approx(expected, rel=1e-12)
+
+
 def test_the_prior_s_median_is_the_start() -> None:
     assert hyper_of(START) == pytest.approx(PRIOR_MEDIAN)
     one = START.copy()
@@ -79,17 +87,6 @@ def test_what_cannot_be_factorised_has_no_density_and_ends_no_search() -> None:
     assert minimise(steep, np.zeros(1))[0] == pytest.approx(0.5, abs=0.1)
     with pytest.raises(FitFailed, match="singular at the prior's own median"):
         minimise(lambda at: (np.inf, at), START)
-
-
-def test_the_draws_are_antithetic_the_same_every_time_and_no_wider_than_the_prior() -> None:
-    flat = draws(lambda at: (0.0, np.zeros_like(at)), START)
-    assert len(flat) == DRAWS
-    assert np.sum(flat, axis=0) == pytest.approx(START)
-    prior = draws(lambda at: (0.5 * float(at @ at), at), START)
-    assert np.abs(flat) == pytest.approx(np.abs(prior)), "a curvature of 0 is no wider than 1"
-    sharp = draws(lambda at: (8.0 * float(at @ at), 16.0 * at), START)
-    assert np.abs(sharp) == pytest.approx(np.abs(prior) / 4.0)
-    assert np.array(draws(lambda at: (np.inf, at), START)) == pytest.approx(np.array(prior))
 
 
 def test_readings_without_noise_of_their_own_are_fitted_too() -> None:

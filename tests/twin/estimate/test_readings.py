@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_twin.estimate.readings import MAX_PER_TAG, Readings, scale_of
+from lupin_twin.estimate.readings import Readings, scale_of
 from tests.support.estimates import DAY_S, readings_of, some_readings
 
 GOOD: dict[str, Any] = {
@@ -51,64 +51,43 @@ def test_the_arrays_are_its_own_and_read_only() -> None:
         readings.value[0] = 0.0
 
 
-def plainly_recent(readings: Readings, at_s: float, per_tag: int) -> list[int]:
-    kept = []
-    for tag in range(len(readings.xy)):
-        own = [
-            index
-            for index in range(len(readings))
-            if readings.tag[index] == tag and 0.0 <= at_s - readings.time_s[index] <= DAY_S
-        ]
-        own.sort(key=lambda index: (readings.time_s[index], index))
-        kept += own[-per_tag:]
-    return sorted(kept)
-
-
-@given(some_readings(), st.floats(0.0, 40.0), st.integers(1, 4))
-def test_the_newest_of_a_day_count(readings: Readings, at_hour: float, per_tag: int) -> None:
-    at_s = at_hour * 3600.0
-    expected = plainly_recent(readings, at_s, per_tag)
-    recent = readings.recent(at_s, per_tag=per_tag)
+@given(some_readings(), st.floats(0.0, 40.0))
+def test_the_readings_of_a_day_count(readings: Readings, at_hour: float) -> None:
+    age_s = at_hour * 3600.0 - readings.time_s
+    expected = np.flatnonzero((age_s >= 0.0) & (age_s <= DAY_S))
+    recent = readings.recent(at_hour * 3600.0)
     assert recent.value.tolist() == readings.value[expected].tolist()
     assert recent.tag.tolist() == readings.tag[expected].tolist()
 
 
-def test_thirty_two_of_a_tag_and_a_day_to_the_second() -> None:
-    many = readings_of([(hour / 100.0, 0, float(hour)) for hour in range(40)], [(0.0, 0.0)])
-    recent = many.recent(3600.0)
-    assert recent.value.tolist() == [float(one) for one in range(40 - MAX_PER_TAG, 40)]
-    assert len(many.recent(DAY_S)) == MAX_PER_TAG
-    assert recent.value[0] == 8.0
+@given(st.integers(1, 200), st.integers(1, 40))
+def test_of_more_the_newest_quarter_and_others_from_all_over_the_day(
+    count: int, per_tag: int
+) -> None:
+    hours = np.linspace(0.0, 23.0, count)
+    rows = [(float(hour), tag, float(n)) for n, hour in enumerate(hours) for tag in (1, 0)]
+    whole = readings_of(rows, [(0.0, 0.0), (1.0, 0.0), (2.0, 0.0)])
+    kept = whole.recent(24 * 3600.0, per_tag=per_tag)
+    newest = min(-(-per_tag // 4), count)
+    for tag in (0, 1):
+        numbers = kept.value[kept.tag == tag]
+        assert newest <= len(numbers) <= per_tag
+        assert numbers[-newest:].tolist() == list(range(count - newest, count))
+        gaps_h = np.diff(np.r_[0.0, hours[numbers.astype(int)], 24.0])
+        if per_tag > newest:
+            parts = per_tag - newest
+            assert gaps_h.max() <= 2.0 * 24.0 / parts + 1.0 + 23.0 / max(count - 1, 1)
+
+
+def test_a_day_is_one_to_the_second() -> None:
     old = readings_of([(0.0, 0, 1.0)], [(0.0, 0.0)])
     assert len(old.recent(DAY_S)) == 1
     assert len(old.recent(DAY_S + 1.0)) == 0
     assert len(old.recent(1_440.0, day_length_s=1_440.0)) == 1
     assert len(old.recent(1_441.0, day_length_s=1_440.0)) == 0
     assert len(old.recent(-1.0)) == 0, "what comes later is not known yet"
-
-
-@given(st.integers(1, 40), st.integers(2, 24))
-def test_half_of_those_kept_are_the_newest_and_the_others_reach_back(
-    count: int, per_tag: int
-) -> None:
-    rows = [(float(hour), tag, float(hour)) for hour in range(count) for tag in (1, 0)]
-    whole = readings_of(rows, [(0.0, 0.0), (1.0, 0.0), (2.0, 0.0)])
-    kept = whole.thinned(per_tag)
-    for tag in (0, 1):
-        back = count - 1 - kept.value[kept.tag == tag][::-1].astype(int)
-        assert len(back) == min(count, per_tag)
-        assert back[-1] == count - 1
-        assert back[: per_tag // 2].tolist() == list(range(min(count, per_tag // 2)))
-        steps = np.diff(back)
-        assert (steps >= 1).all(), "none counts twice"
-
-
-def test_eight_of_a_day_of_rounds_and_the_later_of_equal_stamps() -> None:
-    day = readings_of([(hour / 2.0, 0, float(hour)) for hour in range(32)], [(0.0, 0.0)])
-    assert (31.0 - day.thinned(8).value[::-1]).tolist() == [0, 1, 2, 3, 7, 11, 19, 31]
     twice = readings_of([(1.0, 0, float(number)) for number in range(6)], [(0.0, 0.0)])
-    assert twice.thinned(3).value.tolist() == [0.0, 3.0, 5.0]
-    assert len(twice.take(twice.value < 0.0).thinned(8)) == 0
+    assert twice.recent(DAY_S, per_tag=1).value.tolist() == [5.0], "the later of equal stamps"
 
 
 def test_the_spread_lies_between_a_quarter_of_the_ideal_range_and_the_readings_own() -> None:
@@ -140,12 +119,11 @@ def test_no_readings_and_a_range_without_width_are_refused() -> None:
         scale_of(np.array([1.0]), (18.0, 18.0))
 
 
-def test_one_more_reading_is_of_a_new_tag_and_tags_without_any_are_left_out() -> None:
-    readings = readings_of([(1.0, 0, 20.0), (2.0, 2, 21.0)], [(0.0, 0.0), (1.0, 1.0), (2.0, 2.0)])
-    more = readings.with_one_more(3.0, np.array([5.0, 6.0]), 22.0)
-    assert more.tag.tolist() == [0, 2, 3]
-    assert more.xy[3].tolist() == [5.0, 6.0]
-    assert (more.time_s[-1], more.value[-1]) == (3.0, 22.0)
-    present = more.of_present()
-    assert present.tag.tolist() == [0, 1, 2]
-    assert present.xy.tolist() == [[0.0, 0.0], [2.0, 2.0], [5.0, 6.0]]
+def test_tags_without_any_are_left_out_and_the_rest_is_in_order() -> None:
+    readings = readings_of(
+        [(3.0, 2, 22.0), (1.0, 0, 20.0), (2.0, 2, 21.0)], [(0.0, 0.0), (1.0, 1.0), (2.0, 2.0)]
+    )
+    present = readings.of_present()
+    assert present.tag.tolist() == [0, 1, 1]
+    assert present.value.tolist() == [20.0, 21.0, 22.0]
+    assert present.xy.tolist() == [[0.0, 0.0], [2.0, 2.0]]

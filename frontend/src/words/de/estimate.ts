@@ -18,7 +18,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
     `Schraffiert, wo sie um mehr als ±${error} danebenliegen kann, je dichter, desto mehr. Ohne Farbe: nicht bekannt`,
   errorOf: (sensor) => `${sensor}: wie weit die Schätzung danebenliegen kann`,
   foretold: (inside, scans) =>
-    `${inside} von ${counted(scans, 'Messung', 'Messungen')} im Bereich, der für sie vorhergesagt war`,
+    `${inside} von ${counted(scans, 'Messung', 'Messungen')} dort, wo die anderen Messpunkte sie erwarten ließen`,
   foretoldNone: 'Noch keine Messung wurde an ihr gemessen',
   foretoldDay: (inside, scans) =>
     `Letzter Tag: ${inside} von ${counted(scans, 'Messung', 'Messungen')}`,
@@ -26,11 +26,8 @@ export const ESTIMATE: In<typeof ENGLISH> = {
     `letzte Woche: ${inside} von ${counted(scans, 'Messung', 'Messungen')}`,
   fitProblem: (reason) => `Das Haus kennenzulernen gelingt nicht recht: ${reason}`,
   notTrusted: (count) =>
-    `Nicht auf das ± verlassen: Nur ${count} von 10 Messungen lagen in dem Bereich, der für sie ` +
-    'vorhergesagt war, nicht 9. Stimmt die eingestellte Länge des Tages?',
-  tooWide:
-    'Nicht auf das ± verlassen: Fast alle Messungen lagen in dem Bereich, der für sie vorhergesagt ' +
-    'war, er ist also weiter als nötig. Stimmt die eingestellte Länge des Tages?',
+    `Nicht auf das ± verlassen: Nur ${count} von 10 Messungen lagen dort, wo die anderen ` +
+    'Messpunkte sie erwarten ließen, nicht 9.',
   near: (count) =>
     count === 0
       ? 'kein Messpunkt in der Nähe'

@@ -17,19 +17,15 @@ export const ESTIMATE = {
   /** Beside the colours of the error. */
   errorOf: (sensor: string): string => `${sensor}: how far off the estimate may be`,
   foretold: (inside: number, scans: number): string =>
-    `${inside} of ${counted(scans, 'scan', 'scans')} fell into the range foretold for them`,
-  foretoldNone: 'No scan has been held against it yet',
+    `${inside} of ${counted(scans, 'scan', 'scans')} lay where the other tags put them`,
+  foretoldNone: 'No scan has been compared with it yet',
   foretoldDay: (inside: number, scans: number): string =>
     `Last day: ${inside} of ${counted(scans, 'scan', 'scans')}`,
   foretoldWeek: (inside: number, scans: number): string =>
     `last week: ${inside} of ${counted(scans, 'scan', 'scans')}`,
   fitProblem: (reason: string): string => `Learning the house is not going well: ${reason}`,
   notTrusted: (count: number): string =>
-    `Do not rely on the ±: only ${count} of 10 scans fell into the range foretold for them, not 9. ` +
-    'Is the length of the day set right?',
-  tooWide:
-    'Do not rely on the ±: nearly all scans fell into the range foretold for them, so it is wider ' +
-    'than need be. Is the length of the day set right?',
+    `Do not rely on the ±: only ${count} of 10 scans lay where the other tags put them, not 9.`,
   near: (count: number): string =>
     count === 0 ? 'no tag near' : counted(count, 'tag near', 'tags near'),
   oldest: (age: string): string => `oldest reading ${age}`,

@@ -18,7 +18,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
     `Rayado donde puede desviarse más de ±${error}; cuanto más denso, más. Sin color: no se sabe`,
   errorOf: (sensor) => `${sensor}: cuánto puede desviarse la estimación`,
   foretold: (inside, scans) =>
-    `${inside} de ${counted(scans, 'medición', 'mediciones')} en el rango previsto`,
+    `${inside} de ${counted(scans, 'medición', 'mediciones')} donde indicaban los otros puntos`,
   foretoldNone: 'Aún no se ha comparado con ninguna medición',
   foretoldDay: (inside, scans) =>
     `Último día: ${inside} de ${counted(scans, 'medición', 'mediciones')}`,
@@ -26,11 +26,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
     `última semana: ${inside} de ${counted(scans, 'medición', 'mediciones')}`,
   fitProblem: (reason) => `No se consigue conocer bien la casa: ${reason}`,
   notTrusted: (count) =>
-    `No se fíe del ±: solo ${count} de 10 mediciones cayeron en el rango previsto para ellas, no 9. ` +
-    '¿Es correcta la duración del día?',
-  tooWide:
-    'No se fíe del ±: casi todas las mediciones cayeron en el rango previsto para ellas, así que es ' +
-    'más ancho de lo necesario. ¿Es correcta la duración del día?',
+    `No se fíe del ±: solo ${count} de 10 mediciones estaban donde indicaban los otros puntos, no 9.`,
   near: (count) =>
     count === 0 ? 'ningún punto cerca' : counted(count, 'punto cerca', 'puntos cerca'),
   oldest: (age) => `lectura más antigua: ${age}`,

@@ -18,7 +18,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
     `Gearceerd waar ze er meer dan ±${error} naast kan zitten, hoe dichter hoe meer. Geen kleur: niet bekend`,
   errorOf: (sensor) => `${sensor}: hoe ver de schatting ernaast kan zitten`,
   foretold: (inside, scans) =>
-    `${inside} van ${counted(scans, 'meting', 'metingen')} in het bereik dat ervoor voorspeld was`,
+    `${inside} van ${counted(scans, 'meting', 'metingen')} waar de andere meetpunten ze verwachtten`,
   foretoldNone: 'Er is nog geen meting mee vergeleken',
   foretoldDay: (inside, scans) =>
     `Laatste dag: ${inside} van ${counted(scans, 'meting', 'metingen')}`,
@@ -26,11 +26,8 @@ export const ESTIMATE: In<typeof ENGLISH> = {
     `laatste week: ${inside} van ${counted(scans, 'meting', 'metingen')}`,
   fitProblem: (reason) => `De kas leren kennen lukt niet goed: ${reason}`,
   notTrusted: (count) =>
-    `Vertrouw niet op de ±: maar ${count} van de 10 metingen vielen in het bereik dat ervoor ` +
-    'voorspeld was, geen 9. Is de lengte van de dag goed ingesteld?',
-  tooWide:
-    'Vertrouw niet op de ±: bijna alle metingen vielen in het bereik dat ervoor voorspeld was, dus ' +
-    'het is ruimer dan nodig. Is de lengte van de dag goed ingesteld?',
+    `Vertrouw niet op de ±: maar ${count} van de 10 metingen lagen waar de andere ` +
+    'meetpunten ze verwachtten, geen 9.',
   near: (count) =>
     count === 0
       ? 'geen meetpunt in de buurt'

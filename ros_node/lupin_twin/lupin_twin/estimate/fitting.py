@@ -1,9 +1,8 @@
-"""What the readings say of the kernel's parameters: their most probable values, and how unsure.
+"""What the readings say of the kernel's parameters: the most probable values.
 
 Pure. Maximum a posteriori by BFGS with the analytic gradient (Rasmussen and Williams, "Gaussian
-Processes for Machine Learning", 2006, 5.9), then draws from the Laplace approximation about it,
-which is never taken to be wider than the prior. Coordinates are those in which the prior is a
-standard normal: (log parameter - log median) / sd of the log.
+Processes for Machine Learning", 2006, 5.9). Coordinates are those in which the prior is a standard
+normal: (log parameter - log median) / sd of the log.
 """
 
 from __future__ import annotations
@@ -14,22 +13,15 @@ from typing import Final
 import numpy as np
 
 from lupin_twin.estimate.kernel import PRIOR_LOG_SD, PRIOR_MEDIAN, Hyper, Pairs
-from lupin_twin.estimate.triangle import root_of_inverse
 from lupin_twin.grid import FloatArray
 from lupin_twin.idw import Abandoned, never
 
-DRAWS: Final = 8
 _MAX_STEPS: Final = 60
-# Half a thousandth of a unit of log probability is nothing to anybody.
+# Half a thousandth of a unit of log probability changes nothing that anybody could see.
 _GOOD_ENOUGH: Final = 5e-4
 _SHORTEST: Final = 1e-3
 # Beyond, exp() is past what floats can multiply.
 _FARTHEST: Final = 12.0
-# A draw where the density is too low is moved so much nearer, again and again until so near.
-_NEARER: Final = 0.8
-_NEAREST: Final = 0.3
-_PROBE: Final = 0.02
-_SEED: Final = 20_260_101
 _LOG_MEDIAN: Final = np.log(np.array(PRIOR_MEDIAN))
 _LOG_SD: Final = np.array(PRIOR_LOG_SD)
 
@@ -51,22 +43,21 @@ def surprise(pairs: Pairs, y: FloatArray, should_stop: Callable[[], bool] = neve
     The density of covariances that cannot be factorised, or whose numbers are past what floats
     hold, is taken to be 0. When `should_stop` says so, it raises `Abandoned`.
     """
-    # Large arrays are dear to get from the system again and again.
-    covariance, root, inverse = (np.zeros((len(y), len(y))) for _ in range(3))
 
     def at(coordinates: FloatArray) -> tuple[float, FloatArray]:
         if should_stop():
             raise Abandoned
         h = hyper_of(coordinates)
         try:
-            root_of_inverse(pairs.covariance(h, covariance), root)
+            covariance = pairs.covariance(h)
+            root = np.linalg.cholesky(covariance)
+            inverse = np.linalg.inv(covariance)
         except np.linalg.LinAlgError:
             return np.inf, coordinates
-        alpha = root.T @ (root @ y)
-        value = 0.5 * (y @ alpha + coordinates @ coordinates) - np.log(np.diagonal(root)).sum()
-        np.matmul(root.T, root, out=inverse)
-        np.subtract(inverse, np.outer(alpha, alpha), out=inverse)
-        slope = _LOG_SD * pairs.gradient(h, inverse) + coordinates
+        alpha = inverse @ y
+        value = 0.5 * (y @ alpha + coordinates @ coordinates) + np.log(np.diagonal(root)).sum()
+        weights = inverse - np.outer(alpha, alpha)
+        slope = _LOG_SD * pairs.gradient(h, weights) + coordinates
         if not (np.isfinite(value) and np.isfinite(slope).all()):
             return np.inf, coordinates
         return float(value), slope
@@ -74,7 +65,7 @@ def surprise(pairs: Pairs, y: FloatArray, should_stop: Callable[[], bool] = neve
     return at
 
 
-def minimise(objective: Objective, start: FloatArray, max_steps: int = _MAX_STEPS) -> FloatArray:
+def minimise(objective: Objective, start: FloatArray) -> FloatArray:
     """BFGS (Nocedal and Wright, "Numerical Optimization", 2006, 6.1) with halved steps.
 
     Raises:
@@ -86,7 +77,7 @@ def minimise(objective: Objective, start: FloatArray, max_steps: int = _MAX_STEP
     if not np.isfinite(value):
         raise FitFailed("the readings' covariance is singular at the prior's own median")
     curvature = np.eye(len(place))  # the inverse Hessian, as far as it is known
-    for _ in range(max_steps):
+    for _ in range(_MAX_STEPS):
         step = -curvature @ slope
         gain = float(slope @ step)
         if -gain < _GOOD_ENOUGH:
@@ -108,32 +99,3 @@ def minimise(objective: Objective, start: FloatArray, max_steps: int = _MAX_STEP
             curvature = left @ curvature @ left.T + np.outer(moved, moved) / along
         place, value, slope = there, new_value, new_slope
     return place
-
-
-def draws(objective: Objective, place: FloatArray, count: int = DRAWS) -> list[FloatArray]:
-    """Antithetic draws about the most probable place, the same ones for the same curvature."""
-    size = len(place)
-    hessian = np.eye(size)  # what the prior says, where there is nothing better
-    value, slope = objective(place)
-    for axis in range(size):
-        probe = np.zeros(size)
-        probe[axis] = _PROBE
-        ahead, slope_ahead = objective(place + probe)
-        if np.isfinite(value) and np.isfinite(ahead):
-            hessian[axis] = (slope_ahead - slope) / _PROBE
-    values, vectors = np.linalg.eigh((hessian + hessian.T) / 2.0)
-    # In these coordinates the prior's curvature is 1. The symmetric root is the one that does not
-    # depend on which of equal axes comes first.
-    narrow = (vectors / np.sqrt(np.maximum(values, 1.0))) @ vectors.T
-    chance = np.random.default_rng(_SEED).standard_normal((count // 2, size))
-    result = []
-    for one in chance:
-        for step in (narrow @ one, -(narrow @ one)):
-            # As far as the density is not lower than so many sds away from a normal's middle.
-            lowest, share = value + 0.5 * float(one @ one), 1.0
-            there = np.clip(place + step, -_FARTHEST, _FARTHEST)
-            while share > _NEAREST and not objective(there)[0] <= lowest:
-                share *= _NEARER
-                there = np.clip(place + share * step, -_FARTHEST, _FARTHEST)
-            result.append(there)
-    return result

@@ -10,77 +10,59 @@ from typing import Final
 import numpy as np
 
 from lupin_twin.estimate import fitting
-from lupin_twin.estimate.kernel import HOURS, Hyper, pairs_of
-from lupin_twin.estimate.member import members_of
-from lupin_twin.estimate.posterior import Posterior
+from lupin_twin.estimate.kernel import Hyper, Pairs
+from lupin_twin.estimate.posterior import INFLATION, Posterior
 from lupin_twin.estimate.readings import Readings, Scale, scale_of
-from lupin_twin.estimate.tiled import TiledPosterior
 from lupin_twin.idw import never
 
+# The parameters of a greenhouse are as well known from these as from more.
+MAX_FITTED: Final = 150
+# They are of so many tags at most: of more, groups of neighbours, for these say over how many
+# metres the truth changes.
+_TAGS: Final = 30
+_TOGETHER: Final = 6
 # Beyond this share of how far places differ, one knows no more of a place than of any other.
 _KNOWN_SHARE: Final = 0.6
-# All readings hang together: what they cost grows with the third power of their number.
-MAX_EXACT: Final = 64
+# The ideal range is so many sds wide where a place is known: an interval of 9 in 10 is half of it.
+SDS_OF_IDEAL: Final = 6.0
 
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """How readings of one sensor hang together: parameters, as many as were drawn, and the scale.
+    """How readings of one sensor hang together.
 
-    `most_probable` serves where one answer is wanted, `drawn` where one has to say how sure.
     `limit` is the sd (the sensor's unit) beyond which nothing is called known.
     """
 
     scale: Scale
     limit: float
     day_length_s: float
-    most_probable: Hyper
-    drawn: tuple[Hyper, ...]
+    hyper: Hyper
 
     @property
     def sd_known(self) -> float:
         """Where the estimate's sd (the sensor's unit) is below this, it is known."""
-        local = float(np.mean([h.local_variance for h in self.drawn]))
-        return min(_KNOWN_SHARE * math.sqrt(local) * self.scale.spread, self.limit)
+        local = INFLATION * math.sqrt(self.hyper.local_variance)
+        return min(_KNOWN_SHARE * local * self.scale.spread, self.limit)
 
     def posterior(
         self, readings: Readings, at_s: float, should_stop: Callable[[], bool] = never
-    ) -> Posterior | TiledPosterior:
+    ) -> Posterior:
         """What the readings say of the moment `at_s` (ROS time, s), everywhere.
 
-        Of more than 64 tags with readings, by what is near each place (`tiled`).
+        What is asked of it raises `numpy.linalg.LinAlgError` if the readings' covariance is
+        singular, as far as floats can tell.
 
         Raises:
             ValueError: there are no readings, or some are later than `at_s`.
-            numpy.linalg.LinAlgError: their covariance is singular, as far as floats can tell.
-            lupin_twin.idw.Abandoned: `should_stop`, asked every few milliseconds, said so; also
-                later, when more is asked of what is returned.
 
         """
         if not len(readings):
             raise ValueError("there are no readings")
-        later_h = (at_s - readings.time_s.max()) * (HOURS / self.day_length_s)
-        if not later_h >= 0.0:
+        if not at_s >= readings.time_s.max():
             raise ValueError(f"at_s is {at_s}, the newest reading is of {readings.time_s.max()}")
-        if len(np.unique(readings.tag)) > MAX_EXACT:
-            return TiledPosterior(
-                self.scale,
-                self.sd_known,
-                self.day_length_s,
-                self.most_probable,
-                readings,
-                at_s,
-                should_stop,
-            )
-        pairs = pairs_of(readings, self.day_length_s)
-        y = self.scale.standardised(readings.value)
         return Posterior(
-            self.scale,
-            self.sd_known,
-            self.day_length_s,
-            self.most_probable,
-            readings,
-            members_of(self.drawn, pairs, y, later_h, should_stop),
+            self.scale, self.hyper, self.sd_known, self.day_length_s, readings, at_s, should_stop
         )
 
 
@@ -93,8 +75,9 @@ def fit(
 ) -> Model:
     """The model that the readings, and what is known beforehand, make most probable.
 
-    `ideal` is the sensor's ideal range in its unit, if there is one; `day_length_s` how long a day
-    takes, s of ROS time.
+    Of many readings 150 are fitted, of tags all over the greenhouse and of the whole day. `ideal`
+    is the sensor's ideal range in its unit, if there is one; `day_length_s` how long a day takes, s
+    of ROS time.
 
     Raises:
         ValueError: no readings, a day that is not longer than 0.
@@ -105,15 +88,25 @@ def fit(
     if not day_length_s > 0.0:
         raise ValueError(f"day_length_s is {day_length_s}, must be greater than 0")
     scale = scale_of(readings.value, ideal)
-    pairs = pairs_of(readings, day_length_s)
-    objective = fitting.surprise(pairs, scale.standardised(readings.value), should_stop)
+    some = _some(readings, day_length_s)
+    pairs = Pairs(some, day_length_s)
+    objective = fitting.surprise(pairs, scale.standardised(some.value), should_stop)
     best = fitting.minimise(objective, np.zeros(len(Hyper._fields)))
-    drawn = fitting.draws(objective, best)
-    limit = scale.spread if ideal is None else (ideal[1] - ideal[0]) / 4.0
-    return Model(
-        scale,
-        limit,
-        day_length_s,
-        fitting.hyper_of(best),
-        tuple(fitting.hyper_of(one) for one in drawn),
-    )
+    limit = scale.spread if ideal is None else (ideal[1] - ideal[0]) / SDS_OF_IDEAL
+    return Model(scale, limit, day_length_s, fitting.hyper_of(best))
+
+
+def _some(readings: Readings, day_length_s: float) -> Readings:
+    """At most `MAX_FITTED` of them."""
+    if len(readings) <= MAX_FITTED:
+        return readings.of_present()
+    of = readings.of_present()
+    if len(of.xy) > _TAGS:
+        along = np.lexsort((of.xy[:, 1], of.xy[:, 0]))
+        middles = along[np.linspace(0, len(along) - 1, _TAGS // _TOGETHER + 2).astype(int)[1:-1]]
+        apart = np.square(of.xy[middles, None] - of.xy[None]).sum(axis=2)
+        chosen = np.unique(np.argpartition(apart, _TOGETHER - 1, axis=1)[:, :_TOGETHER])
+        of = of.take(np.isin(of.tag, chosen)).of_present()
+    per_tag = max(MAX_FITTED // len(of.xy), 1)
+    at_s = float(of.time_s.max())
+    return of.recent(at_s, day_length_s=day_length_s, per_tag=per_tag).of_present()

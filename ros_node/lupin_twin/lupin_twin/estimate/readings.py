@@ -74,55 +74,40 @@ class Readings:
     def recent(
         self, at_s: float, *, day_length_s: float = 86_400.0, per_tag: int = MAX_PER_TAG
     ) -> Readings:
-        """Those up to `at_s` that are not older than a day, the newest `per_tag` of each tag."""
+        """Those up to `at_s` that are not older than a day, at most `per_tag` of each tag.
+
+        Of more, the newest quarter counts, and of as many equal parts of the time before as are
+        left the newest of each: what the next hours bring, yesterday's readings tell better than
+        many of the last hour.
+        """
         age_s = at_s - self.time_s
         chosen = np.flatnonzero((age_s >= 0.0) & (age_s <= MAX_AGE_DAYS * day_length_s))
         # By tag, the newest first; of equal stamps the later in order counts as the newer.
         order = chosen[np.lexsort((-chosen, age_s[chosen], self.tag[chosen]))]
-        tags = self.tag[order]
-        starts = np.flatnonzero(np.r_[True, tags[1:] != tags[:-1]]) if len(tags) else tags
-        lengths = np.diff(np.r_[starts, len(tags)])
-        rank = np.arange(len(tags)) - np.repeat(starts, lengths)
-        return self.take(np.sort(order[rank < per_tag]))
-
-    def thinned(self, per_tag: int) -> Readings:
-        """So many of each tag, 2 or more: the newest half, and older ones ever farther apart.
-
-        The oldest is one of them: what the next hours will bring, yesterday's tell better than many
-        readings of the last hour.
-        """
-        # By tag, the newest first; of equal stamps the later in order counts as the newer.
-        order = np.lexsort((-np.arange(len(self)), -self.time_s, self.tag))
-        _, starts, counts = np.unique(self.tag[order], return_index=True, return_counts=True)
-        half = per_tag // 2
-        later = np.arange(1, per_tag - half + 1)
-        kept = []
-        for count in np.unique(counts).tolist():
-            rank = np.arange(min(count, per_tag))
-            if count > per_tag:
-                # Each so many times as far back as the one before it, and one farther at least.
-                back = half * ((count - 1) / half) ** (later / later[-1])
-                rank[half:] = np.maximum.accumulate(np.rint(back).astype(int) - later) + later
-            kept.append((starts[counts == count, None] + rank).ravel())
-        return self.take(np.sort(order[np.concatenate(kept)])) if kept else self
+        tag = self.tag[order]
+        _, starts, counts = np.unique(tag, return_index=True, return_counts=True)
+        rank = np.arange(len(tag)) - np.repeat(starts, counts)
+        newest = -(-per_tag // 4)
+        parts = max(per_tag - newest, 1)
+        reach_s = float(age_s[chosen].max(initial=0.0)) or 1.0
+        part = np.minimum((age_s[order] * (parts / reach_s)).astype(int), parts - 1)
+        is_older = rank >= newest
+        is_first = np.ones(len(tag), dtype=bool)
+        is_first[1:] = (tag[1:] != tag[:-1]) | (part[1:] != part[:-1]) | ~is_older[:-1]
+        kept = (np.repeat(counts, counts) <= per_tag) | ~is_older
+        if per_tag > newest:
+            kept |= is_first
+        return self.take(np.sort(order[kept]))
 
     def take(self, chosen: npt.NDArray[np.int64] | npt.NDArray[np.bool_]) -> Readings:
         """Some of them, at the same places."""
         return Readings(self.time_s[chosen], self.tag[chosen], self.value[chosen], self.xy)
 
-    def with_one_more(self, at_s: float, place: FloatArray, value: float) -> Readings:
-        """With a reading of a new tag at a place (2,), m."""
-        return Readings(
-            np.r_[self.time_s, at_s],
-            np.r_[self.tag, len(self.xy)],
-            np.r_[self.value, value],
-            np.vstack((self.xy, place)),
-        )
-
     def of_present(self) -> Readings:
-        """The same, at the places of tags with readings alone."""
-        present, row = np.unique(self.tag, return_inverse=True)
-        return Readings(self.time_s, row.ravel(), self.value, self.xy[present])
+        """The same by tag and time, at the places of tags with readings alone."""
+        order = np.lexsort((self.time_s, self.tag))
+        present, row = np.unique(self.tag[order], return_inverse=True)
+        return Readings(self.time_s[order], row.ravel(), self.value[order], self.xy[present])
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,17 +17,24 @@ TagLately = tuple[str, float, float, tuple[tuple[int, float], ...]]
 def lately(
     connection: sqlite3.Connection, sensor_type: str, at_ns: int, reach_ns: int, most: int
 ) -> Iterator[TagLately]:
-    """The tags that had a place and a reading at `at_ns`, with their last `most` finite readings.
+    """The tags that had a place and a reading at `at_ns`, with their last finite readings.
 
-    `reach_ns` is how far back. Where rows were deleted, the means of stretches.
+    `reach_ns` is how far back, `most` how many of all tags together. Where rows were deleted, the
+    means of stretches.
     """
-    for tag in state_at(connection, at_ns, "").tags:
-        if tag.pose is None or all(reading.name != sensor_type for reading in tag.readings):
+    tags = [
+        tag
+        for tag in state_at(connection, at_ns, "").tags
+        if tag.pose is not None and any(reading.name == sensor_type for reading in tag.readings)
+    ]
+    each = max(most // max(len(tags), 1), 1)
+    for tag in tags:
+        if tag.pose is None:
             continue
         asked = SeriesRequest(
             tag.tag_id, sensor_type, max(1, at_ns - reach_ns), at_ns + 1, MAX_POINTS
         )
-        found = newest(connection, asked, most)
+        found = newest(connection, asked, each)
         if found is None:
             found = [
                 (min(stamp_ns, at_ns), value)

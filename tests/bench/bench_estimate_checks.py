@@ -1,0 +1,100 @@
+"""What the estimate says of itself: sensors that have changed, and whether it is to be trusted.
+
+On the greenhouses of `other_worlds`, at a moment of the second day. A sensor that has changed reads
+3 more from one scan on; all tags but that one are false alarms, and all in greenhouses where none
+has. Trusted is an estimate by the scans of ten rounds, each held against what all but the tags
+beside it say; what it is worth is the coverage of all cells at the end.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter
+
+import numpy as np
+
+from lupin_twin.estimate import Posterior, Readings, fit
+from lupin_twin.estimates import thinned
+from lupin_twin.grading import Record, Tally
+from tests.bench.bench_estimate import INTERVAL_SDS, case_of
+from tests.bench.other_worlds import CHOOSING, DAY_S, HOUR_S, JUDGING, SORTS, World, world_of
+
+OFFSET = 3.0
+AFTER = (1, 2, 4, 8)
+AT_S = 34 * HOUR_S
+# In these, sensors do change.
+CHANGING = ("drift", "stuck sensors")
+ROUNDS = 10
+
+
+def posterior_at(all_read: Readings, at_s: float) -> Posterior:
+    heard = thinned(all_read.take(all_read.time_s <= at_s), at_s, DAY_S)
+    return fit(heard).posterior(heard, at_s)
+
+
+def changed(all_read: Readings, at_s: float) -> list[int]:
+    found = posterior_at(all_read, at_s).changes()
+    return [tag for tag, one in enumerate(found) if one is not None and one.has_changed]
+
+
+def found_after(all_read: Readings, tag: int) -> tuple[dict[int, bool], int]:
+    """Whether it was found after so many scans; false alarms at the last of these."""
+    own = np.flatnonzero((all_read.tag == tag) & (all_read.time_s > AT_S))
+    value = all_read.value.copy()
+    value[own] += OFFSET
+    off = Readings(all_read.time_s, all_read.tag, value, all_read.xy)
+    found, others = {}, 0
+    for count in AFTER:
+        said = changed(off, float(all_read.time_s[own[count - 1]]))
+        found[count], others = tag in said, len(set(said) - {tag})
+    return found, others
+
+
+def trust(world: World, all_read: Readings) -> tuple[bool | None, float]:
+    """What ten rounds say, and the coverage over all cells at their end."""
+    scans = inside = 0
+    for number in range(ROUNDS):
+        at_s = AT_S + number * world.round_s
+        held = posterior_at(all_read, at_s).left_out(np.arange(len(world.xy)))
+        scans += len(held)
+        inside += sum(abs(read - mean) <= INTERVAL_SDS * sd for read, mean, sd in held)
+    tally = Tally(scans, inside)
+    places = case_of(world, "after one round", 0).places
+    mean, sd = posterior_at(all_read, at_s).points(places)
+    truth = world.truth(places, np.full(len(places), at_s))
+    return Record(0, tally, tally).is_trusted, float(
+        (np.abs(truth - mean) <= INTERVAL_SDS * sd).mean()
+    )
+
+
+def main(arguments: list[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--choosing", action="store_true", help="the seeds that are for choosing")
+    options = parser.parse_args([] if arguments is None else arguments)
+    found: Counter[int] = Counter()
+    houses = alarms = tags = 0
+    said: Counter[tuple[bool | None, bool]] = Counter()
+    for sort in SORTS:
+        for seed in CHOOSING if options.choosing else JUDGING:
+            world = world_of(sort, seed)
+            all_read = world.read(AT_S + (max(AFTER) + 2) * world.round_s + 4 * HOUR_S, seed)
+            is_trusted, covers = trust(world, all_read)
+            said[is_trusted, covers < 0.7] += 1
+            if sort in CHANGING:
+                continue
+            houses += 1
+            tags += len(world.xy)
+            alarms += len(changed(all_read, AT_S))
+            for count, is_found in found_after(all_read, seed % len(world.xy))[0].items():
+                found[count] += is_found
+    print(f"said to have changed where none has: {alarms} of {tags} tags, {houses} greenhouses")
+    for count in AFTER:
+        print(f"+{OFFSET:g} found after {count} scans: {found[count] / houses:.2f}")
+    for trusted, is_narrow in sorted(said, key=str):
+        what = "under 0.7" if is_narrow else "0.7 or more"
+        print(f"is_trusted {trusted}, coverage {what}: {said[trusted, is_narrow]}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -214,20 +214,20 @@ class DailyField:
     """A field as of a moment of what is made of a day's readings; night is by the clock."""
 
     at_ns: int
-    field: Field
+    of: Field
     criteria: Criteria = field(compare=False)
 
     def cost_s(self, tags: int) -> float:
         """See `Asked`: of each tag, a day's readings are read."""
         series_s = tags * _series_s("", MAX_POINTS, tags)
-        return tags * (STATE_S_PER_TAG + _PLAN_TAG_S) + series_s + self.field.write_s(tags)
+        return tags * (STATE_S_PER_TAG + _PLAN_TAG_S) + series_s + self.of.write_s(tags)
 
     def look(self) -> Generator[Need, Found, Plan]:
         """See `Asked`."""
         snapshot: Snapshot = yield self.at_ns
-        daily = DAILY[self.field.asked.query.sensor_type]
+        daily = DAILY[self.of.asked.query.sensor_type]
         tags = yield from derived.with_daily(snapshot.tags, daily, self.at_ns, self.criteria.is_day)
-        return self.field.plan(replace(snapshot, tags=tuple(tags)))
+        return self.of.plan(replace(snapshot, tags=tuple(tags)))
 
 
 # --- over a period --------------------------------------------------------------------------------

@@ -47,8 +47,8 @@ def test_all_is_told_once_and_then_only_what_is_new() -> None:
     assert first["lt/house/health"]["verdict"] == "healthy"
     # Made of temperature and humidity, judged, and told like a sensor.
     assert first["lt/tags/a/readings/vpd"]["unit"] == "kPa"
-    # Of a: four readings, verdict, alarm; of b: one, and these two; of the house: three.
-    assert len(announcements(first)) == 6 + 3 + 3
+    # Of a: five readings, verdict, alarm; of b: one, and these two; of the house: three.
+    assert len(announcements(first)) == 7 + 3 + 3
     assert told(one, seen(a, b)) == {}
     later = tag("b", NOW_NS + 60 * S, temperature=6.0)
     news = told(one, seen(a, later, now_ns=NOW_NS + 60 * S))

@@ -50,13 +50,13 @@ class Recent:
         if found != self.looks:
             self.looks = found
             self.scans = tuple(
-                replace(scan, species=self._species_at(scan.stamp_ns)) for scan in self.scans
+                replace(scan, species=self.species_at(scan.stamp_ns)) for scan in self.scans
             )
 
     def put(self, tag: TagState, at_ns: int, values: Mapping[str, float]) -> None:
         """Take in a scan; those that nothing is judged by any more go."""
         scans = {scan.stamp_ns: scan for scan in self.scans}
-        scans[at_ns] = Scanned(at_ns, values, species=self._species_at(at_ns))
+        scans[at_ns] = Scanned(at_ns, values, species=self.species_at(at_ns))
         newest = sorted(scans)
         kept = {*newest[-INTERVALS - 1 :], *(r.observed_at_ns for r in tag.readings)}
         self.scans = tuple(scans[stamp_ns] for stamp_ns in newest if stamp_ns in kept)
@@ -92,7 +92,7 @@ class Recent:
                 found.setdefault(at_ns, dict(before))[reading.name] = reading.value
         return found
 
-    def _species_at(self, at_ns: int) -> str:
+    def species_at(self, at_ns: int) -> str:
         """The last species by then of which the camera was sure."""
         by_then = self.looks[: bisect_right(self.looks, at_ns, key=lambda look: look[0])]
         return next((species for _, species in reversed(by_then) if species), "")
@@ -133,7 +133,7 @@ class RecentScans:
                     scans.setdefault(key, {})[reading.name] = reading.value
             found.tag(tag.tag_id).see((*looks.get(tag.tag_id, ()), *_look_of(tag)))
         by_id = {tag.tag_id: tag for tag in tags}
-        found.take(
+        found._take_all(
             [(at_ns, by_id[name], it) for (at_ns, name), it in scans.items() if name in by_id]
         )
         return found
@@ -177,6 +177,27 @@ class RecentScans:
             else:
                 others |= self._decide_since(at_ns, all_of_it=self._light.is_day is not before)
         return others
+
+    def _take_all(self, scans: Sequence[TakenScan]) -> None:
+        """The same where none is known: each is gone through once, in the order of time."""
+        mine: dict[str, list[Scanned]] = {}
+        told_ns: dict[str, int] = {}
+        for at_ns, group in groupby(sorted(scans, key=_in_time), key=lambda scan: scan[0]):
+            taken = list(group)
+            for _, tag, values in taken:
+                if LIGHT in values:
+                    told_ns[tag.tag_id] = at_ns
+                    self._light.put(tag.tag_id, values[LIGHT])
+                elif at_ns - told_ns.get(tag.tag_id, at_ns) > LEFT_OUT_NS:
+                    self._light.put(tag.tag_id, None)
+            self._newest_ns = at_ns
+            is_day = self.day(at_ns).is_day
+            for _, tag, values in taken:
+                species = self.tag(tag.tag_id).species_at(at_ns)
+                scan = Scanned(at_ns, values, is_day, species)
+                mine.setdefault(tag.tag_id, []).append(scan)
+        for tag_id, found in mine.items():
+            self.tag(tag_id).scans = tuple(found)
 
     def forget(self, tag_id: str) -> None:
         """Of a tag that is gone."""

@@ -77,7 +77,7 @@ $(DONE)/hmi: $(HMI_SOURCES) $(DONE)/node_modules
 docs: setup $(DONE)/docs ## the guide, which the bridge serves at /docs/guide/
 
 # Much of it is written from the code, so whatever changes there may change it.
-DOCS_SOURCES := $(shell find docs backend ros_node frontend/docs -type f \( -name '*.py' -o -name '*.md' -o \
+DOCS_SOURCES := $(shell find docs backend ros_node -type f \( -name '*.py' -o -name '*.md' -o \
                 -name '*.msg' -o -name '*.srv' -o -name '*.json' -o -name '*.png' -o -path 'docs/_*' \) \
                 -not -path 'docs/reference/*' -not -path 'backend/lupin_bridge/static/*' \
                 -not -path 'backend/lupin_bridge/guide/*' 2>/dev/null)

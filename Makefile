@@ -26,7 +26,7 @@ BENCH_ENV := ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_LOG_DIR=$(CURDIR)/$(DON
 
 say = @printf '\033[1m==> %s\033[0m\n'
 
-.PHONY: help setup run check quick test lint types collect unit hmi-test dist bench bench-live soak clean
+.PHONY: help setup run docs check quick test lint types collect unit hmi-test dist bench bench-live soak clean
 
 help: ## what there is
 	@grep -E '^[a-z-]+:.*## ' Makefile | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -74,11 +74,24 @@ $(DONE)/hmi: $(HMI_SOURCES) $(DONE)/node_modules
 	@npm run --silent build
 	@touch $@
 
+docs: setup $(DONE)/docs ## the guide, which the bridge serves at /docs/guide/
+
+# Much of it is written from the code, so whatever changes there may change it.
+DOCS_SOURCES := $(shell find docs backend ros_node -type f \( -name '*.py' -o -name '*.md' -o \
+                -name '*.msg' -o -name '*.srv' -o -name '*.json' -o -name '*.png' -o -path 'docs/_*' \) \
+                -not -path 'docs/reference/*' -not -path 'backend/lupin_bridge/static/*' \
+                -not -path 'backend/lupin_bridge/guide/*' 2>/dev/null)
+$(DONE)/docs: $(DOCS_SOURCES) $(DONE)/python
+	$(say) 'building the guide'
+	@$(BIN)/sphinx-build --quiet -n -W --keep-going -E -d $(DONE)/doctrees docs backend/lupin_bridge/guide
+	@find backend/lupin_bridge/guide -name '*.map' -delete
+	@touch $@
+
 $(DONE)/tools: .ci/tools | $(DONE)/checked
 	@.ci/tools
 	@touch $@
 
-dist: setup ## what a release holds, in dist/: wheels, sdist, and the context of a container image
+dist: setup docs ## what a release holds, in dist/: wheels, sdist, and the context of a container image
 	$(say) 'building into dist/'
 	@.ci/dist dist
 	@ls dist
@@ -94,8 +107,8 @@ quick: setup ## Python tests that need neither ROS nor a browser
 	$(say) 'Python tests without ROS and browser'
 	@$(TEST_ENV) $(BIN)/pytest -q -n 2 --dist worksteal --quick tests
 
-test: setup $(DONE)/tools ## every check: lint, types, unit, real ROS, browser
-	@$(MAKE) --no-print-directory -j 2 --output-sync=target lint types hmi-test collect
+test: setup $(DONE)/tools ## every check: lint, types, guide, unit, real ROS, browser
+	@$(MAKE) --no-print-directory -j 2 --output-sync=target lint types docs hmi-test collect
 	@$(MAKE) --no-print-directory unit
 	$(say) 'all checks passed'
 
@@ -127,7 +140,7 @@ collect: setup
 	$(say) 'collecting the Python tests'
 	@$(TEST_ENV) $(BIN)/pytest -qq --collect-only tests >$(DONE)/collected || { cat $(DONE)/collected; exit 1; }
 
-unit: setup $(DONE)/tools ## Python tests, real ROS and real browser included
+unit: setup docs $(DONE)/tools ## Python tests, real ROS and real browser included
 	$(say) 'Python tests: units, ROS over DDS, browser'
 	@$(TEST_ENV) $(BIN)/pytest -q -n 3 --dist worksteal tests
 
@@ -145,4 +158,4 @@ soak: setup ## 50 kills under load, and eight hours of writing in a few minutes:
 	@$(TEST_ENV) $(BIN)/python -m tests.soak $(ARGS)
 
 clean: ## remove everything that set-up and builds have made
-	rm -rf $(VENV) $(DONE) node_modules backend/lupin_bridge/static dist
+	rm -rf $(VENV) $(DONE) node_modules backend/lupin_bridge/static backend/lupin_bridge/guide docs/reference dist

@@ -15,7 +15,7 @@ import pytest
 import yaml
 
 from lupin_bridge import journal_command
-from lupin_bridge.cli import USAGE_ERROR, _parser, main, split_ros_args
+from lupin_bridge.cli import USAGE_ERROR, main, parser, split_ros_args
 from lupin_bridge.configuration import settings_from, strange_variables
 from lupin_bridge.settings import variable
 from lupin_bridge.twin.source import STUCK_AFTER_S
@@ -92,7 +92,7 @@ def test_systemd_makes_the_user_and_the_folders() -> None:
 
 def test_the_command_line_is_one_that_the_bridge_takes() -> None:
     own, ros = split_ros_args(shlex.split(script().rpartition("lupin-twin serve")[2]))
-    options = _parser().parse_args(["serve", *own])
+    options = parser().parse_args(["serve", *own])
     assert Path(options.config).name == "bridge.toml"
     assert ros[:2] == ["--ros-args", "--params-file"]
 
@@ -186,7 +186,7 @@ def test_the_image_keeps_its_journal_in_the_volume_as_a_user_without_rights() ->
 def test_the_image_needs_no_memory_of_the_host_and_starts_a_role() -> None:
     assert image()["FASTDDS_BUILTIN_TRANSPORTS"] == "UDPv4"
     assert json.loads(image()["ENTRYPOINT"]) == ["lupin-twin"]
-    assert _parser().parse_args(json.loads(image()["CMD"])).role == "serve"
+    assert parser().parse_args(json.loads(image()["CMD"])).role == "serve"
 
 
 def test_the_health_check_says_whether_the_bridge_lives(domain: int) -> None:
@@ -218,7 +218,7 @@ def test_compose_runs_what_the_image_has_as_nginx_expects_it() -> None:
     bridges = {name: it for name, it in services.items() if name.startswith("bridge")}
     ports = []
     for bridge in bridges.values():
-        assert _parser().parse_args(bridge["command"]).role == "web"
+        assert parser().parse_args(bridge["command"]).role == "web"
         assert strange_variables(bridge["environment"]) == []
         settings = settings_from({}, bridge["environment"], None)
         ports.append(settings.port)

@@ -1,142 +1,214 @@
-"""What the README has to name: every option, parameter, topic, route, metric and command."""
+"""What the docs have to name, and that what they name is there."""
 
 from __future__ import annotations
 
+import argparse
 import re
+import runpy
 from dataclasses import fields
 from pathlib import Path
 
 import pytest
+from fastapi.routing import APIRoute, APIWebSocketRoute
 
-from lupin_bridge.app import create_app
-from lupin_bridge.cli import ROLES
-from lupin_bridge.settings import option, table
-from lupin_patrol import cli as patrol_cli
-from lupin_twin.estimates import ESTIMATE_SERVICE
-from lupin_twin.layers import LAYERS_BELOW, PLANTERS_TOPIC, TAGS_TOPIC
-from lupin_twin.parameters import TIMES_TOPIC, TwinParameters, describe
-from lupin_twin.past import HISTORY_SERVICE, STATE_AT_SERVICE
+from lupin_bridge import metrics
+from lupin_bridge.app import FRAMES, ROUTED, create_app
+from lupin_bridge.cli import parser
+from lupin_twin import interfaces
+from lupin_twin.launching import ARGUMENTS
+from lupin_twin.parameters import TwinParameters
+from tests.support.docs import DOCS, ROOT, blocks, name_of, pages, without_blocks
 from tests.support.structure import PACKAGES, ROOMS
 
-ROOT = Path(__file__).resolve().parents[1]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+GENERATOR = runpy.run_path(str(DOCS / "generate.py"))
+REFERENCE = {name: page() for name, page in GENERATOR["PAGES"].items()}
+EVERY_PAGE = pytest.mark.parametrize("page", pages(), ids=name_of)
+# What the docs show of other programs.
+FOREIGN_OPTIONS = {
+    "--find-links",
+    "--system-site-packages",
+    "--base-paths",
+    "--packages-select",
+    "--packages-skip",
+    "--params-file",
+    "--ros-args",
+    "--show-args",
+    "--enclave",
+    "--prefix",
+    "--share",
+    "--once",
+    "--qos-reliability",
+    "--qos-durability",
+    "--cacert",
+    "--user",
+    "--now",
+    "--no-deps",
+    "--rm",
+    "--network",
+    "--volume",
+    "--help",
+    "--version",
+}
 
 
-def rows(title: str) -> dict[str, list[str]]:
-    """The tables below a heading: first cell, without its backticks, to the other cells."""
-    section = README.split(f"\n## {title}\n", 1)[1].split("\n## ", 1)[0]
-    lines = [line for line in section.splitlines() if line.startswith("| `")]
-    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-    return {key: rest for first, *rest in cells for key in re.findall(r"`([^`]+)`", first)}
+def listed(page: str) -> set[str]:
+    """What stands in the first cells of a generated page's tables."""
+    return set(re.findall(r"^\| `([^`]+)`", REFERENCE[page], re.MULTILINE))
 
 
-def test_every_parameter_is_named_with_its_default() -> None:
-    documented = rows("Parameters of the twin")
-    documented.pop("use_sim_time")
-    assert {name: cells[0].strip("`") for name, cells in documented.items()} == {
-        spec.name: str(spec.default).lower()
-        if isinstance(spec.default, bool)
-        else str(spec.default or "")
-        for spec in fields(TwinParameters)
+def options_of(parser: argparse.ArgumentParser) -> set[str]:
+    return set(re.findall(r"(?<!\S)\[?(--[a-z][a-z-]*)", parser.format_help()))
+
+
+def commands(of: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    [below] = [it for it in of._actions if isinstance(it, argparse._SubParsersAction)]
+    return dict(below.choices)
+
+
+# --- the reference names all that there is --------------------------------------------------------
+
+
+def test_every_option_of_the_bridge_is_a_setting_of_the_reference() -> None:
+    taken = options_of(commands(parser())["serve"]) - {"--help", "--config"}
+    assert len(taken) > 20
+    assert taken == {name for name in listed("settings") if name.startswith("--")}
+
+
+def test_every_parameter_and_launch_argument_is_in_the_reference() -> None:
+    assert listed("parameters") == {spec.name for spec in fields(TwinParameters)}
+    assert listed("launch") == {argument.name for argument in ARGUMENTS}
+
+
+def test_every_command_is_in_the_reference_with_all_of_its_options() -> None:
+    roles = commands(parser())
+    every = {f"lupin-twin {name}": it for name, it in roles.items()}
+    every |= {f"lupin-twin journal {name}": it for name, it in commands(roles["journal"]).items()}
+    for name, command in every.items():
+        section = REFERENCE["commands"].split(f"\n## {name}\n", 1)[1].partition("\n## ")[0]
+        assert options_of(command) <= set(re.findall(r"--[a-z][a-z-]*", section)), name
+    assert "\n## patrol_node\n" in REFERENCE["commands"]
+    assert "twin_node" in REFERENCE["commands"]
+
+
+def test_every_route_is_in_the_reference_and_none_that_is_not_there() -> None:
+    routes = [route for module in ROUTED for route in module.router.routes]
+    routed = {
+        (method, route.path_format)
+        for route in routes
+        if isinstance(route, APIRoute)
+        for method in (route.methods or set()) - {"HEAD"}
     }
+    websockets = {route.path_format for route in routes if isinstance(route, APIWebSocketRoute)}
+    described = set(re.findall(r"^## `(\w+) (/[^`]*)`$", REFERENCE["http"], re.MULTILINE))
+    plain = {name for name in listed("http") if name.startswith("/")}
+    assert described <= routed
+    answered = {path for _, path in routed} | websockets | {"/"}
+    assert len(websockets) > 2
+    assert answered == {path for _, path in described} | plain
 
 
-def test_every_parameter_is_given_with_its_range() -> None:
-    documented = rows("Parameters of the twin")
-    documented.pop("use_sim_time")
-    for name, cells in documented.items():
-        assert cells[1] == describe(name).range, name
+def test_every_member_of_a_frame_and_of_a_type_is_in_the_reference() -> None:
+    schemas = create_app(None).openapi()["components"]["schemas"]
+    for name, schema in schemas.items():
+        page = "frames" if name in {model.__name__ for model in FRAMES} else "types"
+        section = REFERENCE[page].split(f"\n## {name}\n", 1)[1].partition("\n(type-")[0]
+        members = re.findall(r"^\| `(\w+)`", section, re.MULTILINE)
+        assert members == list(schema.get("properties", {})), name
 
 
-def test_every_setting_is_named_with_its_default() -> None:
-    documented = {name: cells[0] for name, cells in rows("Settings of the bridge").items()}
-    for name in ("LUPIN_TOKEN", "LUPIN_MQTT_PASSWORD", "LUPIN_WEBHOOK_SECRET", "--config"):
-        assert documented.pop(name) == ""
-    expected = {
-        option(spec.name): "" if spec.default in ((), "") else str(spec.default) for spec in table()
-    }
-    assert documented == expected
+def test_every_message_is_in_the_reference_with_its_comments() -> None:
+    for file in sorted((ROOT / "ros_node" / "lupin_msgs").glob("[ms][sr][gv]/*.[ms][sr][gv]")):
+        assert f"\n## {file.stem} (" in REFERENCE["messages"]
+        assert file.read_text(encoding="utf-8").strip() in REFERENCE["messages"]
 
 
-def test_every_route_is_named_and_none_that_is_not_there() -> None:
-    documented = set(rows("Ask it over HTTP and WebSocket"))
-    served = {
-        "/",
-        "/ws/state",
-        "/rosbridge",
-        "/foxglove",
-        "/signin",
-        "/api/signin",
-        "/api/signout",
-        "/docs",
-        "/openapi.json",
-    }
-    served |= set(create_app(None).openapi()["paths"])
-    assert documented == served
+def test_every_metric_is_in_the_reference() -> None:
+    total = [f"{name}_total" for name in (*metrics.COUNTERS, *metrics.LABELLED)]
+    assert listed("metrics") == {
+        *metrics.GAUGES, *metrics.LABELLED_GAUGES, *total, *metrics.HISTOGRAMS,
+    }  # fmt: skip
 
 
-def test_every_topic_is_named_with_its_qos() -> None:
-    documented = rows("Ask it over ROS")
-    parameters = TwinParameters()
-    for topic, depth in (
-        (parameters.observations_topic, 50),
-        (parameters.discovered_tags_topic, 50),
-        (parameters.map_topic, 1),
-        (parameters.state_topic, 1),
-    ):
-        assert f"reliable, transient local, depth {depth}" in str(rows_by_name(f"/{topic}"))
-    assert "with the same stamp" in str(rows_by_name(f"/{TIMES_TOPIC}"))
-    for topic in (f"{LAYERS_BELOW}<sensor>", TAGS_TOPIC, PLANTERS_TOPIC):
-        assert "depth 1: while somebody subscribes" in str(rows_by_name(f"/{topic}"))
-    for service in (
-        parameters.field_service_name,
-        ESTIMATE_SERVICE,
-        STATE_AT_SERVICE,
-        HISTORY_SERVICE,
-    ):
-        assert "services' default" in str(rows_by_name(f"/{service}"))
-    assert documented == {}  # topics stand in the second column
+def test_a_text_of_the_code_is_read_as_it_stands() -> None:
+    """No character of it means anything to Markdown, but backticks."""
+    prose = GENERATOR["prose"]
+    assert prose("a_b *c* <d> [e] `f_g`") == r"a\_b \*c\* \<d\> \[e\] `f_g`"
+    assert GENERATOR["grid"](("a",), [("`x|y`",)]).splitlines()[-1] == r"| `x\|y` |"
 
 
-def rows_by_name(name: str) -> list[str]:
-    return [line for line in README.splitlines() if line.startswith("|") and f"`{name}`" in line]
+def test_the_policy_beside_the_systemd_unit_is_that_of_the_table() -> None:
+    file = ROOT / "backend" / "deploy" / "sros2-policy.xml"
+    assert file.read_text(encoding="utf-8") == GENERATOR["policy"](), "python docs/generate.py"
 
 
-def test_every_role_and_patrol_option_is_named() -> None:
-    for role in ROLES:
-        assert f"`lupin-twin {role}`" in README
-    source = Path(patrol_cli.__file__).read_text(encoding="utf-8")
-    for name in set(re.findall(r'add_argument\(\s*"(--[a-z-]+)"', source)):
-        assert f"`{name}" in README
+# --- the pages name nothing that is not there -----------------------------------------------------
 
 
-def test_every_make_target_that_is_named_is_there() -> None:
+@EVERY_PAGE
+def test_every_option_that_a_page_names_is_one(page: Path) -> None:
+    known = set(re.findall(r"--[a-z][a-z-]*", REFERENCE["commands"])) | FOREIGN_OPTIONS
+    shown = re.findall(r"`(--[a-z][a-z-]*)", without_blocks(page))
+    for block in blocks(page):
+        for line in block.text.replace("\\\n", " ").splitlines():
+            own = re.search(r"\blupin-twin .*", line)
+            shown += re.findall(r" (--[a-z][a-z-]*)", own.group() if own else "")
+    assert set(shown) <= known
+
+
+@EVERY_PAGE
+def test_every_parameter_and_variable_that_a_page_names_is_one(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    named = set(re.findall(r"-p (\w+):=", text))
+    assert named <= {spec.name for spec in fields(TwinParameters)} | {"use_sim_time"}
+    variables = set(re.findall(r"`(LUPIN_[A-Z_]+)", text))
+    assert variables <= set(re.findall(r"LUPIN_[A-Z_]+", REFERENCE["settings"]))
+
+
+@EVERY_PAGE
+def test_every_route_topic_and_metric_that_a_page_names_is_one(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    routes = set(re.findall(r"`(?:GET )?(/[^`\s]*)`", REFERENCE["http"]))
+    # A name that goes on in another route, such as `/api/tags`, is a good enough name.
+    known = [re.sub(r"\\\{.*?\\\}", "[^/]+", re.escape(route)) for route in routes]
+    for named in re.findall(r"(?:`|:8000|\.example)(/(?:api|ws)/[\w{}/.-]*)", text):
+        found = [one for one in routes if one.startswith(f"{named}/")]
+        assert found or any(re.fullmatch(one, named.rstrip(".")) for one in known), named
+    topics = {f"/{it.name.lstrip('/')}" for it in (*interfaces.PUBLISHED, *interfaces.SERVICES)}
+    for named in re.findall(r"`(/twin/[\w/]+)`", text):
+        assert named in topics or named.startswith(f"/{interfaces.LAYERS_BELOW}"), named
+    for named in re.findall(r"`(lupin_[a-z_]+(?:_total|_seconds|_bytes))`", text):
+        assert named in listed("metrics"), named
+
+
+@EVERY_PAGE
+def test_every_make_target_that_a_page_names_is_there(page: Path) -> None:
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
-    named = set(re.findall(r"(?:`|^)make ([a-z-]+)", README, re.MULTILINE))
-    assert {"run", "test", "bench", "bench-live"} <= named
-    assert named <= targets
+    named = re.findall(r"(?:`|^)make ([a-z-]+)", page.read_text(encoding="utf-8"), re.MULTILINE)
+    assert set(named) <= targets
 
 
 @pytest.mark.parametrize(
     "page",
     [
-        "README.md",
-        "CHANGELOG.md",
-        "CONTRIBUTING.md",
-        "SECURITY.md",
-        "docs/compatibility.md",
-        "backend/README.md",
-        "ros_node/README.md",
-        "tests/README.md",
+        *pages(),
+        *(ROOT / name for name in ("CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md")),
+        *(ROOT / name / "README.md" for name in ("backend", "ros_node", "tests")),
     ],
+    ids=name_of,
 )
-def test_every_file_that_a_page_names_is_there(page: str) -> None:
-    text = (ROOT / page).read_text(encoding="utf-8")
-    links = re.findall(r"\]\(([^)#:]+)\)", text)
-    paths = re.findall(r"`((?:backend|frontend|ros_node|tests)/[^`]*)`", text)
-    for name in [*links, *paths]:
-        base = ROOT if name in paths else (ROOT / page).parent
-        assert (base / name).exists(), name
+def test_every_file_that_a_page_names_is_there(page: Path) -> None:
+    text = without_blocks(page)
+    for name in re.findall(r"\]\(([^)#: ]+)(?:#[^)]*)?\)|src=\"([^\":]+)\"", text):
+        target = (page.parent / "".join(name)).resolve()
+        if not target.is_relative_to(DOCS / "reference"):  # those are generated
+            assert target.exists(), name
+        else:
+            assert target.stem in REFERENCE, name
+    for name in re.findall(r"`((?:backend|frontend|ros_node|tests|docs)/[^`\s:]*)`", text):
+        assert list(ROOT.glob(name.rstrip("/"))), name
+
+
+# --- the maps of the folders ----------------------------------------------------------------------
 
 
 def test_the_bridges_page_names_every_room_and_no_file_that_is_not_there() -> None:

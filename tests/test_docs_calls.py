@@ -1,4 +1,4 @@
-"""What the README shows of calls: each is one that ROS takes."""
+"""What the docs show of service calls over ROS: each is one that the service takes."""
 
 from __future__ import annotations
 
@@ -8,21 +8,24 @@ from typing import Any
 import yaml
 from lupin_msgs import srv
 
-from lupin_twin.estimates import ESTIMATE_SERVICE
-from lupin_twin.past import HISTORY_SERVICE, STATE_AT_SERVICE
-from tests.test_docs import README
+from lupin_twin.interfaces import SERVICES
+from tests.support.docs import pages
+
+TYPES = {f"/{service.name}": service.type_name for service in SERVICES}
 
 
 def test_every_service_call_that_is_shown_is_one_that_the_service_takes() -> None:
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages())
     calls = re.findall(
-        r'^ros2 service call (/\S+) lupin_msgs/srv/(\w+) (?:\\\n +)?"(.*)"$', README, re.MULTILINE
+        r'^ *ros2 service call (/\S+) (lupin_msgs/srv/\w+) (?:\\\n +)?"(.*)"$', text, re.MULTILINE
     )
-    names = {"/" + name for name in (ESTIMATE_SERVICE, STATE_AT_SERVICE, HISTORY_SERVICE)}
-    assert {name for name, _, _ in calls} == {"/twin/get_field", *names}
-    for _, kind, arguments in calls:
+    assert calls
+    for name, type_name, arguments in calls:
+        assert TYPES[name] == type_name
+        kind = getattr(srv, type_name.rpartition("/")[2]).Request
         # What the shell fills in is a number of seconds.
         given = yaml.safe_load(re.sub(r"\$\([^)]*\)", "5", arguments))
-        assert filled(getattr(srv, kind).Request(), given) != getattr(srv, kind).Request()
+        assert filled(kind(), given) != kind()
 
 
 def filled(message: Any, values: dict[str, Any]) -> Any:

@@ -37,11 +37,14 @@ def test_the_wheel_has_the_three_packages_the_page_and_what_an_operator_adapts(d
     data = f"lupin_twin-{__version__}.data/data/share/lupin-twin"
     for name in (
         "lupin_bridge/static/index.html",
+        "lupin_bridge/guide/index.html",
+        "lupin_bridge/guide/reference/settings.html",
         "lupin_bridge/sensors.json",
         "lupin_twin/py.typed",
         "lupin_patrol/__main__.py",
         f"{data}/lupin-twin.service",
         f"{data}/bridge.toml",
+        f"{data}/sros2-policy.xml",
         f"{data}/twin.yaml",
     ):
         assert name in names

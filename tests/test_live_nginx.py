@@ -27,7 +27,7 @@ from tests.support.rosbridge import Ros
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge
 
-# What a client may be without news of the twin (README, "WebSocket frames").
+# What a client may be without news of the twin (docs/how-to/clients-javascript.md).
 BACK_WITHIN_S = 3.5
 CLIENTS = 12
 PAUSE_S = 0.5
@@ -129,7 +129,7 @@ def test_limits_and_logs_go_by_the_client_and_not_by_nginx(house: House) -> None
 
 @dataclass
 class Screen:
-    """A client that does as the README says: back after half a second, later where that fails."""
+    """A client that does as the docs say: back after half a second, later where that fails."""
 
     url: str
     gaps_s: list[float] = field(default_factory=list)

@@ -12,11 +12,11 @@ from tests.support.needs import TESTS
 
 
 @cache
-def told(target: str) -> str:
+def told(*target: str) -> str:
     """The commands of a target, none of them run."""
     own = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")
     result = subprocess.run(
-        ["make", "--dry-run", "--no-print-directory", target],
+        ["make", "--dry-run", "--no-print-directory", *target],
         capture_output=True, text=True, check=True, cwd=TESTS.parent,
         env={name: value for name, value in os.environ.items() if name not in own},
     )  # fmt: skip
@@ -46,10 +46,14 @@ def test_every_check_is_among_those_of_make_test(command: str) -> None:
 
 @pytest.mark.parametrize(
     ("target", "parts"),
-    [("test", "lint types hmi-test collect"), ("check", "quick lint types hmi-test")],
+    [("test", "lint types docs hmi-test collect"), ("check", "quick lint types hmi-test")],
 )
 def test_what_keeps_no_two_cores_busy_is_run_two_at_a_time(target: str, parts: str) -> None:
     assert f"-j 2 --output-sync=target {parts}" in told(target)
+
+
+def test_a_warning_ends_the_build_of_the_guide() -> None:
+    assert "sphinx-build --quiet -n -W " in told("--what-if=docs/conf.py", "docs")
 
 
 @pytest.mark.parametrize("target", ["unit", "quick", "collect"])

@@ -15,7 +15,7 @@ from lupin_bridge.access.middleware import Access, AccessControl
 from lupin_bridge.access.security import ReadOnly
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.routes import alarms as routes_alarms
-from lupin_bridge.routes import docs_page, no_page
+from lupin_bridge.routes import docs_page, guide, no_page
 from lupin_bridge.routes import estimate as routes_estimate
 from lupin_bridge.routes import estimate_report as routes_estimate_report
 from lupin_bridge.routes import export as routes_export
@@ -35,6 +35,26 @@ from lupin_bridge.serving.metering import Metered
 from lupin_bridge.stream import schema
 
 STATIC_FOLDER = Path(__file__).parent / "static"
+GUIDE_FOLDER = Path(__file__).parent / "guide"
+
+# Every module whose `router` has routes.
+ROUTED = (
+    routes_state,
+    routes_rosbridge,
+    routes_foxglove,
+    routes_field,
+    routes_estimate,
+    routes_estimate_report,
+    routes_past,
+    routes_export,
+    routes_map,
+    routes_judge,
+    routes_alarms,
+    routes_health,
+    routes_signin,
+    docs_page,
+    guide,
+)
 
 
 def has_page(static_folder: Path = STATIC_FOLDER) -> bool:
@@ -47,6 +67,7 @@ def create_app(
     static_folder: Path = STATIC_FOLDER,
     access: Access | None = None,
     entrance: Entrance | None = None,
+    guide_folder: Path = GUIDE_FOLDER,
 ) -> FastAPI:
     """The application around a bridge that its caller starts and stops.
 
@@ -65,22 +86,7 @@ def create_app(
     )
     app.state.bridge = bridge
     app.state.access = access
-    for module in (
-        routes_state,
-        routes_rosbridge,
-        routes_foxglove,
-        routes_field,
-        routes_estimate,
-        routes_estimate_report,
-        routes_past,
-        routes_export,
-        routes_map,
-        routes_judge,
-        routes_alarms,
-        routes_health,
-        routes_signin,
-        docs_page,
-    ):
+    for module in ROUTED:
         app.include_router(module.router)
     # The last one added is the first to be asked.
     if bridge is not None:
@@ -92,6 +98,7 @@ def create_app(
     if bridge is not None:
         app.add_middleware(Metered, note=bridge.note_answer)
     app.add_exception_handler(404, _not_found)
+    guide.add_to(app, guide_folder)
     app.add_api_websocket_route("/{path:path}", _no_websocket)
     if has_page(static_folder):
         app.mount("/", StaticFiles(directory=static_folder, html=True), name="hmi")
@@ -119,7 +126,7 @@ async def _no_websocket(websocket: WebSocket) -> None:
     await websocket.send_denial_response(await _not_found(websocket))
 
 
-_FRAMES = (
+FRAMES = (
     schema.StateFrame,
     schema.DeltaFrame,
     schema.StatusFrame,
@@ -136,7 +143,7 @@ def _describe_frames(app: FastAPI) -> None:
     def with_frames() -> dict[str, object]:
         document = plain()
         schemas = document.setdefault("components", {}).setdefault("schemas", {})
-        for model in _FRAMES:
+        for model in FRAMES:
             described = model.model_json_schema(ref_template="#/components/schemas/{model}")
             schemas.update(described.pop("$defs", {}))
             schemas[model.__name__] = described

@@ -31,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run a role; returns the process's exit code."""
     use_one_core()
     own, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
-    options = _parser().parse_args(own)
+    options = parser().parse_args(own)
     if options.role == "journal":
         if ros_args:
             _fail("journal takes no arguments of ROS: name its file with --journal or --namespace")
@@ -140,15 +140,16 @@ def _settings_from(options: argparse.Namespace) -> Settings:
     )
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def parser() -> argparse.ArgumentParser:
+    """The options of all commands."""
+    made = argparse.ArgumentParser(
         prog="lupin-twin",
         description="Digital twin of a greenhouse: ROS 2 node, web bridge and browser HMI.",
         epilog="Everything from --ros-args on goes to ROS: --ros-args -p idw_power:=3.0. A setting "
         "may also stand in the environment (LUPIN_PORT for --port) or in the file of --config.",
     )
-    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
-    roles = parser.add_subparsers(dest="role", required=True, metavar="ROLE")
+    made.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
+    roles = made.add_subparsers(dest="role", required=True, metavar="ROLE")
     common = argparse.ArgumentParser(add_help=False)
     common.add_argument(
         "--config",
@@ -203,7 +204,7 @@ def _parser() -> argparse.ArgumentParser:
                 help="jump over its silences of more than so many seconds (default: wait)",
             )
     journal_command.add_parser(roles)
-    return parser
+    return made
 
 
 def _seconds(text: str) -> float:

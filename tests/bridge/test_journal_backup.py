@@ -50,7 +50,7 @@ def test_a_backup_of_a_twin_at_work_is_what_another_twin_starts_with(
         wait_for(lambda: "after" in tags(url), "the last tag")
         wait_for(lambda: "after" in journal("export", "--journal", source).stdout, "its row")
         twin.stop()
-    # As the README says.
+    # As the docs say.
     for beside in ("-wal", "-shm"):
         source.with_name(source.name + beside).unlink(missing_ok=True)
     source.write_bytes(copy.read_bytes())

@@ -1,24 +1,22 @@
 """Pictures of the HMI from the real demo: `python -m tests.browser.screenshots FOLDER`.
 
 One for each size, light and dark, and the wide one as people with the common kinds of colour
-blindness see it. To be looked at; those for the README are written to `frontend/docs` with
-`--readme`. With `--states` instead: the page in every state of a house that the tests know.
+blindness see it. To be looked at; with `--docs` those of the docs are made anew, as far as a script
+makes them. With `--states` instead: the page in every state of a house that the tests know.
 """
 
 from __future__ import annotations
 
 import argparse
-import io
 import json
 import sys
 import time
 from pathlib import Path
 from urllib.request import urlopen
 
-from PIL import Image
 from playwright.sync_api import Browser, Page, ViewportSize, expect, sync_playwright
 
-from tests.browser import estimate_pictures
+from tests.browser import estimate_pictures, moving_picture
 from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
 from tests.browser.states import shoot_states
 from tests.support.domains import own_domain
@@ -28,7 +26,7 @@ from tests.support.waiting import wait_for
 
 SIZES = ((360, 740), (820, 1180), (1440, 900), (1920, 1080))
 BLINDNESS = ("protanopia", "deuteranopia", "tritanopia", "achromatopsia")
-README = Path(__file__).parents[2] / "frontend/docs"
+IMAGES = Path(__file__).parents[2] / "docs/images"
 # The second pass of the patrol brings pests, failed scans and ages that differ.
 PATROL_SPEED = 3
 PATIENCE_MS = 120_000
@@ -40,7 +38,7 @@ def main() -> int:
     """Take them all."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--readme", action="store_true", help="also write those of the README")
+    parser.add_argument("--docs", action="store_true", help="also write those of the docs")
     parser.add_argument("--states", action="store_true", help="every state of states.json alone")
     options = parser.parse_args()
     use_own()
@@ -69,9 +67,9 @@ def main() -> int:
             for scheme in ("light", "dark"):
                 views(browser, url, options.folder, size, scheme)
         blindness(browser, url, options.folder)
-        if options.readme:
-            readme(browser, url)
-            estimate_pictures.taken(browser, README)
+        if options.docs:
+            of_the_docs(browser, url)
+            estimate_pictures.taken(browser, IMAGES)
     return 0
 
 
@@ -170,12 +168,10 @@ def past(url: str) -> str:
     return f"/#at={at_s}&period=all&chart.tag=5&tag=5"
 
 
-def readme(browser: Browser, url: str) -> None:
-    """The README's pictures: all their colours, and still under 250 kB each."""
-    README.mkdir(exist_ok=True)
+def of_the_docs(browser: Browser, url: str) -> None:
+    """The docs' pictures of the page, and the README's moving one."""
     for name, size, scheme, path in (
-        ("wide-light", (1280, 800), "light", "/"),
-        ("wide-dark", (1280, 800), "dark", CARD),
+        ("page", (1440, 900), "light", "/"),
         ("past", (1280, 800), "dark", past(url)),
         ("phone", (360, 740), "light", "/"),
     ):
@@ -183,9 +179,9 @@ def readme(browser: Browser, url: str) -> None:
         if "tag=" in path:
             expect(page.get_by_test_id("plot").last.locator("canvas")).to_be_visible()
             page.wait_for_load_state("networkidle")
-        picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+        estimate_pictures.save(page.screenshot(scale="css"), IMAGES / f"{name}.png")
         page.context.close()
-        picture.save(README / f"{name}.png", optimize=True)
+    moving_picture.taken(browser, url, IMAGES / "page.webp")
 
 
 if __name__ == "__main__":

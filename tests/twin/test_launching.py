@@ -1,8 +1,7 @@
-"""What the launch file's arguments make, and that they are what the README says."""
+"""What the launch file's arguments make of a twin."""
 
 from __future__ import annotations
 
-import re
 import runpy
 import sys
 from pathlib import Path
@@ -104,9 +103,3 @@ def test_the_launch_file_starts_the_twin_with_what_is_given(
     ]
     with pytest.raises(LaunchError, match=r"params_file is '/no\.yaml'"):
         twin(NOT_GIVEN | {"params_file": "/no.yaml"})
-
-
-def test_the_readme_names_every_argument() -> None:
-    section = Path("README.md").read_text(encoding="utf-8").split("### Start it by launch", 1)[1]
-    documented = re.findall(r"^\| `(\w+)` \|", section.split("\n## ", 1)[0], re.MULTILINE)
-    assert documented == [argument.name for argument in ARGUMENTS]

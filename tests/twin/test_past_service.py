@@ -12,10 +12,9 @@ from builtin_interfaces.msg import Time
 from lupin_msgs.srv import GetHistory, GetStateAt
 
 from lupin_twin.habits import SERVICE_QOS
+from lupin_twin.interfaces import GET_HISTORY, GET_STATE_AT
 from lupin_twin.past import (
-    HISTORY_SERVICE,
     MAX_POINTS,
-    STATE_AT_SERVICE,
     NotRemembered,
     PastRefused,
     SeriesPast,
@@ -114,7 +113,7 @@ def node() -> Iterator[Node]:
 
 def test_a_state_is_asked_for_by_its_moment(node: Node) -> None:
     node.memory.found.set_result(Snapshot(5 * S + 3, "map", ()))
-    response = node.answer(STATE_AT_SERVICE, at=Time(sec=5, nanosec=3))
+    response = node.answer(GET_STATE_AT.name, at=Time(sec=5, nanosec=3))
     assert response.ok
     assert response.state.header == response.times.header
     assert node.memory.asked == [5 * S + 3]
@@ -123,7 +122,7 @@ def test_a_state_is_asked_for_by_its_moment(node: Node) -> None:
 @pytest.mark.parametrize("at", [Time(sec=100), Time()])
 def test_now_and_zero_can_be_asked_for(node: Node, at: Time) -> None:
     node.memory.found.set_result(Snapshot(at.sec * S, "map", ()))
-    assert node.answer(STATE_AT_SERVICE, at=at).ok
+    assert node.answer(GET_STATE_AT.name, at=at).ok
 
 
 @pytest.mark.parametrize(
@@ -136,7 +135,7 @@ def test_now_and_zero_can_be_asked_for(node: Node, at: Time) -> None:
 def test_a_moment_that_has_not_passed_is_refused_and_nothing_is_looked_up(
     node: Node, at: Time, says: str
 ) -> None:
-    response = node.answer(STATE_AT_SERVICE, at=at)
+    response = node.answer(GET_STATE_AT.name, at=at)
     assert response == GetStateAt.Response(error_message=says)
     assert node.memory.asked == []
     assert node.habits.reported == []
@@ -145,7 +144,7 @@ def test_a_moment_that_has_not_passed_is_refused_and_nothing_is_looked_up(
 def test_a_series_is_asked_for_as_it_stands_in_the_request(node: Node) -> None:
     node.memory.found.set_result(SeriesPast(S, 9 * S, None, (S,), (1,), (2.5,), (2.5,), (2.5,)))
     response = node.answer(
-        HISTORY_SERVICE,
+        GET_HISTORY.name,
         tag_id="1",
         sensor_type="co2",
         start=Time(sec=1),
@@ -172,7 +171,7 @@ def test_a_series_is_asked_for_as_it_stands_in_the_request(node: Node) -> None:
 def test_a_bad_question_is_refused_with_everything_else_empty(
     node: Node, wrong: dict[str, Any], says: str
 ) -> None:
-    response = node.answer(HISTORY_SERVICE, **({"tag_id": "1", "sensor_type": "co2"} | wrong))
+    response = node.answer(GET_HISTORY.name, **({"tag_id": "1", "sensor_type": "co2"} | wrong))
     assert says in response.error_message
     response.error_message = ""
     assert response == GetHistory.Response()
@@ -192,15 +191,15 @@ def test_what_the_memory_meets_is_told_and_what_it_should_not_is_reported(
     node: Node, error: Exception, says: str, is_reported: bool
 ) -> None:
     node.memory.found.set_exception(error)
-    response = node.answer(STATE_AT_SERVICE, at=Time(sec=5))
+    response = node.answer(GET_STATE_AT.name, at=Time(sec=5))
     assert response == GetStateAt.Response(error_message=says)
     assert bool(node.habits.reported) is is_reported
 
 
 def test_one_question_too_many_is_told_to_come_again(node: Node) -> None:
     for _ in range(MAX_QUESTIONS):
-        node.callbacks[STATE_AT_SERVICE](at=Time(sec=5))
-    response = node.answer(STATE_AT_SERVICE, at=Time(sec=5))
+        node.callbacks[GET_STATE_AT.name](at=Time(sec=5))
+    response = node.answer(GET_STATE_AT.name, at=Time(sec=5))
     assert response == GetStateAt.Response(
         error_message=f"{MAX_QUESTIONS} questions about the past wait, which is the limit: "
         "ask again later"
@@ -225,7 +224,7 @@ def peer() -> Iterator[Peer]:
         peer.tag("last")
         # What is shown is in the log within 100 ms.
         wait_for(
-            lambda: peer.ask(GetHistory, HISTORY_SERVICE, tag_id="last", sensor_type="co2").stamps,
+            lambda: peer.ask(GetHistory, GET_HISTORY.name, tag_id="last", sensor_type="co2").stamps,
             "the last scan in the log",
         )
         yield peer

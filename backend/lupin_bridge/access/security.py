@@ -20,12 +20,13 @@ OWN_HEADER: Final = "X-Lupin-Twin"
 # The page loads nothing from elsewhere, is framed by nobody, and runs no inline script. No other
 # page gets at an answer unless by CORS, which CORP does not touch. No HSTS: it would take the way
 # past a self-signed certificate, and it binds all ports of a host, other people's services too.
+CONTENT_POLICY: Final = (
+    "default-src 'self'; img-src 'self' blob: data:; connect-src 'self'; object-src 'none'; "
+    "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+)
 _HEADERS: Final = {
     "Cache-Control": "no-cache",
-    "Content-Security-Policy": (
-        "default-src 'self'; img-src 'self' blob: data:; connect-src 'self'; object-src 'none'; "
-        "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
-    ),
+    "Content-Security-Policy": CONTENT_POLICY,
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",

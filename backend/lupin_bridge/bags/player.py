@@ -46,7 +46,7 @@ _TYPES: Final[Mapping[str, Any]] = {
     TAGS_TYPE: DiscoveredTags,
     MAP_TYPE: OccupancyGrid,
 }
-# As a twin subscribes to them (README, "Ask it over ROS").
+# As a twin subscribes to them (lupin_twin.interfaces).
 _DEPTHS: Final = {OBSERVATION_TYPE: 50, TAGS_TYPE: 50, MAP_TYPE: 1}
 _STATE_TYPE: Final = "lupin_msgs/msg/TwinState"
 _BEAT_S: Final = 0.02

@@ -74,6 +74,7 @@ def render(document: dict[str, Any], base_url: str) -> str:
         f"<h1>{escape(info['title'])}: API</h1><p>{escape(info['summary'])}</p>"
         f"<p>{escape(info['description'])}</p>"
         '<p>As a document for tools: <a href="openapi.json">/openapi.json</a></p>'
+        '<p>For people, with tutorials: <a href="docs/guide/">the guide</a></p>'
         f"<h2>Routes</h2>{routes}<h2>Types</h2>{schemas}</main></body></html>"
     )
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from lupin_twin import interfaces
+
 # What is the largest that a twin itself takes in, see `lupin_twin.shapes`.
 _LARGEST: Final = 64_000_000
 
@@ -43,22 +45,13 @@ class Topic:
 def topics_of(names: TwinNames) -> tuple[Topic, ...]:
     """A twin's state, what it listens to, and what it says of itself."""
     return (
-        Topic(names.state_topic, "lupin_msgs/msg/TwinState"),
-        Topic(
-            names.observations_topic, "lupin_msgs/msg/Observation", depth=50, max_bytes=8_000_000
-        ),
-        Topic(
-            names.discovered_tags_topic,
-            "lupin_msgs/msg/DiscoveredTags",
-            depth=50,
-            max_bytes=16_000_000,
-        ),
-        Topic(names.map_topic, "nav_msgs/msg/OccupancyGrid"),
-        Topic(
-            names.diagnostics_topic,
-            "diagnostic_msgs/msg/DiagnosticArray",
-            latched=False,
-            depth=10,
-            max_bytes=4_000_000,
-        ),
+        _heard(names.state_topic, interfaces.STATE),
+        _heard(names.observations_topic, interfaces.OBSERVATIONS, 8_000_000),
+        _heard(names.discovered_tags_topic, interfaces.DISCOVERED_TAGS, 16_000_000),
+        _heard(names.map_topic, interfaces.MAP),
+        _heard(names.diagnostics_topic, interfaces.DIAGNOSTICS, 4_000_000),
     )
+
+
+def _heard(name: str, topic: interfaces.Topic, max_bytes: int = _LARGEST) -> Topic:
+    return Topic(name, topic.type_name, topic.is_latched, topic.depth, max_bytes)

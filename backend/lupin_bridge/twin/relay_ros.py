@@ -15,10 +15,9 @@ from visualization_msgs import msg as visualization
 
 from lupin_bridge.twin.names import Topic, TwinNames
 from lupin_bridge.twin.relay import RosTime, Sample
-from lupin_twin import diagnostics, shapes
+from lupin_twin import interfaces, shapes
 from lupin_twin.drops import Drop
 from lupin_twin.habits import latched, read_message
-from lupin_twin.layers import LAYERS_BELOW, PLANTERS_TOPIC, TAGS_TOPIC
 
 # A name that comes from outside imports nothing.
 _PACKAGES: Final[Mapping[str, Any]] = {
@@ -113,8 +112,8 @@ def names_of(node: Any) -> TwinNames:
         observations_topic=resolve(parameters.observations_topic),
         discovered_tags_topic=resolve(parameters.discovered_tags_topic),
         map_topic=resolve(parameters.map_topic),
-        diagnostics_topic=resolve(diagnostics.TOPIC),
-        field_layers=resolve(LAYERS_BELOW + "x")[:-1],
-        tags_layer=resolve(TAGS_TOPIC),
-        planters_layer=resolve(PLANTERS_TOPIC),
+        diagnostics_topic=resolve(interfaces.DIAGNOSTICS.name),
+        field_layers=resolve(interfaces.LAYERS_BELOW + "x")[:-1],
+        tags_layer=resolve(interfaces.TAGS.name),
+        planters_layer=resolve(interfaces.PLANTERS.name),
     )

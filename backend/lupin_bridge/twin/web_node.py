@@ -23,22 +23,18 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
 
 from lupin_bridge.twin.pairing import Pairing
-from lupin_twin import convert, diagnostics, ingest, shapes
+from lupin_twin import convert, ingest, interfaces, shapes
 from lupin_twin.clock_watch import StampWatch
 from lupin_twin.convert import findings_of
 from lupin_twin.diagnostics import Origin, SelfReport, self_report
 from lupin_twin.drops import Counts, Drop, Reason
-from lupin_twin.estimate_report import REPORT_SERVICE
-from lupin_twin.estimates import ESTIMATE_SERVICE
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRules
 from lupin_twin.habits import SERVICE_QOS, Habits
 from lupin_twin.history import History, TagHistory
 from lupin_twin.journal.condition import Condition
 from lupin_twin.numbering import TwinCount
-from lupin_twin.parameters import TIMES_TOPIC, TwinParameters
-from lupin_twin.past import HISTORY_SERVICE, STATE_AT_SERVICE
-from lupin_twin.past_writes import WRITES_SERVICE
+from lupin_twin.parameters import TwinParameters
 from lupin_twin.ros_parameters import (
     AdjustableNode,
     declare,
@@ -160,7 +156,7 @@ class WebNode(AdjustableNode):
         self._history = History(p.buffer_len)
         for parameter, topic, shape, callback, on_number in (
             ("state_topic", p.state_topic, shapes.STATE, self._take_state, self.twins.hear),
-            ("times", TIMES_TOPIC, shapes.TIMES, self._take_times, None),
+            ("times", interfaces.TIMES.name, shapes.TIMES, self._take_times, None),
             ("map_topic", p.map_topic, shapes.MAP, self._take_map, None),
         ):
             self._topics[parameter] = self.habits.subscribe(
@@ -174,7 +170,7 @@ class WebNode(AdjustableNode):
             )
         self.habits.subscribe(
             "diagnostics",
-            diagnostics.TOPIC,
+            interfaces.DIAGNOSTICS.name,
             shapes.DIAGNOSTICS,
             depth=50,
             group=group,
@@ -188,11 +184,11 @@ class WebNode(AdjustableNode):
                 )
                 for service, name in (
                     (Service.FIELD, p.field_service_name),
-                    (Service.STATE_AT, STATE_AT_SERVICE),
-                    (Service.HISTORY, HISTORY_SERVICE),
-                    (Service.WRITES, WRITES_SERVICE),
-                    (Service.ESTIMATE, ESTIMATE_SERVICE),
-                    (Service.REPORT, REPORT_SERVICE),
+                    (Service.STATE_AT, interfaces.GET_STATE_AT.name),
+                    (Service.HISTORY, interfaces.GET_HISTORY.name),
+                    (Service.WRITES, interfaces.GET_WRITES.name),
+                    (Service.ESTIMATE, interfaces.GET_ESTIMATE.name),
+                    (Service.REPORT, interfaces.GET_ESTIMATE_REPORT.name),
                 )
             }
         self._patience = self.create_timer(

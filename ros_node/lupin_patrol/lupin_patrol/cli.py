@@ -23,45 +23,50 @@ class _Parser(argparse.ArgumentParser):
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Parse the options, ROS arguments already removed; exits with 2 on a bad one."""
-    parser = _Parser(
+    return parser().parse_args(arguments)
+
+
+def parser() -> argparse.ArgumentParser:
+    """The options."""
+    made = _Parser(
         prog="patrol_node",
         description="A robot on patrol in the simulated greenhouse, as the twin sees it.",
         epilog="ROS arguments follow --ros-args.",
         allow_abbrev=False,
     )
-    parser.add_argument(
+    made.add_argument(
         "--speed",
         type=_number(float, "a number", *SPEED_LIMITS),
         default=1.0,
         help="patrol seconds per second (default 1: the whole greenhouse within a minute)",
     )
-    parser.add_argument(
+    made.add_argument(
         "--day-speed",
         type=_number(float, "a number", *DAY_SPEED_LIMITS),
         default=60.0,
         help="simulated seconds per patrol second (default 60: a day takes 24 minutes)",
     )
-    parser.add_argument(
+    made.add_argument(
         "--seed",
         type=_number(int, "a whole number", *SEED_LIMITS),
         default=0,
         help="the same seed gives the same patrol (default 0)",
     )
-    parser.add_argument(
+    made.add_argument(
         "--since-morning",
         type=_number(float, "a number", *SINCE_MORNING_LIMITS),
         default=0.0,
         help="patrol seconds since nine o'clock, when it begins (default 0)",
     )
-    parser.add_argument(
+    made.add_argument(
         "--once", action="store_true", help="end after one pass, its retries included"
     )
-    parser.add_argument(
+    made.add_argument(
         "--end-with-parent",
         action="store_true",
         help="end when the process that started this one does, even by kill -9 (Linux)",
     )
-    return parser.parse_args(arguments)
+    return made
 
 
 def main() -> int:

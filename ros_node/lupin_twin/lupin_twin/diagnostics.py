@@ -15,8 +15,6 @@ from lupin_twin.journal.condition import UNKNOWN as UNKNOWN_JOURNAL
 from lupin_twin.journal.condition import Condition, JournalState
 from lupin_twin.state import ClockState
 
-# The topic of all nodes of a robot, and of all robots in one domain.
-TOPIC: Final = "/diagnostics"
 # What a source calls itself is its own affair, and so is how long that is.
 MAX_SHOWN: Final = 500
 

@@ -15,8 +15,6 @@ from lupin_twin.fields import FieldRefused, check_sensor_type
 from lupin_twin.free_places import floor, free_of
 from lupin_twin.grading import Record
 
-# The service's name, relative to the node's namespace.
-REPORT_SERVICE: Final = "twin/get_estimate_report"
 DEFAULT_PLACES: Final = 5
 MAX_PLACES: Final = 20
 # What advice takes, roughly and at worst, s of one core.

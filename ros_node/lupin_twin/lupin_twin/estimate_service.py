@@ -20,10 +20,9 @@ from lupin_msgs.srv import GetEstimate, GetEstimateReport
 from lupin_twin import convert_estimate
 from lupin_twin.diagnostics import Estimates
 from lupin_twin.estimate import MAX_PER_TAG, FitFailed, Place
-from lupin_twin.estimate_report import ADVICE_S, REPORT_SERVICE, Report, ReportRequest, advice
+from lupin_twin.estimate_report import ADVICE_S, Report, ReportRequest, advice
 from lupin_twin.estimate_rounds import Done, Loaded, Round, Watch
 from lupin_twin.estimates import (
-    ESTIMATE_SERVICE,
     MAX_TAGS,
     Day,
     Estimate,
@@ -39,6 +38,7 @@ from lupin_twin.fields import FieldRefused
 from lupin_twin.habits import SERVICE_QOS, Habits
 from lupin_twin.history import History, TagHistory
 from lupin_twin.idw import never
+from lupin_twin.interfaces import GET_ESTIMATE, GET_ESTIMATE_REPORT
 from lupin_twin.journal.fold import STATE_S_PER_TAG
 from lupin_twin.journal.lately import lately
 from lupin_twin.journal.queries import SERIES_S
@@ -139,8 +139,8 @@ class EstimateService:
     def offer(self, node: Any, group: Any) -> None:
         """Have `node` offer the services, by names relative to its namespace; some answer later."""
         for kind, name, callback in (
-            (GetEstimate, ESTIMATE_SERVICE, self._on_get_estimate),
-            (GetEstimateReport, REPORT_SERVICE, self._on_get_report),
+            (GetEstimate, GET_ESTIMATE.name, self._on_get_estimate),
+            (GetEstimateReport, GET_ESTIMATE_REPORT.name, self._on_get_report),
         ):
             node.create_service(kind, name, callback, qos_profile=SERVICE_QOS, callback_group=group)
 

@@ -28,8 +28,6 @@ from lupin_twin.history import PastScan
 from lupin_twin.idw import Abandoned, never
 from lupin_twin.state import FLOAT32_MAX, NANOSECONDS_PER_SECOND, Scan, TagState
 
-# The service's name, relative to the node's namespace.
-ESTIMATE_SERVICE: Final = "twin/get_estimate"
 MAX_TAGS: Final = 10_000
 # An estimate of now is one of the last whole minute of a day of so many, or of the newest reading.
 MINUTES_A_DAY: Final = 1_440

@@ -23,6 +23,7 @@ from lupin_twin.cdr import MessageShape, TooManyError
 from lupin_twin.diagnostics import MAX_PROBLEMS
 from lupin_twin.drops import Counts, Drop, Reason, Tally
 from lupin_twin.inputs import Input
+from lupin_twin.interfaces import SERVICE_DEPTH, Topic
 from lupin_twin.lateness import Late
 from lupin_twin.ros_parameters import naming
 from lupin_twin.throttle import Throttle
@@ -34,10 +35,8 @@ DRAIN_S: Final = 0.02
 # at 200 a second, ten of the fifty that may wait. It is believed for as long as says the other.
 BEHIND_S: Final = 0.05
 BELIEVED_S: Final = 0.25
-# Requests that may wait for a service, of all clients together, and answers that may wait in a
-# client, where those to all other clients come along: of more, DDS loses the oldest without a word.
-# ROS's default is 10. The rest is as that has it: reliable, volatile.
-SERVICE_QOS: Final = QoSProfile(depth=50)
+# As ROS has it by default, reliable and volatile, but for the depth.
+SERVICE_QOS: Final = QoSProfile(depth=SERVICE_DEPTH)
 
 
 def waker(condition: Any) -> Callable[[], None]:
@@ -65,6 +64,14 @@ def latched(depth: int) -> QoSProfile:
         reliability=ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.TRANSIENT_LOCAL,
     )
+
+
+def qos_of(topic: Topic) -> QoSProfile:
+    """How a topic of the table of interfaces is published, and subscribed to."""
+    if topic.is_latched:
+        return latched(topic.depth)
+    reliability = ReliabilityPolicy.RELIABLE if topic.is_reliable else ReliabilityPolicy.BEST_EFFORT
+    return QoSProfile(depth=topic.depth, reliability=reliability)
 
 
 def read_message(data: bytes, shape: MessageShape) -> Any | Drop:

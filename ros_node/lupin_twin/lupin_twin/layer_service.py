@@ -26,17 +26,10 @@ from lupin_twin.estimates import MINUTES_A_DAY, EstimateRequest, TagPast
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldEngine, FieldJob, FieldRefused, FieldRequest
 from lupin_twin.grid import FieldGrid
-from lupin_twin.habits import Habits, latched
+from lupin_twin.habits import Habits, qos_of
 from lupin_twin.idw import Abandoned
-from lupin_twin.layers import (
-    PLANTERS_TOPIC,
-    TAGS_TOPIC,
-    layer_request,
-    planter_marks,
-    points,
-    tag_marks,
-    topics_of,
-)
+from lupin_twin.interfaces import LAYERS, PLANTERS, TAGS
+from lupin_twin.layers import layer_request, planter_marks, points, tag_marks, topics_of
 from lupin_twin.past_desk import PastDesk, Question
 from lupin_twin.ros_parameters import naming
 from lupin_twin.state import NANOSECONDS_PER_SECOND, Snapshot, TwinStore
@@ -145,7 +138,7 @@ class LayerService:
         """
         for topic, sensor in topics_of(sensors).items():
             with naming("layers", sensor):
-                publisher = node.create_publisher(PointCloud2, topic, latched(1))
+                publisher = node.create_publisher(PointCloud2, topic, qos_of(LAYERS))
             self._topics.append(
                 _Topic(
                     publisher,
@@ -153,12 +146,12 @@ class LayerService:
                     partial(self._plan_layer, sensor, frame_id),
                 )
             )
-        for topic, marks, make in (
-            (TAGS_TOPIC, tag_marks, tag_markers),
-            (PLANTERS_TOPIC, planter_marks, planter_markers),
+        for kind, marks, make in (
+            (TAGS, tag_marks, tag_markers),
+            (PLANTERS, planter_marks, planter_markers),
         ):
             marked = _Marked(marks, MarkerArrays(make, frame_id))
-            publisher = node.create_publisher(MarkerArray, topic, latched(1))
+            publisher = node.create_publisher(MarkerArray, kind.name, qos_of(kind))
             # They age: whether they look the same is found where they are made.
             self._topics.append(
                 _Topic(

@@ -18,11 +18,10 @@ import numpy.typing as npt
 from lupin_twin.estimate import EstimateGrid
 from lupin_twin.fields import FieldRequest, default_box, default_request
 from lupin_twin.grid import FieldGrid, cell_centres
+from lupin_twin.interfaces import LAYERS_BELOW
 from lupin_twin.parameters import ParameterError
 from lupin_twin.state import STATUS_OK, Snapshot, TagState
 
-TAGS_TOPIC: Final = "twin/tags"
-PLANTERS_TOPIC: Final = "twin/planters"
 # As on the page: an observation is fresh for so long, s, and old from so long on.
 FRESH_S: Final = 60.0
 OLD_S: Final = 1800.0
@@ -83,8 +82,6 @@ def planter_marks(snapshot: Snapshot) -> list[PlanterMark]:
     return [PlanterMark(number, corners) for corners, number in found.items()]
 
 
-# Where layers are published, relative to the node's namespace.
-LAYERS_BELOW: Final = "twin/field/"
 # A point takes 20 bytes: no message is larger than 1 MB, whatever max_grid_cells says. Beside those
 # of 2.5 MB, an answer of a service came 3 s late now and then; beside those of 1.4 MB, none did.
 MAX_POINTS: Final = 50_000

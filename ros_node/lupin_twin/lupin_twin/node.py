@@ -16,20 +16,19 @@ from lupin_msgs.msg import TwinState, TwinTimes
 from lupin_msgs.srv import GetField
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from lupin_twin import convert, convert_field, ingest, shapes
+from lupin_twin import convert, convert_field, ingest, interfaces, shapes
 from lupin_twin.clock_watch import CLOCK_SAYS, ClockWatch
 from lupin_twin.convert import diagnostics
-from lupin_twin.diagnostics import TOPIC, Health, Origin, findings, origin_of
+from lupin_twin.diagnostics import Health, Origin, findings, origin_of
 from lupin_twin.drops import Drop, Reason
 from lupin_twin.estimate_service import EstimateRules, EstimateService, Known
 from lupin_twin.explored import OccupancyMap
 from lupin_twin.field_desk import FieldDesk
 from lupin_twin.fields import FieldCache, FieldEngine, FieldJob, FieldRefused, FieldRules
 from lupin_twin.grid import FieldGrid
-from lupin_twin.habits import SERVICE_QOS, Habits, latched, waker
+from lupin_twin.habits import SERVICE_QOS, Habits, qos_of, waker
 from lupin_twin.history import History, TagHistory, kind_of
 from lupin_twin.journal.runs import Clock as RunClock
 from lupin_twin.lateness import LATCHED_AFTER_S, Lateness
@@ -37,7 +36,7 @@ from lupin_twin.layer_service import LAYER_LOOK_S, LayerService, Shown
 from lupin_twin.memory import Memory, journal_path, open_journal
 from lupin_twin.numbering import TwinCount
 from lupin_twin.other_twins import OtherTwins
-from lupin_twin.parameters import TIMES_TOPIC, ParameterError, TwinParameters, World
+from lupin_twin.parameters import ParameterError, TwinParameters, World
 from lupin_twin.past_desk import PastDesk
 from lupin_twin.past_service import JournalPast, PastService
 from lupin_twin.responses import TRY_EVERY_S, Later, Resending, allow_later
@@ -174,20 +173,21 @@ class TwinNode(AdjustableNode):
         return Memory(self.store, self.history, journal, p.buffer_len)
 
     def _connect(self) -> None:
-        p = self.parameters
-        group = self._group
+        p, group = self.parameters, self._group
         resending = Resending(self.habits.warn, self.habits.drain)
-        for parameter, shape, depth, callback in (
-            ("observations_topic", shapes.OBSERVATION, 50, self._on_observation),
-            ("discovered_tags_topic", shapes.DISCOVERED_TAGS, 50, self._on_discovered_tags),
-            ("map_topic", shapes.MAP, 1, self._on_map),
+        for topic, shape, callback in (
+            (interfaces.OBSERVATIONS, shapes.OBSERVATION, self._on_observation),
+            (interfaces.DISCOVERED_TAGS, shapes.DISCOVERED_TAGS, self._on_discovered_tags),
+            (interfaces.MAP, shapes.MAP, self._on_map),
         ):
-            self._topics[parameter] = self.habits.subscribe(
-                parameter, getattr(p, parameter), shape, depth=depth, group=group, callback=callback
+            name = getattr(p, topic.parameter)
+            self._topics[topic.parameter] = self.habits.subscribe(
+                topic.parameter, name, shape, depth=topic.depth, group=group, callback=callback
             )
+        state, times, own = interfaces.STATE, interfaces.TIMES, interfaces.DIAGNOSTICS
         with naming("state_topic", p.state_topic):
-            self._state_publisher = self.create_publisher(TwinState, p.state_topic, latched(1))
-        self._times_publisher = self.create_publisher(TwinTimes, TIMES_TOPIC, latched(1))
+            self._state_publisher = self.create_publisher(TwinState, p.state_topic, qos_of(state))
+        self._times_publisher = self.create_publisher(TwinTimes, times.name, qos_of(times))
         kind, name, answer = GetField, p.field_service_name, self._on_get_field
         with naming("field_service_name", name):
             self.create_service(kind, name, answer, qos_profile=SERVICE_QOS, callback_group=group)
@@ -198,7 +198,7 @@ class TwinNode(AdjustableNode):
         for service in self.services:  # those of its parameters too
             allow_later(resending.watch(service))
         self._others = OtherTwins(self, self.habits, self.twins, p.state_topic, group)
-        self._diagnostics = self.create_publisher(DiagnosticArray, TOPIC, 10)
+        self._diagnostics = self.create_publisher(DiagnosticArray, own.name, qos_of(own))
         self._every(DIAGNOSTICS_PERIOD_S, "diagnostics timer", self._publish_diagnostics)
         self._every(CLOCK_LOOK_S, "clock timer", self._look_at_clock)
         self._every(FIT_LOOK_S, "estimate timer", self.estimates.go_on)
@@ -415,9 +415,9 @@ class TwinNode(AdjustableNode):
         if watch.wants_to_listen and self._clock_subscription is None:
             self._clock_subscription = self.create_subscription(
                 ClockMessage,
-                "/clock",
+                interfaces.CLOCK.name,
                 lambda _: watch.hear(time.monotonic()),
-                QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
+                qos_of(interfaces.CLOCK),
                 callback_group=self._group,
                 raw=True,
             )

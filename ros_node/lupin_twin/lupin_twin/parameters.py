@@ -10,8 +10,6 @@ from typing import Any, Final
 from lupin_twin.diagnostics import Origin
 from lupin_twin.far_off import FARTHEST_M
 
-# Where the times are published, right behind the state with the same stamp.
-TIMES_TOPIC: Final = "twin/times"
 # Of a parameter that is a list.
 MAX_NAMES: Final = 16
 # Characters of a value that a complaint repeats.
@@ -193,7 +191,7 @@ class Described:
 
 
 def describe(name: str) -> Described:
-    """What `ros2 param describe` and the README tell of a parameter."""
+    """What `ros2 param describe` and the docs tell of a parameter."""
     spec = next(spec for spec in fields(TwinParameters) if spec.name == name)
     told = spec.metadata
     return Described(told["description"], told["low"], told["high"], told["fixed"])

@@ -40,10 +40,6 @@ def lasts(message: str) -> str | None:
     return message.removeprefix(NOT_REMEMBERED) if message.startswith(NOT_REMEMBERED) else None
 
 
-# The services' names, relative to the node's namespace.
-STATE_AT_SERVICE: Final = "twin/get_state_at"
-HISTORY_SERVICE: Final = "twin/get_history"
-
 DEFAULT_POINTS: Final = 500
 MAX_POINTS: Final = 5_000
 # Longer buckets begin on whole ones.

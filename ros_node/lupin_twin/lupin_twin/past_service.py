@@ -10,13 +10,12 @@ from lupin_msgs.srv import GetHistory, GetStateAt, GetWrites
 
 from lupin_twin import convert, convert_past
 from lupin_twin.habits import SERVICE_QOS, Habits
+from lupin_twin.interfaces import GET_HISTORY, GET_STATE_AT, GET_WRITES
 from lupin_twin.journal.fold import STATE_S_PER_TAG, state_at
 from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG, series
 from lupin_twin.journal.writes import WRITES_S, writes
 from lupin_twin.past import (
     EVERY_TAG,
-    HISTORY_SERVICE,
-    STATE_AT_SERVICE,
     NotRemembered,
     PastRefused,
     SeriesPast,
@@ -24,7 +23,7 @@ from lupin_twin.past import (
     check_moment,
 )
 from lupin_twin.past_desk import PastDesk, Question
-from lupin_twin.past_writes import WRITES_SERVICE, PastWrites, WritesRequest
+from lupin_twin.past_writes import PastWrites, WritesRequest
 from lupin_twin.recall import Recall
 from lupin_twin.responses import Later
 from lupin_twin.state import Snapshot, TwinStore
@@ -75,9 +74,9 @@ class PastService:
     def offer(self, node: Any, group: Any) -> None:
         """Have `node` offer the services, by names relative to its namespace; some answer later."""
         for kind, name, callback in (
-            (GetStateAt, STATE_AT_SERVICE, self._on_get_state_at),
-            (GetHistory, HISTORY_SERVICE, self._on_get_history),
-            (GetWrites, WRITES_SERVICE, self._on_get_writes),
+            (GetStateAt, GET_STATE_AT.name, self._on_get_state_at),
+            (GetHistory, GET_HISTORY.name, self._on_get_history),
+            (GetWrites, GET_WRITES.name, self._on_get_writes),
         ):
             node.create_service(kind, name, callback, qos_profile=SERVICE_QOS, callback_group=group)
 

@@ -19,8 +19,6 @@ MAX_NUMBER: Final = 2**63 - 1
 # Of each tag, what is recent at a moment: its last scans and looks, so many of each, and no older.
 RECENT_COUNT: Final = 9
 RECENT_NS: Final = 3 * 86_400 * 1_000_000_000
-# The service's name, relative to the node's namespace.
-WRITES_SERVICE: Final = "twin/get_writes"
 
 
 @dataclass(frozen=True, slots=True)

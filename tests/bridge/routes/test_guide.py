@@ -1,0 +1,77 @@
+"""`/docs/guide/`: what was built, or how to build it; styles have a rule of their own."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import httpx
+import pytest
+
+from lupin_bridge.app import create_app
+from lupin_bridge.stream.schema import ErrorMessage
+
+PAGE = "<!doctype html><title>Guide</title><style>b {}</style>"
+
+
+@pytest.fixture
+def built(tmp_path: Path) -> Path:
+    folder = tmp_path / "guide"
+    (folder / "how-to").mkdir(parents=True)
+    (folder / "index.html").write_text(PAGE)
+    (folder / "how-to" / "server.html").write_text(PAGE)
+    (tmp_path / "secret.txt").write_text("secret")
+    return folder
+
+
+def ask(guide_folder: Path, path: str, method: str = "GET", prefix: str = "") -> httpx.Response:
+    async def request() -> httpx.Response:
+        app = create_app(None, guide_folder=guide_folder)
+        transport = httpx.ASGITransport(app, root_path=prefix)
+        async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
+            return await client.request(method, path)
+
+    return asyncio.run(request())
+
+
+@pytest.mark.parametrize("path", ["/docs/guide/", "/docs/guide/how-to/server.html"])
+def test_a_page_may_have_styles_of_its_own_and_no_script(built: Path, path: str) -> None:
+    answer = ask(built, path)
+    assert (answer.status_code, answer.text) == (200, PAGE)
+    policy = answer.headers["content-security-policy"].split("; ")
+    rules = dict(rule.split(" ", 1) for rule in policy)
+    assert rules["style-src"] == "'self' 'unsafe-inline'"
+    assert rules["default-src"] == "'self'"
+    assert "script-src" not in rules
+    assert answer.headers["x-content-type-options"] == "nosniff"
+
+
+def test_only_the_guide_may_have_styles_of_its_own(built: Path) -> None:
+    for path in ("/docs", "/", "/docs/nowhere"):
+        assert "unsafe-inline" not in ask(built, path).headers["content-security-policy"]
+
+
+@pytest.mark.parametrize("prefix", ["", "/gh1"])
+def test_without_its_slash_it_leads_there(built: Path, prefix: str) -> None:
+    answer = ask(built, f"{prefix}/docs/guide", prefix=prefix)
+    assert answer.is_redirect
+    assert answer.headers["location"] == f"{prefix}/docs/guide/"
+
+
+@pytest.mark.parametrize("path", ["/docs/guide/nowhere.html", "/docs/guide/..%2fsecret.txt"])
+def test_nothing_else_is_served(built: Path, path: str) -> None:
+    answer = ask(built, path)
+    assert answer.status_code == 404
+    assert "secret" not in answer.text.replace("secret.txt", "")
+
+
+def test_it_can_only_be_read(built: Path) -> None:
+    assert ask(built, "/docs/guide/", "POST").status_code == 405
+    assert ask(built, "/docs/guide/", "HEAD").text == ""
+
+
+@pytest.mark.parametrize("path", ["/docs/guide/", "/docs/guide/how-to/server.html"])
+def test_one_that_was_not_built_says_how_to_build_it(tmp_path: Path, path: str) -> None:
+    answer = ask(tmp_path, path)
+    assert answer.status_code == 404
+    assert "make docs" in ErrorMessage.model_validate_json(answer.content).detail

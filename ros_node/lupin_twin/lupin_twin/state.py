@@ -50,10 +50,8 @@ class Pose:
     @property
     def is_finite(self) -> bool:
         """Whether all seven numbers are finite; a pose that is not counts as no pose."""
-        return all(
-            math.isfinite(value)
-            for value in (self.x, self.y, self.z, self.qx, self.qy, self.qz, self.qw)
-        )
+        numbers = (self.x, self.y, self.z, self.qx, self.qy, self.qz, self.qw)
+        return all(map(math.isfinite, numbers))
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,14 +95,10 @@ class Flower:
 
 NO_FLOWER = Flower()
 
-# A camera that is less sure of a species, 0 to 1, has not told which it is.
-SURE_OF_SPECIES = 0.5
-
 
 def sure_species(species: str, confidence: float | None) -> str:
-    """The species where the camera was sure of it, else an empty text."""
-    is_sure = confidence is not None and confidence >= SURE_OF_SPECIES
-    return species if is_sure else ""
+    """The species where the camera was at least half sure of it, else an empty text."""
+    return species if confidence is not None and confidence >= 0.5 else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -351,8 +345,7 @@ class TwinStore:
 
     def is_pinned(self, tag_id: str) -> bool:
         """Whether the tag is known and has a pose."""
-        tag = self._tags.get(tag_id)
-        return tag is not None and tag.pose is not None
+        return self.pose_of(tag_id) is not None
 
     def pose_of(self, tag_id: str) -> Pose | None:
         """Where a tag is, None where that is not known."""
@@ -404,7 +397,7 @@ class TwinStore:
         check_length("readings, flowers and footprint points of all tags", items, MAX_ITEMS)
         self._items = items
         self._tags[tag.tag_id] = tag
-        self._newest_ns = max(self._newest_ns, _newest_of(tag) or 0)
+        self._newest_ns = max(self._newest_ns, _newest_of(tag))
         if known is None or not tag.shows_the_same_as(known):
             self.observation_count += 1
 
@@ -414,11 +407,9 @@ def age_seconds(observed_at_ns: int, now_ns: int) -> float:
     return max(0, now_ns - observed_at_ns) / NANOSECONDS_PER_SECOND
 
 
-def _newest_of(tag: TagState) -> int | None:
+def _newest_of(tag: TagState) -> int:
     """The latest stamp of a tag: none is later than its last observation or its last try."""
-    if tag.last_try is None:
-        return tag.last_observed_ns
-    return max(tag.last_try.stamp_ns, tag.last_observed_ns or 0)
+    return max(tag.last_try.stamp_ns if tag.last_try else 0, tag.last_observed_ns or 0)
 
 
 def _is_later(one_ns: int | None, other_ns: int) -> bool:

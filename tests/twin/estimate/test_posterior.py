@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lupin_twin.estimate import MAX_EXACT, EstimateGrid, Model, Posterior, Readings, fit
+from lupin_twin.estimate.cells import Cells
 from lupin_twin.estimate.kernel import Hyper, Pairs
 from lupin_twin.estimate.posterior import INFLATION
 from lupin_twin.estimate.readings import Scale
@@ -73,6 +74,15 @@ def test_a_fine_grid_is_interpolated_and_off_by_little(length: float) -> None:
     assert (np.abs(grid.mean[y, x] - mean) <= 0.1 * sd).all()
     assert grid.sd[y, x] == pytest.approx(sd, rel=0.15)
     assert not (np.abs(grid.mean[y, x] - mean) < 1e-7).all(), "this was not interpolated"
+
+
+@pytest.mark.parametrize("side_m", [8.0, 100.0, 1_000.0])
+@pytest.mark.parametrize("length", [0.4, 3.0])
+def test_a_lattice_is_never_coarser_than_a_fifth_of_the_length(
+    side_m: float, length: float
+) -> None:
+    x, y = Cells.of(0.0, 0.0, side_m, side_m, side_m / 2_000).lattice(length)
+    assert max(np.diff(x).max(), np.diff(y).max()) <= max(length / 5.0, side_m / 2_000) + 1e-9
 
 
 def beside(posterior: Posterior, grid: EstimateGrid) -> tuple[FloatArray, FloatArray, Any, Any]:

@@ -76,18 +76,17 @@ class LeftOut:
         """Of each tag: z, offset, and since when it has changed, s.
 
         The clearest first; those that are left are judged without what it has read since then.
+        Where most are off, by their median none has changed: it is the model that does not fit.
         """
         result: dict[int, tuple[float, float, float | None]] = {}
-        tags = np.unique(self.readings.tag)
-        rest, left = self, tags.tolist()
+        rest, left = self, np.unique(self.readings.tag).tolist()
         while left:
             found = {tag: rest._onset(tag) for tag in left}
             worst = max(left, key=lambda tag: abs(found[tag][0]))
             others = [abs(found[tag][0]) for tag in left if tag != worst]
             limit = CHANGE_Z * max(1.0, _SD_OF_MEDIAN * float(np.median(others or [0.0])))
             z, offset, first = found[worst]
-            is_few = 2 * (len(tags) - len(left) + 1) > len(tags)
-            if first is None or abs(z) <= limit or is_few:
+            if first is None or abs(z) <= limit:
                 return result | {tag: (*found[tag][:2], None) for tag in left}
             own = rest._own(worst)[first:]
             result[worst] = z, offset, float(rest.readings.time_s[own[0]])

@@ -20,13 +20,13 @@ from tests.support.journal import SECOND, kept, pin, select
 from tests.support.journal import scan as row
 from tests.support.live import attached, wait_until_ready
 from tests.support.messages import scan
-from tests.support.processes import OFTEN, Process, lupin_twin, patrols_of
+from tests.support.processes import OFTEN, Process, limits, lupin_twin, patrols_of
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, bridge
 
 DAY_S = 86_400
-PATIENT = ("--field-timeout-s", str(PATIENCE_S), "--field-rate-hz", "10000")
+PATIENT = limits(answer_timeout_s=PATIENCE_S, answers_per_s=10_000)
 TO, FROM = "x-complete-to", "x-kept-from"
 ROUTES = ("/api/state", "/api/tags/a", "/api/health", "/api/field.json", "/api/field/quality")
 

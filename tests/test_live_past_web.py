@@ -1,18 +1,22 @@
-"""`web` looks back by its twin's services: what it says, and what when the twin ends meanwhile."""
+"""`web` reads its twin's file, or one that follows it: the same answers, also without a twin."""
 
 from __future__ import annotations
 
 import csv
 import io
+import json
+import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 
-from tests.support.domains import own_domain
+from tests.support.domains import own_domain, ros_env
 from tests.support.journal import select
 from tests.support.live import attached, field_of, wait_until_ready
 from tests.support.messages import look, scan
@@ -21,40 +25,116 @@ from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, filled
 
+ROOT = Path(__file__).parents[1]
 # How long Fast DDS keeps a dead process in the graph.
 DDS_LEASE_S = 20.0
 T = 1_700_000_000.0
 OBSERVED = 40
-Both = tuple[Process, Bridge, Bridge]
+# Another file for each process, as on another host: that of its own working folder.
+JOURNAL = "/proc/self/cwd/j.sqlite"
+QUESTIONS = (
+    f"/api/state?at={T + 100}",
+    f"/api/tags/a?at={T + 100}",
+    f"/api/tags/nobody?at={T + 100}",
+    f"/api/health?at={T + 100}",
+    f"/api/field.json?sensor_type=co2&at={T + 100}",
+    f"/api/field.npy?sensor_type=vpd&at={T + 100}",
+    f"/api/field/quality?sensor_type=co2&at={T + 100}",
+    *(
+        f"/api/history?tag_id=a&sensor_type={sensor}&from={T}&to={T + 3000}&points={points}"
+        for sensor in ("co2", "vpd", "~scans", "~pests_seen", "~silences")
+        for points in (10, 500)
+    ),
+    f"/api/history?tag_id=%2A&sensor_type=~failures&from={T}&to={T + 3000}",
+    f"/api/timeline?from={T}&to={T + 3000}",
+    f"/api/timeline?from={T}&to={T + 3000}&points=7&tag_id=a",
+    f"/api/export.csv?from={T}&to={T + 3000}",
+    f"/api/alarms?from={T}&to={T + 3000}",
+    "/api/history?tag_id=&sensor_type=co2",
+    f"/api/state?at={2**31 - 1}",
+)
+
+
+def still(answer: httpx.Response) -> tuple[int, bytes]:
+    """An answer; how far a timeline reaches is this very moment."""
+    assert answer.status_code < 500, answer.text
+    if "timeline" not in answer.url.path:
+        return answer.status_code, answer.content
+    body = answer.json()
+    for run in (body["reach"], *body["runs"]):
+        del run["to"]
+    return answer.status_code, json.dumps(body).encode()
+
+
+class Apart:
+    """A twin, a `web` that reads its file, and one that cannot and follows it."""
+
+    def __init__(self, folder: Path, domain: int, peer: Peer, stack: ExitStack) -> None:
+        self.folder, self.domain, self.peer, self.stack = folder, domain, peer, stack
+        self.state = folder.parent / "state"
+        self.twin = self.start_twin()
+        peer.wait_for_twin()
+        self.observe(0)
+        self.beside, self.following = self.start_web(beside=True), self.start_web()
+
+    def start_twin(self) -> Process:
+        command = ["env", "-C", str(self.folder), sys.executable, "-m", "lupin_twin.cli"]
+        options = (*OFTEN, "-p", f"journal:={JOURNAL}")
+        return self.stack.enter_context(Process([*command, *options], ros_env(self.domain)))
+
+    def start_web(self, *, beside: bool = False) -> Bridge:
+        program = [sys.executable, "-m", "tests.support.limited", "web", "--port", "0"]
+        held = limits(answer_timeout_s=PATIENCE_S, alarm_days=3_652, answers_per_s=10_000)
+        options = [*held, "--day-hours", "00:00-00:00"]
+        where = ["env", "-C", str(self.folder)] if beside else []
+        env = ros_env(self.domain, XDG_STATE_HOME=str(self.state), PYTHONPATH=str(ROOT))
+        process = self.stack.enter_context(Process([*where, *program, *options], env))
+        return self.stack.enter_context(attached(process, self.peer))
+
+    def observe(self, first: int) -> None:
+        """An hour of observations long ago, a minute apart, in the journal when this returns."""
+        for number in range(first, first + OBSERVED):
+            at_s = T + 60.0 * number
+            values = {"co2": 400.0 + number, "temperature": 20.0 + number / 9, "humidity": 60.0}
+            self.peer.observe(scan("a", values, stamp_s=at_s, at=(1.0, 2.0)))
+        self.peer.observe(
+            look("a", anomaly=True, bug_count=2, blooms=[(1.0, 2.0)], stamp_s=T + 90.0),
+            scan("b", status=2, stamp_s=T + 95.0),
+        )
+        rows = "SELECT count(*) FROM scan WHERE is_copy = 0"
+        expected = [(first + OBSERVED + 1,)]
+        wait_for(lambda: select(self.folder / "j.sqlite", rows) == expected, "all in the journal")
+
+    def followed(self) -> list[Path]:
+        return sorted(self.state.glob("lupin-twin/*.followed/*.sqlite"))
+
+    def are_same(self, one: Bridge, other: Bridge) -> None:
+        """Every question has the same answer, to the last byte, as soon as all has come."""
+        for path in QUESTIONS:
+
+            def same(path: str = path) -> bool:
+                here, there = one.http.get(path), other.http.get(path)
+                etags = {answer.headers.get("etag") for answer in (here, there)}
+                is_now = "timeline" in path
+                return still(here) == still(there) and (is_now or len(etags) == 1)
+
+            if "at=2147" in path:  # it says when now is
+                assert other.http.get(path).status_code == 400
+            else:
+                wait_for(same, f"the same answer to {path}")
 
 
 @pytest.fixture(scope="module")
-def both(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Both]:
-    """A twin, two replicas of `web`, and an hour of observations long ago."""
-    journal = tmp_path_factory.mktemp("journal") / "j.sqlite"
+def apart(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Apart]:
+    folder = tmp_path_factory.mktemp("twin") / "here"
+    folder.mkdir()
     with ExitStack() as stack:
         domain = stack.enter_context(own_domain())
-        twin = stack.enter_context(twin_node(domain, *OFTEN, "-p", f"journal:={journal}"))
         peer = stack.enter_context(Peer(domain))
-        peer.wait_for_twin()
-        for number in range(OBSERVED):
-            at_s = T + 60.0 * number
-            peer.observe(scan("a", {"co2": 400.0 + number}, stamp_s=at_s, at=(1.0, 2.0)))
-        peer.observe(
-            look("a", anomaly=True, bug_count=2, stamp_s=T + 90.0),
-            scan("b", status=2, stamp_s=T + 95.0),
-        )
-        peer.tag("b")
-        replicas = []
-        for _ in range(2):
-            process = stack.enter_context(lupin_twin(domain, "web", *limits(answer_timeout_s=2)))
-            replicas.append(stack.enter_context(attached(process, peer)))
-        for replica in replicas:
+        it = Apart(folder, domain, peer, stack)
+        for replica in (it.beside, it.following):
             wait_until_ready(replica)
-        rows = "SELECT count(*) FROM scan"
-        wait_for(lambda: select(journal, rows) == [(OBSERVED + 1,)], "all of it in the journal")
-        first, second = replicas
-        yield twin, first, second
+        yield it
 
 
 def asked(live: Bridge, path: str, **query: Any) -> Any:
@@ -67,12 +147,12 @@ def asked(live: Bridge, path: str, **query: Any) -> Any:
     return wait_for(look_for, f"{path} {query}").json()
 
 
-def test_a_moment_is_as_it_was_then_and_has_one_etag_in_every_replica(both: Both) -> None:
-    _, first, second = both
+def test_a_moment_is_as_it_was_then_and_has_one_etag_in_every_replica(apart: Apart) -> None:
+    first, second = apart.beside, apart.following
     state = asked(first, "/api/state", at=T + 100.0)
     assert state["header"]["stamp"] == {"sec": int(T) + 100, "nanosec": 0}
     tags = {tag["tag_id"]: tag for tag in state["tags"]}
-    [co2] = filled(tags["a"])["readings"]
+    co2, *_ = filled(tags["a"])["readings"]
     assert (co2["value"], co2["observed_at"]["sec"]) == (401.0, int(T) + 60)
     assert (tags["a"]["bug_count"], tags["a"]["anomaly"]) == (2, True)
     assert tags["b"]["last_try_status"] == 2
@@ -85,8 +165,8 @@ def test_a_moment_is_as_it_was_then_and_has_one_etag_in_every_replica(both: Both
     assert (refused.status_code, "later than now" in refused.text) == (400, True)
 
 
-def test_an_estimate_of_then_is_the_same_in_every_replica(both: Both) -> None:
-    _, first, second = both
+def test_an_estimate_of_then_is_the_same_in_every_replica(apart: Apart) -> None:
+    first, second = apart.beside, apart.following
     query: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.5, "at": T + 600.0}
     one = asked(first, "/api/estimate", **query)
     assert (one["sample_count"], one["reading_count"]) == (1, 11)
@@ -102,8 +182,8 @@ def test_an_estimate_of_then_is_the_same_in_every_replica(both: Both) -> None:
     assert (refused.status_code, refused.json()["ok"]) == (400, False)
 
 
-def test_history_timeline_and_export_tell_the_same_past(both: Both) -> None:
-    _, first, second = both
+def test_history_timeline_and_export_tell_the_same_past(apart: Apart) -> None:
+    first, second = apart.beside, apart.following
     query = {"tag_id": "a", "sensor_type": "co2"}
     history = asked(first, "/api/history", **query)
     values = [400.0 + number for number in range(OBSERVED)]
@@ -124,26 +204,58 @@ def test_history_timeline_and_export_tell_the_same_past(both: Both) -> None:
 
     response = first.get("/api/export.csv", to=T + 60.0 * OBSERVED)
     rows = list(csv.DictReader(io.StringIO(response.text)))
-    assert [float(row["value"]) for row in rows if row["tag_id"] == "a"] == values
+    assert [float(row["value"]) for row in rows if row["sensor"] == "co2"] == values
+    assert {row["source"] for row in rows} == {"test"}
     assert {(row["x_m"], row["y_m"]) for row in rows if row["tag_id"] == "a"} == {("1.0", "2.0")}
     assert [(row["status"], row["sensor"]) for row in rows if row["tag_id"] == "b"] == [("2", "")]
 
 
-def test_a_twin_that_is_killed_while_it_is_asked_is_told_of_and_nobody_waits(both: Both) -> None:
+def test_what_is_followed_answers_as_the_file_itself_does(apart: Apart) -> None:
+    assert len(apart.followed()) == 1
+    apart.are_same(apart.beside, apart.following)
+    # And goes on so.
+    apart.observe(OBSERVED)
+    history = {"tag_id": "a", "sensor_type": "co2", "from": T, "to": T + 1e5}
+    for replica in (apart.beside, apart.following):
+        wait_for(
+            lambda replica=replica: (  # type: ignore[misc]
+                len(replica.json("/api/history", **history)["readings"]) == 2 * OBSERVED
+            ),
+            "what came since",
+        )
+    apart.are_same(apart.beside, apart.following)
+
+
+def test_without_its_twin_web_answers_all_the_same_and_goes_on_with_the_next(apart: Apart) -> None:
     """Last: it ends the twin."""
-    twin, first, _ = both
-    twin.freeze()
-    with ThreadPoolExecutor(4) as pool:
-        answers = [
-            pool.submit(first.get, "/api/history", tag_id="a", sensor_type="co2", points=n)
-            for n in (11, 12)
-        ]
-        answers.append(pool.submit(first.get, "/api/state", at=T + 1.0))
-        answers.append(pool.submit(first.get, "/api/export.csv", to=T + 7.0))
-        twin.kill()
-        statuses = {answer.result().status_code for answer in answers}
-    assert statuses <= {503, 504}  # not there, or no answer in time
-    assert first.get("/healthz").status_code == 200
+    before = {path: apart.beside.http.get(path) for path in QUESTIONS[:-2]}
+    apart.twin.kill()
+    for replica in (apart.beside, apart.following):
+        wait_for(lambda replica=replica: replica.get("/readyz").status_code == 503, "silence")  # type: ignore[misc]
+    afresh = apart.start_web()
+    for replica in (apart.beside, apart.following, afresh):
+        for path, told in before.items():
+            if "/api/alarms" not in path:
+                answer = replica.http.get(path)
+                assert still(answer) == still(told), path
+        headers = replica.get("/api/state", at=time.time() - 1.0).headers
+        assert float(headers["x-complete-to"]) < time.time() - 1.0
+    # Another journal is followed into another file.
+    for file in apart.folder.glob("j.sqlite*"):
+        file.rename(file.with_name(f"old-{file.name}"))
+    apart.twin = apart.start_twin()
+    apart.peer.wait_for_twin()
+    apart.peer.observe(scan("new", {"co2": 1.0}, stamp_s=T))
+    for replica in (apart.beside, apart.following, afresh):
+        wait_for(lambda replica=replica: tags(replica) == ["new"], "the next journal")  # type: ignore[misc]
+    assert len(apart.followed()) == 2
+
+
+def tags(live: Bridge) -> list[str]:
+    """Those of that afternoon, as soon as there is a file."""
+    answer = live.get("/api/state", at=T + 1)
+    found = answer.json()["tags"] if answer.status_code == 200 else []
+    return [tag["tag_id"] for tag in found]
 
 
 def test_a_killed_twin_is_asked_nothing_and_who_asked_it_before_is_told(domain: int) -> None:
@@ -160,17 +272,14 @@ def test_a_killed_twin_is_asked_nothing_and_who_asked_it_before_is_told(domain: 
         robot.observe(scan("a", {"co2": 1.0}, (0, 0)))
         live.tag("a")
         field_of(live, sensor_type="co2")
+        wait_for(lambda: live.get("/api/history", **past).status_code == 200, "its journal")
         twin.freeze()
         asked = pool.submit(live.get, "/api/field", sensor_type="temperature")
         twin.kill()
         killed_s = time.monotonic()
         wait_for(lambda: live.get("/readyz").status_code == 503, "its silence")
-        answers = [
-            live.get("/api/field", sensor_type="humidity"),
-            live.get("/api/history", **past),
-            live.get("/api/state", at=1.0),
-            asked.result(),
-        ]
+        answers = [live.get("/api/field", sensor_type="humidity"), asked.result()]
+        assert live.get("/api/history", **past).status_code == 200, "its journal is still there"
         # None has waited for the time-out, nor until DDS missed the twin.
         assert time.monotonic() - killed_s < DDS_LEASE_S
         for answer in answers:

@@ -88,12 +88,14 @@ WIRE_FORMAT = {
         "float64[] means · float64[] minima · float64[] maxima"
     ),
     "srv/GetWrites.srv": (
-        "uint64 after · float64 reach_s · uint64 reach_count · uint32 max_count · --- · "
-        "bool ok · string error_message · string journal · uint64 last · bool is_all · "
+        "uint64 after · float64 reach_s · uint64 reach_count · uint32 max_count · "
+        "bool as_rows · --- · bool ok · string error_message · string journal · uint64 last · "
+        "bool is_all · "
         "uint32[] span_runs · int64[] span_starts_ns · int64[] span_ends_ns · string[] texts · "
         "uint64[] numbers · uint32[] runs · uint32[] tags · int64[] stamps_ns · uint8[] kinds · "
         "uint8[] statuses · uint32[] reading_counts · bool[] has_seen · uint32[] species · "
-        "bool[] anomalies · uint16[] bug_counts · uint32[] sensors · float64[] values"
+        "bool[] anomalies · uint16[] bug_counts · uint32[] sensors · float64[] values · "
+        "string[] rows"
     ),
 }
 

@@ -128,7 +128,12 @@ async def _run(
     limits = Limits()
     timeout_s = limits.answer_timeout_s
     if role == "web":
-        source = WebTwin(ros_args=ros_args, timeout_s=timeout_s, stale_after_s=STALE_AFTER_S)
+        source = WebTwin(
+            ros_args=ros_args,
+            timeout_s=timeout_s,
+            stale_after_s=STALE_AFTER_S,
+            expects=Answering,
+        )
     else:
         all_args = [*own_args, *ros_args]
         world = World() if feed is None else feed.world

@@ -6,13 +6,35 @@ import asyncio
 from collections.abc import AsyncGenerator, Callable, Sequence
 from dataclasses import dataclass, field, replace
 from statistics import fmean
-from typing import Any
+from typing import Any, TypeVar
 
-from lupin_twin.past import Event, PastRow, SeriesPast, SeriesRequest
-from lupin_twin.past_writes import PastWrite, RecentRequest
+from lupin_bridge.twin.looking import Question, Work
+from lupin_twin.past import Event, NotRemembered, PastRow, SeriesPast, SeriesRequest
+from lupin_twin.past_writes import PastWrite, RecentRequest, WritesRequest
 from lupin_twin.state import Snapshot
+from lupin_twin.workers import Workers
 
 NS = 10**9
+ResultT = TypeVar("ResultT")
+
+
+async def look_up(question: Question[ResultT], past: Any, workers: Workers) -> ResultT:
+    """Answer a question here; its work is done on a worker."""
+    looking = question.look()
+    try:
+        need = next(looking)
+        while True:
+            if isinstance(need, SeriesRequest):
+                need = looking.send(await past.series(need))
+            elif isinstance(need, RecentRequest):
+                need = looking.send(await past.recent(need))
+            elif isinstance(need, WritesRequest):
+                raise NotRemembered("what was heard is asked of the journal", is_lasting=True)
+            else:
+                need = looking.send(await past.state_at(need))
+    except StopIteration as end:
+        work: Work[ResultT] = end.value
+    return await asyncio.wrap_future(workers.submit(work.do, work.cost_s))
 
 
 @dataclass(slots=True)

@@ -4,21 +4,17 @@ import math
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from lupin_msgs.srv import GetHistory, GetStateAt
 from rclpy.serialization import deserialize_message, serialize_message
 
-from lupin_twin import convert_past
-from lupin_twin.bounds import MAX_TAGS
-from lupin_twin.convert_past import NotAnAnswerError
+from lupin_twin import convert, convert_past
 from lupin_twin.past import (
     DEFAULT_POINTS,
     MAX_POINTS,
     NotRemembered,
     PastRefused,
     SeriesPast,
-    SeriesRequest,
+    error_of,
 )
 from lupin_twin.state import Bloom, Snapshot, TwinStore
 from tests.support.store import S, at, failed_look, look, scan
@@ -44,6 +40,10 @@ def snapshot() -> Snapshot:
     return store.snapshot(AT_NS, "map")
 
 
+def received(response: Any) -> Snapshot:
+    return convert.snapshot_of(response.state, None, response.times)
+
+
 def test_a_state_as_of_then_survives_the_wire_with_its_times_and_ages() -> None:
     response = over_the_wire(convert_past.state_response(snapshot()))
     assert response.ok
@@ -52,43 +52,12 @@ def test_a_state_as_of_then_survives_the_wire_with_its_times_and_ages() -> None:
     assert [tag.stale_seconds for tag in response.state.tags] == pytest.approx(
         [math.inf, 80.0, 50.0, 40.0]
     )
-    assert convert_past.snapshot_of(response, AT_NS) == snapshot()
+    assert received(response) == snapshot()
 
 
 def test_a_moment_before_everything_is_an_empty_state() -> None:
     response = over_the_wire(convert_past.state_response(Snapshot(0, "map", ())))
-    assert convert_past.snapshot_of(response, 0) == Snapshot(0, "map", ())
-
-
-def broken(change: str) -> Any:
-    response = convert_past.state_response(snapshot())
-    match change:
-        case "moment":
-            response.state.header.stamp.nanosec += 1
-        case "times":
-            response.times.header.stamp.nanosec += 1
-        case "tags":
-            response.times.tags.reverse()
-        case "fewer":
-            response.times.tags.pop()
-        case "many":
-            response.state.tags *= MAX_TAGS // 4 + 1
-    return response
-
-
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        ("moment", "a state as of 90000000008 ns, asked for was 90000000007 ns"),
-        ("times", "a state as of 90000000008 ns"),
-        ("tags", "its times are not those of its tags"),
-        ("fewer", "its times are not those of its tags"),
-        ("many", "20004 tags, the limit is 20000"),
-    ],
-)
-def test_what_is_no_state_as_of_then_is_not_taken_for_one(change: str, says: str) -> None:
-    with pytest.raises(NotAnAnswerError, match=says):
-        convert_past.snapshot_of(broken(change), AT_NS)
+    assert received(response) == Snapshot(0, "map", ())
 
 
 @pytest.mark.parametrize("kind", [GetStateAt, GetHistory])
@@ -106,20 +75,9 @@ def test_a_refusal_is_empty_but_for_why_and_is_read_again(kind: Any, error: Exce
     assert response.ok is False
     response.error_message, message = "", response.error_message
     assert response == kind.Response()
-    response.error_message = message
-    asked: Any = AT_NS if kind is GetStateAt else SeriesRequest("1", "co2")
-    read = convert_past.snapshot_of if kind is GetStateAt else convert_past.entries_of
-    with pytest.raises(type(error), match=str(error)) as raised:
-        read(response, asked)
-    if isinstance(raised.value, NotRemembered):
-        assert raised.value.is_lasting == getattr(error, "is_lasting", None)
-
-
-def test_a_question_survives_the_wire() -> None:
-    asked = SeriesRequest("1", "~scans", 5 * S + 1, 9 * S, 17)
-    request = over_the_wire(convert_past.series_request_message(asked))
-    assert convert_past.series_request(request) == asked
-    assert convert_past.moment_message(AT_NS).at.nanosec == 7
+    read = error_of(message)
+    assert str(error) in str(read)
+    assert getattr(read, "is_lasting", None) == getattr(error, "is_lasting", None)
 
 
 def test_no_number_of_points_is_the_default() -> None:
@@ -144,81 +102,22 @@ def test_a_time_before_zero_is_refused() -> None:
         convert_past.series_request(request)
 
 
-ASKED = SeriesRequest("1", "co2", 10 * S, 20 * S, 4)
-
-
-def series(bucket_ns: int | None = None, **changes: Any) -> SeriesPast:
-    entries: dict[str, Any] = {
-        "stamps_ns": (10 * S, 12 * S + 5, 19 * S),
-        "counts": (1, 1, 1) if bucket_ns is None else (3, 1, 2**40),
-        "means": (1.0, 2.0, 3.0),
-        "minima": (1.0, 2.0, 3.0),
-        "maxima": (1.0, 2.0, 3.0),
-    }
-    return SeriesPast(10 * S, 20 * S, bucket_ns, **(entries | changes))
-
-
-def received(past: SeriesPast, asked: SeriesRequest = ASKED) -> convert_past.Entries:
-    return convert_past.entries_of(over_the_wire(convert_past.series_response(past)), asked)
-
-
 def test_readings_survive_the_wire_those_that_are_no_number_too() -> None:
     values = (1.0, math.nan, math.inf)
-    entries = received(series(means=values, minima=values, maxima=values))
-    assert not entries.is_bucketed
-    assert entries.stamps_ns == (10 * S, 12 * S + 5, 19 * S)
-    assert str(entries.means) == str(entries.minima) == "(1.0, nan, inf)"
+    past = SeriesPast(0, 9 * S, None, (S, 2 * S, 2 * S), (1, 1, 1), values, values, values)
+    response = over_the_wire(convert_past.series_response(past))
+    assert (response.ok, response.is_bucketed) == (True, False)
+    assert [stamp.sec for stamp in response.stamps] == [1, 2, 2]
+    for found in (response.means, response.minima, response.maxima):
+        assert list(found) == pytest.approx(values, nan_ok=True)
 
 
 def test_buckets_survive_the_wire_their_counts_as_far_as_the_message_has_room() -> None:
-    entries = received(series(5 * S))
-    assert entries.is_bucketed
-    assert entries.counts == (3, 1, 2**32 - 1)
-
-
-@pytest.mark.parametrize(
-    ("past", "says"),
-    [
-        (series(counts=(1, 1)), "arrays of [2, 3] entries"),
-        (series(maxima=()), "arrays of [0, 3] entries"),
-        (series(stamps_ns=(10 * S, 9 * S, 19 * S)), "do not ascend"),
-        (series(5 * S, stamps_ns=(10 * S, 10 * S, 19 * S)), "do not ascend"),
-        (series(stamps_ns=(10 * S - 1, 12 * S, 19 * S)), "not of the period"),
-        (series(stamps_ns=(10 * S, 12 * S, 20 * S)), "not of the period"),
-        (series(counts=(1, 2, 1)), "counts more than one"),
-        (series(5 * S, counts=(1, 0, 1)), "a bucket of nothing"),
-        (series(5 * S, minima=(1.0, 2.5, 3.0)), "or of no range"),
-        (series(5 * S, minima=(1.0, math.nan, 3.0)), "or of no range"),
-    ],
-)
-def test_what_is_no_series_is_not_taken_for_one(past: SeriesPast, says: str) -> None:
-    with pytest.raises(NotAnAnswerError, match=says.replace("[", r"\[")):
-        received(past)
-
-
-def test_more_entries_than_asked_for_are_not_taken() -> None:
-    fewer = SeriesRequest("1", "co2", 10 * S, 20 * S, 3)
-    assert len(received(series(), fewer).stamps_ns) == 3
-    with pytest.raises(NotAnAnswerError, match="3 entries, the limit is 2"):
-        received(series(), SeriesRequest("1", "co2", 10 * S, 20 * S, 2))
-
-
-def test_runs_are_told_all_of_them() -> None:
-    asked = SeriesRequest("*", "~runs", 10 * S, 20 * S, 1)
-    assert len(received(series(), asked).stamps_ns) == 3
-
-
-@given(
-    st.lists(st.tuples(st.integers(0, 2**31 * S - 1), st.floats()), max_size=50),
-)
-def test_any_readings_survive_the_wire(found: list[tuple[int, float]]) -> None:
-    found.sort(key=lambda entry: entry[0])
-    stamps = tuple(stamp_ns for stamp_ns, _ in found)
-    values = tuple(value for _, value in found)
-    past = SeriesPast(0, 2**31 * S, None, stamps, (1,) * len(found), values, values, values)
-    entries = received(past, SeriesRequest("1", "co2", max_points=MAX_POINTS))
-    assert entries.stamps_ns == stamps
-    assert list(map(repr, entries.means)) == list(map(repr, values))
+    past = SeriesPast(0, 9 * S, S, (S, 3 * S), (2, 2**40), (2.0, 4.0), (1.0, 3.0), (3.0, 5.0))
+    response = over_the_wire(convert_past.series_response(past))
+    assert response.is_bucketed
+    assert list(response.counts) == [2, 2**32 - 1]
+    assert (list(response.minima), list(response.maxima)) == ([1.0, 3.0], [3.0, 5.0])
 
 
 def test_a_large_state_is_estimated_as_more_than_a_small_one() -> None:

@@ -1,69 +1,77 @@
+"""What was written crosses as values for robots, and as rows for who copies the log."""
+
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import pytest
+from lupin_msgs.srv import GetWrites
+from rclpy.serialization import deserialize_message, serialize_message
 
 from lupin_twin.convert_past import (
-    NotAnAnswerError,
-    writes_of,
+    lot_of,
+    rows_request_message,
+    rows_response,
     writes_request,
-    writes_request_message,
     writes_response,
 )
+from lupin_twin.journal.follow import Lot, NotALotError
+from lupin_twin.past import NotRemembered
 from lupin_twin.past_writes import DEFAULT_WRITES, PastWrite, PastWrites, RunSpan, WritesRequest
-from tests.support.elsewhere import over_the_wire
 
-ASKED = WritesRequest(after=3, max_count=10)
 WRITES = (
     PastWrite(4, 1, "7", 10, 0, 0, ("co2", "light"), (420.5, math.inf)),
     PastWrite(6, 1, "7", 11, 1, 0, has_seen=True, species="tulip", anomaly=True, bug_count=3),
     PastWrite(7, 2, "ä", 9, 0, 2),
 )
 PAST = PastWrites("a-1", (RunSpan(1, 0, 9), RunSpan(2, 9, 2**63 - 1)), WRITES, 9, is_all=True)
+LOT = Lot("0123456789abcdef" * 2, ('["run",1,0,1,1,1,null,null]', '["meta","ä","5"]'), 9, True)
 
 
-def test_a_question_and_an_answer_come_over_the_wire_as_they_are() -> None:
-    assert writes_request(over_the_wire(writes_request_message(ASKED))) == ASKED
-    assert writes_of(over_the_wire(writes_response(PAST)), ASKED) == PAST
+def over_the_wire(message: Any) -> Any:
+    return deserialize_message(serialize_message(message), type(message))
 
 
-def test_of_no_count_the_default_is_meant() -> None:
-    message = writes_request_message(ASKED)
-    message.max_count = 0
-    assert writes_request(message).max_count == DEFAULT_WRITES
+def test_what_was_written_crosses_as_columns() -> None:
+    response = over_the_wire(writes_response(PAST))
+    assert (response.ok, response.journal, response.last, response.is_all) == (True, "a-1", 9, True)
+    assert list(response.numbers) == [4, 6, 7]
+    assert [response.texts[place] for place in response.tags] == ["7", "7", "ä"]
+    assert [response.texts[place] for place in response.sensors] == ["co2", "light"]
+    assert list(response.values) == [420.5, math.inf]
+    assert list(response.reading_counts) == [2, 0, 0]
+    assert (list(response.span_runs), list(response.span_starts_ns)) == ([1, 2], [0, 9])
+    assert (response.has_seen[1], response.bug_counts[1]) == (True, 3)
 
 
-def set_to(name: str, value: Any) -> Callable[[Any], None]:
-    return lambda response: setattr(response, name, value)
+def test_a_question_is_read_with_its_defaults() -> None:
+    message = over_the_wire(GetWrites.Request(after=3))
+    assert writes_request(message) == WritesRequest(after=3, max_count=DEFAULT_WRITES)
+
+
+def test_rows_survive_the_wire() -> None:
+    request = over_the_wire(rows_request_message(8))
+    assert (request.after, request.as_rows) == (8, True)
+    assert lot_of(over_the_wire(rows_response(LOT)), 8) == LOT
 
 
 @pytest.mark.parametrize(
-    "spoil",
+    "lot",
     [
-        set_to("tags", [0]),
-        set_to("tags", [0, 99, 0]),
-        set_to("values", [1.0]),
-        set_to("reading_counts", [1, 0, 0]),
-        set_to("reading_counts", [65, 0, 0]),
-        set_to("numbers", [3, 6, 7]),
-        set_to("numbers", [4, 4, 7]),
-        set_to("last", 6),
-        set_to("span_runs", [1]),
+        LOT._replace(last=7),
+        LOT._replace(last=8, is_all=False),
+        LOT._replace(journal="../../home"),
+        LOT._replace(journal=""),
+        LOT._replace(rows=("[]",) * 50_001),
     ],
 )
-def test_what_does_not_fit_is_no_answer(spoil: Callable[[Any], None]) -> None:
-    response = writes_response(PAST)
-    spoil(response)
-    with pytest.raises(NotAnAnswerError):
-        writes_of(response, ASKED)
+def test_what_leads_nowhere_or_names_no_journal_is_no_lot(lot: Lot) -> None:
+    with pytest.raises(NotALotError):
+        lot_of(rows_response(lot), 8)
 
 
-def test_more_than_was_asked_for_and_nothing_for_ever_is_no_answer() -> None:
-    with pytest.raises(NotAnAnswerError, match="3 writes, asked for were 2"):
-        writes_of(writes_response(PAST), WritesRequest(after=3, max_count=2))
-    empty = writes_response(PastWrites("a", (), (), 3, is_all=False))
-    with pytest.raises(NotAnAnswerError, match="not all"):
-        writes_of(empty, ASKED)
+def test_a_refusal_is_read_again() -> None:
+    response = GetWrites.Response(error_message="not remembered: no journal")
+    with pytest.raises(NotRemembered, match="no journal"):
+        lot_of(response, 8)

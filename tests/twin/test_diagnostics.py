@@ -164,6 +164,7 @@ def test_what_is_said_of_the_journal_is_read_again() -> None:
         simulated_ns=(1_763_440_800_000_000_001, 1_763_700_000_000_000_000),
         complete_ns=1_763_700_000_000_000_002,
         kept_ns=((0, 5), (7, 2**63 - 1)),
+        journal_id="0123456789abcdef",
     )
     none: dict[str, Any] = {"simulated_ns": None, "complete_ns": None, "kept_ns": ()}
     for journal in (told, replace(told, **none)):

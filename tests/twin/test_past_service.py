@@ -13,6 +13,7 @@ from lupin_msgs.srv import GetHistory, GetStateAt
 
 from lupin_twin.habits import SERVICE_QOS
 from lupin_twin.interfaces import GET_HISTORY, GET_STATE_AT
+from lupin_twin.journal.follow import Lot
 from lupin_twin.past import (
     MAX_POINTS,
     NotRemembered,
@@ -56,6 +57,10 @@ class Remembered:
 
     def writes(self, request: WritesRequest) -> Future[PastWrites]:
         self.asked.append(request)
+        return self.found
+
+    def rows(self, after: int, most: int) -> Future[Lot]:
+        self.asked.append((after, most))
         return self.found
 
 

@@ -44,11 +44,7 @@ async def response_as_of(request: Request, at_ns: int | None, of: OfState) -> Re
     """
     bridge = bridge_of(request)
     if at_ns is not None:
-        # Beside the answer, which stays as it is when what is older is deleted; and of before it.
-        headers = complete.of_moment(bridge.source.journal(), at_ns)
-        response = await response_of_past(request, AsOf(at_ns, of), "state")
-        response.headers.update(headers)
-        return response
+        return await response_of_moment(request, AsOf(at_ns, of), at_ns)
 
     async def work() -> Answer | Response:
         if bridge.latest is None:
@@ -73,6 +69,21 @@ async def response_as_of(request: Request, at_ns: int | None, of: OfState) -> Re
         return kept_response(bridge, plan.etag) or await bridge.answering.get(plan.etag, write)
 
     return await admitted_response(request, work)
+
+
+async def response_of_moment(request: Request, asked: Asked, at_ns: int) -> Response:
+    """What is asked of the past as of a moment, and how far that is complete.
+
+    Raises:
+        AdmissionError: past a limit.
+        Exception: what the source or the question raised.
+
+    """
+    # Beside the answer, which stays as it is when what is older is deleted; and of before it.
+    headers = complete.of_moment(bridge_of(request).source.journal(), at_ns)
+    response = await response_of_past(request, asked, "state")
+    response.headers.update(headers)
+    return response
 
 
 async def response_of_past(request: Request, asked: Asked, kind: str) -> Response:

@@ -17,7 +17,7 @@ from lupin_bridge.past import query as past_query
 from lupin_bridge.past.as_of import FieldAsked
 from lupin_bridge.past.asked import DailyField, Field
 from lupin_bridge.query_string import parameters_of, read
-from lupin_bridge.routes.as_of import response_as_of, response_of_past
+from lupin_bridge.routes.as_of import response_as_of, response_of_moment
 from lupin_bridge.routes.computing import (
     field_answer,
     is_large,
@@ -107,7 +107,7 @@ async def _as_of(
         if at_ns is None and now_ns is not None:
             at_ns = now_ns - now_ns % _MINUTE_NS
         question = DailyField(at_ns or 0, of, bridge_of(request).criteria)
-        return await response_of_past(request, question, "state")
+        return await response_of_moment(request, question, at_ns or 0)
     return await response_as_of(request, at_ns, of)
 
 

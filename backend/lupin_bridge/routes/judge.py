@@ -10,7 +10,7 @@ from lupin_bridge.field import query as field_query
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.asked import Health
 from lupin_bridge.query_string import parameters_of
-from lupin_bridge.routes.as_of import response_of_past
+from lupin_bridge.routes.as_of import response_of_moment
 from lupin_bridge.routes.computing import kept_or_computed, or_refusal
 from lupin_bridge.routes.tools import (
     JSON_TYPE,
@@ -53,7 +53,7 @@ async def _health(request: Request) -> Response:
     bridge = bridge_of(request)
     at_ns = past_query.at(request.query_params.multi_items(), bridge.ros_time_ns)
     if at_ns is not None:
-        return await response_of_past(request, Health(at_ns, bridge.criteria), "state")
+        return await response_of_moment(request, Health(at_ns, bridge.criteria), at_ns)
     if bridge.latest is None:
         return error_response("no twin has been heard yet", 503)
     judged = bridge.judged

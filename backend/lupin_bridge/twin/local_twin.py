@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 import time
 import uuid
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import Future
-from contextlib import aclosing, nullcontext
+from contextlib import nullcontext
 from typing import Any, TypeVar
 
-from lupin_bridge.twin.looking import Itself, Question
+from lupin_bridge.twin.log_reader import LogReader
 from lupin_bridge.twin.names import TwinNames
 from lupin_bridge.twin.past_child import Now
 from lupin_bridge.twin.past_process import PastProcess
@@ -28,12 +28,9 @@ from lupin_twin.fields import FieldJob, FieldRequest, FieldRules
 from lupin_twin.grid import FieldGrid
 from lupin_twin.history import TagHistory
 from lupin_twin.journal.condition import Condition
-from lupin_twin.journal.queries import SERIES_S
-from lupin_twin.journal.writes import WRITES_S
 from lupin_twin.node import TwinNode
 from lupin_twin.parameters import World
-from lupin_twin.past import NotRemembered, PastRow, SeriesPast, SeriesRequest
-from lupin_twin.past_writes import PastWrite, PastWrites, RecentRequest, WritesRequest
+from lupin_twin.past import NotRemembered
 from lupin_twin.state import NANOSECONDS_PER_SECOND, Snapshot
 from lupin_twin.workers import SMALL_S, Workers
 
@@ -42,7 +39,7 @@ HEARTBEAT_S = 1.0
 ResultT = TypeVar("ResultT")
 
 
-class LocalTwin:
+class LocalTwin(LogReader):
     """`TwinSource` over a `TwinNode` of this process; see `PastProcess` for what it `expects`."""
 
     def __init__(
@@ -198,47 +195,6 @@ class LocalTwin:
         """The last `buffer_len` scans, and as many tries, of a tag."""
         return await self._in_time(self.thread.call(lambda node: node.history_of(tag_id)))
 
-    async def ask(self, question: Question[ResultT], cost_s: float) -> ResultT:
-        """Answered in a process of its own.
-
-        What is observed within the journal's 100 ms may be missing.
-        """
-        return await self._in_time(self.past.ask(question, self.now(), cost_s))
-
-    async def state_at(self, at_ns: int) -> Snapshot:
-        """The journal's answer."""
-        return await self.ask(Itself(at_ns), 0.0)
-
-    async def series(self, request: SeriesRequest) -> SeriesPast:
-        """The journal's answer, as of now."""
-        return await self.ask(Itself(request), SERIES_S)
-
-    async def recent(self, request: RecentRequest) -> tuple[PastWrite, ...]:
-        """The journal's answer."""
-        return await self.ask(Itself(request), WRITES_S)
-
-    async def writes(self, request: WritesRequest) -> PastWrites:
-        """The journal's rows; what was heard within its 100 ms may be missing."""
-        return await self.ask(Itself(request), WRITES_S)
-
-    async def rows(
-        self,
-        start_ns: int,
-        end_ns: int,
-        tag_id: str | None,
-        sensor_type: str | None,
-        write: Callable[[Sequence[PastRow]], ResultT],
-    ) -> AsyncIterator[ResultT]:
-        """Read a stretch when the last one was taken; what nobody takes is not read."""
-        query = start_ns, end_ns, tag_id, sensor_type
-        async with aclosing(self.past.rows(query, write, self.now)) as lots:
-            while True:
-                try:
-                    lot = await self._in_time(anext(lots))
-                except StopAsyncIteration:
-                    return
-                yield lot
-
     @property
     def now_ns(self) -> int:
         """ROS time now: what was told last may be a heartbeat old."""
@@ -246,6 +202,9 @@ class LocalTwin:
         if now.clock != "running":
             return now.stamp_ns
         return now.stamp_ns + int((time.monotonic() - self.told.made_s) * NANOSECONDS_PER_SECOND)
+
+    async def _found(self) -> None:
+        """It is the node's, from its start."""
 
     def now(self) -> Now:
         """What who looks back has to know of now."""

@@ -15,8 +15,6 @@ from lupin_msgs.srv import (
     GetEstimate,
     GetEstimateReport,
     GetField,
-    GetHistory,
-    GetStateAt,
     GetWrites,
 )
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -50,8 +48,6 @@ class Service(Enum):
     """What a twin is asked for."""
 
     FIELD = GetField
-    STATE_AT = GetStateAt
-    HISTORY = GetHistory
     WRITES = GetWrites
     ESTIMATE = GetEstimate
     REPORT = GetEstimateReport
@@ -184,8 +180,6 @@ class WebNode(AdjustableNode):
                 )
                 for service, name in (
                     (Service.FIELD, p.field_service_name),
-                    (Service.STATE_AT, interfaces.GET_STATE_AT.name),
-                    (Service.HISTORY, interfaces.GET_HISTORY.name),
                     (Service.WRITES, interfaces.GET_WRITES.name),
                     (Service.ESTIMATE, interfaces.GET_ESTIMATE.name),
                     (Service.REPORT, interfaces.GET_ESTIMATE_REPORT.name),

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import math
+import os
 import time
-from collections.abc import AsyncIterator, Callable, Coroutine, Sequence
+from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from hashlib import blake2b
+from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from lupin_bridge.twin import web_node
-from lupin_bridge.twin.looking import WRITE_ROW_S, Question, look_up
+from lupin_bridge.twin.log_here import LogHere
+from lupin_bridge.twin.log_reader import LogReader
 from lupin_bridge.twin.names import TwinNames
+from lupin_bridge.twin.past_child import Now
+from lupin_bridge.twin.past_process import PastProcess
 from lupin_bridge.twin.relay import Relay
 from lupin_bridge.twin.relay_ros import RelayRos, names_of
 from lupin_bridge.twin.ros_thread import RosThread
@@ -27,10 +32,8 @@ from lupin_bridge.twin.source import (
 )
 from lupin_bridge.twin.trust import RevisedEstimate, Trust, revised
 from lupin_bridge.twin.web_node import Service, WebNode
-from lupin_bridge.twin.web_past import WebPast
-from lupin_bridge.twin.web_rows import rows
-from lupin_twin import convert_estimate, convert_field
-from lupin_twin.convert_past import TAG_S, NotAnAnswerError
+from lupin_twin import convert_estimate, convert_field, convert_past
+from lupin_twin.convert_past import NotAnAnswerError
 from lupin_twin.estimate_report import ADVICE_S, Report, ReportRequest
 from lupin_twin.estimates import EstimateRequest
 from lupin_twin.estimates import cost_s as estimate_cost_s
@@ -38,8 +41,9 @@ from lupin_twin.explored import OccupancyMap
 from lupin_twin.fields import FieldRefused, FieldRequest, FieldRules, cost_s
 from lupin_twin.history import TagHistory
 from lupin_twin.journal.condition import UNKNOWN, Condition
-from lupin_twin.past import NotRemembered, PastRow, SeriesPast, SeriesRequest, lasts, may_pass
-from lupin_twin.past_writes import PastWrites, WritesRequest
+from lupin_twin.journal.follow import Lot
+from lupin_twin.memory import journal_path
+from lupin_twin.past import NotRemembered, lasts, may_pass
 from lupin_twin.state import NANOSECONDS_PER_SECOND, Snapshot
 from lupin_twin.workers import SMALL_S, Workers
 
@@ -53,46 +57,47 @@ SERVICE_LOOK_S = 0.02
 # How often who waits for an answer looks whether the twin has fallen silent.
 SILENCE_LOOK_S: Final = 0.2
 
+# ROS time beyond this, in 2001, is that of a wall's clock, and goes on while nobody tells it.
+_A_DATE_NS: Final = 10**18
+
 # What reading a cell of an answer takes, roughly and at worst.
 _READ_CELL_S: Final = 10e-9
 _READ_TAG_S: Final = 20e-6
 
 
-class WebTwin:
+class WebTwin(LogReader):
     """`TwinSource` over the ROS contracts of a twin in another process.
 
     One that was heard, and then for `stale_after_s` no more, is asked nothing.
     """
 
     def __init__(
-        self, *, ros_args: Sequence[str], timeout_s: float, stale_after_s: float = math.inf
+        self,
+        *,
+        ros_args: Sequence[str],
+        timeout_s: float,
+        stale_after_s: float = math.inf,
+        expects: type | None = None,
     ) -> None:
         self._ros_args = ros_args
         self.timeout_s = timeout_s
         self._stale_after_s = stale_after_s
         self.thread: RosThread[WebNode, _Heard]
         self._heard = _Heard()
+        self._number = 0
         self._rules: FieldRules
         # The same for as long as the node lives.
         self._names: TwinNames
         self.workers = Workers("work")
         self.relay = Relay(lambda: self.thread, RelayRos())
         self._asking: Shared[RevisedGrid] = Shared()
-        self._past = WebPast(
-            lambda request: self._ask(Service.STATE_AT, request, self._tags * TAG_S),
-            lambda request: self._ask(Service.HISTORY, request, 0.0),
-            lambda request: self._ask(Service.WRITES, request, 0.0),
-            self.workers,
-            now_ns=self._now_ns,
-            tags=lambda: self._tags,
-        )
+        self._log = LogHere(self._rows_behind, self.workers)
+        self.past = PastProcess(expects, lambda: self.now() if self._log.condition else None)
         self._estimating: Shared[RevisedEstimate] = Shared()
         self._trust = Trust()
         self._slots = asyncio.Semaphore(MAX_REQUESTS)
         # One way is left to the small, which would wait behind the large otherwise.
         self._large_slots = asyncio.Semaphore(MAX_REQUESTS - 1)
-        # A large question of the past asks for one small thing after the other: so of those too.
-        self._large_questions = asyncio.Semaphore(MAX_REQUESTS - 1)
 
     async def start(self, on_state: Callable[[Told], None], on_death: Callable[[], None]) -> None:
         """Start the ROS thread with its node; see `TwinSource.start`."""
@@ -123,27 +128,29 @@ class WebTwin:
 
         def on_heard(heard: _Heard) -> None:
             before, self._heard = self._heard.told, heard
+            self._number += 1
             if heard.rules is not None:
                 self._rules = heard.rules
             # A map alone is no sign of life of the twin.
             if heard.told is not None and heard.told is not before:
+                self._log.on_told(heard.told.journal)
                 on_state(heard.told)
 
         self.thread = RosThread(
             make_node, ros_args=self._ros_args, on_event=on_heard, on_death=on_death
         )
         await self.thread.start()
-        self._rules, self._names = await self.thread.call(
-            lambda node: (
-                node.rules,
-                names_of(node),
-            )
+        self._rules, self._names, self._frame_id, folder = await self.thread.call(
+            lambda node: (node.rules, names_of(node), node.parameters.frame_id, _folder(node))
         )
+        await self._log.start(folder)
+        self.past.start()
 
     async def stop(self) -> None:
-        """Stop the ROS thread and the workers."""
+        """Stop the ROS thread, the workers, and the process that looks back."""
+        await self._log.stop()
         self.workers.close()
-        await self.thread.stop()
+        await asyncio.gather(self.past.stop(), self.thread.stop())
 
     @property
     def identity(self) -> str:
@@ -183,9 +190,9 @@ class WebTwin:
         return self._names
 
     def journal(self) -> Condition:
-        """The twin's, elsewhere: what it says of it on `/diagnostics`."""
+        """The twin's, as far as it is read here; before that, what is said on `/diagnostics`."""
         told = self._heard.told
-        return UNKNOWN if told is None else told.journal
+        return self._log.condition or (UNKNOWN if told is None else told.journal)
 
     def cache_counts(self) -> CacheCounts:
         """Nothing: the cache is the twin's."""
@@ -198,34 +205,6 @@ class WebTwin:
     async def history(self, tag_id: str) -> TagHistory | None:
         """The last scans and tries of a tag, as far as they were seen from here."""
         return await self.thread.call(lambda node: node.history_of(tag_id))
-
-    async def ask(self, question: Question[ResultT], cost_s: float) -> ResultT:
-        """Answered here, of the answers of the twin's services; the same are asked once."""
-        async with self._large_questions if cost_s > SMALL_S else nullcontext():
-            return await look_up(question, self._past, self.workers)
-
-    async def series(self, request: SeriesRequest) -> SeriesPast:
-        """The answer of the twin's `get_history`; identical questions in flight are asked once."""
-        return await self._past.series(request)
-
-    async def writes(self, request: WritesRequest) -> PastWrites:
-        """The answer of the twin's `get_writes`."""
-        return await self._past.writes(request)
-
-    async def rows(
-        self,
-        start_ns: int,
-        end_ns: int,
-        tag_id: str | None,
-        sensor_type: str | None,
-        write: Callable[[Sequence[PastRow]], ResultT],
-    ) -> AsyncIterator[ResultT]:
-        """Put together of many answers, see `web_rows`."""
-        async for lot in rows(self._past, start_ns, end_ns, tag_id, sensor_type):
-            cost_s = len(lot) * WRITE_ROW_S
-            yield await asyncio.wrap_future(
-                self.workers.submit(lambda _, lot=lot: write(lot), cost_s)  # type: ignore[misc]
-            )
 
     def field_revision(self, request: FieldRequest) -> str | None:
         """That of the last answer, as long as nothing was heard that could have changed it.
@@ -270,15 +249,37 @@ class WebTwin:
         told = self._heard.told
         return 0 if told is None else len(told.snapshot.tags)
 
-    def _now_ns(self) -> int:
-        told = self._heard.told
-        if told is None:
-            raise TwinUnavailableError(f"nothing was heard yet on {self._names.state_topic}")
-        snapshot = told.snapshot
-        if snapshot.clock != "running":
-            return snapshot.stamp_ns
-        since_s = time.monotonic() - told.made_s
-        return snapshot.stamp_ns + int(since_s * NANOSECONDS_PER_SECOND)
+    def now(self) -> Now:
+        """What who looks back has to know of now, and where the log is."""
+        condition, told = self._log.condition, self._heard.told
+        if condition is None:
+            raise TwinUnavailableError("the twin's journal is not known here yet")
+        if told is None:  # it has been followed before, and its twin is not there
+            now_ns = condition.complete_ns or 0
+            if now_ns > _A_DATE_NS:
+                now_ns = max(now_ns, time.time_ns())
+            return Now(now_ns, self._frame_id, condition, 0)
+        snapshot, now_ns = told.snapshot, told.snapshot.stamp_ns
+        if snapshot.clock == "running":
+            now_ns += int((time.monotonic() - told.made_s) * NANOSECONDS_PER_SECOND)
+        return Now(now_ns, snapshot.frame_id, condition, self._number)
+
+    async def _found(self) -> None:
+        if self._heard.told is not None:
+            await self._log.found()
+
+    async def _in_time(self, answer: Awaitable[ResultT]) -> ResultT:
+        try:
+            async with asyncio.timeout(self.timeout_s):
+                return await answer
+        except TimeoutError:
+            raise TwinTimeoutError(
+                f"the answer was not there within {self.timeout_s:g} s (field_timeout_s)"
+            ) from None
+
+    async def _rows_behind(self, after: int) -> Lot:
+        response = await self._ask(Service.WRITES, convert_past.rows_request_message(after), 0.0)
+        return convert_past.lot_of(response, after)
 
     async def _find(self, service: Service) -> None:
         # From here on too: a twin that comes and goes would be a new one for ever.
@@ -385,6 +386,16 @@ class _Heard:
     revision: str = ""
     occupancy_map: OccupancyMap | None = None
     rules: FieldRules | None = None
+
+
+def _folder(node: WebNode) -> Path | None:
+    """Where a log is followed to."""
+    domain = int(node.context.get_domain_id())
+    try:
+        journal = journal_path("", os.environ, domain, node.get_namespace())
+    except RuntimeError:
+        return None
+    return None if journal is None else journal.with_suffix(".followed")
 
 
 def _check_ok(response: Any) -> None:

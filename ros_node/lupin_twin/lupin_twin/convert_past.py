@@ -6,29 +6,25 @@ a worker, and nothing of it is kept.
 
 from __future__ import annotations
 
-import operator
+import re
 from array import array
-from itertools import pairwise
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from lupin_msgs.msg import TwinState, TwinTimes
 from lupin_msgs.srv import GetHistory, GetStateAt, GetWrites
 from std_msgs.msg import Header
 
 from lupin_twin import convert
-from lupin_twin.bounds import MAX_ITEMS, MAX_SENSORS_PER_TAG, MAX_TAGS
-from lupin_twin.past import (
-    DEFAULT_POINTS,
-    MAX_POINTS,
-    Event,
-    SeriesPast,
-    SeriesRequest,
-    error_of,
-    message_of,
-)
-from lupin_twin.past_writes import DEFAULT_WRITES, PastWrite, PastWrites, RunSpan, WritesRequest
+from lupin_twin.journal.follow import Lot, NotALotError
+from lupin_twin.past import DEFAULT_POINTS, SeriesPast, SeriesRequest, error_of, message_of
+from lupin_twin.past_writes import DEFAULT_WRITES, MAX_WRITES, PastWrites, WritesRequest
 from lupin_twin.state import Snapshot, TwinStore
 from lupin_twin.workers import in_turns
+
+# Of tables that are small the rows come each time.
+_MAX_ROWS: Final = 50_000
+# It becomes the name of a file.
+_ID: Final = re.compile("[0-9a-f]{32}")
 
 
 def writes_request(request: Any) -> WritesRequest:
@@ -46,14 +42,36 @@ def writes_request(request: Any) -> WritesRequest:
     )
 
 
-def writes_request_message(request: WritesRequest) -> Any:
-    """The other direction of `writes_request`."""
-    return GetWrites.Request(
-        after=request.after,
-        reach_s=request.reach_s,
-        reach_count=request.reach_count,
-        max_count=request.max_count,
+def rows_request_message(after: int) -> Any:
+    """A question for the log's rows behind a number."""
+    return GetWrites.Request(after=after, max_count=MAX_WRITES, as_rows=True)
+
+
+def rows_response(lot: Lot) -> Any:
+    """Rows as GetWrites.Response."""
+    return GetWrites.Response(
+        ok=True, journal=lot.journal, last=lot.last, is_all=lot.is_all, rows=list(lot.rows)
     )
+
+
+def lot_of(response: Any, after: int) -> Lot:
+    """The rows in a GetWrites.Response: the other direction of `rows_response`.
+
+    Raises:
+        PastRefused, NotRemembered: it is not `ok`.
+        NotALotError: it says nothing new, and that there is more, or it is too much.
+
+    """
+    if not response.ok:
+        raise error_of(response.error_message)
+    lot = Lot(response.journal, tuple(response.rows), int(response.last), bool(response.is_all))
+    if lot.last < after or (lot.last == after and not lot.is_all):
+        raise NotALotError(f"it ends with {lot.last}, asked was for what is behind {after}")
+    if len(lot.rows) > _MAX_ROWS:
+        raise NotALotError(f"it has {len(lot.rows)} rows, the limit is {_MAX_ROWS}")
+    if not _ID.fullmatch(lot.journal):
+        raise NotALotError(f"{lot.journal[:64]!r} names no journal")
+    return lot
 
 
 def writes_response(past: PastWrites) -> Any:
@@ -90,72 +108,6 @@ def writes_response(past: PastWrites) -> Any:
     return response
 
 
-def writes_of(response: Any, asked: WritesRequest) -> PastWrites:
-    """The writes in a GetWrites.Response: the other direction of `writes_response`.
-
-    Raises:
-        PastRefused, NotRemembered: it is not `ok`.
-        NotAnAnswerError: arrays that do not fit, or more than was asked for.
-
-    """
-    if not response.ok:
-        raise error_of(response.error_message)
-    try:
-        found, last = tuple(_writes(response)), int(response.last)
-        spans = zip(response.span_runs, response.span_starts_ns, response.span_ends_ns, strict=True)
-        axis = tuple(RunSpan(int(run), int(start), int(end)) for run, start, end in spans)
-    except (IndexError, ValueError) as error:
-        raise NotAnAnswerError(f"arrays that do not fit: {error}") from error
-    if len(found) > asked.max_count:
-        raise NotAnAnswerError(f"{len(found)} writes, asked for were {asked.max_count}")
-    numbers = [asked.after, *(write.number for write in found), last + 1]
-    if not all(one < other for one, other in pairwise(numbers)):
-        raise NotAnAnswerError("its numbers do not ascend")
-    if not (response.is_all or found):
-        raise NotAnAnswerError("nothing, and that is not all")
-    return PastWrites(response.journal, axis, found, last, bool(response.is_all))
-
-
-def _writes(response: Any) -> Any:
-    texts = [str(text) for text in response.texts]
-    columns = zip(
-        response.numbers,
-        response.runs,
-        response.tags,
-        response.stamps_ns,
-        response.kinds,
-        response.statuses,
-        response.reading_counts,
-        response.has_seen,
-        response.species,
-        response.anomalies,
-        response.bug_counts,
-        strict=True,
-    )
-    names, values = response.sensors, response.values
-    if len(names) != len(values) or sum(response.reading_counts) != len(values):
-        raise ValueError(f"{len(values)} values of {len(names)} sensors")
-    at = 0
-    for number, run, tag, stamp_ns, kind, status, count, seen, species, pest, bugs in columns:
-        if count > MAX_SENSORS_PER_TAG:
-            raise ValueError(f"{count} readings in a scan, the limit is {MAX_SENSORS_PER_TAG}")
-        yield PastWrite(
-            int(number),
-            int(run),
-            texts[tag],
-            int(stamp_ns),
-            int(kind),
-            int(status),
-            tuple(texts[name] for name in names[at : at + count]),
-            tuple(map(float, values[at : at + count])),
-            bool(seen),
-            texts[species],
-            bool(pest),
-            int(bugs),
-        )
-        at += count
-
-
 UINT32_MAX: Final = 4_294_967_295
 # What building an answer takes, and reading one, roughly and at worst, for each tag, and for each
 # reading, flower and point of it.
@@ -168,11 +120,6 @@ class NotAnAnswerError(ValueError):
 
 
 # --- the state as of a moment ---------------------------------------------------------------
-
-
-def moment_message(at_ns: int) -> Any:
-    """A moment as GetStateAt.Request."""
-    return GetStateAt.Request(at=convert.time_msg(at_ns))
 
 
 def state_response(snapshot: Snapshot) -> Any:
@@ -191,35 +138,6 @@ def state_response(snapshot: Snapshot) -> Any:
         ok=True,
         state=TwinState(header=header, tags=tags),
         times=TwinTimes(header=header, tags=times),
-    )
-
-
-def snapshot_of(response: Any, at_ns: int) -> Snapshot:
-    """The snapshot in a GetStateAt.Response: the other direction of `state_response`.
-
-    For a worker's thread too.
-
-    Raises:
-        PastRefused, NotRemembered: it is not `ok`.
-        NotAnAnswerError: another moment, times of another, or more than a twin holds.
-
-    """
-    _check_ok(response)
-    state, times = response.state, response.times
-    for header in (state.header, times.header):
-        stamp_ns = convert.nanoseconds(header.stamp)
-        if stamp_ns != at_ns:
-            raise NotAnAnswerError(f"a state as of {stamp_ns} ns, asked for was {at_ns} ns")
-    _check_length("tags", len(state.tags), MAX_TAGS)
-    if [tag.tag_id for tag in state.tags] != [tag.tag_id for tag in times.tags]:
-        raise NotAnAnswerError("its times are not those of its tags")
-    items = sum(
-        len(tag.readings) + len(tag.flowers) + len(tag.box_footprint.points) for tag in state.tags
-    )
-    _check_length("readings, flowers and footprint points", items, MAX_ITEMS)
-    pairs = zip(state.tags, times.tags, strict=True)
-    return Snapshot(
-        at_ns, state.header.frame_id, tuple(convert.tag_state(*pair) for pair in in_turns(pairs))
     )
 
 
@@ -248,17 +166,6 @@ def series_request(request: Any) -> SeriesRequest:
     )
 
 
-def series_request_message(request: SeriesRequest) -> Any:
-    """A question for a series as GetHistory.Request: the other direction of `series_request`."""
-    return GetHistory.Request(
-        tag_id=request.tag_id,
-        sensor_type=request.sensor_type,
-        start=convert.time_msg(request.start_ns),
-        end=convert.time_msg(request.end_ns),
-        max_points=request.max_points,
-    )
-
-
 def series_response(past: SeriesPast) -> Any:
     """A series as GetHistory.Response."""
     return GetHistory.Response(
@@ -272,79 +179,9 @@ def series_response(past: SeriesPast) -> Any:
     )
 
 
-class Entries(NamedTuple):
-    """What a GetHistory.Response holds: the period that buckets divide is not in it."""
-
-    is_bucketed: bool
-    stamps_ns: tuple[int, ...]
-    counts: tuple[int, ...]
-    means: tuple[float, ...]
-    minima: tuple[float, ...]
-    maxima: tuple[float, ...]
-
-
-def entries_of(response: Any, asked: SeriesRequest) -> Entries:
-    """The readings or buckets in a GetHistory.Response to `asked`.
-
-    Raises:
-        PastRefused, NotRemembered: it is not `ok`.
-        NotAnAnswerError: arrays of several lengths, more entries than asked for, stamps that do not
-            ascend or are of another time, counts or ranges that cannot be.
-
-    """
-    _check_ok(response)
-    entries = Entries(
-        bool(response.is_bucketed),
-        tuple(map(convert.nanoseconds, response.stamps)),
-        tuple(response.counts),
-        tuple(response.means),
-        tuple(response.minima),
-        tuple(response.maxima),
-    )
-    lengths = set(map(len, entries[1:]))
-    if len(lengths) > 1:
-        raise NotAnAnswerError(f"arrays of {sorted(lengths)} entries")
-    # The runs of the clock are told all.
-    is_run = asked.event is Event.RUNS
-    _check_length("entries", len(entries.stamps_ns), MAX_POINTS if is_run else asked.max_points)
-    ascends = operator.lt if entries.is_bucketed else operator.le
-    if not all(ascends(one, other) for one, other in pairwise(entries.stamps_ns)):
-        raise NotAnAnswerError("its stamps do not ascend")
-    if entries.is_bucketed:
-        _check_buckets(entries)
-    else:
-        _check_readings(entries, asked)
-    return entries
-
-
-def _check_buckets(entries: Entries) -> None:
-    if not all(entries.counts) or not all(map(operator.le, entries.minima, entries.maxima)):
-        raise NotAnAnswerError("a bucket of nothing, or of no range")
-
-
-def _check_readings(entries: Entries, asked: SeriesRequest) -> None:
-    if any(count != 1 for count in entries.counts):
-        raise NotAnAnswerError("a reading that counts more than one")
-    if not entries.stamps_ns:
-        return
-    is_early = entries.stamps_ns[0] < asked.start_ns
-    if is_early or (asked.end_ns and entries.stamps_ns[-1] >= asked.end_ns):
-        raise NotAnAnswerError("a reading that is not of the period")
-
-
 # --- no answer ------------------------------------------------------------------------------
 
 
 def refused(response: Any, error: Exception) -> Any:
     """A fresh response, empty but for why: of the type that `response` has."""
     return type(response)(error_message=message_of(error))
-
-
-def _check_ok(response: Any) -> None:
-    if not response.ok:
-        raise error_of(response.error_message)
-
-
-def _check_length(what: str, length: int, limit: int) -> None:
-    if length > limit:
-        raise NotAnAnswerError(f"{length} {what}, the limit is {limit}")

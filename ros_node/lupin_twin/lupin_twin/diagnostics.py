@@ -191,6 +191,7 @@ def findings(health: Health) -> Iterator[Finding]:
             "simulated": _stretches((journal.simulated_ns,) if journal.simulated_ns else ()),
             "complete to": "" if journal.complete_ns is None else str(journal.complete_ns),
             "kept": _stretches(journal.kept_ns),
+            "id": journal.journal_id,
         },
     )
     several = health.twins > 1
@@ -314,6 +315,7 @@ def _journal(said: Finding) -> Condition:
         simulated_ns=simulated[0] if len(simulated) == 1 else None,
         complete_ns=int(complete) if _are_stamps(complete) else None,
         kept_ns=_read_stretches(values.get("kept", "")),
+        journal_id=_shown(values.get("id", "")),
     )
 
 

@@ -11,7 +11,9 @@ from lupin_msgs.srv import GetHistory, GetStateAt, GetWrites
 from lupin_twin import convert, convert_past
 from lupin_twin.habits import SERVICE_QOS, Habits
 from lupin_twin.interfaces import GET_HISTORY, GET_STATE_AT, GET_WRITES
+from lupin_twin.journal import follow
 from lupin_twin.journal.fold import STATE_S_PER_TAG, state_at
+from lupin_twin.journal.follow import Lot
 from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG, series
 from lupin_twin.journal.writes import WRITES_S, writes
 from lupin_twin.past import (
@@ -48,6 +50,9 @@ class Remembers(Protocol):
 
     def writes(self, request: WritesRequest) -> Future[PastWrites]:
         """What was heard, in the order of hearing."""
+
+    def rows(self, after: int, most: int) -> Future[Lot]:
+        """The rows behind a number, at most about so many."""
 
 
 class PastService:
@@ -104,6 +109,12 @@ class PastService:
             asked = convert_past.writes_request(request)
             return lambda: self._memory.writes(asked)
 
+        def look_up_rows() -> Callable[[], Future[Lot]]:
+            asked = convert_past.writes_request(request)
+            return lambda: self._memory.rows(asked.after, asked.max_count)
+
+        if request.as_rows:
+            return self._ask(response, look_up_rows, convert_past.rows_response, MESSAGE_S)
         return self._ask(response, look_up, convert_past.writes_response, MESSAGE_S)
 
     def _ask(
@@ -160,5 +171,11 @@ class JournalPast:
         )
 
     def writes(self, request: WritesRequest) -> Future[PastWrites]:
-        """The journal's rows."""
+        """What the journal's rows say."""
         return self._recall.ask(lambda connection, _: writes(connection, request), WRITES_S)
+
+    def rows(self, after: int, most: int) -> Future[Lot]:
+        """The journal's rows."""
+        return self._recall.ask(
+            lambda connection, _: follow.read(connection, after, most), WRITES_S
+        )

@@ -11,7 +11,7 @@ import pytest
 
 from lupin_bridge.past import schema
 from lupin_bridge.serving.limits import Limits
-from lupin_bridge.twin.looking import Question, look_up
+from lupin_bridge.twin.looking import Question
 from lupin_bridge.twin.source import TwinTimeoutError, TwinUnavailableError
 from lupin_twin.past import (
     Event,
@@ -22,7 +22,7 @@ from lupin_twin.past import (
     grid,
 )
 from tests.support.inprocess import Running, run, running
-from tests.support.past import NS, MadeUp
+from tests.support.past import NS, MadeUp, look_up
 from tests.support.waiting import until
 
 HISTORY = "/api/history?tag_id=7&sensor_type=co2"

@@ -36,7 +36,7 @@ class Condition:
 
     All that was received up to `complete_ns`, ROS time, is written; None: it is not known. Within
     `kept_ns`, stretches of ROS time in their order, all of that is still there: what lies before
-    was deleted, or nobody recorded.
+    was deleted, or nobody recorded. `journal_id` tells one file from another.
     """
 
     state: JournalState
@@ -53,6 +53,7 @@ class Condition:
     simulated_ns: tuple[int, int] | None = None
     complete_ns: int | None = None
     kept_ns: tuple[tuple[int, int], ...] = ()
+    journal_id: str = ""
 
     @property
     def is_well(self) -> bool:

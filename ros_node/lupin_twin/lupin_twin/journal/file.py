@@ -130,6 +130,7 @@ class JournalFile:
             self._salvage()
             self._appender = Appender(self._connection)
             self.simulated = simulated(self._connection)
+            self.journal_id = get_meta(self._connection, "journal_id") or ""
             self._purged_s = self._looked_s = 0.0
             self._hours_purged_s = time.monotonic()
             self._purges_before_ns: int | None = None

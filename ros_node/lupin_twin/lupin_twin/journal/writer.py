@@ -94,6 +94,7 @@ class Journal:
         self._doubted_ns: int | None = None
         self._simulated: Stretch | None = None
         self._kept: Stretches = ()
+        self._journal_id = ""
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
         self._thread.start()
 
@@ -160,6 +161,7 @@ class Journal:
             simulated_ns=told.simulated_ns,
             complete_ns=self._pending.complete_ns,
             kept_ns=told.kept_ns,
+            journal_id=told.journal_id,
         )
 
     def heal(self, damage: str) -> None:
@@ -211,6 +213,7 @@ class Journal:
             self._is_sound = True
             self._set_aside = file.set_aside or self._set_aside
             self._simulated = file.simulated
+            self._journal_id = file.journal_id
             if self._runs:
                 file.keep_run(self._runs[-1])
             is_last = False
@@ -333,6 +336,7 @@ class Journal:
             set_aside=self._set_aside,
             simulated_ns=self._simulated,
             kept_ns=self._kept,
+            journal_id=self._journal_id,
         )
 
     def _tell_failure(self, error: Exception) -> None:

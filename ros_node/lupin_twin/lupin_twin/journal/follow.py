@@ -1,0 +1,218 @@
+# ruff: noqa: S608  # SQL is put together of constants
+"""A log copied from where it left off: its rows as texts, and into a file of who copies it.
+
+At least once on the way, exactly once in the file: a lot is one transaction, and rows that are
+there are known by their numbers. A file holds one journal and has its identity; of another journal
+another file is made. What is counted by the hour is counted anew of the rows that come; what the
+journal deletes meanwhile is deleted here too.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Iterable, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from lupin_twin.journal.appending import PURGED_SEQ
+from lupin_twin.journal.hours import WrittenLook, WrittenScan, count
+from lupin_twin.journal.reading import numbers_of
+from lupin_twin.journal.retention import Stretches, kept
+from lupin_twin.journal.schema import (
+    LOCAL_SITE,
+    DamagedFile,
+    get_meta,
+    open_reader,
+    open_writer,
+    set_meta,
+    transaction,
+)
+from lupin_twin.journal.site_log import SiteLog
+
+MAX_ROWS: Final = 2_000
+_MAX_BYTES: Final = 1_000_000
+# In the order in which rows of one number belong.
+_NUMBERED: Final = ("series", "scan", "look", "place")
+_FACTS: Final = ("purged_ns:", "lost_ns:", PURGED_SEQ, "simulated_")
+_FOLLOWED: Final = "followed_seq"
+_COMPLETE: Final = "followed_to_ns"
+_COLUMNS: Final = {"run": 7, "meta": 2, "series": 5, "scan": 11, "look": 16, "place": 13}
+
+
+class Lot(NamedTuple):
+    """Rows behind a number, each a JSON list: its table, its columns but the site.
+
+    `last` is the number to go on behind; `is_all`: nothing more was written yet.
+    """
+
+    journal: str
+    rows: tuple[str, ...]
+    last: int
+    is_all: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """How far a file is: the journal it is of, the last number, and as in `Condition`."""
+
+    journal: str
+    last: int
+    complete_ns: int
+    kept_ns: Stretches
+
+
+class NotALotError(ValueError):
+    """Rows that are none of a log; the file is as it was."""
+
+
+def read(connection: sqlite3.Connection, after: int, most: int = MAX_ROWS) -> Lot:
+    """The rows behind a number, in the order of numbers, and all that is small."""
+    log = SiteLog(connection)
+    with log.one_view():
+        texts = [_text("run", row) for row in _all(log, "run")]
+        texts += [_text("meta", row) for row in _all(log, "meta") if row[1].startswith(_FACTS)]
+        found = [
+            (row[1], rank, row)
+            for rank, table in enumerate(_NUMBERED)
+            for row in _behind(log, table, after, most)
+        ]
+        found.sort(key=lambda entry: entry[:2])
+        last, weight = after, 0
+        for place, (number, rank, row) in enumerate(found):
+            if (place >= most or weight > _MAX_BYTES) and number != last:
+                return Lot(_journal_id(connection), tuple(texts), last, is_all=False)
+            texts.append(_text(_NUMBERED[rank], row))
+            last, weight = number, weight + len(texts[-1])
+        return Lot(_journal_id(connection), tuple(texts), last, is_all=True)
+
+
+def write(path: Path, lot: Lot, complete_ns: int | None) -> Followed:
+    """Put a lot into the file of its journal, made where there is none.
+
+    `complete_ns` is up to when the journal had all, ROS time, before it was asked for the lot; None
+    where more follows.
+
+    Raises:
+        NotALotError: it cannot be what it says.
+        Foreign, sqlite3.Error, OSError: as `open_writer`.
+
+    """
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    with closing(open_writer(path)) as connection:
+        with transaction(connection):
+            set_meta(connection, "journal_id", lot.journal)
+            try:
+                _put(connection, lot)
+            except (ValueError, TypeError, KeyError, IndexError, DamagedFile) as error:
+                raise NotALotError(f"rows that are none of a log: {error}") from error
+            set_meta(connection, _FOLLOWED, max(lot.last, _last(connection)))
+            if not lot.is_all or complete_ns is None:
+                complete_ns = _newest_ns(connection)
+            if complete_ns is not None:
+                set_meta(connection, _COMPLETE, complete_ns)
+        connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
+        return _followed(connection)
+
+
+def followed(path: Path) -> Followed:
+    """How far a file is.
+
+    Raises:
+        Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_reader`.
+
+    """
+    with closing(open_reader(path)) as connection:
+        return _followed(connection)
+
+
+def _followed(connection: sqlite3.Connection) -> Followed:
+    complete_ns = int(get_meta(connection, _COMPLETE) or 0)
+    return Followed(_journal_id(connection), _last(connection), complete_ns, kept(connection))
+
+
+def _last(connection: sqlite3.Connection) -> int:
+    return int(get_meta(connection, _FOLLOWED) or 0)
+
+
+def _newest_ns(connection: sqlite3.Connection) -> int | None:
+    """The stamp of what was received last."""
+    found = [
+        row
+        for table in ("scan", "look")
+        for row in connection.execute(
+            f"SELECT seq, stamp_ns FROM {table} WHERE site = ? ORDER BY seq DESC LIMIT 1",
+            (LOCAL_SITE,),
+        )
+    ]
+    return max(found)[1] if found else None
+
+
+# --- out of a log ---------------------------------------------------------------------------------
+
+
+def _all(log: SiteLog, table: str) -> list[tuple[Any, ...]]:
+    return list(log.execute(f"SELECT * FROM {table} WHERE site = :site").fetchall())
+
+
+def _behind(log: SiteLog, table: str, after: int, most: int) -> list[tuple[Any, ...]]:
+    number = "series" if table == "series" else "seq"
+    return list(
+        log.execute(
+            f"SELECT * FROM {table} WHERE site = :site AND {number} > :after"
+            f" ORDER BY {number} LIMIT :most",
+            {"after": after, "most": most + 1},
+        ).fetchall()
+    )
+
+
+def _text(table: str, row: Iterable[Any]) -> str:
+    _, *columns = row
+    return json.dumps([table, *columns], separators=(",", ":"), ensure_ascii=False)
+
+
+def _journal_id(connection: sqlite3.Connection) -> str:
+    return get_meta(connection, "journal_id") or ""
+
+
+# --- into a file ----------------------------------------------------------------------------------
+
+
+def _put(connection: sqlite3.Connection, lot: Lot) -> None:
+    after, log = _last(connection), SiteLog(connection)
+    scans: list[WrittenScan] = []
+    looks: list[WrittenLook] = []
+    for table, *row in _rows(lot.rows):
+        if table in {"scan", "look"} and row[0] <= after:
+            continue
+        way = "REPLACE" if table in {"run", "meta"} else "IGNORE"
+        marks = ", ?" * len(row)
+        connection.execute(f"INSERT OR {way} INTO {table} VALUES ('{LOCAL_SITE}'{marks})", row)
+        if table == "scan" and not row[9]:
+            scans.append(_scan(connection, row))
+        elif table == "look" and not row[13]:
+            looks.append(WrittenLook(row[1], row[2], row[0], row[3], bool(row[10]), row[12]))
+    count(log, scans, looks)
+    purged = int(get_meta(connection, PURGED_SEQ) or 0)
+    for table in ("scan", "look"):
+        connection.execute(f"DELETE FROM {table} WHERE site = ? AND seq <= ?", (LOCAL_SITE, purged))
+
+
+def _rows(texts: Iterable[str]) -> Iterator[list[Any]]:
+    for text in texts:
+        row = json.loads(text)
+        if len(row) - 1 != _COLUMNS[row[0]] or not all(
+            column is None or isinstance(column, str | int | float) for column in row
+        ):
+            raise ValueError(text[:64])
+        yield row
+
+
+def _scan(connection: sqlite3.Connection, row: list[Any]) -> WrittenScan:
+    (found,) = connection.execute(
+        "SELECT run, kind FROM series WHERE site = ? AND series = ?", (LOCAL_SITE, row[1])
+    ).fetchall()
+    (values,) = numbers_of([row[10]])
+    return WrittenScan(found[0], row[1], found[1], row[2], row[5], values)

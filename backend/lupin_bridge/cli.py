@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from lupin_bridge import __version__, journal_command, logs
+from lupin_bridge.archive import commands
 from lupin_bridge.configuration import (
     CONFIG_VARIABLE,
     settings_from,
@@ -36,6 +37,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         if ros_args:
             _fail("journal takes no arguments of ROS: name its file with --journal or --namespace")
         return journal_command.run(options, os.environ)
+    if options.role in {"archive", "forward"}:
+        if ros_args:
+            _fail(f"{options.role} takes no arguments of ROS")
+        return commands.run(options, os.environ)
     play_args = _play_args(options)
     try:
         settings = _settings_from(options)
@@ -204,6 +209,7 @@ def parser() -> argparse.ArgumentParser:
                 help="jump over its silences of more than so many seconds (default: wait)",
             )
     journal_command.add_parser(roles)
+    commands.add_parsers(roles)
     return made
 
 

@@ -78,21 +78,7 @@ def add_parser(roles: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     for action, what in ACTIONS.items():
         own = actions.add_parser(action, help=what, description=what, allow_abbrev=False)
-        which = own.add_mutually_exclusive_group()
-        which.add_argument("--journal", metavar="PATH", help="the file")
-        which.add_argument(
-            "--demo", metavar="SEED", type=int, help="that of the demo with this seed (make run: 0)"
-        )
-        which.add_argument(
-            "--namespace", default="", help="that of the twin in this namespace (default: none)"
-        )
-        own.add_argument(
-            "--domain",
-            type=int,
-            metavar="ID",
-            help=f"that of the twin in this ROS domain, 0 to {_MAX_DOMAIN}"
-            " (default: ROS_DOMAIN_ID, or 0)",
-        )
+        add_which(own)
         if action == "backup":
             own.add_argument("target", metavar="FILE", type=Path, help="must not be there yet")
         if action == "forget":
@@ -118,10 +104,29 @@ def add_parser(roles: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
             )
 
 
+def add_which(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say which journal, for `path_of`."""
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--journal", metavar="PATH", help="the file")
+    which.add_argument(
+        "--demo", metavar="SEED", type=int, help="that of the demo with this seed (make run: 0)"
+    )
+    which.add_argument(
+        "--namespace", default="", help="that of the twin in this namespace (default: none)"
+    )
+    parser.add_argument(
+        "--domain",
+        type=int,
+        metavar="ID",
+        help=f"that of the twin in this ROS domain, 0 to {_MAX_DOMAIN}"
+        " (default: ROS_DOMAIN_ID, or 0)",
+    )
+
+
 def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
     """Do what the options ask for, to the standard output; returns the process's exit code."""
     try:
-        path = _path(options, environ)
+        path = path_of(options, environ)
         if options.action == "export":
             code = _export(path, options)
         elif options.action == "backup":
@@ -148,7 +153,13 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
 # --- which file ----------------------------------------------------------------------------------
 
 
-def _path(options: argparse.Namespace, environ: Mapping[str, str]) -> Path:
+def path_of(options: argparse.Namespace, environ: Mapping[str, str]) -> Path:
+    """The journal that the options name.
+
+    Raises:
+        JournalError: there is none.
+
+    """
     named = f"--demo {options.demo}" if options.demo is not None else options.journal
     if named and options.domain is not None:
         raise JournalError(f"--domain {options.domain} is for a twin's own file, not with {named}")

@@ -22,6 +22,7 @@ from lupin_bridge.access.middleware import Access
 from lupin_bridge.access.policy import exposure
 from lupin_bridge.access.tls import Certificates, check_pair
 from lupin_bridge.app import create_app, has_page
+from lupin_bridge.archive import child
 from lupin_bridge.bags.recording import RecordingError
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.judge.choosing import Criteria
@@ -69,6 +70,7 @@ def run(
     entrance = Entrance.of(settings)
     criteria = Criteria.of(settings)
     targets = Targets.of(settings, secrets)
+    child.check(settings, role)
     if settings.tls_cert:
         check_pair(settings.tls_cert, settings.tls_key)
     with ExitStack() as ending:
@@ -152,6 +154,7 @@ async def _run(
     gc.collect()
     gc.freeze()
     feeder = None if feed is None else Feeder(feed, lambda: server.should_exit)
+    forwarding = child.Forwarding(settings, lambda: source.journal().path)
     url = address_of(listener, "https" if access.secure else "http")
     print(f"lupin-twin: {url}", flush=True)  # noqa: T201  # for people and scripts
     supervisor.ready(f"serving {url}")
@@ -165,7 +168,8 @@ async def _run(
             renewal.cancel()
         if feeder is not None:
             feeder.terminate()
-        await asyncio.gather(bridge.stop(), *([] if feeder is None else [feeder.wait()]))
+        fed = [] if feeder is None else [feeder.wait()]
+        await asyncio.gather(bridge.stop(), forwarding.stop(), *fed)
 
 
 def _follow_certificates(settings: Settings, server: BridgeServer) -> asyncio.Task[None] | None:

@@ -27,6 +27,7 @@ PROXY: Final = "behind a proxy"
 JUDGEMENT: Final = "judgement"
 MQTT: Final = "MQTT"
 WEBHOOK: Final = "webhook"
+ARCHIVE: Final = "archive"
 LOG: Final = "log"
 
 
@@ -112,6 +113,15 @@ class Settings:
         "", WEBHOOK, "file with the secret that signs them, a line of text"
     )
     webhook_ca: str = _setting("", WEBHOOK, "PEM file with who signs the receiver's certificate")
+    site: str = _setting(
+        "", ARCHIVE, "the greenhouse's name in the archive, and its user's, such as gh1"
+    )
+    archive_url: str = _setting(
+        "",
+        ARCHIVE,
+        "PostgreSQL that the journal is forwarded to, such as postgresql://gh1@db.example/lupin; "
+        "its password: PGPASSWORD or PGPASSFILE",
+    )
     log_format: Literal["text", "json"] = _setting(
         "text", LOG, "lines for people, or JSON for a collector"
     )

@@ -25,6 +25,7 @@ BENCHES = (
     "bench_page",
     "bench_past_page",
     "bench_house",
+    "bench_forward",
 )
 
 

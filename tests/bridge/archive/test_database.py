@@ -1,0 +1,150 @@
+"""The archive's tables, and who may do what with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import psycopg
+import pytest
+
+from tests.support.archive import Archive, forward_once, run
+from tests.support.journal import kept, scan
+from tests.support.postgres import Postgres
+
+
+@pytest.fixture
+def two_sites(archive: Archive, tmp_path: Path) -> Archive:
+    """An archive with a scan of gh1 and one of gh2."""
+    for site in ("gh1", "gh2"):
+        archive.site = site
+        archive.add_user(site)
+        kept(tmp_path / site, [scan(site, a=1.0)])
+        forward_once(archive, tmp_path / site)
+    archive.add_user("page", "lupin_page")
+    return archive
+
+
+def refused(archive: Archive, user: str, sql: str) -> bool:
+    """Whether a user may not do what changes something."""
+    with psycopg.connect(archive.url(user)) as connection:
+        try:
+            return connection.execute(sql).rowcount == 0
+        except psycopg.errors.InsufficientPrivilege:
+            connection.rollback()
+            return True
+
+
+def test_a_forwarder_sees_its_own_site_alone(two_sites: Archive) -> None:
+    with psycopg.connect(two_sites.url("gh1")) as connection:
+        for table in ("scan", "series", "run", "hour", "tally", "epoch", "forwarder", "site"):
+            found = connection.execute(f"SELECT DISTINCT site FROM {table}").fetchall()
+            assert found == [("gh1",)], table
+
+
+SCAN = "INSERT INTO scan SELECT '{}', 99, series, 1, NULL, 1, 0, '', '', '', 0, '[1]' FROM series"
+
+
+@pytest.mark.parametrize(
+    "sql",
+    [
+        SCAN.format("gh2"),
+        "INSERT INTO meta VALUES ('gh2', 'a', 'b')",
+        "UPDATE epoch SET forwarded_seq = 0 WHERE site = 'gh2'",
+        "UPDATE hour SET n = '[]' WHERE site = 'gh2'",
+        "UPDATE scan SET readings = '[2]'",
+        "DELETE FROM scan",
+        "DELETE FROM hour",
+        "DELETE FROM event WHERE site = 'gh2'",
+        "UPDATE archive SET version = 2",
+        "TRUNCATE scan",
+    ],
+)
+def test_a_forwarder_may_only_append_to_its_site(two_sites: Archive, sql: str) -> None:
+    assert refused(two_sites, "gh1", sql)
+
+
+def test_a_forwarder_may_append(two_sites: Archive) -> None:
+    assert not refused(two_sites, "gh1", SCAN.format("gh1"))
+
+
+NOTE = "INSERT INTO note VALUES ('gh2', 'n1', 1, 'anna', 'comment', 'tag:7', 'dry', NULL)"
+
+
+def test_the_page_reads_every_site_and_writes_notes_alone(two_sites: Archive) -> None:
+    with psycopg.connect(two_sites.url("page")) as connection:
+        found = connection.execute("SELECT site FROM scan ORDER BY site").fetchall()
+    assert found == [("gh1",), ("gh2",)]
+    assert not refused(two_sites, "page", NOTE)
+    for sql in (SCAN.format("gh1"), "DELETE FROM note", "UPDATE hour SET n = '[]'"):
+        assert refused(two_sites, "page", sql), sql
+
+
+def test_info_has_a_line_a_site(two_sites: Archive) -> None:
+    told = run("archive", "info", "--archive-url", two_sites.owner).stdout.splitlines()
+    assert [line.partition(", 0 looks, 0 places; ")[0] for line in told] == [
+        "gh1: 1 scans",
+        "gh2: 1 scans",
+    ]
+
+
+def test_check_tells_rows_that_fit_no_other(two_sites: Archive) -> None:
+    assert "is whole" in run("archive", "check", "--archive-url", two_sites.owner).stdout
+    with psycopg.connect(two_sites.owner) as connection:
+        connection.execute("DELETE FROM series WHERE site = 'gh1'")
+    done = run("archive", "check", "--archive-url", two_sites.owner)
+    assert done.returncode == 1
+    assert "1 scans without a series" in done.stdout
+    assert "1 hours without a series" in done.stdout
+
+
+def test_an_archive_is_made_once(archive: Archive) -> None:
+    again = run("archive", "init", "--archive-url", archive.owner)
+    assert (again.returncode, len(again.stderr.splitlines())) == (1, 1)
+    assert "has an archive already" in again.stderr
+
+
+def test_migrating_gives_the_roles_back_what_they_may(two_sites: Archive) -> None:
+    with psycopg.connect(two_sites.owner) as connection:
+        connection.execute("REVOKE ALL ON scan FROM lupin_page")
+    assert run("archive", "migrate", "--archive-url", two_sites.owner).returncode == 0
+    with psycopg.connect(two_sites.url("page")) as connection:
+        assert len(connection.execute("SELECT site FROM scan").fetchall()) == 2
+
+
+def test_an_archive_of_another_version_is_left_alone(archive: Archive) -> None:
+    with psycopg.connect(archive.owner) as connection:
+        connection.execute("UPDATE archive SET version = 9")
+    for action in ("migrate", "info", "check"):
+        done = run("archive", action, "--archive-url", archive.owner)
+        assert done.returncode == 1
+        assert "is of version 9, expected 1: update lupin-twin here" in done.stderr
+
+
+def test_a_database_without_an_archive_is_named_so(postgresql: Postgres) -> None:
+    done = run(
+        "archive",
+        "info",
+        "--archive-url",
+        f"postgresql:///postgres?host={postgresql.folder}&user=postgres",
+    )
+    assert done.returncode == 1
+    assert "the database has no archive: lupin-twin archive init makes it" in done.stderr
+
+
+def test_a_wrong_password_is_said_and_not_repeated(archive: Archive) -> None:
+    hba = archive.server.folder / "data" / "pg_hba.conf"
+    before = hba.read_text()
+    with psycopg.connect(archive.owner, autocommit=True) as owner:
+        owner.execute("ALTER ROLE gh1 PASSWORD 'right'")
+        hba.write_text(f"local {archive.name} gh1 scram-sha-256\n{before}")
+        owner.execute("SELECT pg_reload_conf()")
+        try:
+            words = ("archive", "info", "--archive-url", archive.url("gh1"))
+            done = run(*words, PGPASSWORD="wrong")
+            assert done.returncode == 1
+            assert 'password authentication failed for user "gh1"' in done.stderr
+            assert "wrong" not in done.stderr
+            assert run(*words, PGPASSWORD="right").returncode == 0
+        finally:
+            hba.write_text(before)
+            owner.execute("SELECT pg_reload_conf()")

@@ -1,0 +1,300 @@
+"""What a journal has is in the archive afterwards, row for row, whatever becomes of the journal."""
+
+from __future__ import annotations
+
+import shutil
+import socket
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import psycopg
+import pytest
+
+from lupin_twin.journal.forgetting import forget
+from lupin_twin.journal.forwarded import mark_of
+from lupin_twin.journal.queries import series
+from lupin_twin.journal.retention import Limits
+from lupin_twin.journal.rows import Row
+from lupin_twin.journal.runs import Clock
+from lupin_twin.journal.schema import open_reader
+from lupin_twin.journal.vacuuming import vacuum
+from lupin_twin.past import SeriesRequest
+from tests.support.archive import (
+    TABLES,
+    Archive,
+    forward_once,
+    forwarder,
+    rows_of,
+    run,
+    wait_until_equal,
+)
+from tests.support.journal import NOW, SECOND, kept, look, opened, pin, recording, scan
+from tests.support.waiting import wait_for
+
+HOUR = 3600 * SECOND
+DAY = 24 * HOUR
+AFTER = Clock(NOW + 9 * DAY, NOW + 9 * DAY, is_simulated=False)
+
+
+@pytest.fixture
+def journal(tmp_path: Path) -> Path:
+    return tmp_path / "journal.sqlite"
+
+
+def scans(start: int, count: int) -> list[Row]:
+    """A scan a minute, round five tags."""
+    return [
+        scan(str(n % 5), NOW + n * 60 * SECOND, a=n / 7, b=-n / 3)
+        for n in range(start, start + count)
+    ]
+
+
+def test_archive_and_journal_have_the_same_rows(archive: Archive, journal: Path) -> None:
+    kept(
+        journal, [pin(), *scans(0, 300), look("7", NOW + HOUR, anomaly=True), look("7", NOW + DAY)]
+    )
+    forward_once(archive, journal)
+    assert archive.rows() == rows_of(journal)
+    assert len(archive.rows()["scan"]) == 300
+    assert archive.rows()["event"]
+
+
+def test_what_comes_later_goes_after_it_late_writes_too(archive: Archive, journal: Path) -> None:
+    kept(journal, [*scans(0, 50), scan("9", NOW + DAY), look("7", NOW + DAY)])
+    forward_once(archive, journal)
+    # A pause is cut in two, a pest is seen before a look that saw none; a sensor comes later.
+    kept(journal, [scan("9", NOW + DAY // 2), look("7", NOW + HOUR, anomaly=True)])
+    kept(journal, [scan("9", NOW + DAY, temperature=1.0, humidity=50.0), *scans(50, 20)])
+    assert archive.rows() != rows_of(journal)
+    forward_once(archive, journal)
+    assert archive.rows() == rows_of(journal)
+
+
+def test_runs_of_the_clock_and_their_ends(archive: Archive, journal: Path) -> None:
+    kept(journal, scans(0, 50))
+    forward_once(archive, journal)
+    back = Clock(10 * SECOND, NOW + DAY, is_simulated=True)
+    kept(journal, [scan("1", 11 * SECOND), scan("2", 12 * SECOND)], back)
+    again = Clock(SECOND, NOW + DAY + HOUR, is_simulated=True)
+    kept(journal, [scan("1", 2 * SECOND)], again)
+    forward_once(archive, journal)
+    assert archive.rows() == rows_of(journal)
+    assert len(archive.rows()["run"]) == 3
+
+
+def test_the_same_question_has_the_same_answer(archive: Archive, journal: Path) -> None:
+    kept(journal, scans(0, 3000))
+    forward_once(archive, journal)
+    asked = SeriesRequest("1", "a", NOW, NOW + 2 * DAY, 40)
+    with closing(open_reader(journal)) as here, psycopg.connect(archive.owner) as there:
+        there.autocommit = True
+        assert series(there, asked, NOW + 2 * DAY, "gh1") == series(here, asked, NOW + 2 * DAY)
+
+
+def test_more_rows_than_go_at_once(archive: Archive, journal: Path) -> None:
+    kept(journal, [pin("1"), *scans(0, 6_000), *(look("7", NOW + n * HOUR) for n in range(600))])
+    forward_once(archive, journal)
+    assert archive.rows() == rows_of(journal)
+
+
+def test_the_archive_keeps_what_the_journal_deletes(archive: Archive, journal: Path) -> None:
+    kept(journal, scans(0, 50))
+    forward_once(archive, journal)
+    before = archive.rows()
+    purge(journal)
+    assert len(rows_of(journal)["scan"]) == 1  # the last is never too old
+    kept(journal, scans(60, 10))
+    forward_once(archive, journal)
+    there = {*before["scan"], *rows_of(journal)["scan"]}
+    assert archive.rows()["scan"] == sorted(there, key=repr)
+    assert len(there) == 60
+    assert archive.rows()["hour"] == rows_of(journal)["hour"]
+    assert archive.select("SELECT key FROM meta WHERE key LIKE 'purged%'") == []
+
+
+def test_of_what_was_deleted_before_it_is_known_what_was_counted(
+    archive: Archive, journal: Path
+) -> None:
+    kept(journal, scans(0, 50))
+    purge(journal)
+    kept(journal, scans(60, 10))
+    forward_once(archive, journal)
+    assert archive.rows() == rows_of(journal)
+    assert archive.rows()["hour"]
+    assert archive.select("SELECT key FROM meta WHERE key LIKE 'purged%'") == [("purged_ns:1",)]
+
+
+def purge(journal: Path) -> None:
+    with opened(journal, Limits(days=0.0, max_bytes=10**9)) as file:
+        file.start(AFTER, 1, is_believed=True)
+        while file.look_after(may_purge=True):
+            pass
+
+
+def test_a_journal_keeps_what_is_not_forwarded_and_says_so(archive: Archive, journal: Path) -> None:
+    kept(journal, scans(0, 50))
+    forward_once(archive, journal)
+    kept(journal, scans(50, 25))
+    purge(journal)
+    assert len(rows_of(journal)["scan"]) == 25
+    with recording(journal, AFTER, limits=Limits(days=0.0, max_bytes=10**9)) as twin:
+        said = wait_for(
+            lambda: "until it is forwarded" in twin.condition.detail, "a word of what is kept"
+        )
+        assert said
+    forward_once(archive, journal)
+    purge(journal)
+    assert len(rows_of(journal)["scan"]) == 1
+    assert len(archive.rows()["scan"]) == 75
+
+
+def test_a_disk_that_is_full_is_not_kept_for_the_archive(archive: Archive, journal: Path) -> None:
+    kept(journal, scans(0, 50))
+    mark_of(journal).write_text("another 99\n")
+    with opened(journal, Limits(days=1.0, max_bytes=0)) as file:
+        file.start(Clock(NOW, NOW, is_simulated=False), 1, is_believed=True)
+        while file.look_after(may_purge=True):
+            pass
+    assert rows_of(journal)["scan"] == []
+
+
+def test_another_journal_overwrites_nothing(archive: Archive, journal: Path) -> None:
+    kept(journal, [pin(), *scans(0, 50)])
+    forward_once(archive, journal)
+    before = archive.rows()
+    journal.unlink()
+    kept(journal, [pin(), look(), *scans(200, 20)], Clock(NOW + DAY, NOW + DAY, is_simulated=False))
+    forward_once(archive, journal)
+    after = archive.rows()
+    for table in TABLES:
+        assert [row for row in before[table] if row not in after[table]] == [], table
+    assert len(after["scan"]) == 70
+    seqs = [row[0] for table in ("scan", "look", "place") for row in after[table]]
+    assert len(set(seqs)) == len(seqs) == 73
+    assert [row[0] for row in after["run"]] == [1, 2]
+    assert run("archive", "check", "--archive-url", archive.owner).returncode == 0
+    forward_once(archive, journal)
+    assert archive.rows() == after
+
+
+def test_a_backup_that_is_put_back_loses_and_overwrites_nothing(
+    archive: Archive, journal: Path, tmp_path: Path
+) -> None:
+    kept(journal, scans(0, 50))
+    backup = shutil.copy(journal, tmp_path / "backup")
+    kept(journal, scans(50, 10))
+    forward_once(archive, journal)
+    before = archive.rows()
+    shutil.copy(backup, journal)
+    kept(journal, scans(100, 30))
+    forward_once(archive, journal)
+    after = archive.rows()
+    assert [row for row in before["scan"] if row not in after["scan"]] == []
+    assert len(after["scan"]) == 60 + 80
+    assert archive.select("SELECT epoch FROM epoch ORDER BY epoch") == [(1,), (2,)]
+
+
+def test_a_forwarder_follows_a_journal_that_is_replaced_under_it(
+    archive: Archive, journal: Path, tmp_path: Path
+) -> None:
+    kept(journal, scans(0, 50))
+    other = tmp_path / "other"
+    kept(other, scans(70, 7))
+    with forwarder(archive, journal) as following:
+        following.wait_for_output("is forwarded to")
+        wait_until_equal(archive, journal)
+        other.replace(journal)
+        wait_for(lambda: len(archive.rows()["scan"]) == 57, "the rows of both")
+
+
+def test_a_journal_without_gaps_is_the_same_journal(archive: Archive, journal: Path) -> None:
+    kept(journal, scans(0, 50))
+    forward_once(archive, journal)
+    vacuum(journal, "test", lambda what, share: None)
+    kept(journal, scans(50, 5))
+    forward_once(archive, journal)
+    assert archive.rows() == rows_of(journal)
+
+
+def test_a_journal_of_which_a_tag_was_forgotten_goes_on(archive: Archive, journal: Path) -> None:
+    kept(journal, scans(0, 50))
+    forward_once(archive, journal)
+    forget(journal, "4", pose_only=False, by="test", at_ns=NOW)
+    kept(journal, scans(54, 1))
+    forward_once(archive, journal)
+    assert len(archive.rows()["scan"]) == 51
+
+
+def test_what_is_received_is_in_the_archive_soon(archive: Archive, journal: Path) -> None:
+    with recording(journal) as twin, forwarder(archive, journal) as following:
+        following.wait_for_output("is forwarded to")
+        for n in range(30):
+            twin.write(scan("1", NOW + n * SECOND))
+            wait_for(lambda n=n: len(archive.rows()["scan"]) == n + 1, "the scan", 5.0)  # type: ignore[misc]
+        wait_until_equal(archive, journal)
+
+
+def test_a_second_forwarder_of_a_site_is_refused_by_name(archive: Archive, journal: Path) -> None:
+    kept(journal, scans(0, 5))
+    with forwarder(archive, journal) as first:
+        first.wait_for_output("is forwarded to")
+        again = run(*words(archive, journal))
+        assert again.returncode == 1
+        assert f"forwarded by {socket.gethostname()} (process {first.pid})" in again.stderr
+    forward_once(archive, journal)
+
+
+def words(archive: Archive, path: Path, **more: str) -> list[str]:
+    """Words of a command that forwards once."""
+    given = {"site": archive.site, "archive_url": archive.url(), "journal": str(path)} | more
+    pairs = [(f"--{name.replace('_', '-')}", value) for name, value in given.items()]
+    return ["forward", "--once", *(word for pair in pairs for word in pair)]
+
+
+def test_offline_and_back(archive: Archive, journal: Path) -> None:
+    kept(journal, scans(0, 5))
+    with psycopg.connect(archive.server.url, autocommit=True) as server:
+        server.execute(f"ALTER DATABASE {archive.name} ALLOW_CONNECTIONS false")
+        with forwarder(archive, journal) as following:
+            line = following.wait_for_output("is not forwarded")
+            assert "not currently accepting connections" in line
+            kept(journal, scans(5, 50))
+            server.execute(f"ALTER DATABASE {archive.name} ALLOW_CONNECTIONS true")
+            following.wait_for_output("is forwarded to")
+            wait_until_equal(archive, journal)
+            assert following.output.count("is not forwarded") == 1
+
+
+def test_a_journal_that_is_saved_from_damage_waits_until_it_is(
+    archive: Archive, journal: Path
+) -> None:
+    kept(journal, scans(0, 50))
+    with closing(sqlite3.connect(journal)) as connection, connection:
+        connection.execute("INSERT INTO meta VALUES ('local', 'salvage', 'somewhere')")
+    refused = run(*words(archive, journal))
+    assert refused.returncode == 1
+    assert "being saved from damage" in refused.stderr
+    assert archive.rows()["scan"] == []
+
+
+@pytest.mark.parametrize(
+    ("given", "code", "said"),
+    [
+        ({"site": "GH 1"}, 2, "--site is 'GH 1', expected a-z"),
+        ({"archive_url": "nonsense"}, 2, "--archive-url is no address of a PostgreSQL"),
+        ({"archive_url": "postgresql://gh1@127.0.0.1:1/x"}, 1, "Connection refused"),
+        ({"site": "gh2"}, 1, "the user has to be named as the site is"),
+        ({"journal": "/nowhere/journal.sqlite"}, 1, "there is no journal /nowhere"),
+        ({"journal": __file__}, 1, "is no journal"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(
+    archive: Archive, journal: Path, given: dict[str, str], code: int, said: str
+) -> None:
+    kept(journal, scans(0, 5))
+    done = run(*words(archive, journal, **given))
+    assert done.returncode == code
+    assert said in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert archive.rows()["scan"] == []

@@ -1,0 +1,130 @@
+"""Archives, forwarders, and whether an archive has what a journal has."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Mapping
+from contextlib import closing
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import psycopg
+
+from lupin_twin.journal.schema import open_reader
+from tests.support.domains import ros_env
+from tests.support.postgres import Postgres
+from tests.support.processes import Process
+from tests.support.waiting import PATIENCE_S, wait_for
+
+# What has to be equal; of the rest the archive has its own.
+TABLES = ("run", "series", "scan", "look", "place", "hour", "tally", "event", "note")
+_NUMBERS = count()
+
+
+class Archive:
+    """A database of its own on a server, with the user of a site."""
+
+    def __init__(self, server: Postgres, site: str = "gh1") -> None:
+        self.server = server
+        self.name = f"archive_{next(_NUMBERS)}"
+        self.owner = f"postgresql://postgres@/{self.name}?host={server.folder}"
+        self.site = site
+        with psycopg.connect(server.url, autocommit=True) as connection:
+            connection.execute(f'CREATE DATABASE "{self.name}"')
+        made = run("archive", "init", "--archive-url", self.owner)
+        assert made.returncode == 0, made.stderr
+        self.add_user(site)
+
+    def add_user(self, name: str, role: str = "lupin_forwarder") -> None:
+        """A user, unless another archive of the server made it."""
+        with psycopg.connect(self.owner, autocommit=True) as connection:
+            if not connection.execute(
+                "SELECT 1 FROM pg_roles WHERE rolname = %s", (name,)
+            ).fetchone():
+                connection.execute(f'CREATE ROLE "{name}" LOGIN IN ROLE {role}')
+
+    def url(self, user: str | None = None) -> str:
+        """Its address for a user, the site's own if none is named."""
+        return f"postgresql://{user or self.site}@/{self.name}?host={self.server.folder}"
+
+    def select(self, sql: str) -> list[tuple[Any, ...]]:
+        """What its owner sees."""
+        with psycopg.connect(self.owner) as connection:
+            return connection.execute(sql).fetchall()
+
+    def rows(self, site: str | None = None) -> dict[str, list[tuple[Any, ...]]]:
+        """All rows of a site, without its name."""
+        with psycopg.connect(self.owner) as connection, connection.transaction():
+            connection.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ")
+            return {
+                table: sorted(
+                    (
+                        row[1:]
+                        for row in connection.execute(
+                            f"SELECT {_columns(table)} FROM {table} WHERE site = %s",
+                            (site or self.site,),
+                        ).fetchall()
+                    ),
+                    key=repr,
+                )
+                for table in TABLES
+            }
+
+
+def _columns(table: str) -> str:
+    lists = "".join(f", {name}::text" for name in ("n", "total", "low", "high"))
+    return f"site, series, hour{lists}" if table == "hour" else "*"
+
+
+def rows_of(journal: Path) -> dict[str, list[tuple[Any, ...]]]:
+    """All rows of a journal, without its site's name."""
+    with closing(open_reader(journal)) as connection:
+        connection.execute("BEGIN")
+        return {
+            table: sorted(
+                (row[1:] for row in connection.execute(f"SELECT * FROM {table}").fetchall()),
+                key=repr,
+            )
+            for table in TABLES
+        }
+
+
+def run(*args: str, **env: str) -> subprocess.CompletedProcess[str]:
+    """A command of `lupin-twin` that ends by itself."""
+    return subprocess.run(
+        [sys.executable, "-m", "lupin_bridge.cli", *args],
+        env=_env(env),
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
+    )
+
+
+def forward_once(archive: Archive, journal: Path) -> None:
+    """Forward what is in a journal."""
+    done = run(
+        "forward", "--site", archive.site, "--archive-url", archive.url(), "--journal",
+        str(journal), "--once",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+
+
+def forwarder(archive: Archive, journal: Path, **env: str) -> Process:
+    """`lupin-twin forward`, which goes on until it is ended."""
+    command = [
+        sys.executable, "-m", "lupin_bridge.cli", "forward", "--site", archive.site,
+        "--archive-url", archive.url(), "--journal", str(journal),
+    ]  # fmt: skip
+    return Process(command, _env(env))
+
+
+def wait_until_equal(archive: Archive, journal: Path) -> None:
+    """Wait until the archive has what the journal has, row for row."""
+    wait_for(lambda: archive.rows() == rows_of(journal), "an archive with the journal's rows")
+
+
+def _env(env: Mapping[str, str]) -> dict[str, str]:
+    return ros_env(0, **env)

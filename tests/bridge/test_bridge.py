@@ -28,8 +28,8 @@ from lupin_bridge.twin.source import CacheCounts, Told, TwinUnavailableError
 from lupin_twin.fields import FieldJob
 from lupin_twin.grid import FieldGrid
 from lupin_twin.journal.condition import UNKNOWN, Condition
-from lupin_twin.past import NotRemembered, SeriesPast, SeriesRequest
-from lupin_twin.past_writes import PastWrites, WritesRequest
+from lupin_twin.past import NotRemembered
+from lupin_twin.past_writes import PastWrite
 from lupin_twin.state import Snapshot, TagState
 from lupin_twin.workers import ShouldStop, Workers
 from tests.bridge.stream.test_frames import received
@@ -58,11 +58,8 @@ class Script:
         self.is_alive = False
         self.workers.close()
 
-    async def series(self, request: SeriesRequest) -> SeriesPast:
-        raise NotRemembered(f"nothing of {request.tag_id}", is_lasting=True)
-
-    async def writes(self, request: WritesRequest) -> PastWrites:
-        raise NotRemembered(f"nothing after {request.after}", is_lasting=False)
+    async def ask(self, *_: object) -> tuple[PastWrite, ...]:
+        raise NotRemembered("nothing", is_lasting=True)
 
     def journal(self) -> Condition:
         return UNKNOWN
@@ -269,16 +266,18 @@ def test_a_memory_that_is_busy_at_the_start_is_asked_again(
     async def test() -> None:
         async with Stage() as stage:
             answers = iter([NotRemembered("busy", is_lasting=False), TwinUnavailableError("gone")])
+            tag_id = f"t{4 * hour_ns}"
 
-            async def series(_: SeriesRequest) -> SeriesPast:
+            async def ask(*_: object) -> tuple[PastWrite, ...]:
                 for error in answers:
                     raise error
-                stamps = tuple(hour_ns * n for n in range(1, 5))
-                return SeriesPast(0, 5 * hour_ns, None, stamps, (1,) * 4, (), (), ())
+                return tuple(
+                    PastWrite(n, 1, tag_id, hour_ns * n, 0, 0, ("co2",), (400.0,))
+                    for n in range(1, 5)
+                )
 
-            monkeypatch.setattr(stage.script, "series", series)
+            monkeypatch.setattr(stage.script, "ask", ask)
             stage.script.tell(state(4 * hour_ns))
-            tag_id = f"t{4 * hour_ns}"
 
             def is_learnt() -> bool:
                 stage.script.tell(state(4 * hour_ns))  # judged anew with the next frame

@@ -10,7 +10,7 @@ import pytest
 
 from tests.support.docs import DOCS, ROOT, name_of, pages, without_blocks
 
-EVERY_PAGE = pytest.mark.parametrize("page", pages(), ids=name_of)
+EVERY_PAGE = pytest.mark.parametrize("page", [*pages(), ROOT / "SECURITY.md"], ids=name_of)
 MAX_WORDS = 25
 # By folder of `docs/`, and the README.
 MAX_LINES = {"how-to": 100, "explanation": 150, "README.md": 150}

@@ -97,7 +97,7 @@ def strewn() -> Iterator[int]:
 def test_a_twin_starts_where_one_was_killed_as_it_started(strewn: int) -> None:
     with twin_node(strewn) as twin:
         twin.wait_for_output("left half-made by a killed process")
-        twin.wait_for_output(f"in ROS domain {strewn} hears")
+        twin.wait_for_output(f"in ROS domain {strewn} subscribes")
 
 
 @pytest.mark.parametrize("role", ["serve", "web"])

@@ -82,7 +82,7 @@ test('a house that is not heard of is unknown, whatever was said last', () => {
 });
 
 test.each([
-  [true, 'light', 'Judged by the ranges for the day: so the light in the house says'],
+  [true, 'light', 'Judged by the ranges for the day: so the light in the greenhouse says'],
   [false, 'clock', 'Judged by the ranges for the night: so the clock says, for no light'],
   [true, 'assumed', 'Judged by the ranges for the day: assumed'],
 ] as const)('whose ranges hold is said: day %s, by %s', (is_day, source, told) => {

@@ -210,8 +210,8 @@ class TwinNode(AdjustableNode):
     def _say_start(self) -> None:
         # Who waits for a twin that hears nothing looks for a name or a domain that is another.
         self.get_logger().info(
-            f"{self.get_fully_qualified_name()} in ROS domain {self.context.get_domain_id()} hears "
-            f"{', '.join(self._topics.values())} and publishes "
+            f"{self.get_fully_qualified_name()} in ROS domain {self.context.get_domain_id()} "
+            f"subscribes to {', '.join(self._topics.values())} and publishes "
             f"{self._state_publisher.topic_name}; poses are in frame "
             f"{self.parameters.frame_id!r}"
         )

@@ -42,7 +42,7 @@ export const CHARTS = {
   chartKeys: { ideal: 'ideal', range: 'lowest to highest', gap: 'nothing came' },
   chartFailure: 'failed try',
   chartLook: 'look at the flowers',
-  chartHint: 'Drag: zoom. Click: the house as of then.',
+  chartHint: 'Drag: zoom. Click: the greenhouse as of then.',
   chartTableCaption: (label: string, sensor: string, span: string): string =>
     `${label}, ${sensor}, ${span}`,
   chartColumns: {

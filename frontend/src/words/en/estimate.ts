@@ -4,8 +4,8 @@ import { counted } from './counted';
 export const ESTIMATE = {
   about: 'What ± means',
   aboutText:
-    'Of ten values that the estimate tells, nine should be off by no more than the ± (a 90 % ' +
-    'interval). It counts how far away and how old each reading is, and how the house goes ' +
+    'Of ten values of the estimate, nine should be off by no more than the ± (a 90 % ' +
+    'interval). It counts how far away and how old each reading is, and how the greenhouse goes ' +
     'through its day: the longer nobody measures, the larger the ±.',
   onItsWay: 'The estimate is on its way',
   noService: 'This twin makes no estimate: shown are the nearest readings',
@@ -23,7 +23,7 @@ export const ESTIMATE = {
     `Last day: ${inside} of ${counted(scans, 'scan', 'scans')}`,
   foretoldWeek: (inside: number, scans: number): string =>
     `last week: ${inside} of ${counted(scans, 'scan', 'scans')}`,
-  fitProblem: (reason: string): string => `Learning the house is not going well: ${reason}`,
+  fitProblem: (reason: string): string => `Learning the greenhouse is not going well: ${reason}`,
   notTrusted: (count: number): string =>
     `Do not rely on the ±: only ${count} of 10 scans lay where the other tags put them, not 9.`,
   near: (count: number): string =>

@@ -49,9 +49,9 @@ export const HEALTH = {
   healthDay: (isDay: boolean, source: string): string =>
     `Judged by the ranges for the ${isDay ? 'day' : 'night'}: ${source}`,
   healthDaySource: {
-    light: 'so the light in the house says',
+    light: 'so the light in the greenhouse says',
     clock: 'so the clock says, for no light is measured',
-    assumed: 'assumed, for neither light nor clock tell',
+    assumed: 'assumed, for neither light nor clock tells',
   },
   /** "any": by day and by night it is the same. */
   idealParts: { any: 'ideal', day: 'ideal by day', night: 'ideal by night' },

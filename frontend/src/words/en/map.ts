@@ -42,7 +42,7 @@ export const MAP = {
   legendTransparent:
     'Colour grows from the minimum to the maximum. No colour: the minimum. Hatched: not known',
   legendTransparentShort: 'No colour: the minimum. Hatched: not known',
-  legendHatched: 'Each value known is coloured. Hatched: not known',
+  legendHatched: 'Every known value is coloured. Hatched: not known',
   legendHatchedShort: 'Hatched: not known',
   legendOld: 'Faint and hatched: too old to say',
   readoutOld: 'too old to say',

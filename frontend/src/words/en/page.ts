@@ -112,7 +112,7 @@ export const PAGE = {
   /** What the twin observes where that is no robot's, or not of now. */
   origin: { simulated: 'Simulated', recorded: 'Recording', sim_time: 'Simulated time' },
   originHint: {
-    simulated: 'No robot is at work: house, plants and readings are made up.',
+    simulated: 'No robot is at work: greenhouse, plants and readings are made up.',
     recorded: 'A recording is being played: nothing here is of now.',
     sim_time:
       'The time is not that of the clock on the wall: what is shown comes from a simulation, or from a recording that is played.',

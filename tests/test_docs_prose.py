@@ -10,7 +10,17 @@ import pytest
 
 from tests.support.docs import DOCS, ROOT, name_of, pages, without_blocks
 
-EVERY_PAGE = pytest.mark.parametrize("page", [*pages(), ROOT / "SECURITY.md"], ids=name_of)
+# Beside those of the guide: what stands at the root, and the maps of the folders.
+MORE = (
+    "SECURITY.md",
+    "CONTRIBUTING.md",
+    "backend/README.md",
+    "ros_node/README.md",
+    "tests/README.md",
+)
+EVERY_PAGE = pytest.mark.parametrize(
+    "page", [*pages(), *(ROOT / name for name in MORE)], ids=name_of
+)
 MAX_WORDS = 25
 # By folder of `docs/`, and the README.
 MAX_LINES = {"how-to": 100, "explanation": 150, "README.md": 150}

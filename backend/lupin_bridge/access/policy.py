@@ -131,8 +131,8 @@ class AccessPolicy:
             return f"Host is {hosts[0][:128]!r}, expected a host and a port"
         if not self._goes_by(host):
             return (
-                f"this bridge is not known by the name {host[:128]!r}: use its IP address, or start "
-                f"it with --allow-host {host[:128]}"
+                f"this bridge is not known by the name {host[:128]!r}: use its IP address, or "
+                f"start it with --allow-host {host[:128]}"
             )
         return None
 

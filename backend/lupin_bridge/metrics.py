@@ -24,7 +24,7 @@ GAUGES: Final = {
     "lupin_state_age_seconds": "seconds since the last state came; infinite: none has",
     "lupin_tags": "tags that the twin knows",
     "lupin_tags_pinned": "tags that have a pose",
-    "lupin_alarms_known": "1 once the past has been gone through for alarms",
+    "lupin_alarms_known": "1 once alarms of the past are known",
     "lupin_alarms_active": "alarms that are active",
     "lupin_fields_computing": "field requests being computed now",
     "lupin_exports_running": "exports being sent now",
@@ -43,7 +43,7 @@ LABELLED_GAUGES: Final = {
         "1 while its estimates are about as often right as they say; absent while nobody knows",
     ),
     "lupin_estimate_fit_failing": ("sensor", "1 while its last round of learning came to nothing"),
-    "lupin_outward_waiting": ("channel", "tags and the house, or changes of alarms, not told yet"),
+    "lupin_outward_waiting": ("channel", "tags, the greenhouse or changes of alarms, not sent yet"),
 }
 # Written with `_total` behind the name, as Prometheus wants it.
 COUNTERS: Final = {
@@ -53,7 +53,7 @@ COUNTERS: Final = {
     "lupin_bytes_sent": "bytes of frames written to clients",
     "lupin_messages_sent": "ROS messages written to viewers as they are",
     "lupin_messages_skipped": "ROS messages that a viewer did not get, being slow, or too large",
-    "lupin_alarms_missed": "observations that were heard too late for the alarms they belong to",
+    "lupin_alarms_missed": "observations that were received too late for the alarms they belong to",
     "lupin_alarms_raised": "alarms raised since the start; those of the past are not counted",
     "lupin_ros_callback_errors": "errors met by ROS callbacks",
     "lupin_field_cache_hits": "fields served from the cache",

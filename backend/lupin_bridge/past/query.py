@@ -48,7 +48,7 @@ class OfPeriod:
 class OfHistory:
     """The parameters of `/api/history`."""
 
-    tag_id: Name = needed("one tag; for events, `*` is the whole house")
+    tag_id: Name = needed("one tag; for events, `*` is the whole greenhouse")
     sensor_type: Name = needed(
         f"name of a sensor, as in a reading; or an event: {', '.join(Event)}"
     )

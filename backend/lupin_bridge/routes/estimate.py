@@ -37,7 +37,7 @@ ESTIMATE: Final = InFormats(
     description="""From all readings of a day, in space and time, with its error.
 
 That of now is made for the newest reading or the last whole minute of the day, whichever is
-later: until then its ETag holds, unless something is heard, or a model fitted anew. Of a moment
+later: until then its ETag holds, unless something arrives, or a model fitted anew. Of a moment
 that has passed it is made by the model of now.""",
     parameters=parameters_of(EstimateQuery),
     model=GetEstimateResponse,

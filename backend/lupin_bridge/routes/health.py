@@ -65,9 +65,9 @@ async def metrics(request: Request) -> Response:
     },
 )
 async def readyz(request: Request) -> Response:
-    """The status as WebSocket clients are told it; 503 while the twin is offline.
+    """The status as WebSocket clients receive it; 503 while the twin is offline.
 
-    A journal that cannot be written is told, and is no reason for 503: the twin goes on without.
+    A journal that cannot be written is reported, and no reason for 503: the twin goes on.
     """
     status = bridge_of(request).status
     return json_response(orjson.dumps(status.frame()), 200 if status.is_live else 503)

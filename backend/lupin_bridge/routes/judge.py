@@ -32,11 +32,11 @@ router = APIRouter()
 @read_route(
     router,
     "/api/health",
-    summary="How the house and each tag are, and why",
+    summary="The status of the greenhouse and of each tag, and why",
     responses={
         **NOT_REMEMBERED,
         200: {"model": schema.Judgement},
-        503: {"model": schema.ErrorMessage, "description": "no twin was heard yet, or it is busy"},
+        503: {"model": schema.ErrorMessage, "description": "no twin was found yet, or it is busy"},
     },
     openapi_extra={"parameters": parameters_of(past_query.OfMoment)},
 )

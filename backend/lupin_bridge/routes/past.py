@@ -22,7 +22,7 @@ router = APIRouter()
     openapi_extra={"parameters": parameters_of(query.OfHistory)},
 )
 async def history_route(request: Request) -> Response:
-    """Readings, or buckets of equal length where there are more than `points`; gaps are told."""
+    """Readings, or equal buckets if there are more than `points`; `gaps`: where nothing came."""
     return await or_refusal(_history(request))
 
 

@@ -69,7 +69,7 @@ _WRITE_SCAN_S: Final = 20e-6
 
 _NO_TWIN = "no twin has been heard yet"
 _UNAVAILABLE = {
-    503: {"model": schema.ErrorMessage, "description": "no twin was heard yet, or it is busy"}
+    503: {"model": schema.ErrorMessage, "description": "no twin was found yet, or it is busy"}
 }
 _TOO_MUCH = {429: {"model": schema.ErrorMessage, "description": "this client asks for too much"}}
 _NO_TAG = {404: {"model": schema.ErrorMessage, "description": "no such tag"}}

@@ -131,9 +131,9 @@ class TwinState(Contract):
 
 
 class HealthReason(Contract):
-    """Why a tag, or the house, has its verdict.
+    """Why a tag, or the greenhouse, has its verdict.
 
-    The last two are the house's alone. `silent`: nothing is heard of the twin, or its clock does
+    The last two are the greenhouse's. `silent`: nothing comes from the twin, or its clock does
     not run. `stopped`: no tag was scanned for longer than the patrol's own rhythm allows.
     """
 
@@ -170,7 +170,7 @@ class Day(Contract):
 
 
 class Patrol(Contract):
-    """What the house is doing; nothing of it is a verdict."""
+    """What the greenhouse is doing; nothing of it is a verdict."""
 
     interval_s: float | None = Field(
         description="median of the last intervals between scans, whatever tag they were of; "
@@ -181,7 +181,7 @@ class Patrol(Contract):
 
 
 class HouseHealth(TagHealth):
-    """The house is its worst tag; unknown where more than half of its tags are."""
+    """The greenhouse is its worst tag; unknown where more than half of its tags are."""
 
     day: Day
     patrol: Patrol
@@ -203,7 +203,7 @@ class Alarm(Contract):
 
     id: str = Field(description="opaque; made of what, where and since when")
     reason: HealthReason = Field(description="as it was when the alarm was raised")
-    tag_id: str = Field(description="empty: the house")
+    tag_id: str = Field(description="empty: the greenhouse")
     raised_at: Time = Field(description="ROS time")
     cleared_at: Time | None = Field(description="ROS time; null: it is active")
     worst: float | None = Field(
@@ -215,8 +215,8 @@ class Alarm(Contract):
 class Alarms(Contract):
     """`/api/alarms`: what the past and now give.
 
-    `starting`: the past has not been gone through yet; `heard`: no journal is kept, and only what
-    this process heard since its start is in it.
+    `starting`: the past is still being read; `heard`: no journal is kept, and only what this
+    process received since its start is in it.
     """
 
     alarms: list[Alarm] = Field(description="newest first")
@@ -255,7 +255,7 @@ class DeltaFrame(Contract):
     header: Header
     changed: list[TwinTagState]
     removed: list[str] = Field(description="tag_ids; a restarted twin knows fewer tags")
-    health: Judgement = Field(description="the house, and the tags of whom it is another")
+    health: Judgement = Field(description="the greenhouse, and the tags whose verdict changed")
 
 
 class RecentDrop(Contract):
@@ -288,7 +288,7 @@ class Journal(Contract):
 
 
 class Outward(Contract):
-    """How a channel does by which others are told: MQTT, the webhook."""
+    """How a channel of notifications does: MQTT, the webhook."""
 
     channel: Literal["mqtt", "webhook"]
     is_failing: bool
@@ -311,7 +311,7 @@ class StatusFrame(Contract):
         "thread_dead",
         "shutting_down",
     ] = Field(
-        description="paused: simulated time stands, and is told to, the twin is live; no_clock, "
+        description="paused: simulated time stands on purpose, the twin is live; no_clock, "
         "clock_stopped: the twin's time does not run; clock_doubted: it contradicts the journal; "
         "no age is known then, and the twin counts as offline"
     )
@@ -327,7 +327,7 @@ class StatusFrame(Contract):
     input_problems: list[str] = Field(
         description="why the twin does not hear all that is published for it, with the remedy"
     )
-    drops: list[RecentDrop] = Field(description="what the twin did not take in lately, by reason")
+    drops: list[RecentDrop] = Field(description="what the twin dropped recently, by reason")
     journal: Journal
     outward: list[Outward] = Field(description="those that the operator has set up")
 

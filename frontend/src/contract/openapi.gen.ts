@@ -46,7 +46,7 @@ export interface components {
             readonly reason: components["schemas"]["HealthReason"];
             /**
              * Tag Id
-             * @description empty: the house
+             * @description empty: the greenhouse
              */
             readonly tag_id: string;
             /** @description ROS time */
@@ -63,8 +63,8 @@ export interface components {
          * Alarms
          * @description `/api/alarms`: what the past and now give.
          *
-         *     `starting`: the past has not been gone through yet; `heard`: no journal is kept, and only what
-         *     this process heard since its start is in it.
+         *     `starting`: the past is still being read; `heard`: no journal is kept, and only what this
+         *     process received since its start is in it.
          */
         readonly Alarms: {
             /**
@@ -273,9 +273,9 @@ export interface components {
         };
         /**
          * HealthReason
-         * @description Why a tag, or the house, has its verdict.
+         * @description Why a tag, or the greenhouse, has its verdict.
          *
-         *     The last two are the house's alone. `silent`: nothing is heard of the twin, or its clock does
+         *     The last two are the greenhouse's. `silent`: nothing comes from the twin, or its clock does
          *     not run. `stopped`: no tag was scanned for longer than the patrol's own rhythm allows.
          */
         readonly HealthReason: {
@@ -358,7 +358,7 @@ export interface components {
         };
         /**
          * HouseHealth
-         * @description The house is its worst tag; unknown where more than half of its tags are.
+         * @description The greenhouse is its worst tag; unknown where more than half of its tags are.
          */
         readonly HouseHealth: {
             /**
@@ -433,7 +433,7 @@ export interface components {
         };
         /**
          * Outward
-         * @description How a channel does by which others are told: MQTT, the webhook.
+         * @description How a channel of notifications does: MQTT, the webhook.
          */
         readonly Outward: {
             /**
@@ -473,7 +473,7 @@ export interface components {
         };
         /**
          * Patrol
-         * @description What the house is doing; nothing of it is a verdict.
+         * @description What the greenhouse is doing; nothing of it is a verdict.
          */
         readonly Patrol: {
             /**
@@ -585,7 +585,7 @@ export interface components {
             readonly twin: "live" | "offline";
             /**
              * Reason
-             * @description paused: simulated time stands, and is told to, the twin is live; no_clock, clock_stopped: the twin's time does not run; clock_doubted: it contradicts the journal; no age is known then, and the twin counts as offline
+             * @description paused: simulated time stands on purpose, the twin is live; no_clock, clock_stopped: the twin's time does not run; clock_doubted: it contradicts the journal; no age is known then, and the twin counts as offline
              * @enum {string}
              */
             readonly reason: "live" | "paused" | "no_clock" | "clock_stopped" | "clock_doubted" | "never_seen" | "stale" | "thread_dead" | "shutting_down";
@@ -617,7 +617,7 @@ export interface components {
             readonly input_problems: readonly string[];
             /**
              * Drops
-             * @description what the twin did not take in lately, by reason
+             * @description what the twin dropped recently, by reason
              */
             readonly drops: readonly components["schemas"]["RecentDrop"][];
             readonly journal: components["schemas"]["Journal"];
@@ -870,7 +870,7 @@ export interface components {
              * @description tag_ids; a restarted twin knows fewer tags
              */
             readonly removed: readonly string[];
-            /** @description the house, and the tags of whom it is another */
+            /** @description the greenhouse, and the tags whose verdict changed */
             readonly health: components["schemas"]["Judgement"];
         };
         /**

@@ -121,10 +121,10 @@ class TwinParameters:
         fixed=_MADE,
     )
     journal_days: float = _parameter(
-        90.0, "how long scans and looks are kept in the journal, days", 0.01, 36_500.0, fixed=_MADE
+        90.0, "how long the journal keeps scans and inspections, days", 0.01, 36_500.0, fixed=_MADE
     )
     journal_max_mb: float = _parameter(
-        4000.0, "size past which the journal gives up its oldest scans, MB", 10.0, 1e7, fixed=_MADE
+        4000.0, "size past which the journal deletes its oldest scans, MB", 10.0, 1e7, fixed=_MADE
     )
 
     def __post_init__(self) -> None:

@@ -86,6 +86,22 @@ def test_the_log_is_put_into_the_file_when_it_is_long(
         assert file.size() > path.stat().st_size
 
 
+def test_a_log_that_was_put_into_the_file_is_short_again(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else each commit from then on would have all of it put into the file again."""
+    monkeypatch.setattr("lupin_twin.journal.file._LOG_BYTES", 500_000)
+    with opened(path) as file:
+        run = file.start(CLOCK, 1, is_believed=False).run
+        number = 0
+        while file._log_bytes() <= 500_000:
+            number += 100
+            file.append([(run, scan(at_ns=NOW + number + n)) for n in range(100)])
+        file.look_after(may_purge=True)
+        file.append([(run, scan(at_ns=NOW + number + 100))])
+        assert file._log_bytes() < 100_000
+
+
 def _truncate(path: Path) -> None:
     os.truncate(path, path.stat().st_size * 9 // 10)
 

@@ -165,6 +165,8 @@ def open_writer(path: Path) -> sqlite3.Connection:
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = NORMAL")
         connection.execute("PRAGMA wal_autocheckpoint = 0")
+        # The log begins again behind a checkpoint, and its size tells how much of it is new.
+        connection.execute("PRAGMA journal_size_limit = 0")
         connection.execute("PRAGMA cache_size = -16000")
     except BaseException:
         connection.close()

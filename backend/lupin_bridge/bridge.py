@@ -56,8 +56,10 @@ HEARTBEAT_SPARED_S = 0.8
 # after it would wait for its slot.
 PACE_BURST: Final = 2.0
 _EVERYBODY: Final = ""
-# What a frame of alarms takes to write, at worst; and how fast such frames follow each other.
+# What a frame of alarms takes to write, at worst; and how fast such frames follow each other: each
+# holds all of them, for every client.
 ALARMS_S: Final = 0.03
+ALARMS_REST_S: Final = 1.0
 ALARM_BYTES_PER_S: Final = 500_000
 
 
@@ -376,7 +378,7 @@ class Bridge:
                 log.exception("the newest alarms were told to nobody")
                 continue
             # Of many alarms that change all the time, no more is sent than a browser can take.
-            await asyncio.sleep(len(wire) / ALARM_BYTES_PER_S)
+            await asyncio.sleep(max(ALARMS_REST_S, len(wire) / ALARM_BYTES_PER_S))
 
     def _on_death(self) -> None:
         self.liveness.thread_dead = True

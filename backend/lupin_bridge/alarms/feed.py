@@ -37,6 +37,8 @@ REACH_COUNT: Final = 300_000
 # What is observed stands in the journal so long after; and once more, for a disk that is slow.
 JOURNAL_S: Final = 0.15
 AGAIN_S: Final = 1.5
+# So long after a look nothing is looked at: who scans all the time is followed once a second.
+REST_S: Final = 0.85
 RETRY_S: Final = 5.0
 # A journal that has not answered for so long says nothing of now, although the twin is there.
 UNANSWERED_S: Final = 30.0
@@ -185,6 +187,7 @@ class AlarmFeed:
                 await self._tell_silence(loop.time() - answered_s)
             else:
                 why, answered_s = "", loop.time()
+            await asyncio.sleep(REST_S)
 
     def _ask_again(self, loop: asyncio.AbstractEventLoop, wait_s: float) -> None:
         if self._again is not None:

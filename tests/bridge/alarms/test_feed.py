@@ -134,7 +134,7 @@ def test_what_comes_late_finds_its_place_however_late_it_is(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """Hundreds of looks later, one comes that saw the pest earlier; then one of another tag."""
-    for name in ("AGAIN_S", "JOURNAL_S"):
+    for name in ("AGAIN_S", "JOURNAL_S", "REST_S"):
         monkeypatch.setattr(feed_module, name, 0.01)
 
     def look(number: int, tag_id: str, at: int, bugs: int) -> PastWrite:

@@ -12,7 +12,7 @@ import pytest
 from lupin_twin import convert_estimate
 from lupin_twin.convert_past import NotAnAnswerError
 from lupin_twin.estimate import Place
-from lupin_twin.estimate_report import Report, ReportRequest
+from lupin_twin.estimate_report import DEFAULT_PLACES, Report, ReportRequest
 from lupin_twin.estimate_rounds import TagCheck
 from lupin_twin.estimates import Estimate, EstimateRequest
 from lupin_twin.fields import FieldRefused, FieldRequest
@@ -82,7 +82,7 @@ def test_a_question_for_a_report_comes_back_as_it_was() -> None:
     message = convert_estimate.report_request_message(asked)
     assert convert_estimate.report_request_of(message) == asked
     message.max_places = 0
-    assert convert_estimate.report_request_of(message) == ReportRequest("co2")
+    assert convert_estimate.report_request_of(message) == ReportRequest("co2", DEFAULT_PLACES)
     message.max_places = 21
     with pytest.raises(FieldRefused, match="max_places is 21, the limits are 1 and 20"):
         convert_estimate.report_request_of(message)

@@ -17,6 +17,7 @@ from lupin_msgs.srv import GetEstimate, GetEstimateReport
 
 from lupin_twin.diagnostics import Estimates
 from lupin_twin.estimate import FitFailed
+from lupin_twin.estimate_report import ReportRequest
 from lupin_twin.estimate_rounds import FIRST_FIT, Done, Loaded
 from lupin_twin.estimate_service import EstimateRules, EstimateService, Known
 from lupin_twin.estimates import TagPast, readings_of
@@ -257,6 +258,9 @@ def test_what_is_wrong_with_models_is_said_in_the_log_and_for_diagnostics() -> N
     assert service.state() == Estimates({}, (), 1)
     end(Done(Tally(100_000, 0), loaded))
     assert len(told) == 3, "and again where it was trusted in between"
+    report = service.report(ReportRequest("co2"))()
+    assert report.record.is_trusted is False
+    assert report.places == (), "who asks for no places has none worked out"
     service.close()
 
 

@@ -93,7 +93,9 @@ def report_request_of(msg: Any) -> ReportRequest:
 
 def report_request_message(request: ReportRequest) -> Any:
     """The other direction of `report_request_of`."""
-    return GetEstimateReport.Request(sensor_type=request.sensor_type, max_places=request.max_places)
+    return GetEstimateReport.Request(
+        sensor_type=request.sensor_type, max_places=request.max_places or 0
+    )
 
 
 def report_response(report: Report) -> Any:

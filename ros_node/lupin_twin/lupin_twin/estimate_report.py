@@ -23,7 +23,9 @@ ADVICE_S: Final = 0.3
 
 @dataclass(frozen=True, slots=True)
 class ReportRequest:
-    """A sensor, and how many places for other tags are to be told.
+    """A sensor, and how many places for other tags are to be told; None: nobody asks for any.
+
+    Working them out is dear. By the service there is no asking for none.
 
     Raises:
         FieldRefused: names the field, the value and the limit.
@@ -31,12 +33,12 @@ class ReportRequest:
     """
 
     sensor_type: str
-    max_places: int = DEFAULT_PLACES
+    max_places: int | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be answered."""
         check_sensor_type(self.sensor_type)
-        if not 1 <= self.max_places <= MAX_PLACES:
+        if self.max_places is not None and not 1 <= self.max_places <= MAX_PLACES:
             raise FieldRefused(
                 f"max_places is {self.max_places}, the limits are 1 and {MAX_PLACES}"
             )

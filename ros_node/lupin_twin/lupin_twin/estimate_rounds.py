@@ -28,7 +28,7 @@ FIRST_FIT: Final = 10
 FIT_PERIOD_S: Final = 300.0
 GROWN: Final = 1.5
 # A round of a sensor comes as often at most, s.
-ROUND_REST_S: Final = 2.0
+ROUND_REST_S: Final = 10.0
 
 
 @dataclass(frozen=True, slots=True)

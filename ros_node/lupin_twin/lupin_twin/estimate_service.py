@@ -305,13 +305,16 @@ class EstimateService:
             bare = Report(now_ns, fit.at_ns, fit.problem, record)
             return lambda: bare
         known = Report(loaded.at_ns, fit.at_ns, fit.problem, record, loaded.checks)
+        max_places = asked.max_places
+        if max_places is None:
+            return lambda: known
         occupancy = self._known.occupancy()
-        key = (sensor, asked.max_places)
+        key = (sensor, max_places)
 
         def with_places() -> Report:
             kept = self._advised.get(key)
             if kept is None or kept[0] is not loaded or kept[1] is not occupancy:
-                kept = loaded, occupancy, advice(loaded, occupancy, asked.max_places)
+                kept = loaded, occupancy, advice(loaded, occupancy, max_places)
                 if len(self._advised) >= _MAX_ADVISED:
                     self._advised.clear()
                 self._advised[key] = kept

@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 import orjson
 from fastapi import APIRouter, Request, Response
-from PIL import Image
 
 from lupin_bridge.field.query import matches
 from lupin_bridge.routes.computing import kept_or_computed, made, or_refusal
@@ -62,6 +61,9 @@ def map_png(occupancy: OccupancyMap) -> bytes:
     The picture is in the grid's own axes: a map whose origin has a yaw is turned by the viewer.
     A map without a cell is one transparent pixel, for PNG knows no empty picture.
     """
+    # Megabytes of memory, for who has a map.
+    from PIL import Image  # noqa: PLC0415
+
     cells = occupancy.cells
     if cells.size == 0:
         cells = np.full((1, 1), -1, dtype=np.int8)

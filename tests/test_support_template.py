@@ -37,7 +37,7 @@ def test_it_ends_with_its_own_code_and_words(template: Template) -> None:
         out.seek(0)
         said = out.read().splitlines()
         assert said[-1] == process.output.splitlines()[-1]
-    assert "invalid int value: 'x'" in said[-1]
+    assert "'x': input should be a valid integer" in said[-1]
 
 
 def test_it_is_a_process_of_its_own(template: Template, domain: int) -> None:

@@ -154,7 +154,7 @@ def test_a_longer_word_about_the_house_does_not_move_the_table(
         hmi.page.evaluate("document.fonts.ready")
         before[width, height] = hmi, places(hmi, ".filter-bar")
     long = "a-tag-with-no-short-name"
-    running.peer.observe(scan(long, {"temperature": 99.0}, at=(2, 1)))
+    running.peer.observe(scan(long, {"temperature": 79.0}, at=(2, 1)))
     for size, (hmi, table) in before.items():
         driver = hmi.test_id("health-driver")
         expect(driver).to_contain_text(long)
@@ -162,7 +162,7 @@ def test_a_longer_word_about_the_house_does_not_move_the_table(
         hmi.expect(partial(stays, hmi, table), f"the table in its place at {size}")
         # The rest is to be had by pointing at it, and to be heard anyway.
         expect(driver).to_have_attribute(
-            "title", f"Tag {long}: Temperature 99.0\u00a0°C, above 35.0 (critical)"
+            "title", f"Tag {long}: Temperature 79.0\u00a0°C, above 35.0 (critical)"
         )
 
 
@@ -268,14 +268,14 @@ def test_the_words_of_the_ideal_range_stand_below_its_bracket(open_at: Callable[
 
 
 def test_the_row_of_sensors_fades_where_it_has_more(open_at: Callable[..., Hmi]) -> None:
-    row = open_at((2560, 1440)).page.locator(".sensor-picker")
+    row = open_at((3840, 1440)).page.locator(".sensor-picker")
     expect(row).to_have_attribute("data-more", "")
     expect(row).to_have_css("mask-image", "none")
     phone = open_at((PHONE["width"], PHONE["height"]))
     row = phone.page.locator(".sensor-picker")
     expect(row).to_have_attribute("data-more", "after")
     expect(row).to_have_css("mask-image", re.compile("gradient"))
-    phone.choose_sensor("Dew point")
+    phone.choose_sensor("Condensation margin")
     expect(row).to_have_attribute("data-more", "before")
 
 

@@ -89,7 +89,7 @@ class Readings:
         rank = np.arange(len(tag)) - np.repeat(starts, counts)
         newest = -(-per_tag // 4)
         parts = max(per_tag - newest, 1)
-        reach_s = float(age_s[chosen].max(initial=0.0)) or 1.0
+        reach_s = max(float(age_s[chosen].max(initial=0.0)), 1.0)
         part = np.minimum((age_s[order] * (parts / reach_s)).astype(int), parts - 1)
         is_older = rank >= newest
         is_first = np.ones(len(tag), dtype=bool)

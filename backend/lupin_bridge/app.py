@@ -118,7 +118,8 @@ the current ones at once, then every change. A bridge with a token (`LUPIN_TOKEN
 
 
 async def _not_found(request: HTTPConnection, _error: Exception | None = None) -> Response:
-    prefix = request.scope.get("root_path", "")
+    # Of a path below a mount, `root_path` is the mount's.
+    prefix = request.scope.get("app_root_path", request.scope.get("root_path", ""))
     return error_response(f"there is nothing at {request.url.path[:128]!r}; see {prefix}/docs", 404)
 
 

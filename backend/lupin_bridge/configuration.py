@@ -33,6 +33,8 @@ CONFIG_VARIABLE: Final = variable("config")
 # Each by a variable of its name, or in a file that a setting names.
 SECRETS: Final = tuple(spec.name for spec in fields(Secrets))
 _NOT_IN_THE_TABLE: Final = (CONFIG_VARIABLE, *map(variable, SECRETS))
+# No name, address or path has one, and C's functions end a text, or fail, at the first.
+_CONTROL: Final = re.compile(r"[\x00-\x1f\x7f]")
 _BARE: Final = re.compile(r"[A-Za-z0-9_-]{1,64}")
 # Nobody writes this much; a device or a disk image given by mistake is not read to its end.
 MAX_FILE_BYTES: Final = 65_536
@@ -81,12 +83,23 @@ def _checked(name: str, called: str, value: Any, *, is_text: bool) -> Any:
     from pydantic import TypeAdapter, ValidationError  # noqa: PLC0415  # `--help` has no use for it
 
     try:
-        return TypeAdapter(types()[name]).validate_python(
+        found = TypeAdapter(types()[name]).validate_python(
             tuple(value) if isinstance(value, list) else value, strict=not is_text
         )
     except ValidationError as error:
         why = error.errors(include_url=False)[0]["msg"]
-        raise SettingError(f"{called} is {str(value)[:128]!r}: {why[0].lower()}{why[1:]}") from None
+        raise SettingError(f"{called} is {_shown(value)}: {why[0].lower()}{why[1:]}") from None
+    texts = found if isinstance(found, tuple) else (found,)
+    if any(isinstance(text, str) and _CONTROL.search(text) for text in texts):
+        raise SettingError(f"{called} is {_shown(value)}: there is a control character in it")
+    return found
+
+
+def _shown(value: Any) -> str:
+    try:
+        return repr(str(value)[:128])
+    except ValueError:  # Python writes no number of so many digits
+        return "a number of thousands of digits"
 
 
 def _of_environment(environment: Mapping[str, str]) -> Iterator[_Given]:
@@ -150,7 +163,8 @@ def _of_file(path: str, called: str) -> Iterator[_Given]:
     text = read_text(path, called)
     try:
         content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    # It lets through what Python says of a number of thousands of digits, and of [[[[[...
+    except (ValueError, RecursionError) as error:
         raise SettingError(f"{path} is not TOML: {error}") from None
     names = [spec.name for spec in table()]
     for key, value in content.items():

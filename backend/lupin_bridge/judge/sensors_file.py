@@ -146,4 +146,6 @@ def _said(error: ValidationError) -> str:
     first = error.errors(include_url=False)[0]
     where = ".".join(str(part)[:MAX_TEXT] for part in first["loc"])
     shown = "" if isinstance(first["input"], dict | str) else f", not {first['input']!r:.60}"
-    return f"{where or 'the file'}: {first['msg'].removeprefix('Value error, ')}{shown}"
+    said = f"{where or 'the file'}: {first['msg'].removeprefix('Value error, ')}{shown}"
+    # A name in it may have anything, and this is one line.
+    return "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in said)

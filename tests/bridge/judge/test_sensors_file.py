@@ -242,3 +242,9 @@ def test_there_is_a_limit_to_the_sensors() -> None:
     table["sensors"]["one_more"] = entry
     with pytest.raises(SensorsError, match="sensors: Dictionary should have at most 64 items"):
         parse(json.dumps(table))
+
+
+def test_what_is_wrong_is_one_line_whatever_a_name_has_in_it() -> None:
+    with pytest.raises(SensorsError) as refused:
+        parse(text_with("sensors/a\n\x1b[2Jb", {}))
+    assert str(refused.value) == "sensors.a\\n\\x1b[2Jb.ideal: Field required"

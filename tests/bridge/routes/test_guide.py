@@ -65,6 +65,12 @@ def test_nothing_else_is_served(built: Path, path: str) -> None:
     assert "secret" not in answer.text.replace("secret.txt", "")
 
 
+@pytest.mark.parametrize("prefix", ["", "/gh1"])
+def test_what_is_not_there_says_where_to_look(built: Path, prefix: str) -> None:
+    answer = ask(built, f"{prefix}/docs/guide/nowhere.html", prefix=prefix)
+    assert answer.json()["detail"].endswith(f"; see {prefix}/docs")
+
+
 def test_it_can_only_be_read(built: Path) -> None:
     assert ask(built, "/docs/guide/", "POST").status_code == 405
     assert ask(built, "/docs/guide/", "HEAD").text == ""

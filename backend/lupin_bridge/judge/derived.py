@@ -38,11 +38,11 @@ def vapour_pressure_deficit_kpa(temperature_c: float, humidity_percent: float) -
 
 def dew_point_c(temperature_c: float, humidity_percent: float) -> float:
     """The temperature (°C) at which dew falls; NaN for what cannot be, and for dry air."""
-    if not _is_air(temperature_c, humidity_percent) or humidity_percent == 0.0:
+    share = min(humidity_percent, 100.0) / 100.0
+    # The share and not the percentage: that of the least number above 0 is 0.
+    if not _is_air(temperature_c, humidity_percent) or share == 0.0:
         return math.nan
-    over = math.log(min(humidity_percent, 100.0) / 100.0) + _A * temperature_c / (
-        temperature_c + _B_C
-    )
+    over = math.log(share) + _A * temperature_c / (temperature_c + _B_C)
     return _B_C * over / (_A - over)
 
 

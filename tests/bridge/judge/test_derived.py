@@ -45,8 +45,15 @@ def test_of_what_cannot_be_nothing_is_derived(temperature_c: float, humidity: fl
         assert math.isnan(derived.formula(temperature_c, humidity))
 
 
-def test_dry_air_has_no_dew_point() -> None:
-    assert math.isnan(dew_point_c(20.0, 0.0))
+@pytest.mark.parametrize("humidity", [0.0, 5e-324, 2e-322])
+def test_dry_air_has_no_dew_point(humidity: float) -> None:
+    assert math.isnan(dew_point_c(20.0, humidity))
+
+
+@given(st.floats(), st.floats())
+def test_every_pair_of_numbers_has_an_answer(temperature_c: float, humidity: float) -> None:
+    for derived in DERIVED.values():
+        assert isinstance(derived.formula(temperature_c, humidity), float)
 
 
 def test_a_sensor_that_reads_a_little_high_in_saturated_air_is_taken_for_saturated() -> None:

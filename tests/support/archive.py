@@ -54,6 +54,11 @@ class Archive:
         with psycopg.connect(self.owner) as connection:
             return connection.execute(sql).fetchall()
 
+    def do(self, sql: str) -> None:
+        """What its owner does."""
+        with psycopg.connect(self.owner) as connection:
+            connection.execute(sql)
+
     def rows(self, site: str | None = None) -> dict[str, list[tuple[Any, ...]]]:
         """All rows of a site, without its name."""
         with psycopg.connect(self.owner) as connection, connection.transaction():

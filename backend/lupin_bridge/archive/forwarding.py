@@ -88,9 +88,7 @@ class Forwarder:
         source.claim()
         with closing(Sink(self._url, self._site)) as sink:
             epoch = sink.epoch_of(source, self._say)
-            self._told, self._wait_s = "", FIRST_WAIT_S
-            self._say(f"site {self._site} is forwarded to {place_of(self._url)}")
-            is_full, heard_s = True, time.monotonic()
+            is_full, is_said, heard_s = True, False, time.monotonic()
             while not source.is_replaced():
                 if source.has_changed() or is_full:
                     batch = source.batch(epoch)
@@ -98,6 +96,9 @@ class Forwarder:
                         epoch = sink.put(batch, epoch)
                     source.was_sent(batch, epoch)
                     is_full = batch.is_full
+                if not is_said:  # one that is reached may still take nothing, time after time
+                    self._told, self._wait_s, is_said = "", FIRST_WAIT_S, True
+                    self._say(f"site {self._site} is forwarded to {place_of(self._url)}")
                 if once and not is_full:
                     return
                 if time.monotonic() - heard_s >= _HEARD_S:

@@ -266,6 +266,25 @@ def test_offline_and_back(archive: Archive, journal: Path) -> None:
             assert following.output.count("is not forwarded") == 1
 
 
+def test_an_archive_that_is_reached_and_takes_nothing_is_said_once(
+    archive: Archive, journal: Path
+) -> None:
+    kept(journal, scans(0, 50))
+    archive.do("REVOKE INSERT ON scan FROM lupin_forwarder")
+    with forwarder(archive, journal) as process:
+        process.wait_for_output("is not forwarded: the archive does not allow it")
+        for _ in range(2):
+            here = archive.select("SELECT since FROM forwarder")
+            wait_for(
+                lambda here=here: archive.select("SELECT since FROM forwarder") != here,  # type: ignore[misc]
+                "another try",
+            )
+        assert process.output.count("\n") == 1
+        archive.do("GRANT INSERT ON scan TO lupin_forwarder")
+        wait_until_equal(archive, journal)
+        process.wait_for_output(f"site {archive.site} is forwarded to")
+
+
 def test_a_journal_that_is_saved_from_damage_waits_until_it_is(
     archive: Archive, journal: Path
 ) -> None:

@@ -68,8 +68,9 @@ def check_url(url: str) -> dict[str, Any]:
         found = conninfo.conninfo_to_dict(url)
     except ProgrammingError:
         found = {}
-    # What was given is not repeated: there may be a password in it.
-    if not found:
+    # What was given is not repeated: there may be a password in it. With an @ of its own, part of
+    # the password counts as the host, which messages name; a socket without a file begins with @.
+    if not found or "@" in str(found.get("host", ""))[1:]:
         raise UsageError(
             "--archive-url is no address of a PostgreSQL, expected one such as"
             " postgresql://gh1@db.example/lupin"

@@ -148,3 +148,10 @@ def test_a_wrong_password_is_said_and_not_repeated(archive: Archive) -> None:
         finally:
             hba.write_text(before)
             owner.execute("SELECT pg_reload_conf()")
+
+
+def test_part_of_a_password_is_never_taken_for_a_host() -> None:
+    done = run("archive", "info", "--archive-url", "postgresql://gh1:one@two@127.0.0.1:1/lupin")
+    assert done.returncode == 2
+    assert "--archive-url is no address of a PostgreSQL" in done.stderr
+    assert "two@" not in done.stderr

@@ -226,6 +226,24 @@ def test_what_is_followed_answers_as_the_file_itself_does(apart: Apart) -> None:
     apart.are_same(apart.beside, apart.following)
 
 
+@pytest.mark.parametrize("harm", ["damaged", "deleted", "emptied"])
+def test_a_followed_file_that_is_harmed_is_copied_anew(apart: Apart, harm: str) -> None:
+    (file,) = apart.followed()
+    if harm == "damaged":
+        with file.open("r+b") as content:
+            content.seek(4096)
+            content.write(b"\xa5" * (file.stat().st_size - 4096))
+    else:
+        for part in file.parent.glob(f"{file.name}*"):
+            part.unlink()
+        if harm == "emptied":
+            file.touch()
+    apart.peer.observe(scan(harm, {"co2": 1.0}, stamp_s=T + 2.0))
+    asked(apart.following, f"/api/tags/{harm}", at=T + 100)
+    apart.are_same(apart.beside, apart.following)
+    assert apart.followed() == [file]
+
+
 def test_without_its_twin_web_answers_all_the_same_and_goes_on_with_the_next(apart: Apart) -> None:
     """Last: it ends the twin."""
     before = {path: apart.beside.http.get(path) for path in QUESTIONS[:-2]}

@@ -18,7 +18,14 @@ from typing import Final, TypeVar
 from lupin_bridge.twin.source import TwinUnavailableError
 from lupin_twin.journal.condition import UNKNOWN, Condition, JournalState
 from lupin_twin.journal.follow import Followed, Lot, NotALotError, followed, write
-from lupin_twin.journal.schema import FILE_ERRORS, Foreign, get_meta, open_reader
+from lupin_twin.journal.schema import (
+    FILE_ERRORS,
+    Empty,
+    Foreign,
+    get_meta,
+    open_reader,
+    says_damaged,
+)
 from lupin_twin.past import NotRemembered, PastRefused
 from lupin_twin.workers import Workers
 
@@ -144,21 +151,39 @@ class LogHere:
         self._own = None
         if self._folder is None:
             return RETRY_S
-        now = self._followed
-        after = now.last if now is not None and now.journal == told.journal_id else 0
-        if after == 0 and self._path(told.journal_id).exists():
-            self._followed = await self._on_worker(lambda: followed(self._path(told.journal_id)))
-            after = self._followed.last
-        lot = await self._ask(after)
-        if lot.journal != told.journal_id:
-            return RETRY_S  # it is another one since, and says so soon
-        self._followed = await self._on_worker(
-            lambda: write(self._path(lot.journal), lot, told.complete_ns)
-        )
+        here = self._path(told.journal_id)
+        try:
+            # Each time: another `web` may write it too, and anybody may delete it.
+            after = await self._on_worker(lambda: _last(here))
+            lot = await self._ask(after)
+            if lot.journal != told.journal_id:
+                return RETRY_S  # it is another one since, and says so soon
+            self._followed = await self._on_worker(
+                lambda: write(here, lot, told.complete_ns, after)
+            )
+        except FILE_ERRORS as error:
+            if says_damaged(error):
+                await self._on_worker(lambda: _set_aside(here))
+                log.warning("%s is damaged (%s): the log is copied anew", here, error)
+            raise
         return LOOK_S if lot.is_all else 0.0
 
     async def _on_worker(self, work: Callable[[], ResultT]) -> ResultT:
         return await asyncio.wrap_future(self._workers.submit(lambda _: work(), _WRITE_S))
+
+
+def _last(path: Path) -> int:
+    try:
+        return followed(path).last if path.exists() else 0
+    except Empty:  # whoever began it was killed
+        return 0
+
+
+def _set_aside(path: Path) -> None:
+    # A copy of what the twin has: one that is damaged is kept, the one before it is not.
+    for end in ("-wal", "-shm"):
+        path.with_name(path.name + end).unlink(missing_ok=True)
+    path.replace(path.with_suffix(".damaged"))
 
 
 def _is_journal(path: Path, journal: str) -> bool:

@@ -89,20 +89,22 @@ def read(connection: sqlite3.Connection, after: int, most: int = MAX_ROWS) -> Lo
         return Lot(_journal_id(connection), tuple(texts), last, is_all=True)
 
 
-def write(path: Path, lot: Lot, complete_ns: int | None) -> Followed:
-    """Put a lot into the file of its journal, made where there is none.
+def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Followed:
+    """Put a lot, which was asked for `behind` a number, into its journal's file, made if need be.
 
     `complete_ns` is up to when the journal had all, ROS time, before it was asked for the lot; None
     where more follows.
 
     Raises:
-        NotALotError: it cannot be what it says.
+        NotALotError: it cannot be what it says, or the file is no longer as far as `behind`.
         Foreign, sqlite3.Error, OSError: as `open_writer`.
 
     """
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     with closing(open_writer(path)) as connection:
         with transaction(connection):
+            if _last(connection) < behind:
+                raise NotALotError(f"rows behind number {behind} for a file that ends before it")
             set_meta(connection, "journal_id", lot.journal)
             try:
                 _put(connection, lot)

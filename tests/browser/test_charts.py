@@ -243,6 +243,54 @@ def test_hover_tells_the_time_and_a_click_goes_there(garden: Garden, open_page: 
     expect(hmi.test_id("chart-view")).to_have_count(0)
 
 
+def test_a_quantity_of_the_day_is_charted_where_its_sensor_is(
+    garden: Garden, open_page: OpenPage
+) -> None:
+    running, now_s = garden.bridge, time.time()
+    for start in range(0, 56, 28):
+        running.peer.observe(
+            *(
+                scan(
+                    "5",
+                    {"light": 10_000.0 + index},
+                    at=(1, 3),
+                    stamp_s=now_s - 100_000 + index * 1800,
+                )
+                for index in range(start, start + 28)
+            )
+        )
+        wait_for(
+            partial(_reads, running, "5", "light", 10_000.0 + start + 27), f"lot {start} of light"
+        )
+    period = f"period={round(now_s - 20_000, 3)},{round(now_s, 3)}"
+    hmi = open_page(running.url, f"tag=5&{period}")
+    expect(plot(hmi, "Light")).to_be_visible()
+    hmi.test_id("card-chart").get_by_label("Sensor").select_option("Daily light integral")
+    expect(plot(hmi, "Daily light integral")).to_be_visible()
+    told = running.json("/api/history", **asked(hmi, "daily_light_integral"))
+    assert told["unit"] == "mol/m²/d"
+    # 10,000 lx all day long.
+    assert told["readings"][-1]["value"] == pytest.approx(10_000 / 54 * 86_400 / 1e6, rel=0.03)
+    summary = plot(hmi, "Daily light integral").get_attribute("aria-label") or ""
+    assert f"{len(told['readings'])} readings" in summary
+    hmi.page.keyboard.press("c")
+    expect(hmi.test_id("chart-view").get_by_test_id("plot")).to_have_count(2)
+    # A tag without light has nothing to make it of: its own sensors are shown.
+    hmi = open_page(running.url, f"tag=2&sensor=daily_light_integral&{garden.period}")
+    expect(plot(hmi)).to_be_visible()
+    assert "daily_light_integral" not in {question["sensor_type"] for question in questions(hmi)}
+
+
+def _reads(running: Bridge, tag_id: str, sensor: str, value: float) -> bool:
+    tags = running.json("/api/state")["tags"]
+    return any(
+        (reading["name"], reading["value"]) == (sensor, value)
+        for tag in tags
+        if tag["tag_id"] == tag_id
+        for reading in tag["readings"]
+    )
+
+
 def test_on_a_phone_the_card_makes_room_for_its_charts(garden: Garden, open_page: OpenPage) -> None:
     hmi = open_page(garden.bridge.url, f"tag=1&{garden.period}", viewport=PHONE)
     card = hmi.test_id("tag-card")

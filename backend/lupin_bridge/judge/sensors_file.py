@@ -9,6 +9,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from lupin_bridge.judge.daily import DAILY
 from lupin_bridge.judge.derived import DERIVED
 from lupin_bridge.judge.ranges import Ranges, Sensor, Sensors, Span
 
@@ -20,6 +21,11 @@ MAX_SOURCE = 400
 _Name = Annotated[str, Field(max_length=MAX_TEXT)]
 _Limit = Annotated[float, Field(ge=-1e9, le=1e9)]
 _Share = Annotated[float, Field(ge=0, le=100)]
+# The sensors that each computed quantity is made of.
+_COMPUTED_OF = {
+    **{name: derived.sources for name, derived in DERIVED.items()},
+    **{name: (daily.sensor,) for name, daily in DAILY.items()},
+}
 # Those that the page speaks beside English, which is the `label` itself.
 Language = Literal["de", "es", "nl"]
 
@@ -71,9 +77,9 @@ class _Sensor(_DayAndNight):
     unit: _Name
     hue: Annotated[float, Field(ge=0, le=360)]
     lightness: _Share
-    # For who reads the file: what it is called in other languages, and whether it is computed here.
+    # For who reads the file: what it is called in other languages, and what it is computed of here.
     labels: dict[Language, Annotated[_Name, Field(min_length=1)]] = {}
-    derived: bool = False
+    derived: tuple[_Name, ...] = ()
     # What a sensor that works can read; and where all of this is from.
     plausible: tuple[_Limit, _Limit] | None = None
     source: Annotated[str, Field(max_length=MAX_SOURCE)] = ""
@@ -114,10 +120,10 @@ class _File(_Part):
     @model_validator(mode="after")
     def _says_what_is_derived(self) -> Self:
         for name, sensor in self.sensors.items():
-            if sensor.derived is not (name in DERIVED):
+            if sensor.derived != (of := _COMPUTED_OF.get(name, ())):
                 raise ValueError(
-                    f"sensors.{name}.derived is {sensor.derived}; computed here are "
-                    f"{' and '.join(sorted(DERIVED))} alone"
+                    f"sensors.{name}.derived is {list(sensor.derived)}, and must be {list(of)}:"
+                    f" computed here are {', '.join(sorted(_COMPUTED_OF))} alone"
                 )
         return self
 

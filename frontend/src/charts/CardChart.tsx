@@ -6,6 +6,7 @@ import { S } from '../strings';
 import { Icon } from '../widgets/Icon';
 import { modelOf, pairsOf } from './charted';
 import { PlotView } from './PlotView';
+import { SensorChoice } from './SensorChoice';
 import { useFeed } from './useFeed';
 import { useSensorsOf } from './useSensorsOf';
 import { pointsFor, useSize } from './useSize';
@@ -36,6 +37,7 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
   if (!plan) return null;
   return (
     <div className="card-chart" ref={place} data-testid="card-chart" data-state={fed.state}>
+      <SensorChoice tagId={tagId} value={plan.sensor} />
       {fed.state === 'missing' ? (
         <p className="faint">{S.chartMissingShort}</p>
       ) : (

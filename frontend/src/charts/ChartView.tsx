@@ -13,6 +13,7 @@ import { ChartFiles } from './ChartFiles';
 import { ChartState } from './ChartState';
 import { ChartTables } from './ChartTables';
 import { PlotView } from './PlotView';
+import { SensorChoice } from './SensorChoice';
 import { TagChoice } from './TagChoice';
 import { useFeed } from './useFeed';
 import { useSensorsOf } from './useSensorsOf';
@@ -70,6 +71,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
             act({ type: 'chart', chart: { by, tagIds: charted.tagIds } });
           }}
         />
+        <SensorChoice tagId={tagId} value={sensor} />
         <div className="chart-tools">
           <Tool icon="plus" label={S.chartZoomIn} onClick={zoom(0.5)} />
           <Tool icon="minus" label={S.chartZoomOut} onClick={zoom(2)} />

@@ -1,7 +1,9 @@
 import type { JSX } from 'react';
 
+import { isHad } from '../domain/sensors';
 import { shown } from '../domain/text';
 import { act, useApp } from '../store/app';
+import { selectSensor } from '../store/derived';
 import { selectTags } from '../store/moment';
 import { MOST_CHARTED } from '../store/view';
 import { S } from '../strings';
@@ -11,9 +13,11 @@ import { LineSign } from './PlotView';
 
 /** The tags of one chart: each can go, and another be added while there is room. */
 export function TagChoice({ tagIds }: { tagIds: readonly string[] }): JSX.Element {
-  const sensor = useApp((state) => state.view.sensor);
+  const sensor = useApp(selectSensor);
   const tags = useApp(selectTags);
-  const others = tags.filter(({ id, readings }) => readings.has(sensor) && !tagIds.includes(id));
+  const others = tags.filter(
+    ({ id, readings }) => isHad(sensor, (name) => readings.has(name)) && !tagIds.includes(id),
+  );
   const choose = (next: readonly string[]): void => {
     act({ type: 'chart', chart: { by: 'sensor', tagIds: next } });
   };

@@ -1,15 +1,22 @@
 import { useMemo } from 'react';
 
-import type { Catalogue } from '../domain/sensors';
+import { isHad, isMeasured, type Catalogue } from '../domain/sensors';
 import { useApp } from '../store/app';
-import { selectCatalogue } from '../store/derived';
+import { selectCatalogue, selectSensor } from '../store/derived';
 import { selectTag } from '../store/moment';
 
-/** The sensors that a tag has at the moment that is shown, in their usual order. */
+/**
+ * The sensors that a tag has at the moment that is shown, in their usual order; and what is in
+ * view, where it is computed of them.
+ */
 export function useSensorsOf(tagId: string): readonly string[] {
-  const names = useApp((state) =>
-    [...(selectTag(state, tagId)?.readings.keys() ?? [])].join('\u0000'),
-  );
+  const names = useApp((state) => {
+    const readings = selectTag(state, tagId)?.readings;
+    if (!readings) return '';
+    const inView = selectSensor(state);
+    const isComputed = !isMeasured(inView) && isHad(inView, (name) => readings.has(name));
+    return [...new Set([...readings.keys(), ...(isComputed ? [inView.name] : [])])].join('\u0000');
+  });
   const catalogue = useApp(selectCatalogue);
   return useMemo(
     () => inOrder(catalogue, names === '' ? [] : names.split('\u0000')),

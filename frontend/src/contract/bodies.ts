@@ -60,7 +60,7 @@ const SENSOR = object({
   unit: TEXT,
   hue: number,
   lightness: number,
-  derived: optional(boolean),
+  derived: optional(list(TEXT, MAX_SENSORS)),
   species: optional(record(object(RANGES), MAX_SENSORS)),
 });
 

@@ -79,7 +79,8 @@ export interface SensorEntry extends SensorRanges {
   /** Degrees and percent (HSL). */
   readonly hue: number;
   readonly lightness: number;
-  readonly derived?: boolean;
+  /** The sensors that it is computed of. */
+  readonly derived?: readonly string[];
   readonly species?: Readonly<Record<string, SensorRanges>>;
 }
 

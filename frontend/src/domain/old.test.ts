@@ -49,7 +49,7 @@ test('a field is made of the tags that read its sensor, old as the judge says of
   ]);
 });
 
-test('what is derived is old where two that it may be made of are', () => {
+test('what is derived is old where all that it is made of is', () => {
   const both = { temperature: 22, humidity: 60, co2: 600 };
   const tags = [tag('all', 1, both), tag('two', 2, both), tag('one', 3, both), tag('few', 4, {})];
   const { tags: said } = judgement({
@@ -63,6 +63,13 @@ test('what is derived is old where two that it may be made of are', () => {
     [2, true],
     [3, false],
   ]);
+  const ofDay = sensorNamed('temperature_night_minimum');
+  expect(readSites(tags, said, ofDay).map(({ at, isOld }) => [at.x, isOld])).toEqual([
+    [1, true],
+    [2, true],
+    [3, false],
+  ]);
+  expect(readSites(tags, said, sensorNamed('daily_light_integral'))).toEqual([]);
 });
 
 test('a cell is as old as the nearest reading', () => {

@@ -12,31 +12,22 @@ export interface ReadSite {
   readonly isOld: boolean;
 }
 
-/** A derived quantity is made of so many readings of one scan. */
-const MADE_OF = 2;
-
 /** The tags that a field of the sensor is made of. */
 export function readSites(
   tags: readonly Tag[],
   said: Judgement['tags'],
-  { name, isDerived }: Pick<Sensor, 'name' | 'isDerived'>,
+  { name, madeOf }: Pick<Sensor, 'name' | 'madeOf'>,
 ): ReadSite[] {
   return tags.flatMap(({ id, at, readings }) => {
-    const has = readings.get(name) ?? null;
-    const isDerivedHere = isDerived && !readings.has(name);
-    if (!at || (isDerivedHere ? countOf(readings) < MADE_OF : has === null)) return [];
+    const parts = madeOf.length > 0 && !readings.has(name) ? madeOf : [name];
+    if (!at || parts.some((part) => (readings.get(part) ?? null) === null)) return [];
     const old = said[id]?.reasons.filter(({ kind }) => kind === 'old') ?? [];
     // Without a sensor's name it is said of all that the tag has. Of what is derived no age is
     // told, but where one part alone is old it is of another scan, and nothing is derived of it.
-    const isOld =
-      old.some(({ sensor }) => sensor === '' || sensor === name) ||
-      (isDerivedHere && old.length >= MADE_OF);
+    const isOld = parts.every((part) => old.some(({ sensor }) => sensor === '' || sensor === part));
     return [{ at, isOld }];
   });
 }
-
-const countOf = (readings: Tag['readings']): number =>
-  [...readings.values()].filter((value) => value !== null).length;
 
 /** 1 where the nearest reading is too old, cell by cell, row 0 at the bottom; null: nowhere. */
 export function oldCells(grid: CellGrid, sites: readonly ReadSite[]): Uint8Array | null {

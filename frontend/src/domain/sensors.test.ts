@@ -1,7 +1,7 @@
 import { describe, expect, test } from 'vitest';
 
 import { CATALOGUE, CATALOGUES, FILE, sensorNamed } from '../testing/sensors';
-import { cataloguesOf, isMeasured, NO_CATALOGUES, rangesFor } from './sensors';
+import { cataloguesOf, isHad, isMeasured, NO_CATALOGUES, rangesFor } from './sensors';
 
 test('every look comes from the file, in its order', () => {
   expect(CATALOGUE.all.map(({ name }) => name)).toEqual(Object.keys(FILE.sensors));
@@ -19,8 +19,16 @@ test('an undeclared sensor shows its own name, is never judged, and stays the sa
 
 test('declared sensors first, then the others by name, each once', () => {
   const names = CATALOGUE.with(['zinc', 'humidity', 'ph', 'zinc']).map(({ name }) => name);
-  expect(names).toEqual([...CATALOGUE.all.map(({ name }) => name), 'ph', 'zinc']);
-  expect(CATALOGUE.with(['humidity'])).toBe(CATALOGUE.all);
+  expect(names.slice(0, 2)).toEqual(['temperature', 'humidity']);
+  expect(names.slice(-3)).toEqual(['condensation_margin', 'ph', 'zinc']);
+});
+
+test('what is of a day is offered by charts, and else only while it is in view', () => {
+  const offered = (...reported: string[]): string[] =>
+    CATALOGUE.with(reported).map(({ name }) => name);
+  expect(offered()).not.toContain('co2_dose');
+  expect(offered('co2_dose').filter((name) => name === 'co2_dose')).toEqual(['co2_dose']);
+  expect(offered('co2_dose')).not.toContain('daily_light_integral');
 });
 
 test('a sensor is called what the file calls it in that language, else its label, else its name', () => {
@@ -33,7 +41,25 @@ test('a sensor is called what the file calls it in that language, else its label
 
 test('the file says what is derived', () => {
   const derived = CATALOGUE.all.filter((sensor) => !isMeasured(sensor));
-  expect(derived.map(({ name }) => name)).toEqual(['vpd', 'dew_point', 'condensation_margin']);
+  expect(derived.map(({ name }) => name)).toEqual([
+    ...['vpd', 'dew_point', 'condensation_margin', 'daily_light_integral', 'temperature_24h_mean'],
+    ...['temperature_night_minimum', 'day_night_difference', 'growing_degree_days', 'co2_dose'],
+  ]);
+  expect(sensorNamed('vpd').madeOf).toEqual(['temperature', 'humidity']);
+  expect(sensorNamed('daily_light_integral').madeOf).toEqual(['light']);
+});
+
+test('a tag has what it measures, and what is computed of all that it measures', () => {
+  const has = (name: string, ...measured: string[]): boolean =>
+    isHad(sensorNamed(name), (each) => measured.includes(each));
+  expect(has('light', 'light')).toBe(true);
+  expect(has('light', 'co2')).toBe(false);
+  expect(has('ph')).toBe(false);
+  expect(has('daily_light_integral', 'light')).toBe(true);
+  expect(has('daily_light_integral', 'temperature')).toBe(false);
+  expect(has('vpd', 'temperature')).toBe(false);
+  expect(has('vpd', 'temperature', 'humidity')).toBe(true);
+  expect(has('vpd', 'vpd')).toBe(true);
 });
 
 describe('ranges', () => {

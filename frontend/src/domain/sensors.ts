@@ -27,8 +27,8 @@ export interface Sensor extends Ranges {
   readonly saturation: number;
   readonly lightness: number;
   readonly maxAlpha: number;
-  /** Computed of what was measured: there are fields of it, and no readings. */
-  readonly isDerived: boolean;
+  /** The sensors that it is computed of: there are fields and a past of it, and no readings. */
+  readonly madeOf: readonly string[];
   /** Whose its ranges are; null: by day and by night they are the same. */
   readonly part: 'day' | 'night' | null;
   /** Species with ranges of their own, by their name in lower case. */
@@ -36,7 +36,16 @@ export interface Sensor extends Ranges {
 }
 
 /** Whether tags can have readings of it: what is derived is told where it is a reason. */
-export const isMeasured = ({ isDerived }: Sensor): boolean => !isDerived;
+export const isMeasured = ({ madeOf }: Sensor): boolean => madeOf.length === 0;
+
+/** What is computed of one sensor alone is made of its readings of a day: charts offer it. */
+const isOfDay = ({ madeOf }: Sensor): boolean => madeOf.length === 1;
+
+/** Whether a tag that has these sensors has it, or what it takes to compute it. */
+export const isHad = (
+  { name, madeOf }: Pick<Sensor, 'name' | 'madeOf'>,
+  has: (sensor: string) => boolean,
+): boolean => has(name) || (madeOf.length > 0 && madeOf.every(has));
 
 /** What holds for plants of a species; of one that is not known, what holds for all. */
 export const rangesFor = (sensor: Sensor, species: string): Ranges =>
@@ -71,10 +80,12 @@ export class Catalogue {
 
   /** All sensors to offer: the declared ones, then others that some tag reports, by name. */
   with(reported: Iterable<string>): readonly Sensor[] {
-    const others = [...new Set(reported)].filter((name) => !this.#known.has(name)).sort();
-    return others.length === 0
-      ? this.all
-      : [...this.all, ...others.map((name) => this.named(name))];
+    const names = new Set(reported);
+    const others = [...names].filter((name) => !this.#known.has(name)).sort();
+    return [
+      ...this.all.filter((sensor) => !isOfDay(sensor) || names.has(sensor.name)),
+      ...others.map((name) => this.named(name)),
+    ];
   }
 }
 
@@ -95,7 +106,7 @@ export function cataloguesOf(file: SensorsFile, language: string = LANGUAGE): Ca
       lightness: entry.lightness,
       saturation: file.ramp.saturation,
       maxAlpha: file.ramp.max_alpha,
-      isDerived: entry.derived ?? false,
+      madeOf: entry.derived ?? [],
       part: entry.night ? (isDay ? 'day' : 'night') : null,
       ...rangesOf(entry, isDay),
       species: new Map(

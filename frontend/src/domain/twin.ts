@@ -41,6 +41,8 @@ export interface Tag {
   readonly observation: string;
   readonly species: string;
   readonly speciesConfidence: number | null;
+  /** The species whose ranges hold; empty where the camera was not sure, as the bridge judges. */
+  readonly sureSpecies: string;
   readonly anomaly: boolean;
   readonly flowerCount: number;
   readonly bugCount: number;
@@ -95,6 +97,9 @@ export function whenOf(time: WireTime, { at, takenAt }: TakenState): When {
   return takenAt - Math.max(0, age) * 1000;
 }
 
+/** Below it the bridge judges by what holds for all: `sure_species` of the twin. */
+const SURE = 0.5;
+
 /** Reads a tag of a state. */
 export function tagOf(wire: TwinTagState, state: TakenState): Tag {
   const { takenAt } = state;
@@ -121,6 +126,7 @@ export function tagOf(wire: TwinTagState, state: TakenState): Tag {
     observation: timeKey(wire.last_observed),
     species: wire.species,
     speciesConfidence: wire.species_confidence,
+    sureSpecies: (wire.species_confidence ?? 0) >= SURE ? wire.species : '',
     anomaly: wire.anomaly,
     flowerCount: wire.flower_count,
     bugCount: wire.bug_count,

@@ -4,7 +4,7 @@ import { fieldWith } from '../testing/field';
 import { showField, showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { act, store } from './app';
-import { selectColumns, selectHealth, selectRange, selectSensors } from './derived';
+import { selectColumns, selectHealth, selectRange, selectSensors, selectZones } from './derived';
 
 beforeEach(() => {
   showTags([
@@ -41,6 +41,16 @@ describe('range in use', () => {
     act({ type: 'sensor', sensor: 'co2' });
     expect(selectRange(store.get())).toBeNull();
   });
+});
+
+test('the plants of a place count for its colours where the camera was sure of them', () => {
+  const ideals = (confidence: number | null): unknown => {
+    showTags([wireTag({ species: 'tulip', species_confidence: confidence })]);
+    return selectZones(store.get(), fieldWith([[15]])).kinds.map(({ ideal }) => ideal);
+  };
+  expect(ideals(0.5)).toEqual([[12, 20]]);
+  expect(ideals(0.49)).toEqual([[18, 26]]);
+  expect(ideals(null)).toEqual([[18, 26]]);
 });
 
 test('an undeclared sensor that a tag reports can be chosen', () => {

@@ -99,7 +99,7 @@ export function selectRange(state: AppState): Range | null {
   return range(low, high);
 }
 
-const siteOf = ({ at, species }: Tag): Site[] => (at ? [{ at, species }] : []);
+const siteOf = ({ at, sureSpecies: species }: Tag): Site[] => (at ? [{ at, species }] : []);
 const sitesIn = memoOne((tags: readonly Tag[]): readonly Site[] => tags.flatMap(siteOf));
 
 /** New tags whose places and plants are those of before keep the list. */
@@ -131,7 +131,7 @@ export function selectColouring(state: AppState): ViewState['colouring'] {
   const hasIdeal =
     sensor.ideal !== null ||
     (sensor.species.size > 0 &&
-      selectTags(state).some(({ species }) => rangesFor(sensor, species).ideal));
+      selectTags(state).some(({ sureSpecies }) => rangesFor(sensor, sureSpecies).ideal));
   return hasIdeal ? state.view.colouring : 'value';
 }
 

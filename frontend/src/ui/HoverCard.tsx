@@ -71,7 +71,9 @@ function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
           const sensor = catalogue.named(name);
           const value = tag.readings.get(name);
           const how =
-            value == null ? null : idealText(sensor, rangesFor(sensor, tag.species), value, unit);
+            value == null
+              ? null
+              : idealText(sensor, rangesFor(sensor, tag.sureSpecies), value, unit);
           return (
             <div key={name} data-sensor={name} data-chosen={name === chosen}>
               <dt>{shown(sensor.label, 20)}</dt>
@@ -89,7 +91,10 @@ function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
       </dl>
       {hidden > 0 && <p className="faint">{S.cardMore(hidden)}</p>}
       {names.length === 0 && <p className="faint">{S.cardNoReadings}</p>}
-      <p className="faint">{tag.species ? <bdi>{shown(tag.species, 28)}</bdi> : S.unclassified}</p>
+      <p className="faint">
+        {tag.species ? <bdi>{shown(tag.species, 28)}</bdi> : S.unclassified}
+        {tag.species && !tag.sureSpecies && ` (${S.notSure})`}
+      </p>
     </div>
   );
 }

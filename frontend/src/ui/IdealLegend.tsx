@@ -13,7 +13,7 @@ export function IdealLegend({ sensor }: { sensor: Sensor }): JSX.Element {
   const unit = useApp((state) => state.settings.unit);
   // The species of the house that have an ideal of their own, as one text: the same for the same.
   const own = useApp((state) =>
-    [...new Set(selectTags(state).map(({ species }) => species.toLowerCase()))]
+    [...new Set(selectTags(state).map(({ sureSpecies }) => sureSpecies.toLowerCase()))]
       .filter((species) => sensor.species.has(species))
       .sort()
       .join('\u0000'),

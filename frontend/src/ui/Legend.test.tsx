@@ -86,7 +86,11 @@ describe('legend', () => {
 
   test('tells what the colours mean against the ideal, and has one click to either', () => {
     act({ type: 'colouring', colouring: 'ideal' });
-    const species = { species: 'Tulip', readings: readings({ temperature: 20 }) };
+    const species = {
+      species: 'Tulip',
+      species_confidence: 0.8,
+      readings: readings({ temperature: 20 }),
+    };
     showTags([wireTag(species)], judgement({}, { is_day: false, source: 'light' }));
     render(<Legend kiosk={false} />);
     expect(

@@ -42,11 +42,22 @@ describe('card', () => {
     expect(card.textContent).toContain('x 1.00 m, y 2.00 m');
   });
 
+  test('below half sure of its species it says so, and names the ideal range of all', () => {
+    const unsure = { species: 'Tulip', species_confidence: 0.49 };
+    showTags([wireTag({ tag_id: '7', ...unsure, readings: readings({ temperature: 9 }) })]);
+    render(<TagCard tagId="7" />);
+    expect(document.querySelector('.card-ideal')?.textContent).toContain('18.0 to 26.0');
+    expect(screen.getByRole('complementary').textContent).toContain(
+      'Tulip 49\u00a0% sure (not sure)',
+    );
+  });
+
   test('names the ideal range of its species, and whether it is that of day or night', () => {
     const tags = [
       wireTag({
         tag_id: '7',
         species: 'Tulip',
+        species_confidence: 0.5,
         readings: readings({ temperature: 9, soil_moisture: 30 }),
       }),
     ];

@@ -109,7 +109,7 @@ function CardBody({
             key={name}
             name={name}
             value={value}
-            species={tag.species}
+            species={tag.sureSpecies}
             health={health}
             when={tag.readAt.get(name) ?? 'never'}
             unit={unit}
@@ -140,6 +140,7 @@ function CardBody({
             {tag.species && tag.speciesConfidence !== null && (
               <span className="faint"> {S.confidence(percentText(tag.speciesConfidence))}</span>
             )}
+            {tag.species && !tag.sureSpecies && ` (${S.notSure})`}
           </dd>
         </div>
         <div>

@@ -58,7 +58,7 @@ def test_every_judged_sensor_of_it_has_a_source_and_what_is_measured_can_be_plau
     text = files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8")
     for name, entry in json.loads(text)["sensors"].items():
         assert re.search(r"(19|20)\d\d", entry["source"]), name
-        assert ("plausible" in entry) is not entry.get("derived", False), name
+        assert ("plausible" in entry) is not ("derived" in entry), name
     temperature = parse(text).named("temperature")
     assert [temperature.is_plausible(value) for value in (-300.0, -40.0, 80.0, 80.1)] == (
         [False, True, True, False]
@@ -85,15 +85,21 @@ def test_what_is_wrong_with_limits_and_sources_is_told(path: str, value: Any, wh
 
 def test_the_file_says_what_is_derived() -> None:
     vpd = {"label": "", "unit": "kPa", "hue": 1, "lightness": 50, "ideal": None}
-    with pytest.raises(SensorsError, match=r"sensors\.vpd\.derived is False; computed here"):
+    with pytest.raises(SensorsError, match=r"sensors\.vpd\.derived is \[\], and must be \['temp"):
         parse(text_with("sensors/vpd", vpd))
-    assert parse(text_with("sensors/vpd", vpd | {"derived": True})).named("vpd").unit == "kPa"
+    assert (
+        parse(text_with("sensors/vpd", vpd | {"derived": ["temperature", "humidity"]}))
+        .named("vpd")
+        .unit
+        == "kPa"
+    )
     with pytest.raises(
-        SensorsError, match=r"derived is True; computed here are condensation_margin "
+        SensorsError,
+        match=r"derived is \['light'\], and must be \[\]: computed here are co2_dose, ",
     ):
-        parse(text_with("sensors/temperature/derived", True))
-    with pytest.raises(SensorsError, match=r"derived: Input should be a valid boolean, not 1"):
-        parse(text_with("sensors/vpd", vpd | {"derived": 1}))
+        parse(text_with("sensors/temperature/derived", ["light"]))
+    with pytest.raises(SensorsError, match=r"derived: Input should be a valid array, not True"):
+        parse(text_with("sensors/vpd", vpd | {"derived": True}))
 
 
 def test_every_sensor_has_a_hue_of_its_own() -> None:

@@ -51,6 +51,7 @@ export const TAGS: In<typeof ENGLISH> = {
   sensorFailed: 'ausgefallen',
   sensorFailedLong: 'Der Sensor hat keinen Wert geliefert',
   confidence: (percent) => `zu ${percent} sicher`,
+  notSure: 'nicht sicher',
   unclassified: 'nicht bestimmt',
   tableButton: 'Spalten und Zeilen',
   tableColumns: 'Spalten',

@@ -46,6 +46,7 @@ export const TAGS = {
   sensorFailed: 'failed',
   sensorFailedLong: 'The sensor gave no number',
   confidence: (percent: string): string => `${percent} sure`,
+  notSure: 'not sure',
   unclassified: 'not classified',
   tableButton: 'Columns and rows',
   tableColumns: 'Columns',

@@ -50,6 +50,7 @@ export const TAGS: In<typeof ENGLISH> = {
   sensorFailed: 'averiado',
   sensorFailedLong: 'El sensor no dio ningún valor',
   confidence: (percent) => `seguro al ${percent}`,
+  notSure: 'no es seguro',
   unclassified: 'sin clasificar',
   tableButton: 'Columnas y filas',
   tableColumns: 'Columnas',

@@ -51,6 +51,7 @@ export const TAGS: In<typeof ENGLISH> = {
   sensorFailed: 'uitgevallen',
   sensorFailedLong: 'De sensor gaf geen waarde',
   confidence: (percent) => `${percent} zeker`,
+  notSure: 'niet zeker',
   unclassified: 'niet bepaald',
   tableButton: 'Kolommen en rijen',
   tableColumns: 'Kolommen',

@@ -15,7 +15,7 @@ from tests.support.domains import own_domain
 from tests.support.live import attached
 from tests.support.messages import scan
 from tests.support.processes import limits, lupin_twin
-from tests.support.waiting import PATIENCE_S
+from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, bridge
 
 # No machine is too busy for an answer: the process that looks back gives way to all others.
@@ -124,7 +124,8 @@ def goes_back_while_the_past_is_asked(twin: Bridge, live: Bridge, seconds: int) 
     for path in asked[1:]:
         assert live.json(path)["to"]["sec"] == seconds
     # What it knew it knows still.
-    [tag] = live.json("/api/state", at=seconds)["tags"]
+    found = wait_for(lambda: live.json("/api/state", at=seconds)["tags"], "the new run in the log")
+    [tag] = found
     assert [reading["value"] for reading in tag["readings"]] == [2.0]
 
 

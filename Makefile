@@ -26,7 +26,7 @@ BENCH_ENV := ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_LOG_DIR=$(CURDIR)/$(DON
 
 say = @printf '\033[1m==> %s\033[0m\n'
 
-.PHONY: help setup run docs check quick test lint types collect unit hmi-test dist bench bench-live soak clean
+.PHONY: help setup run run-fleet docs check quick test lint types collect unit hmi-test dist bench bench-live soak clean
 
 help: ## what there is
 	@grep -E '^[a-z-]+:.*## ' Makefile | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -34,6 +34,10 @@ help: ## what there is
 run: setup ## twin, bridge, HMI and the simulated patrol on http://127.0.0.1:8000 (PORT=…, HOST=…)
 	$(say) 'demo on http://$(HOST):$(PORT) (Ctrl-C ends it)'
 	@exec $(BIN)/lupin-twin demo --host $(HOST) --port $(PORT) $(ARGS)
+
+run-fleet: setup $(DONE)/tools ## three simulated greenhouses, a PostgreSQL and the page over them, on the same address
+	$(say) 'three greenhouses on http://$(HOST):$(PORT) (Ctrl-C ends it)'
+	@exec $(BIN)/python -m tests.support.run_fleet --host $(HOST) --port $(PORT) $(ARGS)
 
 setup: $(DONE)/python $(DONE)/hmi ## everything that `make run` needs; nothing to do the second time
 
@@ -144,17 +148,13 @@ unit: setup docs $(DONE)/tools ## Python tests, real ROS and real browser includ
 	$(say) 'Python tests: units, ROS over DDS, browser'
 	@$(TEST_ENV) $(BIN)/pytest -q -n 3 --dist worksteal tests
 
-$(DONE)/bench: pyproject.toml $(DONE)/python
-	@env -u PYTHONPATH $(BIN)/pip install --quiet -e '.[bench]'
-	@touch $@
-
-bench: setup $(DONE)/tools $(DONE)/bench ## measure: ratios side by side, nothing asserted
+bench: setup $(DONE)/tools ## measure: ratios side by side, nothing asserted
 	@$(BENCH_ENV) $(BIN)/python -m tests.bench $(ARGS)
 
 bench-live: setup ## the live bridge with up to 5,000 clients, in five minutes
 	@$(BENCH_ENV) $(BIN)/python -m tests.bench.bench_live $(ARGS)
 
-soak: setup ## 50 kills under load, and eight hours of writing in a few minutes: what must hold for long
+soak: setup ## 50 kills under load, of the archive too, and eight hours of writing in a few minutes: what must hold for long
 	@$(TEST_ENV) $(BIN)/python -m tests.soak $(ARGS)
 
 clean: ## remove everything that set-up and builds have made

@@ -16,14 +16,15 @@ from typing import Any, Final
 from unittest import mock
 from xml.sax.saxutils import escape
 
-from lupin_bridge import cli, metrics
+from lupin_bridge import metrics
 from lupin_bridge.app import FRAMES, ROUTED, create_app
-from lupin_bridge.configuration import CONFIG_VARIABLE, SECRETS
+from lupin_bridge.cli import command
+from lupin_bridge.cli.configuration import CONFIG_VARIABLE, SECRETS
 from lupin_bridge.settings import limits_of, option, table, variable
 from lupin_patrol import cli as patrol_cli
-from lupin_twin import interfaces
-from lupin_twin.launching import ARGUMENTS
-from lupin_twin.parameters import TwinParameters, describe
+from lupin_twin.core import interfaces
+from lupin_twin.core.parameters import TwinParameters, describe
+from lupin_twin.ros.launch_arguments import ARGUMENTS
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 MESSAGES: Final = ROOT / "ros_node" / "lupin_msgs"
@@ -136,7 +137,7 @@ def commands() -> str:
     with mock.patch.dict(os.environ, {"COLUMNS": _HELP_COLUMNS}):
         sections = [
             part
-            for parser in (*_parsers(cli.parser()), patrol_cli.parser())
+            for parser in (*_parsers(command.parser()), patrol_cli.parser())
             for part in (f"## {parser.prog}", block(parser.format_help()))
         ]
     return page(

@@ -1,6 +1,6 @@
 """The field by DESIGN.md's definition, as the plainest double loop: what the tests compare to.
 
-Nothing here is fast and nothing is shared with `lupin_twin.idw`.
+Nothing here is fast and nothing is shared with `lupin_twin.field.idw`.
 """
 
 from __future__ import annotations

@@ -14,12 +14,12 @@ from pathlib import Path
 import pytest
 import yaml
 
-from lupin_bridge import journal_command
-from lupin_bridge.cli import USAGE_ERROR, main, parser, split_ros_args
-from lupin_bridge.configuration import settings_from, strange_variables
+from lupin_bridge.cli import journal
+from lupin_bridge.cli.command import USAGE_ERROR, main, parser, split_ros_args
+from lupin_bridge.cli.configuration import settings_from, strange_variables
+from lupin_bridge.feed.source import STUCK_AFTER_S
 from lupin_bridge.settings import variable
-from lupin_bridge.twin.source import STUCK_AFTER_S
-from lupin_twin.memory import journal_path
+from lupin_twin.runtime.memory import journal_path
 from tests.support.domains import ros_env
 from tests.support.processes import Process, lupin_twin, url_of
 from tests.support.programs import program
@@ -142,10 +142,10 @@ def test_the_service_serves_and_the_journal_command_finds_its_file(
     with Process(command, ros_env(domain, **env), afresh=True) as process:
         url_of(process)
         assert process.output.startswith("sourced\n")
-        folder = Path(moved(str(journal_command.SERVICE_FOLDER)))
+        folder = Path(moved(str(journal.SERVICE_FOLDER)))
         file = folder / f"domain-{domain}.sqlite"
         assert file.is_file()
-        monkeypatch.setattr(journal_command, "SERVICE_FOLDER", folder)
+        monkeypatch.setattr(journal, "SERVICE_FOLDER", folder)
         assert main(["journal", "info", "--domain", str(domain)]) == 0
         assert str(file) in capsys.readouterr().out
 

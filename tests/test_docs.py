@@ -13,16 +13,18 @@ from fastapi.routing import APIRoute, APIWebSocketRoute
 
 from lupin_bridge import metrics
 from lupin_bridge.app import FRAMES, ROUTED, create_app
-from lupin_bridge.cli import parser
-from lupin_twin import interfaces
-from lupin_twin.launching import ARGUMENTS
-from lupin_twin.parameters import TwinParameters
+from lupin_bridge.cli.command import parser
+from lupin_twin.core import interfaces
+from lupin_twin.core.parameters import TwinParameters
+from lupin_twin.ros.launch_arguments import ARGUMENTS
 from tests.support.docs import DOCS, ROOT, blocks, name_of, pages, without_blocks
 from tests.support.structure import PACKAGES, ROOMS
 
 GENERATOR = runpy.run_path(str(DOCS / "generate.py"))
 REFERENCE = {name: page() for name, page in GENERATOR["PAGES"].items()}
 EVERY_PAGE = pytest.mark.parametrize("page", pages(), ids=name_of)
+# Those of `lupin-twin fleet` beside the bridge's.
+FLEET_ROUTES = {"/api/sites", "/ws/sites"}
 # What the docs show of other programs.
 FOREIGN_OPTIONS = {
     "--find-links",
@@ -167,7 +169,7 @@ def test_every_parameter_and_variable_that_a_page_names_is_one(page: Path) -> No
 @EVERY_PAGE
 def test_every_route_topic_and_metric_that_a_page_names_is_one(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
-    routes = set(re.findall(r"`(?:GET )?(/[^`\s]*)`", REFERENCE["http"]))
+    routes = set(re.findall(r"`(?:GET )?(/[^`\s]*)`", REFERENCE["http"])) | FLEET_ROUTES
     # A name that goes on in another route, such as `/api/tags`, is a good enough name.
     known = [re.sub(r"\\\{.*?\\\}", "[^/]+", re.escape(route)) for route in routes]
     for named in re.findall(r"(?:`|:8000|\.example)(/(?:api|ws)/[\w{}/.-]*)", text):
@@ -224,8 +226,15 @@ def test_the_bridges_page_names_every_room_and_no_file_that_is_not_there() -> No
 
 def test_the_ros_packages_page_names_every_module_of_the_twin_and_none_that_is_not_there() -> None:
     text = (ROOT / "ros_node" / "README.md").read_text(encoding="utf-8")
-    modules = {file.name for file in PACKAGES["lupin_twin"].glob("*.py")} - {"__init__.py"}
-    assert set(re.findall(r"(?<=`)\w+\.py(?=`)", text)) - {"oracle_idw.py"} == modules
+    twin = PACKAGES["lupin_twin"]
+    modules = {
+        file.relative_to(twin).as_posix()
+        for room in (".", "core", "field", "ros", "runtime")
+        for file in (twin / room).glob("*.py")
+        if file.name != "__init__.py"
+    }
+    named = set(re.findall(r"(?<=`)[\w/]+\.py(?=`)", text)) - {"oracle_idw.py"}
+    assert {name for name in named if not name.startswith("estimate/")} == modules
 
 
 def test_the_tests_page_names_every_folder_and_no_file_that_is_not_there() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import yaml
 from lupin_msgs import srv
 
-from lupin_twin.interfaces import SERVICES
+from lupin_twin.core.interfaces import SERVICES
 from tests.support.docs import pages
 
 TYPES = {f"/{service.name}": service.type_name for service in SERVICES}

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from lupin_twin.journal.rebuild import upgrade
 from lupin_twin.journal.schema import open_reader
-from lupin_twin.journal.upgrade import upgrade
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "log.md").read_text(encoding="utf-8")

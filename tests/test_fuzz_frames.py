@@ -14,8 +14,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from lupin_bridge.serving.client_messages import MAX_BURST
-from lupin_bridge.serving.ws_protocol import FRAMES_AT_ONCE
+from lupin_bridge.serving.ws_protocol import FRAMES_AT_ONCE, MAX_BURST
 from tests.support.messages import scan
 from tests.support.proc_stat import open_files, peak_mb, reset_peak, resident_mb
 from tests.support.raw_ws import (

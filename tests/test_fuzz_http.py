@@ -18,7 +18,7 @@ from hypothesis import HealthCheck, settings
 from schemathesis.specs.openapi.checks import positive_data_acceptance
 
 from lupin_bridge.access.middleware import MAX_TARGET_BYTES
-from lupin_bridge.openapi import document
+from lupin_bridge.app import document
 from tests.support.messages import look, occupancy_grid, scan
 from tests.support.proc_stat import open_files, peak_mb, reset_peak, resident_mb
 from tests.support.processes import limits

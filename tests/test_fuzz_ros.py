@@ -16,7 +16,12 @@ import pytest
 from lupin_msgs.msg import SensorReading, TwinState
 
 from lupin_bridge.stream import schema
-from lupin_twin.bounds import MAX_BLOOMS_PER_TAG, MAX_SENSORS_PER_TAG, MAX_TAGS, MAX_TEXT_LENGTH
+from lupin_twin.core.drops import (
+    MAX_BLOOMS_PER_TAG,
+    MAX_SENSORS_PER_TAG,
+    MAX_TAGS,
+    MAX_TEXT_LENGTH,
+)
 from tests.support.domains import own_domain
 from tests.support.hostile import (
     ANY,

@@ -47,7 +47,7 @@ def installed(clone: Path, folder: Path) -> Path:
 
 
 def started(package: Path, domain: int) -> Process:
-    command = [sys.executable, "-m", "lupin_bridge.cli", "web", "--port", "0"]
+    command = [sys.executable, "-m", "lupin_bridge.cli.command", "web", "--port", "0"]
     return Process(command, ros_env(domain, PYTHONPATH=str(package)))
 
 

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import random
 import signal
-import subprocess
-import sys
+import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
-from tests.support.archive import Archive, forwarder, rows_of, run, wait_until_equal
-from tests.support.journal import select
+from lupin_twin.journal.beside import mark_of
+from tests.support.archive import Archive, forwarder, rows_of, wait_until_equal
+from tests.support.archive_killing import RATE, count, kill_and_compare, twin
 from tests.support.messages import scan
 from tests.support.postgres import Postgres, server
-from tests.support.processes import OFTEN, Process, children_of, lupin_twin, url_of
+from tests.support.processes import OFTEN, children_of, lupin_twin, url_of
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
 
 MOMENTS = 6
-RATE = 300
 
 
 @pytest.fixture(scope="module")
@@ -30,57 +28,41 @@ def postgresql() -> Iterator[Postgres]:
         yield made
 
 
-@contextmanager
-def twin(journal: Path, first: int) -> Iterator[subprocess.Popen[bytes]]:
-    """A process with a twin's journal alone, under load; killed at the end."""
-    words = (str(journal), str(RATE), "8000000", str(first))
-    with subprocess.Popen(
-        [sys.executable, "-m", "tests.support.journal_child", *words],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-    ) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
-
-
-def count(journal: Path) -> int:
-    rows = select(journal, "SELECT coalesce(max(seq), 0) FROM scan")
-    return int(str(rows[0][0])) if rows else 0
-
-
 def test_kills_at_any_moment_lose_nothing_and_double_nothing(
     postgresql: Postgres, tmp_path: Path
 ) -> None:
-    archive, journal = Archive(postgresql), tmp_path / "journal.sqlite"
-    chance = random.Random(23)
-    first = 0
-    with ExitStack() as stack:
-        recording = stack.enter_context(twin(journal, first))
-        wait_for(lambda: count(journal) > 0, "a journal")
-        following: Process = stack.enter_context(forwarder(archive, journal))
-        for moment in range(MOMENTS):
-            enough = count(journal) + chance.randrange(50, 2 * RATE)
-            wait_for(lambda enough=enough: count(journal) >= enough, "the moment")  # type: ignore[misc]
-            match ("forwarder", "postgres", "twin")[moment % 3]:
-                case "forwarder":
-                    following.kill()
-                    following = stack.enter_context(forwarder(archive, journal))
-                case "postgres":
-                    postgresql.kill()
-                    postgresql.start()
-                case "twin":
-                    recording.kill()
-                    recording.wait()
-                    first += 1_000_000
-                    recording = stack.enter_context(twin(journal, first))
-        recording.communicate()
-        wait_until_equal(archive, journal)
-        assert following.exit_code is None
-    assert count(journal) > MOMENTS * 50
-    checked = run("archive", "check", "--archive-url", archive.owner)
-    assert checked.returncode == 0, checked.stdout
+    assert kill_and_compare(postgresql, tmp_path, MOMENTS, seed=23) > MOMENTS * 20
+
+
+def test_a_standby_that_is_promoted_is_gone_on_with_and_has_what_was_acknowledged(
+    tmp_path: Path,
+) -> None:
+    journal = tmp_path / "journal.sqlite"
+    with server() as primary:
+        archive = Archive(primary)
+        with server(primary=primary) as standby, ExitStack() as stack:
+            archive.hosts.append(standby.folder)
+            recording = stack.enter_context(twin(journal))
+            wait_for(lambda: count(journal) > 0, "a journal")
+            following = stack.enter_context(forwarder(archive, journal))
+            wait_for(lambda: len(archive.rows()["scan"]) > 2 * RATE, "rows in both")
+            primary.kill()
+            following.wait_for_output("is not forwarded: the archive cannot be reached")
+            acknowledged = int(mark_of(journal).read_text().split()[1])
+            archive.server = standby
+            ((replicated,),) = archive.select("SELECT forwarded_seq FROM epoch")
+            assert replicated >= acknowledged > 2 * RATE
+            standby.promote()
+            missing = count(journal)
+            begun_s = time.monotonic()
+            wait_for(
+                lambda: archive.select("SELECT max(seq) FROM scan")[0][0] > missing, "new rows"
+            )
+            took_s = time.monotonic() - begun_s
+            recording.communicate()
+            wait_until_equal(archive, journal)
+            assert following.exit_code is None
+            assert took_s < 10.0, took_s
 
 
 def test_serve_forwards_and_lives_through_the_end_of_archive_and_forwarder(

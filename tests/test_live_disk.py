@@ -33,7 +33,7 @@ def disk(tmp_path: Path, library: Path) -> Disk:
     return Disk(folder, library, tmp_path / "control")
 
 
-class Told:
+class TwinUpdate:
     """What the child has said of its journal."""
 
     def __init__(self, child: subprocess.Popen[str]) -> None:
@@ -59,7 +59,7 @@ class Told:
 
 
 @contextmanager
-def feeding(disk: Disk, log_bytes: int = 8_000_000) -> Iterator[Told]:
+def feeding(disk: Disk, log_bytes: int = 8_000_000) -> Iterator[TwinUpdate]:
     """A child that hands rows over; ends it by ending its input."""
     command = [sys.executable, "-m", "tests.support.journal_child"]
     child = subprocess.Popen(
@@ -70,7 +70,7 @@ def feeding(disk: Disk, log_bytes: int = 8_000_000) -> Iterator[Told]:
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
     )
-    told = Told(child)
+    told = TwinUpdate(child)
     try:
         yield told
     finally:
@@ -128,7 +128,15 @@ def test_a_journal_in_a_read_only_folder_can_be_read(disk: Disk) -> None:
     disk.be("readonly")
     for action, said in (("info", "scans      1, of them 0 failed"), ("check", f"{path} is whole")):
         done = subprocess.run(
-            [sys.executable, "-m", "lupin_bridge.cli", "journal", action, "--journal", path],
+            [
+                sys.executable,
+                "-m",
+                "lupin_bridge.cli.command",
+                "journal",
+                action,
+                "--journal",
+                path,
+            ],
             env=disk.env,
             check=True,
             capture_output=True,

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from lupin_twin.journal.lock import Lock
+from lupin_twin.journal.beside import Lock
 from tests.support.inprocess import Running, run, running
 from tests.support.journal import SECOND, is_whole, kept, scan, select
 from tests.support.messages import scan as observation
@@ -78,14 +78,14 @@ async def shows(live: Running, tag_id: str, value: float) -> None:
     await until(
         lambda: any(
             tag.tag_id == tag_id and tag.readings[0].value == value
-            for tag in live.twin.told.snapshot.tags
+            for tag in live.twin.update.snapshot.tags
         ),
         f"{value} at tag {tag_id}",
     )
 
 
 @pytest.mark.parametrize("damage", [truncated, flipped, no_database])
-def test_a_damaged_file_is_set_aside_read_as_far_as_it_goes_and_named(
+def test_a_damaged_file_is_quarantined_read_as_far_as_it_goes_and_named(
     damage: Callable[[Path], None], domain: int, tmp_path: Path
 ) -> None:
     path = tmp_path / "j.sqlite"
@@ -95,11 +95,11 @@ def test_a_damaged_file_is_set_aside_read_as_far_as_it_goes_and_named(
     async def test() -> None:
         with Peer(domain) as robot:
             async with serve(path) as live:
-                journal = await told(live, "recording", "a damaged journal was set aside as")
+                journal = await told(live, "recording", "a damaged journal was quarantined as")
                 aside = Path(journal["set_aside"])
                 assert aside.name.startswith("j.sqlite.damaged-")
                 assert aside.read_bytes() == broken
-                known = {tag.tag_id for tag in live.twin.told.snapshot.tags}
+                known = {tag.tag_id for tag in live.twin.update.snapshot.tags}
                 assert known == ({"7"} if damage is not no_database else set())
                 robot.observe(observation("8", {"co2": 1.0}))
                 await shows(live, "8", 1.0)

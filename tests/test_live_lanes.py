@@ -10,7 +10,7 @@ from contextlib import AsyncExitStack
 import httpx
 import pytest
 
-from lupin_bridge.serving.limits import Limits
+from lupin_bridge.serving.admission import Limits
 from tests.support.domains import own_domain
 from tests.support.journal import NOW, SECOND, kept, scan
 from tests.support.processes import OFTEN, Process, limits, lupin_twin, url_of

@@ -16,8 +16,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from lupin_msgs.msg import Observation
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
-from lupin_bridge.twin.web_node import REPORT_HOLDS_S
-from lupin_twin.inputs import SETTLED_S
+from lupin_bridge.feed.web_node import REPORT_HOLDS_S
+from lupin_twin.ros.inputs import SETTLED_S
 from tests.support.domains import ros_env
 from tests.support.live import attached, wait_until_ready
 from tests.support.messages import scan

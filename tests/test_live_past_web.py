@@ -5,11 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import json
+import sqlite3
 import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
@@ -226,7 +227,7 @@ def test_what_is_followed_answers_as_the_file_itself_does(apart: Apart) -> None:
     apart.are_same(apart.beside, apart.following)
 
 
-@pytest.mark.parametrize("harm", ["damaged", "deleted", "emptied"])
+@pytest.mark.parametrize("harm", ["damaged", "deleted", "emptied", "foreign", "folder"])
 def test_a_followed_file_that_is_harmed_is_copied_anew(apart: Apart, harm: str) -> None:
     (file,) = apart.followed()
     if harm == "damaged":
@@ -238,6 +239,11 @@ def test_a_followed_file_that_is_harmed_is_copied_anew(apart: Apart, harm: str) 
             part.unlink()
         if harm == "emptied":
             file.touch()
+        elif harm == "folder":
+            file.mkdir()
+        elif harm == "foreign":
+            with closing(sqlite3.connect(file)) as other:
+                other.execute("CREATE TABLE theirs (x)")
     apart.peer.observe(scan(harm, {"co2": 1.0}, stamp_s=T + 2.0))
     asked(apart.following, f"/api/tags/{harm}", at=T + 100)
     apart.are_same(apart.beside, apart.following)
@@ -303,4 +309,4 @@ def test_a_killed_twin_is_asked_nothing_and_who_asked_it_before_is_told(domain: 
         for answer in answers:
             assert answer.status_code == 503, answer.text
             assert int(answer.headers["retry-after"]) >= 1
-        assert "nothing was heard on /twin/state for 3 s" in answers[0].json()["detail"]
+        assert "nothing was received on /twin/state for 3 s" in answers[0].json()["detail"]

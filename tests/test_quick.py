@@ -17,13 +17,13 @@ FILES = sorted(TESTS.rglob("test_*.py"))
 @pytest.mark.parametrize(
     ("name", "quick"),
     [
-        ("twin/test_idw.py", True),
-        ("twin/test_node.py", False),  # imports rclpy
+        ("twin/field/test_idw.py", True),
+        ("twin/ros/test_node.py", False),  # imports rclpy
         ("bridge/access/test_policy.py", True),
         ("bridge/access/test_middleware.py", False),  # starts a bridge
         ("bridge/test_settings.py", True),
         ("bridge/test_supervisor.py", False),
-        ("browser/test_geometry.py", False),
+        ("browser/test_house.py", False),
         ("test_deploy.py", False),  # asks systemd
         ("test_docs.py", True),  # the command's module, which imports ROS when it runs
         ("test_live_nginx.py", False),
@@ -42,7 +42,7 @@ def test_a_need_is_found_through_any_module_and_not_in_functions(tmp_path: Path)
         ("import rclpy.node", False),
         ("from tests.support import processes", False),
         ("from tests.support.web import bridge", False),
-        ("from lupin_bridge import roles", False),
+        ("from lupin_bridge.cli import roles", False),
         ("try:\n    import rclpy\nexcept ImportError:\n    pass", False),
         ("def test():\n    import rclpy", True),
     ):

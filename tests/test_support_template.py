@@ -17,7 +17,7 @@ from tests.support.template import Template
 from tests.support.waiting import PATIENCE_S, wait_for
 
 TWIN = (sys.executable, "-m", "lupin_twin.cli", *OFTEN)
-MISTAKEN = (sys.executable, "-m", "lupin_bridge.cli", "serve", "--port", "x")
+MISTAKEN = (sys.executable, "-m", "lupin_bridge.cli.command", "serve", "--port", "x")
 
 
 @pytest.fixture(scope="module")

@@ -1,60 +1,33 @@
-"""The FastAPI application: every route, and the page."""
+"""The FastAPI application: every route, and the page.
+
+`python -m lupin_bridge.app` writes its OpenAPI document, without a twin and without ROS.
+"""
 
 from __future__ import annotations
 
+import sys
 from functools import cache
 from pathlib import Path
 
+import orjson
 from fastapi import FastAPI, Response, WebSocket
 from starlette.requests import HTTPConnection
 from starlette.staticfiles import StaticFiles
 
 from lupin_bridge import __version__
-from lupin_bridge.access.entrance import ComesIn, Entrance
-from lupin_bridge.access.middleware import Access, AccessControl
-from lupin_bridge.access.security import ReadOnly
+from lupin_bridge.access.middleware import Access, AccessControl, ReadOnly
+from lupin_bridge.access.policy import BehindProxies, Proxies
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.routes import alarms as routes_alarms
-from lupin_bridge.routes import docs_page, guide, no_page
-from lupin_bridge.routes import estimate as routes_estimate
-from lupin_bridge.routes import estimate_report as routes_estimate_report
-from lupin_bridge.routes import export as routes_export
-from lupin_bridge.routes import field as routes_field
-from lupin_bridge.routes import foxglove as routes_foxglove
-from lupin_bridge.routes import health as routes_health
-from lupin_bridge.routes import judge as routes_judge
-from lupin_bridge.routes import map as routes_map
-from lupin_bridge.routes import past as routes_past
-from lupin_bridge.routes import rosbridge as routes_rosbridge
-from lupin_bridge.routes import signin as routes_signin
-from lupin_bridge.routes import state as routes_state
-from lupin_bridge.routes.tools import error_response
-from lupin_bridge.serving.goodbye import EndsWithTheBridge
-from lupin_bridge.serving.http_protocol import PieceByPiece
-from lupin_bridge.serving.metering import Metered
+from lupin_bridge.routes import estimate, field, pages, past, sockets, state, status
+from lupin_bridge.routes.answers import add_refusals, error_response
+from lupin_bridge.serving.middleware import EndsAtShutdown, Metered, PieceByPiece
 from lupin_bridge.stream import schema
 
 STATIC_FOLDER = Path(__file__).parent / "static"
 GUIDE_FOLDER = Path(__file__).parent / "guide"
 
 # Every module whose `router` has routes.
-ROUTED = (
-    routes_state,
-    routes_rosbridge,
-    routes_foxglove,
-    routes_field,
-    routes_estimate,
-    routes_estimate_report,
-    routes_past,
-    routes_export,
-    routes_map,
-    routes_judge,
-    routes_alarms,
-    routes_health,
-    routes_signin,
-    docs_page,
-    guide,
-)
+ROUTED = (state, sockets, field, estimate, past, status, pages)
 
 
 def has_page(static_folder: Path = STATIC_FOLDER) -> bool:
@@ -66,13 +39,13 @@ def create_app(
     bridge: Bridge | None,
     static_folder: Path = STATIC_FOLDER,
     access: Access | None = None,
-    entrance: Entrance | None = None,
+    proxies: Proxies | None = None,
     guide_folder: Path = GUIDE_FOLDER,
 ) -> FastAPI:
     """The application around a bridge that its caller starts and stops.
 
     Without a bridge it can only describe itself (OpenAPI). Without `access` it goes by the names
-    of this machine, and asks for no token. Without `entrance`, who asks is who is connected.
+    of this machine, and wants no token. Without `proxies`, the client is the connected peer.
     """
     access = access or Access()
     app = FastAPI(
@@ -88,22 +61,23 @@ def create_app(
     app.state.access = access
     for module in ROUTED:
         app.include_router(module.router)
-    # The last one added is the first to be asked.
+    # The last one added runs first.
     if bridge is not None:
         app.add_middleware(PieceByPiece)
-        app.add_middleware(EndsWithTheBridge, goodbye=bridge.goodbye)
+        app.add_middleware(EndsAtShutdown, shutdown=bridge.shutdown)
     app.add_middleware(ReadOnly)
     app.add_middleware(AccessControl, access=access)
-    app.add_middleware(ComesIn, entrance=entrance or Entrance())
+    app.add_middleware(BehindProxies, proxies=proxies or Proxies())
     if bridge is not None:
         app.add_middleware(Metered, note=bridge.note_answer)
     app.add_exception_handler(404, _not_found)
-    guide.add_to(app, guide_folder)
+    add_refusals(app)
+    pages.add_guide(app, guide_folder)
     app.add_api_websocket_route("/{path:path}", _no_websocket)
     if has_page(static_folder):
         app.mount("/", StaticFiles(directory=static_folder, html=True), name="hmi")
     else:
-        app.include_router(no_page.router)
+        app.include_router(pages.no_page_router)
     _describe_frames(app)
     return app
 
@@ -151,3 +125,14 @@ def _describe_frames(app: FastAPI) -> None:
         return document
 
     app.openapi = with_frames  # type: ignore[method-assign]  # FastAPI's documented way
+
+
+@cache
+def document() -> bytes:
+    """The document as indented JSON with a newline at its end."""
+    options = orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE
+    return orjson.dumps(create_app(None).openapi(), option=options)
+
+
+if __name__ == "__main__":
+    sys.stdout.buffer.write(document())

@@ -14,31 +14,28 @@ from typing import Final
 from lupin_bridge.alarms.board import AlarmBoard, Board
 from lupin_bridge.alarms.feed import AlarmFeed
 from lupin_bridge.alarms.ledger import Change
-from lupin_bridge.estimates.following import EstimateFollower, Reports
-from lupin_bridge.foxglove.offer import Offer
-from lupin_bridge.judge.choosing import Criteria
-from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced
+from lupin_bridge.feed.estimates import EstimateFollower, Reports
+from lupin_bridge.feed.shared_work import Shared
+from lupin_bridge.feed.source import TwinSource, TwinUpdate
+from lupin_bridge.judge.alarm import reasons_of_days
+from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced, unjudged
+from lupin_bridge.judge.options import Criteria
 from lupin_bridge.metrics import Metrics, Sample
-from lupin_bridge.outward.channels import Channels
-from lupin_bridge.outward.payloads import Seen
-from lupin_bridge.past.asked import Answered
-from lupin_bridge.past.learning import learn_recent
-from lupin_bridge.serving.admission import Admission
-from lupin_bridge.serving.goodbye import Goodbye
-from lupin_bridge.serving.kept import Answer, Kept
-from lupin_bridge.serving.limits import Limits
-from lupin_bridge.serving.metering import route_class
-from lupin_bridge.serving.rate_limit import RateLimit
+from lupin_bridge.notify.channels import Channels
+from lupin_bridge.notify.messages import GreenhouseState
+from lupin_bridge.past.plans import Answered
+from lupin_bridge.past.recent_scans import learn_recent
+from lupin_bridge.serving.admission import Admission, Answer, AnswerCache, Limits, RateLimit
+from lupin_bridge.serving.middleware import Shutdown, route_class
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import FrameWriter, text_frame
-from lupin_bridge.stream.health_json import alarms_frame, told_of
+from lupin_bridge.stream.health_json import alarms_frame, alarms_in_frame
 from lupin_bridge.stream.hub import Client, Hub
 from lupin_bridge.stream.status import Liveness, Status
-from lupin_bridge.twin.shared import Shared
-from lupin_bridge.twin.source import Told, TwinSource
-from lupin_twin.diagnostics import Origin
-from lupin_twin.drops import LATE, LOST, Reason
-from lupin_twin.state import NANOSECONDS_PER_SECOND
+from lupin_bridge.viewers.foxglove_session import Offer
+from lupin_twin.core.diagnostics import Origin
+from lupin_twin.core.drops import LATE, LOST, Reason
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
 
 log = logging.getLogger(__name__)
 
@@ -87,15 +84,17 @@ class Bridge:
         self.admission = Admission(
             limits.answers_per_s, limits.concurrency, limits.total_concurrency
         )
-        self.kept = Kept()
+        self.cache = AnswerCache()
         self.answering: Shared[Answer] = Shared()
         self.looking_back: Shared[Answered] = Shared()
-        self.goodbye = Goodbye()
+        self.shutdown = Shutdown()
         self.frames = FrameWriter()
         self.offer = Offer(source)
         self.criteria = criteria or Criteria.of(settings)
         self._judge = Judge(self.criteria.sensors, self.criteria.day, self.criteria.recent_s)
         self._judged = NOTHING_JUDGED
+        self._states_unjudged = 0
+        self._is_judge_failing = False
         self.reports = Reports(source)
         self._estimates = EstimateFollower(
             source,
@@ -112,18 +111,18 @@ class Bridge:
         self.http_answers: Counter[str] = Counter()
         self.metrics = Metrics(self._measure, self._count)
         self.alarms_raised = 0
-        self.kept_state: Hashable = None
+        self.cached_state: Hashable = None
         self.state_number = 0
-        self._latest: Told | None = None
-        self._told: Status | None = None
-        self._pushed: Told | None = None
+        self._latest: TwinUpdate | None = None
+        self._published: Status | None = None
+        self._pushed: TwinUpdate | None = None
         self._pushed_s = 0.0
         self._pace = RateLimit(limits.frames_per_s, PACE_BURST)
         self._push_timer: asyncio.TimerHandle | None = None
         self._watch: asyncio.Task[None] | None = None
         self._learning: asyncio.Task[None] | None = None
         self._has_alarms = asyncio.Event()
-        self._telling_alarms: asyncio.Task[None] | None = None
+        self._publishing_alarms: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
         """Start the source and the watch.
@@ -133,16 +132,16 @@ class Bridge:
 
         """
         await self.source.start(self._on_state, self._on_death)
-        self._tell_status()
+        self._publish_status()
         self._watch = asyncio.create_task(self._keep_watch(), name="watch")
-        self._telling_alarms = asyncio.create_task(self._tell_alarms(), name="alarm frames")
+        self._publishing_alarms = asyncio.create_task(self._publish_alarms(), name="alarm frames")
         self.outward.start(self, self.criteria.sensors)
         self._alarm_feed.start()
         self._estimates.start()
 
     async def stop(self) -> None:
-        """Stop them, and what tells others; the clients were told by `say_goodbye`."""
-        for task in (self._watch, self._learning, self._telling_alarms):
+        """Stop them, and the channels; `announce_shutdown` has notified the clients."""
+        for task in (self._watch, self._learning, self._publishing_alarms):
             if task is not None:
                 task.cancel()
                 with contextlib.suppress(asyncio.CancelledError):
@@ -153,16 +152,16 @@ class Bridge:
             self._push_timer.cancel()
         await asyncio.gather(self.outward.stop(), self.source.stop())
 
-    def say_goodbye(self) -> None:
+    def announce_shutdown(self) -> None:
         """Tell every client that the bridge is about to go, those who wait for an answer too."""
         self.liveness.shutting_down = True
-        self._tell_status()
-        self.goodbye.say()
+        self._publish_status()
+        self.shutdown.begin()
 
     # --- for the routes -----------------------------------------------------------------------
 
     @property
-    def latest(self) -> Told | None:
+    def latest(self) -> TwinUpdate | None:
         """The newest state, before any pacing; None while no twin was heard."""
         return self._latest
 
@@ -184,7 +183,7 @@ class Bridge:
         snapshot = self._latest.snapshot
         if snapshot.clock != "running":  # paused: it stands
             return snapshot.now_ns
-        since_s = self._clock() - self.liveness.last_state_s
+        since_s = self._clock() - self.liveness.last_state_s + self.liveness.silent_s
         return self._latest.snapshot.stamp_ns + int(since_s * NANOSECONDS_PER_SECOND)
 
     @property
@@ -196,10 +195,10 @@ class Bridge:
         """For how long those of each tag do, by the rhythm of now."""
         return self._judge.holds_ns()
 
-    def seen(self) -> Seen:
+    def seen(self) -> GreenhouseState:
         """How the house is now, for who tells others of it."""
         latest, status = self._latest, self.status
-        return Seen(
+        return GreenhouseState(
             snapshot=None if latest is None else latest.snapshot,
             judged=self.judged,
             board=self.alarms.now,
@@ -213,7 +212,7 @@ class Bridge:
 
     def join(self, client: Client) -> None:
         """Add a listener; it has the status and the current state when this returns."""
-        self._tell_status()  # so that nobody hears of it before the others
+        self._publish_status()  # all clients get it at once
         self.hub.join(client, self._clock())
 
     def serve(self, client: Client) -> None:
@@ -277,6 +276,7 @@ class Bridge:
         )
         yield "lupin_tags", len(tags)
         yield "lupin_tags_pinned", sum(tag.pose is not None for tag in tags)
+        yield "lupin_judge_errors", self._judge.errors + self._states_unjudged
         yield "lupin_alarms_known", self.alarms.now.source != "starting"
         yield "lupin_alarms_active", len(self.alarms.now.active)
         yield "lupin_alarms_missed", self._alarm_feed.missed
@@ -299,11 +299,12 @@ class Bridge:
 
     # --- from the source ----------------------------------------------------------------------
 
-    def _on_state(self, state: Told) -> None:
+    def _on_state(self, state: TwinUpdate) -> None:
         self._latest = state
         self.state_number += 1
         now_s = self._clock()
         self.liveness.last_state_s = now_s
+        self.liveness.silent_s = state.silent_s
         self.liveness.twin_count = state.twin_count
         self.liveness.has_map = state.occupancy_map is not None
         self.liveness.clock = state.snapshot.clock
@@ -314,7 +315,7 @@ class Bridge:
         self._alarm_feed.on_state(state)
         if self._push_timer is not None:
             return  # it will take this state along
-        if self._is_old_news(state, now_s):
+        if self._is_redundant(state, now_s):
             return
         self._push_when_due()
 
@@ -327,7 +328,7 @@ class Bridge:
         else:
             self._push()
 
-    def _is_old_news(self, state: Told, now_s: float) -> bool:
+    def _is_redundant(self, state: TwinUpdate, now_s: float) -> bool:
         """Whether this is a mere heartbeat, and a frame has just gone out.
 
         It would tell nobody anything, and a change right behind it would have to wait for its turn.
@@ -346,21 +347,34 @@ class Bridge:
             return
         now_s = self._clock()
         self._pushed, self._pushed_s = state, now_s
-        self._tell_status()
+        self._publish_status()
         # A source answers once it has started, which it may not have as it tells its first state.
         if self._watch is not None and self._learning is None and state.snapshot.tags:
             work = learn_recent(self.source, self._judge, state.snapshot)
             self._learning = asyncio.create_task(work, name="recent")
-        self._judged = self._judge.see(state.snapshot)
+        self._judged = self._judge_state(state.snapshot)
         self.hub.publish(self.frames.state(state.snapshot, state.revision, self._judged), now_s)
         self.metrics.push_seconds.observe(time.monotonic() - state.made_s)
+
+    def _judge_state(self, snapshot: Snapshot) -> Judged:
+        try:
+            judged = self._judge.see(snapshot)
+        except Exception:  # whatever it is: the state itself goes out
+            self._states_unjudged += 1
+            if not self._is_judge_failing:
+                log.exception("the state could not be judged: every status is unknown")
+            self._is_judge_failing = True
+            return unjudged(snapshot)
+        self._is_judge_failing = False
+        return judged
 
     def _on_alarms(self, change: Change) -> None:
         if not change.is_past:
             self.alarms_raised += sum(alarm.is_active for alarm in change.changed)
+        self._judge.note_days(reasons_of_days(self.alarms.now.active))
         self._has_alarms.set()
 
-    async def _tell_alarms(self) -> None:
+    async def _publish_alarms(self) -> None:
         """The newest alarms, again and again; a frame of a thousand is written by a worker."""
         while True:
             await self._has_alarms.wait()
@@ -368,34 +382,34 @@ class Bridge:
             now, now_ns = self.alarms.now, self.ros_time_ns
 
             def write(_: object, now: Board = now, now_ns: int | None = now_ns) -> bytes:
-                told = told_of(now.page, now_ns)
-                return text_frame(alarms_frame(told, now.source, now.since_ns))
+                shown = alarms_in_frame(now.page, now_ns)
+                return text_frame(alarms_frame(shown, now.source, now.since_ns))
 
             try:
                 wire = await asyncio.wrap_future(self.source.workers.submit(write, ALARMS_S))
-                self.hub.tell_alarms(wire, self._clock())
-            except Exception:  # nobody waits for this task: the next alarms are told
-                log.exception("the newest alarms were told to nobody")
+                self.hub.publish_alarms(wire, self._clock())
+            except Exception:  # nobody waits for this task: the next alarms are sent
+                log.exception("the newest alarms could not be sent")
                 continue
             # Of many alarms that change all the time, no more is sent than a browser can take.
             await asyncio.sleep(max(ALARMS_REST_S, len(wire) / ALARM_BYTES_PER_S))
 
     def _on_death(self) -> None:
         self.liveness.thread_dead = True
-        self._tell_status()
+        self._publish_status()
 
     # --- the watch ----------------------------------------------------------------------------
 
-    def _tell_status(self) -> None:
+    def _publish_status(self) -> None:
         self.liveness.outward = self.outward.status()
         status = self.status
-        if not status.is_news_after(self._told):
+        if not status.is_news_after(self._published):
             return
         is_good = (status.is_live and status.twin_count <= 1) or status.reason == "shutting_down"
-        first = self._told is None
-        if (first and not is_good) or (self._told and status.says_more_than(self._told)):
+        first = self._published is None
+        if (first and not is_good) or (self._published and status.says_more_than(self._published)):
             log.log(logging.INFO if is_good else logging.WARNING, "%s", status.message)
-        self._told = status
+        self._published = status
         if status.reason not in ("never_seen", "shutting_down"):
             last = self._latest
             self._alarm_feed.on_silence(
@@ -408,7 +422,7 @@ class Bridge:
         while True:
             await asyncio.sleep(WATCH_PERIOD_S)
             try:
-                self._tell_status()
+                self._publish_status()
                 now_s = self._clock()
                 if not self.status.is_live:
                     self.hub.remind(now_s)

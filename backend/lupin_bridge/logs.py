@@ -12,7 +12,7 @@ from collections.abc import Hashable
 from datetime import UTC, datetime
 from typing import Final
 
-# Of what is said again and again: so many at once of our own, and one a period from then on.
+# Of a repeated message: so many at once of our own, and one a period from then on.
 AT_ONCE: Final = 20
 PERIOD_S: Final = 5.0
 # Of all that one logger says.
@@ -22,7 +22,7 @@ MAX_KINDS: Final = 1_000
 
 _NUMBER: Final = re.compile(r"(?:0x)?[0-9a-f]*[0-9][0-9a-f]*", re.IGNORECASE)
 
-# uvicorn's words, with a trace that tells nothing: the bytes were a stranger's.
+# uvicorn's words, with a trace of no use: the bytes were a stranger's.
 _NO_TEXT: Final = "Invalid UTF-8 sequence received from client."
 
 
@@ -57,7 +57,7 @@ class Ration:
     def __len__(self) -> int:
         return len(self._kinds)
 
-    def ask(self, kind: Hashable, at_once: int, now_s: float) -> int | None:
+    def admit(self, kind: Hashable, at_once: int, now_s: float) -> int | None:
         """How many of the kind were held back since the last one, or None: this one is, too."""
         through_s, held_back = self._kinds.pop(kind, (now_s, 0))
         through_s = max(through_s, now_s) + self._period_s
@@ -88,8 +88,8 @@ class OnceInAWhile(logging.Filter):
         text = record.getMessage() if record.msg == "%s" else str(record.msg)
         error = record.exc_info[0] if record.exc_info else None
         kind = (record.name, record.levelno, _NUMBER.sub("#", text[:200].partition("\n")[0]), error)
-        held_back = self._kinds.ask(kind, AT_ONCE if is_ours(record.name) else 1, now_s)
-        if held_back is None or self._loggers.ask(record.name, LOGGER_AT_ONCE, now_s) is None:
+        held_back = self._kinds.admit(kind, AT_ONCE if is_ours(record.name) else 1, now_s)
+        if held_back is None or self._loggers.admit(record.name, LOGGER_AT_ONCE, now_s) is None:
             return False
         if record.msg == _NO_TEXT:
             record.exc_info = record.exc_text = None
@@ -120,5 +120,5 @@ def set_up(log_format: str, level: str = "info") -> None:
     logging.root.setLevel(max(least, logging.INFO))
     for ours in ("lupin_bridge", "lupin_twin"):
         logging.getLogger(ours).setLevel(least)
-    # Its news (started, waiting, connection open) are ours to tell, once.
+    # Its news (started, waiting, connection open) are logged here, once.
     logging.getLogger("uvicorn").setLevel(max(least, logging.WARNING))

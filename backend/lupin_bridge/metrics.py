@@ -56,6 +56,7 @@ COUNTERS: Final = {
     "lupin_alarms_missed": "observations that were received too late for the alarms they belong to",
     "lupin_alarms_raised": "alarms raised since the start; those of the past are not counted",
     "lupin_ros_callback_errors": "errors met by ROS callbacks",
+    "lupin_judge_errors": "errors met in judging a tag or a state, whose status is then unknown",
     "lupin_field_cache_hits": "fields served from the cache",
     "lupin_field_cache_misses": "fields that had to be computed",
     "lupin_work_abandoned": "computations that were ended because nobody waited any more",

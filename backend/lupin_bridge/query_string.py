@@ -1,4 +1,4 @@
-"""A query string, read by the dataclass that says what may stand in it, and OpenAPI told of it.
+"""A query string, read by the dataclass of its parameters, which also describes it to OpenAPI.
 
 pydantic reads, and is imported as it does: what looks back knows queries, and has no use for it.
 """
@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final, TypeVar
 
 from annotated_types import Len
 
-from lupin_twin.bounds import MAX_TEXT_LENGTH
+from lupin_twin.core.drops import MAX_TEXT_LENGTH
 
 QueryT = TypeVar("QueryT")
 MOMENT: Final = "ROS seconds as a decimal number, or ISO 8601 with an offset"

@@ -17,18 +17,10 @@ class SettingError(ValueError):
     """A setting that cannot be; the message names it, its value and the limit."""
 
 
-def _setting(default: Any, group: str, help_text: str) -> Any:
-    return field(default=default, metadata={"group": group, "help": help_text})
-
-
-LISTENING: Final = "listening"
-ACCESS: Final = "access"
-PROXY: Final = "behind a proxy"
-JUDGEMENT: Final = "judgement"
-MQTT: Final = "MQTT"
-WEBHOOK: Final = "webhook"
-ARCHIVE: Final = "archive"
-LOG: Final = "log"
+def _setting(default: Any, group: str, help_text: str, *, is_private: bool = False) -> Any:
+    """A line of the table; `is_private`: a password may be in it, so no message repeats it."""
+    metadata = {"group": group, "help": help_text, "is_private": is_private}
+    return field(default=default, metadata=metadata)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,97 +28,106 @@ class Settings:
     """How the bridge serves, as `configuration.settings_from` found it right. Times are seconds."""
 
     host: Annotated[str, MinLen(1)] = _setting(
-        "127.0.0.1", LISTENING, "address to listen on; other machines need 0.0.0.0 or ::"
+        "127.0.0.1", "listening", "address to listen on; other machines need 0.0.0.0 or ::"
     )
     port: Annotated[int, Interval(ge=0, le=65_535)] = _setting(
-        8000, LISTENING, "port to listen on; 0: any free one"
+        8000, "listening", "port to listen on; 0: any free one"
     )
     tls_cert: str = _setting(
-        "", LISTENING, "PEM file with the certificate chain: serve https and wss"
+        "", "listening", "PEM file with the certificate chain: serve https and wss"
     )
     tls_key: str = _setting(
-        "", LISTENING, "PEM file with the certificate's private key, not encrypted"
+        "", "listening", "PEM file with the certificate's private key, not encrypted"
     )
     max_clients: Annotated[int, Interval(ge=1, le=100_000)] = _setting(
-        5_000, LISTENING, "WebSocket clients at most"
+        5_000, "listening", "WebSocket clients at most"
     )
     token_file: str = _setting(
-        "", ACCESS, "file with the token that readers have to know, a line of text"
+        "", "access", "file with the token that readers have to know, a line of text"
     )
     allow_host: tuple[str, ...] = _setting(
-        (), ACCESS, "another name of the bridge, such as twin.example; may be given more than once"
+        (),
+        "access",
+        "another name of the bridge, such as twin.example; may be given more than once",
     )
     allow_origin: tuple[str, ...] = _setting(
         (),
-        ACCESS,
+        "access",
         "origin whose pages may read the bridge too, and whose host is a name of the bridge, such "
         "as https://panel.example; may be given more than once",
     )
     trusted_proxy: tuple[str, ...] = _setting(
         (),
-        PROXY,
+        "behind a proxy",
         "address or network of a reverse proxy whose X-Forwarded-For and X-Forwarded-Proto are "
         "believed, such as 127.0.0.1 or 10.0.0.0/24; may be given more than once",
     )
     path_prefix: str = _setting(
-        "", PROXY, "path that a proxy serves the bridge below, such as /gh1"
+        "", "behind a proxy", "path that a proxy serves the bridge below, such as /gh1"
     )
     sensors: str = _setting(
         "",
-        JUDGEMENT,
+        "judgement",
         "JSON file with every sensor's label, unit, colour and ranges, instead of our own",
     )
     reading_validity_s: Annotated[float, Interval(ge=0.0, le=604_800.0)] = _setting(
         0.0,
-        JUDGEMENT,
+        "judgement",
         "how long a reading is valid, s; 0: three times the tag's own usual interval",
     )
     day_hours: str = _setting(
         "06:00-20:00",
-        JUDGEMENT,
+        "judgement",
         "from when to when it is day where no light is measured; 00:00-00:00: always",
     )
     time_zone: str = _setting(
         "",
-        JUDGEMENT,
+        "judgement",
         "such as Europe/Amsterdam: for the hours of the day; empty: this machine's",
     )
     mqtt_url: str = _setting(
         "",
-        MQTT,
+        "MQTT",
         "MQTT broker, such as mqtt://broker.lan or mqtts://broker.lan:8883: readings, verdicts and "
         "alarms go there",
+        is_private=True,
     )
-    mqtt_user: str = _setting("", MQTT, "who the bridge is to the broker")
-    mqtt_password_file: str = _setting("", MQTT, "file with that user's password, a line of text")
-    mqtt_ca: str = _setting("", MQTT, "PEM file with who signs the broker's certificate")
-    mqtt_prefix: str = _setting("lupin-twin", MQTT, "what the topics begin with, such as farm/gh1")
+    mqtt_user: str = _setting("", "MQTT", "who the bridge is to the broker")
+    mqtt_password_file: str = _setting("", "MQTT", "file with that user's password, a line of text")
+    mqtt_ca: str = _setting("", "MQTT", "PEM file with who signs the broker's certificate")
+    mqtt_prefix: str = _setting(
+        "lupin-twin", "MQTT", "what the topics begin with, such as farm/gh1"
+    )
     mqtt_discovery_prefix: str = _setting(
         "homeassistant",
-        MQTT,
+        "MQTT",
         "where Home Assistant looks for devices; empty: they are not announced",
     )
     webhook_url: str = _setting(
-        "", WEBHOOK, "http or https address that changes of alarms are posted to"
+        "",
+        "webhook",
+        "http or https address that changes of alarms are posted to",
+        is_private=True,
     )
     webhook_secret_file: str = _setting(
-        "", WEBHOOK, "file with the secret that signs them, a line of text"
+        "", "webhook", "file with the secret that signs them, a line of text"
     )
-    webhook_ca: str = _setting("", WEBHOOK, "PEM file with who signs the receiver's certificate")
+    webhook_ca: str = _setting("", "webhook", "PEM file with who signs the receiver's certificate")
     site: str = _setting(
-        "", ARCHIVE, "the greenhouse's name in the archive, and its user's, such as gh1"
+        "", "archive", "the greenhouse's name in the archive, and its user's, such as gh1"
     )
     archive_url: str = _setting(
         "",
-        ARCHIVE,
-        "PostgreSQL that the journal is forwarded to, such as postgresql://gh1@db.example/lupin; "
-        "its password: PGPASSWORD or PGPASSFILE",
+        "archive",
+        "PostgreSQL that the journal is forwarded to, or that fleet shows, such as "
+        "postgresql://gh1@db.example/lupin; its password: PGPASSWORD or PGPASSFILE",
+        is_private=True,
     )
     log_format: Literal["text", "json"] = _setting(
-        "text", LOG, "lines for people, or JSON for a collector"
+        "text", "log", "lines for people, or JSON for a collector"
     )
     log_level: Literal["debug", "info", "warning", "error"] = _setting(
-        "info", LOG, "the least that is logged"
+        "info", "log", "the least that is logged"
     )
     # What the operator called a setting: the option, a variable, a file's line.
     given_as: Mapping[str, str] = field(

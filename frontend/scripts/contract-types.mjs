@@ -1,5 +1,5 @@
 /**
- * Writes src/contract/openapi.gen.ts from openapi.json (which `python -m lupin_bridge.openapi`
+ * Writes src/contract/openapi.gen.ts from openapi.json (which `python -m lupin_bridge.app`
  * prints): the schemas that src/contract/types.ts names, and those that they are made of. With
  * --check it writes nothing and fails when the file on disk is stale.
  */

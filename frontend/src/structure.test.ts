@@ -53,6 +53,11 @@ const TABLE: Table = {
     ...['styles', 'widgets', 'alarms', 'timebar', 'charts', 'estimate'],
     ...['npm:react', 'npm:react-dom'],
   ],
+  // The page over all greenhouses, a bundle of its own.
+  fleet: [
+    ...['words', 'strings', 'clock', 'contract', 'connection', 'ui', 'styles'],
+    ...['npm:react', 'npm:react-dom'],
+  ],
   main: ['styles', 'strings', 'store', 'alarms', 'ui', 'npm:react', 'npm:react-dom'],
   // For tests alone: no part above names it.
   testing: [

@@ -16,8 +16,7 @@ BENCHES = (
     "bench_estimate_many",
     "bench_estimate_speed",
     "bench_tick",
-    "bench_store",
-    "bench_asof",
+    "bench_log",
     "bench_alarms",
     "bench_outward",
     "bench_bridge",
@@ -26,6 +25,7 @@ BENCHES = (
     "bench_past_page",
     "bench_house",
     "bench_forward",
+    "bench_fleet",
 )
 
 

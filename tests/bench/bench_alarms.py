@@ -19,14 +19,13 @@ from random import Random
 from lupin_bridge.alarms.board import AlarmBoard
 from lupin_bridge.alarms.feed import LOT, REACH_COUNT
 from lupin_bridge.alarms.ledger import change_between, page_of
-from lupin_bridge.judge.choosing import own_sensors
-from lupin_bridge.judge.following import Follower
+from lupin_bridge.judge.alarm_fold import Follower
 from lupin_bridge.judge.judging import Judge
-from lupin_bridge.outward.mirror import Mirror
-from lupin_bridge.outward.names import Topics
-from lupin_bridge.outward.payloads import Seen
-from lupin_twin.past_writes import PastWrite, RunSpan
-from lupin_twin.state import Reading, Snapshot, TagState
+from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.notify.messages import GreenhouseState, Topics
+from lupin_bridge.notify.mirror import Mirror
+from lupin_twin.core.state import Reading, Snapshot, TagState
+from lupin_twin.core.writes import PastWrite, RunSpan
 from tests.support.ordinary_day import DAY_NS, S, ordinary_days
 from tests.support.seen import alarm, by_light
 
@@ -169,7 +168,9 @@ def loop_of(tags: int) -> None:
         snapshot = Snapshot(now_ns + second * S, "map", house)
         start = time.process_time()
         judged = judge.see(snapshot)
-        seen = Seen(snapshot, judged, board.now, judge.holds_ns(), snapshot.stamp_ns, is_live=True)
+        seen = GreenhouseState(
+            snapshot, judged, board.now, judge.holds_ns(), snapshot.stamp_ns, is_live=True
+        )
         mirror.see(seen)
         for _ in mirror.messages():
             pass

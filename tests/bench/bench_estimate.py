@@ -17,11 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.estimate import Model, Readings, fit
-from lupin_twin.estimates import thinned
-from lupin_twin.fields import FieldRules
-from lupin_twin.idw import compute_idw_field
-from lupin_twin.parameters import TwinParameters
+from lupin_twin.estimate.engine import RecentReadings, TagPast, readings_of
+from lupin_twin.field.engine import FieldRules
+from lupin_twin.field.idw import compute_idw_field
 from tests.bench.other_worlds import CHOOSING, HOUR_S, JUDGING, SORTS, Floats, World, world_of
 
 CELL_M = 0.25
@@ -80,7 +80,16 @@ def case_of(world: World, phase: str, seed: int) -> Case:
         power=RULES.idw_power,
     ).values.astype(np.float64)
     truth = world.truth(places, np.full(len(places), at_s))
-    return Case(world, thinned(all_read, at_s, 24.0 * HOUR_S), at_s, places, truth, idw)
+    return Case(world, as_received(all_read, at_s), 0.0, places, truth, idw)
+
+
+def as_received(read: Readings, at_s: float) -> Readings:
+    """What a twin that has received all of it makes an estimate of, by seconds from `at_s` on."""
+    recent = RecentReadings(24.0 * HOUR_S)
+    for row, tag in enumerate(read.tag.tolist()):
+        recent.add(str(tag), "", round(read.time_s[row] * 1e9), float(read.value[row]))
+    tags = [TagPast(str(tag), x, y, recent.of(str(tag), "")) for tag, (x, y) in enumerate(read.xy)]
+    return readings_of(tags, round(at_s * 1e9), 24.0 * HOUR_S)
 
 
 def judged(case: Case, model: Model | None = None) -> Field:

@@ -15,8 +15,8 @@ from collections import Counter
 import numpy as np
 
 from lupin_twin.estimate import Posterior, Readings, fit
-from lupin_twin.estimates import thinned
-from lupin_twin.grading import Record, Tally
+from lupin_twin.estimate.engine import thinned
+from lupin_twin.estimate.grading import Record, Tally
 from tests.bench.bench_estimate import INTERVAL_SDS, case_of
 from tests.bench.other_worlds import CHOOSING, DAY_S, HOUR_S, JUDGING, SORTS, World, world_of
 

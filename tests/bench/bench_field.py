@@ -22,18 +22,18 @@ import numpy.typing as npt
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "ros_node" / "lupin_twin")]
 
-from lupin_twin.explored import explored_mask, occupancy_map  # noqa: E402
-from lupin_twin.field_quality import leave_one_out  # noqa: E402
-from lupin_twin.fields import (  # noqa: E402
+from lupin_twin.core.state import Pose, Reading, Scan, TagState, TwinStore  # noqa: E402
+from lupin_twin.field.engine import (  # noqa: E402
     FieldCache,
     FieldEngine,
     FieldJob,
     FieldRequest,
     FieldRules,
 )
-from lupin_twin.grid import FieldGrid, cell_centres  # noqa: E402
-from lupin_twin.idw import FieldSample, compute_idw_field  # noqa: E402
-from lupin_twin.state import Pose, Reading, Scan, TagState, TwinStore  # noqa: E402
+from lupin_twin.field.explored import OccupancyMap, explored_mask  # noqa: E402
+from lupin_twin.field.grid import FieldGrid, cell_centres  # noqa: E402
+from lupin_twin.field.idw import FieldSample, compute_idw_field  # noqa: E402
+from lupin_twin.field.quality import leave_one_out  # noqa: E402
 from tests.oracle_idw import value_at  # noqa: E402
 
 REACH_M = 1.5
@@ -179,7 +179,7 @@ def other_rules() -> None:
 def explored_masks() -> None:
     print("\nexplored mask of 1000 x 1000 cells over a map of 1000 x 1000")
     for name, yaw in (("map along the axes", 0.0), ("map turned", 0.3)):
-        occupancy = occupancy_map(
+        occupancy = OccupancyMap(
             frame_id="map",
             stamp_ns=0,
             width=1_000,
@@ -188,7 +188,7 @@ def explored_masks() -> None:
             origin_x=0.0,
             origin_y=0.0,
             origin_yaw=yaw,
-            data=np.zeros(1_000_000, dtype=np.int8),
+            cells=np.zeros(1_000_000, dtype=np.int8),
             revision=1,
         )
 

@@ -13,14 +13,14 @@ from dataclasses import dataclass, field, replace
 from itertools import count
 from pathlib import Path
 
-from lupin_bridge.judge.choosing import own_sensors
 from lupin_bridge.judge.judging import Judge
-from lupin_bridge.outward.choosing import Targets
-from lupin_bridge.outward.mirror import Mirror
-from lupin_bridge.outward.mqtt import Mqtt
-from lupin_bridge.outward.payloads import Seen
+from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.notify.destinations import Targets
+from lupin_bridge.notify.messages import GreenhouseState
+from lupin_bridge.notify.mirror import Mirror
+from lupin_bridge.notify.mqtt import Mqtt
 from lupin_bridge.settings import Secrets, Settings
-from lupin_twin.state import Reading, Snapshot, TagState
+from lupin_twin.core.state import Reading, Snapshot, TagState
 from tests.support.mosquitto import Broker
 from tests.support.seen import by_light
 from tests.support.waiting import until
@@ -61,10 +61,10 @@ class House:
         for number in (next(self.scanned) for _ in range(tags)):
             self.tags[number % TAGS] = self.tag(number % TAGS, 21.0 + number / TAGS % 1)
 
-    def look(self) -> Seen:
+    def look(self) -> GreenhouseState:
         snapshot = Snapshot(self.now_ns, "map", tuple(self.tags))
         judged = self.judge.see(snapshot)
-        seen = Seen(snapshot, judged, now_ns=self.now_ns, is_live=True)
+        seen = GreenhouseState(snapshot, judged, now_ns=self.now_ns, is_live=True)
         return replace(seen, holds_ns=self.judge.holds_ns())
 
 

@@ -14,9 +14,9 @@ from lupin_msgs.msg import TwinState, TwinTimes
 from rclpy.context import Context
 
 from lupin_bridge.stream.state_json import StateJson
-from lupin_twin import convert
-from lupin_twin.habits import latched
-from lupin_twin.state import Flower, Pose, Reading, Snapshot, TagState, Try
+from lupin_twin.core.state import Attempt, Flower, Pose, Reading, Snapshot, TagState
+from lupin_twin.ros import convert
+from lupin_twin.ros.base_node import latched
 from tests.support.domains import own_domain
 
 S = 1_000_000_000
@@ -34,7 +34,7 @@ def tags(count: int) -> tuple[TagState, ...]:
             last_observed_ns=S + i,
             flower=Flower("rose", 0.9, flower_count=3, footprint=((0.0, 0.0, 0.0),) * 4),
             looked_at_ns=S + i,
-            last_try=Try(S + i),
+            last_try=Attempt(S + i),
         )
         for i in range(count)
     )

@@ -14,18 +14,18 @@ import numpy as np
 from builtin_interfaces.msg import Time
 from greenhouse_sim.simulator import GreenhouseSimulator
 
-from lupin_patrol import messages
-from lupin_patrol.climate import Climate
-from lupin_patrol.events import FlowersSeen, PassCompleted, TagScanned, TagsDiscovered
-from lupin_patrol.mission import Mission
-from lupin_twin import convert, ingest
-from lupin_twin.drops import Drop
-from lupin_twin.field_quality import leave_one_out, painted_share
-from lupin_twin.fields import FieldCache, FieldEngine, FieldJob, FieldRequest, FieldRules
-from lupin_twin.grid import FieldGrid, cell_centres
-from lupin_twin.history import History
-from lupin_twin.parameters import TwinParameters
-from lupin_twin.state import TwinStore
+from lupin_patrol import node as messages
+from lupin_patrol.mission import FlowersSeen, Mission, PassCompleted, TagScanned, TagsDiscovered
+from lupin_patrol.plants import Climate
+from lupin_twin.core import ingest
+from lupin_twin.core.drops import Drop
+from lupin_twin.core.history import History
+from lupin_twin.core.parameters import TwinParameters
+from lupin_twin.core.state import TwinStore
+from lupin_twin.field.engine import FieldCache, FieldEngine, FieldJob, FieldRequest, FieldRules
+from lupin_twin.field.grid import FieldGrid, cell_centres
+from lupin_twin.field.quality import leave_one_out, painted_share
+from lupin_twin.ros import convert
 
 WIDTH_M, HEIGHT_M, CELL_M = 4.0, 8.0, 0.05
 RULES = FieldRules.of(TwinParameters())
@@ -50,13 +50,13 @@ def after_one_pass(day_speed: float) -> tuple[TwinStore, float]:
 
 
 def write(store: TwinStore, msg: Any) -> None:
-    made = ingest.observation(convert.heard(msg), "map", 10**18)
+    made = ingest.observation(convert.received(msg), "map", 10**18)
     assert not isinstance(made, Drop)
     ingest.apply(made, store, History())
 
 
 def pin_all(store: TwinStore, msg: Any) -> None:
-    for pin in ingest.discoveries(convert.heard_tags(msg), "map", store.is_pinned):
+    for pin in ingest.discoveries(convert.received_tags(msg), "map", store.is_pinned):
         assert not isinstance(pin, Drop)
         ingest.apply(pin, store, History())
 

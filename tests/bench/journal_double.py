@@ -18,11 +18,11 @@ from itertools import islice
 from pathlib import Path
 from typing import Final
 
+from lupin_twin.core.state import Bloom, Flower, Pose, Reading
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
-from lupin_twin.journal.rows import LookRow, PinRow, Row, ScanRow
+from lupin_twin.journal.rows import InspectionRow, PinRow, Row, ScanRow
 from lupin_twin.journal.runs import Clock
-from lupin_twin.state import Bloom, Flower, Pose, Reading
 
 SECOND: Final = 1_000_000_000
 DAY_S: Final = 86_400.0
@@ -99,14 +99,14 @@ def _place(tag: int) -> Pose:
     return Pose(tag % 100 * 0.5, tag // 100 * 0.5, 0.3, 0.0, 0.0, 0.0, 1.0)
 
 
-def _look(tag: int, at_ns: int, *, has_pest: bool) -> LookRow:
+def _look(tag: int, at_ns: int, *, has_pest: bool) -> InspectionRow:
     place = _place(tag)
     blooms = tuple(
         Bloom(place.x + n / 10, place.y + 0.1, 0.4, 0.25, "lupin", 0.9, anomaly=False)
         for n in range(2)
     )
     flower = Flower("lupin", 0.9, has_pest, 2, int(has_pest), blooms)
-    return LookRow(str(tag + 1), at_ns + 1, at_ns + 60_000_000, flower, "robot", "patrol")
+    return InspectionRow(str(tag + 1), at_ns + 1, at_ns + 60_000_000, flower, "robot", "patrol")
 
 
 @dataclass(frozen=True)

@@ -19,19 +19,19 @@ from hypothesis import strategies as st
 from websockets.asyncio.client import connect
 
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.feed.relay import Relay
+from lupin_bridge.feed.source import CacheCounts, TwinUnavailableError, TwinUpdate
 from lupin_bridge.field import formats as field_formats
-from lupin_bridge.serving.limits import Limits
+from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.hub import Client
-from lupin_bridge.twin.relay import Relay
-from lupin_bridge.twin.source import CacheCounts, Told, TwinUnavailableError
-from lupin_twin.fields import FieldJob
-from lupin_twin.grid import FieldGrid
-from lupin_twin.journal.condition import UNKNOWN, Condition
-from lupin_twin.past import NotRemembered
-from lupin_twin.past_writes import PastWrite
-from lupin_twin.state import Snapshot, TagState
-from lupin_twin.workers import ShouldStop, Workers
+from lupin_twin.core.journal_condition import UNKNOWN, Condition
+from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.state import Snapshot, TagState
+from lupin_twin.core.writes import PastWrite
+from lupin_twin.field.engine import FieldJob
+from lupin_twin.field.grid import FieldGrid
+from lupin_twin.runtime.workers import ShouldStop, Workers
 from tests.bridge.stream.test_frames import received
 from tests.support.inprocess import Running, run, running
 from tests.support.messages import scan
@@ -44,14 +44,16 @@ class Script:
     """A source that tells what the test makes it tell. What a real one does, others test."""
 
     def __init__(self) -> None:
-        self.tell: Callable[[Told], None]
+        self.tell: Callable[[TwinUpdate], None]
         self.die: Callable[[], None]
         self.is_alive = True
         self.calls_waiting = self.callback_errors = 0
         self.workers = Workers("script")
         self.relay = Relay(lambda: cast("Any", self), cast("Any", self))  # listened to by nobody
 
-    async def start(self, on_state: Callable[[Told], None], on_death: Callable[[], None]) -> None:
+    async def start(
+        self, on_state: Callable[[TwinUpdate], None], on_death: Callable[[], None]
+    ) -> None:
         self.tell, self.die = on_state, on_death
 
     async def stop(self) -> None:
@@ -91,9 +93,9 @@ class Ear:
         return [frame["reason"] for frame in self.heard if frame["type"] == "status"]
 
 
-def state(number: int) -> Told:
+def state(number: int) -> TwinUpdate:
     """The state after so many changes."""
-    return Told(Snapshot(number, "map", (TagState(f"t{number}"),)), f"r{number}")
+    return TwinUpdate(Snapshot(number, "map", (TagState(f"t{number}"),)), f"r{number}")
 
 
 class Stage:
@@ -219,7 +221,7 @@ def test_a_heartbeat_right_after_a_frame_tells_nobody_anything_and_is_spared() -
         async with Stage(frames_per_s=100.0) as stage:
             stage.script.tell(state(1))
             for _ in range(3):
-                stage.script.tell(Told(state(1).snapshot, "r1"))
+                stage.script.tell(TwinUpdate(state(1).snapshot, "r1"))
             stage.script.tell(state(2))
             await until(lambda: len(stage.ear.states) == 2, "the change")
             assert stage.ear.states[-1]["revision"] == "r2"
@@ -244,7 +246,7 @@ def test_a_status_goes_out_when_it_changes_and_only_then() -> None:
             await until(lambda: len(stage.ear.reasons) == 4, "the twin to be back")
             stage.script.die()
             stage.script.die()
-            stage.bridge.say_goodbye()
+            stage.bridge.announce_shutdown()
         assert stage.ear.reasons == [
             "never_seen",
             "live",
@@ -260,7 +262,7 @@ def test_a_status_goes_out_when_it_changes_and_only_then() -> None:
 def test_a_memory_that_is_busy_at_the_start_is_asked_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("lupin_bridge.past.learning.ASK_AGAIN_S", 0.01)
+    monkeypatch.setattr("lupin_bridge.past.recent_scans.RETRY_S", 0.01)
     hour_ns = 3_600 * 10**9
 
     async def test() -> None:

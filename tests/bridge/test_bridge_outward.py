@@ -8,8 +8,8 @@ from functools import partial
 from pathlib import Path
 
 from lupin_bridge.alarms.ledger import Page, change_between, page_of
-from lupin_bridge.outward.channels import Channels
-from lupin_bridge.outward.choosing import Targets
+from lupin_bridge.notify.channels import Channels
+from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.settings import Secrets, Settings
 from tests.bridge.test_bridge import Stage, state
 from tests.support.mosquitto import Broker

@@ -11,8 +11,8 @@ from pathlib import Path
 import httpx
 import pytest
 
-from lupin_bridge.cli import main
-from lupin_bridge.journal_output import backup
+from lupin_bridge.cli.command import main
+from lupin_bridge.cli.output import backup
 from tests.support.journal import NOW, kept
 from tests.support.journal import scan as row
 from tests.support.messages import scan
@@ -22,7 +22,7 @@ from tests.support.waiting import PATIENCE_S, wait_for
 
 
 def journal(*words: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "lupin_bridge.cli", "journal", *map(str, words)]
+    command = [sys.executable, "-m", "lupin_bridge.cli.command", "journal", *map(str, words)]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
@@ -108,7 +108,7 @@ def test_of_a_backup_that_failed_nothing_is_left(tmp_path: Path) -> None:
     # Its signal is ignored, so that SQLite sees the error.
     limit = "import resource as r, signal as s, runpy, sys; s.signal(s.SIGXFSZ, s.SIG_IGN);"
     limit += " r.setrlimit(r.RLIMIT_FSIZE, (40_960, 40_960));"
-    limit += " runpy.run_module('lupin_bridge.cli', run_name='__main__')"
+    limit += " runpy.run_module('lupin_bridge.cli.command', run_name='__main__')"
     words = ["journal", "backup", str(copy), "--journal", str(source)]
     done = subprocess.run(
         [sys.executable, "-c", limit, *words],

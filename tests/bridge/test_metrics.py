@@ -11,8 +11,8 @@ from websockets.sync.client import connect
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.metrics import CONTENT_TYPE, COUNTERS, GAUGES, HISTOGRAMS, Metrics
 from lupin_bridge.settings import Settings
-from lupin_twin.estimate_report import Report
-from lupin_twin.grading import Record, Tally
+from lupin_twin.estimate.grading import Record, Tally
+from lupin_twin.runtime.estimate_rounds import Report
 from tests.bridge.test_bridge import Script
 from tests.support.messages import scan
 from tests.support.processes import lupin_twin, url_of
@@ -49,6 +49,9 @@ def test_every_metric_is_there_and_follows_what_happens(domain: int) -> None:
             wait_for(lambda: scrape(url)["lupin_tags"] == 2.0, "both tags")
             for suffix in ("json", "npy", "json"):
                 httpx.get(f"{url}/api/field.{suffix}", params=CO2, timeout=PATIENCE_S)
+            # Counts of the cache come with the twin's next update, a heartbeat at the latest.
+            hits = "lupin_field_cache_hits_total"
+            wait_for(lambda: scrape(url)[hits] == 1.0, "the counts of the cache")
             after = scrape(url)
             text = httpx.get(f"{url}/metrics", timeout=PATIENCE_S).text
             assert 'lupin_dropped_total{reason="frame"} 2.0' in text

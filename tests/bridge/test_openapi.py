@@ -10,8 +10,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.app import create_app
-from lupin_bridge.openapi import document
+from lupin_bridge.app import create_app, document
 from tests.support.web import ROUTES
 
 DOCUMENT: dict[str, Any] = json.loads(document())
@@ -74,13 +73,13 @@ def test_asking_for_it_twice_gives_the_same() -> None:
 def test_the_copy_that_the_browsers_types_are_made_from_is_fresh() -> None:
     copy = Path(__file__).parents[2] / "frontend" / "openapi.json"
     assert copy.read_bytes() == document(), (
-        f"stale: run `python -m lupin_bridge.openapi > {copy}` and `npm run types:gen`"
+        f"stale: run `python -m lupin_bridge.app > {copy}` and `npm run types:gen`"
     )
 
 
 def test_the_command_needs_no_ros() -> None:
     script = (
-        "import runpy, sys; runpy.run_module('lupin_bridge.openapi', run_name='__main__');"
+        "import runpy, sys; runpy.run_module('lupin_bridge.app', run_name='__main__');"
         "ros = [m for m in sys.modules if m.split('.')[0] in ('rclpy', 'lupin_msgs')];"
         "assert not ros, ros"
     )

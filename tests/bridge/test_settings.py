@@ -7,7 +7,7 @@ from typing import Any, get_args, get_origin
 import pytest
 from annotated_types import Interval
 
-from lupin_bridge.configuration import settings_from
+from lupin_bridge.cli.configuration import settings_from
 from lupin_bridge.settings import (
     SettingError,
     Settings,

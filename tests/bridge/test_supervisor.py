@@ -13,8 +13,8 @@ from pathlib import Path
 import httpx
 import pytest
 
-from lupin_bridge.supervisor import Supervisor
-from lupin_bridge.twin.source import STUCK_AFTER_S
+from lupin_bridge.cli.supervisor import Supervisor
+from lupin_bridge.feed.source import STUCK_AFTER_S
 from tests.support.messages import scan
 from tests.support.processes import lupin_twin, patrols_of, url_of
 from tests.support.ros import Peer
@@ -150,10 +150,12 @@ def test_the_bridge_is_ready_when_it_serves_and_says_when_it_stops(
 def test_a_callback_that_hangs_is_told_to_health_checks_and_ends_the_watchdogs_words(
     domain: int, listening: Manager
 ) -> None:
-    faults = ("--hang", "lupin_twin.state:TwinStore.record:hang me")
+    faults = ("--hang", "lupin_twin.core.state:TwinStore.record:hang me")
     env = {"NOTIFY_SOCKET": listening.address, "WATCHDOG_USEC": "1500000"}
     with (
-        sabotaged(domain, faults, "lupin_bridge.cli", "serve", "--port", "0", **env) as process,
+        sabotaged(
+            domain, faults, "lupin_bridge.cli.command", "serve", "--port", "0", **env
+        ) as process,
         Peer(domain) as peer,
     ):
         url = url_of(process)

@@ -22,9 +22,9 @@ from greenhouse_sim.simulator import GreenhouseSimulator
 from PIL import Image
 from playwright.sync_api import Browser, expect
 
-from lupin_bridge.demo import rows
-from lupin_patrol.exploration import FREE, OCCUPIED, RESOLUTION_M
-from lupin_patrol.house import read_house
+from lupin_bridge.cli.demo import rows
+from lupin_patrol.greenhouse import read_greenhouse
+from lupin_patrol.perception import FREE, OCCUPIED, RESOLUTION_M
 from lupin_twin.journal.rows import Row, ScanRow
 from lupin_twin.journal.runs import Clock
 from tests.support.journal import SECOND, kept
@@ -134,7 +134,7 @@ def scan_wrongly(running: Bridge) -> None:
 
 def house_map() -> object:
     """The house's floor within its walls."""
-    inside = read_house(GreenhouseSimulator()).interior
+    inside = read_greenhouse(GreenhouseSimulator()).interior
     columns, lines = (
         2 + round(extent / RESOLUTION_M)
         for extent in (inside.x1 - inside.x0, inside.y1 - inside.y0)

@@ -20,7 +20,7 @@ from PIL import Image
 from playwright.sync_api import Browser, Page, Route, expect
 
 import lupin_bridge
-from lupin_twin.idw import compute_idw_field
+from lupin_twin.field.idw import compute_idw_field
 
 HOME: Final = Path(lupin_bridge.__file__).parent
 TABLE: Final = Path(__file__).parents[1] / "bridge/judge/states.json"

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import expect
 
-from lupin_bridge.judge.choosing import own_sensors
-from lupin_bridge.judge.daily import DAILY
+from lupin_bridge.judge.derived import DAILY
+from lupin_bridge.judge.options import own_sensors
 from tests.browser.hmi import PHONE, Hmi, OpenPage
 from tests.support.domains import own_domain
 from tests.support.messages import look, occupancy_grid, scan

@@ -26,7 +26,7 @@ TOLD = "/lupin_twin: journal"
 @contextmanager
 def serving(domain: int, disk: SmallDisk) -> Iterator[Bridge]:
     """`lupin-twin serve` with its journal on a small disk."""
-    words = [sys.executable, "-m", "lupin_bridge.cli", "serve", "--port", "0", *OFTEN]
+    words = [sys.executable, "-m", "lupin_bridge.cli.command", "serve", "--port", "0", *OFTEN]
     journal = ["-p", f"journal:={disk.folder / 'j.sqlite'}"]
     command = disk.command(*words, *journal)
     with Process(command, ros_env(domain)) as process, Peer(domain) as peer:

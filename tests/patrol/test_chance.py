@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 
-from lupin_patrol.chance import stream
+from lupin_patrol.plants import stream
 
 
 def draws(generator: random.Random) -> list[float]:

@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 
-from lupin_patrol.chance import stream
-from lupin_patrol.climate import Climate
+from lupin_patrol.plants import Climate, stream
 
 NOON_S = 12 * 3600.0
 ALL = ("temperature", "humidity", "co2", "light", "soil_moisture")

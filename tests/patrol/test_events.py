@@ -8,7 +8,7 @@ from typing import get_args
 import pytest
 from lupin_msgs.msg import Observation
 
-from lupin_patrol.events import Event, PassCompleted, ScanStatus
+from lupin_patrol.mission import Event, PassCompleted, ScanStatus
 
 
 def test_events_are_values() -> None:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 
-from lupin_patrol.exploration import (
+from lupin_patrol.greenhouse import Greenhouse, Point, Rect, Table, read_greenhouse
+from lupin_patrol.perception import (
     FREE,
     OCCUPIED,
     RESOLUTION_M,
@@ -17,12 +18,10 @@ from lupin_patrol.exploration import (
     Exploration,
     Grid,
 )
-from lupin_patrol.geometry import Point, Rect
-from lupin_patrol.house import House, Table, read_house
 
 # A table in the middle of a hall, the robot left of it.
 TABLE = Rect(1.5, 1.0, 2.0, 2.0)
-HALL = House(Rect(0.0, 0.0, 3.0, 3.0), (Table("middle", TABLE),), ())
+HALL = Greenhouse(Rect(0.0, 0.0, 3.0, 3.0), (Table("middle", TABLE),), ())
 LEFT: Point = (1.0, 1.5)
 
 
@@ -33,19 +32,19 @@ def cell(grid: Grid, point: Point) -> int:
     return int(np.frombuffer(grid.cells, dtype=np.int8)[row * grid.width + column])
 
 
-def explored_from(*positions: Point, house: House = HALL) -> Grid:
-    exploration = Exploration(house)
+def explored_from(*positions: Point, greenhouse: Greenhouse = HALL) -> Grid:
+    exploration = Exploration(greenhouse)
     for position in positions:
-        exploration.look_from(position)
+        exploration.observe_from(position)
     return exploration.snapshot()
 
 
-def everywhere(house: House) -> list[Point]:
+def everywhere(greenhouse: Greenhouse) -> list[Point]:
     return [
         (x, y)
-        for x in np.arange(0.25, house.interior.x1, 0.5).tolist()
-        for y in np.arange(0.25, house.interior.y1, 0.5).tolist()
-        if house.is_free((x, y))
+        for x in np.arange(0.25, greenhouse.interior.x1, 0.5).tolist()
+        for y in np.arange(0.25, greenhouse.interior.y1, 0.5).tolist()
+        if greenhouse.is_free((x, y))
     ]
 
 
@@ -56,22 +55,22 @@ def test_at_first_nothing_is_known() -> None:
 
 
 def test_the_grid_covers_the_house_and_a_ring_of_wall() -> None:
-    grid = Exploration(read_house(GreenhouseSimulator())).snapshot()
+    grid = Exploration(read_greenhouse(GreenhouseSimulator())).snapshot()
     assert (grid.width, grid.height, grid.resolution_m) == (82, 162, 0.05)
     assert grid.origin == (-0.05, -0.05)
     assert len(grid.cells) == 82 * 162
 
 
 def test_a_complete_map_has_tables_and_walls_and_else_free_floor() -> None:
-    house = read_house(GreenhouseSimulator())
-    grid = explored_from(*everywhere(house), house=house)
+    greenhouse = read_greenhouse(GreenhouseSimulator())
+    grid = explored_from(*everywhere(greenhouse), greenhouse=greenhouse)
     assert grid.known == len(grid.cells)
     for row in range(grid.height):
         for column in range(grid.width):
             x = grid.origin[0] + (column + 0.5) * RESOLUTION_M
             y = grid.origin[1] + (row + 0.5) * RESOLUTION_M
-            is_floor = house.interior.contains((x, y)) and not any(
-                table.rect.contains((x, y)) for table in house.tables
+            is_floor = greenhouse.interior.contains((x, y)) and not any(
+                table.rect.contains((x, y)) for table in greenhouse.tables
             )
             assert cell(grid, (x, y)) == (FREE if is_floor else OCCUPIED), (x, y)
 
@@ -92,14 +91,14 @@ def test_what_stands_behind_a_table_is_hidden() -> None:
 
 def test_a_table_is_hidden_by_another_one() -> None:
     behind = Table("behind", Rect(2.5, 1.3, 2.7, 1.7))
-    house = House(HALL.interior, (*HALL.tables, behind), ())
-    assert cell(explored_from(LEFT, house=house), (2.6, 1.5)) == UNKNOWN
-    assert cell(explored_from((2.2, 1.5), house=house), (2.6, 1.5)) == OCCUPIED
+    greenhouse = Greenhouse(HALL.interior, (*HALL.tables, behind), ())
+    assert cell(explored_from(LEFT, greenhouse=greenhouse), (2.6, 1.5)) == UNKNOWN
+    assert cell(explored_from((2.2, 1.5), greenhouse=greenhouse), (2.6, 1.5)) == OCCUPIED
 
 
 def test_nothing_is_known_beyond_the_view_radius() -> None:
-    far = House(Rect(0.0, 0.0, 8.0, 2.0), (), ())
-    grid = explored_from((0.5, 1.0), house=far)
+    far = Greenhouse(Rect(0.0, 0.0, 8.0, 2.0), (), ())
+    grid = explored_from((0.5, 1.0), greenhouse=far)
     cells = np.frombuffer(grid.cells, dtype=np.int8).reshape(grid.height, grid.width)
     for row, column in np.argwhere(cells != UNKNOWN):
         x, y = grid.origin[0] + (column + 0.5) * 0.05, grid.origin[1] + (row + 0.5) * 0.05
@@ -112,7 +111,7 @@ def test_the_map_only_ever_grows() -> None:
     exploration = Exploration(HALL)
     before = np.frombuffer(exploration.snapshot().cells, dtype=np.int8)
     for position in everywhere(HALL):
-        exploration.look_from(position)
+        exploration.observe_from(position)
         after = np.frombuffer(exploration.snapshot().cells, dtype=np.int8)
         assert (after[before != UNKNOWN] == before[before != UNKNOWN]).all()
         before = after
@@ -120,24 +119,24 @@ def test_the_map_only_ever_grows() -> None:
 
 def test_a_look_says_whether_it_showed_anything_new() -> None:
     exploration = Exploration(HALL)
-    assert exploration.look_from(LEFT)
-    assert not exploration.look_from(LEFT)
+    assert exploration.observe_from(LEFT)
+    assert not exploration.observe_from(LEFT)
     for position in everywhere(HALL):
-        exploration.look_from(position)
-    assert not exploration.look_from((2.5, 2.5))
+        exploration.observe_from(position)
+    assert not exploration.observe_from((2.5, 2.5))
 
 
 def test_a_snapshot_does_not_change_any_more() -> None:
     exploration = Exploration(HALL)
-    exploration.look_from(LEFT)
+    exploration.observe_from(LEFT)
     snapshot = exploration.snapshot()
     known = snapshot.known
-    exploration.look_from((2.5, 1.5))
+    exploration.observe_from((2.5, 1.5))
     assert snapshot.known == known < exploration.snapshot().known
 
 
 @pytest.mark.parametrize("extent", [3.0, 3.01, 2.99])
 def test_a_house_that_is_no_multiple_of_the_cell_is_covered(extent: float) -> None:
-    grid = Exploration(House(Rect(0.0, 0.0, extent, 3.0), (), ())).snapshot()
+    grid = Exploration(Greenhouse(Rect(0.0, 0.0, extent, 3.0), (), ())).snapshot()
     wall_starts = grid.origin[0] + (grid.width - 1) * RESOLUTION_M
     assert extent - 1e-9 <= wall_starts < extent + RESOLUTION_M - 1e-9

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from lupin_patrol.geometry import Point, Rect, crossings, length_of, walk
+from lupin_patrol.greenhouse import Point, Rect, crossings, length_of, walk
 
 BOX = Rect(1.0, 2.0, 3.0, 4.0)
 

@@ -12,8 +12,9 @@ from lupin_msgs.msg import DiscoveredTags, Observation
 from nav_msgs.msg import OccupancyGrid
 from rclpy.serialization import deserialize_message, serialize_message
 
-from lupin_patrol import messages
-from lupin_patrol.events import (
+from lupin_patrol import node as messages
+from lupin_patrol.greenhouse import TAG_HEIGHT_M, Rect, Table, Tag
+from lupin_patrol.mission import (
     FlowersSeen,
     MapGrown,
     ScanStatus,
@@ -21,11 +22,8 @@ from lupin_patrol.events import (
     TagScanned,
     TagsDiscovered,
 )
-from lupin_patrol.exploration import Grid
-from lupin_patrol.geometry import Rect
-from lupin_patrol.house import TAG_HEIGHT_M, Table, Tag
-from lupin_patrol.perception import Sighting
-from lupin_patrol.plants import Bloom, Look
+from lupin_patrol.perception import Grid, Sighting
+from lupin_patrol.plants import Bloom, Inspection
 
 STAMP = Time(sec=12, nanosec=34)
 POSE = TagPose((1.5, 2.5), pi / 2)
@@ -41,7 +39,7 @@ SCAN = TagScanned(
 )
 # Numbers that a float32 holds exactly: what was sent equals what comes.
 BLOOM = Bloom((1.5, 2.2), 0.25, "lupin", 0.875, anomaly=True)
-LOOK = Look("lupin", 0.75, anomaly=True, flower_count=12, bug_count=3, blooms=(BLOOM,))
+LOOK = Inspection("lupin", 0.75, anomaly=True, flower_count=12, bug_count=3, blooms=(BLOOM,))
 FLOWERS = FlowersSeen(3.2, 4, "7", POSE, LOOK, Rect(1.0, 2.0, 2.0, 2.25))
 
 

@@ -12,17 +12,19 @@ import numpy as np
 import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 
-from lupin_patrol.events import (
+from lupin_patrol.greenhouse import Point
+from lupin_patrol.mission import (
+    DOCK,
+    START_OF_DAY_S,
     Event,
     FlowersSeen,
     MapGrown,
+    Mission,
     PassCompleted,
     ScanStatus,
     TagScanned,
     TagsDiscovered,
 )
-from lupin_patrol.geometry import Point
-from lupin_patrol.mission import DOCK, START_OF_DAY_S, Mission
 
 DEFAULT_SEED = 0
 DAY_SPEED = 60.0
@@ -211,11 +213,11 @@ def test_every_pass_tries_every_tag(patrol: list[Event]) -> None:
 
 
 def test_poses_are_the_tags_own_at_first_and_jitter_a_little_later(patrol: list[Event]) -> None:
-    house = Mission(GreenhouseSimulator(), 0, DAY_SPEED).house
+    greenhouse = Mission(GreenhouseSimulator(), 0, DAY_SPEED).greenhouse
     for scan in only(TagScanned, patrol):
         if scan.pose is None:
             continue
-        tag = house.tag(scan.tag_id)
+        tag = greenhouse.tag(scan.tag_id)
         off = dist(scan.pose.position, tag.position)
         if scan.pass_index == 0:
             assert off == 0.0
@@ -239,19 +241,19 @@ def test_a_look_at_the_flowers_follows_every_scan_that_went_well(patrol: list[Ev
 
 
 def test_blooms_stand_in_the_box_and_the_box_is_the_tags_table(patrol: list[Event]) -> None:
-    house = Mission(GreenhouseSimulator(), 0, DAY_SPEED).house
+    greenhouse = Mission(GreenhouseSimulator(), 0, DAY_SPEED).greenhouse
     for event in only(FlowersSeen, patrol):
-        assert event.box == house.tag(event.tag_id).table.rect
-        assert all(event.box.contains(bloom.position) for bloom in event.look.blooms)
+        assert event.box == greenhouse.tag(event.tag_id).table.rect
+        assert all(event.box.contains(bloom.position) for bloom in event.inspection.blooms)
 
 
 def test_a_pest_is_seen_and_cleared_by_a_later_pass(patrol: list[Event]) -> None:
     looks = only(FlowersSeen, patrol)
-    infested = [look for look in looks if look.look.anomaly]
+    infested = [look for look in looks if look.inspection.anomaly]
     assert infested[0].pass_index == 0
-    assert infested[0].look.bug_count > 0
+    assert infested[0].inspection.bug_count > 0
     assert any(
-        not look.look.anomaly and look.look.bug_count == 0
+        not look.inspection.anomaly and look.inspection.bug_count == 0
         for look in looks
         if look.tag_id == infested[0].tag_id and look.pass_index > 0
     )
@@ -263,18 +265,18 @@ def test_a_pest_is_seen_and_cleared_by_a_later_pass(patrol: list[Event]) -> None
 def test_the_robot_never_enters_a_table_nor_jumps(monkeypatch: pytest.MonkeyPatch) -> None:
     mission = Mission(GreenhouseSimulator(), DEFAULT_SEED, DAY_SPEED)
     positions: list[Point] = []
-    see_tags = mission._detector.look_from
+    see_tags = mission._detector.observe_from
 
-    def look_from(position: Point, pass_index: int) -> bool:
+    def observe_from(position: Point, pass_index: int) -> bool:
         positions.append(position)
         return see_tags(position, pass_index)
 
-    monkeypatch.setattr(mission._detector, "look_from", look_from)
+    monkeypatch.setattr(mission._detector, "observe_from", observe_from)
     list(until(3, mission.events()))
     assert positions[0] == DOCK
     assert any(dist(position, DOCK) < 1e-6 for position in positions[1:])
     assert len(positions) > 300
-    assert all(mission.house.is_free(position) for position in positions)
+    assert all(mission.greenhouse.is_free(position) for position in positions)
     assert max(dist(a, b) for a, b in pairwise(positions)) < 0.3
 
 

@@ -20,7 +20,7 @@ from nav_msgs.msg import OccupancyGrid
 from rosgraph_msgs.msg import Clock
 
 from lupin_patrol import node
-from lupin_patrol.events import PassCompleted
+from lupin_patrol.mission import PassCompleted
 from lupin_patrol.node import PatrolNode
 from tests.support.domains import ros_env
 from tests.support.inprocess import ros_domain
@@ -38,7 +38,7 @@ def patrol(domain: int, *arguments: str) -> Process:
 
 
 @dataclass
-class Heard:
+class Received:
     """All that came on the three topics, asked for as the contract has it."""
 
     observations: list[Any] = field(default_factory=list)
@@ -51,7 +51,7 @@ class Heard:
         observations: str = OBSERVATIONS,
         discovered_tags: str = DISCOVERED_TAGS,
         map_topic: str = MAP,
-    ) -> Heard:
+    ) -> Received:
         for kind, topic, depth, heard in (
             (Observation, observations, 50, self.observations),
             (DiscoveredTags, discovered_tags, 50, self.discovered_tags),
@@ -79,7 +79,7 @@ class Heard:
 def test_one_pass_shows_the_whole_greenhouse_and_ends(domain: int) -> None:
     tags = GreenhouseSimulator().tag_manager.get_tags()
     with Peer(domain) as peer:
-        heard = Heard().listen(peer)
+        heard = Received().listen(peer)
         with patrol(domain, "--once", "--speed", "10") as process:
             peer.until(heard.map_is_complete, "a complete map")
             peer.until(
@@ -109,7 +109,7 @@ def test_it_does_not_begin_before_somebody_listens(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Else a fast patrol would push its first observations out of the latch during discovery.
-    monkeypatch.setattr(node, "_LISTENERS_S", PATIENCE_S)
+    monkeypatch.setattr(node, "_SUBSCRIBERS_S", PATIENCE_S)
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
     has_begun = Event()
 
@@ -124,18 +124,18 @@ def test_it_does_not_begin_before_somebody_listens(
         patrol_thread.start()
         peer.until(lambda: peer.node.count_publishers(OBSERVATIONS), "the patrol")
         assert not has_begun.is_set()
-        Heard().listen(peer)
+        Received().listen(peer)
         peer.until(has_begun.is_set, "the first event")
         peer.until(lambda: not patrol_thread.is_alive(), "the end of the patrol")
 
 
 def test_who_comes_late_gets_the_latched_map_and_list(domain: int) -> None:
     with Peer(domain) as early, patrol(domain, "--speed", "30"):
-        first = Heard().listen(early)
+        first = Received().listen(early)
         # The map is published when it grows: once it is complete, never again.
         early.until(first.map_is_complete, "a complete map")
         with Peer(domain, "late") as late:
-            second = Heard().listen(late)
+            second = Received().listen(late)
             late.until(second.map_is_complete, "the latched map")
             assert len(second.maps) == 1
             late.until(
@@ -156,7 +156,7 @@ def test_topics_and_frame_are_parameters(domain: int) -> None:
     }
     arguments = [part for name, value in parameters.items() for part in ("-p", f"{name}:={value}")]
     with Peer(domain) as peer:
-        heard = Heard().listen(peer, "/robot/observations", "/elsewhere/tags", "/elsewhere/map")
+        heard = Received().listen(peer, "/robot/observations", "/elsewhere/tags", "/elsewhere/map")
         with patrol(domain, "--speed", "20", "--ros-args", *arguments):
             peer.until(
                 lambda: heard.observations and heard.discovered_tags and heard.maps, "every topic"
@@ -167,7 +167,7 @@ def test_topics_and_frame_are_parameters(domain: int) -> None:
 
 def test_stamps_follow_simulated_time(domain: int) -> None:
     with Peer(domain) as peer:
-        heard = Heard().listen(peer)
+        heard = Received().listen(peer)
 
         def heard_simulated_time() -> bool:
             # Again and again: who listens to /clock does not ask for the latched one.
@@ -184,7 +184,7 @@ def test_a_signal_ends_it_cleanly_even_while_it_waits_for_long(
     domain: int, number: signal.Signals
 ) -> None:
     with Peer(domain) as peer, patrol(domain, "--speed", "0.1") as process:
-        heard = Heard().listen(peer)
+        heard = Received().listen(peer)
         peer.until(lambda: heard.maps, "the first look around")
         assert process.stop(number) == 0
         assert "Traceback" not in process.output
@@ -192,7 +192,7 @@ def test_a_signal_ends_it_cleanly_even_while_it_waits_for_long(
 
 def test_it_goes_on_after_it_was_stopped_for_a_while(domain: int) -> None:
     with Peer(domain) as peer, patrol(domain, "--speed", "5") as process:
-        heard = Heard().listen(peer)
+        heard = Received().listen(peer)
         peer.until(lambda: heard.maps, "the first look around")
         process.stand_still()
         drained = -1

@@ -10,10 +10,10 @@ import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 
 from lupin_patrol.cli import parse
-from lupin_patrol.climate import Climate
-from lupin_patrol.house import read_house
+from lupin_patrol.greenhouse import read_greenhouse
 from lupin_patrol.mission import START_OF_DAY_S
 from lupin_patrol.past import DAYS, main, past
+from lupin_patrol.plants import Climate
 
 DAY_SPEED = 60.0
 
@@ -42,7 +42,7 @@ def test_it_is_three_days_of_the_demo_s_own_length_up_to_now(events: list[dict[s
 def test_every_tag_is_scanned_in_every_pass_and_some_scans_fail(
     scans: list[dict[str, Any]],
 ) -> None:
-    tags = {tag.tag_id for tag in read_house(GreenhouseSimulator()).tags}
+    tags = {tag.tag_id for tag in read_greenhouse(GreenhouseSimulator()).tags}
     last = scans[-1]["pass"]
     assert last > 50
     for number in range(1, last):
@@ -65,15 +65,15 @@ def test_pests_come_and_are_cleared(events: list[dict[str, Any]]) -> None:
 
 
 def test_places_are_exact_at_first(events: list[dict[str, Any]]) -> None:
-    house = read_house(GreenhouseSimulator())
+    greenhouse = read_greenhouse(GreenhouseSimulator())
     first = {event["tag_id"]: event["pose"] for event in reversed(events) if event["pose"]}
-    for tag in house.tags:
+    for tag in greenhouse.tags:
         assert tuple(first[tag.tag_id][:2]) == tag.position
 
 
 def test_its_time_of_day_is_that_of_the_patrol(scans: list[dict[str, Any]]) -> None:
     """Readings follow the climate's own curve, at the time of day that leads up to the start."""
-    house = read_house(GreenhouseSimulator())
+    greenhouse = read_greenhouse(GreenhouseSimulator())
     climate = Climate(GreenhouseSimulator())
 
     def off_by(hours: float) -> float:
@@ -82,7 +82,7 @@ def test_its_time_of_day_is_that_of_the_patrol(scans: list[dict[str, Any]]) -> N
                 value
                 - climate.truth(
                     "temperature",
-                    house.tag(event["tag_id"]).position,
+                    greenhouse.tag(event["tag_id"]).position,
                     START_OF_DAY_S + event["at_s"] * DAY_SPEED + hours * 3600,
                 )
             )

@@ -7,18 +7,17 @@ from math import cos, radians, sin
 import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 
-from lupin_patrol.geometry import Point, Rect
-from lupin_patrol.house import House, Table, Tag, read_house
+from lupin_patrol.greenhouse import Greenhouse, Point, Rect, Table, Tag, read_greenhouse
 from lupin_patrol.perception import TAG_RANGE_M, TagDetector
 from lupin_patrol.plants import SPECIES, Plants
 
 TABLE = Table("one", Rect(1.0, 1.0, 2.0, 2.0))
 TAG = Tag("7", (1.05, 1.5), ("co2",), TABLE, (1.0, 1.5), (-1.0, 0.0), (0.6, 1.5))
-HALL = House(Rect(0.0, 0.0, 4.0, 4.0), (TABLE,), (TAG,))
+HALL = Greenhouse(Rect(0.0, 0.0, 4.0, 4.0), (TABLE,), (TAG,))
 
 
-def sees(position: Point, house: House = HALL) -> bool:
-    return TagDetector(house, Plants(house, 0), 0).look_from(position, 0)
+def sees(position: Point, greenhouse: Greenhouse = HALL) -> bool:
+    return TagDetector(greenhouse, Plants(greenhouse, 0), 0).observe_from(position, 0)
 
 
 def in_front(angle_deg: float, away_m: float) -> Point:
@@ -46,45 +45,45 @@ def test_a_tag_is_seen_from_near_and_from_its_front(position: Point, expected: b
 
 def test_a_table_in_between_hides_a_tag() -> None:
     post = Table("post", Rect(0.5, 1.45, 0.6, 1.55))
-    assert not sees(in_front(0, 0.8), House(HALL.interior, (TABLE, post), (TAG,)))
+    assert not sees(in_front(0, 0.8), Greenhouse(HALL.interior, (TABLE, post), (TAG,)))
 
 
 def test_a_tag_is_new_once_and_counted_each_time() -> None:
     detector = TagDetector(HALL, Plants(HALL, 0), 0)
     assert detector.sightings() == ()
-    assert detector.look_from(in_front(0, 0.4), 0)
-    assert not detector.look_from(in_front(10, 0.4), 0)
-    assert not detector.look_from((3.0, 3.0), 0)
+    assert detector.observe_from(in_front(0, 0.4), 0)
+    assert not detector.observe_from(in_front(10, 0.4), 0)
+    assert not detector.observe_from((3.0, 3.0), 0)
     [sighting] = detector.sightings()
     assert sighting.tag == TAG
     assert sighting.sightings == 2
 
 
 def test_every_tag_of_the_greenhouse_is_seen_from_its_stop_in_the_order_of_the_looks() -> None:
-    house = read_house(GreenhouseSimulator())
-    plants = Plants(house, 0)
-    for tag in house.tags:
-        detector = TagDetector(house, plants, 0)
-        assert detector.look_from(tag.stop, 0)
+    greenhouse = read_greenhouse(GreenhouseSimulator())
+    plants = Plants(greenhouse, 0)
+    for tag in greenhouse.tags:
+        detector = TagDetector(greenhouse, plants, 0)
+        assert detector.observe_from(tag.stop, 0)
         assert tag in [sighting.tag for sighting in detector.sightings()]
-    detector = TagDetector(house, plants, 0)
-    detector.look_from(house.tag("2").stop, 0)
-    detector.look_from(house.tag("21").stop, 0)
+    detector = TagDetector(greenhouse, plants, 0)
+    detector.observe_from(greenhouse.tag("2").stop, 0)
+    detector.observe_from(greenhouse.tag("21").stop, 0)
     found = [sighting.tag.tag_id for sighting in detector.sightings()]
     assert found.index("2") < found.index("21")
 
 
 def test_the_guess_at_the_species_is_mostly_right_and_never_changes() -> None:
-    house = read_house(GreenhouseSimulator())
+    greenhouse = read_greenhouse(GreenhouseSimulator())
     right = 0
     for seed in range(10):
-        plants = Plants(house, seed)
-        detector = TagDetector(house, plants, seed)
-        for tag in house.tags:
-            detector.look_from(tag.stop, 0)
+        plants = Plants(greenhouse, seed)
+        detector = TagDetector(greenhouse, plants, seed)
+        for tag in greenhouse.tags:
+            detector.observe_from(tag.stop, 0)
         first = {s.tag.tag_id: (s.species, s.species_confidence) for s in detector.sightings()}
-        for tag in house.tags:
-            detector.look_from(tag.stop, 1)
+        for tag in greenhouse.tags:
+            detector.observe_from(tag.stop, 1)
         assert first == {
             s.tag.tag_id: (s.species, s.species_confidence) for s in detector.sightings()
         }
@@ -94,12 +93,12 @@ def test_the_guess_at_the_species_is_mostly_right_and_never_changes() -> None:
 
 
 def test_a_pest_is_suspected_while_it_is_there() -> None:
-    house = read_house(GreenhouseSimulator())
-    plants = Plants(house, 0)
-    detector = TagDetector(house, plants, 0)
+    greenhouse = read_greenhouse(GreenhouseSimulator())
+    plants = Plants(greenhouse, 0)
+    detector = TagDetector(greenhouse, plants, 0)
     for pass_index in range(6):
-        for tag in house.tags:
-            detector.look_from(tag.stop, pass_index)
+        for tag in greenhouse.tags:
+            detector.observe_from(tag.stop, pass_index)
         assert {s.tag.tag_id for s in detector.sightings() if s.anomaly} == {
-            tag.tag_id for tag in house.tags if plants.bugs(tag.tag_id, pass_index)
+            tag.tag_id for tag in greenhouse.tags if plants.bugs(tag.tag_id, pass_index)
         }

@@ -7,25 +7,25 @@ from math import dist
 import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 
-from lupin_patrol.house import TABLE_HEIGHT_M, House, read_house
+from lupin_patrol.greenhouse import TABLE_HEIGHT_M, Greenhouse, read_greenhouse
 from lupin_patrol.plants import SPECIES, Plants
 
 PASSES = range(30)
 
 
 @pytest.fixture(scope="module")
-def house() -> House:
-    return read_house(GreenhouseSimulator())
+def greenhouse() -> Greenhouse:
+    return read_greenhouse(GreenhouseSimulator())
 
 
 @pytest.fixture(scope="module")
-def plants(house: House) -> Plants:
-    return Plants(house, 0)
+def plants(greenhouse: Greenhouse) -> Plants:
+    return Plants(greenhouse, 0)
 
 
-def test_a_table_grows_one_species(house: House, plants: Plants) -> None:
+def test_a_table_grows_one_species(greenhouse: Greenhouse, plants: Plants) -> None:
     by_table: dict[str, set[str]] = {}
-    for tag in house.tags:
+    for tag in greenhouse.tags:
         by_table.setdefault(tag.table.name, set()).add(plants.species(tag.tag_id))
     assert len(by_table) == 10
     assert all(len(species) == 1 for species in by_table.values())
@@ -34,17 +34,19 @@ def test_a_table_grows_one_species(house: House, plants: Plants) -> None:
     assert len(grown) > 1
 
 
-def test_looks_repeat_with_the_seed_and_differ_without(house: House, plants: Plants) -> None:
-    assert Plants(house, 0).look("12", 3, 0) == plants.look("12", 3, 0)
-    assert Plants(house, 1).look("12", 3, 0) != plants.look("12", 3, 0)
-    assert plants.look("12", 4, 0) != plants.look("12", 3, 0)
-    assert plants.look("12", 3, 1) != plants.look("12", 3, 0)
+def test_looks_repeat_with_the_seed_and_differ_without(
+    greenhouse: Greenhouse, plants: Plants
+) -> None:
+    assert Plants(greenhouse, 0).inspect("12", 3, 0) == plants.inspect("12", 3, 0)
+    assert Plants(greenhouse, 1).inspect("12", 3, 0) != plants.inspect("12", 3, 0)
+    assert plants.inspect("12", 4, 0) != plants.inspect("12", 3, 0)
+    assert plants.inspect("12", 3, 1) != plants.inspect("12", 3, 0)
 
 
-def test_blooms_stand_inside_the_tags_own_table(house: House, plants: Plants) -> None:
-    for tag in house.tags:
+def test_blooms_stand_inside_the_tags_own_table(greenhouse: Greenhouse, plants: Plants) -> None:
+    for tag in greenhouse.tags:
         for pass_index in range(5):
-            look = plants.look(tag.tag_id, pass_index, 0)
+            look = plants.inspect(tag.tag_id, pass_index, 0)
             assert look.blooms
             assert look.flower_count == len(look.blooms)
             for bloom in look.blooms:
@@ -56,35 +58,39 @@ def test_blooms_stand_inside_the_tags_own_table(house: House, plants: Plants) ->
             assert 0.0 <= look.confidence <= 1.0
 
 
-def test_a_bloom_belongs_to_the_nearest_tag_of_its_table(house: House, plants: Plants) -> None:
-    for tag in house.tags:
-        others = [t for t in house.tags if t.table == tag.table and t != tag]
-        for bloom in plants.look(tag.tag_id, 0, 0).blooms:
+def test_a_bloom_belongs_to_the_nearest_tag_of_its_table(
+    greenhouse: Greenhouse, plants: Plants
+) -> None:
+    for tag in greenhouse.tags:
+        others = [t for t in greenhouse.tags if t.table == tag.table and t != tag]
+        for bloom in plants.inspect(tag.tag_id, 0, 0).blooms:
             # The look places it 1 cm off in each axis, so the border is a little soft.
             nearest = min(dist(bloom.position, other.position) for other in others)
             assert dist(bloom.position, tag.position) < nearest + 0.03
 
 
 def test_a_flower_stays_where_it_is(plants: Plants) -> None:
-    first = [bloom.position for bloom in plants.look("12", 0, 0).blooms]
-    for bloom in plants.look("12", 7, 0).blooms:
+    first = [bloom.position for bloom in plants.inspect("12", 0, 0).blooms]
+    for bloom in plants.inspect("12", 7, 0).blooms:
         assert min(dist(bloom.position, position) for position in first) < 0.09
 
 
-def test_some_flowers_are_overlooked(house: House, plants: Plants) -> None:
-    counts = {plants.look("12", pass_index, 0).flower_count for pass_index in PASSES}
+def test_some_flowers_are_overlooked(greenhouse: Greenhouse, plants: Plants) -> None:
+    counts = {plants.inspect("12", pass_index, 0).flower_count for pass_index in PASSES}
     assert len(counts) > 1
 
 
-def test_the_first_pass_has_a_pest_for_every_seed(house: House) -> None:
+def test_the_first_pass_has_a_pest_for_every_seed(greenhouse: Greenhouse) -> None:
     for seed in range(30):
-        infested = [tag for tag in house.tags if Plants(house, seed).bugs(tag.tag_id, 0)]
+        infested = [tag for tag in greenhouse.tags if Plants(greenhouse, seed).bugs(tag.tag_id, 0)]
         assert len(infested) == 1
 
 
-def test_pests_come_now_and_then_and_go_after_two_passes(house: House, plants: Plants) -> None:
+def test_pests_come_now_and_then_and_go_after_two_passes(
+    greenhouse: Greenhouse, plants: Plants
+) -> None:
     quiet = 0
-    for tag in house.tags:
+    for tag in greenhouse.tags:
         history = [plants.bugs(tag.tag_id, pass_index) for pass_index in PASSES]
         # Two outbreaks in a row at one tag are possible and rare; none in this seed.
         assert not any(all(history[p : p + 3]) for p in PASSES)
@@ -92,20 +98,22 @@ def test_pests_come_now_and_then_and_go_after_two_passes(house: House, plants: P
     assert 0.9 < quiet / (29 * len(PASSES)) < 1.0
 
 
-def test_a_flower_with_a_pest_is_never_overlooked(house: House) -> None:
+def test_a_flower_with_a_pest_is_never_overlooked(greenhouse: Greenhouse) -> None:
     for seed in range(40):
-        plants = Plants(house, seed)
-        for tag in house.tags:
+        plants = Plants(greenhouse, seed)
+        for tag in greenhouse.tags:
             bugs = plants.bugs(tag.tag_id, 0)
-            shown = sum(bloom.anomaly for bloom in plants.look(tag.tag_id, 0, 0).blooms)
+            shown = sum(bloom.anomaly for bloom in plants.inspect(tag.tag_id, 0, 0).blooms)
             assert shown == min(3, bugs, len(plants._blooms[tag.tag_id]))
 
 
-def test_a_pest_shows_in_the_look_and_on_some_blooms(house: House, plants: Plants) -> None:
+def test_a_pest_shows_in_the_look_and_on_some_blooms(
+    greenhouse: Greenhouse, plants: Plants
+) -> None:
     shown = 0
     for pass_index in PASSES:
-        for tag in house.tags:
-            look = plants.look(tag.tag_id, pass_index, 0)
+        for tag in greenhouse.tags:
+            look = plants.inspect(tag.tag_id, pass_index, 0)
             bugs = plants.bugs(tag.tag_id, pass_index)
             assert look.bug_count == bugs
             assert look.anomaly is (bugs > 0)

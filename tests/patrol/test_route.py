@@ -9,42 +9,51 @@ import numpy as np
 import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 
-from lupin_patrol.geometry import Point, Rect, length_of, walk
-from lupin_patrol.house import CLEARANCE_M, House, Table, read_house
+from lupin_patrol.greenhouse import (
+    CLEARANCE_M,
+    Greenhouse,
+    Point,
+    Rect,
+    Roadmap,
+    Table,
+    length_of,
+    read_greenhouse,
+    tour,
+    walk,
+)
 from lupin_patrol.mission import DOCK
-from lupin_patrol.route import Roadmap, tour
 
 
 @pytest.fixture(scope="module")
-def house() -> House:
-    return read_house(GreenhouseSimulator())
+def greenhouse() -> Greenhouse:
+    return read_greenhouse(GreenhouseSimulator())
 
 
 @pytest.fixture(scope="module")
-def roadmap(house: House) -> Roadmap:
-    return Roadmap(house)
+def roadmap(greenhouse: Greenhouse) -> Roadmap:
+    return Roadmap(greenhouse)
 
 
 def hall(*tables: Rect) -> Roadmap:
     """A hall of 4 × 4 m."""
     named = tuple(Table(str(index), rect) for index, rect in enumerate(tables))
-    return Roadmap(House(Rect(0.0, 0.0, 4.0, 4.0), named, ()))
+    return Roadmap(Greenhouse(Rect(0.0, 0.0, 4.0, 4.0), named, ()))
 
 
-def test_the_dock_is_free(house: House) -> None:
-    assert house.is_free(DOCK)
+def test_the_dock_is_free(greenhouse: Greenhouse) -> None:
+    assert greenhouse.is_free(DOCK)
 
 
 def test_no_way_between_two_stops_enters_a_table_or_its_clearance(
-    house: House, roadmap: Roadmap
+    greenhouse: Greenhouse, roadmap: Roadmap
 ) -> None:
-    stops = [DOCK, *(tag.stop for tag in house.tags)]
+    stops = [DOCK, *(tag.stop for tag in greenhouse.tags)]
     for a in stops:
         for b in stops:
             way = roadmap.way(a, b)
             assert (way[0], way[-1]) == (a, b)
             positions = [p for p, _ in walk(way, 0.05, length_of(way))]
-            assert all(house.is_free(p) for p in positions), (a, b)
+            assert all(greenhouse.is_free(p) for p in positions), (a, b)
 
 
 def test_a_free_line_of_sight_is_the_way(roadmap: Roadmap) -> None:
@@ -72,13 +81,15 @@ def test_a_place_that_is_walled_off_is_refused(others: tuple[Rect, ...]) -> None
         walled_off.way((0.5, 0.5), (0.5, 3.5))
 
 
-def test_the_tour_visits_every_stop_once(house: House, roadmap: Roadmap) -> None:
-    order = tour(roadmap, DOCK, [tag.stop for tag in house.tags])
+def test_the_tour_visits_every_stop_once(greenhouse: Greenhouse, roadmap: Roadmap) -> None:
+    order = tour(roadmap, DOCK, [tag.stop for tag in greenhouse.tags])
     assert sorted(order) == list(range(29))
 
 
-def test_the_tour_is_far_shorter_than_the_list_of_tags(house: House, roadmap: Roadmap) -> None:
-    stops = [tag.stop for tag in house.tags]
+def test_the_tour_is_far_shorter_than_the_list_of_tags(
+    greenhouse: Greenhouse, roadmap: Roadmap
+) -> None:
+    stops = [tag.stop for tag in greenhouse.tags]
     order = tour(roadmap, DOCK, stops)
 
     def length(places: list[Point]) -> float:

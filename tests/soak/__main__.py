@@ -5,10 +5,10 @@ from __future__ import annotations
 import importlib
 import sys
 
-from lupin_twin.process import leave_after
+from lupin_twin.runtime.process import exit_after
 from tests.support.state_home import use_own
 
-SOAKS = ("kills", "hours")
+SOAKS = ("kills", "archive_kills", "hours")
 
 
 def main() -> int:
@@ -22,4 +22,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    leave_after(main)
+    exit_after(main)

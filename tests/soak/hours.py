@@ -14,12 +14,12 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from lupin_twin.history import History
+from lupin_twin.core.history import History
+from lupin_twin.core.state import Pose, Reading, Scan, TwinStore
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.writer import Journal
-from lupin_twin.memory import Memory
-from lupin_twin.state import Pose, Reading, Scan, TwinStore
+from lupin_twin.runtime.memory import Memory
 from tests.support.journal import NOW, SECOND, is_whole, select
 from tests.support.proc_stat import resident_mb
 from tests.support.waiting import wait_for

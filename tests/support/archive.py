@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from contextlib import closing
+from copy import copy
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -26,16 +27,24 @@ _NUMBERS = count()
 class Archive:
     """A database of its own on a server, with the user of a site."""
 
-    def __init__(self, server: Postgres, site: str = "gh1") -> None:
+    def __init__(
+        self, server: Postgres, site: str = "gh1", *, tablespace: str = "pg_default"
+    ) -> None:
         self.server = server
         self.name = f"archive_{next(_NUMBERS)}"
-        self.owner = f"postgresql://postgres@/{self.name}?host={server.folder}"
+        # Where clients look for it: standbys may be among them.
+        self.hosts = [server.folder]
         self.site = site
         with psycopg.connect(server.url, autocommit=True) as connection:
-            connection.execute(f'CREATE DATABASE "{self.name}"')
+            connection.execute(f'CREATE DATABASE "{self.name}" TABLESPACE {tablespace}')
         made = run("archive", "init", "--archive-url", self.owner)
         assert made.returncode == 0, made.stderr
         self.add_user(site)
+
+    @property
+    def owner(self) -> str:
+        """Its address for its owner."""
+        return f"postgresql://postgres@/{self.name}?host={self.server.folder}"
 
     def add_user(self, name: str, role: str = "lupin_forwarder") -> None:
         """A user, unless another archive of the server made it."""
@@ -47,7 +56,15 @@ class Archive:
 
     def url(self, user: str | None = None) -> str:
         """Its address for a user, the site's own if none is named."""
-        return f"postgresql://{user or self.site}@/{self.name}?host={self.server.folder}"
+        hosts = ",".join(map(str, self.hosts))
+        return f"postgresql://{user or self.site}@/{self.name}?host={hosts}"
+
+    def of_site(self, site: str) -> Archive:
+        """The same, for another site."""
+        other = copy(self)
+        other.site = site
+        other.add_user(site)
+        return other
 
     def select(self, sql: str) -> list[tuple[Any, ...]]:
         """What its owner sees."""
@@ -99,7 +116,7 @@ def rows_of(journal: Path) -> dict[str, list[tuple[Any, ...]]]:
 def run(*args: str, **env: str) -> subprocess.CompletedProcess[str]:
     """A command of `lupin-twin` that ends by itself."""
     return subprocess.run(
-        [sys.executable, "-m", "lupin_bridge.cli", *args],
+        [sys.executable, "-m", "lupin_bridge.cli.command", *args],
         env=_env(env),
         capture_output=True,
         text=True,
@@ -120,7 +137,7 @@ def forward_once(archive: Archive, journal: Path) -> None:
 def forwarder(archive: Archive, journal: Path, **env: str) -> Process:
     """`lupin-twin forward`, which goes on until it is ended."""
     command = [
-        sys.executable, "-m", "lupin_bridge.cli", "forward", "--site", archive.site,
+        sys.executable, "-m", "lupin_bridge.cli.command", "forward", "--site", archive.site,
         "--archive-url", archive.url(), "--journal", str(journal),
     ]  # fmt: skip
     return Process(command, _env(env))

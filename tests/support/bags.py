@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import resource
-import struct
 from array import array
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
@@ -12,15 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mcap.exceptions import EndOfFile
 from mcap.reader import make_reader
-from mcap.records import Channel, Message, Schema
-from mcap.stream_reader import StreamReader
+from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-from lupin_bridge.bags.topics import Topic
 
 
 def plain(value: Any) -> Any:
@@ -66,12 +61,6 @@ def by_rosbags(type_name: str, schema: str, data: bytes) -> Any:
 
 # --- recordings ----------------------------------------------------------------------------------
 
-TOPICS = (
-    Topic("/floranova/observations", "lupin_msgs/msg/Observation", 3),
-    Topic("/map", "nav_msgs/msg/OccupancyGrid", 1),
-    Topic("/clock", "rosgraph_msgs/msg/Clock"),
-)
-OBSERVATIONS, MAP, CLOCK = range(3)
 # What is written need not be a message for who only carries it.
 Entry = tuple[str, int, int, bytes]
 
@@ -115,17 +104,3 @@ def read(path: Path) -> list[Entry]:
         )
     assert by_rosbags == sorted((topic, log_ns, data) for topic, log_ns, _, data in raw)
     return raw
-
-
-def read_unfinished(path: Path) -> list[Entry]:
-    """The same of a file that nobody has finished: what of it is whole."""
-    found: list[Entry] = []
-    topics: dict[int, str] = {}
-    with path.open("rb") as file, contextlib.suppress(EndOfFile, struct.error):
-        for record in StreamReader(file).records:
-            if isinstance(record, Channel):
-                topics[record.id] = record.topic
-            elif isinstance(record, Message):
-                topic = topics[record.channel_id]
-                found.append((topic, record.log_time, record.publish_time, record.data))
-    return found

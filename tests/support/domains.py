@@ -52,7 +52,7 @@ def _ports_of(domain: int) -> range:
 
 
 def _remove_ports_of(domain: int, folder: Path = SHARED_MEMORY) -> None:
-    """Remove what killed processes left of a domain's ports: half-made, they stop whoever comes."""
+    """Remove what killed processes left of a domain's ports, which would stop others."""
     for port in _ports_of(domain):
         for name in (f"fastrtps_port{port}", f"fastrtps_port{port}_el"):
             (folder / name).unlink(missing_ok=True)

@@ -17,7 +17,7 @@ from tests.support.ws_client import open_websocket
 
 SDK, WEBSOCKET = "foxglove.sdk.v1", "foxglove.websocket.v1"
 
-Told = dict[str, Any]
+TwinUpdate = dict[str, Any]
 
 
 class Viewer:
@@ -25,16 +25,16 @@ class Viewer:
 
     def __init__(self, connection: ClientConnection) -> None:
         self.connection = connection
-        self.channels: dict[str, Told] = {}
+        self.channels: dict[str, TwinUpdate] = {}
 
     def send(self, **members: Any) -> None:
         self.connection.send(json.dumps(members))
 
-    def next(self) -> Told | tuple[int, int, bytes]:
+    def next(self) -> TwinUpdate | tuple[int, int, bytes]:
         """The next message: JSON, or (subscription or -1 for a time, ns, payload)."""
         message = self.connection.recv(timeout=PATIENCE_S)
         if isinstance(message, str):
-            told: Told = json.loads(message)
+            told: TwinUpdate = json.loads(message)
             if told["op"] == "advertise":
                 self.channels |= {channel["topic"]: channel for channel in told["channels"]}
             return told
@@ -43,7 +43,7 @@ class Viewer:
         key, stamp_ns = struct.unpack_from("<IQ", message, 1)
         return key, stamp_ns, message[13:]
 
-    def told(self, op: str) -> Told:
+    def told(self, op: str) -> TwinUpdate:
         """Read on to the first JSON message of a kind."""
         while not isinstance(message := self.next(), dict) or message["op"] != op:
             pass
@@ -77,7 +77,7 @@ def viewer(url: str, subprotocols: Sequence[str] = (SDK,), **options: Any) -> It
         yield client
 
 
-def reader_of(channel: Told) -> Callable[[bytes], Any]:
+def reader_of(channel: TwinUpdate) -> Callable[[bytes], Any]:
     """What makes a message of a channel's payload, by the schema that was advertised alone."""
     schema = Schema(1, channel["schema"].encode(), channel["schemaEncoding"], channel["schemaName"])
     decode = DecoderFactory().decoder_for(channel["encoding"], schema)

@@ -27,7 +27,7 @@ from lupin_msgs.msg import (
 from nav_msgs.msg import OccupancyGrid
 from rclpy.serialization import serialize_message
 
-# The messages of each package, for `lupin_twin.cdr`.
+# The messages of each package, for `lupin_twin.ros.message_limits`.
 PACKAGES: Final[Mapping[str, Any]] = {
     module.__name__.partition(".")[0]: module
     for module in (

@@ -14,11 +14,11 @@ import httpx
 
 from lupin_bridge.app import create_app
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.serving.limits import Limits
+from lupin_bridge.feed.local import LocalTwin
+from lupin_bridge.serving.admission import Limits
 from lupin_bridge.serving.server import BridgeServer, address_of, listen
 from lupin_bridge.settings import Settings
-from lupin_bridge.twin.local_twin import LocalTwin
-from lupin_twin.node import TwinNode
+from lupin_twin.ros.node import TwinNode
 from tests.support.waiting import PATIENCE_S
 
 T = TypeVar("T")
@@ -82,7 +82,7 @@ async def running(
     limits = limits or Limits(answer_timeout_s=PATIENCE_S)
     twin = LocalTwin(ros_args=ros_args, timeout_s=limits.answer_timeout_s)
     bridge = Bridge(twin, settings, limits=limits)
-    server = BridgeServer(create_app(bridge), settings, bridge.say_goodbye, limits)
+    server = BridgeServer(create_app(bridge), settings, bridge.announce_shutdown, limits)
     listener = listen("127.0.0.1", 0)
     url = address_of(listener)
     await bridge.start()

@@ -7,16 +7,15 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from lupin_twin.journal.condition import Condition, JournalState
+from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.state import Bloom, Flower, Pose, Reading
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import Restored
-from lupin_twin.journal.pending import MAX_WEIGHT
 from lupin_twin.journal.retention import Limits
-from lupin_twin.journal.rows import LookRow, PinRow, Row, ScanRow
+from lupin_twin.journal.rows import InspectionRow, PinRow, Row, ScanRow
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import Empty, open_reader
-from lupin_twin.journal.writer import Journal
-from lupin_twin.state import Bloom, Flower, Pose, Reading
+from lupin_twin.journal.writer import MAX_WEIGHT, Journal
 from tests.support.waiting import wait_for
 
 SECOND = 1_000_000_000
@@ -39,7 +38,7 @@ def scan(
     )
 
 
-def look(tag_id: str = "7", at_ns: int = NOW, *, anomaly: bool = False) -> LookRow:
+def look(tag_id: str = "7", at_ns: int = NOW, *, anomaly: bool = False) -> InspectionRow:
     """A look at two flowers."""
     flower = Flower(
         species="lupin",
@@ -53,7 +52,7 @@ def look(tag_id: str = "7", at_ns: int = NOW, *, anomaly: bool = False) -> LookR
         ),
         footprint=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.1)),
     )
-    return LookRow(tag_id, at_ns, at_ns + 2000, flower, source="robot", mission="m1")
+    return InspectionRow(tag_id, at_ns, at_ns + 2000, flower, source="robot", mission="m1")
 
 
 def pin(tag_id: str = "7", at_ns: int = NOW, x: float = 1.5) -> PinRow:

@@ -15,12 +15,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
-from lupin_twin.journal.export import rows
+from lupin_twin.core.past import SeriesRequest
+from lupin_twin.core.writes import WritesRequest
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.queries import series
-from lupin_twin.journal.writes import writes
-from lupin_twin.past import SeriesRequest
-from lupin_twin.past_writes import WritesRequest
+from lupin_twin.journal.follow import writes
+from lupin_twin.journal.queries import rows, series
 
 JOURNALS: Final = Path(__file__).parents[1] / "fixtures" / "journals"
 NAMES: Final = sorted(path.stem for path in JOURNALS.glob("*.sqlite"))

@@ -13,10 +13,10 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from lupin_bridge import cli
-from lupin_bridge.serving.limits import Limits
-from lupin_twin.parameters import World
-from lupin_twin.process import use_one_core
+from lupin_bridge.cli import command as cli_command
+from lupin_bridge.serving.admission import Limits
+from lupin_twin.core.parameters import World
+from lupin_twin.runtime.process import limit_blas_threads
 
 
 def _values(pairs: Sequence[str]) -> dict[str, Any]:
@@ -29,14 +29,14 @@ def command() -> None:
     parser.add_argument("--world", action="append", default=[])
     options, rest = parser.parse_known_args()
     sys.argv[1:] = rest
-    use_one_core()
-    from lupin_bridge import roles
+    limit_blas_threads()
+    from lupin_bridge.cli import roles
 
     vars(roles).update(
         Limits=partial(Limits, **_values(options.limit)),
         World=partial(World, **_values(options.world)),
     )
-    cli.command()
+    cli_command.command()
 
 
 if __name__ == "__main__":

@@ -14,13 +14,13 @@ from typing import Any
 
 from hypothesis import strategies as st
 
+from lupin_twin.core.past import EVERY_TAG, Event, PastRow, SeriesPast, SeriesRequest
+from lupin_twin.core.state import NO_FLOWER, Pose, Reading
 from lupin_twin.journal.appending import KNOWN_BY_NOTHING, Appender
 from lupin_twin.journal.retention import Limits, purge_step
-from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, LookRow, PinRow, Row, ScanRow
+from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, InspectionRow, PinRow, Row, ScanRow
 from lupin_twin.journal.runs import runs, spans
 from lupin_twin.journal.schema import open_writer, transaction
-from lupin_twin.past import EVERY_TAG, Event, PastRow, SeriesPast, SeriesRequest
-from lupin_twin.state import NO_FLOWER, Pose, Reading
 
 SECOND = 1_000_000_000
 MINUTE = 60 * SECOND
@@ -46,12 +46,12 @@ def failure(tag: str = "7", at_ns: int = BEGUN, status: int = 2, kind: int = 0) 
     return ScanRow(tag, at_ns, at_ns + 1000, (), kind, status, "no", source="robot")
 
 
-def look(tag: str = "7", at_ns: int = BEGUN, *, anomaly: bool = False) -> LookRow:
+def look(tag: str = "7", at_ns: int = BEGUN, *, anomaly: bool = False) -> InspectionRow:
     """A look at flowers."""
     flower = replace(
         NO_FLOWER, species="lupin", confidence=0.9, anomaly=anomaly, bug_count=int(anomaly)
     )
-    return LookRow(tag, at_ns, at_ns + 2000, flower, source="robot", mission="m1")
+    return InspectionRow(tag, at_ns, at_ns + 2000, flower, source="robot", mission="m1")
 
 
 def pin(tag: str = "7", at_ns: int = BEGUN, x: float = 1.5) -> PinRow:
@@ -68,6 +68,7 @@ class Life:
     run: int = 0
     batches: list[list[Row]] = field(default_factory=list)
     _known: dict[object, set[str]] = field(default_factory=dict)
+    _copied: dict[object, Row] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._appender = Appender(self.connection)
@@ -99,10 +100,11 @@ class Life:
     def begin(self, at_ns: int, ended_ns: int | None = None) -> None:
         """A clock that is new, or has gone back; the latest of what was known is copied."""
         before, self.run = self.run, self.run + 1
-        copied: dict[object, Row] = {}
         for run, row in self.rows:
             if run == before:
-                copied[type(row), row.tag_id] = replace(row, stamp_ns=min(row.stamp_ns, at_ns))
+                self._copied[type(row), row.tag_id] = row
+        for key, row in self._copied.items():
+            self._copied[key] = replace(row, stamp_ns=min(row.stamp_ns, at_ns))
         with transaction(self.connection):
             self.connection.execute(
                 "UPDATE run SET ended_stamp_ns = ? WHERE run = ?", (ended_ns, before)
@@ -115,7 +117,7 @@ class Life:
                 self.run,
                 [
                     row if isinstance(row, PinRow) else replace(row, own_stamp_ns=KNOWN_BY_NOTHING)
-                    for row in copied.values()
+                    for row in self._copied.values()
                 ],
                 are_copies=True,
             )
@@ -155,7 +157,7 @@ class Life:
         found = []
         for number, row in self._of(tag_id):
             value: float | None = None
-            if isinstance(row, LookRow) and event is Event.LOOKS:
+            if isinstance(row, InspectionRow) and event is Event.LOOKS:
                 value = row.flower.bug_count
             elif isinstance(row, ScanRow) and row.status != STATUS_OK and event is Event.FAILURES:
                 value = row.status
@@ -171,7 +173,7 @@ class Life:
         had: dict[tuple[int, str], bool] = {}
         looks = [(row.stamp_ns, n, run, row) for n, (run, row) in enumerate(self.rows)]
         for stamp_ns, number, run, row in sorted(looks, key=lambda look: look[:2]):
-            if not isinstance(row, LookRow) or tag_id not in (EVERY_TAG, row.tag_id):
+            if not isinstance(row, InspectionRow) or tag_id not in (EVERY_TAG, row.tag_id):
                 continue
             has = row.flower.anomaly
             if has != had.get((run, row.tag_id), False) and has == is_seen and number in held:
@@ -181,7 +183,7 @@ class Life:
 
     def attempts(self, tag_id: str) -> list[int]:
         found = self._of(tag_id)
-        return sorted(row.stamp_ns for _, row in found if isinstance(row, ScanRow | LookRow))
+        return sorted(row.stamp_ns for _, row in found if isinstance(row, ScanRow | InspectionRow))
 
     def silences(
         self, tag_id: str, start_ns: int, end_ns: int, now_ns: int
@@ -290,6 +292,7 @@ steps = st.lists(
     min_size=1,
     max_size=8,
 )
+one_run = steps.map(lambda told: [step for step in told if step[0] != "back"])
 periods = st.one_of(
     st.tuples(_stamps, _stamps).map(sorted),
     st.tuples(st.just(0), _stamps),

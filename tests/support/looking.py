@@ -10,14 +10,14 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Any
 
-from lupin_bridge.past.as_of import Written
-from lupin_bridge.past.asked import Answered
-from lupin_bridge.twin.looking import Found, Need, Work
-from lupin_bridge.twin.past_child import Child
-from lupin_twin.explored import OccupancyMap
-from lupin_twin.past import PastRefused
-from lupin_twin.state import Snapshot
-from lupin_twin.workers import SMALL_S, ShouldStop
+from lupin_bridge.feed.past_child import Child
+from lupin_bridge.feed.query import Found, Need, Work
+from lupin_bridge.past.plans import Answered
+from lupin_bridge.serving.admission import Answer
+from lupin_twin.core.past import PastRefused
+from lupin_twin.core.state import Snapshot
+from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.runtime.workers import SMALL_S, ShouldStop
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ class Body:
     def look(self) -> Generator[Need, Found, Work[Answered]]:
         """See `Question`."""
         yield from ()
-        return Work(0.0, lambda _: Answered("x", Written(b"7" * self.count, "text/plain", {})))
+        return Work(0.0, lambda _: Answered("x", Answer(b"7" * self.count, "text/plain", {})))
 
 
 @dataclass(frozen=True, slots=True)

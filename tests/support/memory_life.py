@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from lupin_twin import ingest
-from lupin_twin.drops import Drop
-from lupin_twin.history import KIND_FLOWER, KIND_TAG_READING, History
-from lupin_twin.ingest import Heard, HeardLook, HeardReading
+from lupin_twin.core import ingest
+from lupin_twin.core.drops import Drop
+from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING, History
+from lupin_twin.core.ingest import Received, ReceivedInspection, ReceivedReading
+from lupin_twin.core.state import Flower, Pose, Reading, Snapshot, TagState, TwinStore
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.runs import Clock
-from lupin_twin.memory import Memory, open_journal
-from lupin_twin.state import Flower, Pose, Reading, Snapshot, TagState, TwinStore
+from lupin_twin.runtime.memory import Memory, open_journal
 from tests.support.waiting import wait_for
 
 S = 1_000_000_000
@@ -63,12 +63,12 @@ class Twin:
         stamp_ns = 0 if stamp_s is None else int(stamp_s * S)
         stamp_ns += 0 if self.is_simulated or stamp_s is None else NOW
         part = (
-            HeardReading(tag, 0, tuple(Reading(*each) for each in readings.items()), pose)
+            ReceivedReading(tag, 0, tuple(Reading(*each) for each in readings.items()), pose)
             if flower is None
-            else HeardLook(tag, "", flower, pose)
+            else ReceivedInspection(tag, "", flower, pose)
         )
         kind = KIND_TAG_READING if flower is None else KIND_FLOWER
-        heard = Heard(kind, source, status, "", "", stamp_ns, part)
+        heard = Received(kind, source, status, "", "", stamp_ns, part)
         write = ingest.observation(heard, "map", self.now_ns)
         assert not isinstance(write, Drop)
         assert self.memory.apply(write, self.wall_ns) is None
@@ -87,7 +87,7 @@ class Twin:
         wait_for(lambda: self.memory.condition.waiting == 0, "all to be written")
         offset_ns = 0 if self.is_simulated else NOW
         at_ns = self.now_ns if at_s is None else int(at_s * S) + offset_ns
-        asked = self.memory.recall.ask(lambda connection, _: state_at(connection, at_ns, "map"))
+        asked = self.memory.recall.query(lambda connection, _: state_at(connection, at_ns, "map"))
         return by_id(asked.result(20.0))
 
     def says(self, name: str = "t", tag: str = "7") -> tuple[float, float | None]:

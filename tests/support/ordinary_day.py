@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from lupin_patrol.cli import parse
 from lupin_patrol.past import DAYS, past
-from lupin_twin.past_writes import PastWrite
+from lupin_twin.core.writes import PastWrite
 
 S: Final = 1_000_000_000
 DAY_NS: Final = 86_400 * S

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 from statistics import fmean
 from typing import Any, TypeVar
 
-from lupin_bridge.twin.looking import Question, Work
-from lupin_twin.past import Event, NotRemembered, PastRow, SeriesPast, SeriesRequest
-from lupin_twin.past_writes import PastWrite, RecentRequest, WritesRequest
-from lupin_twin.state import Snapshot
-from lupin_twin.workers import Workers
+from lupin_bridge.feed.query import Question, Work
+from lupin_twin.core.past import Event, NotRemembered, PastRow, SeriesPast, SeriesRequest
+from lupin_twin.core.state import Snapshot
+from lupin_twin.core.writes import PastWrite, RecentRequest, WritesRequest
+from lupin_twin.runtime.workers import Workers
 
 NS = 10**9
 ResultT = TypeVar("ResultT")

@@ -12,15 +12,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import psycopg
+
 from tests.support.waiting import wait_for
 
 _USER = "postgres"
 _BIN = Path("/usr/lib/postgresql/15/bin")
 
 
-def _run(*command: str) -> None:
+def _run(*command: str, as_root: bool = False) -> None:
     # It refuses to be root's.
-    user = _USER if os.geteuid() == 0 else None
+    user = _USER if os.geteuid() == 0 and not as_root else None
     done = subprocess.run(
         command, user=user, group=user, cwd="/", capture_output=True, text=True, check=False
     )
@@ -30,29 +32,61 @@ def _run(*command: str) -> None:
 class Postgres:
     """A server; `url` is its connection string, `folder` has its socket."""
 
-    def __init__(self, folder: Path, *, fsync: bool) -> None:
-        found = shutil.which("initdb") or _BIN / "initdb"
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        fsync: bool,
+        small_mb: int = 0,
+        connections: int = 100,
+        primary: Postgres | None = None,
+    ) -> None:
+        found = Path(shutil.which("initdb") or _BIN / "initdb").resolve()
         self.folder = folder
         self.url = f"host={folder} user={_USER} dbname=postgres"
-        self._pg_ctl = str(Path(found).with_name("pg_ctl"))
+        self._pg_ctl = str(found.with_name("pg_ctl"))
         self._data = folder / "data"
         self._fsync = "on" if fsync else "off"
+        self._small_mb = small_mb
+        self._connections = connections
         if os.geteuid() == 0:
             owner = pwd.getpwnam(_USER)
             os.chown(folder, owner.pw_uid, owner.pw_gid)
-        _run(
-            *(str(found), "-D", str(self._data), "-U", _USER),
-            *("-A", "trust", "-E", "UTF8", "--no-sync"),
-        )
+        data = ("-D", str(self._data), "-U", _USER, "--no-sync")
+        if primary is None:
+            _run(str(found), *data, "-A", "trust", "-E", "UTF8")
+        else:
+            backup = str(found.with_name("pg_basebackup"))
+            _run(backup, *data, "-h", str(primary.folder), "-c", "fast", "--write-recovery-conf")
 
     def start(self) -> None:
         """Start it; returns when it answers."""
-        options = f"-k {self.folder} -c listen_addresses='' -c fsync={self._fsync}"
+        options = (
+            f"-k {self.folder} -c listen_addresses='' -c fsync={self._fsync}"
+            f" -c max_connections={self._connections}"
+        )
         log = str(self.folder / "log")
-        _run(self._pg_ctl, "-D", str(self._data), "-o", options, "-l", log, "-w", "start")
+        start = (self._pg_ctl, "-D", str(self._data), "-o", options, "-l", log, "-w", "start")
+        if not self._small_mb:
+            _run(*start)
+            return
+        # A disk that the server alone sees, and that goes with it.
+        small = self.folder / "small"
+        small.mkdir()
+        mount = f"mount -t tmpfs -o size={self._small_mb}m,uid=$(id -u {_USER}) none {small}"
+        script = f'{mount} && cd / && exec setpriv --reuid {_USER} --clear-groups "$0" "$@"'
+        _run("unshare", "-m", "--", "sh", "-c", script, *start, as_root=True)
+        with psycopg.connect(self.url, autocommit=True) as connection:
+            connection.execute(f"CREATE TABLESPACE small LOCATION '{small}'")
+
+    def promote(self) -> None:
+        """Make a primary of a standby; returns when it takes writes."""
+        _run(self._pg_ctl, "-D", str(self._data), "-w", "promote")
 
     def stop(self) -> None:
-        """End it without a word to its clients."""
+        """End it without a word to its clients, if it runs."""
+        if not (self._data / "postmaster.pid").exists():
+            return
         _run(self._pg_ctl, "-D", str(self._data), "-m", "immediate", "-w", "stop")
 
     def kill(self) -> None:
@@ -75,19 +109,41 @@ def _has_ended(pid: str) -> bool:
 
 
 @contextmanager
-def server(*, fsync: bool = False) -> Iterator[Postgres]:
-    """One that runs; it ends, and is gone, with the block."""
+def server(
+    *,
+    fsync: bool = False,
+    small_mb: int = 0,
+    connections: int = 100,
+    primary: Postgres | None = None,
+) -> Iterator[Postgres]:
+    """One that runs; it ends, and is gone, with the block.
+
+    `small_mb`: it has a tablespace `small` on a disk of that size; only root may have that made.
+    `primary`: it is the standby of that one, which from now on waits for it at each commit.
+    """
     # Short: the path of a socket has 107 bytes at most.
     folder = Path(tempfile.mkdtemp(prefix="pg", dir="/tmp"))
     try:
-        made = Postgres(folder, fsync=fsync)
+        made = Postgres(
+            folder, fsync=fsync, small_mb=small_mb, connections=connections, primary=primary
+        )
         made.start()
         try:
+            if primary is not None:
+                _wait_for_each_commit(primary)
             yield made
         finally:
             made.stop()
     finally:
         shutil.rmtree(folder)
+
+
+def _wait_for_each_commit(primary: Postgres) -> None:
+    with psycopg.connect(primary.url, autocommit=True) as connection:
+        connection.execute("ALTER SYSTEM SET synchronous_standby_names = '*'")
+        connection.execute("SELECT pg_reload_conf()")
+        synced = "SELECT 1 FROM pg_stat_replication WHERE sync_state = 'sync'"
+        wait_for(lambda: connection.execute(synced).fetchone(), "a standby that is waited for")
 
 
 @contextmanager

@@ -145,7 +145,9 @@ def twin_node(domain: int, *ros_args: str, afresh: bool = False, **env: str) -> 
 
 def lupin_twin(domain: int, role: str, *args: str, afresh: bool = False, **env: str) -> Process:
     """`lupin-twin ROLE` on a free port; ask `url_of` for its address."""
-    module = "tests.support.limited" if {"--limit", "--world"} & {*args} else "lupin_bridge.cli"
+    module = (
+        "tests.support.limited" if {"--limit", "--world"} & {*args} else "lupin_bridge.cli.command"
+    )
     command = [sys.executable, "-m", module, role, "--port", "0", *args]
     return Process(command, ros_env(domain, **env), afresh=afresh)
 

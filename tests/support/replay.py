@@ -11,10 +11,10 @@ from typing import TypeGuard
 
 from hypothesis import strategies as st
 
+from lupin_twin.core.state import Flower, Inspection, Pose, Reading, Scan, TagState, TwinStore
 from lupin_twin.journal.file import JournalFile
-from lupin_twin.journal.rows import KIND_FLOWER, KIND_READING, LookRow, PinRow, Row, ScanRow
+from lupin_twin.journal.rows import KIND_FLOWER, KIND_READING, InspectionRow, PinRow, Row, ScanRow
 from lupin_twin.journal.runs import CORRECTION_NS, Carries, Clock, Run
-from lupin_twin.state import Flower, Look, Pose, Reading, Scan, TagState, TwinStore
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def _rows(draw: st.DrawFn) -> Row:
             return PinRow(tag_id, 0, 0, Pose(float(draw(_SMALL)), 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
         case "look":
             flower = Flower(flower_count=draw(_SMALL), anomaly=draw(st.booleans()))
-            return LookRow(tag_id, 0, 0, flower, source)
+            return InspectionRow(tag_id, 0, 0, flower, source)
         case "blind":
             return ScanRow(tag_id, 0, 0, (), KIND_FLOWER, draw(st.integers(1, 2)), "dark", source)
         case kind:
@@ -120,7 +120,7 @@ class Life:
         return min(stretch.run.begun.stamp_ns for stretch in self.stretches)
 
 
-class Heard:
+class Received:
     """Writes steps into a file, and keeps the plainest account of them."""
 
     def __init__(self, file: JournalFile, steps: Sequence[Step]) -> None:
@@ -297,10 +297,12 @@ def write(row: Row, store: TwinStore) -> None:
     match row:
         case PinRow():
             store.pin(row.tag_id, row.pose)
-        case LookRow():
-            store.record_look(Look(row.tag_id, row.stamp_ns, row.flower))
+        case InspectionRow():
+            store.record_inspection(Inspection(row.tag_id, row.stamp_ns, row.flower))
         case ScanRow(kind=0):
             readings = row.readings
             store.record(Scan(row.tag_id, row.stamp_ns, readings, None, row.status, row.detail))
         case ScanRow():
-            store.record_look(Look(row.tag_id, row.stamp_ns, None, None, row.status, row.detail))
+            store.record_inspection(
+                Inspection(row.tag_id, row.stamp_ns, None, None, row.status, row.detail)
+            )

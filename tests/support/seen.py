@@ -8,13 +8,13 @@ from dataclasses import replace
 from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, Board
 from lupin_bridge.alarms.ledger import Page, change_between, page_of
 from lupin_bridge.judge.alarm import Alarm, alarm_id
-from lupin_bridge.judge.choosing import own_sensors
 from lupin_bridge.judge.daylight import Day, judge_day
 from lupin_bridge.judge.judging import judge_once
+from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
-from lupin_bridge.outward.payloads import Seen
-from lupin_twin.diagnostics import Origin
-from lupin_twin.state import Reading, Snapshot, TagState
+from lupin_bridge.notify.messages import GreenhouseState
+from lupin_twin.core.diagnostics import Origin
+from lupin_twin.core.state import Reading, Snapshot, TagState
 
 SENSORS = own_sensors()
 S = 1_000_000_000
@@ -41,13 +41,13 @@ def seen(
     is_live: bool = True,
     holds_ns: Mapping[str, int] | None = None,
     origin: Origin = "robot",
-) -> Seen:
+) -> GreenhouseState:
     """What a bridge would say of these tags."""
     snapshot = Snapshot(
         now_ns or NOW_NS, "map", tags, clock="running" if now_ns is not None else "stopped"
     )
     holds = dict.fromkeys((it.tag_id for it in tags), HOLDS_NS) | dict(holds_ns or {})
-    return Seen(
+    return GreenhouseState(
         snapshot=snapshot,
         judged=judge_once(snapshot, (), SENSORS, lambda *_: Day(True, "assumed"), HOLDS_NS / 1e9),
         board=Board(Page.of(alarms), "heard", NOW_NS, 1),

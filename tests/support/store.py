@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from lupin_twin.state import NANOSECONDS_PER_SECOND, STATUS_OK, Flower, Look, Pose, Reading, Scan
+from lupin_twin.core.state import (
+    NANOSECONDS_PER_SECOND,
+    STATUS_OK,
+    Flower,
+    Inspection,
+    Pose,
+    Reading,
+    Scan,
+)
 
 S = NANOSECONDS_PER_SECOND
 SCAN_FAILED = 2
@@ -27,11 +35,11 @@ def scan(
     return Scan(tag_id, round(at_s * S), values, pose, status, source=source)
 
 
-def look(tag_id: str, at_s: float = 1.0, pose: Pose | None = None, **flower: object) -> Look:
+def look(tag_id: str, at_s: float = 1.0, pose: Pose | None = None, **flower: object) -> Inspection:
     """A look at the flowers; keyword arguments are what was seen."""
-    return Look(tag_id, round(at_s * S), Flower(**flower), pose)  # type: ignore[arg-type]
+    return Inspection(tag_id, round(at_s * S), Flower(**flower), pose)  # type: ignore[arg-type]
 
 
-def failed_look(tag_id: str, at_s: float = 1.0) -> Look:
+def failed_look(tag_id: str, at_s: float = 1.0) -> Inspection:
     """A look that saw no flowers."""
-    return Look(tag_id, round(at_s * S), None, status=SCAN_FAILED)
+    return Inspection(tag_id, round(at_s * S), None, status=SCAN_FAILED)

@@ -28,13 +28,13 @@ from pathlib import Path
 from typing import IO, Any, Final
 
 # The programs that it can be, by the module that `python -m` would run.
-PROGRAMS: Final = ("lupin_bridge.cli", "lupin_twin.cli", "tests.support.limited")
+PROGRAMS: Final = ("lupin_bridge.cli.command", "lupin_twin.cli", "tests.support.limited")
 # What they import once they run.
 IMPORTED: Final = (
-    "lupin_bridge.roles",
-    "lupin_twin.node",
-    "lupin_twin.ros_parameters",
-    "lupin_twin.spinning",
+    "lupin_bridge.cli.roles",
+    "lupin_twin.ros.node",
+    "lupin_twin.ros.parameters",
+    "lupin_twin.ros.base_node",
 )
 # Variables that are read where a program runs, by us or by rcl. Of all others some are read as
 # something is imported: with one that differs a process has to start anew.

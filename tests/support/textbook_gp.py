@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lupin_twin.estimate.kernel import Hyper
-from lupin_twin.grid import FloatArray
+from lupin_twin.field.grid import FloatArray
 
 
 class Spot(NamedTuple):

@@ -11,7 +11,7 @@ import signal
 import sys
 from pathlib import Path
 
-from lupin_twin.journal import upgrade
+from lupin_twin.journal import rebuild
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.writer import Journal
@@ -24,7 +24,7 @@ LIMITS = Limits(days=36_500, max_bytes=4_000_000_000)
 
 def main(path: Path, kill_at: int) -> None:
     """Start as a twin does, and be told what was known."""
-    upgrade._ROWS = 20  # type: ignore[misc]
+    rebuild._ROWS = 20  # type: ignore[misc]
     seen = 0
 
     def step() -> None:
@@ -37,13 +37,13 @@ def main(path: Path, kill_at: int) -> None:
         if event in _OPERATIONS and str(path) in str(arguments[0]):
             step()
 
-    tell = Journal._tell_progress
+    tell = Journal._report_progress
 
     def tell_and_count(journal: Journal, share: float) -> None:
         tell(journal, share)
         step()
 
-    Journal._tell_progress = tell_and_count  # type: ignore[assignment, method-assign]
+    Journal._report_progress = tell_and_count  # type: ignore[assignment, method-assign]
     sys.addaudithook(watch)
     journal = Journal(path, "/child", LIMITS)
     journal.begin(CLOCK)

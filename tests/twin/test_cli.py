@@ -81,7 +81,7 @@ def test_it_goes_on_after_it_was_stopped_for_a_while(domain: int) -> None:
 
 def test_it_ends_with_1_when_its_thread_dies(domain: int) -> None:
     program = (
-        "import lupin_twin.spinning as spinning, lupin_twin.cli as cli, sys; "
+        "import lupin_twin.ros.base_node as spinning, lupin_twin.cli as cli, sys; "
         "spinning.spin_until_shutdown = lambda *_: None; "
         "sys.exit(cli.main())"
     )

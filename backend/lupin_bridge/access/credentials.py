@@ -59,10 +59,10 @@ class Sessions:
 
     def _forget(self, now_s: float) -> None:
         """Forget the ended ones; were there none, the one that ends first."""
-        kept = {name: ends_s for name, ends_s in self._signed_out.items() if ends_s > now_s}
-        if len(kept) >= self._max_signed_out:
-            del kept[min(kept, key=kept.__getitem__)]
-        self._signed_out = kept
+        open_ = {name: ends_s for name, ends_s in self._signed_out.items() if ends_s > now_s}
+        if len(open_) >= self._max_signed_out:
+            del open_[min(open_, key=open_.__getitem__)]
+        self._signed_out = open_
 
 
 # Our own cookie out of a request's headers, by one look along them. Pure.
@@ -123,7 +123,7 @@ class BrowserSession:
 
 
 class TokenError(SettingError):
-    """A token that cannot be one; the message tells its length, never the token."""
+    """A token that cannot be one; the message has its length, never the token."""
 
 
 class Credentials:
@@ -144,7 +144,7 @@ class Credentials:
                 "-._~+/ (RFC 6750)"
             )
         self._digest = _digest(token.encode())
-        # Slow on purpose: whoever gets hold of a cookie must not find a weak token from it.
+        # Slow on purpose: a stolen cookie must not reveal a weak token.
         self._key = hashlib.scrypt(token.encode(), salt=b"lupin-twin session", n=2**14, r=8, p=1)
         # Browsers keep one jar for all ports of a host: bridges with different tokens must not
         # overwrite each other's session.

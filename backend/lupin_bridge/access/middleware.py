@@ -1,4 +1,7 @@
-"""The doorman: every request and WebSocket handshake passes `access` and `credentials` here."""
+"""Access control: every request passes policy and credentials here, and only reads.
+
+Outside is `AccessControl` (403, 401, 429, 414), inside of it `ReadOnly` (405, security headers).
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import Final, Self
 
 import orjson
-from starlette.datastructures import MutableHeaders
+from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from websockets.frames import CloseCode
@@ -23,14 +26,75 @@ from lupin_bridge.access.credentials import (
     Sessions,
     cookies_of,
 )
-from lupin_bridge.access.entrance import path_of
-from lupin_bridge.access.policy import AccessPolicy, Asked, HostError, OriginError
-from lupin_bridge.access.security import with_security_headers
-from lupin_bridge.serving.rate_limit import RateLimit, client_key
+from lupin_bridge.access.policy import AccessPolicy, HostError, OriginError, RequestSource, path_of
+from lupin_bridge.serving.admission import RateLimit, client_key
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.settings import SettingError, Settings
 
 log = logging.getLogger(__name__)
+
+_READS: Final = ("GET", "HEAD")
+# Where a session begins and ends. A form, a link or a picture of a foreign page can ask for these
+# too, with the browser's cookie, but none of them can send a header of its own: for that, a script
+# has to ask first (CORS preflight), and is not given leave.
+POSTED: Final = frozenset({"/api/signin", "/api/signout"})
+OWN_HEADER: Final = "X-Lupin-Twin"
+
+# The page loads nothing from elsewhere, is framed by nobody, and runs no inline script. No other
+# page gets at an answer unless by CORS, which CORP does not touch. No HSTS: it would take the way
+# past a self-signed certificate, and it binds all ports of a host, other people's services too.
+CONTENT_POLICY: Final = (
+    "default-src 'self'; img-src 'self' blob: data:; connect-src 'self'; object-src 'none'; "
+    "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+)
+_SECURITY_HEADERS: Final = {
+    "Cache-Control": "no-cache",
+    "Content-Security-Policy": CONTENT_POLICY,
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+}
+
+
+class ReadOnly:
+    """ASGI middleware: reads only, but for sign-in and sign-out, and the headers on everything."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on what a path is there for, refuse anything else."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+
+        send = with_security_headers(send)
+        method = scope["method"]
+        methods = ("POST",) if path_of(scope) in POSTED else _READS
+        if method not in methods:
+            detail = f"method {method[:16]} is not allowed here, use {' or '.join(methods)}"
+            await _Refusal(405, detail, {"allow": ", ".join(methods)}).send(scope, receive, send)
+        elif method == "POST" and OWN_HEADER not in Headers(scope=scope):
+            detail = f"{method} without the header {OWN_HEADER}, expected any value"
+            await _Refusal(403, detail).send(scope, receive, send)
+        else:
+            await self._app(scope, receive, send)
+
+
+def with_security_headers(send: Send) -> Send:
+    """`send`, with the headers above on every answer that does not have its own."""
+
+    async def send_with_headers(message: Message) -> None:
+        if message["type"] in ("http.response.start", "websocket.http.response.start"):
+            headers = MutableHeaders(scope=message)
+            for name, value in _SECURITY_HEADERS.items():
+                headers.setdefault(name, value)
+        await send(message)
+
+    return send_with_headers
+
 
 # What a browser needs to sign in, and what a supervisor needs to see that the process lives.
 OPEN_PATHS: Final = frozenset({"/signin", "/signin.js", "/signin.css", "/healthz"})
@@ -86,7 +150,7 @@ class Access:
 
 
 class AccessControl:
-    """ASGI middleware: 403 for foreign hosts and pages, 401 and 429 for whoever has no token.
+    """ASGI middleware: 403 for foreign hosts and pages, 401 and 429 without the token.
 
     And 414 for an address that is far too long.
     """
@@ -107,22 +171,22 @@ class AccessControl:
             await _Refusal(414, detail).send(scope, receive, send)
             return
         request = HTTPConnection(scope)
-        verdict = self._access.policy.judge(_asked(request))
+        decision = self._access.policy.judge(_source_of(request))
         if self._access.policy.origins:
-            send = _with_cors(send, verdict.foreign)
-        if verdict.refusal is not None:
-            refusal = _Refusal(403, verdict.refusal)
-        elif verdict.foreign is not None and _is_preflight(request):
+            send = _with_cors(send, decision.foreign)
+        if decision.refusal is not None:
+            refusal = _Refusal(403, decision.refusal)
+        elif decision.foreign is not None and _is_preflight(request):
             refusal = _Refusal(204, "", _PREFLIGHT_HEADERS)
         else:
             checked = self._check_credentials(request)
             if not isinstance(checked, _Refusal):
-                await self._let_in(checked, scope, receive, send)
+                await self._pass_on(checked, scope, receive, send)
                 return
             refusal = checked
         await refusal.send(scope, receive, send)
 
-    async def _let_in(
+    async def _pass_on(
         self, session: BrowserSession | None, scope: Scope, receive: Receive, send: Send
     ) -> None:
         scope = _without_cookies(scope)
@@ -192,7 +256,7 @@ class AccessControl:
 
 
 def _without_cookies(scope: Scope) -> Scope:
-    """What the routes get: FastAPI takes the cookies of every request apart, asked for or not."""
+    """What the routes get: FastAPI takes the cookies of every request apart, wanted or not."""
     return {**scope, "headers": [line for line in scope["headers"] if line[0] != b"cookie"]}
 
 
@@ -240,9 +304,9 @@ def _unauthorized(detail: str) -> _Refusal:
     return _Refusal(401, detail, {"www-authenticate": 'Bearer realm="lupin-twin"'})
 
 
-def _asked(request: HTTPConnection) -> Asked:
+def _source_of(request: HTTPConnection) -> RequestSource:
     headers = request.headers
-    return Asked(
+    return RequestSource(
         scheme="https" if request.scope["scheme"] in ("https", "wss") else "http",
         hosts=headers.getlist("host"),
         origins=headers.getlist("origin"),

@@ -1,4 +1,10 @@
-"""Who may read, by a request's Host, Origin, Sec-Fetch and Referer headers. Pure.
+"""Where requests come from: past which proxies, below which path, and from whose page.
+
+A header may claim any address. X-Forwarded-For and X-Forwarded-Proto are believed of a proxy that
+the operator has named, and of nobody else. What the claim replaces (`client` and `scheme` of the
+scope) counts for limits, logs, wrong tokens and the check of origins. uvicorn's own middleware for
+this takes an address with a port, as some proxies write it, for a new client each time, knows no
+IPv4 address on a socket that listens for IPv6, and reads the last line of several alone.
 
 A browser will carry any page's request to a bridge that its machine can reach. Four rules keep
 foreign pages from reading, or computing, anything through it:
@@ -9,12 +15,12 @@ foreign pages from reading, or computing, anything through it:
 - Origin (RFC 6454): a request that a page makes in CORS mode, or for a WebSocket, names the page's
   origin. It has to be this bridge's own, or one that the operator has allowed.
 - Sec-Fetch-Site (W3C Fetch Metadata): a request without Origin that a foreign page makes, for an
-  `<img>` or an `<iframe>` say, is turned away as well. The page could not read the answer, only
+  `<img>` or an `<iframe>` say, is refused as well. The page could not read the answer, only
   make us compute it.
 - Referer: beyond this machine and without TLS, browsers send no Sec-Fetch headers. What is no page
   is then refused to whoever names a foreign page as where it comes from. A page passes, for that is
   what a link looks like; none of ours can be framed. A foreign page may keep its name to itself:
-  nothing tells its request from a program's then.
+  then its request looks like a program's.
 
 Programs other than browsers send none of Origin, Sec-Fetch-Site and Referer.
 """
@@ -24,8 +30,132 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from ipaddress import ip_address
-from typing import Final
+from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
+from typing import Final, Self
+
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from lupin_bridge.settings import SettingError, Settings
+
+# RFC 3986: a path of plain segments, none of which is "." or "..", without a slash at its end.
+_PATH_PREFIX: Final = re.compile(r"(?:/(?!\.{1,2}(?:/|$))[A-Za-z0-9._~-]+)+")
+# "10.0.0.7:1234" and "[fd00::7]:1234", as some proxies write an address.
+_WITH_PORT: Final = re.compile(r"\[(?P<v6>[^\]]+)\](?::\d+)?|(?P<v4>[\d.]+):\d+")
+
+
+@dataclass(frozen=True, slots=True)
+class Proxies:
+    """The proxies whose headers count, and the path that the bridge is below ("": none)."""
+
+    proxies: tuple[IPv4Network | IPv6Network, ...] = ()
+    path_prefix: str = ""
+
+    @classmethod
+    def of(cls, settings: Settings) -> Self:
+        """From the settings.
+
+        Raises:
+            SettingError: a proxy that is no address or network, or a prefix that is no path.
+
+        """
+        prefix = settings.path_prefix
+        if prefix and _PATH_PREFIX.fullmatch(prefix) is None:
+            raise SettingError(
+                f"{settings.called('path_prefix')} is {prefix[:128]!r}, must be a path such as "
+                "/gh1, without a slash at its end"
+            )
+        called = settings.called("trusted_proxy")
+        return cls(tuple(_network(text, called) for text in settings.trusted_proxy), prefix)
+
+    def trusts(self, address: str) -> bool:
+        """Whether this is a proxy whose headers count."""
+        ip = _address(address)
+        return ip is not None and any(ip in network for network in self.proxies)
+
+    def client(self, peer: str, forwarded_for: Iterable[str]) -> str:
+        """The client, by X-Forwarded-For in lines: the nearest address that is no trusted proxy.
+
+        Each proxy adds at the right whom it got the request from; what stands to the left of the
+        first stranger is the stranger's own claim. What is no address ends the search.
+        """
+        client = peer
+        hops = [hop for line in forwarded_for for hop in line.split(",")]
+        while hops and self.trusts(client):
+            hop = _address(hops.pop())
+            if hop is None:
+                break
+            client = str(hop)
+        return client
+
+
+class BehindProxies:
+    """ASGI middleware, the first of all: the client, scheme and path behind proxies and prefix.
+
+    A proxy may cut the prefix off or leave it on: either way `root_path` is the prefix and `path`
+    has it, as ASGI wants it.
+    """
+
+    def __init__(self, app: ASGIApp, proxies: Proxies) -> None:
+        self._app = app
+        self._proxies = proxies
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on with its client, scheme and path."""
+        if scope["type"] in ("http", "websocket"):
+            scope = {**scope, **self._forwarded(scope), **self._path(scope)}
+        await self._app(scope, receive, send)
+
+    def _forwarded(self, scope: Scope) -> dict[str, object]:
+        peer = (scope.get("client") or ("", 0))[0]
+        if not self._proxies.trusts(peer):
+            return {}
+        headers = Headers(scope=scope)
+        client = self._proxies.client(peer, headers.getlist("x-forwarded-for"))
+        forwarded: dict[str, object] = {"client": (client, 0)}
+        # Of several, the nearest proxy's: it is the one that we know.
+        proto = ",".join(headers.getlist("x-forwarded-proto")).rpartition(",")[2].strip().lower()
+        if proto in ("http", "https"):
+            is_socket = scope["type"] == "websocket"
+            forwarded["scheme"] = proto.replace("http", "ws") if is_socket else proto
+        return forwarded
+
+    def _path(self, scope: Scope) -> dict[str, object]:
+        prefix = self._proxies.path_prefix
+        if not prefix:
+            return {}
+        path: str = scope["path"]
+        has_it = path == prefix or path.startswith(f"{prefix}/")
+        return {"root_path": prefix, "path": path if has_it else prefix + path}
+
+
+def path_of(scope: Scope) -> str:
+    """A request's path below the prefix: the bridge's own."""
+    path: str = scope["path"]
+    return path[len(scope.get("root_path", "")) :]
+
+
+def _network(text: str, called: str) -> IPv4Network | IPv6Network:
+    try:
+        return ip_network(text.strip("[]"))
+    except ValueError:
+        raise SettingError(
+            f"{called} is {text[:128]!r}, must be an address or a network, such as 10.0.0.7 or "
+            "10.0.0.0/24"
+        ) from None
+
+
+def _address(text: str) -> IPv4Address | IPv6Address | None:
+    text = text.strip()
+    match = _WITH_PORT.fullmatch(text)
+    if match is not None:
+        text = match["v6"] or match["v4"]
+    try:
+        ip = ip_address(text.partition("%")[0])
+    except ValueError:
+        return None
+    return ip.ipv4_mapped or ip if isinstance(ip, IPv6Address) else ip
+
 
 _DEFAULT_PORTS: Final = {"http": "80", "https": "443"}
 _AUTHORITY: Final = re.compile(
@@ -80,7 +210,7 @@ def parse_host(text: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class RequestSource:
     """What a request says of where it comes from; headers in the order of their appearance.
 
     `scheme` is http or https, for WebSockets too; the values of Sec-Fetch headers and Referer are
@@ -98,7 +228,7 @@ class Asked:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class Decision:
     """`refusal` is None where the request may pass; `foreign` is the allowed foreign origin."""
 
     refusal: str | None = None
@@ -118,10 +248,10 @@ class AccessPolicy:
         named = (host_of(origin.partition("://")[2]) for origin in self.origins)
         self._hosts = {host.rstrip(".").lower(), *named, *map(parse_host, allowed_hosts)}
 
-    def judge(self, asked: Asked) -> Verdict:
-        """Whether a request may pass."""
-        refusal = self._refusal_of_host(asked.hosts)
-        return Verdict(refusal) if refusal is not None else self._judge_page(asked)
+    def judge(self, source: RequestSource) -> Decision:
+        """Decide whether a request may pass."""
+        refusal = self._refusal_of_host(source.hosts)
+        return Decision(refusal) if refusal is not None else self._judge_page(source)
 
     def _refusal_of_host(self, hosts: Sequence[str]) -> str | None:
         if len(hosts) != 1:
@@ -129,30 +259,30 @@ class AccessPolicy:
         host = host_of(hosts[0])
         if host is None:
             return f"Host is {hosts[0][:128]!r}, expected a host and a port"
-        if not self._goes_by(host):
+        if not self._is_own_name(host):
             return (
                 f"this bridge is not known by the name {host[:128]!r}: use its IP address, or "
                 f"start it with --allow-host {host[:128]}"
             )
         return None
 
-    def _judge_page(self, asked: Asked) -> Verdict:
-        if asked.origins:
-            return self._judge_origin(" ".join(asked.origins), asked)
-        if asked.fetch_site:
+    def _judge_page(self, source: RequestSource) -> Decision:
+        if source.origins:
+            return self._judge_origin(" ".join(source.origins), source)
+        if source.fetch_site:
             # A link shows our page to a person; the page that led there does not see it. A frame,
             # or an object, is a navigation too, of which the person need not see anything.
-            is_link = asked.fetch_mode == "navigate" and asked.fetch_dest == "document"
-            if asked.fetch_site in ("cross-site", "same-site") and not is_link:
-                return Verdict(
+            is_link = source.fetch_mode == "navigate" and source.fetch_dest == "document"
+            if source.fetch_site in ("cross-site", "same-site") and not is_link:
+                return Decision(
                     "a page of another origin asks without naming itself: load it in CORS mode "
                     "(<img crossorigin>, or fetch) and start the bridge with --allow-origin for it"
                 )
-        elif asked.referer and not asked.wants_page:
-            return self._judge_origin("/".join(asked.referer.split("/", 3)[:3]), asked)
-        return Verdict()
+        elif source.referer and not source.wants_page:
+            return self._judge_origin("/".join(source.referer.split("/", 3)[:3]), source)
+        return Decision()
 
-    def _goes_by(self, host: str) -> bool:
+    def _is_own_name(self, host: str) -> bool:
         # RFC 6761, section 6.3: localhost and what is below it never leave the machine.
         return (
             host in self._hosts
@@ -161,24 +291,24 @@ class AccessPolicy:
             or _is_ip(host)
         )
 
-    def _judge_origin(self, named: str, asked: Asked) -> Verdict:
+    def _judge_origin(self, named: str, source: RequestSource) -> Decision:
         try:
             origin = parse_origin(named)
         except OriginError:
             # "null", for one: a page from a file, or in a sandbox.
-            return Verdict(f"pages of the origin {named[:128]!r} may not read this bridge")
-        if origin == parse_origin(f"{asked.scheme}://{asked.hosts[0]}"):
-            return Verdict()
+            return Decision(f"pages of the origin {named[:128]!r} may not read this bridge")
+        if origin == parse_origin(f"{source.scheme}://{source.hosts[0]}"):
+            return Decision()
         if origin in self.origins:
-            return Verdict(foreign=origin)
-        return Verdict(
+            return Decision(foreign=origin)
+        return Decision(
             f"pages of the origin {origin[:128]!r} may not read this bridge: to let them, start it "
             f"with --allow-origin {origin[:128]}"
         )
 
 
 def exposure(address: str, *, has_token: bool, has_tls: bool) -> list[str]:
-    """What whoever starts the bridge should know about listening on `address`, as warnings."""
+    """What an operator should know about listening on `address`, as warnings."""
     if _is_ip(address) and ip_address(address).is_loopback:
         return []
     warnings = []

@@ -14,17 +14,17 @@ from dataclasses import replace
 from typing import Final, TypeVar
 
 from lupin_bridge.alarms.board import AlarmBoard, AlarmSource
-from lupin_bridge.alarms.hearing import RUN, writes_between
 from lupin_bridge.alarms.ledger import Change, Page, change_between, page_of
+from lupin_bridge.alarms.state_changes import RUN, writes_between
+from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
 from lupin_bridge.judge.alarm import HOUSE, Alarm, alarm_id
-from lupin_bridge.judge.choosing import Criteria
-from lupin_bridge.judge.following import FORGET_EVERY_NS, Follower
+from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, Follower
+from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
-from lupin_bridge.twin.source import Told, TwinSource, TwinUnavailableError
-from lupin_twin.journal.condition import JournalState
-from lupin_twin.past import NotRemembered, PastRefused
-from lupin_twin.past_writes import PastWrite, PastWrites, RunSpan, WritesRequest
-from lupin_twin.state import NANOSECONDS_PER_SECOND, Snapshot
+from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.core.past import NotRemembered, PastRefused
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
+from lupin_twin.core.writes import PastWrite, PastWrites, RunSpan, WritesRequest
 
 log = logging.getLogger(__name__)
 
@@ -48,7 +48,7 @@ _FIRST_HEARD: Final = 2**62
 _ALL_TIME: Final = (RunSpan(RUN, 0, 2**63 - 1),)
 _SILENCES: Final = 100
 
-# What a page is of: alarms of the log, those beside them, and the moment since when they are told.
+# What a page is of: alarms of the log, those beside them, and the moment from which they are kept.
 _NO_PAGE: Final[tuple[tuple[Alarm, ...], tuple[Alarm, ...], int]] = ((), (), 0)
 
 ResultT = TypeVar("ResultT")
@@ -83,10 +83,10 @@ class AlarmFeed:
         self._is_caught_up = False
         self._generation = 0
         self.missed = 0
-        self._says: AlarmSource = "journal"
+        self._origin: AlarmSource = "journal"
         self._seen: Snapshot | None = None
-        self._heard: list[PastWrite] = []
-        self._heard_number = _FIRST_HEARD
+        self._received: list[PastWrite] = []
+        self._received_number = _FIRST_HEARD
         self._silences: list[Alarm] = []
         self._alarms: tuple[Alarm, ...] = ()
         self._page, self._page_of = Page(), _NO_PAGE
@@ -108,12 +108,12 @@ class AlarmFeed:
 
     # --- what happens ----------------------------------------------------------------------------
 
-    def on_state(self, told: Told) -> None:
-        """The twin has told its state; costs nothing where that and the journal are as before."""
-        before, now = self._seen, told.snapshot
+    def on_state(self, update: TwinUpdate) -> None:
+        """The twin has a new state; costs nothing where that and the journal are as before."""
+        before, now = self._seen, update.snapshot
         is_new = before is None or before.tags != now.tags
-        is_kept = told.journal.state not in _NOT_KEPT
-        if is_kept == (self._says == "heard"):
+        is_kept = update.journal.state not in _NOT_KEPT
+        if is_kept == (self._origin == "heard"):
             self._begin("journal" if is_kept else "heard")
             before, is_new = None, True
         if is_new:
@@ -121,13 +121,13 @@ class AlarmFeed:
                 if before is not None and now.stamp_ns < before.stamp_ns:
                     self._begin("heard")
                     before = None
-                writes = writes_between(before, now, self._heard_number)
-                self._heard_number += len(writes)
-                self._heard += writes
+                writes = writes_between(before, now, self._received_number)
+                self._received_number += len(writes)
+                self._received += writes
             self._seen = now
         # What comes late, or is written late, is in the journal and changes nothing that is now.
-        is_written = is_kept and told.journal.written != self._written
-        self._written = told.journal.written
+        is_written = is_kept and update.journal.written != self._written
+        self._written = update.journal.written
         if is_new or is_written or now.stamp_ns >= self._due_ns:
             self._wake.set()
 
@@ -157,9 +157,9 @@ class AlarmFeed:
     def _begin(self, says: AlarmSource) -> None:
         """Forget all that was read, to read it again."""
         self._generation += 1
-        self._says = says
+        self._origin = says
         self._follower, self._last, self._journal = None, 0, ""
-        self._heard, self._seen = [], None
+        self._received, self._seen = [], None
         self._since_ns, self._is_caught_up = None, False
 
     async def _run(self) -> None:
@@ -170,21 +170,21 @@ class AlarmFeed:
             await asyncio.sleep(JOURNAL_S)
             self._wake.clear()
             try:
-                await (self._take_heard() if self._says == "heard" else self._follow())
+                await (self._take_received() if self._origin == "heard" else self._follow())
             except (NotRemembered, PastRefused, TwinUnavailableError) as error:
                 if str(error) != why:
                     log.info("alarms are as they were: %s", error)
                 why = str(error)
                 if isinstance(error, NotRemembered) and error.is_lasting:
-                    self._hear_instead()
+                    self._follow_states()
                 else:
                     self._ask_again(loop, RETRY_S)
-                await self._tell_silence(loop.time() - answered_s)
+                await self._publish_silence(loop.time() - answered_s)
             except Exception:  # nobody waits for this task: it begins anew whatever it was
                 log.exception("alarms are as they were, and are worked out anew")
-                self._begin(self._says)
+                self._begin(self._origin)
                 self._ask_again(loop, RETRY_S)
-                await self._tell_silence(loop.time() - answered_s)
+                await self._publish_silence(loop.time() - answered_s)
             else:
                 why, answered_s = "", loop.time()
             await asyncio.sleep(REST_S)
@@ -194,30 +194,30 @@ class AlarmFeed:
             self._again.cancel()
         self._again = loop.call_later(wait_s, self._wake.set)
 
-    def _hear_instead(self) -> None:
+    def _follow_states(self) -> None:
         """The twin keeps no journal, though it did not say so."""
         seen = self._seen
         self._begin("heard")
         if seen is not None:
-            self._heard = writes_between(None, seen, self._heard_number)
-            self._heard_number += len(self._heard)
+            self._received = writes_between(None, seen, self._received_number)
+            self._received_number += len(self._received)
             self._seen = seen
         self._wake.set()
 
-    async def _take_heard(self) -> None:
-        lot, self._heard = self._heard, []
+    async def _take_received(self) -> None:
+        lot, self._received = self._received, []
         if self._follower is None:
             self._follower = self._new(_ALL_TIME)
         for first in range(0, len(lot), LOT):
             await self._take(lot[first : first + LOT])
-        await self._tell()
+        await self._publish()
 
     async def _follow(self) -> None:
         loop, had = asyncio.get_running_loop(), self._last
         while True:
             generation = self._generation
-            asked = WritesRequest(self._last, self._reach_ns / 1e9, REACH_COUNT, LOT)
-            past = await self._source.writes(asked)
+            request = WritesRequest(self._last, self._reach_ns / 1e9, REACH_COUNT, LOT)
+            past = await self._source.writes(request)
             if generation != self._generation:
                 return  # it was begun anew meanwhile, and has been woken
             if self._is_another(past):
@@ -231,7 +231,7 @@ class AlarmFeed:
                 return
             if past.is_all:
                 break
-        await self._tell()
+        await self._publish()
         if self._last != had:
             self._ask_again(loop, AGAIN_S)
 
@@ -263,12 +263,11 @@ class AlarmFeed:
     def _missed(self, count: int) -> None:
         if count and not self.missed:
             log.warning(
-                "something was heard so late that alarms are told as if it had not been: more of "
-                "it is in lupin_alarms_missed"
+                "an observation came too late for its alarms: lupin_alarms_missed counts them"
             )
         self.missed += count
 
-    async def _tell(self) -> None:
+    async def _publish(self) -> None:
         follower, now_ns = self._follower, self._now_ns()
         if follower is None or now_ns is None:
             return
@@ -284,9 +283,9 @@ class AlarmFeed:
         self._due_ns = due_ns
         is_past, self._is_caught_up = not self._is_caught_up, True
         begins_ns = moment_ns if self._since_ns is None else self._since_ns
-        self._board.put(page, replace(change, is_past=is_past), self._says, begins_ns)
+        self._board.put(page, replace(change, is_past=is_past), self._origin, begins_ns)
 
-    async def _tell_silence(self, unanswered_s: float) -> None:
+    async def _publish_silence(self, unanswered_s: float) -> None:
         """The rest is as it was: of a twin that is gone nobody else says anything.
 
         Of one that is there, and a journal that does not answer, nobody may take it for all there

@@ -78,7 +78,7 @@ class Forwarding:
         while True:
             try:
                 self._process = await asyncio.create_subprocess_exec(
-                    *(sys.executable, "-P", "-m", "lupin_bridge.cli", *words),
+                    *(sys.executable, "-P", "-m", "lupin_bridge.cli.command", *words),
                     env=self._env,
                     stdin=asyncio.subprocess.PIPE,
                 )

@@ -15,19 +15,25 @@ if TYPE_CHECKING:
     import psycopg
 
 VERSION: Final = 1
+# Whoever listens is told the site that has something new: a hint, which may be lost.
+CHANNEL: Final = "lupin_log"
 _OLDEST_SERVER: Final = 150_000
-# A network that is gone is met within half a minute, here and, by `_SESSION`, at the server.
+# A network that is gone is met within half a minute, here and, by `_SESSION`, at the server. A
+# host that does not answer must not keep from the next one, which may be a standby of before.
 _LINK: Final = {
-    "connect_timeout": "10",
+    "connect_timeout": "4",
     "keepalives_idle": "10",
     "keepalives_interval": "5",
     "keepalives_count": "3",
     "tcp_user_timeout": "30000",
-    # Of several hosts, the one that takes writes.
-    "target_session_attrs": "read-write",
 }
 _SESSION: Final = (
     "SET tcp_keepalives_idle = 10; SET tcp_keepalives_interval = 5; SET tcp_keepalives_count = 3"
+)
+# Up to which stamp something was deleted or lost never gets less.
+META_AGAIN: Final = (
+    "ON CONFLICT (site, key) DO UPDATE SET value = CASE WHEN meta.key ~ '_ns:' THEN"
+    " greatest(meta.value::bigint, excluded.value::bigint)::text ELSE excluded.value END"
 )
 _SITE: Final = re.compile(r"[a-z][a-z0-9_-]{0,62}")
 
@@ -84,8 +90,11 @@ def place_of(url: str) -> str:
     return f"{said.get('host', 'the local PostgreSQL')}/{said.get('dbname', '')}"
 
 
-def connect(url: str, name: str) -> psycopg.Connection[Any]:
+def connect(url: str, name: str, session: str = "read-write") -> psycopg.Connection[Any]:
     """A connection that commits by itself; its transactions are blocks.
+
+    Of several hosts it is to the one that takes writes; with another `session`, as libpq's
+    `target_session_attrs` has it.
 
     Raises:
         UsageError: see `check_url`.
@@ -98,7 +107,10 @@ def connect(url: str, name: str) -> psycopg.Connection[Any]:
 
     try:
         connection = psycopg.connect(
-            conninfo.make_conninfo("", **{**_LINK, "application_name": name, **said}),
+            conninfo.make_conninfo(
+                "",
+                **{**_LINK, "target_session_attrs": session, "application_name": name, **said},
+            ),
             autocommit=True,
         )
         connection.execute(_SESSION)

@@ -24,7 +24,7 @@ from lupin_bridge.archive.source import Source
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign
 
 FIRST_WAIT_S: Final = 0.5
-MAX_WAIT_S: Final = 30.0
+MAX_WAIT_S: Final = 5.0
 # How often is looked for what is new, and how often the archive is told that this lives.
 _LOOK_S: Final = 0.25
 _HEARD_S: Final = 2.0
@@ -87,7 +87,7 @@ class Forwarder:
         # Without an archive too: from now on the twin keeps what is not there.
         source.claim()
         with closing(Sink(self._url, self._site)) as sink:
-            epoch = sink.epoch_of(source, self._say)
+            epoch = sink.begin(source, self._say)
             is_full, is_said, heard_s = True, False, time.monotonic()
             while not source.is_replaced():
                 if source.has_changed() or is_full:

@@ -3,22 +3,33 @@
 
 from __future__ import annotations
 
+import json
 import os
 import socket
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from datetime import UTC, datetime
 from typing import Any, Final
 
-from lupin_bridge.archive.database import ArchiveError, check_site, check_version, connect
+from lupin_bridge.archive.database import (
+    CHANNEL,
+    META_AGAIN,
+    ArchiveError,
+    check_site,
+    check_version,
+    connect,
+)
 from lupin_bridge.archive.source import Batch, Epoch, Row, Source
+from lupin_twin.journal.retention import DAY_NS, RECORD
 
 _COLUMNS: Final = {
     "meta": 3, "run": 8, "series": 6, "scan": 12, "look": 17, "place": 14, "hour": 7, "tally": 10,
     "event": 7, "note": 8,
 }  # fmt: skip
+# Where the tables that are in parts by month have the stamp.
+_STAMP: Final = {"scan": 3, "look": 4}
 # What is said anew of a row that is there; of other tables a row stays as it came first.
 _SAID_ANEW: Final = {
-    "meta": ("site, key", "value"),
     "run": ("site, run", "joins ended_stamp_ns"),
     "hour": ("site, series, hour", "n total low high"),
     "tally": ("site, run, event, hour", "n total low high first_ns last_ns"),
@@ -28,6 +39,8 @@ _SAID_ANEW: Final = {
 
 def _insert(table: str) -> str:
     marks = ", ".join(["%s"] * _COLUMNS[table])
+    if table == "meta":
+        return f"INSERT INTO meta VALUES ({marks}) {META_AGAIN}"
     if table not in _SAID_ANEW:
         return f"INSERT INTO {table} VALUES ({marks}) ON CONFLICT DO NOTHING"
     key, columns = _SAID_ANEW[table]
@@ -52,10 +65,10 @@ _HERE: Final = (
 
 
 class Sink:
-    """A connection to the archive that alone writes a site, in one thread.
+    """A connection to the archive that writes a site, from `begin` on it alone; in one thread.
 
     Raises:
-        ArchiveError: there is none, it is none, or another forwarder writes the site.
+        ArchiveError: there is none.
         psycopg.Error: anything else that the database says; also of every method.
 
     """
@@ -64,18 +77,14 @@ class Sink:
         check_site(site)
         self._site = site
         self._connection: Any = connect(url, f"lupin-twin forward {site}")
-        try:
-            check_version(self._connection)
-            self._lock()
-        except BaseException:
-            self._connection.close()
-            raise
+        self._months: set[int] = set()
 
     def close(self) -> None:
         """Let others write the site."""
         self._connection.close()
 
     def _lock(self) -> None:
+        check_version(self._connection)
         execute = self._connection.execute
         # The server lets go of it when the connection ends, however that ends.
         name = f"lupin-twin forward {self._site}"
@@ -99,14 +108,20 @@ class Sink:
             "UPDATE forwarder SET heard_at = now() WHERE site = %s", (self._site,)
         )
 
-    def epoch_of(self, source: Source, say: Callable[[str], None]) -> Epoch:
-        """Where a journal goes on; one that is not what was forwarded last begins an epoch.
+    def begin(self, source: Source, say: Callable[[str], None]) -> Epoch:
+        """Keep others from the site; returns where the journal goes on.
 
-        So does one that was put back from a copy: its numbers are given to other rows now.
+        One that is not what was forwarded last begins an epoch. So does one that was put back from
+        a copy: its numbers are given to other rows now.
+
+        Raises:
+            ArchiveError: the archive is of another version, or another forwarder writes the site.
+
         """
+        self._lock()
         found = self._connection.execute(_EPOCH, (self._site,)).fetchone()
         if found is None:
-            return self._begin(source, Epoch(self._site, 1, 0, 0, 0))
+            return self._new_epoch(source, Epoch(self._site, 1, 0, 0, 0))
         journal_id, *numbers = found
         last = Epoch(self._site, *numbers)
         if journal_id == source.journal_id and self._goes_on(source, last):
@@ -116,7 +131,7 @@ class Sink:
             "SELECT coalesce(max(run), 0) FROM run WHERE site = %s", (self._site,)
         ).fetchone()
         seqs = last.seq_offset + last.forwarded_seq
-        return self._begin(source, Epoch(self._site, last.number + 1, seqs, runs, 0))
+        return self._new_epoch(source, Epoch(self._site, last.number + 1, seqs, runs, 0))
 
     def _goes_on(self, source: Source, last: Epoch) -> bool:
         if source.last_seq() < last.forwarded_seq:
@@ -128,7 +143,7 @@ class Sink:
         # One that is no longer here or there was deleted.
         return here is None or there is None or here == (there,)
 
-    def _begin(self, source: Source, epoch: Epoch) -> Epoch:
+    def _new_epoch(self, source: Source, epoch: Epoch) -> Epoch:
         # Before the epoch: if this is cut short it is done again, to the same numbers.
         for table, rows in source.counted(epoch):
             self._put({table: rows})
@@ -141,7 +156,14 @@ class Sink:
     def put(self, batch: Batch, epoch: Epoch) -> Epoch:
         """Append a batch, all or nothing; returns where the epoch stands now."""
         upto = max(batch.upto, epoch.forwarded_seq)
+        self._make_months(batch)
         with self._connection.pipeline(), self._connection.transaction():
+            # First: what came since may be of a series with the same tag and sensors.
+            for _, key, value in batch.rows.get("meta", ()):
+                if key.startswith(RECORD):
+                    record = json.loads(value)
+                    gone = (record["tag"], record["seq"], record["what"] == "pose")
+                    self._connection.execute("SELECT forget_tag(%s, %s, %s)", gone)
             self._put(batch.rows)
             for (run, since_ns), rows in batch.events.items():
                 self._connection.execute(
@@ -153,7 +175,21 @@ class Sink:
                 "UPDATE epoch SET forwarded_seq = %s WHERE site = %s AND epoch = %s",
                 (upto, self._site, epoch.number),
             )
+            self._connection.execute("SELECT pg_notify(%s, %s)", (CHANNEL, self._site))
         return replace(epoch, forwarded_seq=upto)
+
+    def _make_months(self, batch: Batch) -> None:
+        """Have a part of the tables for each month, and for the one behind it."""
+        days = {
+            row[column] // DAY_NS
+            for table, column in _STAMP.items()
+            for row in batch.rows.get(table, ())
+        }
+        for day in days:
+            month = int(f"{datetime.fromtimestamp(day * 86_400, UTC):%Y%m}")
+            if month not in self._months:
+                self._connection.execute("SELECT make_months(%s)", (day * 86_400,))
+                self._months.add(month)
 
     def _put(self, rows: dict[str, list[Row]] | dict[str, Sequence[Row]]) -> None:
         with self._connection.cursor() as cursor:

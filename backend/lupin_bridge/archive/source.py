@@ -7,18 +7,21 @@ is handed on: after a power cut the twin must not count anew from before what th
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
 from lupin_bridge.archive.database import ArchiveError
+from lupin_twin.core.past import HOUR_NS, Event
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ
-from lupin_twin.journal.forwarded import forwarded_seq, note_forwarded
+from lupin_twin.journal.beside import forwarded_seq, note_forwarded
+from lupin_twin.journal.retention import RECORD
 from lupin_twin.journal.schema import LOCAL_SITE, get_meta, one_view, open_named
-from lupin_twin.past import HOUR_NS, Event
 
 Row = tuple[Any, ...]
 
@@ -142,7 +145,6 @@ class Source:
     """An open journal, in one thread. `path` has to be one.
 
     Raises:
-        ArchiveError: it is not to be forwarded now.
         Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_named`.
 
     """
@@ -151,12 +153,6 @@ class Source:
         self._path = path
         self._inode = path.stat().st_ino
         self._connection = open_named(path)
-        try:
-            self._refuse_salvaged()
-            self.journal_id = get_meta(self._connection, "journal_id") or ""
-        except BaseException:
-            self._connection.close()
-            raise
         self._version = -1
         self._sent: dict[str, frozenset[Row]] = {}
         # From which stamp on events of a run are to be sent; None: all of every run.
@@ -165,6 +161,11 @@ class Source:
     def close(self) -> None:
         """Let go of it."""
         self._connection.close()
+
+    @cached_property
+    def journal_id(self) -> str:
+        """Its identity."""
+        return get_meta(self._connection, "journal_id") or ""
 
     def is_replaced(self) -> bool:
         """Whether another file has its name now, or none."""
@@ -214,6 +215,7 @@ class Source:
                 "site": epoch.site,
                 "seqs": epoch.seq_offset,
                 "runs": epoch.run_offset,
+                "epoch": epoch.number,
                 "after": epoch.forwarded_seq,
                 "upto": upto,
             }
@@ -241,9 +243,11 @@ class Source:
         """Have the twin keep what is not in the archive yet.
 
         Raises:
+            ArchiveError: it is not to be forwarded now.
             OSError: there is no writing beside the journal.
 
         """
+        self._refuse_salvaged()
         if not forwarded_seq(self._path, self.journal_id):
             self._note(0)
 
@@ -296,6 +300,11 @@ class Source:
             name, _, run = key.partition(":")
             if f"{name}:" in of_runs:
                 found.append((asked["site"], f"{name}:{int(run) + asked['runs']}", value))
+            elif f"{name}:" == RECORD:
+                record = json.loads(value)
+                record["seq"] = record.get("seq", 0) + asked["seqs"]
+                moved = f"{key}:{asked['epoch']}"
+                found.append((asked["site"], moved, json.dumps(record)))
             elif key.startswith("simulated_"):
                 found.append((asked["site"], key, value))
         return found

@@ -12,3 +12,7 @@ CREATE TABLE forwarder (
     site TEXT NOT NULL PRIMARY KEY, machine TEXT NOT NULL, process INTEGER NOT NULL,
     since TIMESTAMPTZ NOT NULL, heard_at TIMESTAMPTZ NOT NULL
 );
+-- Parts for what is before 2020, such as a simulated clock's; `make_months` makes the others. There is
+-- no default part: with one, PostgreSQL looks into every part for the newest row of a series.
+CREATE TABLE scan_before PARTITION OF scan FOR VALUES FROM (MINVALUE) TO (1577836800000000000);
+CREATE TABLE look_before PARTITION OF look FOR VALUES FROM (MINVALUE) TO (1577836800000000000);

@@ -1,23 +1,90 @@
-"""A period of a journal as a recording of the messages that made it."""
+"""A period of a journal as a recording of the messages that made it: an MCAP file, as rosbag2's.
+
+The journal does not keep all of a message. What it lacks is left at its default: where the robot
+saw a tag at each scan (its place comes as a discovered tag), the hour of the simulated day. The
+stamp is the one by which it counts; the frame is empty, which is the one that the twin expects.
+"""
 
 from __future__ import annotations
 
+import os
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from lupin_bridge.bags import journal_messages
-from lupin_bridge.bags.bag_file import BagFile
-from lupin_bridge.bags.topics import Topic
-from lupin_twin.journal.reading import listed_rows
-from lupin_twin.journal.rows import PinRow, Row
+from geometry_msgs.msg import Point, Point32, Quaternion
+from geometry_msgs.msg import Pose as PoseMsg
+from lupin_msgs.msg import (
+    DiscoveredTag,
+    DiscoveredTags,
+    FlowerObservation,
+    FlowerPoint,
+    Observation,
+    SensorReading,
+)
+from mcap.writer import CompressionType, Writer
+from rclpy.serialization import serialize_message
+from rosgraph_msgs.msg import Clock
+
+from lupin_bridge.bags.recording import (
+    CLOCK_TOPIC,
+    CLOCK_TYPE,
+    MESSAGE_ENCODING,
+    OBSERVATION_TYPE,
+    TAGS_TYPE,
+)
+from lupin_bridge.feed.topics import Topic
+from lupin_bridge.message_schemas import ENCODING, schema_text
+from lupin_twin.core.parameters import TwinParameters
+from lupin_twin.core.state import Flower, Pose
+from lupin_twin.journal.rows import (
+    KIND_FLOWER,
+    InspectionRow,
+    PinRow,
+    Row,
+    ScanRow,
+    listed_rows,
+)
 from lupin_twin.journal.runs import Run, runs, spans_within
 from lupin_twin.journal.schema import LOCAL_SITE, one_view
-from lupin_twin.parameters import TwinParameters
-from lupin_twin.state import Pose
+from lupin_twin.ros.convert import time_msg
+
+# What rosbag2 calls it in a channel's metadata; without it rosbag2 plays everything as volatile.
+QOS_KEY: Final = "offered_qos_profiles"
+PROFILE: Final = "ros2"
+LIBRARY: Final = "lupin-twin"
+
+# One of rosbag2's profiles, as it writes them since its metadata's version 9 (Jazzy), without which
+# it takes a file for of that version. No deadline, no lifespan: RMW_DURATION_INFINITE.
+_PROFILE: Final = """\
+- history: keep_last
+  depth: {depth}
+  reliability: reliable
+  durability: {durability}
+  deadline:
+    sec: 9223372036
+    nsec: 854775807
+  lifespan:
+    sec: 9223372036
+    nsec: 854775807
+  liveliness: automatic
+  liveliness_lease_duration:
+    sec: 9223372036
+    nsec: 854775807
+  avoid_ros_namespace_conventions: false
+"""
+
+
+def offered_qos(topic: Topic) -> str:
+    """How a topic is published, as rosbag2 writes that."""
+    durability = "transient_local" if topic.latched else "volatile"
+    return _PROFILE.format(depth=topic.depth, durability=durability)
+
+
+# --- the rows -------------------------------------------------------------------------------------
 
 # Rows that are read in one go, in one short transaction: the log may not grow meanwhile for long.
 LOT: Final = 2_000
@@ -65,7 +132,7 @@ class JournalRows:
 
     def _lot(self, after: int) -> tuple[list[tuple[Run, Row]], int | None]:
         """The next rows by their numbers, and the number of the last; None: that is all."""
-        asked: dict[str, Any] = self._period | {"after": after}
+        values: dict[str, Any] = self._period | {"after": after}
         numbers = [
             [
                 seq
@@ -73,7 +140,7 @@ class JournalRows:
                     f"SELECT seq FROM {table} WHERE site = :site AND seq > :after"  # noqa: S608
                     " AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
                     " ORDER BY seq LIMIT :lot",
-                    asked,
+                    values,
                 )
             ]
             for table in _TABLES
@@ -105,9 +172,79 @@ class JournalRows:
         )
 
 
+# --- their messages, serialised -------------------------------------------------------------------
+
+
+def observation(row: ScanRow | InspectionRow) -> bytes:
+    """lupin_msgs/Observation."""
+    stamp = time_msg(row.stamp_ns)
+    msg = Observation(mission_id=row.mission, source=row.source)
+    msg.header.stamp = stamp
+    msg.tag_pose_in_map.orientation.w = 0.0
+    msg.flower.pose.pose.orientation.w = 0.0
+    if isinstance(row, ScanRow):
+        msg.kind, msg.status, msg.status_detail = row.kind, row.status, row.detail
+        if row.kind == KIND_FLOWER:
+            msg.flower.tag_id = row.tag_id
+        else:
+            msg.tag_reading.tag_id = row.tag_id
+            msg.tag_reading.stamp = stamp
+            msg.tag_reading.readings = [
+                SensorReading(name=reading.name, value=float(reading.value))
+                for reading in row.readings
+            ]
+    else:
+        msg.kind = KIND_FLOWER
+        msg.flower.tag_id = row.tag_id
+        _fill(msg.flower, row.flower)
+    return bytes(serialize_message(msg))
+
+
+def discovered(pins: Iterable[PinRow]) -> bytes:
+    """lupin_msgs/DiscoveredTags."""
+    pins = list(pins)
+    tags = [DiscoveredTag(tag_id=pin.tag_id, pose_in_map=_pose(pin.pose)) for pin in pins]
+    msg = DiscoveredTags(tags=tags)
+    msg.header.stamp = time_msg(max((pin.stamp_ns for pin in pins), default=0))
+    return bytes(serialize_message(msg))
+
+
+def clock(now_ns: int) -> bytes:
+    """rosgraph_msgs/Clock."""
+    return bytes(serialize_message(Clock(clock=time_msg(now_ns))))
+
+
+def _fill(msg: FlowerObservation, flower: Flower) -> None:
+    msg.species = flower.species
+    msg.confidence = float(flower.confidence)
+    msg.anomaly = flower.anomaly
+    msg.flower_count = flower.flower_count
+    msg.bug_count = flower.bug_count
+    msg.flowers = [
+        FlowerPoint(
+            position=Point(x=bloom.x, y=bloom.y, z=bloom.z),
+            height_m=float(bloom.height_m),
+            species=bloom.species,
+            confidence=float(bloom.confidence),
+            anomaly=bloom.anomaly,
+        )
+        for bloom in flower.blooms
+    ]
+    msg.box_footprint.points = [
+        Point32(x=float(x), y=float(y), z=float(z)) for x, y, z in flower.footprint
+    ]
+
+
+def _pose(pose: Pose) -> PoseMsg:
+    return PoseMsg(
+        position=Point(x=pose.x, y=pose.y, z=pose.z),
+        orientation=Quaternion(x=pose.qx, y=pose.qy, z=pose.qz, w=pose.qw),
+    )
+
+
+# --- the file -------------------------------------------------------------------------------------
+
 _OBSERVATIONS, _TAGS, _CLOCK = range(3)
-# Of so many messages the chunks reach the file together.
-_FLUSH_EVERY: Final = 1_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,11 +258,11 @@ class Exported:
 def export(
     connection: sqlite3.Connection, path: Path, start_ns: int, end_ns: int, namespace: str = ""
 ) -> Exported:
-    """Write what was heard with `start_ns <= stamp < end_ns` into a new file.
+    """Write what was received with `start_ns <= stamp < end_ns` into a new file.
 
     A message is logged when it arrived, by the wall clock, as a recorder would have. Places that
-    tags had before come first. Where time was simulated, `/clock` tells it before each message.
-    Where nothing was heard no file is left.
+    tags had before come first. Where time was simulated, `/clock` comes before each message.
+    Where nothing was received no file is left.
 
     Raises:
         OSError: the file cannot be made or written, and there is none then; FileExistsError: it is
@@ -134,17 +271,31 @@ def export(
 
     """
     rows = JournalRows(connection, start_ns, end_ns)
-    file = BagFile(path, _topics(namespace, has_clock=rows.is_simulated))
-    with ExitStack() as otherwise:
-        otherwise.callback(path.unlink)
-        otherwise.callback(file.close)
-        written = _write(file, rows)
-        file.finish()
-        file.flush_rest()
-        otherwise.pop_all()
-    file.close()
-    if not written.observations + written.tags:
-        path.unlink()
+    topics = _topics(namespace, has_clock=rows.is_simulated)
+    texts = {topic.type_name: schema_text(topic.type_name) for topic in topics}
+    with ExitStack() as if_not_kept, path.open("xb") as file:
+        if_not_kept.callback(path.unlink)
+        writer = Writer(file, compression=CompressionType.ZSTD)
+        writer.start(profile=PROFILE, library=LIBRARY)
+        schemas = {
+            name: writer.register_schema(name, ENCODING, text.encode())
+            for name, text in texts.items()
+        }
+        channels = [
+            writer.register_channel(
+                topic.name,
+                MESSAGE_ENCODING,
+                schemas[topic.type_name],
+                {QOS_KEY: offered_qos(topic)},
+            )
+            for topic in topics
+        ]
+        written = _write(writer, channels, rows)
+        writer.finish()  # type: ignore[no-untyped-call]
+        file.flush()
+        os.fdatasync(file.fileno())
+        if written.observations + written.tags:
+            if_not_kept.pop_all()
     return written
 
 
@@ -152,31 +303,33 @@ def _topics(namespace: str, *, has_clock: bool) -> list[Topic]:
     names = TwinParameters()
     root = f"/{namespace.strip('/')}/".replace("//", "/")
     topics = [
-        Topic(root + names.observations_topic, "lupin_msgs/msg/Observation", 50),
-        Topic(root + names.discovered_tags_topic, "lupin_msgs/msg/DiscoveredTags", 50),
-        Topic("/clock", "rosgraph_msgs/msg/Clock"),
+        Topic(root + names.observations_topic, OBSERVATION_TYPE, depth=50),
+        Topic(root + names.discovered_tags_topic, TAGS_TYPE, depth=50),
+        Topic(CLOCK_TOPIC, CLOCK_TYPE, latched=False, depth=10),
     ]
     return topics if has_clock else topics[:_CLOCK]
 
 
-def _write(file: BagFile, rows: JournalRows) -> Exported:
+def _write(writer: Writer, channels: Sequence[int], rows: JournalRows) -> Exported:
     counts = [0, 0]
+
+    def write(topic: int, at_ns: int, data: bytes) -> None:
+        writer.add_message(channels[topic], at_ns, data, at_ns)
+
     for run, row in rows:
         at_ns = row.arrival_ns
         if run.begun.is_simulated:
             # What ROS time was when it arrived.
             now_ns = max(row.stamp_ns, at_ns - run.begun.arrival_ns + run.begun.stamp_ns)
-            file.write(_CLOCK, at_ns, at_ns, journal_messages.clock(now_ns))
+            write(_CLOCK, at_ns, clock(now_ns))
         if rows.places and not sum(counts):
-            file.write(_TAGS, at_ns, at_ns, journal_messages.discovered(rows.places))
+            write(_TAGS, at_ns, discovered(rows.places))
             counts[_TAGS] += 1
         if isinstance(row, PinRow):
-            topic, data = _TAGS, journal_messages.discovered([row])
+            topic, data = _TAGS, discovered([row])
         else:
-            topic, data = _OBSERVATIONS, journal_messages.observation(row)
-        file.write(topic, at_ns, at_ns, data)
+            topic, data = _OBSERVATIONS, observation(row)
+        write(topic, at_ns, data)
         counts[topic] += 1
-        if sum(counts) % _FLUSH_EVERY == 0:
-            file.flush()
     observations, tags = counts
     return Exported(observations, tags)

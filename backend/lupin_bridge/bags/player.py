@@ -35,10 +35,10 @@ from lupin_bridge.bags.recording import (
     RecordingError,
     clock_ns,
 )
-from lupin_bridge.telling import say
-from lupin_twin import process
-from lupin_twin.convert import time_msg
-from lupin_twin.half_made import remove_half_made
+from lupin_bridge.console import say
+from lupin_twin.ros.convert import time_msg
+from lupin_twin.runtime import process
+from lupin_twin.runtime.process import remove_stale_shared_memory
 
 NODE_NAME: Final = "lupin_player"
 _TYPES: Final[Mapping[str, Any]] = {
@@ -46,20 +46,20 @@ _TYPES: Final[Mapping[str, Any]] = {
     TAGS_TYPE: DiscoveredTags,
     MAP_TYPE: OccupancyGrid,
 }
-# As a twin subscribes to them (lupin_twin.interfaces).
+# As a twin subscribes to them (lupin_twin.core.interfaces).
 _DEPTHS: Final = {OBSERVATION_TYPE: 50, TAGS_TYPE: 50, MAP_TYPE: 1}
 _STATE_TYPE: Final = "lupin_msgs/msg/TwinState"
 _BEAT_S: Final = 0.02
-# So many a beat, 250 a second: of the 50 that may wait at a twin none is lost while its thread is
-# busy for a fifth of a second. DDS acknowledges what waits there, taken or not.
-_MAX_A_BEAT: Final = 5
+# So many a beat, 100 a second: of the 50 that may wait at a twin none is lost while its thread is
+# busy for half a second. DDS acknowledges what waits there, taken or not.
+_MAX_A_BEAT: Final = 2
 # A message goes out so long behind the clock, s: before the twin knows that time, its stamp would
 # be one from the future.
 _LAG_S: Final = 0.1
 # A machine that stood still goes on from where it stood.
 _MAX_STEP_S: Final = 0.25
 # Longer silences than this, s of waiting, are announced.
-_TOLD_S: Final = 60.0
+_LONG_S: Final = 60.0
 # How long the twin is waited for: DDS finds who is there within 3 s, a busy machine takes longer.
 _TWIN_S: Final = 30.0
 _LOOK_S: Final = 1.0
@@ -80,13 +80,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         own, ros_args = words[:at], words[at:]
     options = parser().parse_args(own)
     process.end_with_parent()
-    stopped = _stop_asked()
+    stopped = _stop_flag()
     try:
         with Recording(options.files) as recording:
             recording.check_start(options.start)
             rclpy.init(args=ros_args, signal_handler_options=SignalHandlerOptions.NO)
             try:
-                remove_half_made(rclpy.get_default_context().get_domain_id())
+                remove_stale_shared_memory(rclpy.get_default_context().get_domain_id())
                 node = PlayerNode(recording.inputs)
                 try:
                     _play(recording, node, options, stopped)
@@ -215,7 +215,7 @@ class Player:
         topics = [*inputs, *([CLOCK_TOPIC] if recording.has_clock else [])]
         self._rest = recording.messages(topics, from_ns=self._start_ns)
         self._next = next(self._rest, None)
-        self._told_ns = -1
+        self._noted_ns = -1
         self._last_s: float | None = None
 
     @property
@@ -263,8 +263,8 @@ class Player:
             silence_ns = self._next.log_ns - self._position_ns
             if silence_ns > self._skip_ns:
                 self._position_ns = self._next.log_ns
-            elif silence_ns > _TOLD_S * self._speed * 1e9 and self._told_ns != self._next.log_ns:
-                self._told_ns = self._next.log_ns
+            elif silence_ns > _LONG_S * self._speed * 1e9 and self._noted_ns != self._next.log_ns:
+                self._noted_ns = self._next.log_ns
                 say(
                     f"the recording is silent for {silence_ns / 1e9:,.0f} s: "
                     "--skip-gaps SECONDS jumps over that"
@@ -297,7 +297,7 @@ def _play(
         time.sleep(_BEAT_S)
     say(f"playing {recording.name}")
     player = Player(recording, node, options)
-    is_told = False
+    is_announced = False
     looked_s = -math.inf
     while not stopped():
         now_s = time.monotonic()
@@ -309,28 +309,28 @@ def _play(
             node.deliver()
             node.advertise()
             player.begin()
-        elif player.is_over and not is_told:
-            is_told = True
+        elif player.is_over and not is_announced:
+            is_announced = True
             say(f"the end: {player.published:,} messages were published")
         time.sleep(_BEAT_S)
 
 
-def _stop_asked() -> Callable[[], bool]:
+def _stop_flag() -> Callable[[], bool]:
     """Whether a stop signal has come; from then on the process has to end.
 
     Handlers only note it: a demo holds both signals back, and its child inherits that.
     """
-    asked: list[int] = []
+    signals: list[int] = []
 
     def note(number: int, _frame: object) -> None:
-        if not asked:
+        if not signals:
             process.must_end()
-        asked.append(number)
+        signals.append(number)
 
     for number in process.STOP_SIGNALS:
         signal.signal(number, note)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, process.STOP_SIGNALS)
-    return lambda: bool(asked)
+    return lambda: bool(signals)
 
 
 if __name__ == "__main__":

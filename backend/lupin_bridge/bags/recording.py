@@ -18,8 +18,9 @@ from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
 from mcap.records import Statistics
 
-from lupin_bridge.bags.topics import MESSAGE_ENCODING, SUFFIX
-
+# Of the files' names.
+SUFFIX: Final = ".mcap"
+MESSAGE_ENCODING: Final = "cdr"
 CLOCK_TOPIC: Final = "/clock"
 CLOCK_TYPE: Final = "rosgraph_msgs/msg/Clock"
 OBSERVATION_TYPE: Final = "lupin_msgs/msg/Observation"

@@ -1,1 +1,1 @@
-"""Fields: what was asked, how it is written, what colour it has."""
+"""Fields: their queries, formats and colours."""

@@ -1,25 +1,26 @@
-"""A field as JSON, PNG or NPY. Pure; a large field takes milliseconds, so call it on a worker."""
+"""Fields and estimates as JSON, PNG or NPY. Pure; on a worker, for large ones take a while."""
 
 from __future__ import annotations
 
 import colorsys
 import io
+import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 import orjson
 
 from lupin_bridge.judge.ranges import Sensor, Sensors
-from lupin_twin.estimate import EstimateGrid
-from lupin_twin.far_off import far_off_tags
-from lupin_twin.field_quality import leave_one_out, painted_share
-from lupin_twin.fields import FieldRules
-from lupin_twin.grid import FieldGrid
-from lupin_twin.idw import never
-from lupin_twin.state import TagState
+from lupin_twin.core.state import TagState
+from lupin_twin.estimate import SDS_OF_IDEAL, EstimateGrid
+from lupin_twin.estimate.engine import Estimate
+from lupin_twin.field.engine import FieldRules
+from lupin_twin.field.grid import FieldGrid, far_off_tags
+from lupin_twin.field.idw import never
+from lupin_twin.field.quality import leave_one_out, painted_share
 
 
 def rgb(hue: float, saturation: float, lightness: float) -> tuple[int, int, int]:
@@ -128,7 +129,7 @@ def write_quality(
     """`schema.FieldQuality` of a field and of the tags that it was made from.
 
     Raises:
-        lupin_twin.idw.Abandoned: `should_stop`, asked now and then, said so.
+        lupin_twin.field.idw.Abandoned: `should_stop`, called now and then, returned true.
 
     """
     quality = leave_one_out(
@@ -229,3 +230,114 @@ def _palette_indices(grid: FieldGrid) -> npt.NDArray[np.uint8]:
         steps = np.full(values.shape, _RAMP_STEPS - 1.0)
     steps += 1
     return np.where(np.isfinite(values), steps, 0).astype(np.uint8)
+
+
+def estimate_metadata(estimate: Estimate, sensor: Sensor) -> dict[str, str]:
+    """What a picture or a bare array cannot say of itself: extent, unit, the limit of known."""
+    grid = estimate.grid
+    return {
+        **extent(grid, sensor),
+        "Sd-Known": str(np.float32(grid.sd_known)),
+        "Sample-Count": str(estimate.sample_count),
+        "Reading-Count": str(estimate.reading_count),
+    }
+
+
+def within_ideal(estimate: Estimate, sensor: Sensor) -> Estimate:
+    """The estimate, known only where its interval for 9 of 10 is about half of the ideal range."""
+    spans = [ranges.ideal for ranges in (sensor.day, sensor.night) if ranges.ideal is not None]
+    limit = min((span.high - span.low for span in spans), default=math.inf) / SDS_OF_IDEAL
+    grid = estimate.grid
+    if not limit < grid.sd_known:
+        return estimate
+    return replace(estimate, grid=replace(grid, sd_known=limit, known=grid.sd < limit))
+
+
+def write_estimate(
+    estimate: Estimate,
+    field_format: FieldFormat,
+    sensor_type: str,
+    sensors: Sensors,
+    *,
+    layer: str,
+    scale: int = 1,
+) -> bytes:
+    """The estimate in a format; `layer` and `scale`, the side of a cell in pixels, are a PNG's."""
+    if field_format == PNG:
+        return write_png(estimate_picture(estimate, layer), sensor_type, sensors, scale)
+    return write_estimate_npy(estimate) if field_format == NPY else write_estimate_json(estimate)
+
+
+def write_estimate_json(estimate: Estimate) -> bytes:
+    """`estimate_schema.GetEstimateResponse`: `mean` and `sd` flat and row-major."""
+    grid = estimate.grid
+    rest = orjson.dumps(
+        {
+            "width": grid.width,
+            "height": grid.height,
+            "origin_x": np.float32(grid.origin_x),
+            "origin_y": np.float32(grid.origin_y),
+            "resolution_used": np.float32(grid.resolution),
+            "sd_known": np.float32(grid.sd_known),
+            "sample_count": estimate.sample_count,
+            "reading_count": estimate.reading_count,
+        },
+        option=orjson.OPT_SERIALIZE_NUMPY,
+    )
+    # Put together once: to copy twenty megabytes takes a while too.
+    return b"".join(
+        (
+            b'{"ok":true,"error_message":"","mean":[',
+            *numbers(grid.mean),
+            b'],"sd":[',
+            *numbers(grid.sd),
+            b"],",
+            rest[1:],
+        )
+    )
+
+
+def estimate_refusal_json(reason: str) -> bytes:
+    """GetEstimate's failure body: the reason, and every other field zeroed."""
+    empty: dict[str, Any] = {
+        "ok": False,
+        "error_message": reason,
+        "mean": [],
+        "sd": [],
+        "width": 0,
+        "height": 0,
+        "origin_x": 0.0,
+        "origin_y": 0.0,
+        "resolution_used": 0.0,
+        "sd_known": 0.0,
+        "sample_count": 0,
+        "reading_count": 0,
+    }
+    return orjson.dumps(empty)
+
+
+def write_estimate_npy(estimate: Estimate) -> bytes:
+    """NumPy's own format, float32 (2, height, width): mean and sd, row 0 at `bbox_min_y`."""
+    buffer = io.BytesIO()
+    both = np.stack((estimate.grid.mean, estimate.grid.sd))
+    np.lib.format.write_array(buffer, both, allow_pickle=False)
+    return buffer.getvalue()
+
+
+def estimate_picture(estimate: Estimate, layer: str) -> FieldGrid:
+    """One of the two numbers as a field, NaN where the estimate is not known."""
+    grid = estimate.grid
+    cells = grid.mean if layer == "mean" else grid.sd
+    values = np.where(grid.known, cells, np.float32(np.nan)).ravel()
+    known = cells[grid.known]
+    return FieldGrid(
+        width=grid.width,
+        height=grid.height,
+        origin_x=grid.origin_x,
+        origin_y=grid.origin_y,
+        resolution=grid.resolution,
+        values=values,
+        value_min=float(known.min()) if known.size else 0.0,
+        value_max=float(known.max()) if known.size else 0.0,
+        sample_count=estimate.sample_count,
+    )

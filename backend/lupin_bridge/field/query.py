@@ -1,4 +1,4 @@
-"""A field's query string and headers: what was asked, in which format, under which ETag. Pure."""
+"""A field's query string, format, ETag and headers. Pure."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from annotated_types import Gt, Interval
 
 from lupin_bridge.field.formats import FORMATS, JSON, PNG, FieldFormat
 from lupin_bridge.query_string import AT, Name, needed, parameter
-from lupin_twin.fields import (
+from lupin_twin.field.engine import (
     DEFAULT_RESOLUTION_M,
     FieldRefused,
     FieldRequest,
@@ -28,7 +28,7 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class FieldQuery:
-    """What is asked of a field; `resolution` and the box are None where left to the server."""
+    """The parameters of a field; `resolution` and the box are None where left to the server."""
 
     sensor_type: Name = needed("name of a sensor, as in a reading")
     resolution: Annotated[float, Gt(0)] | None = parameter(
@@ -59,7 +59,7 @@ class FieldQuery:
         return None if missing else box  # type: ignore[return-value]  # all of it is there
 
     def request(self, default_box: Box, max_cells: int) -> FieldRequest:
-        """The query as GetField's request; one that asks for neither has `max_cells` at most.
+        """The request for GetField; one with neither box nor resolution has `max_cells` at most.
 
         Raises:
             FieldRefused: see `box`.
@@ -74,7 +74,7 @@ class FieldQuery:
 
 @dataclass(frozen=True, slots=True)
 class EstimateQuery(FieldQuery):
-    """What is asked of an estimate: it is two numbers a cell, and a picture shows one of them."""
+    """Those of an estimate: it is two numbers a cell, and a picture shows one of them."""
 
     layer: Literal["mean", "sd"] = parameter(
         "PNG only: which of the two numbers; transparent where the estimate is not known", "mean"
@@ -136,7 +136,7 @@ def _weight(media_type: str, ranges: Iterable[tuple[str, float]]) -> float:
 
 
 def etag(revision: str, request: FieldRequest, kind: str, scale: int) -> str:
-    """The strong ETag of a field: of the revision and of all that was asked for."""
+    """The strong ETag of a field: of the revision and the whole request."""
     numbers = (
         request.resolution,
         request.bbox_min_x,

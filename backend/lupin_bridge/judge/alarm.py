@@ -1,16 +1,18 @@
-"""An alarm: one episode of a reason at a tag, or of the house. Pure; ns of ROS time.
+"""An alarm: one episode of a reason at a tag, or of the greenhouse. Pure; ns of ROS time.
 
 It is never stored: it follows from what was observed and from the ranges.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from hashlib import blake2b
 
+from lupin_bridge.judge.derived import DAILY
 from lupin_bridge.judge.verdict import Reason, Verdict
 
-# The `tag_id` of an alarm of the whole house.
+# The `tag_id` of an alarm of the whole greenhouse.
 HOUSE = ""
 
 
@@ -18,9 +20,9 @@ HOUSE = ""
 class Alarm:
     """What was wrong, where, from when to when, and how bad at worst.
 
-    `reason` is as it was when the alarm was raised, `tag_id` is `HOUSE` for the house, `worst` the
-    value farthest beyond its limit, in the sensor's unit; of a pest, the most that were counted.
-    The reason's verdict is the worst so far, `raised_as` the one with which it was raised.
+    `reason` is as it was when the alarm was raised, `tag_id` is `HOUSE` for the greenhouse. `worst`
+    is the value farthest beyond its limit, in the sensor's unit; of a pest, the most counted. The
+    reason's verdict is the worst so far, `raised_as` the one with which it was raised.
     """
 
     id: str
@@ -41,6 +43,12 @@ class Alarm:
         """Whether it has not been cleared."""
         return self.cleared_at_ns is None
 
+    def was_active(self, at_ns: int | None) -> bool:
+        """Whether it was raised, and not cleared, at a moment; None: whether it is active now."""
+        if at_ns is None or self.cleared_at_ns is None:
+            return self.is_active and (at_ns is None or self.raised_at_ns <= at_ns)
+        return self.raised_at_ns <= at_ns < self.cleared_at_ns
+
 
 def alarm_id(tag_id: str, kind: str, sensor: str, run_ns: int, began_ns: int) -> str:
     """The same for the same episode, whoever works it out.
@@ -54,3 +62,14 @@ def alarm_id(tag_id: str, kind: str, sensor: str, run_ns: int, began_ns: int) ->
         digest.update(len(text).to_bytes(4, "big"))
         digest.update(text)
     return digest.hexdigest()
+
+
+def reasons_of_days(
+    alarms: Iterable[Alarm], at_ns: int | None = None
+) -> Mapping[str, tuple[Reason, ...]]:
+    """By tag, the reasons of alarms of quantities of a day that were active at a moment, or are."""
+    found: dict[str, tuple[Reason, ...]] = {}
+    for alarm in alarms:
+        if alarm.reason.sensor in DAILY and alarm.was_active(at_ns):
+            found[alarm.tag_id] = (*found.get(alarm.tag_id, ()), alarm.reason)
+    return found

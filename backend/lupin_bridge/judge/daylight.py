@@ -1,18 +1,22 @@
-"""Whether it is day in the house: by its own light, else by the clock. Pure.
+"""Whether it is day in the greenhouse: by its own light, else by the clock. Pure.
 
 Light decides where it was measured lately, for lamps make day in winter and screens make night in
-summer. The house is one: what most of its sensors say.
+summer. The greenhouse is one: what half of its sensors say or more, each by its newest reading
+unless scans have left that out for long.
 """
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, time, tzinfo
 from typing import Final, Literal
 
 # The sensor that tells, by its name.
 LIGHT: Final = "light"
-# The dullest day gives a house some hundred lx, moon and lamps outside less than ten.
+# The dullest day gives a greenhouse some hundred lx, moon and lamps outside less than ten.
 DAY_FROM_LX: Final = 50.0
 # A light that the scans of its tag have left out for longer says nothing of their day any more.
 LEFT_OUT_NS: Final = 2 * 3600 * 1_000_000_000
@@ -48,7 +52,7 @@ class ClockDay:
 
 
 class Light:
-    """The house's light, tag by tag: the finite readings, and how many of them are of day."""
+    """The light of all tags, by tag: the finite readings, and how many of them are of day."""
 
     def __init__(self) -> None:
         self._is_bright: dict[str, bool] = {}
@@ -74,3 +78,87 @@ def judge_day(light: bool | None, clock: ClockDay | None, now_s: float | None) -
     if clock is not None and now_s is not None:
         return Day(clock.is_day(now_s), "clock")
     return Day(True, "assumed")
+
+
+# From a moment of ROS time on, ns, what a tag's sensor said: day, night, or nothing.
+Turn = tuple[int, bool | None]
+
+
+class DayLine:
+    """The days and nights of a greenhouse; tags are known by any name."""
+
+    def __init__(self) -> None:
+        self._turns: dict[str, tuple[Turn, ...]] = {}
+        self._says: dict[str, bool | None] = {}
+        self._counts = Counter[bool | None]()
+        self._newest_ns = -1
+        self._since_ns = 0
+        self._at: list[int] = []
+        self._is_day: list[bool | None] = []
+
+    def forget(self, before_ns: int, turns: Mapping[str, Sequence[Turn]]) -> None:
+        """Of what was before, nothing is asked any more; `turns` are all that are left."""
+        self._since_ns = before_ns
+        self._turns = {tag_id: tuple(of_tag) for tag_id, of_tag in turns.items()}
+        self._rebuild()
+
+    def put(self, tag_id: str, turns: Sequence[Turn]) -> int | None:
+        """All of a tag's turns; from when on those of the greenhouse may be other, or None."""
+        before, now = self._turns.get(tag_id, ()), tuple(turns)
+        if now == before:
+            return None
+        self._turns[tag_id] = now
+        is_appended = now[: len(before)] == before
+        if is_appended and now[len(before)][0] > self._newest_ns:
+            known = len(self._at)
+            for turn in now[len(before) :]:
+                self._turn(tag_id, turn)
+            return self._at[known] if len(self._at) > known else None
+        return self._rebuild()
+
+    def is_day(self, at_ns: int) -> bool | None:
+        """What the light of then said; None: none had been measured."""
+        index = bisect_right(self._at, at_ns)
+        return self._is_day[index - 1] if index else None
+
+    def _rebuild(self) -> int | None:
+        before = self._line()
+        self._says, self._counts, self._newest_ns = {}, Counter(), -1
+        self._at, self._is_day = [], []
+        for turn, tag_id in merged(self._turns):
+            self._turn(tag_id, turn)
+        now = self._line()
+        same = next(
+            (n for n, (one, other) in enumerate(zip(before, now, strict=False)) if one != other),
+            min(len(before), len(now)),
+        )
+        changed = [at_ns for at_ns, _ in (*before[same : same + 1], *now[same : same + 1])]
+        return min(changed, default=None)
+
+    def _line(self) -> list[Turn]:
+        """The greenhouse's days and nights, as far back as they are asked for."""
+        known = zip(self._at, self._is_day, strict=True)
+        first = (self._since_ns, self.is_day(self._since_ns))
+        return [first, *(turn for turn in known if turn[0] > self._since_ns)]
+
+    def _turn(self, tag_id: str, turn: Turn) -> None:
+        at_ns, says = turn
+        self._newest_ns = max(self._newest_ns, at_ns)
+        if tag_id in self._says:
+            self._counts[self._says[tag_id]] -= 1
+        self._says[tag_id] = says
+        self._counts[says] += 1
+        day, night = self._counts[True], self._counts[False]
+        is_day = 2 * day >= day + night if day + night else None
+        if self._at and self._at[-1] == at_ns:
+            self._at.pop()
+            self._is_day.pop()
+        if (self._is_day[-1] if self._is_day else None) is not is_day:
+            self._at.append(at_ns)
+            self._is_day.append(is_day)
+
+
+def merged(turns: Mapping[str, Sequence[Turn]]) -> list[tuple[Turn, str]]:
+    """The turns of all tags, in the order of time."""
+    every = [(turn, tag_id) for tag_id, of_tag in turns.items() for turn in of_tag]
+    return sorted(every, key=lambda each: (each[0][0], each[1]))

@@ -1,14 +1,28 @@
-"""Quantities that growers steer by, out of what was measured at one place and moment. Pure.
+"""Quantities that growers steer by, out of what was measured. Pure.
 
-Saturation vapour pressure: Tetens in the form of FAO Irrigation and Drainage Paper 56 (Allen et
-al., 1998), equation 11: es = 0.6108 exp(17.27 T / (T + 237.3)) kPa, T in °C. Deficit: equations 19
-and 26, for one place and moment. Dew point: equation 11 solved for T.
+Of one scan. Saturation vapour pressure: Tetens in the form of FAO Irrigation and Drainage Paper 56
+(Allen et al., 1998), equation 11: es = 0.6108 exp(17.27 T / (T + 237.3)) kPa, T in °C. Deficit:
+equations 19 and 26, for one place and moment. Dew point: equation 11 solved for T.
+
+Of one sensor's readings of 24 hours. Between two readings that are no farther apart than
+`MAX_GAP_NS` the course is a straight line; farther apart, nothing is known of the time between. Of
+less than `LEAST_COVERED` of 24 hours, there is no value (NaN).
+
+- Daily light integral, mol/m²/d: the sum of the photons of 400 to 700 nm. In sunlight 54 lx are
+  1 umol/m²/s (Thimijan and Heins, HortScience 18, 1983, 818-822); lamps have other factors.
+- Mean temperature of 24 hours, °C, and the least of the night: Heuvelink (ed.), Tomatoes, 2nd
+  edition, 2018, on temperature integration.
+- Day-night difference (DIF), K: mean by day less mean by night. Erwin, Heins and Karlsson, American
+  Journal of Botany 76, 1989, 47-52.
+- Growing degree days, °C·d, above 10 °C: (highest + lowest) / 2 - base, never below 0. McMaster and
+  Wilhelm, Agricultural and Forest Meteorology 87, 1997, 291-300, method 1.
+- CO2 dose, ppm·h: the sum of the concentration over the hours of day, in which plants take it up.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -75,4 +89,127 @@ CONDENSATION_MARGIN: Final = Derived(
 )
 DERIVED: Final[Mapping[str, Derived]] = {
     each.name: each for each in (VPD, DEW_POINT, CONDENSATION_MARGIN)
+}
+
+
+DAY_NS: Final = 86_400 * 1_000_000_000
+MAX_GAP_NS: Final = 3 * 3600 * 1_000_000_000
+LEAST_COVERED: Final = 0.8
+LX_PER_UMOL: Final = 54.0
+BASE_C: Final = 10.0
+
+# (ns of ROS time, value) of a sensor, oldest first, finite.
+Readings = Sequence[tuple[int, float]]
+# Whether it is day at a moment of ROS time, ns.
+IsDay = Callable[[int], bool]
+_HOUR_NS: Final = 3600 * 1_000_000_000
+# So long are the pieces that a line from day to night is cut to.
+_PIECE_NS: Final = 600 * 1_000_000_000
+
+
+@dataclass(slots=True)
+class Course:
+    """A sensor's course from its first reading on, reading by reading in the order of time.
+
+    Lengths are in ns, sums in the sensor's unit times ns, each by night and by day.
+    """
+
+    start_ns: int
+    last_ns: int
+    last: float
+    is_day: bool
+    low: float
+    high: float
+    night_low: float
+    lengths: tuple[int, int] = (0, 0)
+    sums: tuple[float, float] = (0.0, 0.0)
+
+    @classmethod
+    def begin(cls, at_ns: int, value: float, *, is_day: bool) -> Course:
+        """The course of one reading."""
+        return cls(at_ns, at_ns, value, is_day, value, value, math.inf if is_day else value)
+
+    def after(self, at_ns: int, value: float, is_day: IsDay) -> Course:
+        """The course with one more reading."""
+        gap_ns, now = at_ns - self.last_ns, is_day(at_ns)
+        lengths, sums = [*self.lengths], [*self.sums]
+        # Between two readings by day it was day; from day to night the line is cut to pieces.
+        count = 1 if now is self.is_day else -(-gap_ns // _PIECE_NS)
+        for index in range(count if 0 < gap_ns <= MAX_GAP_NS else 0):
+            from_ns, to_ns = (gap_ns * (index + more) // count for more in (0, 1))
+            middle = (from_ns + to_ns) // 2
+            by_day = now if count == 1 else is_day(self.last_ns + middle)
+            lengths[by_day] += to_ns - from_ns
+            sums[by_day] += (self.last + (value - self.last) * middle / gap_ns) * (to_ns - from_ns)
+        return Course(
+            self.start_ns,
+            at_ns,
+            value,
+            now,
+            min(self.low, value),
+            max(self.high, value),
+            self.night_low if now else min(self.night_low, value),
+            (lengths[0], lengths[1]),
+            (sums[0], sums[1]),
+        )
+
+    def ends(self, at_ns: int, *, is_day: bool) -> bool:
+        """Whether a reading is the first of another day: at dawn, or after 24 hours without one."""
+        return (is_day and not self.is_day) or at_ns - self.start_ns >= DAY_NS
+
+    def mean(self, *of_day: bool) -> float:
+        """The mean over time by night, by day, or both; NaN where there was none."""
+        length_ns = sum(self.lengths[by_day] for by_day in of_day)
+        return sum(self.sums[by_day] for by_day in of_day) / length_ns if length_ns else math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class Daily:
+    """One quantity: what it is made of, its unit, and how."""
+
+    name: str
+    sensor: str
+    unit: str
+    formula: Callable[[Course], float]
+
+    def of(self, course: Course) -> float:
+        """Its value over a course; NaN: too little of a day is known."""
+        return self.formula(course) if sum(course.lengths) >= LEAST_COVERED * DAY_NS else math.nan
+
+    def at(self, at_ns: int, readings: Readings, is_day: IsDay) -> float:
+        """Its value at a moment, of the readings of the 24 hours up to then; NaN: not known."""
+        recent = [each for each in readings if at_ns - DAY_NS <= each[0] <= at_ns]
+        if not recent:
+            return math.nan
+        course = Course.begin(*recent[0], is_day=is_day(recent[0][0]))
+        for stamp_ns, value in recent[1:]:
+            course = course.after(stamp_ns, value, is_day)
+        return self.of(course)
+
+
+def _daily_light_integral(course: Course) -> float:
+    return sum(course.sums) / 1e9 / LX_PER_UMOL / 1e6
+
+
+def _night_minimum(course: Course) -> float:
+    return course.night_low if course.night_low < math.inf else math.nan
+
+
+DAILY: Final[Mapping[str, Daily]] = {
+    each.name: each
+    for each in (
+        Daily("daily_light_integral", "light", "mol/m²/d", _daily_light_integral),
+        Daily("temperature_24h_mean", "temperature", "°C", lambda it: it.mean(False, True)),
+        Daily("temperature_night_minimum", "temperature", "°C", _night_minimum),
+        Daily(
+            "day_night_difference", "temperature", "K", lambda it: it.mean(True) - it.mean(False)
+        ),
+        Daily(
+            "growing_degree_days",
+            "temperature",
+            "°C·d",
+            lambda it: max(0.0, (it.high + it.low) / 2.0 - BASE_C),
+        ),
+        Daily("co2_dose", "co2", "ppm·h", lambda it: it.sums[True] / _HOUR_NS),
+    )
 }

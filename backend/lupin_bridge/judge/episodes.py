@@ -1,27 +1,29 @@
 """The episodes of one tag: what was wrong from when to when, by its occasions alone. Pure.
 
-An occasion is all that was heard of a tag with one stamp. A reason that holds at two occasions in a
-row, of those that can tell, raises an alarm; one that has not held at two clears it. Tries that
-fail raise one only where they go on for the tag's usual interval: a second try in one round says no
-more than the first. A sensor that scans leave out is old once its reading holds no longer, but not
-before three times the sensor's own last interval: what every tenth scan has is not missing from the
-others. Heard once, it has no interval yet. Too little light raises one after two hours: before, it
-may be dawn or dusk. A pest is seen or not: one look raises, one clears. What
-is out of its range is so until it lies within by 5 % of the range's width: a value that wobbles
-about a limit is one episode.
+An occasion is all that was received of a tag with one stamp. A reason that holds at two occasions
+in a row, of those that can tell, raises an alarm; one that has not held at two clears it. Attempts
+that fail raise one only where they go on for the tag's usual interval: a second one in a round says
+no more than the first. A sensor that scans leave out is old once its reading holds no longer, but
+not before three times the sensor's own last interval: what every tenth scan has is not missing from
+the others. Received once, it has no interval yet. Too little light raises one after two hours:
+before, it may be dawn or dusk. A pest is seen or not: one inspection raises, one clears. What is
+out of its range is so until it lies within by 5 % of the range's width: a value that wobbles about
+a limit is one episode. A quantity of a day is known once a day, at the first scan of the next one:
+from dawn to dawn by the clock, or 24 hours where that has none. One value raises, one clears.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 from lupin_bridge.judge.alarm import Alarm, alarm_id
 from lupin_bridge.judge.daylight import LIGHT
-from lupin_bridge.judge.derived import DERIVED
+from lupin_bridge.judge.derived import DAILY, DERIVED, Course, IsDay
 from lupin_bridge.judge.ranges import Sensors
-from lupin_bridge.judge.rhythm import INTERVALS, holds_ns, interval_ns
+from lupin_bridge.judge.scan_interval import INTERVALS, holds_ns, interval_ns
 from lupin_bridge.judge.verdict import (
     DEADBAND,
     Kind,
@@ -33,9 +35,9 @@ from lupin_bridge.judge.verdict import (
     pest,
     worst,
 )
-from lupin_twin.history import KIND_FLOWER
-from lupin_twin.past_writes import PastWrite
-from lupin_twin.state import STATUS_OK, Reading
+from lupin_twin.core.history import KIND_FLOWER
+from lupin_twin.core.state import STATUS_OK, Reading
+from lupin_twin.core.writes import PastWrite
 
 # Occasions in a row that raise, and that clear.
 HOLD: Final = 2
@@ -44,9 +46,8 @@ TWILIGHT_NS: Final = 2 * 3600 * 1_000_000_000
 # Episodes of a tag that are kept: a sensor that goes wild has no more.
 MAX_EPISODES: Final = 100
 
-# Kind, sensor, and what tells two of those apart: the side of a range, the kind of a try.
+# Kind, sensor, and what tells two of those apart: the side of a range, the kind of an attempt.
 Key = tuple[Kind, str, str]
-IsDay = Callable[[int], bool]
 _DIM: Final[Key] = (Kind.RANGE, LIGHT, "low")
 
 
@@ -76,12 +77,15 @@ class _Finding:
 class TagEpisodes:
     """A tag's episodes in one run of the clock; `step` takes its occasions in the order of time.
 
-    `recent_ns` fixes how long readings hold; None: it is learnt.
+    `recent_ns` fixes how long readings hold; None: it is learnt. `clock` says whether it was day by
+    the clock alone: the days of a quantity of a day.
     """
 
     __slots__ = (
+        "_clock",
+        "_courses",
         "_done",
-        "_heard_ns",
+        "_received_ns",
         "_recent_ns",
         "_run_ns",
         "_scans_ns",
@@ -92,25 +96,33 @@ class TagEpisodes:
     )
 
     def __init__(
-        self, tag_id: str, run_ns: int, sensors: Sensors, recent_ns: int | None = None
+        self,
+        tag_id: str,
+        run_ns: int,
+        sensors: Sensors,
+        recent_ns: int | None = None,
+        clock: IsDay = lambda _: True,
     ) -> None:
         self._tag_id = tag_id
         self._run_ns = run_ns
         self._sensors = sensors
         self._recent_ns = recent_ns
+        self._clock = clock
         self._species = ""
+        # Since the last dawn, of each sensor of which a judged quantity of a day is made.
+        self._courses: dict[str, Course] = {}
         self._scans_ns: tuple[int, ...] = ()
         # Of each sensor, the last scan that had it, and how long it was from the one before.
-        self._heard_ns: dict[str, tuple[int, int]] = {}
+        self._received_ns: dict[str, tuple[int, int]] = {}
         self._watches: dict[Key, _Watch] = {}
         self._done: tuple[Alarm, ...] = ()
 
     def copy(self) -> TagEpisodes:
         """The same, to go on from here apart."""
-        other = TagEpisodes(self._tag_id, self._run_ns, self._sensors, self._recent_ns)
+        other = TagEpisodes(self._tag_id, self._run_ns, self._sensors, self._recent_ns, self._clock)
         other._species, other._done = self._species, self._done
-        other._scans_ns, other._heard_ns = self._scans_ns, dict(self._heard_ns)
-        other._watches = dict(self._watches)
+        other._scans_ns, other._received_ns = self._scans_ns, dict(self._received_ns)
+        other._watches, other._courses = dict(self._watches), dict(self._courses)
         return other
 
     def alarms(self, ended_ns: int | None = None) -> Iterator[Alarm]:
@@ -121,7 +133,7 @@ class TagEpisodes:
                 yield self._alarm(key, watch, ended_ns)
 
     def step(self, writes: Sequence[PastWrite], is_day: IsDay) -> None:
-        """The next occasion: `writes` of one stamp, in the order of hearing."""
+        """The next occasion: `writes` of one stamp, in the order of receiving."""
         stamp_ns = writes[0].stamp_ns
         for write in writes:
             if write.has_seen and write.species:
@@ -130,8 +142,8 @@ class TagEpisodes:
         if readings:
             self._scans_ns = (*self._scans_ns, stamp_ns)[-INTERVALS - 1 :]
             for name in [reading.name for reading in readings]:
-                before_ns, _ = self._heard_ns.get(name, (stamp_ns, 0))
-                self._heard_ns[name] = (stamp_ns, stamp_ns - before_ns)
+                before_ns, _ = self._received_ns.get(name, (stamp_ns, 0))
+                self._received_ns[name] = (stamp_ns, stamp_ns - before_ns)
         for finding in self._findings(writes, readings, stamp_ns, is_day):
             self._note(finding, stamp_ns)
 
@@ -155,6 +167,8 @@ class TagEpisodes:
             if is_good:
                 day = is_day(stamp_ns) if day is None else day
                 yield from self._of_range(reading, is_day=day)
+                if name in self._sensors.judged_by_the_day:
+                    yield from self._of_days(reading, stamp_ns)
         if readings:
             yield from self._of_age({reading.name for reading in readings}, stamp_ns)
         for kind, status in {write.kind: write.status for write in writes}.items():
@@ -185,12 +199,29 @@ class TagEpisodes:
             reason = judge_value(reading, ranges) if is_out else None
             yield _Finding(key, is_out, is_near, reason, min if side == "low" else max)
 
-    def _of_age(self, told: Collection[str], stamp_ns: int) -> Iterator[_Finding]:
-        """Of the sensors that were heard before, those that a scan told and those it left out."""
+    def _of_days(self, reading: Reading, stamp_ns: int) -> Iterator[_Finding]:
+        """What the first reading of a day says of the day before."""
+        name, value = reading.name, reading.value
+        before, by_day = self._courses.get(name), self._clock(stamp_ns)
+        if before is None:
+            self._courses[name] = Course.begin(stamp_ns, value, is_day=by_day)
+            return
+        self._courses[name] = course = before.after(stamp_ns, value, self._clock)
+        if not before.ends(stamp_ns, is_day=by_day):
+            return
+        self._courses[name] = Course.begin(stamp_ns, value, is_day=by_day)
+        for quantity in self._sensors.judged_by_the_day[name]:
+            known = DAILY[quantity].of(course)
+            # A sensor of that name goes first.
+            if quantity not in self._received_ns and math.isfinite(known):
+                yield from self._of_range(Reading(quantity, known, stamp_ns), is_day=True)
+
+    def _of_age(self, present: Collection[str], stamp_ns: int) -> Iterator[_Finding]:
+        """Of the sensors that were read before: those that a scan has, and those it left out."""
         holds: int | None = None
-        for name, (last_ns, interval) in self._heard_ns.items():
+        for name, (last_ns, interval) in self._received_ns.items():
             key = (Kind.OLD, name, "")
-            if name in told:
+            if name in present:
                 if key in self._watches:
                     yield _Finding(key, holds=False, still_holds=False)
                 continue
@@ -206,7 +237,7 @@ class TagEpisodes:
 
     def _note(self, finding: _Finding, stamp_ns: int) -> None:
         watch = self._watches.get(finding.key)
-        at_once = finding.key[0] is Kind.PEST
+        at_once = finding.key[0] is Kind.PEST or finding.key[1] in DAILY
         if watch is None:
             if finding.holds and finding.reason is not None:
                 value = finding.reason.value if finding.worse else None
@@ -272,7 +303,7 @@ class TagEpisodes:
 
 
 def readings_of(writes: Sequence[PastWrite]) -> tuple[Reading, ...]:
-    """The readings of an occasion: of one sensor, what was heard last."""
+    """The readings of an occasion: of one sensor, what was received last."""
     stamp_ns = writes[0].stamp_ns
     latest = {
         name: value

@@ -7,28 +7,40 @@ and since when each of its reasons holds.
 from __future__ import annotations
 
 import heapq
+import logging
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
+from types import MappingProxyType
 from typing import Final
 
 from lupin_bridge.judge.daylight import Day
-from lupin_bridge.judge.patrol import NO_PATROL, Patrol, Scans, is_overdue
 from lupin_bridge.judge.ranges import Sensors
-from lupin_bridge.judge.rhythm import SHORTEST_NS, holds_ns, interval_ns
-from lupin_bridge.judge.scanned import DayOf, Recent, RecentScans
+from lupin_bridge.judge.recent_scans import DayOf, Recent, RecentScans
+from lupin_bridge.judge.scan_interval import (
+    NO_PATROL,
+    SHORTEST_NS,
+    Patrol,
+    Scans,
+    holds_ns,
+    interval_ns,
+)
 from lupin_bridge.judge.verdict import (
     FORGOTTEN_NS,
     NOTHING_CHANGED,
     Health,
     Reason,
     Verdict,
+    is_overdue,
     judge_house,
     judge_tag,
+    stopped,
 )
-from lupin_twin.past_writes import PastWrite
-from lupin_twin.state import Snapshot, TagState
+from lupin_twin.core.state import Snapshot, TagState
+from lupin_twin.core.writes import PastWrite
+
+log = logging.getLogger(__name__)
 
 _NEVER: Final = 2**63 - 1
 # Readings that are judged at once, a tag counting as one more: some 20 ms.
@@ -38,7 +50,7 @@ _UNKNOWN: Final = Health(Verdict.UNKNOWN)
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """The house and its tags as of one snapshot; `changed` are the tags that are not as before.
+    """The greenhouse and its tags as of one snapshot; `changed` are the tags that changed.
 
     `number` counts what was told. While the twin's clock does not run, everything is unknown.
     """
@@ -55,8 +67,14 @@ NOTHING_JUDGED: Final = Judged(_UNKNOWN, {}, frozenset(), Day(True, "assumed"))
 
 
 def silenced(judged: Judged) -> Judged:
-    """The same of a house whose twin has fallen silent since."""
+    """The same of a greenhouse whose twin has fallen silent since."""
     return replace(judged, house=judge_house({}, is_silent=True))
+
+
+def unjudged(snapshot: Snapshot) -> Judged:
+    """Of a snapshot that could not be judged nothing is known; it is next to no other."""
+    tags = {tag.tag_id: _UNKNOWN for tag in snapshot.tags}
+    return replace(NOTHING_JUDGED, tags=tags, changed=frozenset(tags), number=-1)
 
 
 def judge_once(
@@ -65,30 +83,42 @@ def judge_once(
     sensors: Sensors,
     day_of: DayOf,
     recent_s: float | None = None,
+    *,
+    days: Mapping[str, Sequence[Reason]] = MappingProxyType({}),
 ) -> Judged:
     """What is to be said of one snapshot, given what was recent in the log then.
+
+    `days` are the reasons of quantities of a day, by tag.
 
     Nobody knows since when a reason holds: told is the observation that says so.
     """
     now_ns = snapshot.now_ns
     recent = RecentScans.of(snapshot.tags, writes, day_of)
-    healths = {
-        tag.tag_id: _UNKNOWN
-        if now_ns is None
-        else judge_tag(
-            tag,
-            now_ns,
-            sensors,
-            recent.tag(tag.tag_id),
-            holds_ns=_holds_ns(recent.tag(tag.tag_id), recent_s),
-        )
-        for tag in snapshot.tags
-    }
+    healths = dict.fromkeys((tag.tag_id for tag in snapshot.tags), _UNKNOWN)
+    has_failed = False
+    for tag in snapshot.tags:
+        if now_ns is None:
+            break
+        try:
+            healths[tag.tag_id] = judge_tag(
+                tag,
+                now_ns,
+                sensors,
+                recent.tag(tag.tag_id),
+                holds_ns=_holds_ns(recent.tag(tag.tag_id), recent_s),
+                days=days.get(tag.tag_id, ()),
+            )
+        except Exception:  # whatever it is: the others are judged, and this one is unknown
+            if not has_failed:
+                log.exception("%s could not be judged: its status is unknown", tag.tag_id)
+            has_failed = True
     counts = Counter(health.verdict for health in healths.values())
-    house = judge_house(counts, is_silent=now_ns is None)
     scans = Scans()
     scans.heard(recent.stamps_ns(), now_ns)
     patrol = scans.patrol(sum(map(is_overdue, healths.values())))
+    once = sum(_is_once(recent.tag(tag_id), recent_s) for tag_id in healths)
+    stop = stopped(patrol.last_scan_ns, now_ns, once, len(healths))
+    house = judge_house(counts, is_silent=now_ns is None, stopped=stop)
     day = recent.day(snapshot.stamp_ns)
     return Judged(house, healths, frozenset(healths), day, patrol=patrol)
 
@@ -96,6 +126,11 @@ def judge_once(
 def _holds_ns(recent: Recent, recent_s: float | None) -> int:
     """For how long readings hold; a fixed time goes before what is learnt."""
     return holds_ns(interval_ns(recent.stamps_ns)) if recent_s is None else int(recent_s * 1e9)
+
+
+def _is_once(recent: Recent, recent_s: float | None) -> bool:
+    """Whether a tag was scanned once, and nothing says how long that holds."""
+    return len(recent.stamps_ns) == 1 and recent_s is None
 
 
 @dataclass(slots=True)
@@ -109,7 +144,8 @@ class Judge:
     """Belongs to one thread. `recent_s` fixes how long readings hold; None: it is learnt.
 
     Where many are judged anew, it is so many at once as nobody has to wait for, and the others with
-    the next snapshots.
+    the next snapshots. A tag that raises an error is unknown until it is judged again, and counted
+    in `errors`; the others are judged all the same.
     """
 
     def __init__(self, sensors: Sensors, day_of: DayOf, recent_s: float | None = None) -> None:
@@ -126,8 +162,12 @@ class Judge:
         self._counts = Counter[Verdict]()
         self._scans = Scans()
         self._overdue = 0
+        self._once: set[str] = set()
         self._judged = NOTHING_JUDGED
         self._changed: Mapping[str, Mapping[str, int]] = {}
+        self._days: Mapping[str, Sequence[Reason]] = {}
+        self.errors = 0
+        self._failing: set[str] = set()
 
     def see(self, snapshot: Snapshot, *, is_silent: bool = False) -> Judged:
         """What is to be said now; the very same object where nothing has changed."""
@@ -144,15 +184,17 @@ class Judge:
         if now_ns is None or self._now_ns is None or is_back:
             # All ages are others.
             news = dict.fromkeys(self._tags)
-        self._now_ns = now_ns
+        self._now_ns = None  # after an error, all are judged again
         self._waiting |= news | self._grown_old(now_ns)
-        healths = {tag_id: self._judge(tag_id, now_ns) for tag_id in self._turn()}
+        healths = {tag_id: self._judge_safely(tag_id, now_ns) for tag_id in self._turn()}
         changed = {
             tag_id: health
             for tag_id, health in healths.items()
             if before.tags.get(tag_id) != health
         }
-        return self._tell(changed, gone, day, is_silent=is_silent or now_ns is None)
+        judged = self._tell(changed, gone, day, None if is_silent else now_ns)
+        self._now_ns = now_ns
+        return judged
 
     def learn(self, writes: Iterable[PastWrite]) -> None:
         """What was recent before the first snapshot, as far as the log has it."""
@@ -161,14 +203,17 @@ class Judge:
         self._waiting |= dict.fromkeys(self._tags)
 
     def note_changed(self, changed: Mapping[str, Mapping[str, int]]) -> None:
-        """By tag, the sensors that do not read as everything else foretells, and since when.
+        """By tag, the sensors that do not read as everything else predicts, and since when.
 
         The next snapshot is judged by it.
         """
-        for tag_id in (*self._changed, *changed):
-            if self._changed.get(tag_id) != changed.get(tag_id):
-                self._waiting[tag_id] = None
+        self._waiting |= _others(self._changed, changed)
         self._changed = changed
+
+    def note_days(self, days: Mapping[str, Sequence[Reason]]) -> None:
+        """By tag, the reasons of quantities of a day; the next snapshot is judged by them."""
+        self._waiting |= _others(self._days, days)
+        self._days = days
 
     def holds_ns(self) -> dict[str, int]:
         """For how long each tag's readings hold, as was last known."""
@@ -200,6 +245,8 @@ class Judge:
         for tag_id in gone:
             del self._tags[tag_id], self._holds[tag_id]
             self._recent.forget(tag_id)
+            self._once.discard(tag_id)
+            self._failing.discard(tag_id)
         self._seen = snapshot.tags
         return news, gone
 
@@ -239,12 +286,25 @@ class Judge:
             kept.due_ns = kept.until_ns
             heapq.heappush(self._due, (kept.due_ns, kept.state.tag_id))
 
+    def _judge_safely(self, tag_id: str, now_ns: int | None) -> Health:
+        try:
+            health = self._judge(tag_id, now_ns)
+        except Exception:  # whatever it is: the other tags, and the state itself, go out
+            self.errors += 1
+            if not self._failing:  # once, and not for each of ten thousand tags at each scan
+                log.exception("%s could not be judged: its status is unknown", tag_id)
+            self._failing.add(tag_id)
+            return _UNKNOWN
+        self._failing.discard(tag_id)
+        return health
+
     def _judge(self, tag_id: str, now_ns: int | None) -> Health:
         kept = self._tags[tag_id]
         if now_ns is None:
             return _UNKNOWN
         recent = self._recent.tag(tag_id)
         holds = self._holds[tag_id] = _holds_ns(recent, self._recent_s)
+        (self._once.add if _is_once(recent, self._recent_s) else self._once.discard)(tag_id)
         health = judge_tag(
             kept.state,
             now_ns,
@@ -252,6 +312,7 @@ class Judge:
             recent,
             holds_ns=holds,
             changed=self._changed.get(tag_id, NOTHING_CHANGED),
+            days=self._days.get(tag_id, ()),
         )
         kept.until_ns = min(
             (
@@ -267,7 +328,7 @@ class Judge:
         return _since(self._judged.tags.get(tag_id, _UNKNOWN), health)
 
     def _tell(
-        self, changed: Mapping[str, Health], gone: Sequence[str], day: Day, *, is_silent: bool
+        self, changed: Mapping[str, Health], gone: Sequence[str], day: Day, now_ns: int | None
     ) -> Judged:
         before = self._judged
         tags = before.tags
@@ -282,8 +343,9 @@ class Judge:
             tags = {**tags, **changed}
             for tag_id in gone:
                 tags.pop(tag_id, None)
-        house = judge_house(self._counts, is_silent=is_silent)
         patrol = self._scans.patrol(self._overdue)
+        stop = stopped(patrol.last_scan_ns, now_ns, len(self._once), len(tags))
+        house = judge_house(self._counts, is_silent=now_ns is None, stopped=stop)
         is_same = (house, day, patrol) == (before.house, before.day, before.patrol)
         if tags is before.tags and is_same and before.number:
             return before
@@ -291,6 +353,11 @@ class Judge:
             house, tags, frozenset(changed) | frozenset(gone), day, before.number + 1, patrol
         )
         return self._judged
+
+
+def _others(before: Mapping[str, object], now: Mapping[str, object]) -> dict[str, None]:
+    """The tags of which not the same is said."""
+    return {name: None for name in (*before, *now) if before.get(name) != now.get(name)}
 
 
 def _since(before: Health, now: Health) -> Health:

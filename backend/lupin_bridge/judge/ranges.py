@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
+
+from lupin_bridge.judge.derived import DAILY
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,13 +57,19 @@ class Sensor:
         is_finite = value - value == 0.0
         return is_finite and (span is None or span.low <= value <= span.high)
 
+    @property
+    def is_judged(self) -> bool:
+        """Whether it has a range, for any plants."""
+        ranges = (self.day, self.night, *(one for both in self.species.values() for one in both))
+        return any(each.ideal is not None for each in ranges)
+
     def ranges(self, *, is_day: bool, species: str = "") -> Ranges:
         """What holds at a tag with such plants; of an unknown species, what holds for all."""
         day, night = self.species.get(species.lower(), (self.day, self.night))
         return day if is_day else night
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Sensors:
     """The whole file, `text` as it stands, for whoever asks for it."""
 
@@ -77,3 +86,12 @@ class Sensors:
             return known
         other = self.fallback
         return Sensor(name, other.label or name, other.unit, other.hue, other.lightness)
+
+    @cached_property
+    def judged_by_the_day(self) -> Mapping[str, tuple[str, ...]]:
+        """By sensor, the quantities of a day that are made of it and have a range."""
+        found: dict[str, tuple[str, ...]] = {}
+        for daily in DAILY.values():
+            if self.named(daily.name).is_judged:
+                found[daily.sensor] = (*found.get(daily.sensor, ()), daily.name)
+        return found

@@ -1,4 +1,4 @@
-"""What is to be said of a tag, and of the house: a verdict, and the reasons for it as data.
+"""What is to be said of a tag, and of the greenhouse: a verdict, and the reasons for it as data.
 
 Pure, and without memory. Times are ns of ROS time. A verdict is that of the worst reason; healthy
 is only what was judged and is recent.
@@ -15,12 +15,14 @@ from typing import Final
 
 from lupin_bridge.judge.derived import DERIVED
 from lupin_bridge.judge.ranges import Ranges, Sensor, Sensors
-from lupin_bridge.judge.scanned import Recent, Scanned
-from lupin_twin.state import NO_FLOWER, STATUS_OK, Reading, TagState
+from lupin_bridge.judge.recent_scans import Recent, Scanned
+from lupin_twin.core.state import NO_FLOWER, STATUS_OK, Reading, TagState
 
 # Readings that do not hold any more say nothing about now, but until then nobody may forget that
-# the last that was heard of a tag was alarming.
+# the last that was received of a tag was alarming.
 FORGOTTEN_NS: Final = 24 * 3600 * 1_000_000_000
+# While no tag has an interval yet, the robot has stopped when nothing was scanned for longer.
+FIRST_ROUND_NS: Final = 1800 * 1_000_000_000
 # Of a range's width: what has been out of it is so until it lies so far within.
 DEADBAND: Final = 0.05
 
@@ -44,7 +46,7 @@ def worst(verdicts: Iterable[Verdict]) -> Verdict | None:
 
 
 class Kind(StrEnum):
-    """What a reason is about; the last two are the house's alone."""
+    """What a reason is about; the last two are the greenhouse's alone."""
 
     RANGE = "range"
     READING_FAILED = "reading_failed"
@@ -62,7 +64,7 @@ class Reason:
 
     `since_ns` is the observation that says so; None: there was none. Of `old`, `limit` is how long
     readings hold, s, and `since_ns` the last one: its age would change all the time. Of `pest`,
-    `value` is how many were counted, of `scan_failed` the status of the try, of `reading_failed`
+    `value` is how many were counted, of `scan_failed` the attempt's status, of `reading_failed`
     what no sensor reads that works, or None: no number.
     """
 
@@ -90,11 +92,13 @@ def judge_tag(
     *,
     holds_ns: int,
     changed: Mapping[str, int] = NOTHING_CHANGED,
+    days: Sequence[Reason] = (),
 ) -> Health:
     """What is to be said of a tag at `now_ns`, where its readings hold for `holds_ns`.
 
     Each reading is judged by the day and the plants of its own time, which `recent` has.
-    `changed` are the sensors that do not read as everything else foretells, and since when.
+    `changed` are the sensors that do not read as everything else predicts, and since when. `days`
+    are the reasons of quantities of a day; they hold until everything read of the tag is forgotten.
     """
     reasons: list[Reason] = []
     was_judged = False
@@ -120,9 +124,10 @@ def judge_tag(
             reasons.append(reason)
         elif ranges.ideal is not None and age_ns is not None and age_ns <= holds_ns:
             was_judged = True
+    reasons += days if _is_remembered(tag, now_ns) else ()
     reasons += _of_age(tag, now_ns, holds_ns)
     reasons += _of_changes(tag, changed)
-    reasons += _of_tries(tag)
+    reasons += _of_attempts(tag)
     reasons += _of_flowers(tag)
     reasons.sort(key=lambda reason: _ORDER[reason.verdict])
     verdict = worst(reason.verdict for reason in reasons)
@@ -240,18 +245,28 @@ def with_derived(tags: Sequence[TagState], sensor_type: str) -> Sequence[TagStat
     return [replace(tag, readings=(*tag.readings, *derive(tag.readings))) for tag in tags]
 
 
-def judge_house(tags: Mapping[Verdict, int], *, is_silent: bool) -> Health:
-    """The house is its worst tag; unknown where more than half of its tags are, or none speaks.
+def judge_house(
+    tags: Mapping[Verdict, int], *, is_silent: bool, stopped: Reason | None = None
+) -> Health:
+    """The greenhouse is its worst tag; unknown where more than half are, or nothing is scanned.
 
-    What is critical goes before what is not known. `tags` is how many have each verdict.
+    What is critical goes before what is not known. `tags` is how many have each verdict, `stopped`
+    why nothing is known of when tags will be scanned again.
     """
     if is_silent:
         return Health(Verdict.UNKNOWN, (Reason(Kind.SILENT, Verdict.UNKNOWN),))
     if tags.get(Verdict.CRITICAL, 0):
-        return Health(Verdict.CRITICAL)
+        return Health(Verdict.CRITICAL, (stopped,) if stopped else ())
+    if stopped is not None:
+        return Health(Verdict.UNKNOWN, (stopped,))
     if 2 * tags.get(Verdict.UNKNOWN, 0) > sum(tags.values()):
         return Health(Verdict.UNKNOWN)
     return Health(worst(v for v, count in tags.items() if count) or Verdict.UNKNOWN)
+
+
+def _is_remembered(tag: TagState, now_ns: int) -> bool:
+    ages = (_age_ns(reading.observed_at_ns, now_ns) for reading in tag.readings)
+    return any(age is not None and age <= FORGOTTEN_NS for age in ages)
 
 
 def _age_ns(observed_at_ns: int | None, now_ns: int) -> int | None:
@@ -293,7 +308,7 @@ def _of_changes(tag: TagState, changed: Mapping[str, int]) -> Iterable[Reason]:
             )
 
 
-def _of_tries(tag: TagState) -> Iterable[Reason]:
+def _of_attempts(tag: TagState) -> Iterable[Reason]:
     last = tag.last_try
     if last is not None and last.status != STATUS_OK:
         yield Reason(
@@ -308,6 +323,25 @@ def _of_flowers(tag: TagState) -> Iterable[Reason]:
 
 
 def pest(bug_count: int, since_ns: int | None) -> Reason:
-    """That a look saw pests: critical if it counted any, else somebody should look."""
+    """That an inspection saw pests: critical if it counted any, else somebody should look."""
     verdict = Verdict.CRITICAL if bug_count else Verdict.STRESSED
     return Reason(Kind.PEST, verdict, value=float(bug_count), since_ns=since_ns)
+
+
+def stopped(last_scan_ns: int | None, now_ns: int | None, once: int, tags: int) -> Reason | None:
+    """That nothing is scanned any more, where more than half of the tags were scanned `once`.
+
+    Such a tag has no interval, and its readings hold for a day: nobody knows when it should be
+    scanned again. Where tags have intervals, these say what is overdue.
+    """
+    if last_scan_ns is None or now_ns is None or 2 * once <= tags:
+        return None
+    if now_ns - last_scan_ns <= FIRST_ROUND_NS:
+        return None
+    limit_s = FIRST_ROUND_NS / 1e9
+    return Reason(Kind.STOPPED, Verdict.UNKNOWN, limit=limit_s, since_ns=last_scan_ns)
+
+
+def is_overdue(health: Health) -> bool:
+    """Whether none of a tag's readings holds any more, or it never had one."""
+    return any(reason.kind is Kind.OLD and not reason.sensor for reason in health.reasons)

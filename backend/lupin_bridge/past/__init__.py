@@ -1,1 +1,1 @@
-"""The past over HTTP: what is asked, and what is made of a source's answers."""
+"""The past over HTTP: queries, and the answers made of a source's."""

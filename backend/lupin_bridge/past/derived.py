@@ -1,4 +1,4 @@
-"""The past of a quantity that nobody measured: of what it is made of, reading by reading. Pure.
+"""The past of a derived quantity, made of its parts reading by reading. Pure.
 
 A bucket is of such readings too: of means, no mean of what is derived can be made.
 """
@@ -12,9 +12,8 @@ from functools import partial
 from statistics import fmean
 from typing import Any
 
-from lupin_bridge.judge.daily import DAILY, DAY_NS, Daily, IsDay
-from lupin_bridge.judge.derived import DERIVED, Derived
-from lupin_twin.past import (
+from lupin_bridge.judge.derived import DAILY, DAY_NS, DERIVED, Daily, Derived, IsDay
+from lupin_twin.core.past import (
     HOUR_NS,
     MAX_POINTS,
     PastRefused,
@@ -23,17 +22,17 @@ from lupin_twin.past import (
     grid,
     seconds,
 )
-from lupin_twin.state import Reading, TagState
+from lupin_twin.core.state import Reading, TagState
 
 # (ns of ROS time, value), oldest first.
 Readings = list[tuple[int, float]]
 
 
 def series(request: SeriesRequest, is_day: IsDay) -> Generator[SeriesRequest, Any, SeriesPast]:
-    """The series that is asked for; a derived one, unless a sensor has its name, of its parts.
+    """The series of a request; a derived one, unless a sensor has its name, of its parts.
 
     Raises:
-        PastRefused: more readings of the parts than can be asked for at once.
+        PastRefused: more readings of the parts than one request may have.
 
     """
     measured: SeriesPast = yield request
@@ -48,17 +47,17 @@ def series(request: SeriesRequest, is_day: IsDay) -> Generator[SeriesRequest, An
         return measured
     period, readings = yield from read(request)
     if len(readings) > request.max_points:
-        told = grid(period.start_ns, period.end_ns, request.max_points)
-        wider = replace(request, start_ns=told.start_ns, end_ns=told.end_ns)
-        _, readings = yield from read(wider)
+        wide = grid(period.start_ns, period.end_ns, request.max_points)
+        request = replace(request, start_ns=wide.start_ns, end_ns=wide.end_ns)
+        _, readings = yield from read(request)
         buckets: dict[int, list[float]] = {}
         for stamp_ns, value in readings:
-            buckets.setdefault((stamp_ns - told.start_ns) // told.bucket_ns, []).append(value)
+            buckets.setdefault((stamp_ns - wide.start_ns) // wide.bucket_ns, []).append(value)
         return SeriesPast(
-            told.start_ns,
-            told.end_ns,
-            told.bucket_ns,
-            tuple(told.start_ns + number * told.bucket_ns for number in buckets),
+            wide.start_ns,
+            wide.end_ns,
+            wide.bucket_ns,
+            tuple(wide.start_ns + number * wide.bucket_ns for number in buckets),
             tuple(map(len, buckets.values())),
             tuple(map(fmean, buckets.values())),
             tuple(map(min, buckets.values())),
@@ -78,7 +77,7 @@ def with_daily(
     """The tags as of a moment, those of which it is known with a reading of the quantity too.
 
     Raises:
-        PastRefused: more readings of a day than can be asked for at once.
+        PastRefused: more readings of a day than one request may have.
 
     """
     found = []
@@ -88,8 +87,8 @@ def with_daily(
             found.append(tag)
             continue
         start_ns = max(1, at_ns - DAY_NS)
-        asked = SeriesRequest(tag.tag_id, daily.sensor, start_ns, at_ns + 1, MAX_POINTS)
-        part: SeriesPast = yield asked
+        part_request = SeriesRequest(tag.tag_id, daily.sensor, start_ns, at_ns + 1, MAX_POINTS)
+        part: SeriesPast = yield part_request
         value = daily.at(at_ns, _finite(daily.name, daily.sensor, part), is_day)
         if math.isfinite(value):
             readings = (*tag.readings, Reading(daily.name, value, at_ns))
@@ -103,8 +102,10 @@ def _of_days(
 ) -> Generator[SeriesRequest, Any, tuple[SeriesPast, Readings]]:
     """The period, empty, and a value at the last reading of each hour in it."""
     first_ns = max(1, request.start_ns - DAY_NS) if request.start_ns else 0
-    asked = replace(request, sensor_type=daily.sensor, start_ns=first_ns, max_points=MAX_POINTS)
-    part: SeriesPast = yield asked
+    part_request = replace(
+        request, sensor_type=daily.sensor, start_ns=first_ns, max_points=MAX_POINTS
+    )
+    part: SeriesPast = yield part_request
     start_ns = request.start_ns or part.start_ns
     every = _finite(daily.name, daily.sensor, part)
     last = {at_ns // HOUR_NS: at_ns for at_ns, _ in every if at_ns >= start_ns}
@@ -132,10 +133,10 @@ def _readings(
     derived: Derived, request: SeriesRequest
 ) -> Generator[SeriesRequest, Any, tuple[SeriesPast, Readings]]:
     """The period, empty, and what can be derived in it: of readings of one moment, one scan."""
-    asked = replace(request, max_points=MAX_POINTS)
+    part_request = replace(request, max_points=MAX_POINTS)
     parts: list[SeriesPast] = []
     for name in derived.sources:
-        part: SeriesPast = yield replace(asked, sensor_type=name)
+        part: SeriesPast = yield replace(part_request, sensor_type=name)
         if part.is_bucketed:
             raise PastRefused(
                 f"{derived.name} is derived of {' and '.join(derived.sources)}, reading by reading:"
@@ -143,7 +144,7 @@ def _readings(
                 f" {MAX_POINTS} of them, the limit, or hours alone: ask for a shorter period"
             )
         parts.append(part)
-        asked = replace(asked, end_ns=part.end_ns)  # now is the same for both
+        part_request = replace(part_request, end_ns=part.end_ns)  # now is the same for both
     first, second = parts
     others = dict(zip(second.stamps_ns, second.means, strict=True))
     readings = [

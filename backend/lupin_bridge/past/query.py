@@ -1,16 +1,17 @@
-"""What a query string asks of the past. Pure."""
+"""What a query string requests of the past, and its moments: exact to the nanosecond. Pure."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, date, datetime
 from typing import Annotated, Final, Literal
 
 from annotated_types import Interval
 
-from lupin_bridge.past.moments import moment
 from lupin_bridge.query_string import AT, MOMENT, Name, needed, parameter, read
-from lupin_twin.past import (
+from lupin_twin.core.past import (
     DEFAULT_POINTS,
     MAX_POINTS,
     Event,
@@ -19,6 +20,71 @@ from lupin_twin.past import (
     check_moment,
     seconds,
 )
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND
+
+# builtin_interfaces/Time has its seconds as int32.
+MAX_SECONDS: Final = 2**31 - 1
+
+_SECONDS: Final = re.compile(r"([0-9]+)(?:\.([0-9]+))?", re.ASCII)
+# In a query string, `+01:00` reads ` 01:00`.
+_ISO: Final = re.compile(
+    r"([0-9]{4})-([0-9]{2})-([0-9]{2})[Tt]([0-9]{2}):([0-9]{2})(?::([0-9]{2})(?:\.([0-9]+))?)?"
+    r"(?:[Zz]|([+ -])([0-9]{2}):?([0-9]{2}))",
+    re.ASCII,
+)
+_EPOCH: Final = date(1970, 1, 1).toordinal()
+_SECONDS_A_DAY: Final = 86_400
+
+
+def moment(name: str, text: str) -> int:
+    """A moment in a query string, ns of ROS time; what is finer than a nanosecond is cut off.
+
+    Raises:
+        PastRefused: no moment, one before 0, or past what ROS time holds.
+
+    """
+    text = text.strip(" ")
+    if plain := _SECONDS.fullmatch(text):
+        whole, fraction = plain.groups()
+        # As text: int() takes its time for a thousand digits.
+        seconds = int(whole) if len(whole.lstrip("0")) <= len(str(MAX_SECONDS)) else None
+    elif iso := _ISO.fullmatch(text):
+        seconds, fraction = _unix_seconds(name, text, iso), iso.group(7)
+    else:
+        raise PastRefused(f"{name} is {text[:64]!r}, expected {MOMENT}")
+    if seconds is None or seconds > MAX_SECONDS:
+        raise PastRefused(f"{name} is {text[:64]!r}, the limit is {MAX_SECONDS} s of ROS time")
+    if seconds < 0:
+        raise PastRefused(f"{name} is {text[:64]!r}, which is before 0 s of ROS time")
+    return seconds * NANOSECONDS_PER_SECOND + int(f"{fraction or '':<09.9}")
+
+
+def _unix_seconds(name: str, text: str, iso: re.Match[str]) -> int:
+    year, month, day, hour, minute = (int(part) for part in iso.groups()[:5])
+    second, sign = int(iso.group(6) or 0), iso.group(8)
+    offset_hours, offset_minutes = int(iso.group(9) or 0), int(iso.group(10) or 0)
+    try:
+        days = date(year, month, day).toordinal() - _EPOCH
+    except ValueError as error:
+        raise PastRefused(f"{name} is {text[:64]!r}: {error}") from None
+    if hour > 23 or minute > 59 or second > 59 or offset_hours > 23 or offset_minutes > 59:
+        raise PastRefused(f"{name} is {text[:64]!r}, which no clock shows")
+    offset = (offset_hours * 60 + offset_minutes) * 60
+    local = days * _SECONDS_A_DAY + (hour * 60 + minute) * 60 + second
+    return local + offset if sign == "-" else local - offset
+
+
+def iso(stamp_ns: int) -> str:
+    """A moment as ISO 8601 in UTC, to the nanosecond: `2026-11-21T14:15:00.000000000Z`."""
+    whole, rest = divmod(stamp_ns, NANOSECONDS_PER_SECOND)
+    return f"{datetime.fromtimestamp(whole, UTC):%Y-%m-%dT%H:%M:%S}.{rest:09d}Z"
+
+
+def compact(stamp_ns: int) -> str:
+    """A moment for a file's name, to the second: `20261121T141500Z`."""
+    whole = stamp_ns // NANOSECONDS_PER_SECOND
+    return f"{datetime.fromtimestamp(whole, UTC):%Y%m%dT%H%M%SZ}"
+
 
 Parameters = Sequence[tuple[str, str]]
 
@@ -83,48 +149,19 @@ class OfExport(OfPeriod):
 
 
 @dataclass(frozen=True, slots=True)
-class TimelineQuery:
-    """A period in at most so many buckets; 0 ns: from the oldest, to now. No tag: every one."""
+class PeriodQuery:
+    """A period; 0 ns: from the oldest, to now. None: every tag, every sensor, active or not."""
 
     start_ns: int
     end_ns: int
-    points: int
-    tag_id: str | None
-
-
-@dataclass(frozen=True, slots=True)
-class ExportQuery:
-    """The rows of a period; 0 ns: from the oldest, to now. None: every tag, every sensor."""
-
-    start_ns: int
-    end_ns: int
-    tag_id: str | None
-    sensor_type: str | None
-
-
-@dataclass(frozen=True, slots=True)
-class AlarmsQuery:
-    """The alarms of a period; 0 ns: from the oldest, to now. `active` None: over or not."""
-
-    start_ns: int
-    end_ns: int
-    active: bool | None
-
-
-def alarms(parameters: Parameters, now_ns: int | None) -> AlarmsQuery:
-    """What `/api/alarms` asks for.
-
-    Raises:
-        PastRefused: see `history`.
-
-    """
-    given = read(OfAlarms, parameters, PastRefused)
-    active = None if given.active is None else given.active == "1"
-    return AlarmsQuery(*_period(given, now_ns), active)
+    points: int = DEFAULT_POINTS
+    tag_id: str | None = None
+    sensor_type: str | None = None
+    active: bool | None = None
 
 
 def at(parameters: Parameters, now_ns: int | None) -> int | None:
-    """The moment that is asked for, ns; None: now. `now_ns` None: nobody knows when that is.
+    """The moment of `at`, ns; None: now. `now_ns` is None where it is not known.
 
     Raises:
         PastRefused: anything but one `at`, or a moment that has not come.
@@ -134,7 +171,7 @@ def at(parameters: Parameters, now_ns: int | None) -> int | None:
 
 
 def at_of(text: str | None, now_ns: int | None) -> int | None:
-    """`at`, where the other parameters are for somebody else.
+    """`at`, where the other parameters are read elsewhere.
 
     Raises:
         PastRefused: no moment, or one that has not come.
@@ -149,7 +186,7 @@ def at_of(text: str | None, now_ns: int | None) -> int | None:
 
 
 def history(parameters: Parameters, now_ns: int | None) -> SeriesRequest:
-    """What `/api/history` asks for.
+    """The query of `/api/history`.
 
     Raises:
         PastRefused: an unknown or repeated parameter, or a value that cannot be.
@@ -159,26 +196,25 @@ def history(parameters: Parameters, now_ns: int | None) -> SeriesRequest:
     return SeriesRequest(given.tag_id, given.sensor_type, *_period(given, now_ns), given.points)
 
 
-def timeline(parameters: Parameters, now_ns: int | None) -> TimelineQuery:
-    """What `/api/timeline` asks for.
+def period(kind: type[OfPeriod], parameters: Parameters, now_ns: int | None) -> PeriodQuery:
+    """The query of a period, with what its `kind` has beside that.
 
     Raises:
         PastRefused: see `history`.
 
     """
-    given = read(OfTimeline, parameters, PastRefused)
-    return TimelineQuery(*_period(given, now_ns), given.points, given.tag_id)
-
-
-def export(parameters: Parameters, now_ns: int | None) -> ExportQuery:
-    """What `/api/export.csv` asks for.
-
-    Raises:
-        PastRefused: see `history`.
-
-    """
-    given = read(OfExport, parameters, PastRefused)
-    return ExportQuery(*_period(given, now_ns), given.tag_id, given.sensor_type)
+    given = read(kind, parameters, PastRefused)
+    start_ns, end_ns = _period(given, now_ns)
+    match given:
+        case OfTimeline():
+            return PeriodQuery(start_ns, end_ns, given.points, given.tag_id)
+        case OfExport():
+            tag_id, sensor_type = given.tag_id, given.sensor_type
+            return PeriodQuery(start_ns, end_ns, tag_id=tag_id, sensor_type=sensor_type)
+        case OfAlarms():
+            active = None if given.active is None else given.active == "1"
+            return PeriodQuery(start_ns, end_ns, active=active)
+    return PeriodQuery(start_ns, end_ns)
 
 
 def _period(given: OfPeriod | OfHistory, now_ns: int | None) -> tuple[int, int]:

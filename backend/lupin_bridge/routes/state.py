@@ -13,28 +13,25 @@ from fastapi import APIRouter, Request, Response, WebSocket
 
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.past import complete
+from lupin_bridge.past import bodies
 from lupin_bridge.past import query as past_query
-from lupin_bridge.past.asked import NoSuchTag, OneTag, WholeState
+from lupin_bridge.past.plans import NoSuchTag, OneTag, WholeState
 from lupin_bridge.query_string import parameter, parameters_of, read
-from lupin_bridge.routes.as_of import response_as_of
-from lupin_bridge.routes.clients import has_place, next_message
-from lupin_bridge.routes.computing import (
-    computed_response,
-    kept_or_computed,
-    on_worker,
-    or_refusal,
-)
-from lupin_bridge.routes.tools import (
-    JSON_TYPE,
-    NEVER_KEEP,
+from lupin_bridge.routes.answers import (
+    NEVER_STORE,
+    NO_TWIN,
     NOT_REMEMBERED,
+    TOO_MUCH,
     bridge_of,
     error_response,
     json_response,
+    on_worker,
     read_route,
+    respond,
+    respond_as_of,
 )
-from lupin_bridge.serving.kept import Answer
+from lupin_bridge.routes.sockets import has_place, next_message
+from lupin_bridge.serving.admission import Answer
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.stream import schema, state_json
 from lupin_bridge.stream.hub import CLOSE_POLICY, Client
@@ -67,17 +64,15 @@ AGES_HOLD_S: Final = 0.2
 # What writing a scan of a history takes, roughly and at worst.
 _WRITE_SCAN_S: Final = 20e-6
 
-_NO_TWIN = "no twin has been heard yet"
 _UNAVAILABLE = {
     503: {"model": schema.ErrorMessage, "description": "no twin was found yet, or it is busy"}
 }
-_TOO_MUCH = {429: {"model": schema.ErrorMessage, "description": "this client asks for too much"}}
 _NO_TAG = {404: {"model": schema.ErrorMessage, "description": "no such tag"}}
 
 
 @router.websocket("/ws/state")
 async def ws_state(websocket: WebSocket) -> None:
-    """The status and the current state at once, then every change; a client is not listened to."""
+    """The status and the current state at once, then every change; input is ignored."""
     bridge: Bridge = websocket.app.state.bridge
     await websocket.accept()
     try:
@@ -117,29 +112,25 @@ async def state(request: Request) -> Response:
 
     As of a moment that has passed, `header.stamp` is that moment, and ages are those of then.
     """
-    return await or_refusal(_state(request))
-
-
-async def _state(request: Request) -> Response:
     bridge = bridge_of(request)
     at_ns = past_query.at(request.query_params.multi_items(), bridge.ros_time_ns)
     if at_ns is not None:
-        return await response_as_of(request, at_ns, WholeState())
+        return await respond_as_of(request, WholeState(at_ns), at_ns)
     latest = bridge.latest
     if latest is None:
-        return error_response(_NO_TWIN, 503)
+        return error_response(NO_TWIN, 503)
     # The newest state always, its ages a little older at most: so thousands of tags that thousands
-    # of clients ask for are written a few times a second.
+    # of clients request are written a few times a second.
     key = ("state", bridge.state_number, int(time.monotonic() / AGES_HOLD_S))
 
     async def compute() -> Answer:
         body = bridge.frames.json.state(latest.snapshot, bridge.ros_time_ns)
-        answer = Answer(body, JSON_TYPE, NEVER_KEEP)
-        bridge.kept.put(key, answer, instead_of=bridge.kept_state)
-        bridge.kept_state = key
+        answer = Answer(body, "application/json", NEVER_STORE)
+        bridge.cache.put(key, answer, instead_of=bridge.cached_state)
+        bridge.cached_state = key
         return answer
 
-    return await kept_or_computed(request, key, compute)
+    return await respond(request, key, compute)
 
 
 # An id may hold a slash, which is decoded before the routes are tried: hence :path, and the longer
@@ -148,32 +139,28 @@ async def _state(request: Request) -> Response:
     router,
     "/api/tags/{tag_id:path}/history",
     summary="The last scans and tries of one tag",
-    responses={200: {"model": schema.TagHistory}, **_NO_TAG, **_TOO_MUCH, **_UNAVAILABLE},
+    responses={200: {"model": schema.TagHistory}, **_NO_TAG, **TOO_MUCH, **_UNAVAILABLE},
 )
 async def history(request: Request, tag_id: str) -> Response:
     """The tag's last scans that brought readings, sensor by sensor, and its last tries."""
     bridge = bridge_of(request)
     if bridge.latest is None:
-        return error_response(_NO_TWIN, 503)
+        return error_response(NO_TWIN, 503)
     number_of_tags = len(bridge.latest.snapshot.tags)
 
     async def compute() -> Answer:
         with bridge.admission.computing(client_of(request)):
             past = await bridge.source.history(tag_id)
             if past is None:
-                raise _NoSuchTagError
+                raise NoSuchTag(tag_id, number_of_tags)
             body = await on_worker(
                 bridge,
                 lambda _: orjson.dumps(state_json.history(tag_id, past)),
-                (len(past.scans) + len(past.tries)) * _WRITE_SCAN_S,
+                (len(past.scans) + len(past.attempts)) * _WRITE_SCAN_S,
             )
-        return Answer(body, JSON_TYPE, NEVER_KEEP)
+        return Answer(body, "application/json", NEVER_STORE)
 
-    key = ("history", bridge.state_number, tag_id)
-    try:
-        return await or_refusal(computed_response(request, key, compute))
-    except _NoSuchTagError:
-        return _no_such_tag(tag_id, number_of_tags)
+    return await respond(request, ("history", bridge.state_number, tag_id), compute)
 
 
 @read_route(
@@ -185,36 +172,24 @@ async def history(request: Request, tag_id: str) -> Response:
 )
 async def tag(request: Request, tag_id: str) -> Response:
     """Everything that the twin knows about one tag, or knew at a moment."""
-    return await or_refusal(_tag(request, tag_id))
-
-
-async def _tag(request: Request, tag_id: str) -> Response:
     bridge = bridge_of(request)
     at_ns = past_query.at(request.query_params.multi_items(), bridge.ros_time_ns)
     if at_ns is not None:
         return await _tag_as_of(request, tag_id, at_ns)
     latest = bridge.latest
     if latest is None:
-        return error_response(_NO_TWIN, 503)
+        return error_response(NO_TWIN, 503)
     for candidate in latest.snapshot.tags:
         if candidate.tag_id == tag_id:
             return json_response(bridge.frames.json.tag(candidate, bridge.ros_time_ns))
-    return _no_such_tag(tag_id, len(latest.snapshot.tags))
+    raise NoSuchTag(tag_id, len(latest.snapshot.tags))
 
 
 async def _tag_as_of(request: Request, tag_id: str, at_ns: int) -> Response:
     try:
-        return await response_as_of(request, at_ns, OneTag(tag_id))
+        return await respond_as_of(request, OneTag(at_ns, tag_id), at_ns)
     except NoSuchTag as error:
         journal = bridge_of(request).source.journal()
-        response = _no_such_tag(tag_id, error.known, complete.why_not(journal, at_ns))
-        response.headers.update(complete.of_moment(journal, at_ns))
+        response = error_response(f"{error}{bodies.why_not(journal, at_ns)}", 404)
+        response.headers.update(bodies.moment_headers(journal, at_ns))
         return response
-
-
-class _NoSuchTagError(KeyError):
-    """The twin knows no tag of that id."""
-
-
-def _no_such_tag(tag_id: str, known: int, more: str = "") -> Response:
-    return error_response(f"no tag {tag_id[:64]!r} is known ({known} others are){more}", 404)

@@ -1,23 +1,104 @@
-"""One rule of admission for every answer that has to be computed. Pure.
+"""What clients may cost: limits, rates, admission of computed answers, and their cache. Pure.
 
-What is kept already passes without it. Nothing waits for a turn: a request past a bound is refused
-at once, so that nothing piles up. A client's own requests count until it has taken the answer, all
+A cached answer needs no admission. Nothing waits for a turn: a request past a bound is refused at
+once, so that nothing piles up. A client's own requests count until it has received the answer, all
 computations together until the answer is written: a client that does not read holds up nobody but
-itself. Large computations leave a quarter of the places to the small ones, which are soon done: a
-flood of the dearest fields keeps nobody from a cheap answer. And no client takes more places than
-it leaves free: however many ask for much, there is one for who comes next.
+itself. Large computations leave a quarter of the places to small ones: a flood of the dearest
+fields keeps nobody from a cheap answer. And no client takes more places than it leaves free.
 """
 
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from ipaddress import IPv6Address, ip_address
+from itertools import islice
 from typing import Final
 
-from lupin_bridge.serving.rate_limit import RateLimit
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Times in seconds.
+
+    `client_timeout_s`: a client that asks, or takes, nothing for so long is cut off.
+    `answer_timeout_s`: a computed answer that takes longer ends in 504, and its work with it.
+    `answers_per_s` may be computed for one client, and two seconds' worth at once: a page that is
+    dragged through the past asks for ten moments a second, each for a state and a field or two;
+    and behind one address there may be two such pages. `concurrency` of them may be under way for
+    one client (a browser has six at once), `total_concurrency` for all of them together, of
+    which large ones take three quarters. `frames_per_s` is what the state's listeners get at most,
+    on average. Alarms are worked out from `alarm_days` before the start on.
+    """
+
+    client_timeout_s: float = 30.0
+    answer_timeout_s: float = 10.0
+    answers_per_s: float = 50.0
+    concurrency: int = 8
+    total_concurrency: int = 32
+    frames_per_s: float = 10.0
+    alarm_days: float = 7.0
+
+
+# One entry is an address and a number: some hundred kilobytes when the table is full.
+MAX_CLIENTS: Final = 4_096
+
+# Sums of float intervals miss a whole burst by less than this.
+_NOISE_S: Final = 1e-9
+
+
+class RateLimit:
+    """At most `rate_hz` in the long run and `burst` at once, for each client by itself.
+
+    Generic cell rate algorithm (ITU-T I.371): what is kept of a client is the one moment at which
+    its bucket will be full again. A client that reached that moment is as one never seen; the
+    least recently active leaves a full table first.
+    """
+
+    def __init__(self, rate_hz: float, burst: float, max_clients: int = MAX_CLIENTS) -> None:
+        self._interval_s = 1.0 / rate_hz
+        self._slack_s = (max(1.0, burst) - 1.0) / rate_hz
+        self._max_clients = max_clients
+        self._full_at_s: OrderedDict[str, float] = OrderedDict()
+
+    def __len__(self) -> int:
+        return len(self._full_at_s)
+
+    def wait_s(self, client: str, now_s: float) -> float:
+        """How long until the client's next turn, s; 0: now."""
+        wait = self._full_at_s.get(client, now_s) - self._slack_s - now_s
+        return wait if wait > _NOISE_S else 0.0
+
+    def take(self, client: str, now_s: float) -> float:
+        """Take a turn if there is one; returns `wait_s`, and more than 0 means: not taken."""
+        wait = self.wait_s(client, now_s)
+        if wait == 0.0:
+            full_at = max(self._full_at_s.get(client, now_s), now_s)
+            self._full_at_s[client] = full_at + self._interval_s
+            self._full_at_s.move_to_end(client)
+            if len(self._full_at_s) > self._max_clients:
+                self._full_at_s.popitem(last=False)
+        return wait
+
+
+def client_key(address: str) -> str:
+    """The client that an address stands for.
+
+    An IPv6 host has a whole /64 to itself (RFC 6177) and may change within it as it likes; an IPv4
+    address has a second spelling on a socket that listens for both.
+    """
+    try:
+        ip = ip_address(address.partition("%")[0])
+    except ValueError:
+        return address
+    if not isinstance(ip, IPv6Address):
+        return str(ip)
+    if ip.ipv4_mapped is not None:
+        return str(ip.ipv4_mapped)
+    return f"{IPv6Address(int(ip) >> 64 << 64)}/64"
+
 
 # A page that opens asks for several fields at once; seconds' worth of the rate.
 BURST_S: Final = 2.0
@@ -158,7 +239,7 @@ class Admission:
     def computing(self, client: str, *, is_large: bool = False) -> Iterator[None]:
         """What keeps the twin and the workers busy, once for all who wait for it.
 
-        `client` is who asked first.
+        `client` was the first to ask.
 
         Raises:
             BusyError: one more than there may be at once, or than the client leaves to others.
@@ -202,3 +283,90 @@ def _give_back(taken: Counter[str], client: str) -> None:
     taken[client] -= 1
     if not taken[client]:
         del taken[client]
+
+
+MAX_BYTES: Final = 64_000_000
+# What an entry takes beside its body, roughly: the least that it counts.
+ENTRY_BYTES: Final = 1_000
+# So many entries are looked through for the newest.
+MAX_NEWEST: Final = 64
+
+
+# Browsers and proxies keep what they got, and ask each time whether it still holds.
+REVALIDATE: Final = {"Cache-Control": "no-cache"}
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The body of an answer, and its headers."""
+
+    body: bytes | memoryview
+    media_type: str
+    headers: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(slots=True, eq=False)
+class _Entry:
+    answer: Answer
+    readers: int = 0
+
+    @property
+    def bytes(self) -> int:
+        return len(self.answer.body) + ENTRY_BYTES
+
+
+class AnswerCache:
+    """Answers by their keys, the least recently used dropped first. Belongs to one thread.
+
+    A key stands for everything that its answer depends on. An answer that is being sent counts and
+    is not dropped: slow readers hold what is cached, and never more than the bound.
+    """
+
+    def __init__(self, max_bytes: int = MAX_BYTES) -> None:
+        self.bytes = 0
+        self._max_bytes = max_bytes
+        self._entries: OrderedDict[Hashable, _Entry] = OrderedDict()
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def put(self, key: Hashable, answer: Answer, instead_of: Hashable | None = None) -> None:
+        """Cache an answer if there is room, or can be made; the one it replaces goes first."""
+        for old in (key, instead_of):
+            entry = self._entries.get(old)
+            if entry is not None and not entry.readers:
+                self._drop(old)
+        if key in self._entries:
+            return  # the same answer, which is being sent
+        new = _Entry(answer)
+        if new.bytes > self._max_bytes:
+            return
+        idle = (old for old, entry in list(self._entries.items()) if not entry.readers)
+        while self.bytes + new.bytes > self._max_bytes:
+            victim = next(idle, None)
+            if victim is None:
+                return
+            self._drop(victim)
+        self._entries[key] = new
+        self.bytes += new.bytes
+
+    def lend(self, key: Hashable) -> tuple[Answer, Callable[[], None]] | None:
+        """The answer under `key`, and what to call once it is sent; None: there is none."""
+        entry = self._entries.get(key)
+        if entry is None:
+            return None
+        self._entries.move_to_end(key)
+        entry.readers += 1
+
+        def release() -> None:
+            entry.readers -= 1
+
+        return entry.answer, release
+
+    def newest_tags(self) -> list[str]:
+        """The ETags that were put or lent last, of those that are keys."""
+        newest = islice(reversed(self._entries), MAX_NEWEST)
+        return [key for key in newest if isinstance(key, str)]
+
+    def _drop(self, key: Hashable) -> None:
+        self.bytes -= self._entries.pop(key).bytes

@@ -1,10 +1,10 @@
-"""HTTP with slow clients: what waits for one is a piece, and who takes or asks nothing is cut off.
+"""HTTP with slow clients: what waits for one is a piece, and an idle client is cut off.
 
 uvicorn takes an answer whole and keeps what the socket does not take, and it waits for the rest of
-a request, for as long as the client likes. A few hundred connections that ask for a large field and
-never read would fill the memory, and some thousand that never finish asking use up all sockets.
+a request, for as long as the client likes. A few hundred connections that request a large field and
+never read would fill the memory, and some thousand that never finish a request use up all sockets.
 The times hold for the connection, and so for whatever is sent: answers of routes, and refusals of
-the doorman, of the framework and of this protocol alike.
+access control, of the framework and of this protocol alike.
 
 A request is its head: no route wants a body. The parser gets one whole head at a time, of bounded
 size and number of lines. A request with a body is refused before any of the body is read.
@@ -16,20 +16,16 @@ import asyncio
 import logging
 import re
 import sys
-from collections.abc import Iterator
 from typing import Any, Final, cast
 
 import h11
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
 
-from lupin_bridge.serving.rate_limit import client_key
-from lupin_bridge.serving.transports import CLOSE_GRACE_S, bound_unsent, refusal, reset, tear_down
+from lupin_bridge.serving.admission import client_key
+from lupin_bridge.serving.connections import CLOSE_GRACE_S, bound_unsent, refusal, reset, tear_down
 
 log = logging.getLogger(__name__)
 
-# What may wait for a reader; the next piece follows when the socket has taken this one.
-PIECE_BYTES: Final = 64 * 1024
 # The request's line and all header lines. The parser's own limit is one for what is incomplete: all
 # that comes at once, it would take, up to asyncio's 256 kB.
 MAX_HEAD_BYTES: Final = 32 * 1024
@@ -76,7 +72,7 @@ class HttpConnection(H11Protocol):
     """uvicorn's protocol, with an end to every wait.
 
     A client has uvicorn's `timeout_keep_alive` for a whole request, from its connection or its last
-    answer on, however often it sends a byte; and as long to take a piece of what it has asked for.
+    answer on, however often it sends a byte; and as long to take a piece of an answer.
     """
 
     def __init__(
@@ -93,16 +89,16 @@ class HttpConnection(H11Protocol):
         self._reader_deadline: asyncio.TimerHandle | None = None
         self._is_refused = False
         self._is_handed_over = False
-        self._quiet_since_s = 0.0
-        # What has come and is not for the parser yet.
-        self._unheard = bytearray()
+        self._idle_since_s = 0.0
+        # Received, and not passed to the parser yet.
+        self._unparsed = bytearray()
 
     @property
     def waiting_since_s(self) -> float | None:
-        """Since when the client has asked nothing, or taken nothing; None: it is being served."""
+        """Since when the client has requested, or taken, nothing; None: it is being served."""
         if self.transport.is_closing() or (self._is_at_work and self._reader_deadline is None):
             return None
-        return self._quiet_since_s
+        return self._idle_since_s
 
     def connection_made(self, transport: Any) -> None:
         """Start to wait for a request."""
@@ -114,24 +110,24 @@ class HttpConnection(H11Protocol):
         self._wait_for_request()
 
     def data_received(self, data: bytes) -> None:
-        """Listen to a client, unless it was refused."""
+        """Take bytes, unless the client was refused."""
         if self._is_refused:
-            self.flow.pause_reading()  # who goes on is not read; who ends is noticed
+            self.flow.pause_reading()  # input is not read any more, but an end is noticed
         else:
-            self._unheard += data
-            self._listen()
+            self._unparsed += data
+            self._parse()
 
     def on_response_complete(self) -> None:
         """Go on to the next request, and start to wait for it."""
         super().on_response_complete()
-        self._listen()
+        self._parse()
         if not self._is_handed_over:
             self._wait_for_request()
 
     def pause_writing(self) -> None:
-        """Start to wait for the client to take what it has asked for."""
+        """Start to wait for the client to take a piece."""
         super().pause_writing()
-        self._quiet_since_s = self.loop.time()
+        self._idle_since_s = self.loop.time()
         self._reader_deadline = self.loop.call_later(self.timeout_keep_alive, self._give_up)
 
     def resume_writing(self) -> None:
@@ -154,9 +150,9 @@ class HttpConnection(H11Protocol):
 
     def send_400_response(self, msg: str) -> None:
         """Answer what the parser does not take, and end; uvicorn calls this from its `except`."""
-        complaint = sys.exception()
-        if isinstance(complaint, h11.RemoteProtocolError):
-            self._refuse(complaint.error_status_hint, str(complaint)[:500])
+        error = sys.exception()
+        if isinstance(error, h11.RemoteProtocolError):
+            self._refuse(error.error_status_hint, str(error)[:500])
         else:
             self._refuse(400, msg)
 
@@ -165,18 +161,18 @@ class HttpConnection(H11Protocol):
         tear_down(self.transport)
 
     def break_off(self) -> None:
-        """End an answer in its middle: whoever gets it must not take what has come for all of it.
+        """End an answer in its middle: its client must not take the part for the whole.
 
         Of HTTP/1.0, where an answer ends with its connection, that goes for nothing but a reset.
         """
         reset(self.transport)
 
     def _should_upgrade(self) -> bool:
-        # RFC 9110, section 7.8: an upgrade asked for in HTTP/1.0 is to be passed over.
+        # RFC 9110, section 7.8: an upgrade in HTTP/1.0 is to be ignored.
         return self.scope["http_version"] == "1.1" and super()._should_upgrade()
 
     def _refuse(self, status: int, detail: str) -> None:
-        """Answer, and end; nothing that the client has asked for is under way now."""
+        """Answer, and end; no other answer is under way now."""
         self._is_refused = True
         self.transport.write(refusal(status, detail))
         # Closed at once, with more of the client's still on its way, the connection would be
@@ -186,30 +182,30 @@ class HttpConnection(H11Protocol):
         self.loop.call_later(CLOSE_GRACE_S, self.transport.close)
         self._wait_for_request()
 
-    def _listen(self) -> None:
+    def _parse(self) -> None:
         """Give the parser one whole head, and the next one after the answer."""
-        while self._unheard and not self._is_over:
+        while self._unparsed and not self._is_over:
             if self.conn.their_state is not h11.IDLE:
                 self.flow.pause_reading()  # until the answer has gone
                 return
-            blank = _BLANK_LINE.search(self._unheard, 0, MAX_HEAD_BYTES)
-            end = min(len(self._unheard), MAX_HEAD_BYTES) if blank is None else blank.end()
-            if self._unheard.count(b"\n", 0, end) > MAX_LINES:
+            blank = _BLANK_LINE.search(self._unparsed, 0, MAX_HEAD_BYTES)
+            end = min(len(self._unparsed), MAX_HEAD_BYTES) if blank is None else blank.end()
+            if self._unparsed.count(b"\n", 0, end) > MAX_LINES:
                 self._refuse(431, f"the request has more headers than the limit of {MAX_HEADERS}")
             elif blank is None and end == MAX_HEAD_BYTES:
                 self._refuse(431, f"the request's head is longer than {MAX_HEAD_BYTES} bytes")
-            elif blank is None and self._unheard[0] > 0x20:
+            elif blank is None and self._unparsed[0] > 0x20:
                 return  # the rest is on its way; a smaller byte begins no request, but TLS, say
             else:
-                head = bytes(self._unheard[:end])
-                del self._unheard[:end]
+                head = bytes(self._unparsed[:end])
+                del self._unparsed[:end]
                 super().data_received(head)
         if self._is_over:
-            self._unheard.clear()
+            self._unparsed.clear()
 
     @property
     def _is_over(self) -> bool:
-        """Whether nothing more is listened to here."""
+        """Whether no more input is taken here."""
         return self._is_refused or self._is_handed_over or self.transport.is_closing()
 
     @property
@@ -220,7 +216,7 @@ class HttpConnection(H11Protocol):
     def _wait_for_request(self) -> None:
         if self._deadline is not None:
             self._deadline.cancel()
-        self._quiet_since_s = self.loop.time()
+        self._idle_since_s = self.loop.time()
         self._deadline = self.loop.call_later(self.timeout_keep_alive, self._look_for_request)
 
     def _stop_waiting(self) -> None:
@@ -237,35 +233,3 @@ class HttpConnection(H11Protocol):
         self._reader_deadline = None
         log.warning("cut off a reader that took nothing for %g s", self.timeout_keep_alive)
         self.abort()
-
-
-def pieces_of(message: Message) -> Iterator[Message]:
-    """A message of an answer as messages with no more than `PIECE_BYTES` of body."""
-    body = message.get("body", b"")
-    if len(body) <= PIECE_BYTES:
-        yield message
-        return
-    body = memoryview(body)  # a piece is a view: of one body for a hundred readers there is one
-    for start in range(0, len(body), PIECE_BYTES):
-        yield {**message, "body": body[start : start + PIECE_BYTES], "more_body": True}
-    # uvicorn waits before it writes: the empty end waits for the last piece.
-    yield {**message, "body": b""}
-
-
-class PieceByPiece:
-    """ASGI middleware: an answer returns when its reader has taken all but the last piece."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send the application's answers in pieces."""
-        if scope["type"] != "http":
-            await self._app(scope, receive, send)
-            return
-
-        async def send_in_pieces(message: Message) -> None:
-            for piece in pieces_of(message):
-                await send(piece)
-
-        await self._app(scope, receive, send_in_pieces)

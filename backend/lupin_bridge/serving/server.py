@@ -1,41 +1,130 @@
-"""The web server: uvicorn, set up for this application, with the signals in our hands."""
+"""The web server: uvicorn, set up for this application, its signals, and its TLS certificate."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
 import math
+import os
 import resource
 import signal
 import socket
+import ssl
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any
+from typing import Any, Final, NoReturn
 
 import uvicorn
 from fastapi import FastAPI
 from uvicorn.server import HANDLED_SIGNALS
 
-from lupin_bridge.serving.acceptor import Acceptor, room_for_connections
+from lupin_bridge.serving.admission import Limits
+from lupin_bridge.serving.connections import Acceptor, room_for_connections, tear_down
 from lupin_bridge.serving.http_protocol import HttpConnection
-from lupin_bridge.serving.limits import Limits
-from lupin_bridge.serving.transports import tear_down
 from lupin_bridge.serving.ws_protocol import Connection
-from lupin_bridge.settings import Settings
-from lupin_twin import process
+from lupin_bridge.settings import SettingError, Settings
+from lupin_twin.runtime import process
 
 log = logging.getLogger(__name__)
+
+# How often the files are looked at. Certificates are renewed weeks before they end.
+WATCH_PERIOD_S: Final = 2.0
+
+
+class TlsError(SettingError):
+    """A certificate or key that cannot be served; the message names the option and the file."""
+
+
+def check_pair(cert_file: str, key_file: str) -> None:
+    """Load a certificate chain and its private key, both PEM, and forget them again.
+
+    Raises:
+        TlsError: a file that cannot be read or is not what it should be, or a pair that is none.
+
+    """
+    for option, path in (("--tls-cert", cert_file), ("--tls-key", key_file)):
+        try:
+            with open(path, "rb"):  # noqa: PTH123  # read rights, whatever kind of file it is
+                pass
+        except OSError as error:
+            raise TlsError(f"{option} {path}: {error.strerror}") from None
+
+    def no_password() -> NoReturn:
+        # Without this, OpenSSL would ask the terminal.
+        raise TlsError(f"--tls-key {key_file} is encrypted: give a key without a passphrase")
+
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    try:
+        context.load_verify_locations(cert_file)
+    except ssl.SSLError:
+        raise TlsError(f"--tls-cert {cert_file} holds no PEM certificate") from None
+    try:
+        context.load_cert_chain(cert_file, key_file, no_password)
+    except ssl.SSLError as error:
+        if error.reason == "KEY_VALUES_MISMATCH":
+            raise TlsError(f"--tls-key {key_file} is not the key of {cert_file}") from None
+        reason = error.reason or "not PEM"
+        raise TlsError(f"--tls-key {key_file} is no usable private key ({reason})") from None
+
+
+class Certificates:
+    """A pair that is served, and follows its files: who connects later gets what they hold by then.
+
+    Connections that are open keep what they have. A new pair that cannot be served is logged once,
+    and the old one goes on until the files hold one that can.
+    """
+
+    def __init__(self, cert_file: str, key_file: str, context: ssl.SSLContext) -> None:
+        self._files = (cert_file, key_file)
+        self._context = context
+        self._served = self._version()
+        self._warned = ""
+
+    async def watch(self) -> NoReturn:
+        """Look at the files now and then, for ever."""
+        while True:
+            await asyncio.sleep(WATCH_PERIOD_S)
+            self.look()
+
+    def look(self) -> None:
+        """Serve what the files hold, if that is something else by now and will do."""
+        version = self._version()
+        if version == self._served:
+            return
+        try:
+            # Not into the live context: a pair that is none would leave it with neither.
+            check_pair(*self._files)
+            self._context.load_cert_chain(*self._files)
+        except (TlsError, OSError) as error:  # ssl.SSLError is an OSError
+            if str(error) != self._warned:
+                log.warning("the new TLS certificate is refused, the old one goes on: %s", error)
+            self._warned = str(error)
+            return
+        self._served, self._warned = version, ""
+        log.info("new connections get the TLS certificate of %s as it is now", self._files[0])
+
+    def _version(self) -> list[tuple[int, ...] | None]:
+        return [_stamp(path) for path in self._files]
+
+
+def _stamp(path: str) -> tuple[int, ...] | None:
+    try:
+        status = os.stat(path)  # noqa: PTH116  # through links, as renewals are made
+    except OSError:
+        return None
+    return status.st_mtime_ns, status.st_ino, status.st_size
+
 
 # Clients have nothing to say: what they send is read and thrown away, and bounded.
 MAX_INBOUND_BYTES = 65_536
 PING_PERIOD_S = 20.0
 # Files open beside the clients' sockets: DDS, plain HTTP requests, those who are turned away.
 SPARE_FILES = 512
-# Ctrl-C ends within 2 s: so much for the clients to take what they are told and what they are being
+# Ctrl-C ends within 2 s: so much for the clients to take the last messages and what they are being
 # sent, the rest for the ROS thread (`ros_thread.STOP_TIMEOUT_S`). Should a request outlive even its
 # connection, uvicorn cancels it.
-GOODBYE_S = 0.5
+CLOSE_AFTER_S = 0.5
 GRACEFUL_SHUTDOWN_S = 1
 # Who comes while the loop is busy waits in the kernel; whom that has no place for tries again a
 # second later. All clients come at once when a bridge is started anew.
@@ -45,13 +134,13 @@ TICKS_PER_S = 10
 
 
 class BridgeServer(uvicorn.Server):
-    """uvicorn's server, that says good-bye first and does not raise the signal once more."""
+    """uvicorn's server: its clients learn of the shutdown, and no signal is raised again."""
 
     def __init__(
         self,
         app: FastAPI,
         settings: Settings,
-        say_goodbye: Callable[[], None],
+        announce_shutdown: Callable[[], None],
         limits: Limits = Limits(),
     ) -> None:
         super().__init__(
@@ -69,11 +158,11 @@ class BridgeServer(uvicorn.Server):
                 server_header=False,
                 ssl_certfile=settings.tls_cert or None,
                 ssl_keyfile=settings.tls_key or None,
-                proxy_headers=False,  # who asks is who is connected, whatever a header claims
+                proxy_headers=False,  # `BehindProxies` decides which headers count
                 timeout_graceful_shutdown=GRACEFUL_SHUTDOWN_S,
             )
         )
-        self._say_goodbye = say_goodbye
+        self._announce_shutdown = announce_shutdown
         # Connections that are being closed, and since when, s.
         self._closing_since_s: dict[Any, float] = {}
 
@@ -105,7 +194,7 @@ class BridgeServer(uvicorn.Server):
         return await super().on_tick(counter)
 
     def _end_the_closing(self, now_s: float) -> None:
-        """Tear down what has been closed, by whomever, and whose last bytes nobody takes."""
+        """Tear down what has been closed, and whose client does not take the last bytes."""
         since_s = self._closing_since_s
         self._closing_since_s = {
             connection: since_s.get(connection, now_s)
@@ -137,8 +226,8 @@ class BridgeServer(uvicorn.Server):
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Tell the clients, then close."""
-        self._say_goodbye()
-        asyncio.get_running_loop().call_later(GOODBYE_S, self._cut_off_clients)
+        self._announce_shutdown()
+        asyncio.get_running_loop().call_later(CLOSE_AFTER_S, self._cut_off_clients)
         await super().shutdown(sockets)
 
     def _cut_off_clients(self) -> None:
@@ -149,15 +238,15 @@ class BridgeServer(uvicorn.Server):
 def listen(host: str, port: int) -> socket.socket:
     """A listening socket, so that an address in use is known before anything else starts.
 
-    It listens from here on, not from when the server takes over: whoever comes in between waits
-    for a moment instead of being turned away.
+    It listens from here on, not from when the server takes over: a client in between waits
+    for a moment instead of being refused.
 
     Raises:
         OSError: the address cannot be had.
 
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    # asyncio turns Nagle's algorithm off only where it is told that this is TCP. With it, the
+    # asyncio turns Nagle's algorithm off only where it knows that this is TCP. With it, the
     # second write to a client (a body after its headers, a state after the status) waits 40 ms.
     listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -177,8 +266,7 @@ def allow_connections(number: int) -> int:
     The usual limit of 1,024 is there for programs that use select(2), which this is not.
 
     Returns how many clients it will do for: fewer than `number` where the limit cannot be raised as
-    far, so that there is room beside them for those who ask, and for those who are told that the
-    house is full.
+    far, so that there is room beside them for plain requests, and for refusals.
     """
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = number + SPARE_FILES

@@ -1,6 +1,6 @@
-"""The WebSocket connection as the fan-out needs it: write at once, or know that it cannot take it.
+"""WebSocket connections as the fan-out needs them: write at once, or know that one is full.
 
-uvicorn hands an application `send()` alone, which waits for a slow client. The fan-out must not
+uvicorn gives an application `send()` alone, which waits for a slow client. The fan-out must not
 wait: it asks, and keeps the newest frame for the moment at which the client is ready again.
 """
 
@@ -12,12 +12,82 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 
+import orjson
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import CloseCode, Frame
 from websockets.protocol import State
 
-from lupin_bridge.serving.rate_limit import client_key
-from lupin_bridge.serving.transports import CLOSE_GRACE_S, refusal, tear_down
+from lupin_bridge.serving.admission import RateLimit, client_key
+from lupin_bridge.serving.connections import CLOSE_GRACE_S, refusal, tear_down
+
+# A page subscribes a few times as it opens, a layout with twenty panels twenty times, and both
+# hardly ever from then on; more fields than 50 a second nobody gets anyway.
+MAX_MESSAGES_PER_S: Final = 100
+MAX_BURST: Final = 500
+
+
+class TooManyMessages(ValueError):
+    """A client that sends faster than any use of it could need."""
+
+
+class ClientPace:
+    """One client's messages, counted whatever they say."""
+
+    def __init__(self) -> None:
+        self._limit = RateLimit(MAX_MESSAGES_PER_S, MAX_BURST)
+
+    def take(self, now_s: float) -> None:
+        """Count a message at `now_s`, seconds of a clock that never jumps.
+
+        Raises:
+            TooManyMessages: the client has to go.
+
+        """
+        if self._limit.take("", now_s) > 0.0:
+            raise TooManyMessages(
+                f"more than {MAX_MESSAGES_PER_S} messages a second after {MAX_BURST} at once"
+            )
+
+
+# No message that we serve has more than some hundred bytes.
+MAX_MESSAGE_LENGTH: Final = 16_384
+# orjson reads nested values by recursion and has no limit of its own: 60,000 levels end the
+# process. What we serve has three.
+MAX_BRACKETS: Final = 1_000
+
+
+def members_of(message: str | bytes) -> dict[str, Any]:
+    """The members of an object.
+
+    Raises:
+        ValueError: it is none, or past a limit; the text names which.
+
+    """
+    if isinstance(message, bytes):
+        raise ValueError("a binary frame is refused, expected JSON text")  # noqa: TRY004
+    if len(message) > MAX_MESSAGE_LENGTH:
+        raise ValueError(
+            f"the message has {len(message)} characters, the limit is {MAX_MESSAGE_LENGTH}"
+        )
+    brackets = message.count("[") + message.count("{")
+    if brackets > MAX_BRACKETS:
+        raise ValueError(f"the message opens {brackets} brackets, the limit is {MAX_BRACKETS}")
+    try:
+        members = orjson.loads(message)
+    except ValueError as error:
+        raise ValueError(f"the message is not JSON: {error}") from None
+    if not isinstance(members, dict):
+        raise ValueError(f"the message is {shown(members)}, expected an object")  # noqa: TRY004
+    return members
+
+
+def shown(value: object) -> str:
+    """A value as a refusal quotes it: short, and never its inside."""
+    if isinstance(value, dict | list):
+        return "an object" if isinstance(value, dict) else "an array"
+    text = repr(value)
+    return text if len(text) <= 64 else text[:63] + "…"
+
 
 # A large WebSocket message as a row of small frames, whose payloads are views of it. Pure.
 #
@@ -40,7 +110,7 @@ _CONTINUATION: Final = 0
 def pieces(frame: bytes, rest: bytes = b"") -> Iterator[Piece]:
     """A whole message as frames of `PIECE_BYTES` at most; one that is small stays as it is.
 
-    `frame` is unmasked and its head tells the length of all, `rest` what is not yet in it.
+    `frame` is unmasked and its head has the length of all, `rest` what is not yet in it.
     """
     if len(frame) + len(rest) <= PIECE_BYTES:
         yield frame, rest
@@ -85,7 +155,7 @@ _READ_BUFFER = memoryview(bytearray(READ_BYTES))
 class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
     """uvicorn's protocol, that also puts itself into `scope["state"]["connection"]`.
 
-    Buffered, so that a client is heard in small helpings, each in its turn.
+    Buffered, so that each client is read in small parts, in turn.
     """
 
     def __init__(
@@ -99,11 +169,11 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         self.address = ""
         # uvicorn's own, which is for the client's answer to a close: ten seconds.
         self.close_timeout = CLOSE_GRACE_S
-        # Since when it is told to go, and stays for as long as one takes to read why, s.
-        self._leaving_since_s: float | None = None
+        # Since when it is being closed, with time left for its client to read why, s.
+        self._closing_since_s: float | None = None
         self.on_writable: Callable[[], None] | None = None
         self._handshake_deadline: asyncio.TimerHandle | None = None
-        # When all frames heard would be through at the allowed rate (ITU-T I.371).
+        # When all frames received would be through at the allowed rate (ITU-T I.371).
         self._frames_through_s = 0.0
         # What is left of large messages, for as long as the socket does not take it.
         self._pieces: deque[Piece] = deque()
@@ -118,12 +188,11 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         if self.client is not None:
             self.address = client_key(self.client[0])
         # uvicorn does so later. Over TLS something may be unsent when the limits are set: HTTP's
-        # protocol would be told, wait for a reader who is not its own, and cut the client off.
+        # protocol would be notified, wait for a reader not its own, and cut the client off.
         self.transport.set_protocol(self)
         # Not 0: asyncio's TLS transport stops at the limit, not past it, and would stop on nothing.
         self.transport.set_write_buffer_limits(high=1, low=0)
-        # What the client has asked for before, over HTTP, may still fill the socket. It is HTTP's
-        # protocol then that was told.
+        # An earlier answer over HTTP may still fill the socket. Then HTTP's protocol was notified.
         if self.transport.get_write_buffer_size() > 0:
             self.pause_writing()
         self._handshake_deadline = self.loop.call_later(
@@ -138,8 +207,8 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
 
     @property
     def waiting_since_s(self) -> float | None:
-        """Since when it was told to go; None: a client is not turned out for others."""
-        return self._leaving_since_s
+        """Since when it is being closed; None: an open one is not evicted for others."""
+        return self._closing_since_s
 
     def abort(self) -> None:
         """Tear the connection down and forget what was still to be sent."""
@@ -165,9 +234,9 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
     def handle_events(self) -> None:
         """Handle the frames that a client has sent, unless it sends too many."""
         now_s = self.loop.time()
-        heard_s = max(self._frames_through_s, now_s) + len(self.conn.events) / FRAMES_PER_S
-        if heard_s - now_s <= FRAMES_AT_ONCE / FRAMES_PER_S:
-            self._frames_through_s = heard_s
+        through_s = max(self._frames_through_s, now_s) + len(self.conn.events) / FRAMES_PER_S
+        if through_s - now_s <= FRAMES_AT_ONCE / FRAMES_PER_S:
+            self._frames_through_s = through_s
             super().handle_events()
         else:
             self.transport.pause_reading()
@@ -200,7 +269,7 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         if self.handshake_complete:
             self._end_handshake()
         if self.close_sent:
-            self._note_the_end()
+            self._note_closing()
         if message["type"] == "websocket.http.response.body" and self.close_sent:
             self.handshake_complete = True
 
@@ -228,7 +297,7 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         self.queue.put_nowait(
             {"type": "websocket.disconnect", "code": close.code, "reason": close.reason}
         )
-        self._say_last_words()
+        self._send_close()
 
     @property
     def can_take(self) -> bool:
@@ -236,7 +305,7 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         return self.writable.is_set() and not self.close_sent and not self.transport.is_closing()
 
     def write(self, wire: bytes) -> None:
-        """Write a whole frame; never waits. The caller has asked `can_take`."""
+        """Write a whole frame; never waits. The caller has checked `can_take`."""
         self.transport.write(wire)
 
     def write_shared(self, frame: bytes, rest: bytes = b"") -> None:
@@ -263,14 +332,14 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         """Send a close frame with the reason, and tear the socket down if nobody reads it."""
         if self.conn.state is State.OPEN and not self.transport.is_closing():
             self.conn.send_close(code, reason)
-            self._say_last_words()
+            self._send_close()
         else:
-            self._note_the_end()
+            self._note_closing()
             self.loop.call_later(CLOSE_GRACE_S, tear_down, self.transport)
 
-    def _note_the_end(self) -> None:
-        if self._leaving_since_s is None:
-            self._leaving_since_s = self.loop.time()
+    def _note_closing(self) -> None:
+        if self._closing_since_s is None:
+            self._closing_since_s = self.loop.time()
 
     def _end_handshake(self) -> None:
         if self._handshake_deadline is not None:
@@ -281,12 +350,12 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         self._handshake_deadline = None
         self.abort()
 
-    def _say_last_words(self) -> None:
+    def _send_close(self) -> None:
         """Write the close frame that the protocol has ready, and end after the grace."""
         self._pieces.clear()
         self.transport.write(b"".join(self.conn.data_to_send()))
         self.close_sent = True
-        self._note_the_end()
+        self._note_closing()
         # uvicorn's own: with it, the end of the application is not yet that of the connection.
         self.close_timer = self.loop.call_later(CLOSE_GRACE_S, tear_down, self.transport)
 

@@ -16,7 +16,7 @@ from lupin_bridge.judge.judging import NOTHING_JUDGED, Judged
 from lupin_bridge.stream.health_json import HealthJson
 from lupin_bridge.stream.state_json import StateJson, header
 from lupin_bridge.stream.status import Status
-from lupin_twin.state import Snapshot, TagState
+from lupin_twin.core.state import Snapshot, TagState
 
 
 def text_frame(payload: bytes) -> bytes:

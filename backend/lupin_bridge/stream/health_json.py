@@ -1,6 +1,6 @@
 """What the judge says as JSON text: `schema.Judgement`, whole or only what has changed.
 
-Pure. A tag's text is kept until its health is another: it is told for hours as it is.
+Pure. A tag's text is kept until its health is another: it stays the same for hours.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ import orjson
 
 from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.judge.judging import Judged
-from lupin_bridge.judge.patrol import Patrol
+from lupin_bridge.judge.scan_interval import Patrol
 from lupin_bridge.judge.verdict import Health, Reason
 from lupin_bridge.stream.state_json import stamp
-from lupin_twin.state import NANOSECONDS_PER_SECOND
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 
 
 def alarm_json(alarm: Alarm) -> dict[str, Any]:
@@ -40,7 +40,7 @@ def alarms_body(alarms: Iterable[Alarm], source: str, since_ns: int | None) -> d
     }
 
 
-class Told(Protocol):
+class AlarmLists(Protocol):
     """All alarms and the active ones, each newest first: `alarms.ledger.Page`."""
 
     @property
@@ -57,7 +57,7 @@ MAX_IN_FRAME: Final = 1_000
 LATELY_NS: Final = 86_400 * NANOSECONDS_PER_SECOND
 
 
-def told_of(page: Told, now_ns: int | None) -> list[Alarm]:
+def alarms_in_frame(page: AlarmLists, now_ns: int | None) -> list[Alarm]:
     """What a frame tells of all alarms: those active now or within 24 h, newest first as they."""
     since_ns = 0 if now_ns is None else now_ns - LATELY_NS
     active = page.active[:MAX_IN_FRAME]
@@ -128,10 +128,10 @@ def _patrol(patrol: Patrol) -> dict[str, Any]:
 
 
 def _health(health: Health) -> dict[str, Any]:
-    told: dict[str, Any] = {"verdict": health.verdict}
+    found: dict[str, Any] = {"verdict": health.verdict}
     if health.reasons:
-        told["reasons"] = [reason_json(reason) for reason in health.reasons]
-    return told
+        found["reasons"] = [reason_json(reason) for reason in health.reasons]
+    return found
 
 
 def reason_json(reason: Reason) -> dict[str, Any]:

@@ -74,8 +74,8 @@ CLOSE_TRY_AGAIN_LATER: Final = 1013
 # What is smaller is not worth counting, of what waits for sockets.
 LARGE_BYTES: Final = 131_072
 
-# A client that has been told nothing for so long is told the status again: of a twin that is silent
-# come no states, and who hears nothing for seconds takes the connection for dead.
+# A client that was sent nothing for so long gets the status again: a silent twin sends no states,
+# and a browser that receives nothing for seconds takes the connection for dead.
 REMINDED_AFTER_S: Final = 1.0
 
 # Frames come a little early or late; so much of an interval is forgiven.
@@ -120,7 +120,7 @@ class Client:
 
     `min_interval_s` is the time between two frames: now and then a tenth less, on average right;
     never less where `strict_interval`. `wire` writes a frame as this client reads it. `address` is
-    the one whose share of the places it takes. `told_s` is when the last frame was written to it.
+    the one whose share of the places it takes. `written_s` is when it was written to last.
     """
 
     connection: Writable
@@ -136,7 +136,7 @@ class Client:
     next_due_s: float = 0.0
     status_due: bool = True
     alarms_due: bool = True
-    told_s: float = 0.0
+    written_s: float = 0.0
     blocked_since_s: float | None = None
 
 
@@ -235,16 +235,16 @@ class Hub:
         self.serve_all(now_s)
 
     def remind(self, now_s: float) -> None:
-        """Who was told nothing for a second, and can take it, is told the status when next served.
+        """Have clients that were sent nothing for a second get the status when next served.
 
-        Who asked for fewer frames is told as seldom as that.
+        A client that asked for fewer frames gets it as seldom as that.
         """
         for client in self._clients:
             silence_s = max(REMINDED_AFTER_S, client.min_interval_s)
-            if client.blocked_since_s is None and now_s >= client.told_s + silence_s:
+            if client.blocked_since_s is None and now_s >= client.written_s + silence_s:
                 client.status_due = True
 
-    def tell_alarms(self, wire: bytes, now_s: float) -> None:
+    def publish_alarms(self, wire: bytes, now_s: float) -> None:
         """The alarms are others: give this frame to everyone who can take it."""
         self._alarms = wire
         for client in self._clients:
@@ -319,7 +319,7 @@ class Hub:
             self._mark_blocked(client, now_s)
             return False
         client.blocked_since_s = None
-        client.told_s = now_s
+        client.written_s = now_s
         client.connection.write(wire)
         self.bytes_sent += len(wire)
         return True

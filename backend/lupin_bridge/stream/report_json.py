@@ -8,9 +8,9 @@ from typing import Any
 import orjson
 
 from lupin_bridge.stream.state_json import stamp
-from lupin_twin.estimate_report import Report
-from lupin_twin.grading import Tally
-from lupin_twin.workers import in_turns
+from lupin_twin.estimate.grading import Tally
+from lupin_twin.runtime.estimate_rounds import Report
+from lupin_twin.runtime.workers import in_turns
 
 
 def qualities(reports: Mapping[str, Report]) -> bytes:

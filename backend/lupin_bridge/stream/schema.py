@@ -405,7 +405,7 @@ class SensorHistory(Contract):
     values: list[HistoryReading]
 
 
-class PastTry(Contract):
+class PastAttempt(Contract):
     """One scan or look, with success or without."""
 
     stamp: Time
@@ -425,7 +425,7 @@ class TagHistory(Contract):
         description="false: this twin does not tell what was observed when (no /twin/times)"
     )
     sensors: list[SensorHistory]
-    tries: list[PastTry] = Field(description="oldest first")
+    tries: list[PastAttempt] = Field(description="oldest first")
 
 
 class Health(Contract):

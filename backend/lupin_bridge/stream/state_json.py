@@ -12,13 +12,13 @@ from typing import Any, Final
 
 import orjson
 
-from lupin_twin.history import TagHistory
-from lupin_twin.state import (
+from lupin_twin.core.history import TagHistory
+from lupin_twin.core.state import (
     NANOSECONDS_PER_SECOND,
+    Attempt,
     Pose,
     Snapshot,
     TagState,
-    Try,
     age_seconds,
 )
 
@@ -87,7 +87,7 @@ class StateJson:
         last = tag.last_try
         if last is None:
             fields |= {"last_try": None, "last_try_status": None, "last_try_detail": ""}
-        elif last != Try(last_observed_ns, 0, ""):
+        elif last != Attempt(last_observed_ns, 0, ""):
             fields |= {
                 "last_try": stamp(last.stamp_ns),
                 "last_try_status": last.status,
@@ -180,6 +180,6 @@ def history(tag_id: str, past: TagHistory) -> dict[str, Any]:
                 "status_detail": tried.what.detail,
                 "kind": tried.kind,
             }
-            for tried in past.tries
+            for tried in past.attempts
         ],
     }

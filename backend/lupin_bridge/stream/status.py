@@ -8,10 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from lupin_twin.diagnostics import Origin
-from lupin_twin.drops import Recent
-from lupin_twin.journal.condition import UNKNOWN, Condition, JournalState
-from lupin_twin.state import NANOSECONDS_PER_SECOND, ClockState
+from lupin_twin.core.diagnostics import Origin
+from lupin_twin.core.drops import Recent
+from lupin_twin.core.journal_condition import UNKNOWN, Condition, JournalState
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, ClockState
 
 # The twin publishes at least once a second (parameter state_publish_rate_hz, default 1); three
 # missed publications are no accident.
@@ -163,10 +163,14 @@ def _time(stamp_ns: int) -> dict[str, int]:
 
 @dataclass(slots=True)
 class Liveness:
-    """What is known of the twin: when its last state came, and whether the thread still runs."""
+    """What is known of the twin: when its last state came, and whether the thread still runs.
+
+    `silent_s` is for how long the twin had been silent when that came: what an archive tells.
+    """
 
     stale_after_s: float = STALE_AFTER_S
     last_state_s: float | None = None
+    silent_s: float = 0.0
     twin_count: int = 1
     has_map: bool = False
     clock: ClockState = "running"
@@ -180,7 +184,9 @@ class Liveness:
 
     def status(self, now_s: float) -> Status:
         """The status at `now_s`."""
-        age = None if self.last_state_s is None else max(0.0, now_s - self.last_state_s)
+        age = None
+        if self.last_state_s is not None:
+            age = max(0.0, now_s - self.last_state_s) + self.silent_s
         return Status(
             self._reason(age),
             age,

@@ -450,10 +450,10 @@ export interface components {
             readonly detail: string;
         };
         /**
-         * PastTry
+         * PastAttempt
          * @description One scan or look, with success or without.
          */
-        readonly PastTry: {
+        readonly PastAttempt: {
             readonly stamp: components["schemas"]["Time"];
             /**
              * Status
@@ -678,7 +678,7 @@ export interface components {
              * Tries
              * @description oldest first
              */
-            readonly tries: readonly components["schemas"]["PastTry"][];
+            readonly tries: readonly components["schemas"]["PastAttempt"][];
         };
         /**
          * Time

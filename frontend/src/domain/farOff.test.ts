@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 
-import cases from '../../../tests/twin/far_off.json';
+import cases from '../../../tests/twin/core/far_off.json';
 import { mapPoint } from '../geometry/coordinates';
 import { holds, reachOf } from './farOff';
 

@@ -1,6 +1,6 @@
 /**
- * Which tags lie so far from the others that they are on no map: `lupin_twin/far_off.py`, which says
- * why, has the same rule. Both are held to the cases of `tests/twin/far_off.json`.
+ * Which tags lie so far from the others that they are on no map: `lupin_twin/core/outlying.py`, which says
+ * why, has the same rule. Both are held to the cases of `tests/twin/core/far_off.json`.
  */
 import type { MapPoint } from '../geometry/coordinates';
 

@@ -8,13 +8,18 @@ import { Icon } from '../widgets/Icon';
 import { ConnectionBadge } from './ConnectionBadge';
 import { WithParts } from './WithParts';
 
+/** Which of a fleet's greenhouses the page shows; a page of one greenhouse is below no `/sites/`. */
+function siteName(): string | undefined {
+  return /\/sites\/([^/]+)\/$/.exec(location.pathname)?.[1];
+}
+
 export function Header({ kiosk }: { kiosk: boolean }): JSX.Element {
   return (
     <header className="header">
       <h1 className="brand">
         <img src="./lupin.svg" alt="" width="28" height="28" />
         <span>
-          {S.product} <span className="brand-sub">{S.subtitle}</span>
+          {S.product} <span className="brand-sub">{siteName() ?? S.subtitle}</span>
         </span>
       </h1>
       <PastHeader />

@@ -1,6 +1,6 @@
 import type { JSX } from 'react';
 
-import type { PastTry } from '../contract/types';
+import type { PastAttempt } from '../contract/types';
 import { shown } from '../domain/text';
 import { tryKind } from '../domain/tries';
 import { whenOf } from '../domain/twin';
@@ -12,7 +12,7 @@ import { Age } from './Age';
 const LONGEST = 5;
 
 /** The last scans and looks of a tag, newest first, those that came to nothing too. */
-export function Tries({ tries }: { tries: readonly PastTry[] }): JSX.Element | null {
+export function Tries({ tries }: { tries: readonly PastAttempt[] }): JSX.Element | null {
   const snapshot = useApp(selectSnapshot);
   if (!snapshot || tries.length === 0) return null;
   return (

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import NoReturn
 
-from lupin_twin import process
+from lupin_twin.runtime import process
 
 SPEED_LIMITS = (0.1, 50.0)
 DAY_SPEED_LIMITS = (0.0, 3600.0)

@@ -1,40 +1,116 @@
-"""The patrol itself: an endless, repeatable sequence of events.
+"""The patrol itself: an endless, repeatable sequence of events, as plain data.
 
 Patrol time is the mission's own: the node plays it faster or slower. The robot is brisker than
-hardware, so that a demo shows the whole greenhouse within a minute.
+hardware, so that a demo shows the whole greenhouse within a minute. `at_s` is seconds since the
+start; positions are metres in the map frame, times of day seconds since simulated midnight.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
 from itertools import count
+from math import cos, sin
 from random import Random
 from typing import Any
 
-from lupin_patrol.chance import stream
-from lupin_patrol.climate import SECONDS_PER_DAY, Climate
-from lupin_patrol.events import (
-    Event,
-    FlowersSeen,
-    MapGrown,
-    PassCompleted,
-    ScanStatus,
-    TagPose,
-    TagScanned,
-    TagsDiscovered,
+from lupin_patrol.greenhouse import (
+    TAG_HEIGHT_M,
+    Point,
+    Rect,
+    Roadmap,
+    Tag,
+    length_of,
+    read_greenhouse,
+    tour,
+    walk,
 )
-from lupin_patrol.exploration import Exploration
-from lupin_patrol.geometry import Point, length_of, walk
-from lupin_patrol.house import Tag, read_house
-from lupin_patrol.perception import TagDetector
-from lupin_patrol.plants import Plants
-from lupin_patrol.route import Roadmap, tour
+from lupin_patrol.perception import Exploration, Grid, Sighting, TagDetector
+from lupin_patrol.plants import SECONDS_PER_DAY, Climate, Inspection, Plants, stream
+
+
+class ScanStatus(Enum):
+    """How a scan went; the names are those of lupin_msgs/Observation's STATUS_*."""
+
+    OK = "OK"
+    UNREACHABLE = "UNREACHABLE"
+    SCAN_FAILED = "SCAN_FAILED"
+
+
+@dataclass(frozen=True, slots=True)
+class TagPose:
+    """Where a tag was located. `yaw` (rad, from x towards y) points from the tag into the aisle."""
+
+    position: Point
+    yaw: float
+
+    @property
+    def numbers(self) -> tuple[float, float, float, float, float, float, float]:
+        """x, y, z (m) and the quaternion's x, y, z, w, as a pose of ROS has them."""
+        x, y = self.position
+        return x, y, TAG_HEIGHT_M, 0.0, 0.0, sin(self.yaw / 2), cos(self.yaw / 2)
+
+
+@dataclass(frozen=True, slots=True)
+class MapGrown:
+    """The map shows more than before."""
+
+    at_s: float
+    grid: Grid
+
+
+@dataclass(frozen=True, slots=True)
+class TagsDiscovered:
+    """Perception's whole list, after it got longer or at the end of a pass."""
+
+    at_s: float
+    sightings: tuple[Sighting, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TagScanned:
+    """One try at a tag's sensors. Without success there are neither readings nor a pose."""
+
+    at_s: float
+    pass_index: int
+    tag_id: str
+    status: ScanStatus
+    status_detail: str
+    time_of_day_s: float
+    readings: tuple[tuple[str, float], ...]
+    pose: TagPose | None
+
+
+@dataclass(frozen=True, slots=True)
+class FlowersSeen:
+    """One look at the plants around a tag; `box` is the outline of their table."""
+
+    at_s: float
+    pass_index: int
+    tag_id: str
+    pose: TagPose
+    inspection: Inspection
+    box: Rect
+
+
+@dataclass(frozen=True, slots=True)
+class PassCompleted:
+    """Every tag was visited, and those that failed were tried again."""
+
+    at_s: float
+    pass_index: int
+    failed: tuple[str, ...]
+
+
+Event = MapGrown | TagsDiscovered | TagScanned | FlowersSeen | PassCompleted
+
 
 DOCK: Point = (0.4, 0.4)
 START_OF_DAY_S = 9 * 3600.0
 
 _ROBOT_SPEED_M_S = 1.2
-_LOOK_PERIOD_S = 0.2
+_OBSERVE_PERIOD_S = 0.2
 _MAP_PERIOD_S = 1.0
 _READ_S = 0.3
 _PICTURE_S = 0.2
@@ -69,33 +145,33 @@ class Mission:
         begin_s: float = 0.0,
         first_pass: int = 0,
     ) -> None:
-        self.house = read_house(simulator)
+        self.greenhouse = read_greenhouse(simulator)
         self._climate = Climate(simulator)
-        self._plants = Plants(self.house, seed, first_pass)
-        self._roadmap = Roadmap(self.house)
-        self._exploration = Exploration(self.house)
-        self._detector = TagDetector(self.house, self._plants, seed)
+        self._plants = Plants(self.greenhouse, seed, first_pass)
+        self._roadmap = Roadmap(self.greenhouse)
+        self._exploration = Exploration(self.greenhouse)
+        self._detector = TagDetector(self.greenhouse, self._plants, seed)
         self._seed = seed
         self._day_speed = day_speed
         self._position = DOCK
         self._now_s = begin_s
         self._first_pass = first_pass
-        self._looks_around = True
+        self._is_observing = True
         self._map_due_s = begin_s
         self._map_is_new = False
-        order = tour(self._roadmap, DOCK, [tag.stop for tag in self.house.tags])
-        self._tour = [self.house.tags[index] for index in order]
+        order = tour(self._roadmap, DOCK, [tag.stop for tag in self.greenhouse.tags])
+        self._tour = [self.greenhouse.tags[index] for index in order]
 
     def events(self) -> Iterator[Event]:
         """Patrol for ever. To be called once: a mission is one robot's life."""
-        yield from self._look(self._first_pass)
+        yield from self._observe(self._first_pass)
         for pass_index in count(self._first_pass):
             yield from self._patrol(pass_index)
             yield from self._drive(DOCK, pass_index)
 
     def visits(self) -> Iterator[TagScanned | FlowersSeen]:
         """The scans and looks of `events`, a tenth of the work: nobody looks around on the way."""
-        self._looks_around = False
+        self._is_observing = False
         for event in self.events():
             if isinstance(event, TagScanned | FlowersSeen):
                 yield event
@@ -125,7 +201,7 @@ class Mission:
     def _planned_failures(self, pass_index: int) -> dict[str, ScanStatus]:
         """Choose the tags whose first try fails: in every pass some do, in both ways."""
         chance = stream(self._seed, "failures", pass_index)
-        tags = chance.sample([tag.tag_id for tag in self.house.tags], _FAILURES_A_PASS)
+        tags = chance.sample([tag.tag_id for tag in self.greenhouse.tags], _FAILURES_A_PASS)
         return dict(zip(tags, (ScanStatus.UNREACHABLE, ScanStatus.SCAN_FAILED), strict=True))
 
     def _retry_status(self, tag: Tag, pass_index: int) -> ScanStatus:
@@ -161,24 +237,24 @@ class Mission:
         )
         if pose is not None:
             self._now_s += _PICTURE_S
-            look = self._plants.look(tag.tag_id, pass_index, attempt)
+            look = self._plants.inspect(tag.tag_id, pass_index, attempt)
             yield FlowersSeen(self._now_s, pass_index, tag.tag_id, pose, look, tag.table.rect)
 
     def _drive(self, goal: Point, pass_index: int, short_m: float = 0.0) -> Iterator[Event]:
         """Drive to a goal, or stop a little before it, and look around on the way."""
         way = self._roadmap.way(self._position, goal)
-        step_m = _ROBOT_SPEED_M_S * _LOOK_PERIOD_S
+        step_m = _ROBOT_SPEED_M_S * _OBSERVE_PERIOD_S
         for position, driven_m in walk(way, step_m, max(0.0, length_of(way) - short_m)):
             self._position = position
             self._now_s += driven_m / _ROBOT_SPEED_M_S
-            yield from self._look(pass_index)
+            yield from self._observe(pass_index)
 
-    def _look(self, pass_index: int) -> Iterator[Event]:
-        if not self._looks_around:
+    def _observe(self, pass_index: int) -> Iterator[Event]:
+        if not self._is_observing:
             return
-        if self._detector.look_from(self._position, pass_index):
+        if self._detector.observe_from(self._position, pass_index):
             yield TagsDiscovered(self._now_s, self._detector.sightings())
-        self._map_is_new |= self._exploration.look_from(self._position)
+        self._map_is_new |= self._exploration.observe_from(self._position)
         if self._map_is_new and self._now_s >= self._map_due_s:
             yield self._map()
 

@@ -2,11 +2,13 @@
 
 Stamps are ROS time (`use_sim_time` included); the pace is the process's steady clock. Signals are
 waited for in a thread, never handled asynchronously: whoever calls `play` has blocked them before
-the first other thread was started.
+the first other thread was started. Every number of a message is written as `float(...)` or
+`int(...)`: rclpy does not check fields by default and serialises a wrong type as garbage.
 """
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Event as Flag
@@ -15,7 +17,15 @@ from time import monotonic
 from typing import Any
 
 import rclpy
-from lupin_msgs.msg import DiscoveredTags, Observation
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Point, Point32, Pose, PoseStamped, Quaternion
+from lupin_msgs.msg import (
+    DiscoveredTag,
+    DiscoveredTags,
+    FlowerPoint,
+    Observation,
+    SensorReading,
+)
 from nav_msgs.msg import OccupancyGrid
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.duration import Duration
@@ -26,21 +36,24 @@ from rclpy.exceptions import (
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import Header
 
-from lupin_patrol.events import (
+from lupin_patrol.mission import (
     Event,
     FlowersSeen,
     MapGrown,
     PassCompleted,
     ScanStatus,
+    TagPose,
     TagScanned,
     TagsDiscovered,
 )
-from lupin_patrol.messages import discovered_tags, flower, occupancy_grid, tag_reading
-from lupin_twin import process
-from lupin_twin.habits import Habits, latched
-from lupin_twin.half_made import remove_half_made
-from lupin_twin.spinning import end_spinning, spin_until_shutdown
+from lupin_patrol.mission import TagsDiscovered as TagsDiscoveredEvent
+from lupin_patrol.perception import Sighting
+from lupin_patrol.plants import Bloom
+from lupin_twin.ros.base_node import NodeUtilities, end_spinning, latched, spin_until_shutdown
+from lupin_twin.runtime import process
+from lupin_twin.runtime.process import remove_stale_shared_memory
 
 # The contract's depth. One pass makes more observations than that (two for each of 29 tags), so a
 # twin that starts late misses the oldest ones; the next pass brings them.
@@ -48,7 +61,7 @@ OBSERVATIONS_DEPTH = 50
 
 # A twin that already runs is discovered within this time. Without the wait the first observations
 # of a fast patrol would have left the latch before anyone could hear them.
-_LISTENERS_S = 3.0
+_SUBSCRIBERS_S = 3.0
 # How long a finished patrol waits until its last messages are acknowledged.
 _DELIVERY_S = 5.0
 _POLL_S = 0.05
@@ -66,7 +79,7 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
             super().__init__("lupin_patrol")
         except InvalidParameterTypeException as error:
             raise ParameterError(f"parameter use_sim_time is no bool: {error}") from error
-        self.habits = Habits(self)
+        self.utilities = NodeUtilities(self)
         self._frame_id = self._name("frame_id", "map")
         self.observations = self._latched(
             Observation, "observations_topic", "floranova/observations", OBSERVATIONS_DEPTH
@@ -138,8 +151,8 @@ def play(
     stop = _stop_flag()
     with _running_node(ros_arguments) as node:
         node.get_logger().info(f"patrol starts at speed {speed:g}")
-        listened_to = node.observations.get_subscription_count
-        if _stopped_before(stop, lambda: listened_to() > 0, _LISTENERS_S):
+        subscribers = node.observations.get_subscription_count
+        if _stopped_before(stop, lambda: subscribers() > 0, _SUBSCRIBERS_S):
             return
         start = monotonic()
         for event in events:
@@ -155,12 +168,14 @@ def play(
 def _running_node(ros_arguments: list[str]) -> Iterator[PatrolNode]:
     """Start a node that listens (to /clock, to parameter services) in a thread of its own."""
     rclpy.init(args=ros_arguments, signal_handler_options=SignalHandlerOptions.NO)
-    remove_half_made(rclpy.get_default_context().get_domain_id())
+    remove_stale_shared_memory(rclpy.get_default_context().get_domain_id())
     executor = SingleThreadedExecutor()
     try:
         node = PatrolNode()
         executor.add_node(node)
-        thread = Thread(target=spin_until_shutdown, args=(executor, node.habits.report), name="ros")
+        thread = Thread(
+            target=spin_until_shutdown, args=(executor, node.utilities.report), name="ros"
+        )
         thread.start()
         try:
             yield node
@@ -191,3 +206,107 @@ def _stopped_before(stop: Flag, condition: Callable[[], bool], timeout_s: float)
         if stop.wait(_POLL_S):
             return True
     return False
+
+
+SOURCE = "lupin_patrol"
+
+_STATUS = {
+    ScanStatus.OK: Observation.STATUS_OK,
+    ScanStatus.UNREACHABLE: Observation.STATUS_UNREACHABLE,
+    ScanStatus.SCAN_FAILED: Observation.STATUS_SCAN_FAILED,
+}
+
+
+def tag_reading(event: TagScanned, stamp: Time, frame_id: str) -> Observation:
+    """Return a KIND_TAG_READING observation; without success it has no readings and no pose."""
+    message = _observation(event, stamp, frame_id)
+    message.kind = Observation.KIND_TAG_READING
+    message.status = _STATUS[event.status]
+    message.status_detail = event.status_detail
+    message.tag_reading.tag_id = event.tag_id
+    message.tag_reading.stamp = stamp
+    message.tag_reading.sim_time_of_day_seconds = float(event.time_of_day_s)
+    message.tag_reading.readings = [
+        SensorReading(name=name, value=float(value)) for name, value in event.readings
+    ]
+    return message
+
+
+def flower(event: FlowersSeen, stamp: Time, frame_id: str) -> Observation:
+    """Return a KIND_FLOWER observation."""
+    message = _observation(event, stamp, frame_id)
+    message.kind = Observation.KIND_FLOWER
+    message.status = Observation.STATUS_OK
+    seen = message.flower
+    seen.tag_id = event.tag_id
+    seen.pose = PoseStamped(header=message.header, pose=message.tag_pose_in_map)
+    seen.species = event.inspection.species
+    seen.confidence = float(event.inspection.confidence)
+    seen.anomaly = event.inspection.anomaly
+    seen.flower_count = int(event.inspection.flower_count)
+    seen.bug_count = int(event.inspection.bug_count)
+    seen.flowers = [_flower_point(bloom) for bloom in event.inspection.blooms]
+    seen.box_footprint.points = [
+        Point32(x=float(x), y=float(y), z=0.0) for x, y in event.box.corners
+    ]
+    return message
+
+
+def discovered_tags(event: TagsDiscoveredEvent, stamp: Time, frame_id: str) -> DiscoveredTags:
+    """Return perception's whole list."""
+    return DiscoveredTags(
+        header=Header(stamp=stamp, frame_id=frame_id),
+        tags=[_discovered_tag(sighting) for sighting in event.sightings],
+    )
+
+
+def occupancy_grid(event: MapGrown, stamp: Time, frame_id: str) -> OccupancyGrid:
+    """Return the map."""
+    grid = event.grid
+    message = OccupancyGrid(header=Header(stamp=stamp, frame_id=frame_id))
+    message.info.map_load_time = stamp
+    message.info.resolution = float(grid.resolution_m)
+    message.info.width = int(grid.width)
+    message.info.height = int(grid.height)
+    message.info.origin.position = Point(x=float(grid.origin[0]), y=float(grid.origin[1]), z=0.0)
+    message.data = array("b", grid.cells)
+    return message
+
+
+def _observation(event: TagScanned | FlowersSeen, stamp: Time, frame_id: str) -> Observation:
+    return Observation(
+        header=Header(stamp=stamp, frame_id=frame_id),
+        mission_id=f"patrol-{event.pass_index + 1:04d}",
+        source=SOURCE,
+        tag_pose_in_map=_pose(event.pose),
+    )
+
+
+def _pose(pose: TagPose | None) -> Pose:
+    if pose is None:
+        # w defaults to 1 in ROS 2, which would pin the tag at the origin.
+        return Pose(orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=0.0))
+    x, y, z, qx, qy, qz, qw = map(float, pose.numbers)
+    return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
+
+
+def _flower_point(bloom: Bloom) -> FlowerPoint:
+    x, y = bloom.position
+    return FlowerPoint(
+        position=Point(x=float(x), y=float(y), z=float(bloom.z)),
+        height_m=float(bloom.height_m),
+        species=bloom.species,
+        confidence=float(bloom.confidence),
+        anomaly=bloom.anomaly,
+    )
+
+
+def _discovered_tag(sighting: Sighting) -> DiscoveredTag:
+    return DiscoveredTag(
+        tag_id=sighting.tag.tag_id,
+        pose_in_map=_pose(TagPose(sighting.tag.position, sighting.tag.yaw)),
+        species=sighting.species,
+        species_confidence=float(sighting.species_confidence),
+        anomaly=sighting.anomaly,
+        sightings=int(sighting.sightings),
+    )

@@ -17,9 +17,8 @@ from typing import Any
 from greenhouse_sim.simulator import GreenhouseSimulator
 
 from lupin_patrol.cli import parse
-from lupin_patrol.climate import SECONDS_PER_DAY
-from lupin_patrol.events import FlowersSeen, ScanStatus, TagScanned
-from lupin_patrol.mission import Mission
+from lupin_patrol.mission import FlowersSeen, Mission, ScanStatus, TagScanned
+from lupin_patrol.plants import SECONDS_PER_DAY
 
 DAYS = 3
 # So far before the patrol's own passes that none of them is alike.
@@ -61,7 +60,7 @@ def _scan(event: TagScanned) -> dict[str, Any]:
 
 
 def _look(event: FlowersSeen) -> dict[str, Any]:
-    look = event.look
+    look = event.inspection
     return {
         "species": look.species,
         "confidence": look.confidence,

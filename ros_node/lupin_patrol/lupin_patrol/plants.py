@@ -1,19 +1,36 @@
-"""The plants on the tables and their pests: what the camera could see at each tag.
+"""The plants on the tables, their pests and the climate: what camera and sensors measure at tags.
 
-Everything is a function of the seed: nothing here changes while the patrol runs, so a look at one
-tag never depends on the others.
+Everything is a function of the seed: nothing here changes while the patrol runs, so an inspection
+of one tag never depends on the others. Sensors have the units of `lupin_msgs/SensorReading`:
+temperature °C, humidity % relative, co2 ppm, light lx, soil_moisture %.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import random
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from math import dist
 from random import Random
+from typing import Any
 
-from lupin_patrol.chance import stream
-from lupin_patrol.geometry import Point
-from lupin_patrol.house import TABLE_HEIGHT_M, House, Table, Tag
+from greenhouse_sim.simulator import SensorRegistry
+
+from lupin_patrol.greenhouse import TABLE_HEIGHT_M, Greenhouse, Point, Table, Tag
+
+
+def stream(seed: int, *occasion: str | int) -> random.Random:
+    """Return the random stream of one occasion, such as `stream(seed, "look", tag_id, pass)`.
+
+    The same seed and occasion give the same numbers in every process, whatever was drawn
+    elsewhere before: an event does not depend on the order in which the others were made.
+    A text as seed is hashed with SHA-512 by the standard library, not by the process's `hash`.
+    """
+    text = "/".join(str(part) for part in (seed, *occasion))
+    return random.Random(text)  # noqa: S311  # a simulation, not a secret
+
 
 SPECIES = ("lupin", "tulip", "gerbera", "orchid", "rose")
 
@@ -43,7 +60,7 @@ class Bloom:
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class Inspection:
     """What the camera made of the plants around a tag."""
 
     species: str
@@ -57,14 +74,14 @@ class Look:
 class Plants:
     """All plants of a greenhouse. Each table grows one species; a bloom belongs to one tag."""
 
-    def __init__(self, house: House, seed: int, first_pass: int = 0) -> None:
+    def __init__(self, greenhouse: Greenhouse, seed: int, first_pass: int = 0) -> None:
         self._seed = seed
         self._first_pass = first_pass
-        self._tag_ids = [tag.tag_id for tag in house.tags]
+        self._tag_ids = [tag.tag_id for tag in greenhouse.tags]
         self._blooms: dict[str, list[Bloom]] = {tag_id: [] for tag_id in self._tag_ids}
         self._species: dict[str, str] = {}
-        for table in house.tables:
-            tags = [tag for tag in house.tags if tag.table == table]
+        for table in greenhouse.tables:
+            tags = [tag for tag in greenhouse.tags if tag.table == table]
             species = stream(seed, "species", table.name).choice(SPECIES)
             for tag in tags:
                 self._species[tag.tag_id] = species
@@ -94,7 +111,7 @@ class Plants:
                 bugs = max(bugs, at_first // (1 + pass_index - start))
         return bugs
 
-    def look(self, tag_id: str, pass_index: int, attempt: int) -> Look:
+    def inspect(self, tag_id: str, pass_index: int, attempt: int) -> Inspection:
         """Look at the plants of a tag: some flowers are overlooked, the others placed to 1 cm."""
         chance = stream(self._seed, "look", tag_id, pass_index, attempt)
         bugs = self.bugs(tag_id, pass_index)
@@ -110,7 +127,7 @@ class Plants:
             for index, bloom in enumerate(blooms)
             if index in infested or chance.random() > _OVERLOOKED
         )
-        return Look(
+        return Inspection(
             species=self.species(tag_id),
             confidence=chance.uniform(0.8, 0.99),
             anomaly=bugs > 0,
@@ -144,3 +161,60 @@ def _nearest(tags: list[Tag], position: Point) -> Tag:
 def _jitter(position: Point, chance: Random) -> Point:
     noise = _POSITION_NOISE_M
     return position[0] + chance.uniform(-noise, noise), position[1] + chance.uniform(-noise, noise)
+
+
+SECONDS_PER_DAY = 86_400.0
+
+# The simulator gives soil moisture as a fraction, everything else in the contract's unit.
+_TO_CONTRACT_UNIT = {"soil_moisture": 100.0}
+
+
+class Climate:
+    """The climate of one greenhouse, anywhere on its floor and at any time of day."""
+
+    def __init__(self, simulator: Any) -> None:
+        self._noisy = simulator.sensor_registry
+        quiet = deepcopy(simulator.sim_config)
+        for components in quiet["sensors"].values():
+            for component in components:
+                component["noise_sigma"] = 0.0
+        self._quiet = SensorRegistry(quiet)
+        self.sensors: tuple[str, ...] = tuple(simulator.sensors())
+
+    def read(
+        self,
+        sensors: Sequence[str],
+        position: Point,
+        time_of_day_s: float,
+        chance: random.Random,
+    ) -> tuple[tuple[str, float], ...]:
+        """Read sensors at a place (m, map) and time (s since midnight), noise included."""
+        with _as_global_random(chance):
+            return tuple(
+                (name, _value(self._noisy, name, position, time_of_day_s)) for name in sensors
+            )
+
+    def truth(self, sensor: str, position: Point, time_of_day_s: float) -> float:
+        """Return the value without noise, from the same dynamics. Pure: no chance, no state.
+
+        Where a sensor is the largest of several noisy components, its readings lie above this on
+        average wherever the components are close to each other.
+        """
+        return _value(self._quiet, sensor, position, time_of_day_s)
+
+
+def _value(registry: Any, sensor: str, position: Point, time_of_day_s: float) -> float:
+    value = registry.get_sensor(sensor).retrieve_data(position, time_of_day_s % SECONDS_PER_DAY)
+    return float(value) * _TO_CONTRACT_UNIT.get(sensor, 1.0)
+
+
+@contextmanager
+def _as_global_random(chance: random.Random) -> Iterator[None]:
+    """Let the simulator, which draws from the process's global stream, draw from `chance`."""
+    outer = random.getstate()
+    random.setstate(chance.getstate())
+    try:
+        yield
+    finally:
+        chance.setstate(random.getstate())
+        random.setstate(outer)

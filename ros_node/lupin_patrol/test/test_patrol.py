@@ -5,9 +5,9 @@ from __future__ import annotations
 from builtin_interfaces.msg import Time
 from lupin_msgs.msg import Observation
 
-from lupin_patrol.events import ScanStatus, TagScanned
-from lupin_patrol.geometry import Rect
-from lupin_patrol.messages import tag_reading
+from lupin_patrol.greenhouse import Rect
+from lupin_patrol.mission import ScanStatus, TagScanned
+from lupin_patrol.node import tag_reading
 
 
 def test_a_rectangle_does_not_contain_its_edge() -> None:

@@ -8,27 +8,32 @@ from collections.abc import Sequence
 from threading import Event, Thread, main_thread
 from typing import NoReturn
 
-from lupin_twin import process
-from lupin_twin.half_made import remove_half_made
-from lupin_twin.process import leave_after, use_one_core
+from lupin_twin.runtime import process
+from lupin_twin.runtime.process import (
+    exit_after,
+    limit_blas_threads,
+    remove_stale_shared_memory,
+    return_large_blocks,
+)
 
 USAGE_ERROR = 2
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the twin until a signal ends it; returns the exit code, 1 if its thread has died."""
-    use_one_core()
+    limit_blas_threads()
+    return_large_blocks()
     process.block()  # before anything slow is imported
     import rclpy  # noqa: PLC0415  # see above
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
 
-    from lupin_twin.parameters import ParameterError  # noqa: PLC0415
+    from lupin_twin.core.parameters import ParameterError  # noqa: PLC0415
 
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # the parent of all that rclpy raises for bad arguments
         return _refuse(f"cannot start ROS: {error}")
-    remove_half_made(rclpy.get_default_context().get_domain_id())
+    remove_stale_shared_memory(rclpy.get_default_context().get_domain_id())
     try:
         return _run()
     except ParameterError as error:
@@ -39,14 +44,14 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def command() -> NoReturn:
     """`main` as a process of its own."""
-    leave_after(main)
+    exit_after(main)
 
 
 def _run() -> int:
     from rclpy.executors import SingleThreadedExecutor  # noqa: PLC0415
 
-    from lupin_twin.node import TwinNode  # noqa: PLC0415
-    from lupin_twin.spinning import end_spinning, spin_until_shutdown  # noqa: PLC0415
+    from lupin_twin.ros.base_node import end_spinning, spin_until_shutdown  # noqa: PLC0415
+    from lupin_twin.ros.node import TwinNode  # noqa: PLC0415
 
     node = TwinNode()
     executor = SingleThreadedExecutor()
@@ -55,7 +60,7 @@ def _run() -> int:
 
     def spin() -> None:
         try:
-            spin_until_shutdown(executor, node.habits.report)
+            spin_until_shutdown(executor, node.utilities.report)
         finally:
             ended.set()
             signal.pthread_kill(main_thread().ident or 0, signal.SIGTERM)  # it waits, see below

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from lupin_twin.idw import compute_idw_field
-from lupin_twin.node import NODE_NAME
-from lupin_twin.parameters import TwinParameters
+from lupin_twin.core.parameters import TwinParameters
+from lupin_twin.field.idw import compute_idw_field
+from lupin_twin.ros.node import NODE_NAME
 
 
 def test_a_field_halfway_between_two_tags() -> None:

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from lupin_bridge.access.policy import (
     AccessPolicy,
-    Asked,
+    Decision,
     HostError,
     OriginError,
-    Verdict,
+    RequestSource,
     exposure,
     host_of,
     parse_host,
@@ -23,11 +23,11 @@ from lupin_bridge.access.policy import (
 POLICY = AccessPolicy(
     "greenhouse.lan", ["http://panel.example:3000", "https://Robot.Example", "http://[fd00::7]:80"]
 )
-PASS = Verdict()
+PASS = Decision()
 
 
-def judge(host: str = "127.0.0.1:8000", *origins: str, scheme: str = "http") -> Verdict:
-    return POLICY.judge(Asked(scheme=scheme, hosts=[host], origins=origins))
+def judge(host: str = "127.0.0.1:8000", *origins: str, scheme: str = "http") -> Decision:
+    return POLICY.judge(RequestSource(scheme=scheme, hosts=[host], origins=origins))
 
 
 # --- Host ---------------------------------------------------------------------------------------
@@ -86,7 +86,7 @@ def test_what_is_no_host_is_refused(host: str) -> None:
 
 @pytest.mark.parametrize("hosts", [[], ["127.0.0.1", "evil.example"]])
 def test_there_is_one_host_header(hosts: list[str]) -> None:
-    refusal = POLICY.judge(Asked(scheme="http", hosts=hosts)).refusal
+    refusal = POLICY.judge(RequestSource(scheme="http", hosts=hosts)).refusal
     assert refusal == f"the request has {len(hosts)} Host headers, expected one"
 
 
@@ -101,7 +101,7 @@ def test_an_allowed_host_goes_by_its_name_whatever_the_port(name: str) -> None:
     host = name if name.startswith("[") else name.lower().rstrip(".")
     assert parse_host(name) == host.strip("[]")
     for authority in (host, f"{host}:8443"):
-        assert policy.judge(Asked("http", [authority])) == PASS
+        assert policy.judge(RequestSource("http", [authority])) == PASS
 
 
 @pytest.mark.parametrize("name", ["", "*", "a b", "twin.example:80", "http://twin.example", "a/b"])
@@ -139,7 +139,7 @@ def test_the_bridges_own_pages_pass(host: str, origin: str, scheme: str) -> None
     ],
 )
 def test_an_allowed_foreign_origin_passes_and_is_told_apart(origin: str, allowed: str) -> None:
-    assert judge("127.0.0.1:8000", origin) == Verdict(foreign=allowed)
+    assert judge("127.0.0.1:8000", origin) == Decision(foreign=allowed)
 
 
 @pytest.mark.parametrize(
@@ -244,14 +244,16 @@ def test_any_text_is_an_origin_or_none(text: str) -> None:
 def test_a_foreign_page_that_does_not_name_itself_gets_nothing(
     site: str, mode: str, dest: str, passes: bool
 ) -> None:
-    asked = Asked("http", ["127.0.0.1"], fetch_site=site, fetch_mode=mode, fetch_dest=dest)
+    asked = RequestSource("http", ["127.0.0.1"], fetch_site=site, fetch_mode=mode, fetch_dest=dest)
     refusal = POLICY.judge(asked).refusal
     assert (refusal is None) == passes
     assert passes or "--allow-origin" in str(refusal)
 
 
 def test_an_allowed_origin_that_names_itself_may_be_cross_site() -> None:
-    asked = Asked("http", ["127.0.0.1"], ["http://panel.example:3000"], "cross-site", "cors")
+    asked = RequestSource(
+        "http", ["127.0.0.1"], ["http://panel.example:3000"], "cross-site", "cors"
+    )
     assert POLICY.judge(asked).refusal is None
 
 
@@ -274,7 +276,7 @@ def test_an_allowed_origin_that_names_itself_may_be_cross_site() -> None:
     ],
 )
 def test_without_sec_fetch_the_referer_names_the_page(referer: str, passes: bool) -> None:
-    asked = Asked("http", ["127.0.0.1:8000"], referer=referer)
+    asked = RequestSource("http", ["127.0.0.1:8000"], referer=referer)
     assert (POLICY.judge(asked).refusal is None) == passes
     assert POLICY.judge(replace(asked, wants_page=True)).refusal is None, "it may be a link"
     assert POLICY.judge(replace(asked, fetch_site="same-origin")).refusal is None

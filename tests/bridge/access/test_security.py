@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import httpx
 import pytest
 
-from lupin_bridge.access.security import POSTED
+from lupin_bridge.access.middleware import POSTED
 from lupin_bridge.stream import schema
 from tests.support.access import OWN
 from tests.support.messages import occupancy_grid, scan

@@ -18,7 +18,7 @@ from cryptography.hazmat.primitives.serialization import (
     load_pem_private_key,
 )
 
-from lupin_bridge.access.tls import TlsError, check_pair
+from lupin_bridge.serving.server import TlsError, check_pair
 from tests.support.access import BEARER, TOKEN, Served, refused_start, served
 from tests.support.processes import limits
 from tests.support.raw_ws import frames_of, handshake_request

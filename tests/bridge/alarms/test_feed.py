@@ -12,14 +12,14 @@ from lupin_bridge.alarms import feed as feed_module
 from lupin_bridge.alarms.board import AlarmBoard
 from lupin_bridge.alarms.feed import AlarmFeed
 from lupin_bridge.alarms.ledger import Change
-from lupin_bridge.judge import following
-from lupin_bridge.judge.choosing import Criteria
+from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
+from lupin_bridge.judge import alarm_fold
+from lupin_bridge.judge.options import Criteria
 from lupin_bridge.settings import Settings
-from lupin_bridge.twin.source import Told, TwinUnavailableError
-from lupin_twin.journal.condition import Condition, JournalState
-from lupin_twin.past_writes import PastWrite, PastWrites, RunSpan, WritesRequest
-from lupin_twin.state import Flower, Look, Snapshot, TwinStore
-from lupin_twin.workers import Workers
+from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.state import Flower, Inspection, Snapshot, TwinStore
+from lupin_twin.core.writes import PastWrite, PastWrites, RunSpan, WritesRequest
+from lupin_twin.runtime.workers import Workers
 from tests.support.waiting import PATIENCE_S, until
 
 NOW = 10**15
@@ -51,11 +51,13 @@ def pest(number: int, bugs: int) -> PastWrite:
     return PastWrite(number, 1, "a", NOW - 100 + number, 1, 0, (), (), *seen)
 
 
-def told(number: int, **over: object) -> Told:
+def told(number: int, **over: object) -> TwinUpdate:
     store = TwinStore()
-    store.record_look(Look("a", NOW - 100 + number, Flower(bug_count=number, anomaly=True)))
+    store.record_inspection(
+        Inspection("a", NOW - 100 + number, Flower(bug_count=number, anomaly=True))
+    )
     snapshot: Snapshot = store.snapshot(NOW + number, "map")
-    return Told(snapshot, str(number), **over)  # type: ignore[arg-type]
+    return TwinUpdate(snapshot, str(number), **over)  # type: ignore[arg-type]
 
 
 def follow(test: Callable[[AlarmFeed, AlarmBoard, Journal], object]) -> None:
@@ -114,7 +116,7 @@ def test_it_reads_the_past_once_then_what_is_new_and_another_journal_from_its_be
 
 def test_what_is_written_is_read_also_where_the_state_stays_as_it_is() -> None:
     async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
-        def wrote(count: int) -> Told:
+        def wrote(count: int) -> TwinUpdate:
             return told(1, journal=Condition(JournalState.RECORDING, written=count))
 
         source.writes_now = [pest(1, 2)]
@@ -167,7 +169,7 @@ def test_what_comes_late_finds_its_place_however_late_it_is(
 def test_what_is_older_than_what_is_kept_is_counted_and_told(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(following.Follower.__init__, "__kwdefaults__", {"kept": 8})
+    monkeypatch.setattr(alarm_fold.Follower.__init__, "__kwdefaults__", {"kept": 8})
 
     async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
         source.writes_now = [
@@ -181,7 +183,7 @@ def test_what_is_older_than_what_is_kept_is_counted_and_told(
         assert len(board.now.active) == 1
 
     follow(test)
-    assert "alarms are told as if it had not been" in caplog.text
+    assert "too late for its alarms" in caplog.text
 
 
 def test_a_twin_that_is_gone_answers_nothing_and_is_an_alarm_beside_those_of_before() -> None:

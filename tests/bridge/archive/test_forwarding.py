@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import socket
 import sqlite3
@@ -11,15 +12,14 @@ from pathlib import Path
 import psycopg
 import pytest
 
-from lupin_twin.journal.forgetting import forget
-from lupin_twin.journal.forwarded import mark_of
+from lupin_twin.core.past import SeriesRequest
+from lupin_twin.journal.beside import mark_of
 from lupin_twin.journal.queries import series
-from lupin_twin.journal.retention import Limits
+from lupin_twin.journal.rebuild import vacuum
+from lupin_twin.journal.retention import Limits, forget
 from lupin_twin.journal.rows import Row
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
-from lupin_twin.journal.vacuuming import vacuum
-from lupin_twin.past import SeriesRequest
 from tests.support.archive import (
     TABLES,
     Archive,
@@ -217,13 +217,52 @@ def test_a_journal_without_gaps_is_the_same_journal(archive: Archive, journal: P
     assert archive.rows() == rows_of(journal)
 
 
-def test_a_journal_of_which_a_tag_was_forgotten_goes_on(archive: Archive, journal: Path) -> None:
-    kept(journal, scans(0, 50))
+@pytest.mark.parametrize("pose_only", [False, True])
+def test_a_tag_that_its_journal_forgets_is_forgotten_in_the_archive(
+    archive: Archive, journal: Path, *, pose_only: bool
+) -> None:
+    kept(journal, [pin("4"), *scans(0, 50), look("4", NOW + HOUR, anomaly=True)])
     forward_once(archive, journal)
+    forget(journal, "4", pose_only=pose_only, by="test", at_ns=NOW)
+    kept(journal, [pin("4"), *scans(54, 6), look("4", NOW + DAY, anomaly=True)])
+    forward_once(archive, journal)
+    assert archive.rows() == rows_of(journal)
+    # What was scanned since stays, also when the forwarder begins anew.
+    forward_once(archive, journal)
+    assert archive.rows() == rows_of(journal)
+    assert len(archive.rows()["scan"]) == (56 if pose_only else 46)
+    ((record,),) = archive.select("SELECT value FROM meta WHERE key LIKE 'forgotten:%'")
+    assert json.loads(record)["by"] == "test"
+
+
+def test_a_forgotten_tag_is_forgotten_in_journals_of_before_and_of_its_site_alone(
+    archive: Archive, journal: Path, tmp_path: Path
+) -> None:
+    archive.add_user("gh2")
+    for site in ("gh2", "gh1"):
+        archive.site = site
+        journal.unlink(missing_ok=True)
+        kept(journal, scans(0, 50))
+        forward_once(archive, journal)
+    journal.unlink()
+    kept(journal, scans(100, 50))
     forget(journal, "4", pose_only=False, by="test", at_ns=NOW)
-    kept(journal, scans(54, 1))
     forward_once(archive, journal)
-    assert len(archive.rows()["scan"]) == 51
+    tags = "SELECT site, count(*) FROM scan JOIN series USING (site, series) WHERE tag = '4'"
+    assert archive.select(f"{tags} GROUP BY site") == [("gh2", 10)]
+
+
+def test_notes_and_what_they_say_anew(archive: Archive, journal: Path) -> None:
+    kept(journal, scans(0, 5))
+    for sql in (
+        "INSERT INTO note VALUES ('local', 'n1', 1, 'anna', 'comment', 'tag:7', 'dry', NULL)",
+        "UPDATE note SET text = 'watered', until_ns = 5",
+    ):
+        with closing(sqlite3.connect(journal)) as connection, connection:
+            connection.execute(sql)
+        forward_once(archive, journal)
+        assert archive.rows() == rows_of(journal)
+    assert archive.rows()["note"] == [("n1", 1, "anna", "comment", "tag:7", "watered", 5)]
 
 
 def test_what_is_received_is_in_the_archive_soon(archive: Archive, journal: Path) -> None:
@@ -233,6 +272,23 @@ def test_what_is_received_is_in_the_archive_soon(archive: Archive, journal: Path
             twin.write(scan("1", NOW + n * SECOND))
             wait_for(lambda n=n: len(archive.rows()["scan"]) == n + 1, "the scan", 5.0)  # type: ignore[misc]
         wait_until_equal(archive, journal)
+
+
+def test_a_forwarder_that_is_killed_in_the_middle_of_a_batch_loses_nothing(
+    archive: Archive, journal: Path
+) -> None:
+    waiting = "SELECT 1 FROM pg_locks WHERE NOT granted AND relation = 'scan'::regclass"
+    kept(journal, scans(0, 50))
+    with forwarder(archive, journal) as following:
+        wait_until_equal(archive, journal)
+        with psycopg.connect(archive.owner) as other:
+            other.execute("LOCK TABLE scan IN SHARE MODE")
+            kept(journal, scans(50, 10))
+            wait_for(lambda: archive.select(waiting), "a batch that is held up")
+            following.kill()
+    forward_once(archive, journal)
+    assert archive.rows() == rows_of(journal)
+    assert len(archive.rows()["scan"]) == 60
 
 
 def test_a_second_forwarder_of_a_site_is_refused_by_name(archive: Archive, journal: Path) -> None:

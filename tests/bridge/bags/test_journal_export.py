@@ -6,20 +6,23 @@ from pathlib import Path
 
 import pytest
 from lupin_msgs.msg import DiscoveredTags, Observation
+from mcap.reader import make_reader
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from lupin_bridge.bags.journal_export import LOT, Exported, export
-from lupin_twin import convert, ingest
-from lupin_twin.drops import Drop
-from lupin_twin.history import History
+from lupin_bridge.bags.journal_export import LOT, Exported, export, offered_qos
+from lupin_bridge.feed.topics import Topic
+from lupin_twin.core import ingest
+from lupin_twin.core.drops import Drop
+from lupin_twin.core.history import History
+from lupin_twin.core.state import TagState, TwinStore
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.rows import Row
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
-from lupin_twin.state import TagState, TwinStore
+from lupin_twin.ros import convert
 from tests.bridge.bags.test_journal_messages import FAILED_LOOK
-from tests.bridge.test_journal_command import Said
+from tests.bridge.cli.test_journal import Said
 from tests.support.bags import is_open, no_file_above, read
 from tests.support.journal import NOW, SECOND, kept, look, pin, scan
 
@@ -50,11 +53,11 @@ def fed(target: Path) -> dict[str, str]:
     for topic, log_ns, _, data in read(target):
         if topic == "/floranova/observations":
             msg = deserialize_message(data, Observation)
-            write = ingest.observation(convert.heard(msg), "map", log_ns)
+            write = ingest.observation(convert.received(msg), "map", log_ns)
             assert not isinstance(write, Drop)
             assert ingest.apply(write, store, history) is None
         elif topic == "/perception/discovered_tags":
-            heard = convert.heard_tags(deserialize_message(data, DiscoveredTags))
+            heard = convert.received_tags(deserialize_message(data, DiscoveredTags))
             for pinned in list(ingest.discoveries(heard, "map", store.is_pinned)):
                 assert not isinstance(pinned, Drop)
                 assert ingest.apply(pinned, store, history) is None
@@ -80,6 +83,22 @@ def test_who_hears_it_knows_what_the_journal_says_of_its_end(tmp_path: Path, unt
     messages = [row for row in ROWS if row.stamp_ns <= end_ns]
     assert made.observations + made.tags == len(messages) == len(read(target))
     assert [entry[1] for entry in read(target)] == [row.arrival_ns for row in messages]
+
+
+def test_other_programs_learn_types_and_qos_from_the_file(tmp_path: Path) -> None:
+    path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
+    kept(path, ROWS)
+    exported(path, target)
+    with target.open("rb") as opened:
+        reader = make_reader(opened)
+        assert reader.get_header().profile == "ros2"
+        summary = reader.get_summary()
+    assert summary is not None
+    for channel in summary.channels.values():
+        schema = summary.schemas[channel.schema_id]
+        assert (channel.message_encoding, schema.encoding) == ("cdr", "ros2msg")
+        topic = Topic(channel.topic, schema.name, depth=50)
+        assert channel.metadata == {"offered_qos_profiles": offered_qos(topic)}
 
 
 def test_a_period_begins_with_the_places_of_before(tmp_path: Path) -> None:

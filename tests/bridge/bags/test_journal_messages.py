@@ -6,10 +6,11 @@ from lupin_msgs.msg import DiscoveredTags, Observation
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
 
-from lupin_bridge.bags import journal_messages
-from lupin_twin import convert, ingest
-from lupin_twin.journal.rows import KIND_FLOWER, LookRow, ScanRow
-from lupin_twin.state import Look, Pose, Scan
+from lupin_bridge.bags import journal_export as journal_messages
+from lupin_twin.core import ingest
+from lupin_twin.core.state import Inspection, Pose, Scan
+from lupin_twin.journal.rows import KIND_FLOWER, InspectionRow, ScanRow
+from lupin_twin.ros import convert
 from tests.support.journal import NOW, look, pin, scan
 
 FAILED_LOOK = ScanRow(
@@ -17,12 +18,12 @@ FAILED_LOOK = ScanRow(
 )
 
 
-def written(row: ScanRow | LookRow) -> Scan | Look:
+def written(row: ScanRow | InspectionRow) -> Scan | Inspection:
     """What the message makes a twin write that hears it later."""
     msg = deserialize_message(journal_messages.observation(row), Observation)
     assert msg.mission_id == row.mission
-    write = ingest.observation(convert.heard(msg), "map", NOW * 2)
-    assert isinstance(write, Scan | Look)
+    write = ingest.observation(convert.received(msg), "map", NOW * 2)
+    assert isinstance(write, Scan | Inspection)
     return write
 
 
@@ -36,8 +37,8 @@ def test_a_scan_is_heard_as_it_was() -> None:
 
 def test_a_look_is_heard_as_it_was() -> None:
     row = look(anomaly=True)
-    assert written(row) == Look("7", NOW, row.flower, source="robot", own_stamp_ns=NOW)
-    expected = Look("7", NOW, None, status=2, status_detail="dark", source="robot")
+    assert written(row) == Inspection("7", NOW, row.flower, source="robot", own_stamp_ns=NOW)
+    expected = Inspection("7", NOW, None, status=2, status_detail="dark", source="robot")
     assert written(FAILED_LOOK) == replace(expected, own_stamp_ns=NOW)
 
 
@@ -49,7 +50,7 @@ def test_places_are_discovered_again() -> None:
     half_turn = replace(pin("8"), pose=Pose(1.0, 2.0, 3.0, 0.0, 0.0, 1.0, 1e-9))
     data = journal_messages.discovered([replace(pin("7"), stamp_ns=NOW - 1), half_turn])
     assert convert.nanoseconds(deserialize_message(data, DiscoveredTags).header.stamp) == NOW
-    heard = convert.heard_tags(deserialize_message(data, DiscoveredTags))
+    heard = convert.received_tags(deserialize_message(data, DiscoveredTags))
     found = list(ingest.discoveries(heard, "map", lambda _: False))
     assert found == [ingest.Pin("7", pin().pose), ingest.Pin("8", half_turn.pose)]
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lupin_bridge.field import estimate_formats, formats
+from lupin_bridge.field import formats
 from lupin_bridge.field.formats import JSON, NPY, PNG, FieldFormat
-from lupin_bridge.judge.choosing import Criteria
+from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.ranges import Ranges, Span
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.estimate_schema import GetEstimateResponse
@@ -24,7 +24,7 @@ ESTIMATE = an_estimate(width=3, height=2)
 
 
 def written(field_format: FieldFormat, layer: str = "mean") -> bytes:
-    return estimate_formats.write(ESTIMATE, field_format, "co2", SENSORS, layer=layer)
+    return formats.write_estimate(ESTIMATE, field_format, "co2", SENSORS, layer=layer)
 
 
 def test_json_is_the_service_s_response() -> None:
@@ -44,7 +44,7 @@ def test_a_large_one_is_written_in_parts_that_are_one_list(monkeypatch: pytest.M
 
 
 def test_a_refusal_has_the_same_names_and_nothing_in_them() -> None:
-    body = json.loads(estimate_formats.refusal_json("why"))
+    body = json.loads(formats.estimate_refusal_json("why"))
     assert GetEstimateResponse.model_validate(body).error_message == "why"
     del body["error_message"]
     assert not any(body.values())
@@ -58,7 +58,7 @@ def test_npy_is_mean_and_sd() -> None:
 
 @pytest.mark.parametrize(("layer", "highest"), [("mean", 24.0), ("sd", 2.0)])
 def test_a_picture_is_transparent_where_it_is_not_known(layer: str, highest: float) -> None:
-    field = estimate_formats.picture(ESTIMATE, layer)
+    field = formats.estimate_picture(ESTIMATE, layer)
     assert field.value_max == highest
     assert np.isnan(field.values).tolist() == [False] * 5 + [True]
     alpha = np.asarray(Image.open(io.BytesIO(written(PNG, layer))).convert("RGBA"))[..., 3]
@@ -68,13 +68,13 @@ def test_a_picture_is_transparent_where_it_is_not_known(layer: str, highest: flo
 
 
 def test_a_picture_of_nothing_known_is_transparent() -> None:
-    field = estimate_formats.picture(an_estimate(2, 2, sd_known=0.0), "mean")
+    field = formats.estimate_picture(an_estimate(2, 2, sd_known=0.0), "mean")
     assert (field.value_min, field.value_max) == (0.0, 0.0)
     assert np.isnan(field.values).all()
 
 
 def test_headers_say_what_an_array_cannot() -> None:
-    assert estimate_formats.metadata(ESTIMATE, SENSORS.named("co2")) == {
+    assert formats.estimate_metadata(ESTIMATE, SENSORS.named("co2")) == {
         "Sensor": "co2",
         "Unit": "ppm",
         "Width": "3",
@@ -91,8 +91,8 @@ def test_headers_say_what_an_array_cannot() -> None:
 def test_known_is_only_what_is_sure_to_a_part_of_the_narrowest_ideal_range() -> None:
     wide, narrow = (Ranges(ideal=Span(20.0, high)) for high in (60.0, 26.0))
     sensor = replace(SENSORS.named("ph"), day=wide, night=narrow)
-    found = estimate_formats.within_ideal(ESTIMATE, sensor).grid
+    found = formats.within_ideal(ESTIMATE, sensor).grid
     assert found.sd_known == 1.0
     assert found.known.ravel().tolist() == [True, True, False, False, False, False]
     for other in (replace(sensor, night=wide), SENSORS.named("ph")):
-        assert estimate_formats.within_ideal(ESTIMATE, other) is ESTIMATE
+        assert formats.within_ideal(ESTIMATE, other) is ESTIMATE

@@ -16,9 +16,9 @@ from PIL import Image
 
 from lupin_bridge.field import formats as field_formats
 from lupin_bridge.field.formats import FORMATS, JSON, NPY, PNG, rgb
-from lupin_bridge.judge.choosing import own_sensors
+from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.stream import schema
-from lupin_twin.grid import FieldGrid
+from lupin_twin.field.grid import FieldGrid
 
 SENSORS = own_sensors()
 TEMPERATURE_RGB = rgb(8, 72, 50)

@@ -16,7 +16,7 @@ from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import FORMATS, JSON, NPY, PNG, FieldFormat
 from lupin_bridge.field.query import FieldQuery
 from lupin_bridge.query_string import read
-from lupin_twin.fields import FieldRefused, FieldRequest
+from lupin_twin.field.engine import FieldRefused, FieldRequest
 
 BOX = {"bbox_min_x": "-1", "bbox_min_y": "0.5", "bbox_max_x": "2e1", "bbox_max_y": "3"}
 REQUEST = FieldRequest("co2", 0.1, -1.0, 0.5, 20.0, 3.0)

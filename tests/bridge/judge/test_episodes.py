@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 from lupin_bridge.judge.alarm import Alarm
-from lupin_bridge.judge.choosing import own_sensors
 from lupin_bridge.judge.episodes import MAX_EPISODES, TagEpisodes
-from lupin_twin.past_writes import PastWrite
+from lupin_bridge.judge.options import own_sensors
+from lupin_twin.core.writes import PastWrite
 
 MINUTE = 60 * 10**9
 

@@ -2,19 +2,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 from importlib.resources import files
+from typing import Any
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lupin_bridge.judge.daylight import Day
 from lupin_bridge.judge.judging import MAX_AT_ONCE, Judge, judge_once
-from lupin_bridge.judge.patrol import Patrol
+from lupin_bridge.judge.scan_interval import Patrol
 from lupin_bridge.judge.sensors_file import parse
-from lupin_bridge.judge.verdict import Health, Kind, Reason, Verdict
-from lupin_twin.past_writes import PastWrite, recent_of
-from lupin_twin.state import (
+from lupin_bridge.judge.verdict import Health, Kind, Reason, Verdict, judge_tag
+from lupin_twin.core.state import (
     Flower,
-    Look,
+    Inspection,
     Reading,
     Scan,
     Snapshot,
@@ -22,6 +23,7 @@ from lupin_twin.state import (
     TwinStore,
     sure_species,
 )
+from lupin_twin.core.writes import PastWrite, recent_of
 from tests.support.seen import by_light
 
 SENSORS = parse(files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8"))
@@ -217,6 +219,23 @@ def test_silence_makes_the_house_unknown_and_leaves_the_tags() -> None:
     assert judge.see(snapshot(START, GOOD)).house.verdict is Verdict.HEALTHY
 
 
+def test_as_of_a_moment_a_tag_that_cannot_be_judged_is_unknown_and_the_others_are_judged(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail_at_b(state: TagState, *args: Any, **more: Any) -> Health:
+        if state.tag_id == "b":
+            raise ZeroDivisionError("a defect")
+        return judge_tag(state, *args, **more)
+
+    monkeypatch.setattr("lupin_bridge.judge.judging.judge_tag", fail_at_b)
+    judged = judge_once(snapshot(START, GOOD, COLD), (), SENSORS, by_light)
+    assert {tag_id: health.verdict for tag_id, health in judged.tags.items()} == {
+        "a": "healthy",
+        "b": "unknown",
+    }
+    assert "b could not be judged: its status is unknown" in caplog.text
+
+
 def test_without_a_clock_nothing_is_known() -> None:
     judge = Judge(SENSORS, by_light)
     judge.see(snapshot(START, GOOD))
@@ -276,7 +295,7 @@ def test_judging_bit_by_bit_is_judging_all_of_it_by_the_log(
     for number, (tag_id, values, flower, step_s) in enumerate(events):
         now_ns += step_s * S
         if flower is not None:
-            store.record_look(Look(tag_id, now_ns, flower))
+            store.record_inspection(Inspection(tag_id, now_ns, flower))
             species = sure_species(flower.species, flower.confidence)
             log.append(PastWrite(number, 1, tag_id, now_ns, 1, 0, (), (), True, species))
         elif values:
@@ -340,3 +359,61 @@ def test_a_sensor_that_has_changed_is_a_reason_until_it_has_come_back() -> None:
     judge.note_changed({})
     back = judge.see(snapshot(START + 2 * S, GOOD, COLD))
     assert back.tags["a"] == before.tags["a"]
+
+
+def test_a_tag_is_also_judged_by_the_day_before_until_nothing_of_it_is_remembered() -> None:
+    cold = Reason(Kind.RANGE, Verdict.CRITICAL, "temperature_24h_mean", 11.0, 12.0, START)
+    judge = Judge(SENSORS, by_light)
+
+    def kinds(after_ns: int, **days: tuple[Reason, ...]) -> list[Kind]:
+        judge.note_days(days)
+        now = snapshot(START + after_ns, GOOD)
+        live = judge.see(now).tags["a"]
+        assert live == judge_once(now, (), SENSORS, by_light, days=days).tags["a"]
+        assert cold in live.reasons or Kind.RANGE not in {one.kind for one in live.reasons}
+        return [one.kind for one in live.reasons]
+
+    assert kinds(S) == []
+    assert kinds(2 * S, a=(cold,)) == [Kind.RANGE]
+    assert kinds(3 * S) == []
+    assert kinds(24 * 60 * MINUTE, a=(cold,)) == [Kind.RANGE]
+    assert kinds(24 * 60 * MINUTE + 1, a=(cold,)) == [Kind.OLD]
+
+
+def test_a_first_round_that_stops_is_not_healthy_for_a_day() -> None:
+    judge = Judge(SENSORS, by_light)
+    house = tuple(tag(name, START + n * MINUTE, temperature=22.0) for n, name in enumerate("abc"))
+    last_ns = START + 2 * MINUTE
+
+    def reasons(now_ns: int, *tags: TagState) -> tuple[Verdict, list[tuple[Kind, int | None]]]:
+        live = judge.see(snapshot(now_ns, *tags))
+        once = judge_once(snapshot(now_ns, *tags), writes_of(*house, *tags), SENSORS, by_light)
+        assert live.house == once.house
+        return live.house.verdict, [(one.kind, one.since_ns) for one in live.house.reasons]
+
+    assert reasons(last_ns + 30 * MINUTE, *house) == (Verdict.HEALTHY, [])
+    stopped = [(Kind.STOPPED, last_ns)]
+    assert reasons(last_ns + 30 * MINUTE + 1, *house) == (Verdict.UNKNOWN, stopped)
+    assert judge.see(snapshot(last_ns + 20 * 60 * MINUTE, *house)).tags["a"].verdict == "healthy"
+    # The next round: two of three tags have an interval, and that holds for hours.
+    again_ns = last_ns + 21 * 60 * MINUTE
+    later = [tag(name, again_ns, temperature=22.0) for name in "ab"]
+    assert reasons(again_ns, *later, house[2]) == (Verdict.HEALTHY, [])
+    assert reasons(again_ns + 60 * MINUTE, *later, house[2]) == (Verdict.HEALTHY, [])
+
+
+def writes_of(*tags: TagState) -> list[PastWrite]:
+    """The scans of these states, as the log has them."""
+    return [
+        PastWrite(
+            number,
+            1,
+            one.tag_id,
+            one.last_observed_ns or 0,
+            0,
+            0,
+            tuple(reading.name for reading in one.readings),
+            tuple(reading.value for reading in one.readings),
+        )
+        for number, one in enumerate(tags, start=1)
+    ]

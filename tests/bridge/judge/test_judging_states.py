@@ -21,13 +21,13 @@ import pytest
 from lupin_bridge.alarms import feed as feed_module
 from lupin_bridge.alarms.board import AlarmBoard
 from lupin_bridge.alarms.feed import AlarmFeed
-from lupin_bridge.judge.choosing import Criteria, own_sensors
+from lupin_bridge.feed.source import TwinUpdate
 from lupin_bridge.judge.daylight import ClockDay
 from lupin_bridge.judge.judging import Judge, Judged, silenced
+from lupin_bridge.judge.options import Criteria, own_sensors
 from lupin_bridge.judge.verdict import Health, Kind
-from lupin_bridge.twin.source import Told
-from lupin_twin.past_writes import PastWrite
-from lupin_twin.state import Flower, Look, Pose, Reading, Scan, TwinStore
+from lupin_twin.core.state import Flower, Inspection, Pose, Reading, Scan, TwinStore
+from lupin_twin.core.writes import PastWrite
 from tests.bridge.alarms.test_feed import Journal, changed
 
 TABLE = json.loads(Path(__file__).with_name("states.json").read_text(encoding="utf-8"))
@@ -37,7 +37,7 @@ S = 1_000_000_000
 EVERY_S, ROUNDS = 120, 5
 SCAN, LOOK = 0, 1
 
-Write = tuple[int, str, Scan | Look]
+Write = tuple[int, str, Scan | Inspection]
 
 
 def now_ns(state: dict[str, Any]) -> int:
@@ -81,7 +81,7 @@ def of_tag(state: dict[str, Any], tag_id: str, tag: dict[str, Any]) -> Iterator[
     if "species" in tag or "pest" in tag:
         at_ns, bugs = now - tag.get("looked_s", 90) * S, tag.get("pest", 0)
         flower = Flower(tag.get("species", ""), 0.9, anomaly=bugs > 0, bug_count=bugs)
-        yield at_ns, tag_id, Look(tag_id, at_ns, flower)
+        yield at_ns, tag_id, Inspection(tag_id, at_ns, flower)
 
 
 def heard_by_the_journal(writes: list[Write]) -> list[PastWrite]:
@@ -102,7 +102,7 @@ def heard_by_the_journal(writes: list[Write]) -> list[PastWrite]:
     ]
 
 
-def seen(look: Look) -> tuple[bool, str, bool, int]:
+def seen(look: Inspection) -> tuple[bool, str, bool, int]:
     assert look.flower is not None
     return True, look.flower.species, look.flower.anomaly, look.flower.bug_count
 
@@ -117,7 +117,7 @@ def judged(state: dict[str, Any]) -> Judged:
         if isinstance(write, Scan):
             store.record(write)
         else:
-            store.record_look(write)
+            store.record_inspection(write)
         judge.see(store.snapshot(at_ns, "map"))
     for tag_id, tag in tags_of(state).items():
         if not tag["readings"]:
@@ -137,7 +137,7 @@ async def alarms(state: dict[str, Any]) -> list[list[str]]:
         is_silent = state.get("twin") == "silent"
         feed.on_silence(is_silent=is_silent, last_ns=moment_ns - 60 * S)
         if state.get("twin") != "never_seen":
-            feed.on_state(Told(TwinStore().snapshot(moment_ns, "map"), "1"))
+            feed.on_state(TwinUpdate(TwinStore().snapshot(moment_ns, "map"), "1"))
             await changed(board)
     finally:
         await feed.stop()

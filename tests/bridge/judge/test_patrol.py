@@ -3,8 +3,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.judge.patrol import INTERVALS, NO_PATROL, Patrol, Scans, is_overdue
-from lupin_bridge.judge.verdict import Health, Kind, Reason, Verdict
+from lupin_bridge.judge.scan_interval import LAP_INTERVALS, NO_PATROL, Patrol, Scans
+from lupin_bridge.judge.verdict import Health, Kind, Reason, Verdict, is_overdue
 
 S = 1_000_000_000
 
@@ -55,7 +55,7 @@ def test_it_does_not_matter_how_stamps_come_together(stamps: list[int], size: in
 
 def test_only_the_last_intervals_count() -> None:
     slow = [i * 600 for i in range(5)]
-    fast = [slow[-1] + 5 * (i + 1) for i in range(INTERVALS)]
+    fast = [slow[-1] + 5 * (i + 1) for i in range(LAP_INTERVALS)]
     assert heard(*slow, *fast).interval_ns == 5 * S
 
 

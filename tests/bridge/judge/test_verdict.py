@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 
 from lupin_bridge.judge.daylight import Day
-from lupin_bridge.judge.scanned import RecentScans
+from lupin_bridge.judge.recent_scans import RecentScans
 from lupin_bridge.judge.sensors_file import parse
 from lupin_bridge.judge.verdict import Health, Kind, Verdict, judge_house, judge_tag, worst
-from lupin_twin.state import NO_FLOWER, Flower, Reading, TagState, Try
+from lupin_twin.core.state import NO_FLOWER, Attempt, Flower, Reading, TagState
 
 CASES = json.loads(Path(__file__).with_name("verdicts.json").read_text(encoding="utf-8"))
 SENSORS = parse(files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8"))
@@ -42,7 +42,7 @@ def tag_of(case: dict[str, Any]) -> TagState:
         ),
         flower=flower,
         looked_at_ns=ago(90),
-        last_try=Try(NOW_NS - int(tried_s * 1e9), status),
+        last_try=Attempt(NOW_NS - int(tried_s * 1e9), status),
     )
 
 

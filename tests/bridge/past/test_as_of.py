@@ -14,20 +14,20 @@ import pytest
 
 from lupin_bridge.field.formats import FORMATS, JSON, PNG, FieldFormat
 from lupin_bridge.field.query import FieldQuery
-from lupin_bridge.judge.choosing import Criteria, own_sensors
 from lupin_bridge.judge.daylight import ClockDay
 from lupin_bridge.judge.derived import vapour_pressure_deficit_kpa
-from lupin_bridge.past import as_of
-from lupin_bridge.past.as_of import FieldAsked, Plan
+from lupin_bridge.judge.options import Criteria, own_sensors
+from lupin_bridge.past.plans import Field, Health, NoSuchTag, OneTag, Plan, WholeState
 from lupin_bridge.query_string import read
 from lupin_bridge.stream import schema
-from lupin_twin.explored import OccupancyMap, occupancy_map
-from lupin_twin.fields import FieldRefused, FieldRules
-from lupin_twin.past_writes import PastWrite
-from lupin_twin.state import Pose, Reading, Snapshot, TagState
-from lupin_twin.workers import SMALL_S
+from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
+from lupin_twin.core.writes import PastWrite, RecentRequest
+from lupin_twin.field.engine import FieldRefused, FieldRules
+from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.runtime.workers import SMALL_S
 
 NS = 10**9
+CRITERIA = Criteria(own_sensors(), None, ClockDay(UTC))
 RULES = FieldRules(2.0, 1.5, 1.5, max_grid_cells=10_000)
 
 
@@ -40,7 +40,7 @@ HOUSE = Snapshot(5 * NS, "map", (tag("a", 0.0, 400.0), tag("b", 1.0, 500.0)))
 
 
 def a_map(revision: int, free: int = 0) -> OccupancyMap:
-    return occupancy_map(
+    return OccupancyMap(
         frame_id="map",
         stamp_ns=revision,
         width=2,
@@ -49,17 +49,21 @@ def a_map(revision: int, free: int = 0) -> OccupancyMap:
         origin_x=0.0,
         origin_y=0.0,
         origin_yaw=0.0,
-        data=np.array([free, -1], dtype=np.int8),
+        cells=np.array([free, -1], dtype=np.int8),
         revision=revision,
     )
 
 
 def asked(
     rules: FieldRules = RULES, occupancy: OccupancyMap | None = None, **parameters: Any
-) -> FieldAsked:
+) -> Field:
     values = {"sensor_type": "co2", **parameters}
     query = read(FieldQuery, [(name, str(value)) for name, value in values.items()], FieldRefused)
-    return FieldAsked(query, rules, occupancy, own_sensors())
+    return Field(None, query, None, rules, occupancy, CRITERIA)
+
+
+def field_of(house: Snapshot, field: Field, field_format: FieldFormat | None = None) -> Plan:
+    return replace(field, field_format=field_format).plan(house)
 
 
 def body(plan: Plan) -> dict[str, Any]:
@@ -68,26 +72,25 @@ def body(plan: Plan) -> dict[str, Any]:
 
 
 def test_a_state_has_its_moment_and_the_ages_of_then() -> None:
-    found = body(as_of.state(HOUSE))
+    found = body(WholeState(None).plan(HOUSE))
     schema.TwinState.model_validate(found)
     assert found["header"] == {"stamp": {"sec": 5, "nanosec": 0}, "frame_id": "map"}
     assert [t["stale_seconds"] for t in found["tags"]] == [4.0, 4.0]
 
 
 def test_a_tag_is_the_one_in_the_state() -> None:
-    plan = as_of.tag(HOUSE, "b")
-    assert plan is not None
-    assert body(plan) == body(as_of.state(HOUSE))["tags"][1]
-    assert as_of.tag(HOUSE, "c") is None
+    assert body(OneTag(None, "b").plan(HOUSE)) == body(WholeState(None).plan(HOUSE))["tags"][1]
+    with pytest.raises(NoSuchTag):
+        OneTag(None, "c").plan(HOUSE)
 
 
 def test_a_field_is_that_of_the_tags_of_then_over_the_box_of_then() -> None:
-    found = body(as_of.field(HOUSE, asked(), JSON))
+    found = body(field_of(HOUSE, asked(), JSON))
     schema.GetFieldResponse.model_validate(found)
     assert (found["origin_x"], found["origin_y"]) == (-1.5, -1.5)
     assert (found["width"], found["height"], found["sample_count"]) == (40, 30, 2)
     assert 400.0 <= found["value_min"] < found["value_max"] <= 500.0
-    found = body(as_of.quality(HOUSE, asked()))
+    found = body(field_of(HOUSE, asked()))
     schema.FieldQuality.model_validate(found)
     assert (found["sample_count"], found["rmse"]) == (2, 100.0)
 
@@ -101,35 +104,40 @@ def test_what_is_derived_is_made_of_the_readings_of_one_scan() -> None:
     house = Snapshot(5 * NS, "map", (air("a", 0.25, NS), air("b", 9.0, 2 * NS)))
     box = {"bbox_min_x": 0, "bbox_min_y": 0, "bbox_max_x": 0.5, "bbox_max_y": 0.5}
     query: dict[str, Any] = {"sensor_type": "vpd", "resolution": 0.5, **box}
-    found = body(as_of.field(house, asked(**query), JSON))
+    found = body(field_of(house, asked(**query), JSON))
     assert found["values"] == [pytest.approx(vapour_pressure_deficit_kpa(25.0, 60.0), rel=1e-6)]
     assert found["sample_count"] == 1
-    quality = body(as_of.quality(house, asked(**query)))
+    quality = body(field_of(house, asked(**query)))
     assert (quality["sensor_type"], quality["unit"], quality["sample_count"]) == ("vpd", "kPa", 1)
 
 
 def test_before_there_was_anything_there_is_an_empty_state_and_an_empty_field() -> None:
     nothing = Snapshot(1, "map", ())
-    assert body(as_of.state(nothing))["tags"] == []
-    found = body(as_of.field(nothing, asked(), JSON))
+    assert body(WholeState(None).plan(nothing))["tags"] == []
+    found = body(field_of(nothing, asked(), JSON))
     assert (found["sample_count"], set(found["values"])) == (0, {None})
 
 
 def test_a_field_is_clipped_to_the_map_of_now() -> None:
     box = {"bbox_min_x": 0, "bbox_min_y": 0, "bbox_max_x": 1, "bbox_max_y": 0.5, "resolution": 0.5}
-    found = body(as_of.field(HOUSE, asked(RULES, a_map(1), **box), JSON))
+    found = body(field_of(HOUSE, asked(RULES, a_map(1), **box), JSON))
     assert [value is None for value in found["values"]] == [False, True]
 
 
 def judged_at(at_s: float, *tags: TagState, before_s: Sequence[float] = ()) -> Plan:
     """Where tag a was also scanned some seconds before its own second."""
-    criteria = Criteria(own_sensors(), None, ClockDay(UTC))
     at_ns = int(at_s * NS)
     recent = [
         PastWrite(number, 1, "a", int((1 - second) * NS), 0, 0, ("temperature",), (22.0,))
         for number, second in enumerate(before_s)
     ]
-    return as_of.health(Snapshot(at_ns, "map", tags), recent, criteria)
+    looking = Health(at_ns, CRITERIA).look()
+    assert next(looking) == at_ns
+    assert isinstance(looking.send(Snapshot(at_ns, "map", tags)), RecentRequest)
+    with pytest.raises(StopIteration) as end:
+        looking.send(tuple(recent))
+    plan: Plan = end.value.value
+    return plan
 
 
 def verdict_of(plan: Plan) -> tuple[str, str]:
@@ -182,33 +190,32 @@ def test_what_is_wrong_by_itself_is_refused_before_anything_is_known(
     parameters: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(FieldRefused, match=message):
-        asked(**parameters).check(JSON)
-    asked().check(JSON)
+        asked(**parameters).check()
+    asked().check()
 
 
 def test_what_is_too_large_by_the_tags_of_then_is_refused() -> None:
     limit = replace(RULES, max_grid_cells=40 * 30)
-    as_of.field(HOUSE, asked(limit), JSON)
+    field_of(HOUSE, asked(limit), JSON)
     with pytest.raises(FieldRefused, match="the limit is 1199"):
-        as_of.field(HOUSE, asked(replace(RULES, max_grid_cells=1_199), resolution=0.1), JSON)
+        field_of(HOUSE, asked(replace(RULES, max_grid_cells=1_199), resolution=0.1), JSON)
     # Who does not say how wide the cells are gets wider ones.
-    as_of.field(HOUSE, asked(replace(RULES, max_grid_cells=1_199)), JSON)
-    as_of.field(HOUSE, asked(replace(RULES, max_grid_cells=4_800), scale=2), PNG)
+    field_of(HOUSE, asked(replace(RULES, max_grid_cells=1_199)), JSON)
+    field_of(HOUSE, asked(replace(RULES, max_grid_cells=4_800), scale=2), PNG)
     with pytest.raises(FieldRefused, match="4800 pixels, the limit is 4799"):
-        as_of.field(HOUSE, asked(replace(RULES, max_grid_cells=4_799), scale=2), PNG)
+        field_of(HOUSE, asked(replace(RULES, max_grid_cells=4_799), scale=2), PNG)
 
 
 # --- ETags ----------------------------------------------------------------------------------------
 
 
-def plans(house: Snapshot, field: FieldAsked) -> list[str]:
+def plans(house: Snapshot, field: Field) -> list[str]:
     """The ETags of every kind of answer."""
-    tags = [as_of.tag(house, "a"), as_of.tag(house, "b")]
     return [
-        as_of.state(house).etag,
-        *(plan.etag for plan in tags if plan is not None),
-        *(as_of.field(house, field, field_format).etag for field_format in FORMATS),
-        as_of.quality(house, field).etag,
+        WholeState(None).plan(house).etag,
+        *(OneTag(None, tag_id).plan(house).etag for tag_id in "ab"),
+        *(field_of(house, field, field_format).etag for field_format in FORMATS),
+        field_of(house, field).etag,
     ]
 
 
@@ -242,9 +249,9 @@ def test_what_changes_an_answer_changes_its_etag(
     change: Callable[[Snapshot], Snapshot], field_changes: bool
 ) -> None:
     house = change(HOUSE)
-    assert as_of.state(house).etag != as_of.state(HOUSE).etag
+    assert WholeState(None).plan(house).etag != WholeState(None).plan(HOUSE).etag
     for field_format in FORMATS:
-        one, other = (as_of.field(h, asked(), field_format) for h in (HOUSE, house))
+        one, other = (field_of(h, asked(), field_format) for h in (HOUSE, house))
         assert (one.etag != other.etag) is field_changes
         is_same = one.write(lambda: False) == other.write(lambda: False)
         assert is_same is not field_changes
@@ -261,12 +268,12 @@ def test_what_changes_an_answer_changes_its_etag(
         asked(RULES, a_map(1, free=-1)),
     ],
 )
-def test_another_field_has_another_etag(other: FieldAsked) -> None:
+def test_another_field_has_another_etag(other: Field) -> None:
     assert not set(plans(HOUSE, other)[3:]) & set(plans(HOUSE, asked())[3:])
 
 
 def test_a_scaled_picture_is_another_one() -> None:
-    etags = {as_of.field(HOUSE, asked(scale=scale), PNG).etag for scale in (1, 2)}
+    etags = {field_of(HOUSE, asked(scale=scale), PNG).etag for scale in (1, 2)}
     assert len(etags) == 2
 
 
@@ -276,8 +283,8 @@ def test_a_scaled_picture_is_another_one() -> None:
 @pytest.mark.parametrize("field_format", [JSON, PNG])
 def test_what_takes_long_says_so(field_format: FieldFormat) -> None:
     large = replace(RULES, max_grid_cells=1_000_000)
-    assert as_of.field(HOUSE, asked(), field_format).cost_s < SMALL_S
-    assert as_of.field(HOUSE, asked(large, resolution=0.004), field_format).cost_s > SMALL_S
+    assert field_of(HOUSE, asked(), field_format).cost_s < SMALL_S
+    assert field_of(HOUSE, asked(large, resolution=0.004), field_format).cost_s > SMALL_S
     many = Snapshot(NS, "map", tuple(tag(str(n), n, 1.0) for n in range(2_000)))
-    assert as_of.state(many).cost_s > SMALL_S > as_of.state(HOUSE).cost_s
-    assert as_of.quality(many, asked(large, resolution=1)).cost_s > SMALL_S
+    assert WholeState(None).plan(many).cost_s > SMALL_S > WholeState(None).plan(HOUSE).cost_s
+    assert field_of(many, asked(large, resolution=1)).cost_s > SMALL_S

@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.judge.daily import DAILY, DAY_NS
+from lupin_bridge.judge.derived import DAILY, DAY_NS
 from lupin_bridge.judge.derived import vapour_pressure_deficit_kpa as vpd
 from lupin_bridge.past import derived
-from lupin_twin.past import MAX_POINTS, PastRefused, SeriesPast, SeriesRequest
-from lupin_twin.state import Reading, TagState
+from lupin_twin.core.past import MAX_POINTS, PastRefused, SeriesPast, SeriesRequest
+from lupin_twin.core.state import Reading, TagState
 
 S = 10**9
 NOW_NS = 1_000 * S

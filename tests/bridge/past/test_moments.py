@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.past.moments import MAX_SECONDS, compact, iso, moment
-from lupin_twin.past import PastRefused, seconds
+from lupin_bridge.past.query import MAX_SECONDS, compact, iso, moment
+from lupin_twin.core.past import PastRefused, seconds
 
 NS = 10**9
 LAST_NS = MAX_SECONDS * NS + NS - 1

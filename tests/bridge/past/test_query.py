@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import pytest
 
 from lupin_bridge.past import query
-from lupin_bridge.past.query import ExportQuery, TimelineQuery
-from lupin_twin.bounds import MAX_TEXT_LENGTH
-from lupin_twin.past import DEFAULT_POINTS, MAX_POINTS, PastRefused, SeriesRequest
+from lupin_bridge.past.query import PeriodQuery
+from lupin_twin.core.drops import MAX_TEXT_LENGTH
+from lupin_twin.core.past import DEFAULT_POINTS, MAX_POINTS, PastRefused, SeriesRequest
 
 NS = 10**9
 NOW_NS = 1_000 * NS
 Parse = Callable[[list[tuple[str, str]], int | None], Any]
-ALL: tuple[Parse, ...] = (query.at, query.history, query.timeline, query.export)
+TIMELINE = partial(query.period, query.OfTimeline)
+EXPORT = partial(query.period, query.OfExport)
+ALL: tuple[Parse, ...] = (query.at, query.history, TIMELINE, EXPORT)
 NEEDED: dict[Parse, dict[str, str]] = {query.history: {"tag_id": "7", "sensor_type": "co2"}}
 
 
@@ -27,8 +30,8 @@ def ask(parse: Parse, **given: str) -> Any:
 def test_what_is_left_out_is_all_that_is_kept() -> None:
     assert query.at([], NOW_NS) is None
     assert ask(query.history) == SeriesRequest("7", "co2", 0, 0, DEFAULT_POINTS)
-    assert ask(query.timeline) == TimelineQuery(0, 0, DEFAULT_POINTS, None)
-    assert ask(query.export) == ExportQuery(0, 0, None, None)
+    assert ask(TIMELINE) == PeriodQuery(0, 0)
+    assert ask(EXPORT) == PeriodQuery(0, 0)
 
 
 def test_what_is_given_is_what_is_asked() -> None:
@@ -38,11 +41,11 @@ def test_what_is_given_is_what_is_asked() -> None:
     assert ask(query.history, **period, points="7") == SeriesRequest(
         "7", "co2", start_ns, end_ns, 7
     )
-    assert ask(query.timeline, **period, points="5000", tag_id="a/b") == TimelineQuery(
+    assert ask(TIMELINE, **period, points="5000", tag_id="a/b") == PeriodQuery(
         start_ns, end_ns, 5000, "a/b"
     )
-    assert ask(query.export, **period, tag_id="7", sensor_type="co2") == ExportQuery(
-        start_ns, end_ns, "7", "co2"
+    assert ask(EXPORT, **period, tag_id="7", sensor_type="co2") == PeriodQuery(
+        start_ns, end_ns, tag_id="7", sensor_type="co2"
     )
 
 
@@ -74,13 +77,13 @@ def test_where_nobody_knows_when_now_is_nothing_is_later() -> None:
 
 
 def test_a_period_may_end_after_now_and_be_empty_but_not_be_inverted() -> None:
-    assert ask(query.export, from_="2000", to="2001").start_ns == 2_000 * NS
-    assert ask(query.export, from_="5", to="5").end_ns == 5 * NS
+    assert ask(EXPORT, from_="2000", to="2001").start_ns == 2_000 * NS
+    assert ask(EXPORT, from_="5", to="5").end_ns == 5 * NS
     with pytest.raises(PastRefused, match=r"^to is 4\.999999999 s, before from, 5\.000000000 s"):
-        ask(query.export, from_="5", to="4.999999999")
+        ask(EXPORT, from_="5", to="4.999999999")
 
 
-@pytest.mark.parametrize("parse", [query.history, query.timeline, query.export])
+@pytest.mark.parametrize("parse", [query.history, TIMELINE, EXPORT])
 def test_an_end_at_0_is_not_taken_for_now(parse: Parse) -> None:
     with pytest.raises(PastRefused, match=r"^to is 0 s"):
         ask(parse, to="0")
@@ -91,7 +94,7 @@ def test_an_end_at_0_is_not_taken_for_now(parse: Parse) -> None:
 
 @pytest.mark.parametrize("text", ["0", "5001", "-1", "1.5", "", "²", "٣", "1e2", "9" * 5_000, "x"])
 def test_points_out_of_their_range_are_refused(text: str) -> None:
-    for parse in (query.history, query.timeline):
+    for parse in (query.history, TIMELINE):
         with pytest.raises(PastRefused, match=f"^points is '{text[:64]}': "):
             ask(parse, points=text)
 
@@ -99,10 +102,10 @@ def test_points_out_of_their_range_are_refused(text: str) -> None:
 @pytest.mark.parametrize("points", [1, MAX_POINTS])
 def test_both_ends_of_points_belong_to_them(points: int) -> None:
     assert ask(query.history, points=str(points)).max_points == points
-    assert ask(query.timeline, points=str(points)).points == points
+    assert ask(TIMELINE, points=str(points)).points == points
 
 
-@pytest.mark.parametrize("parse", [query.history, query.timeline, query.export])
+@pytest.mark.parametrize("parse", [query.history, TIMELINE, EXPORT])
 def test_an_empty_name_is_refused_and_so_is_one_that_nothing_can_have(parse: Parse) -> None:
     with pytest.raises(PastRefused, match=r"^tag_id is '': string should have at least 1 char"):
         ask(parse, tag_id="")

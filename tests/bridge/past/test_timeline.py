@@ -9,12 +9,14 @@ import orjson
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.past import schema, timeline
-from lupin_bridge.past.query import TimelineQuery
-from lupin_bridge.past.timeline import COUNTED, Parts, period
-from lupin_twin.past import HOUR_NS, Event, Grid, SeriesPast, grid
+from lupin_bridge.past import schema
+from lupin_bridge.past.bodies import COUNTED, timeline_body, timeline_period
+from lupin_bridge.past.query import PeriodQuery
+from lupin_twin.core.past import HOUR_NS, Event, Grid, SeriesPast, grid
 
 NS = 10**9
+# The runs, the period, what is counted, the silences.
+Parts = tuple[SeriesPast, Grid, dict[Event, SeriesPast], SeriesPast]
 
 
 def one_by_one(stamps_ns: list[int], start_ns: int, end_ns: int) -> SeriesPast:
@@ -43,7 +45,7 @@ def parts(
 ) -> Parts:
     """What a source says; nothing of what is not given."""
     nothing = SeriesPast(start_ns, end_ns)
-    return Parts(
+    return (
         runs or nothing,
         grid(start_ns, end_ns, points),
         {event: counted.get(name, nothing) for name, event in COUNTED.items()},
@@ -53,7 +55,7 @@ def parts(
 
 def written(given_: Parts) -> dict[str, Any]:
     """The body as a client reads it, which has to be what the contract says."""
-    text = orjson.dumps(timeline.body(given_))
+    text = orjson.dumps(timeline_body(*given_))
     schema.Timeline.model_validate_json(text)
     found: dict[str, Any] = orjson.loads(text)
     return found
@@ -122,13 +124,13 @@ def test_the_runs_that_meet_the_period_are_told_and_how_far_all_of_them_reach() 
 
 def test_the_period_is_what_is_asked_for_or_all_that_there_is() -> None:
     runs = SeriesPast(7 * NS, 107 * NS)
-    assert period(TimelineQuery(0, 0, 100, None), runs) == Grid(7 * NS, 107 * NS, NS)
-    assert period(TimelineQuery(57 * NS, 0, 100, None), runs) == Grid(57 * NS, 107 * NS, NS // 2)
-    assert period(TimelineQuery(0, 57 * NS, 100, None), runs) == Grid(7 * NS, 57 * NS, NS // 2)
+    assert timeline_period(PeriodQuery(0, 0, 100), runs) == Grid(7 * NS, 107 * NS, NS)
+    assert timeline_period(PeriodQuery(57 * NS, 0, 100), runs) == Grid(57 * NS, 107 * NS, NS // 2)
+    assert timeline_period(PeriodQuery(0, 57 * NS, 100), runs) == Grid(7 * NS, 57 * NS, NS // 2)
     # Nobody knew when now is, and it was not later than the beginning.
-    assert period(TimelineQuery(200 * NS, 0, 100, None), runs).end_ns == 200 * NS
+    assert timeline_period(PeriodQuery(200 * NS, 0, 100), runs).end_ns == 200 * NS
     # Buckets that were counted before begin on whole slots.
-    month = period(TimelineQuery(NS, 30 * 86_400 * NS, 500, None), runs)
+    month = timeline_period(PeriodQuery(NS, 30 * 86_400 * NS, 500), runs)
     assert (month.start_ns, month.bucket_ns % HOUR_NS) == (0, 0)
 
 
@@ -155,7 +157,7 @@ def test_each_event_is_in_the_one_bucket_that_holds_it(
         scans=one_by_one([start_ns + stamp for stamp in scans], start_ns, end_ns),
         looks=one_by_one([start_ns + stamp for stamp in looks], start_ns, end_ns),
     )
-    found = timeline.body(given_)
+    found = timeline_body(*given_)
     width_ns = -(-1_000 // points)
     assert found["bucket_s"] == width_ns / NS
     for name, stamps in (("scans", scans), ("looks", looks)):
@@ -174,13 +176,13 @@ def test_each_event_is_in_the_one_bucket_that_holds_it(
 def test_bucketed_or_not_the_counts_are_the_same(
     scans: list[int], looks: list[int], points: int
 ) -> None:
-    plain = parts(
+    runs, period, counted, silences = parts(
         0,
         1_000,
         points=points,
         scans=one_by_one(scans, 0, 1_000),
         looks=one_by_one(looks, 0, 1_000),
     )
-    bucketed = {**plain.counted, Event.SCANS: in_buckets(scans, plain.period)}
-    mixed = Parts(plain.runs, plain.period, bucketed, plain.silences)
-    assert timeline.body(mixed) == timeline.body(plain)
+    mixed = {**counted, Event.SCANS: in_buckets(scans, period)}
+    plain = timeline_body(runs, period, counted, silences)
+    assert timeline_body(runs, period, mixed, silences) == plain

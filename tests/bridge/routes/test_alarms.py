@@ -9,8 +9,8 @@ import pytest
 
 from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
-from lupin_bridge.past.query import AlarmsQuery
-from lupin_bridge.routes.alarms import _of
+from lupin_bridge.past.query import PeriodQuery
+from lupin_bridge.routes.status import _is_in
 from lupin_bridge.stream import schema
 from tests.support.messages import look
 from tests.support.rosbridge import ros_at
@@ -75,7 +75,7 @@ def test_a_period_has_what_was_active_at_any_time_of_it() -> None:
     over, still = Alarm("1", reason, "a", 20, 30), Alarm("2", reason, "a", 40)
 
     def found(start: int, end: int, active: bool | None = None) -> list[str]:
-        is_asked = _of(AlarmsQuery(start, end, active))
+        is_asked = _is_in(PeriodQuery(start, end, active=active))
         return [alarm.id for alarm in (over, still) if is_asked(alarm)]
 
     assert found(0, 0) == found(30, 41) == ["1", "2"]

@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.past import as_of
+from lupin_bridge.past import plans
 from lupin_bridge.stream import schema
-from lupin_twin import fields
-from lupin_twin.past import NotRemembered
-from lupin_twin.state import Pose, Reading, Snapshot, TagState
+from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
+from lupin_twin.field import engine
 from tests.bridge.routes.test_past import remembering
 from tests.support.inprocess import run
 from tests.support.past import NS, MadeUp
@@ -115,10 +115,10 @@ def test_who_has_the_answer_is_told_so_and_nothing_is_written_for_him(
                 answer = await it.http.get(f"{path}&at=9")
                 assert (answer.status_code, answer.headers["cache-control"]) == (200, "no-cache")
                 tags[path] = answer.headers["etag"]
-            it.bridge.kept.__init__()  # type: ignore[misc]
+            it.bridge.cache.__init__()  # type: ignore[misc]
             with monkeypatch.context() as patch:
-                patch.setattr(as_of, "compute_field", none)
-                patch.setattr(as_of, "StateJson", none)
+                patch.setattr(plans, "compute_field", none)
+                patch.setattr(plans, "StateJson", none)
                 for path, tag in tags.items():
                     has = {"If-None-Match": tag}
                     answer = await it.http.get(f"{path}&at=9", headers=has)
@@ -135,14 +135,14 @@ def test_who_has_the_answer_is_told_so_and_nothing_is_written_for_him(
 
 def test_what_was_written_is_kept(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
     computed = []
-    compute = fields.compute_field
+    compute = engine.compute_field
 
     def counted(*args: Any) -> Any:
         computed.append(args)
         return compute(*args)
 
     async def test() -> None:
-        monkeypatch.setattr(as_of, "compute_field", counted)
+        monkeypatch.setattr(plans, "compute_field", counted)
         async with remembering(MadeUp(snapshot=house())) as it:
             path = f"/api/field?{FIELD}"
             # Nothing was scanned in between: it is the same field.

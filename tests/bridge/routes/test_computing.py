@@ -14,19 +14,20 @@ import httpx
 import numpy as np
 import pytest
 
-from lupin_bridge.routes import map as routes_map
-from lupin_bridge.routes.computing import is_large, within_time
+from lupin_bridge.feed.source import TwinTimeoutError
+from lupin_bridge.routes import status
+from lupin_bridge.routes.answers import within_time
+from lupin_bridge.routes.field import is_large
 from lupin_bridge.routes.state import AGES_HOLD_S
-from lupin_bridge.serving.http_protocol import PIECE_BYTES
-from lupin_bridge.serving.limits import Limits
+from lupin_bridge.serving.admission import Limits
+from lupin_bridge.serving.middleware import PIECE_BYTES
 from lupin_bridge.stream.state_json import StateJson
-from lupin_bridge.twin.source import TwinTimeoutError
-from lupin_twin.explored import OccupancyMap, occupancy_map
-from lupin_twin.fields import FieldJob, FieldRequest, cost_s
-from lupin_twin.grid import FieldGrid
-from lupin_twin.node import TwinNode
-from lupin_twin.state import Pose, Reading, Scan
-from lupin_twin.workers import LARGE_THREADS, SMALL_S, Job, ShouldStop, Workers
+from lupin_twin.core.state import Pose, Reading, Scan
+from lupin_twin.field.engine import FieldJob, FieldRequest, cost_s
+from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.field.grid import FieldGrid
+from lupin_twin.ros.node import TwinNode
+from lupin_twin.runtime.workers import LARGE_THREADS, SMALL_S, Job, ShouldStop, Workers
 from tests.support.inprocess import Running, run, running
 from tests.support.waiting import PATIENCE_S, until
 from tests.support.web import deaf_client
@@ -251,7 +252,7 @@ def test_the_state_is_written_a_few_times_a_second_and_never_old(
             most = states + (loop.time() - began_s) / AGES_HOLD_S + 1
             # The frames' own of each state beside the answers.
             assert len(written) <= most + states
-            entries = [key for key in it.bridge.kept._entries if "state" in str(key)]
+            entries = [key for key in it.bridge.cache._entries if "state" in str(key)]
             assert len(entries) == 1, "the ones before have gone"
             pose = Pose(1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0)
             new = Scan("new", 1, (), pose)
@@ -267,7 +268,7 @@ def large_map() -> OccupancyMap:
     """4 million cells of noise, whose picture takes some 3 MB."""
     side = 2_000
     cells = np.random.default_rng(1).integers(-1, 101, side * side, dtype=np.int8)
-    return occupancy_map(
+    return OccupancyMap(
         frame_id="map",
         stamp_ns=0,
         width=side,
@@ -276,7 +277,7 @@ def large_map() -> OccupancyMap:
         origin_x=0.0,
         origin_y=0.0,
         origin_yaw=0.0,
-        data=cells,
+        cells=cells,
         revision=1,
     )
 
@@ -284,7 +285,7 @@ def large_map() -> OccupancyMap:
 def test_a_hundred_readers_of_a_map_that_do_not_read_hold_one_picture_and_two_pieces_each(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    drawn = count(monkeypatch, routes_map, "map_png")
+    drawn = count(monkeypatch, status, "map_png")
 
     async def test() -> None:
         async with house() as it:
@@ -296,7 +297,7 @@ def test_a_hundred_readers_of_a_map_that_do_not_read_hold_one_picture_and_two_pi
                 stack.enter_context(deaf_client(it.url, "/api/map.png"))
             (entry,) = [
                 entry
-                for entry in it.bridge.kept._entries.values()
+                for entry in it.bridge.cache._entries.values()
                 if entry.answer.media_type == "image/png"
             ]
             await until(lambda: entry.readers == 100, "all of them to be answered")

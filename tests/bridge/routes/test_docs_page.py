@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.openapi import document
-from lupin_bridge.routes.docs_page import render
+from lupin_bridge.app import document
+from lupin_bridge.routes.pages import render
 from tests.support.web import ROUTES
 
 DOCUMENT: dict[str, Any] = json.loads(document())

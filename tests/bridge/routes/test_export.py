@@ -11,11 +11,10 @@ from contextlib import ExitStack
 import httpx
 import pytest
 
-from lupin_bridge.judge.choosing import own_sensors
-from lupin_bridge.past import table
-from lupin_bridge.serving.admission import EXPORTS
-from lupin_bridge.serving.limits import Limits
-from lupin_twin.past import PastRow
+from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.past import bodies
+from lupin_bridge.serving.admission import EXPORTS, Limits
+from lupin_twin.core.past import PastRow
 from tests.bridge.routes.test_past import remembering
 from tests.support import raw_http
 from tests.support.inprocess import run
@@ -42,10 +41,10 @@ def test_all_rows_come_under_one_header(domain: int) -> None:
         async with remembering(past) as it:
             query = "from=1&to=9&tag_id=a/b&sensor_type=co2"
             answer = await it.http.get(f"{PATH}?{query}")
-            assert answer.content == table.HEADER + table.lines(
+            assert answer.content == bodies.CSV_HEADER + bodies.csv_lines(
                 [*rows(3), *rows(2, 5)], own_sensors()
             )
-            assert answer.headers["content-type"] == table.MEDIA_TYPE
+            assert answer.headers["content-type"] == bodies.CSV_TYPE
             assert answer.headers["cache-control"] == "no-store"
             assert answer.headers["content-disposition"] == (
                 'attachment; filename="lupin-twin_a_b_co2_'
@@ -59,7 +58,7 @@ def test_all_rows_come_under_one_header(domain: int) -> None:
 def test_a_period_without_rows_is_a_header(domain: int) -> None:
     async def test() -> None:
         async with remembering(MadeUp()) as it:
-            assert (await it.http.get(PATH)).content == table.HEADER
+            assert (await it.http.get(PATH)).content == bodies.CSV_HEADER
 
     run(domain, test())
 
@@ -92,7 +91,9 @@ def test_a_reader_that_does_not_read_stops_it_and_is_cut_off(domain: int) -> Non
                     "a socket that is full",
                 )
                 await until(lambda: it.bridge.admission.exporting == 0, "its end")
-                assert past.lots_taken * len(table.lines(lot, own_sensors())) < MOST_TAKEN_BYTES
+                assert (
+                    past.lots_taken * len(bodies.csv_lines(lot, own_sensors())) < MOST_TAKEN_BYTES
+                )
                 assert past.is_closed
                 with pytest.raises(ConnectionResetError):
                     deque(iter(lambda: client.recv(65_536), b""))
@@ -103,7 +104,7 @@ def test_a_reader_that_does_not_read_stops_it_and_is_cut_off(domain: int) -> Non
 def test_a_slow_reader_gets_all_of_it_and_no_more_is_read_than_he_takes(domain: int) -> None:
     lot = rows(1_000)
     past = MadeUp(lots=[lot] * MANY)
-    size = len(table.lines(lot, own_sensors()))
+    size = len(bodies.csv_lines(lot, own_sensors()))
 
     async def test() -> None:
         async with remembering(past) as it, it.http.stream("GET", PATH) as answer:
@@ -111,7 +112,7 @@ def test_a_slow_reader_gets_all_of_it_and_no_more_is_read_than_he_takes(domain: 
             async for piece in answer.aiter_raw(65_536):
                 taken += len(piece)
                 assert past.lots_taken * size - taken < MOST_TAKEN_BYTES
-            assert taken == len(table.HEADER) + MANY * size
+            assert taken == len(bodies.CSV_HEADER) + MANY * size
 
     run(domain, test())
 
@@ -204,7 +205,7 @@ def test_a_bridge_that_ends_breaks_it_off(domain: int) -> None:
     async def test() -> None:
         async with remembering(past) as it, it.http.stream("GET", PATH) as answer:
             it.server.should_exit = True
-            await until(lambda: it.bridge.goodbye.is_said, "the good-bye")
+            await until(lambda: it.bridge.shutdown.has_begun, "the good-bye")
             with pytest.raises(httpx.TransportError):
                 async for _ in answer.aiter_raw():
                     pass

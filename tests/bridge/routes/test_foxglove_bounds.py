@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from lupin_bridge.feed import relay as relay_module
 from lupin_bridge.serving.ws_protocol import PIECE_BYTES
-from lupin_bridge.twin import relay as relay_module
 from tests.bridge.routes.test_foxglove import INPUT, play
 from tests.support import inprocess, messages
 from tests.support.foxglove import viewer

@@ -9,8 +9,8 @@ import sys
 from websockets.asyncio.client import connect
 
 from lupin_bridge.stream import schema
-from lupin_twin.node import TwinNode
-from lupin_twin.state import TwinStore
+from lupin_twin.core.state import TwinStore
+from lupin_twin.ros.node import TwinNode
 from tests.support.inprocess import Running, run, running
 from tests.support.messages import scan
 from tests.support.ros import Peer

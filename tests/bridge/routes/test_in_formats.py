@@ -9,14 +9,15 @@ import httpx
 import pytest
 from fastapi import APIRouter, FastAPI, Request, Response
 
+from lupin_bridge.feed.source import TwinTimeoutError
 from lupin_bridge.field import formats
 from lupin_bridge.field.formats import FieldFormat
-from lupin_bridge.routes.in_formats import InFormats
+from lupin_bridge.routes.answers import add_refusals
+from lupin_bridge.routes.field import InFormats
 from lupin_bridge.serving.admission import BusyError, ClientLimitError
 from lupin_bridge.stream import schema
-from lupin_bridge.twin.source import TwinTimeoutError
-from lupin_twin.fields import FieldRefused
-from lupin_twin.past import NotRemembered, PastRefused
+from lupin_twin.core.past import NotRemembered, PastRefused
+from lupin_twin.field.engine import FieldRefused
 
 PLANTS = InFormats(
     name="plants",
@@ -38,6 +39,7 @@ def app(error: Exception | None = None) -> FastAPI:
 
     PLANTS.register(router, answer)
     application = FastAPI()
+    add_refusals(application)
     application.include_router(router)
     return application
 
@@ -96,6 +98,7 @@ def test_what_is_refused_has_the_body_of_the_service(error: Exception, status: i
 def test_what_else_stands_in_the_way_is_told_as_everywhere(error: Exception, status: int) -> None:
     answer = get("/api/plants.json", error)
     assert (answer.status_code, answer.json()) == (status, {"detail": "why"})
+    assert get("/api/plants", error).headers["vary"] == "Accept"
 
 
 def test_the_document_tells_of_each_path_and_each_refusal() -> None:

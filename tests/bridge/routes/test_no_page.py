@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_bridge.routes.no_page import HOW
+from lupin_bridge.routes.pages import HOW_TO_BUILD
 from tests.bridge.test_app import ask
 
 
@@ -19,7 +19,7 @@ def test_the_root_says_how_to_build_the_page(tmp_path: Path, method: str) -> Non
         assert answer.headers["cache-control"] == "no-store"
         assert answer.headers["content-type"].startswith("text/html")
         assert "default-src 'self'" in answer.headers["content-security-policy"]
-        assert (escape(HOW) in answer.text) == (method == "GET")
+        assert (escape(HOW_TO_BUILD) in answer.text) == (method == "GET")
 
 
 def test_everything_else_is_where_it_is(tmp_path: Path) -> None:

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
+from lupin_bridge.feed.query import Question
+from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.past import schema
-from lupin_bridge.serving.limits import Limits
-from lupin_bridge.twin.looking import Question
-from lupin_bridge.twin.source import TwinTimeoutError, TwinUnavailableError
-from lupin_twin.past import (
+from lupin_bridge.serving.admission import Limits
+from lupin_twin.core.past import (
     Event,
     NotRemembered,
     PastRefused,

@@ -11,7 +11,7 @@ import pytest
 from lupin_msgs.msg import TwinTagState
 from websockets.exceptions import ConnectionClosed
 
-from lupin_bridge.serving.client_messages import MAX_BURST
+from lupin_bridge.serving.ws_protocol import MAX_BURST
 from tests.support import messages
 from tests.support.proc_stat import resident_mb
 from tests.support.processes import limits

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.rosbridge.session import Reaction, Session
-from lupin_bridge.routes.rosbridge import MAX_OPEN_CALLS
-from lupin_bridge.serving.limits import Limits
+from lupin_bridge.feed.source import TwinUnavailableError
+from lupin_bridge.routes.sockets import MAX_OPEN_CALLS
+from lupin_bridge.serving.admission import Limits
 from lupin_bridge.stream.frames import StateFrame
-from lupin_bridge.twin.source import TwinUnavailableError
-from lupin_twin.fields import FieldRequest
+from lupin_bridge.viewers.rosbridge_session import Reaction, Session
+from lupin_twin.field.engine import FieldRequest
 from tests.support import inprocess
 from tests.support.raw_ws import deaf
 from tests.support.rosbridge import (

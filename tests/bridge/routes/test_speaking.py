@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from lupin_bridge.routes.signin import language_of
+from lupin_bridge.routes.pages import language_of
 
 SPOKEN = ("en", "de", "nl", "es")
 

@@ -12,9 +12,9 @@ from contextlib import ExitStack, contextmanager, suppress
 
 import pytest
 
-from lupin_bridge.serving.acceptor import (
-    KEPT_FILES,
+from lupin_bridge.serving.connections import (
     MIN_CONNECTIONS,
+    SPARE_FILES,
     Acceptor,
     room_for_connections,
 )
@@ -65,9 +65,9 @@ def test_who_asks_for_nothing_makes_room_for_who_does(said: bytes) -> None:
         for _ in range(20):
             assert raw_http.status(raw_http.answer(live.url, GET)) == 200
         assert live.handshake() == 101
-        assert open_files(live.process.pid) <= FILES - KEPT_FILES // 2
+        assert open_files(live.process.pid) <= FILES - SPARE_FILES // 2
         assert open_files(live.process.pid) >= kept
-        live.process.wait_for_output("turned out the ")
+        live.process.wait_for_output("evicted the ")
 
 
 def test_one_address_crowds_out_none_but_itself() -> None:
@@ -76,7 +76,7 @@ def test_one_address_crowds_out_none_but_itself() -> None:
         quiet.sendall(GET[:-2])
         for _ in range(2 * STUCK):
             stack.enter_context(raw_http.connect(live.url, "127.0.7.2"))
-        live.process.wait_for_output("turned out the ")
+        live.process.wait_for_output("evicted the ")
         quiet.sendall(GET[-2:])
         assert raw_http.status(raw_http.heard(quiet)) == 200
 
@@ -143,11 +143,11 @@ def test_nobody_is_turned_out_before_somebody_else_comes() -> None:
             for _ in range(room):
                 stack.enter_context(raw_http.connect(address_of(listener)))
             door = Acceptor(listener, Waiting, guests, room=room, tls=None, timeout_s=PATIENCE_S)
-            await until(lambda: guests and not door._arrivals, "all who wait outside")
+            await until(lambda: guests and not door._handshakes, "all who wait outside")
             assert len(guests) == room
             first = guests[0]
             stack.enter_context(raw_http.connect(address_of(listener)))
-            await until(lambda: lost and not door._arrivals, "one more")
+            await until(lambda: lost and not door._handshakes, "one more")
             assert (lost, len(guests)) == ([first], room)
             door.close()
             await door.wait_closed()
@@ -161,10 +161,10 @@ def test_room_is_what_the_limit_leaves(monkeypatch: pytest.MonkeyPatch) -> None:
     limits = [(10_000, 10_000)]
     monkeypatch.setattr(resource, "getrlimit", lambda _: limits[-1])
     room = room_for_connections()
-    assert 9_000 < room < 10_000 - KEPT_FILES
+    assert 9_000 < room < 10_000 - SPARE_FILES
     limits.append((10_100, 10_100))
     assert room_for_connections() == room + 100
-    limits.append((KEPT_FILES, KEPT_FILES))
+    limits.append((SPARE_FILES, SPARE_FILES))
     assert room_for_connections() == MIN_CONNECTIONS
     limits.append((resource.RLIM_INFINITY, resource.RLIM_INFINITY))
     assert room_for_connections() > 100_000

@@ -23,8 +23,8 @@ from lupin_bridge.serving.admission import (
     BusyError,
     ClientLimitError,
     Export,
+    Limits,
 )
-from lupin_bridge.serving.limits import Limits
 from lupin_bridge.stream import schema
 from tests.support.access import Served, served
 from tests.support.inprocess import run, running

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from lupin_bridge.serving.client_messages import MAX_BRACKETS, MAX_MESSAGE_LENGTH, members_of, shown
+from lupin_bridge.serving.ws_protocol import MAX_BRACKETS, MAX_MESSAGE_LENGTH, members_of, shown
 
 
 def refusal(message: str | bytes) -> str:

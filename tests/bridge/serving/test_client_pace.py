@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from lupin_bridge.serving.client_messages import (
+from lupin_bridge.serving.ws_protocol import (
     MAX_BURST,
     MAX_MESSAGES_PER_S,
     ClientPace,

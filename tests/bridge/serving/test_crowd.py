@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from lupin_bridge.serving.acceptor import whom_to_turn_out
+from lupin_bridge.serving.connections import choose_evicted
 
 
 @dataclass(eq=False)
@@ -21,7 +21,7 @@ class Someone:
 def chosen(number: int, **parties: list[float | None]) -> list[tuple[str, float | None]]:
     """Who is turned out of parties given by their address and since when their members wait."""
     guests = [Someone(address, since) for address, party in parties.items() for since in party]
-    return [(guest.address, guest.waiting_since_s) for guest in whom_to_turn_out(guests, number)]
+    return [(guest.address, guest.waiting_since_s) for guest in choose_evicted(guests, number)]
 
 
 def test_the_longest_waiting_goes_first() -> None:

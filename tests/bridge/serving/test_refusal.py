@@ -5,7 +5,7 @@ from __future__ import annotations
 import h11
 import pytest
 
-from lupin_bridge.serving.transports import refusal
+from lupin_bridge.serving.connections import refusal
 from lupin_bridge.stream import schema
 
 

@@ -17,9 +17,10 @@ import pytest
 from fastapi import FastAPI
 from websockets.exceptions import ConnectionClosed
 
-from lupin_bridge.roles import FEEDER_STOP_S
+from lupin_bridge.cli.roles import FEEDER_STOP_S
+from lupin_bridge.feed.ros_thread import STOP_TIMEOUT_S
 from lupin_bridge.serving.server import (
-    GOODBYE_S,
+    CLOSE_AFTER_S,
     GRACEFUL_SHUTDOWN_S,
     MAX_INBOUND_BYTES,
     BridgeServer,
@@ -28,8 +29,7 @@ from lupin_bridge.serving.server import (
     listen,
 )
 from lupin_bridge.settings import Settings
-from lupin_bridge.twin.ros_thread import STOP_TIMEOUT_S
-from lupin_twin.process import END_S, IDLE_WORKERS_END_S
+from lupin_twin.runtime.process import END_S, IDLE_WORKERS_END_S
 from tests.support.inprocess import run, running
 from tests.support.live import attached, wait_until_ready
 from tests.support.processes import Process, lupin_twin, twin_node, url_of
@@ -251,16 +251,18 @@ def test_clients_that_do_not_read_do_not_hold_up_the_end() -> None:
 # What of a request for a field never comes back: a worker that computes it, one that writes it,
 # the ROS thread.
 HANGS = (
-    "lupin_twin.fields:FieldJob.compute:co2",
+    "lupin_twin.field.engine:FieldJob.compute:co2",
     "lupin_bridge.field.formats:write:co2",
-    "lupin_twin.fields:FieldEngine.lookup:co2",
+    "lupin_twin.field.engine:FieldEngine.lookup:co2",
 )
 
 
 @pytest.mark.parametrize("hang", HANGS)
 def test_a_field_that_takes_for_ever_does_not_hold_up_the_end(domain: int, hang: str) -> None:
     with (
-        sabotaged(domain, ["--hang", hang], "lupin_bridge.cli", "serve", "--port", "0") as process,
+        sabotaged(
+            domain, ["--hang", hang], "lupin_bridge.cli.command", "serve", "--port", "0"
+        ) as process,
         listener(url_of(process)) as healthy,
         waiting_for(url_of(process), FIELD) as answer,
     ):
@@ -304,5 +306,5 @@ def test_from_a_signal_on_it_has_to_end_whatever_hangs() -> None:
 
 
 def test_the_times_of_the_end_add_up_to_what_is_promised() -> None:
-    assert GOODBYE_S < GRACEFUL_SHUTDOWN_S
+    assert CLOSE_AFTER_S < GRACEFUL_SHUTDOWN_S
     assert GRACEFUL_SHUTDOWN_S + max(STOP_TIMEOUT_S, FEEDER_STOP_S) + IDLE_WORKERS_END_S <= 2.0

@@ -12,7 +12,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 
-from lupin_bridge.serving.transports import UNSENT_BYTES, bound_unsent, reset, tear_down
+from lupin_bridge.serving.connections import UNSENT_BYTES, bound_unsent, reset, tear_down
 from tests.support.tls import certificate
 from tests.support.waiting import until
 

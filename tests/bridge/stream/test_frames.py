@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from websockets.frames import Frame, Opcode
 from websockets.streams import StreamReader
 
-from lupin_bridge.judge.choosing import own_sensors
 from lupin_bridge.judge.judging import Judge
+from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.frames import (
     FrameWriter,
@@ -23,7 +23,7 @@ from lupin_bridge.stream.frames import (
     text_frame,
 )
 from lupin_bridge.stream.status import Status
-from lupin_twin.state import Pose, Reading, Snapshot, TagState, Try
+from lupin_twin.core.state import Attempt, Pose, Reading, Snapshot, TagState
 from tests.support.seen import by_light
 
 
@@ -203,7 +203,7 @@ def house() -> Snapshot:
                 pose=Pose(0.5 * (number % 6), 0.7 * (number // 6), 0.0, 0.0, 0.0, 0.0, 1.0),
                 readings=tuple(Reading(*each, at_ns) for each in (values | wrong).items()),
                 last_observed_ns=at_ns,
-                last_try=Try(at_ns),
+                last_try=Attempt(at_ns),
             )
         )
     return Snapshot(now_ns, "map", tuple(tags))

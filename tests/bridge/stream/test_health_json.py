@@ -8,11 +8,11 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.judge.choosing import own_sensors
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced
+from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.health_json import HealthJson
-from lupin_twin.state import Reading, Snapshot, TagState
+from lupin_twin.core.state import Reading, Snapshot, TagState
 from tests.support.seen import by_light
 
 SENSORS = own_sensors()

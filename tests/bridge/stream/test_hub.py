@@ -11,7 +11,7 @@ from lupin_bridge.stream.frames import FrameWriter, text_frame
 from lupin_bridge.stream.health_json import alarms_frame
 from lupin_bridge.stream.hub import CLOSE_POLICY, Client, Hub
 from lupin_bridge.stream.status import Reason, Status
-from lupin_twin.state import Snapshot, TagState
+from lupin_twin.core.state import Snapshot, TagState
 from tests.bridge.stream.test_frames import received
 from tests.support.seen import alarm
 
@@ -77,7 +77,7 @@ class Stage:
     def alarms(self, *tag_ids: str, now_s: float = 0.0) -> None:
         """Tell of active alarms at these tags."""
         text = alarms_frame([alarm(tag_id) for tag_id in tag_ids], "journal", 0)
-        self.hub.tell_alarms(text_frame(text), now_s)
+        self.hub.publish_alarms(text_frame(text), now_s)
 
     def join(self, socket: Socket, now_s: float = 0.0, **asked: Any) -> Client:
         client = Client(socket, **asked)

@@ -13,16 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from lupin_bridge.routes.map import map_json, map_png
+from lupin_bridge.routes.status import map_json, map_png
 from lupin_bridge.stream import schema
-from lupin_twin.explored import OccupancyMap, occupancy_map
+from lupin_twin.field.explored import OccupancyMap
 
 FREE, OCCUPIED = 236, 70
 
 
 def map_of(rows: Sequence[Sequence[int]], yaw: float = 0.0) -> OccupancyMap:
     """A map from its rows, the first at the origin."""
-    return occupancy_map(
+    return OccupancyMap(
         frame_id="map",
         stamp_ns=12_000_000_034,
         width=len(rows[0]) if rows else 0,
@@ -31,7 +31,7 @@ def map_of(rows: Sequence[Sequence[int]], yaw: float = 0.0) -> OccupancyMap:
         origin_x=-4.0,
         origin_y=1.5,
         origin_yaw=yaw,
-        data=[cell for row in rows for cell in row],
+        cells=np.array([cell for row in rows for cell in row], dtype=np.int8),
         revision=1,
     )
 

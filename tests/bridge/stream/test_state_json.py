@@ -13,8 +13,17 @@ from hypothesis import strategies as st
 
 from lupin_bridge.stream import schema, state_json
 from lupin_bridge.stream.state_json import StateJson
-from lupin_twin.history import PastScan, PastTry, TagHistory
-from lupin_twin.state import Bloom, ClockState, Flower, Pose, Reading, Snapshot, TagState, Try
+from lupin_twin.core.history import PastAttempt, PastScan, TagHistory
+from lupin_twin.core.state import (
+    Attempt,
+    Bloom,
+    ClockState,
+    Flower,
+    Pose,
+    Reading,
+    Snapshot,
+    TagState,
+)
 from tests.support.web import filled
 
 ANY_NUMBER = st.floats(width=64)
@@ -50,7 +59,7 @@ TAGS = st.builds(
     last_observed_ns=st.none() | STAMP_NS,
     flower=FLOWERS,
     looked_at_ns=st.none() | STAMP_NS,
-    last_try=st.none() | st.builds(Try, STAMP_NS, st.integers(0, 255), TEXT),
+    last_try=st.none() | st.builds(Attempt, STAMP_NS, st.integers(0, 255), TEXT),
 )
 SNAPSHOTS = st.builds(
     Snapshot,
@@ -193,12 +202,12 @@ def test_the_time_of_a_reading_is_told_where_it_is_not_that_of_the_one_before() 
 
 
 def test_the_last_try_is_told_unless_it_was_the_last_observation() -> None:
-    tag = TagState("7", POSE, last_observed_ns=5 * S, last_try=Try(5 * S))
+    tag = TagState("7", POSE, last_observed_ns=5 * S, last_try=Attempt(5 * S))
     assert (
         not {"last_try", "last_try_status", "last_try_detail"}
         & json.loads(StateJson().tag(tag, 5 * S)).keys()
     )
-    for tried in (Try(6 * S), Try(5 * S, 2), Try(5 * S, 0, "late"), None):
+    for tried in (Attempt(6 * S), Attempt(5 * S, 2), Attempt(5 * S, 0, "late"), None):
         written = json.loads(StateJson().tag(replace(tag, last_try=tried), 5 * S))
         assert written["last_try"] == (tried and stamp(tried.stamp_ns))
         assert written["last_try_status"] == (tried and tried.status)
@@ -244,7 +253,7 @@ def test_a_history_is_sorted_by_sensor_and_keeps_its_order() -> None:
             PastScan(2_000_000_000, (Reading("co2", math.nan),)),
             PastScan(3_000_000_001, (Reading("light", 800.0),)),
         ),
-        (PastTry(Try(S), 0), PastTry(Try(4 * S, 2, "not decoded"), None)),
+        (PastAttempt(Attempt(S), 0), PastAttempt(Attempt(4 * S, 2, "not decoded"), None)),
     )
     written = state_json.history("7", past)
     assert written == {

@@ -9,9 +9,9 @@ import pytest
 from lupin_bridge.bridge import WATCH_PERIOD_S
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.status import STALE_AFTER_S, Liveness, Outward, Reason, Status
-from lupin_twin.drops import Recent
-from lupin_twin.journal.condition import Condition, JournalState
-from lupin_twin.state import ClockState
+from lupin_twin.core.drops import Recent
+from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.state import ClockState
 
 
 def test_a_twin_is_live_until_it_was_silent_for_the_limit() -> None:

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 
 from lupin_twin.estimate import Model, Readings, fit
-from lupin_twin.estimate.kernel import Hyper
-from lupin_twin.estimate.readings import Scale
+from lupin_twin.estimate.kernel import Hyper, Scale
 from tests.support import textbook_gp
 from tests.support.estimates import DAY_S, a_day, hypers, some_readings, spot_at, spots_of
 

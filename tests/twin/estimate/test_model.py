@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lupin_twin.estimate import SDS_OF_IDEAL, FitFailed, Model, Readings, fit
-from lupin_twin.estimate.kernel import Hyper
+from lupin_twin.estimate.kernel import Hyper, Scale
 from lupin_twin.estimate.posterior import INFLATION
-from lupin_twin.estimate.readings import Scale
 from tests.support import textbook_gp
 from tests.support.estimates import DAY_S, a_day, hypers, readings_of, some_readings, spots_of
 from tests.support.textbook_gp import Spot

@@ -11,12 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lupin_twin.estimate import MAX_EXACT, EstimateGrid, Model, Posterior, Readings, fit
-from lupin_twin.estimate.cells import Cells
-from lupin_twin.estimate.kernel import Hyper, Pairs
-from lupin_twin.estimate.posterior import INFLATION
-from lupin_twin.estimate.readings import Scale
-from lupin_twin.grid import FloatArray
-from lupin_twin.idw import Abandoned
+from lupin_twin.estimate.kernel import Hyper, Pairs, Scale
+from lupin_twin.estimate.posterior import INFLATION, Cells
+from lupin_twin.field.grid import FloatArray
+from lupin_twin.field.idw import Abandoned
 from tests.support import textbook_gp
 from tests.support.estimates import DAY_S, a_day, hypers, some_readings, spot_at, spots_of
 
@@ -37,7 +35,7 @@ def test_the_variance_is_never_negative_and_never_above_the_prior_s(
 ) -> None:
     found = variance(h, readings)
     assert (found >= 0.0).all()
-    assert (found <= h.house_variance + h.local_variance + 1e-9).all()
+    assert (found <= h.common_variance + h.local_variance + 1e-9).all()
 
 
 @given(some_readings(), hypers, st.data())
@@ -113,7 +111,7 @@ def test_of_more_readings_than_can_be_solved_at_once_the_nearest_say_nearly_the_
         [[textbook_gp.common(spot_at(place, 24.0), one, h) for one in spots] for place in places]
     )
     weights = np.linalg.solve(covariance, shared.T).T
-    prior = h.house_variance + h.local_variance
+    prior = h.common_variance + h.local_variance
     exact = weights @ y * model.scale.spread + model.scale.centre
     exact_sd = np.sqrt(prior - (weights * shared).sum(axis=1)) * model.scale.spread * INFLATION
     off = np.abs(mean - exact) / exact_sd

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_twin.estimate.readings import Readings, scale_of
+from lupin_twin.estimate.kernel import Readings, scale_of
 from tests.support.estimates import DAY_S, readings_of, some_readings
 
 GOOD: dict[str, Any] = {

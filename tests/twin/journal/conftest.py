@@ -1,18 +1,25 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Callable, Iterator
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager
 from itertools import count
+from pathlib import Path
 from typing import Any
 
 import psycopg
 import pytest
 
 from lupin_twin.journal.schema import POSTGRESQL_TABLES
+from tests.support.log_life import Life, lived
 from tests.support.postgres import postgres
 
 # As the same log in SQLite, and where its rows are in PostgreSQL: a connection, and the site.
 Copied = Callable[[sqlite3.Connection], tuple[Any, str]]
+Engines = Callable[[sqlite3.Connection], list[tuple[Any, str]]]
+Living = Callable[[Iterable[tuple[str, Any]]], AbstractContextManager[Life]]
 
 _TABLES = ("meta", "run", "series", "scan", "look", "place", "hour", "tally", "event")
 
@@ -23,6 +30,8 @@ def copied() -> Iterator[Copied]:
     numbers = count()
     with postgres() as url, psycopg.connect(url, autocommit=True) as archive:
         archive.execute(POSTGRESQL_TABLES)
+        for table in ("scan", "look"):
+            archive.execute(f"CREATE TABLE {table}_any PARTITION OF {table} DEFAULT")
 
         def copy(log: sqlite3.Connection) -> tuple[Any, str]:
             site = f"site {next(numbers)}"
@@ -37,3 +46,29 @@ def copied() -> Iterator[Copied]:
             return archive, site
 
         yield copy
+
+
+@pytest.fixture(scope="session")
+def engines(copied: Copied) -> Engines:
+    """The log in SQLite, and the same log in PostgreSQL."""
+    return lambda log: [(log, "local"), copied(log)]
+
+
+@pytest.fixture(scope="session")
+def living(tmp_path_factory: pytest.TempPathFactory) -> Living:
+    """A log that has lived through steps, in a file of its own."""
+    folder, numbers = tmp_path_factory.mktemp("lives"), count()
+    return lambda told: lived(folder / f"{next(numbers)}.sqlite", told)
+
+
+def fail_on_a_full_disk(code: str, path: Path, most: int) -> None:
+    """Run code in a process none of whose files may grow past `most` bytes, as on a full disk."""
+    program = (
+        "import resource, sys; from pathlib import Path; path = Path(sys.argv[1]);"
+        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({most}, {most})); {code}"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program, str(path)], check=False, capture_output=True, text=True
+    )
+    assert ended.returncode == 1
+    assert ended.stderr.splitlines()[-1].startswith("sqlite3.OperationalError: ")

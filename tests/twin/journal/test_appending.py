@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from lupin_twin.core.state import Reading
 from lupin_twin.journal.rows import ScanRow
-from lupin_twin.state import Reading
 from tests.support.journal import NOW, SECOND, kept, look, scan, select
 
 

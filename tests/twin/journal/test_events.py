@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from itertools import count
 from pathlib import Path
 from sqlite3 import Connection
 from typing import Any
@@ -10,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lupin_twin.core.past import EVERY_TAG, HOUR_NS, Event, SeriesPast, SeriesRequest
 from lupin_twin.journal.hours import SILENCE_NS
 from lupin_twin.journal.queries import series
-from lupin_twin.past import EVERY_TAG, HOUR_NS, Event, SeriesPast, SeriesRequest
 from tests.support.log_life import (
     BEGUN,
     HOUR,
@@ -23,11 +22,12 @@ from tests.support.log_life import (
     failure,
     lived,
     look,
+    one_run,
     periods,
     scan,
     steps,
 )
-from tests.twin.journal.conftest import Copied
+from tests.twin.journal.conftest import Engines, Living
 
 END = BEGUN + (LATEST + 200) * MINUTE
 COUNTED = (
@@ -37,12 +37,6 @@ COUNTED = (
     Event.PESTS_SEEN,
     Event.PESTS_CLEARED,
 )
-numbers = count()
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("events")
 
 
 def ask(
@@ -66,15 +60,15 @@ def told(answer: SeriesPast) -> list[tuple[int, float]]:
 @given(steps, st.tuples(periods, st.integers(1, 30)), st.sampled_from([EVERY_TAG, "7"]))
 @settings(deadline=None, max_examples=60)
 def test_they_are_those_of_a_plain_list_on_either_engine(
-    folder: Path,
-    copied: Copied,
+    living: Living,
+    engines: Engines,
     lives: list[tuple[str, Any]],
     asked: tuple[tuple[int, int], int],
     tag_id: str,
 ) -> None:
     period, points = asked
-    with lived(folder / f"{next(numbers)}.sqlite", lives) as life:
-        for connection, site in ((life.connection, "local"), copied(life.connection)):
+    with living(lives) as life:
+        for connection, site in engines(life.connection):
             for event in COUNTED:
                 request = SeriesRequest(tag_id, event, *period, points)
                 answer = series(connection, request, END, site)
@@ -85,20 +79,19 @@ def test_they_are_those_of_a_plain_list_on_either_engine(
             assert told(series(connection, request, END, site)) == expected
 
 
-@given(steps, st.tuples(periods, st.integers(1, 30)), st.integers(0, LATEST))
+@given(one_run, st.tuples(periods, st.integers(1, 30)), st.integers(0, LATEST))
 @settings(deadline=None, max_examples=40)
 def test_those_of_the_site_outlive_rows_that_were_deleted(
-    folder: Path,
-    copied: Copied,
+    living: Living,
+    engines: Engines,
     lives: list[tuple[str, Any]],
     asked: tuple[tuple[int, int], int],
     minute: int,
 ) -> None:
     period, points = asked
-    one_run = [step for step in lives if step[0] != "back"]
-    with lived(folder / f"{next(numbers)}.sqlite", one_run) as life:
+    with living(lives) as life:
         life.delete(BEGUN + minute * MINUTE)
-        for connection, site in ((life.connection, "local"), copied(life.connection)):
+        for connection, site in engines(life.connection):
             for event in COUNTED:
                 request = SeriesRequest(EVERY_TAG, event, *period, points)
                 answer = series(connection, request, END, site)

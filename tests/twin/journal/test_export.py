@@ -4,7 +4,6 @@ import math
 import sqlite3
 from contextlib import closing
 from dataclasses import replace
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lupin_twin.journal.export import LOT, Export, rows
+from lupin_twin.core.past import NotRemembered, PastRow
+from lupin_twin.core.state import Reading
+from lupin_twin.journal.queries import LOT, Export, rows
 from lupin_twin.journal.schema import open_reader
-from lupin_twin.past import NotRemembered, PastRow
-from lupin_twin.state import Reading
 from tests.support.log_life import (
     BEGUN,
     LATEST,
@@ -28,15 +27,9 @@ from tests.support.log_life import (
     scan,
     steps,
 )
-from tests.twin.journal.conftest import Copied
+from tests.twin.journal.conftest import Engines, Living
 
 END = BEGUN + (LATEST + 200) * MINUTE
-numbers = count()
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("export")
 
 
 def every(
@@ -48,25 +41,25 @@ def every(
 @given(steps, st.tuples(*[st.integers(0, LATEST)] * 2).map(sorted), st.sampled_from([None, "7"]))
 @settings(deadline=None, max_examples=40)
 def test_it_is_that_of_a_plain_list_on_either_engine(
-    folder: Path,
-    copied: Copied,
+    living: Living,
+    engines: Engines,
     told: list[tuple[str, Any]],
     minutes: list[int],
     tag_id: str | None,
 ) -> None:
     start_ns, end_ns = (BEGUN + minute * MINUTE for minute in minutes)
     with (
-        lived(folder / f"{next(numbers)}.sqlite", told) as life,
+        living(told) as life,
         pytest.MonkeyPatch.context() as patch,
     ):
-        patch.setattr("lupin_twin.journal.export._STRETCH", 64)
-        patch.setattr("lupin_twin.journal.export.LOT", 3)
+        patch.setattr("lupin_twin.journal.queries._STRETCH", 64)
+        patch.setattr("lupin_twin.journal.queries.LOT", 3)
         # What is no number is null in the log.
         expected = [
             row if math.isfinite(row.value) else replace(row, value=math.nan)
             for row in life.export(start_ns, end_ns, tag_id)
         ]
-        for connection, site in ((life.connection, "local"), copied(life.connection)):
+        for connection, site in engines(life.connection):
             lots = list(rows(connection, start_ns, end_ns, tag_id, site=site))
             assert repr([row for lot in lots for row in lot]) == repr(expected)
             assert all(0 < len(lot) <= 3 for lot in lots)
@@ -144,7 +137,7 @@ def test_what_comes_while_it_is_taken_is_read_too(tmp_path: Path) -> None:
 def test_what_is_deleted_meanwhile_breaks_it_off_and_only_if_it_was_to_come(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lupin_twin.journal.export._STRETCH", 400)
+    monkeypatch.setattr("lupin_twin.journal.queries._STRETCH", 400)
     total = 3_000
     with lived(tmp_path / "j.sqlite") as life:
         life.write(scan(at_ns=BEGUN + n * SECOND) for n in range(total))

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from lupin_twin.core.state import Reading
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
-from lupin_twin.state import Reading
 from tests.support.journal import (
     CLOCK,
     LIMITS,
@@ -112,7 +112,7 @@ def _overwrite_header(path: Path) -> None:
 
 
 @pytest.mark.parametrize(("damage", "at_least"), [(_truncate, 20), (_overwrite_header, 0)])
-def test_a_damaged_file_is_set_aside_and_read_as_far_as_it_goes(
+def test_a_damaged_file_is_quarantined_and_read_as_far_as_it_goes(
     path: Path, damage: object, at_least: int
 ) -> None:
     rows = [scan(str(tag), NOW + n, temperature=n / 7) for n in range(20) for tag in range(100)]
@@ -122,7 +122,7 @@ def test_a_damaged_file_is_set_aside_and_read_as_far_as_it_goes(
     damaged = path.read_bytes()
     with opened(path) as file:
         found = set(file.start(CLOCK, 1, is_believed=False).rows)
-        aside = Path(file.set_aside)
+        aside = Path(file.quarantined)
     assert found <= set(rows)
     assert len(found) >= at_least
     assert aside.name.startswith("j.sqlite.damaged-20")

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 
+from lupin_twin.core.state import Attempt, Reading, TagState
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.schema import open_reader
-from lupin_twin.state import Reading, TagState, Try
 from tests.support.journal import NOW, kept, opened, pin, scan
-from tests.support.replay import Heard, Step, steps
+from tests.support.replay import Received, Step, steps
 
 
 def shown(tag: TagState) -> object:
@@ -44,7 +44,7 @@ def test_as_of_a_moment_is_what_a_plain_replay_of_all_writes_up_to_then_leaves(
 ) -> None:
     path = folder / f"{next(_numbers)}.sqlite"
     with opened(path) as file:
-        heard = Heard(file, steps)
+        heard = Received(file, steps)
     with closing(open_reader(path)) as reader:
         for at_ns in heard.moments:
             found = state_at(reader, at_ns, "map")
@@ -94,5 +94,5 @@ def test_of_equal_stamps_what_came_later_counts(tmp_path: Path) -> None:
     other = scan(at_ns=NOW, source="other", temperature=5.0)
     kept(path, [before, scan(at_ns=NOW), failed, other])
     tag = at(path, NOW)["7"]
-    assert tag.last_try == Try(NOW)
+    assert tag.last_try == Attempt(NOW)
     assert tag.readings == (Reading("temperature", 5.0, NOW),)

@@ -11,10 +11,10 @@ import pytest
 
 from lupin_twin.journal import follow
 from lupin_twin.journal.follow import Followed, Lot, NotALotError
+from lupin_twin.journal.rebuild import upgrade
 from lupin_twin.journal.retention import Limits, purge_step
 from lupin_twin.journal.rows import Row
 from lupin_twin.journal.schema import open_reader, open_writer, transaction
-from lupin_twin.journal.upgrade import upgrade
 from tests.support.journal import NOW, SECOND, kept, look, pin, scan
 from tests.support.journal_answers import NAMES, answer, answers, old, same
 

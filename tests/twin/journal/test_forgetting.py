@@ -48,7 +48,7 @@ def twin(path: Path) -> Iterator[Bridge]:
 
 
 def journal(path: Path, action: str, *words: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "lupin_bridge.cli", "journal", action, *words]
+    command = [sys.executable, "-m", "lupin_bridge.cli.command", "journal", action, *words]
     return subprocess.run(
         [*command, "--journal", str(path)],
         capture_output=True,
@@ -90,7 +90,7 @@ def test_all_of_a_tag_is_forgotten_and_what_comes_later_is_kept(path: Path) -> N
     assert exported(path) == [*HOME, LOST]
     said = journal(path, "forget", LOST)
     assert (said.returncode, said.stderr) == (0, "")
-    assert "1 scans, 1 looks, 1 places; counts of the timeline still have them" in said.stdout
+    assert "1 scans, 1 inspections, 1 places; counts of the timeline still have them" in said.stdout
     assert exported(path) == [*HOME]
     with twin(path) as running:
         running.tag("3")

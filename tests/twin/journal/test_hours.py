@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -11,20 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lupin_twin.journal.hours import WrittenLook, WrittenScan, delete_before
+from lupin_twin.journal.hours import WrittenInspection, WrittenScan, delete_before
 from lupin_twin.journal.hours import count as count_rows
-from lupin_twin.journal.reading import numbers_of
-from lupin_twin.journal.site_log import SiteLog
+from lupin_twin.journal.rows import numbers_of
+from lupin_twin.journal.schema import SiteLog
 from tests.support.log_life import BEGUN, HOUR, MINUTE, lived, look, scan, steps
-from tests.twin.journal.conftest import Copied
+from tests.twin.journal.conftest import Copied, Living
 
-numbers = count()
 _DERIVED = ("hour", "tally", "event")
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("hours")
 
 
 def derived(log: SiteLog) -> list[list[tuple[Any, ...]]]:
@@ -44,14 +37,14 @@ def derived(log: SiteLog) -> list[list[tuple[Any, ...]]]:
 @given(steps, st.randoms(use_true_random=False))
 @settings(deadline=None, max_examples=30)
 def test_what_is_counted_in_another_order_on_the_other_engine_is_the_same(
-    folder: Path, copied: Copied, told: list[tuple[str, Any]], random: Any
+    living: Living, copied: Copied, told: list[tuple[str, Any]], random: Any
 ) -> None:
-    with lived(folder / f"{next(numbers)}.sqlite", told) as life:
+    with living(told) as life:
         log = SiteLog(life.connection)
         archive = SiteLog(*copied(life.connection))
         for table in _DERIVED:
             archive.execute(f"DELETE FROM {table} WHERE site = :site")
-        found: list[WrittenScan | WrittenLook] = [
+        found: list[WrittenScan | WrittenInspection] = [
             WrittenScan(run, series, kind, stamp_ns, status, numbers_of([readings])[0])
             for run, series, kind, stamp_ns, status, readings in log.execute(
                 "SELECT run, scan.series, kind, stamp_ns, status, readings FROM scan"
@@ -59,7 +52,7 @@ def test_what_is_counted_in_another_order_on_the_other_engine_is_the_same(
             )
         ]
         found += [
-            WrittenLook(run, tag, seq, stamp_ns, bool(anomaly), bug_count)
+            WrittenInspection(run, tag, seq, stamp_ns, bool(anomaly), bug_count)
             for run, tag, seq, stamp_ns, anomaly, bug_count in log.execute(
                 "SELECT run, tag, seq, stamp_ns, anomaly, bug_count FROM look WHERE is_copy = 0"
             )
@@ -71,7 +64,7 @@ def test_what_is_counted_in_another_order_on_the_other_engine_is_the_same(
             count_rows(
                 archive,
                 [row for row in lot if isinstance(row, WrittenScan)],
-                [row for row in lot if isinstance(row, WrittenLook)],
+                [row for row in lot if isinstance(row, WrittenInspection)],
             )
         *there, there_sums = derived(archive)
         *here, here_sums = derived(log)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.journal.lock import InUse, Lock, holder_of
+from lupin_twin.journal.beside import InUse, Lock, holder_of
 
 
 def test_a_second_holder_is_refused_by_name(tmp_path: Path) -> None:

@@ -2,9 +2,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from lupin_twin.journal.overview import overview
+from lupin_twin.core.past import HOUR_NS
+from lupin_twin.journal.checking import overview
 from lupin_twin.journal.retention import DAY_NS, Limits, note_limits
-from lupin_twin.past import HOUR_NS
 from tests.support.log_life import BEGUN, SECOND, failure, lived, look, pin, scan
 
 

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from lupin_twin.journal.pending import Entry, Pending
+from lupin_twin.journal.writer import Entry, Pending
 from tests.support.journal import scan
 
 

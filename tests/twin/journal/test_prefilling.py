@@ -5,10 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.journal.appending import PURGED_SEQ
-from lupin_twin.journal.condition import JournalState
-from lupin_twin.journal.lock import InUse, Lock
-from lupin_twin.journal.prefilling import Stretch, is_empty, prefill, simulated
+from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.journal.appending import PURGED_SEQ, Stretch, is_empty, prefill, simulated
+from lupin_twin.journal.beside import InUse, Lock
 from lupin_twin.journal.rows import Row
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.salvage import quarantine
@@ -54,7 +53,11 @@ def test_a_journal_that_is_not_there_gets_a_past_that_goes_on(tmp_path: Path) ->
     assert filled(path)
     assert is_whole(path)
     assert mark(path) == (START, NOW)
-    assert {type(row).__name__ for row in known(path, CLOCK)} == {"PinRow", "ScanRow", "LookRow"}
+    assert {type(row).__name__ for row in known(path, CLOCK)} == {
+        "PinRow",
+        "ScanRow",
+        "InspectionRow",
+    }
     # Past and present are one run of the clock.
     kept(path, [scan(at_ns=NOW + SECOND)], CLOCK)
     assert select(path, "SELECT run, begun_stamp_ns FROM run") == [(1, START)]

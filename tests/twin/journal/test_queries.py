@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lupin_twin.core.past import HOUR_NS, MAX_POINTS, SeriesPast, SeriesRequest
+from lupin_twin.core.state import Reading
 from lupin_twin.journal.queries import newest, series
-from lupin_twin.past import HOUR_NS, MAX_POINTS, SeriesPast, SeriesRequest
-from lupin_twin.state import Reading
 from tests.support.log_life import (
     BEGUN,
     LATEST,
@@ -21,19 +20,14 @@ from tests.support.log_life import (
     check,
     lived,
     look,
+    one_run,
     periods,
     scan,
     steps,
 )
-from tests.twin.journal.conftest import Copied
+from tests.twin.journal.conftest import Engines, Living
 
 END = BEGUN + (LATEST + 200) * MINUTE
-numbers = count()
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("series")
 
 
 def temperature(start_ns: int = 0, end_ns: int = 0, points: int = 500) -> SeriesRequest:
@@ -43,15 +37,15 @@ def temperature(start_ns: int = 0, end_ns: int = 0, points: int = 500) -> Series
 @given(steps, st.tuples(periods, st.integers(1, 40)), st.sampled_from(["temperature", "co2"]))
 @settings(deadline=None, max_examples=40)
 def test_it_is_that_of_a_plain_list_on_either_engine(
-    folder: Path,
-    copied: Copied,
+    living: Living,
+    engines: Engines,
     told: list[tuple[str, Any]],
     asked: tuple[tuple[int, int], int],
     sensor: str,
 ) -> None:
     period, points = asked
-    with lived(folder / f"{next(numbers)}.sqlite", told) as life:
-        for where in ((life.connection, "local"), copied(life.connection)):
+    with living(told) as life:
+        for where in engines(life.connection):
             for tag_id in ("7", "ü 9"):
                 request = SeriesRequest(tag_id, sensor, *period, points)
                 answer = series(where[0], request, END, where[1])
@@ -66,23 +60,22 @@ def test_it_is_that_of_a_plain_list_on_either_engine(
                 assert newest(where[0], ended, points, where[1]) == finite[-points:]
 
 
-@given(steps, st.tuples(periods, st.integers(1, 40)), st.integers(0, LATEST))
+@given(one_run, st.tuples(periods, st.integers(1, 40)), st.integers(0, LATEST))
 @settings(deadline=None, max_examples=40)
 def test_hours_stay_where_rows_were_deleted(
-    folder: Path,
-    copied: Copied,
+    living: Living,
+    engines: Engines,
     told: list[tuple[str, Any]],
     asked: tuple[tuple[int, int], int],
     minute: int,
 ) -> None:
     period, points = asked
-    one_run = [step for step in told if step[0] != "back"]
-    with lived(folder / f"{next(numbers)}.sqlite", one_run) as life:
+    with living(told) as life:
         everything = life.readings("7", "temperature")
         life.delete(BEGUN + minute * MINUTE)
         # A reading that is no number has left no trace in an hour, and so no beginning of all.
         if period[0] or all(math.isfinite(value) for *_, value in everything):
-            for connection, site in ((life.connection, "local"), copied(life.connection)):
+            for connection, site in engines(life.connection):
                 request = temperature(*period, points)
                 check(series(connection, request, END, site), request, everything, now_ns=END)
 

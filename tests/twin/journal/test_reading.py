@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from lupin_twin.journal.reading import flower_of, numbers_of, sensor_names
+from lupin_twin.journal.rows import flower_of, numbers_of, sensor_names
 from lupin_twin.journal.schema import DamagedFile
 
 

@@ -6,19 +6,19 @@ from pathlib import Path
 
 import pytest
 
+from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal import retention
+from lupin_twin.journal.hours import deleted_ns
 from lupin_twin.journal.retention import (
     Limits,
     horizon_ns,
     note_lost,
     purge_step,
-    purged_ns,
     shrink_step,
     used_bytes,
 )
 from lupin_twin.journal.runs import FOREVER_NS, Carries, Clock
-from lupin_twin.journal.schema import open_reader, open_writer, transaction
-from lupin_twin.past import HOUR_NS
+from lupin_twin.journal.schema import SiteLog, open_reader, open_writer, transaction
 from tests.support.journal import CLOCK, NOW, SECOND, kept, look, opened, pin, restored, scan
 
 DAY = 24 * HOUR_NS
@@ -116,9 +116,9 @@ def test_numbers_go_on_when_everything_is_gone(path: Path, file: sqlite3.Connect
 
 
 def test_where_scans_were_given_up_is_known(file: sqlite3.Connection) -> None:
-    assert purged_ns(file, 1) == -1
+    assert deleted_ns(SiteLog(file), 1) == -1
     purge(file, Limits(1.0, ENOUGH), NOW + DAY + 10 * 60 * SECOND)
-    assert purged_ns(file, 1) == scans(file)[0] - 60 * SECOND
+    assert deleted_ns(SiteLog(file), 1) == scans(file)[0] - 60 * SECOND
 
 
 def test_what_is_kept_begins_with_the_log_and_behind_what_was_deleted_or_lost(
@@ -130,7 +130,7 @@ def test_what_is_kept_begins_with_the_log_and_behind_what_was_deleted_or_lost(
         note_lost(file, 1, NOW + 3)
     assert retention.kept(file) == ((NOW + 6, FOREVER_NS),)
     purge(file, Limits(1.0, ENOUGH), NOW + 2 * DAY)
-    assert retention.kept(file) == ((purged_ns(file, 1) + 1, FOREVER_NS),)
+    assert retention.kept(file) == ((deleted_ns(SiteLog(file), 1) + 1, FOREVER_NS),)
     # Another run holds what lies before the end of the first, and has lost nothing.
     file.close()
     with opened(path) as again:

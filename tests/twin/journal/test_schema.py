@@ -47,6 +47,18 @@ def test_a_reader_cannot_write(path: Path) -> None:
     connection.close()
 
 
+def test_an_index_that_an_earlier_release_did_not_make_is_made_and_no_damage(path: Path) -> None:
+    indexes = "SELECT name FROM sqlite_schema WHERE type = 'index' AND sql != '' ORDER BY name"
+    with closing(open_writer(path)) as connection:
+        whole = connection.execute(indexes).fetchall()
+        connection.execute("DROP INDEX scan_bare")
+    assert find_damage(path) is None
+    with closing(open_reader(path)) as connection:
+        assert connection.execute("SELECT count(*) FROM scan").fetchone() == (0,)
+    with closing(open_writer(path)) as connection:
+        assert connection.execute(indexes).fetchall() == whole
+
+
 def test_a_database_of_somebody_else_is_told_and_left(tmp_path: Path) -> None:
     foreign = tmp_path / "theirs.sqlite"
     connection = sqlite3.connect(foreign)

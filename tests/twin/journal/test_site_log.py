@@ -4,7 +4,7 @@ from pathlib import Path
 
 import psycopg
 
-from lupin_twin.journal.site_log import SiteLog
+from lupin_twin.journal.schema import SiteLog
 from tests.support.log_life import lived, scan
 from tests.twin.journal.conftest import Copied
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from lupin_twin.journal.beside import Syncing
 from lupin_twin.journal.schema import open_writer
-from lupin_twin.journal.syncing import Syncing
 from tests.support.waiting import wait_for
 
 

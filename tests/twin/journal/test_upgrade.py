@@ -14,13 +14,14 @@ from typing import NamedTuple
 
 import pytest
 
-from lupin_twin.journal.condition import JournalState
+from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.journal.rebuild import is_version3, upgrade
 from lupin_twin.journal.schema import open_reader
-from lupin_twin.journal.upgrade import is_version3, upgrade
 from lupin_twin.journal.writer import Journal
 from tests.support.journal_answers import answer, answers, old, same
 from tests.support.upgrade_child import CLOCK, LIMITS
 from tests.support.waiting import wait_for
+from tests.twin.journal.conftest import fail_on_a_full_disk
 
 
 class Usage(NamedTuple):
@@ -145,18 +146,8 @@ def test_on_a_full_disk_the_old_file_is_left_and_it_is_said(
 def test_a_disk_that_fills_meanwhile_leaves_the_old_file_as_it_was(tmp_path: Path) -> None:
     path = old("day", tmp_path)
     content = path.read_bytes()
-    # A file that may not grow fails as one on a full disk does.
-    program = (
-        "import resource, sys; from pathlib import Path;"
-        "from lupin_twin.journal.upgrade import upgrade;"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000));"
-        "upgrade(Path(sys.argv[1]), print)"
-    )
-    ended = subprocess.run(
-        [sys.executable, "-c", program, str(path)], check=False, capture_output=True, text=True
-    )
-    assert ended.returncode == 1
-    assert ended.stderr.splitlines()[-1].startswith("sqlite3.OperationalError: ")
+    code = "from lupin_twin.journal.rebuild import upgrade; upgrade(path, print)"
+    fail_on_a_full_disk(code, path, 50_000)
     assert path.read_bytes() == content
     assert names_in(tmp_path) == {"j.sqlite"}
 

@@ -2,18 +2,17 @@ from __future__ import annotations
 
 import shutil
 import sqlite3
-import subprocess
-import sys
 from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
-from lupin_twin.journal.lock import InUse, Lock
+from lupin_twin.journal.beside import InUse, Lock
+from lupin_twin.journal.rebuild import NotPossible, vacuum
 from lupin_twin.journal.schema import Empty, Foreign, open_reader, open_writer
-from lupin_twin.journal.vacuuming import NotPossible, vacuum
 from tests.support.journal import NOW, SECOND, is_whole, kept, known, pin, scan
+from tests.twin.journal.conftest import fail_on_a_full_disk
 
 
 class Usage(NamedTuple):
@@ -128,18 +127,8 @@ def test_what_an_interrupted_one_left_is_no_hindrance(path: Path) -> None:
 def test_a_disk_that_fills_meanwhile_leaves_the_file_as_it_was(path: Path) -> None:
     kept(path, [scan(at_ns=NOW + n * SECOND, a=n / 3) for n in range(5000, 9000)])
     rows = known(path)
-    # A file that may not grow fails as one on a full disk does.
-    program = (
-        "import resource, sys; from pathlib import Path;"
-        "from lupin_twin.journal.vacuuming import vacuum;"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000));"
-        "vacuum(Path(sys.argv[1]), 'a test', print)"
-    )
-    ended = subprocess.run(
-        [sys.executable, "-c", program, str(path)], check=False, capture_output=True, text=True
-    )
-    assert ended.returncode == 1
-    assert ended.stderr.splitlines()[-1].startswith("sqlite3.OperationalError: ")
+    code = "from lupin_twin.journal.rebuild import vacuum; vacuum(path, 'a test', print)"
+    fail_on_a_full_disk(code, path, 100_000)
     assert not path.with_name("j.sqlite.vacuum").exists()
     assert is_whole(path)
     assert known(path) == rows

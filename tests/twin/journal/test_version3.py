@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from lupin_twin.journal.checking import find_all_damage
+from lupin_twin.journal.rebuild import is_version3, upgrade
 from lupin_twin.journal.schema import open_reader
-from lupin_twin.journal.upgrade import is_version3, upgrade
 from tests.support.journal_answers import NAMES, answer, answers, old, same
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from lupin_twin.core.journal_condition import JournalState
 from lupin_twin.journal import writer
-from lupin_twin.journal.condition import JournalState
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rows import Row
@@ -124,18 +124,18 @@ def test_a_database_of_somebody_else_is_told_and_left(path: Path) -> None:
     assert path.read_bytes() == before
 
 
-def test_a_damaged_file_is_set_aside_and_the_twin_goes_on(path: Path) -> None:
+def test_a_damaged_file_is_quarantined_and_the_twin_goes_on(path: Path) -> None:
     path.parent.mkdir()
     path.write_text("nothing of the kind" * 1000)
     with recording(path) as journal:
         journal.write(scan())
         wait_for(lambda: journal.condition.written == 1, "the row")
-        condition = wait_state(journal, JournalState.RECORDING, "set aside as")
+        condition = wait_state(journal, JournalState.RECORDING, "quarantined as")
         assert Path(condition.set_aside).read_text() == "nothing of the kind" * 1000
     assert known(path) == {scan()}
 
 
-def test_damage_that_is_met_while_it_records_has_the_file_set_aside_too(
+def test_damage_that_is_met_while_it_records_has_the_file_quarantined_too(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     append = JournalFile.append
@@ -149,7 +149,7 @@ def test_damage_that_is_met_while_it_records_has_the_file_set_aside_too(
         wait_for(lambda: journal.condition.written == 1, "the row")
         monkeypatch.setattr(JournalFile, "append", meet_damage)
         journal.write(scan("2"))
-        condition = wait_state(journal, JournalState.RECORDING, "set aside as")
+        condition = wait_state(journal, JournalState.RECORDING, "quarantined as")
         assert Path(condition.set_aside).exists()
         wait_for(lambda: journal.condition.written == 2, "the row after it")
     assert known(path) == {scan("1"), scan("2")}

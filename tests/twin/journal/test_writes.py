@@ -5,14 +5,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lupin_twin.journal.writes import recent, writes
-from lupin_twin.past_writes import (
+from lupin_twin.core.writes import (
     PastWrite,
     PastWrites,
     RecentRequest,
     WritesRequest,
     recent_of,
 )
+from lupin_twin.journal.follow import recent, writes
 from tests.support.log_life import BEGUN, SECOND, Life, failure, lived, look, pin, scan
 from tests.twin.journal.conftest import Copied
 

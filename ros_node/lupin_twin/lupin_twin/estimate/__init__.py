@@ -3,14 +3,11 @@
 Pure: numpy and the standard library only.
 """
 
-from lupin_twin.estimate.advice import Place
-from lupin_twin.estimate.cells import EstimateGrid
-from lupin_twin.estimate.fitting import FitFailed
-from lupin_twin.estimate.left_out import Change
-from lupin_twin.estimate.model import SDS_OF_IDEAL, Model, fit
-from lupin_twin.estimate.neighbours import MAX_EXACT, PER_TAG
-from lupin_twin.estimate.posterior import Posterior
-from lupin_twin.estimate.readings import MAX_PER_TAG, Readings
+from lupin_twin.estimate.cholesky import MAX_EXACT, PER_TAG
+from lupin_twin.estimate.cross_validation import Change, Place
+from lupin_twin.estimate.kernel import MAX_PER_TAG, Readings
+from lupin_twin.estimate.model import SDS_OF_IDEAL, FitFailed, Model, fit
+from lupin_twin.estimate.posterior import EstimateGrid, Posterior
 
 __all__ = [
     "MAX_EXACT",

@@ -1,4 +1,9 @@
-"""From readings to a model, and from a model to an estimate as of a moment. Pure, immutable."""
+"""From readings to a model, and from a model to an estimate as of a moment. Pure, immutable.
+
+The kernel's most probable parameters: maximum a posteriori by BFGS with the analytic gradient
+(Rasmussen and Williams, "Gaussian Processes for Machine Learning", 2006, 5.9). Coordinates are
+those in which the prior is a standard normal: (log parameter - log median) / sd of the log.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +14,103 @@ from typing import Final
 
 import numpy as np
 
-from lupin_twin.estimate import fitting
-from lupin_twin.estimate.kernel import Hyper, Pairs
+from lupin_twin.estimate.kernel import (
+    PRIOR_LOG_SD,
+    PRIOR_MEDIAN,
+    Hyper,
+    Pairs,
+    Readings,
+    Scale,
+    scale_of,
+)
 from lupin_twin.estimate.posterior import INFLATION, Posterior
-from lupin_twin.estimate.readings import Readings, Scale, scale_of
-from lupin_twin.idw import never
+from lupin_twin.field.grid import FloatArray
+from lupin_twin.field.idw import Abandoned, never
+
+_MAX_STEPS: Final = 60
+# Half a thousandth of a unit of log probability changes nothing that anybody could see.
+_GOOD_ENOUGH: Final = 5e-4
+_SHORTEST: Final = 1e-3
+# Beyond, exp() is past what floats can multiply.
+_FARTHEST: Final = 12.0
+_LOG_MEDIAN: Final = np.log(np.array(PRIOR_MEDIAN))
+_LOG_SD: Final = np.array(PRIOR_LOG_SD)
+
+Objective = Callable[[FloatArray], tuple[float, FloatArray]]
+
+
+class FitFailed(RuntimeError):
+    """No parameters were found; the message says why."""
+
+
+def hyper_of(coordinates: FloatArray) -> Hyper:
+    """The parameters at a place."""
+    return Hyper(*np.exp(_LOG_MEDIAN + _LOG_SD * coordinates).tolist())
+
+
+def surprise(pairs: Pairs, y: FloatArray, should_stop: Callable[[], bool] = never) -> Objective:
+    """Minus the log of the posterior density, but for a constant, and its gradient.
+
+    The density of covariances that cannot be factorised, or whose numbers are past what floats
+    hold, is taken to be 0. When `should_stop` says so, it raises `Abandoned`.
+    """
+
+    def at(coordinates: FloatArray) -> tuple[float, FloatArray]:
+        if should_stop():
+            raise Abandoned
+        h = hyper_of(coordinates)
+        try:
+            covariance = pairs.covariance(h)
+            root = np.linalg.cholesky(covariance)
+            inverse = np.linalg.inv(covariance)
+        except np.linalg.LinAlgError:
+            return np.inf, coordinates
+        alpha = inverse @ y
+        value = 0.5 * (y @ alpha + coordinates @ coordinates) + np.log(np.diagonal(root)).sum()
+        weights = inverse - np.outer(alpha, alpha)
+        slope = _LOG_SD * pairs.gradient(h, weights) + coordinates
+        if not (np.isfinite(value) and np.isfinite(slope).all()):
+            return np.inf, coordinates
+        return float(value), slope
+
+    return at
+
+
+def minimise(objective: Objective, start: FloatArray) -> FloatArray:
+    """BFGS (Nocedal and Wright, "Numerical Optimization", 2006, 6.1) with halved steps.
+
+    Raises:
+        FitFailed: not even the start has a density.
+
+    """
+    place = start
+    value, slope = objective(place)
+    if not np.isfinite(value):
+        raise FitFailed("the readings' covariance is singular at the prior's own median")
+    curvature = np.eye(len(place))  # the inverse Hessian, as far as it is known
+    for _ in range(_MAX_STEPS):
+        step = -curvature @ slope
+        gain = float(slope @ step)
+        if -gain < _GOOD_ENOUGH:
+            break
+        step *= min(1.0, 2.0 / float(np.abs(step).max()))  # a prior's two sds at a time
+        share, there = 1.0, place
+        while True:
+            there = np.clip(place + share * step, -_FARTHEST, _FARTHEST)
+            new_value, new_slope = objective(there)
+            if new_value <= value + 1e-4 * share * gain or share < _SHORTEST:
+                break
+            share /= 2.0
+        if not new_value < value:
+            break
+        moved, turned = there - place, new_slope - slope
+        along = float(moved @ turned)
+        if along > 1e-10:
+            left = np.eye(len(place)) - np.outer(moved, turned) / along
+            curvature = left @ curvature @ left.T + np.outer(moved, moved) / along
+        place, value, slope = there, new_value, new_slope
+    return place
+
 
 # The parameters of a greenhouse are as well known from these as from more.
 MAX_FITTED: Final = 150
@@ -50,7 +147,7 @@ class Model:
     ) -> Posterior:
         """What the readings say of the moment `at_s` (ROS time, s), everywhere.
 
-        What is asked of it raises `numpy.linalg.LinAlgError` if the readings' covariance is
+        Its methods raise `numpy.linalg.LinAlgError` if the readings' covariance is
         singular, as far as floats can tell.
 
         Raises:
@@ -82,7 +179,7 @@ def fit(
     Raises:
         ValueError: no readings, a day that is not longer than 0.
         FitFailed: the readings do not let themselves be fitted.
-        lupin_twin.idw.Abandoned: `should_stop`, asked at each step, said so.
+        lupin_twin.field.idw.Abandoned: `should_stop`, called at each step, was true.
 
     """
     if not day_length_s > 0.0:
@@ -90,10 +187,10 @@ def fit(
     scale = scale_of(readings.value, ideal)
     some = _some(readings, day_length_s)
     pairs = Pairs(some, day_length_s)
-    objective = fitting.surprise(pairs, scale.standardised(some.value), should_stop)
-    best = fitting.minimise(objective, np.zeros(len(Hyper._fields)))
+    objective = surprise(pairs, scale.standardised(some.value), should_stop)
+    best = minimise(objective, np.zeros(len(Hyper._fields)))
     limit = scale.spread if ideal is None else (ideal[1] - ideal[0]) / SDS_OF_IDEAL
-    return Model(scale, limit, day_length_s, fitting.hyper_of(best))
+    return Model(scale, limit, day_length_s, hyper_of(best))
 
 
 def _some(readings: Readings, day_length_s: float) -> Readings:

@@ -10,16 +10,33 @@ from __future__ import annotations
 import json
 import math
 import sqlite3
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from contextlib import closing
 from dataclasses import replace
-from typing import Final
+from pathlib import Path
+from typing import Final, NamedTuple
 
-from lupin_twin.journal.hours import WrittenLook, WrittenScan, count
-from lupin_twin.journal.reading import sensor_names
-from lupin_twin.journal.rows import KIND_FLOWER, LookRow, PinRow, Row, ScanRow, weight
-from lupin_twin.journal.schema import LOCAL_SITE, get_meta
-from lupin_twin.journal.site_log import SiteLog
-from lupin_twin.state import Flower
+from lupin_twin.core.state import Flower
+from lupin_twin.journal.beside import Lock
+from lupin_twin.journal.hours import WrittenInspection, WrittenScan, count
+from lupin_twin.journal.rows import (
+    KIND_FLOWER,
+    InspectionRow,
+    PinRow,
+    Row,
+    ScanRow,
+    sensor_names,
+    weight,
+)
+from lupin_twin.journal.runs import Clock, Run, put_run
+from lupin_twin.journal.schema import (
+    LOCAL_SITE,
+    SiteLog,
+    get_meta,
+    open_writer,
+    set_meta,
+    transaction,
+)
 
 PURGED_SEQ: Final = "purged_seq"
 # The numbers go on from here at least: rows that had later ones are gone.
@@ -82,7 +99,7 @@ class Appender:
         self._waiting: dict[str, list[tuple[object, ...]]] = {table: [] for table in _ADD}
         self._waiting_weight = 0
         self._scans: list[WrittenScan] = []
-        self._looks: list[WrittenLook] = []
+        self._inspections: list[WrittenInspection] = []
 
     def append(self, run: int, rows: Iterable[Row], *, are_copies: bool = False) -> int:
         """Take in what is not there yet; returns how many rows that were."""
@@ -102,9 +119,9 @@ class Appender:
             if rows:
                 self._connection.executemany(_ADD[table], rows)
                 rows.clear()
-        if self._scans or self._looks:
-            count(SiteLog(self._connection), self._scans, self._looks)
-            self._scans, self._looks = [], []
+        if self._scans or self._inspections:
+            count(SiteLog(self._connection), self._scans, self._inspections)
+            self._scans, self._inspections = [], []
 
     # --- the three kinds ----------------------------------------------------------------------
 
@@ -118,8 +135,8 @@ class Appender:
                 (self.last_seq, run, tag, row.stamp_ns, row.arrival_ns, *numbers, is_copy)
             )
             return True
-        if isinstance(row, LookRow):
-            return self._put_look(run, tag, row, is_copy)
+        if isinstance(row, InspectionRow):
+            return self._put_inspection(run, tag, row, is_copy)
         return self._put_scan(run, tag, row, is_copy)
 
     def _put_scan(self, run: int, tag: str, scan: ScanRow, is_copy: int) -> bool:
@@ -160,9 +177,9 @@ class Appender:
             self._scans.append(WrittenScan(run, series, scan.kind, stamp_ns, scan.status, values))
         return True
 
-    def _put_look(self, run: int, tag: str, look: LookRow, is_copy: int) -> bool:
+    def _put_inspection(self, run: int, tag: str, inspection: InspectionRow, is_copy: int) -> bool:
         group = self._group(run, tag, KIND_FLOWER)
-        source, key = _unicode(look.source), look.own_stamp_ns or look.stamp_ns
+        source, key = _unicode(inspection.source), inspection.own_stamp_ns or inspection.stamp_ns
         if is_copy or key > group.newest_ns:
             group.newest_ns = max(group.newest_ns, key)
         else:
@@ -171,17 +188,17 @@ class Appender:
                 return False
         self.last_seq += 1
         self._series(group, run, tag, KIND_FLOWER, ())
-        flower = look.flower
+        flower = inspection.flower
         self._waiting["look"].append(
             (
                 self.last_seq,
                 run,
                 tag,
-                look.stamp_ns,
-                look.own_stamp_ns,
-                look.arrival_ns,
+                inspection.stamp_ns,
+                inspection.own_stamp_ns,
+                inspection.arrival_ns,
                 source,
-                _unicode(look.mission),
+                _unicode(inspection.mission),
                 _unicode(flower.species),
                 flower.confidence,
                 int(flower.anomaly),
@@ -193,9 +210,9 @@ class Appender:
             )
         )
         if not is_copy:
-            self._looks.append(
-                WrittenLook(
-                    run, tag, self.last_seq, look.stamp_ns, flower.anomaly, flower.bug_count
+            self._inspections.append(
+                WrittenInspection(
+                    run, tag, self.last_seq, inspection.stamp_ns, flower.anomaly, flower.bug_count
                 )
             )
         return True
@@ -207,17 +224,17 @@ class Appender:
     ) -> tuple[int, int | None, set[str]] | None:
         """The stamps of the write that is known by `key`, and its sensors; None: there is none."""
         run, tag, kind = at
-        asked = {
+        query = {
             "site": LOCAL_SITE, "run": run, "tag": tag, "key": key, "source": source, "series": 0,
         }  # fmt: skip
         execute = self._connection.execute
-        if kind == KIND_FLOWER and execute(_KNOWN_LOOK, asked).fetchone() is not None:
+        if kind == KIND_FLOWER and execute(_KNOWN_LOOK, query).fetchone() is not None:
             return 0, None, set()
         stamps: tuple[int, int | None] | None = None
         sensors: set[str] = set()
         for names, series in self._group(run, tag, kind).series.items():
-            asked["series"] = series
-            found = execute(_KNOWN_SCAN, asked).fetchone()
+            query["series"] = series
+            found = execute(_KNOWN_SCAN, query).fetchone()
             if found is not None:
                 stamps = found
                 sensors.update(names)
@@ -227,12 +244,12 @@ class Appender:
         group = self._groups.get((run, tag, kind))
         if group is None:
             if len(self._groups) >= _MAX_AT_HAND:
+                self.flush()
                 self._groups.clear()
             group = self._groups[run, tag, kind] = self._look_up(run, tag, kind)
         return group
 
     def _look_up(self, run: int, tag: str, kind: int) -> _Group:
-        self.flush()
         execute = self._connection.execute
         found = execute(
             "SELECT series, sensors FROM series WHERE site = ? AND run = ? AND tag = ?"
@@ -308,3 +325,58 @@ def held(row: Row, begun_ns: int, *, keeps_key: bool) -> Row:
         return replace(row, stamp_ns=begun_ns)
     own_ns = (row.own_stamp_ns or row.stamp_ns) if keeps_key else KNOWN_BY_NOTHING
     return replace(row, stamp_ns=begun_ns, own_stamp_ns=own_ns)
+
+
+_FROM: Final = "simulated_from_ns"
+_UNTIL: Final = "simulated_until_ns"
+_LOT: Final = 1_000
+
+
+class Stretch(NamedTuple):
+    """From one moment of ROS time to another, ns."""
+
+    start_ns: int
+    end_ns: int
+
+
+def is_empty(connection: sqlite3.Connection) -> bool:
+    """Whether nothing was ever observed into a journal."""
+    return not Appender(connection).last_seq
+
+
+def prefill(path: Path, holder: str, rows: Sequence[Row], until_ns: int) -> bool:
+    """Write rows of wall time into a journal that is new or empty, all or none.
+
+    `rows` are in the order of their stamps, all before `until_ns`. Returns whether it was done:
+    into a journal that anybody has ever recorded, nothing is written.
+
+    Raises:
+        InUse: a twin has it.
+        Foreign, DamagedFile, sqlite3.Error, OSError: it cannot be written.
+
+    """
+    if not rows:
+        return False
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    with Lock(path, holder), closing(open_writer(path)) as connection:
+        if not is_empty(connection):
+            return False
+        first = rows[0]
+        with transaction(connection):
+            # Of twins that have received nothing.
+            connection.execute("DELETE FROM run")
+            put_run(connection, Run(1, Clock(first.stamp_ns, first.arrival_ns, False), 1))
+            appender = Appender(connection)
+            for start in range(0, len(rows), _LOT):
+                appender.append(1, rows[start : start + _LOT])
+                appender.flush()
+            set_meta(connection, _FROM, first.stamp_ns)
+            set_meta(connection, _UNTIL, until_ns)
+        connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+    return True
+
+
+def simulated(connection: sqlite3.Connection) -> Stretch | None:
+    """The stretch of a journal that was filled in, None if nothing was."""
+    start_ns, end_ns = get_meta(connection, _FROM), get_meta(connection, _UNTIL)
+    return Stretch(int(start_ns), int(end_ns)) if start_ns and end_ns else None

@@ -1,5 +1,5 @@
 # ruff: noqa: S608  # SQL is put together of constants
-"""Is a journal what was written? Its structure, what rows refer to, hours against their scans.
+"""Is a journal what was written, and what is in it? Reads alone, also while a twin records.
 
 SQLite keeps no checksums: a digit that has flipped in a reading shows in its hour alone, which was
 counted as the scan was written.
@@ -10,26 +10,30 @@ from __future__ import annotations
 import json
 import math
 import sqlite3
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import closing
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-from lupin_twin.journal.hours import is_counted
-from lupin_twin.journal.reading import numbers_of
-from lupin_twin.journal.retention import purged_ns
+from lupin_twin.core.past import HOUR_NS
+from lupin_twin.journal.hours import deleted_ns, is_counted
+from lupin_twin.journal.retention import KEPT_BYTES, KEPT_NS, records
+from lupin_twin.journal.rows import numbers_of, sensor_names
+from lupin_twin.journal.runs import Run, runs
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
     DamagedFile,
     Empty,
     Foreign,
+    SiteLog,
+    get_meta,
     open_reader,
     says_damaged,
 )
-from lupin_twin.past import HOUR_NS
 
-# A lot is one short look at the file: a check that takes minutes must not keep the log growing.
+# A lot is one short read of the file: a check that takes minutes must not keep the log growing.
 _ROWS: Final = 5_000
 _MAX_STRUCTURE: Final = 100
 # So many hours, spread over all of them, are held against their scans: some seconds' worth.
@@ -78,21 +82,21 @@ def find_damage(path: Path) -> str | None:
     return None if found == "ok" else str(found)
 
 
-def find_all_damage(connection: sqlite3.Connection, tell: Progress) -> Generator[str, None, None]:
+def find_all_damage(connection: sqlite3.Connection, report: Progress) -> Generator[str, None, None]:
     """Everything that is wrong with a journal, a sentence each, as it is found.
 
-    `tell(what, share)` is called as the work goes on, with the share of it that is done. What lies
-    on pages that cannot be read is reported once, with the table that it ends the reading of.
+    `report(what, share)` is called as the work goes on, with the share that is done. What lies on
+    pages that cannot be read is reported once, with the table that it ends the reading of.
 
     Raises:
         sqlite3.OperationalError: somebody interrupts it; that is no damage.
 
     """
-    tell("structure", 0.0)
+    report("structure", 0.0)
     parts: dict[str, Callable[[], Iterator[str]]] = {
         "structure": partial(_structure, connection),
-        **{table: partial(_rows, connection, table, tell) for table in _WRONG},
-        "hour": partial(_hours, connection, tell),
+        **{table: partial(_rows, connection, table, report) for table in _WRONG},
+        "hour": partial(_hours, connection, report),
     }
     for what, read in parts.items():
         try:
@@ -119,8 +123,8 @@ def _structure(connection: sqlite3.Connection) -> Iterator[str]:
         yield f"run {number} joins run {joins}, which is missing"
 
 
-def _rows(connection: sqlite3.Connection, table: str, tell: Progress) -> Iterator[str]:
-    tell(table, 0.0)
+def _rows(connection: sqlite3.Connection, table: str, report: Progress) -> Iterator[str]:
+    report(table, 0.0)
     sites = connection.execute(f"SELECT site, min(seq), max(seq) FROM {table} GROUP BY site")
     for site, first, last in sites.fetchall():
         after = first - 1
@@ -133,12 +137,12 @@ def _rows(connection: sqlite3.Connection, table: str, tell: Progress) -> Iterato
                 f"SELECT min(seq) FROM {table} WHERE site = :site AND seq > :until", within
             ).fetchone()
             after = last if following is None else following - 1
-            tell(table, (after - first + 1) / (last - first + 1))
-    tell(table, 1.0)
+            report(table, (after - first + 1) / (last - first + 1))
+    report(table, 1.0)
 
 
-def _hours(connection: sqlite3.Connection, tell: Progress) -> Iterator[str]:
-    tell("hour", 0.0)
+def _hours(connection: sqlite3.Connection, report: Progress) -> Iterator[str]:
+    report("hour", 0.0)
     (count,) = connection.execute("SELECT count(*) FROM hour").fetchone()
     stride, seen = -(-count // _COMPARED), 0
     every = connection.execute("SELECT site, series, run, tag FROM series").fetchall()
@@ -146,10 +150,10 @@ def _hours(connection: sqlite3.Connection, tell: Progress) -> Iterator[str]:
         for row in connection.execute(_HOURS_OF, (site, series)).fetchall():
             seen += 1
             # Of earlier hours some scans may have been deleted by age.
-            is_whole = row[0] > purged_ns(connection, run, site) // HOUR_NS
+            is_whole = row[0] > deleted_ns(SiteLog(connection, site), run) // HOUR_NS
             if seen % stride == 0 and is_whole and not _fits(connection, site, series, row):
                 yield f"hour {row[0]} of tag {tag!r} does not fit its scans"
-        tell("hour", done / len(every))
+        report("hour", done / len(every))
 
 
 _HOURS_OF: Final = (
@@ -180,3 +184,130 @@ def _fits(connection: sqlite3.Connection, site: str, series: int, row: tuple[Any
         return bool(texts) or not any(n)
     except (DamagedFile, ValueError, TypeError, IndexError, RecursionError):
         return False
+
+
+_COUNTED: Final = ("scan", "look", "place", "hour")
+
+
+@dataclass(frozen=True, slots=True)
+class RunExtent:
+    """A run, and its first and last stamp in ns of ROS time; None where nothing is left of it."""
+
+    run: Run
+    first_ns: int | None
+    last_ns: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Overview:
+    """What a journal holds.
+
+    `rows` counts by table, and `tag` by name; `failures` the scans that failed; copies are rows
+    too. `hours_ns` is the stretch of the hours of wall time. `kept_ns` and `kept_bytes` are the
+    limits that its last twin was given, 0 where none has said; `quarantined` names damaged journals
+    beside it, with their sizes; `forgotten` are the records of `forgetting`.
+    """
+
+    file_bytes: int
+    free_bytes: int
+    log_bytes: int
+    rows: dict[str, int]
+    failures: int
+    sensors: tuple[str, ...]
+    runs: tuple[RunExtent, ...]
+    hours_ns: tuple[int, int] | None
+    kept_ns: int
+    kept_bytes: int
+    quarantined: tuple[tuple[str, int], ...]
+    forgotten: tuple[Mapping[str, object], ...]
+
+
+def overview(connection: sqlite3.Connection, path: Path) -> Overview:
+    """What the journal at `path` holds, which the connection reads.
+
+    Raises:
+        sqlite3.Error: it cannot be read.
+
+    """
+    pages, free, size = (
+        int(connection.execute(f"PRAGMA {name}").fetchone()[0])
+        for name in ("page_count", "freelist_count", "page_size")
+    )
+    rows = {
+        table: int(connection.execute(f"SELECT count(*) FROM {table}").fetchone()[0])
+        for table in _COUNTED
+    }
+    (rows["tag"],) = connection.execute(
+        "SELECT count(*) FROM (SELECT tag FROM series UNION SELECT tag FROM place)"
+    ).fetchone()
+    # Its index has none but those.
+    (failures,) = connection.execute(
+        "SELECT count(*) FROM scan WHERE status != 0 AND is_copy = 0"
+    ).fetchone()
+    return Overview(
+        file_bytes=pages * size,
+        free_bytes=free * size,
+        log_bytes=_size(path.with_name(path.name + "-wal")),
+        rows=rows,
+        failures=int(failures),
+        sensors=_sensors(connection),
+        runs=_extents(connection),
+        hours_ns=_hours_extent(connection),
+        kept_ns=int(get_meta(connection, KEPT_NS) or 0),
+        kept_bytes=int(get_meta(connection, KEPT_BYTES) or 0),
+        quarantined=quarantined_beside(path),
+        forgotten=tuple(records(connection)),
+    )
+
+
+def quarantined_beside(path: Path) -> tuple[tuple[str, int], ...]:
+    """(name, bytes) of the damaged journals that were quarantined, the newest last."""
+    prefix = f"{path.name}.damaged-"
+    return tuple(
+        (file.name, _size(file))
+        for file in sorted(path.parent.iterdir())
+        if file.name.startswith(prefix) and not file.name.endswith(("-wal", "-shm"))
+    )
+
+
+def _sensors(connection: sqlite3.Connection) -> tuple[str, ...]:
+    names: set[str] = set()
+    for (text,) in connection.execute("SELECT DISTINCT sensors FROM series"):
+        names.update(sensor_names(text))
+    return tuple(sorted(names))
+
+
+# One step in the index for each series; an extent over all rows would read all of them.
+_EXTENTS: Final = (
+    "SELECT run, min(least), max(most) FROM ("
+    "SELECT run, (SELECT min(stamp_ns) FROM scan WHERE site = s.site AND series = s.series"
+    " AND is_copy = 0) AS least, (SELECT max(stamp_ns) FROM scan WHERE site = s.site"
+    " AND series = s.series AND is_copy = 0) AS most FROM series AS s UNION ALL"
+    " SELECT run, min(stamp_ns), max(stamp_ns) FROM look WHERE is_copy = 0 GROUP BY run"
+    ") GROUP BY run"
+)
+
+
+def _extents(connection: sqlite3.Connection) -> tuple[RunExtent, ...]:
+    found = {run: extent for run, *extent in connection.execute(_EXTENTS)}
+    return tuple(
+        RunExtent(run, *found.get(run.id, (None, None)))
+        for run in runs(connection.execute)
+        if run.joins is None
+    )
+
+
+def _hours_extent(connection: sqlite3.Connection) -> tuple[int, int] | None:
+    first, last = connection.execute(
+        "SELECT min((SELECT min(hour) FROM hour WHERE site = s.site AND series = s.series)),"
+        " max((SELECT max(hour) FROM hour WHERE site = s.site AND series = s.series))"
+        " FROM series AS s JOIN run ON run.site = s.site AND run.run = s.run WHERE NOT is_simulated"
+    ).fetchone()
+    return None if first is None else (first * HOUR_NS, (last + 1) * HOUR_NS)
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except FileNotFoundError:
+        return 0

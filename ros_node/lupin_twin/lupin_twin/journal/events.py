@@ -3,7 +3,7 @@
 
 The values are those of GetHistory.srv. Everything goes by spans: what a run has said of moments
 that another one holds is left out. At a tag all is read off its rows. Of the site scans, failures
-and looks come by the hour where they are many, or deleted; what is rare is kept one by one.
+and inspections come by the hour where they are many, or deleted; what is rare is kept one by one.
 """
 
 from __future__ import annotations
@@ -11,21 +11,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from statistics import median
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
-from lupin_twin.journal.hours import (
-    SILENCE_NS,
-    TALLIED,
-    Buckets,
-    deleted_ns,
-    extent,
-    silence_over,
-    whole_hours,
-)
-from lupin_twin.journal.reading import sensor_names
-from lupin_twin.journal.runs import FOREVER_NS, Run, Span, runs, spans
-from lupin_twin.journal.site_log import SiteLog
-from lupin_twin.past import (
+from lupin_twin.core.past import (
     EVERY_TAG,
     HOUR_NS,
     MAX_POINTS,
@@ -34,6 +22,19 @@ from lupin_twin.past import (
     SeriesRequest,
     grid,
 )
+from lupin_twin.journal.hours import (
+    SILENCE_NS,
+    TALLIED,
+    Buckets,
+    deleted_ns,
+    extent,
+    individually,
+    silence_over,
+    whole_hours,
+)
+from lupin_twin.journal.rows import sensor_names
+from lupin_twin.journal.runs import FOREVER_NS, Run, Span, cut, runs, spans
+from lupin_twin.journal.schema import SiteLog
 
 # A silence is longer than so many median intervals between the attempts of the period.
 INTERVALS: Final = 3
@@ -43,7 +44,8 @@ MAX_ROWS: Final = 50_000
 # The first and the last attempt of a stretch in which no gap matters.
 Extent = tuple[int, int]
 
-_FROM_SCAN: Final = (
+# What is no copy, of all tags or of one.
+FROM_SCAN: Final = (
     "FROM series CROSS JOIN scan WHERE series.site = :site AND run = :run{tag}"
     " AND scan.site = :site AND scan.series = series.series"
     " AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
@@ -58,13 +60,13 @@ _FROM_EVENT: Final = (
 )
 # What has the value of an event, and where the rows are.
 _ROWS: Final = {
-    Event.SCANS: ("sensors", f"{_FROM_SCAN} AND kind = 0 AND status = 0"),
-    Event.FAILURES: ("status", f"{_FROM_SCAN} AND status != 0"),
+    Event.SCANS: ("sensors", f"{FROM_SCAN} AND kind = 0 AND status = 0"),
+    Event.FAILURES: ("status", f"{FROM_SCAN} AND status != 0"),
     Event.LOOKS: ("bug_count", _FROM_LOOK),
     Event.PESTS_SEEN: ("value", _FROM_EVENT),
     Event.PESTS_CLEARED: ("value", _FROM_EVENT),
 }
-_STAMPS: Final = f"SELECT stamp_ns {_FROM_SCAN} UNION ALL SELECT stamp_ns {_FROM_LOOK}"
+_STAMPS: Final = f"SELECT stamp_ns {FROM_SCAN} UNION ALL SELECT stamp_ns {_FROM_LOOK}"
 # A few steps in the index for each series.
 _IN_SERIES: Final = (
     "(SELECT {0}(stamp_ns) FROM scan WHERE site = s.site AND series = s.series"
@@ -86,9 +88,8 @@ _SILENCES: Final = (
 
 
 def events(log: SiteLog, request: SeriesRequest, now_ns: int) -> SeriesPast:
-    """The events that are asked for, see GetHistory.srv."""
-    is_site = request.tag_id == EVERY_TAG
-    source: _Source = _OfSite(log) if is_site else _OfTag(log, request.tag_id)
+    """The events that are requested, see GetHistory.srv."""
+    source = _Source(log, None if request.tag_id == EVERY_TAG else request.tag_id)
     axis = spans(runs(log.execute, log.site))
     # What is of this very moment counts as past.
     end_ns = max(request.end_ns or now_ns + 1, request.start_ns)
@@ -103,22 +104,13 @@ def events(log: SiteLog, request: SeriesRequest, now_ns: int) -> SeriesPast:
         case Event.SILENCES:
             found = list(_silences(source, axis, period, now_ns))
             if len(found) <= request.max_points:
-                return _individually(found, *period)
+                return individually(found, *period)
             buckets = Buckets(grid(*period, request.max_points))
             for at_ns, length_s in found:
                 buckets.add_value(at_ns, length_s)
             return buckets.past()
     assert request.event is not None
     return _happened(source, request.event, axis, period, request.max_points)
-
-
-def cut(axis: Iterable[Span], start_ns: int, end_ns: int) -> list[Span]:
-    """The spans of a period, cut to it."""
-    return [
-        Span(span.run, max(span.start_ns, start_ns), min(span.end_ns, end_ns))
-        for span in axis
-        if max(span.start_ns, start_ns) < min(span.end_ns, end_ns)
-    ]
 
 
 def _happened(
@@ -128,25 +120,19 @@ def _happened(
     if not any(source.is_deleted(event, span) for span in within):
         entries: list[tuple[int, int, int]] = []
         for span in within:
-            entries += source.rows.entries(event, span, max_points + 1 - len(entries))
+            entries += source.entries(event, span, max_points + 1 - len(entries))
             if len(entries) > max_points:
                 break
         else:
             entries.sort()
-            return _individually([(at_ns, float(value)) for at_ns, _, value in entries], *period)
-    told = grid(*period, max_points)
-    if told.bucket_ns < HOUR_NS and source.is_hourly(event, within):
-        told = grid(*period, max_points, HOUR_NS)
-    buckets = Buckets(told)
-    for span in cut(axis, told.start_ns, told.end_ns):
+            return individually([(at_ns, float(value)) for at_ns, _, value in entries], *period)
+    steps = grid(*period, max_points)
+    if steps.bucket_ns < HOUR_NS and source.is_hourly(event, within):
+        steps = grid(*period, max_points, HOUR_NS)
+    buckets = Buckets(steps)
+    for span in cut(axis, steps.start_ns, steps.end_ns):
         source.count(buckets, event, span)
     return buckets.past()
-
-
-def _individually(found: Sequence[tuple[int, float]], start_ns: int, end_ns: int) -> SeriesPast:
-    values = tuple(value for _, value in found)
-    stamps = tuple(stamp_ns for stamp_ns, _ in found)
-    return SeriesPast(start_ns, end_ns, None, stamps, (1,) * len(found), values, values, values)
 
 
 def _runs(found: Sequence[Span], start_ns: int, end_ns: int) -> SeriesPast:
@@ -219,42 +205,32 @@ def _last(source: _Source, axis: Sequence[Span]) -> int | None:
 # --- where it stands ------------------------------------------------------------------------------
 
 
-class _Source(Protocol):
-    """What is asked of one tag, or of the site, about a span."""
+class _Source:
+    """The attempts and events of a tag, or of the site (`tag` None), span by span.
 
-    rows: _Rows
-
-    def is_deleted(self, event: Event, span: Span) -> bool:
-        """Whether only their counts are left."""
-
-    def is_hourly(self, event: Event, within: Iterable[Span]) -> bool:
-        """Whether less than an hour cannot be told apart."""
-
-    def count(self, buckets: Buckets, event: Event, span: Span) -> None:
-        """Add the events of a span."""
-
-    def attempts(self, span: Span) -> int:
-        """How many there were, at least."""
-
-    def stamps(self, span: Span) -> Iterable[int]:
-        """Of each attempt."""
-
-    def stretches(self, span: Span, longest_ns: int, period: Extent) -> Iterable[Extent]:
-        """The attempts of a period and the next ones on both sides, in order.
-
-        Such as follow each other within `longest_ns` may be in one.
-        """
-
-    def ends(self, span: Span) -> Extent | None:
-        """The first and the last attempt; None if there was none."""
-
-
-class _Rows:
-    """Of one tag, or all: as far back as rows are kept, what is rare for ten years."""
+    Rows are there as far back as they are kept, what is rare for ten years; of the site the hours
+    of all attempts too.
+    """
 
     def __init__(self, log: SiteLog, tag: str | None) -> None:
         self._log = log
         self._tag = tag
+
+    def _is_tallied(self, event: Event) -> bool:
+        return self._tag is None and event in TALLIED
+
+    def is_deleted(self, event: Event, span: Span) -> bool:
+        """Whether only their counts are left."""
+        return self._is_tallied(event) and span.start_ns <= deleted_ns(self._log, span.run.id)
+
+    def is_hourly(self, event: Event, within: Iterable[Span]) -> bool:
+        """Whether less than an hour cannot be resolved, or is too much to count."""
+        count = 0
+        for span in within if self._is_tallied(event) else ():
+            count += self._tallied(span, _hours(span), [event])
+            if self.is_deleted(event, span) or count > MAX_ROWS:
+                return True
+        return False
 
     def entries(self, event: Event, span: Span, limit: int) -> list[tuple[int, int, int]]:
         """(stamp, seq, value) of some of the events, at most `limit`."""
@@ -263,177 +239,125 @@ class _Rows:
         return [(stamp_ns, seq, _number(of)) for stamp_ns, seq, of in found]
 
     def count(self, buckets: Buckets, event: Event, span: Span) -> None:
-        """Add the events of a span."""
+        """Add the events of a span: hours where it has them whole, and rows."""
+        steps, rest = buckets.grid, [span]
+        if self._is_tallied(event) and buckets.are_hours():
+            hours, rest = whole_hours(span, deleted_ns(self._log, span.run.id))
+            for index, *numbers in self._ask(
+                f"SELECT (hour - {steps.start_ns // HOUR_NS}) / {steps.bucket_ns // HOUR_NS},"
+                f" sum(n), sum(total), min(low), max(high) {_FROM_TALLY} AND event = :event"
+                " GROUP BY 1",
+                span,
+                event,
+                hours,
+            ):
+                buckets.add(index, *map(int, numbers))
         value, rows = _ROWS[event]
-        told = buckets.told
-        for index, of, n in self._ask(
-            f"SELECT (stamp_ns - {told.start_ns}) / {told.bucket_ns}, {value}, count(*) {rows}"
-            " GROUP BY 1, 2",
-            span,
-            event,
-        ):
-            number = _number(of)
-            buckets.add(index, n, n * number, number, number)
-
-    def stamps(self, span: Span) -> list[int]:
-        """Of each attempt."""
-        return [stamp_ns for (stamp_ns,) in self._ask(_STAMPS, span)]
-
-    def ends(self, span: Span) -> Extent | None:
-        """The first and the last attempt; None if there was none."""
-        found = [row for row in self._ask(_ENDS, span) if row[0] is not None]
-        return (min(found)[0], max(last for _, last in found)) if found else None
-
-    def _ask(self, sql: str, span: Span, event: Event | None = None) -> list[tuple[Any, ...]]:
-        asked = {"run": span.run.id, "start": span.start_ns, "end": span.end_ns}
-        sql = sql.replace("{tag}", "" if self._tag is None else " AND tag = :tag")
-        found = self._log.execute(sql, asked | {"tag": self._tag, "event": event})
-        return list(found.fetchall())
-
-
-def _number(value: int | str) -> int:
-    """Of a scan the number of its sensors."""
-    return len(sensor_names(value)) if isinstance(value, str) else value
-
-
-class _OfTag:
-    """One tag's."""
-
-    def __init__(self, log: SiteLog, tag: str) -> None:
-        self.rows = _Rows(log, tag)
-        self.count = self.rows.count
-        self.stamps = self.rows.stamps
-        self.ends = self.rows.ends
-
-    def is_deleted(self, event: Event, span: Span) -> bool:  # noqa: ARG002
-        """See `_Source`."""
-        return False
-
-    def is_hourly(self, event: Event, within: Iterable[Span]) -> bool:  # noqa: ARG002
-        """See `_Source`."""
-        return False
-
-    def attempts(self, span: Span) -> int:  # noqa: ARG002
-        """See `_Source`."""
-        return 0
-
-    def stretches(self, span: Span, longest_ns: int, period: Extent) -> Iterable[Extent]:  # noqa: ARG002
-        """See `_Source`."""
-        found = [stamp_ns for part in cut([span], *period) for stamp_ns in self.stamps(part)]
-        for part in cut([span], 0, period[0]):
-            found += (self.ends(part) or ())[1:]
-        for part in cut([span], period[1], FOREVER_NS):
-            found += (self.ends(part) or ())[:1]
-        return [(stamp_ns, stamp_ns) for stamp_ns in sorted(found)]
-
-
-class _OfSite:
-    """All tags'."""
-
-    def __init__(self, log: SiteLog) -> None:
-        self._log = log
-        self.rows = _Rows(log, None)
-
-    def is_deleted(self, event: Event, span: Span) -> bool:
-        """See `_Source`."""
-        return event in TALLIED and span.start_ns <= deleted_ns(self._log, span.run.id)
-
-    def is_hourly(self, event: Event, within: Iterable[Span]) -> bool:
-        """See `_Source`."""
-        if event not in TALLIED:
-            return False
-        count = 0
-        for span in within:
-            hours = span.start_ns // HOUR_NS, -(-span.end_ns // HOUR_NS)
-            count += self._tallied(span, hours, [event])
-            if self.is_deleted(event, span) or count > MAX_ROWS:
-                return True
-        return False
-
-    def count(self, buckets: Buckets, event: Event, span: Span) -> None:
-        """See `_Source`."""
-        told = buckets.told
-        if event not in TALLIED or not buckets.are_hours():
-            self.rows.count(buckets, event, span)
-            return
-        hours, rest = whole_hours(span, deleted_ns(self._log, span.run.id))
-        for index, *numbers in self._ask(
-            f"SELECT (hour - {told.start_ns // HOUR_NS}) / {told.bucket_ns // HOUR_NS}, sum(n),"
-            f" sum(total), min(low), max(high) {_FROM_TALLY} AND event = :event GROUP BY 1",
-            span,
-            hours,
-            event,
-        ):
-            buckets.add(index, *map(int, numbers))
         for part in rest:
-            self.rows.count(buckets, event, part)
+            for index, of, n in self._ask(
+                f"SELECT (stamp_ns - {steps.start_ns}) / {steps.bucket_ns}, {value}, count(*)"
+                f" {rows} GROUP BY 1, 2",
+                part,
+                event,
+            ):
+                number = _number(of)
+                buckets.add(index, n, n * number, number, number)
 
     def attempts(self, span: Span) -> int:
-        """See `_Source`."""
-        hours = -(-span.start_ns // HOUR_NS), span.end_ns // HOUR_NS
-        return self._tallied(span, hours, TALLIED)
+        """How many there were, at least."""
+        whole = -(-span.start_ns // HOUR_NS), span.end_ns // HOUR_NS
+        return self._tallied(span, whole, TALLIED) if self._tag is None else 0
 
     def stamps(self, span: Span) -> Iterator[int]:
-        """See `_Source`; what was deleted is spread over its hour."""
-        kept_ns = (deleted_ns(self._log, span.run.id) // HOUR_NS + 1) * HOUR_NS
+        """Of each attempt; what was deleted of the site is spread over its hour."""
+        kept_ns = 0
+        if self._tag is None:
+            kept_ns = (deleted_ns(self._log, span.run.id) // HOUR_NS + 1) * HOUR_NS
         for part in cut([span], kept_ns, FOREVER_NS):
-            yield from self.rows.stamps(part)
+            for (stamp_ns,) in self._ask(_STAMPS, part):
+                yield stamp_ns
         for part in cut([span], 0, kept_ns):
-            hours = part.start_ns // HOUR_NS, -(-part.end_ns // HOUR_NS)
             sql = f"SELECT n, first_ns, last_ns {_FROM_TALLY}"
-            for n, first_ns, last_ns in self._ask(sql, part, hours):
+            for n, first_ns, last_ns in self._ask(sql, part, hours=_hours(part)):
                 for number in range(n):
                     stamp_ns = first_ns + (last_ns - first_ns) * number // max(1, n - 1)
                     if part.start_ns <= stamp_ns < part.end_ns:
                         yield stamp_ns
 
     def stretches(self, span: Span, longest_ns: int, period: Extent) -> Iterable[Extent]:
-        """See `_Source`."""
+        """The attempts of a period and the next ones on both sides, in order.
+
+        Such as follow each other within `longest_ns` may be in one.
+        """
+        if self._tag is not None:
+            found = [stamp_ns for part in cut([span], *period) for stamp_ns in self.stamps(part)]
+            for part in cut([span], 0, period[0]):
+                found += (self.ends(part) or ())[1:]
+            for part in cut([span], period[1], FOREVER_NS):
+                found += (self.ends(part) or ())[:1]
+            return [(stamp_ns, stamp_ns) for stamp_ns in sorted(found)]
         ends = self.ends(span)
         if ends is None:
-            return
-        first_ns = ends[0]
-        asked = {"run": span.run.id, "event": Event.SILENCES, "longest": longest_ns}
-        asked |= {"start": period[0], "end": period[1], "least": ends[0], "most": ends[1]}
-        for silent_ns, until_ns in self._log.execute(_SILENCES, asked).fetchall():
-            yield first_ns, silent_ns
-            first_ns = until_ns
-        yield first_ns, ends[1]
+            return []
+        query = {"run": span.run.id, "event": Event.SILENCES, "longest": longest_ns}
+        query |= {"start": period[0], "end": period[1], "least": ends[0], "most": ends[1]}
+        silences = self._log.execute(_SILENCES, query).fetchall()
+        edges = [ends[0], *(at_ns for silence in silences for at_ns in silence), ends[1]]
+        return list(zip(edges[::2], edges[1::2], strict=True))
 
     def ends(self, span: Span) -> Extent | None:
-        """See `_Source`."""
+        """The first and the last attempt; None if there was none."""
+        if self._tag is not None:
+            found = [row for row in self._ask(_ENDS, span) if row[0] is not None]
+            return (min(found)[0], max(last for _, last in found)) if found else None
         every = extent(self._log, span.run.id)
         if every is None or every[1] < span.start_ns or every[0] >= span.end_ns:
             return None
         first_ns, last_ns = every
         if span.start_ns > first_ns:
-            first_ns = self._attempt_from(span.run, span.start_ns)
+            first_ns = self._near(span.run, span.start_ns, 1)
         if span.end_ns <= last_ns:
-            last_ns = self._attempt_until(span.run, span.end_ns - 1)
+            last_ns = self._near(span.run, span.end_ns - 1, 0)
         return (first_ns, last_ns) if first_ns <= last_ns else None
 
-    def _attempt_from(self, run: Run, at_ns: int) -> int:
-        """The first attempt from a moment on, of which there are earlier and later ones."""
-        over = silence_over(self._log, run.id, at_ns)
-        if over is not None:
-            return over[1]
-        near = self.rows.ends(Span(run, at_ns, at_ns + SILENCE_NS + 1))
-        return at_ns if near is None else near[0]  # it is deleted
+    def _near(self, run: Run, at_ns: int, which: int) -> int:
+        """The last attempt up to a moment (0) or the first from then on (1).
 
-    def _attempt_until(self, run: Run, at_ns: int) -> int:
-        """The last attempt up to a moment, of which there are earlier and later ones."""
-        over = silence_over(self._log, run.id, at_ns + 1)
+        There are earlier ones and later ones.
+        """
+        over = silence_over(self._log, run.id, at_ns if which else at_ns + 1)
         if over is not None:
-            return over[0]
-        near = self.rows.ends(Span(run, at_ns - SILENCE_NS, at_ns + 1))
-        return at_ns if near is None else near[1]
+            return over[which]
+        start_ns = at_ns if which else at_ns - SILENCE_NS
+        rows = self._ask(_ENDS, Span(run, start_ns, start_ns + SILENCE_NS + 1))
+        found: list[int] = [row[1 - which] for row in rows if row[0] is not None]
+        if not found:  # it is deleted
+            return at_ns
+        return min(found) if which else max(found)
 
     def _tallied(self, span: Span, hours: Extent, which: Sequence[Event]) -> int:
         sql = f"SELECT coalesce(sum(n), 0) {_FROM_TALLY} AND event = :event"
-        return sum(int(self._ask(sql, span, hours, event)[0][0]) for event in which)
+        return sum(int(self._ask(sql, span, event, hours)[0][0]) for event in which)
 
     def _ask(
-        self, sql: str, span: Span, hours: Extent, event: Event | None = None
+        self, sql: str, span: Span, event: Event | None = None, hours: Extent = (0, 0)
     ) -> list[tuple[Any, ...]]:
-        asked = {"run": span.run.id, "first": hours[0], "last": hours[1], "event": event}
-        return list(self._log.execute(sql, asked).fetchall())
+        query: dict[str, Any] = {
+            "start": span.start_ns,
+            "end": span.end_ns,
+            "first": hours[0],
+            "last": hours[1],
+        }
+        query |= {"run": span.run.id, "tag": self._tag, "event": event}
+        sql = sql.replace("{tag}", "" if self._tag is None else " AND tag = :tag")
+        return list(self._log.execute(sql, query).fetchall())
+
+
+def _hours(span: Span) -> Extent:
+    """The hours that a span touches, first to before last."""
+    return span.start_ns // HOUR_NS, -(-span.end_ns // HOUR_NS)
+
+
+def _number(value: int | str) -> int:
+    """Of a scan the number of its sensors."""
+    return len(sensor_names(value)) if isinstance(value, str) else value

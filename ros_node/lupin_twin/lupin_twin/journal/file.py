@@ -7,15 +7,14 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 from typing import Final
 
-from lupin_twin.journal.appending import Appender, held
+from lupin_twin.journal.appending import Appender, Stretch, held, simulated
+from lupin_twin.journal.beside import Syncing, forwarded_seq
 from lupin_twin.journal.checking import find_damage
 from lupin_twin.journal.fold import Restored, copies, fold
-from lupin_twin.journal.forwarded import forwarded_seq
-from lupin_twin.journal.prefilling import Stretch, simulated
-from lupin_twin.journal.reading import newest_rows
 from lupin_twin.journal.retention import (
     Limits,
     Stretches,
@@ -28,13 +27,14 @@ from lupin_twin.journal.retention import (
     purge_step,
     shrink_step,
 )
-from lupin_twin.journal.rows import PinRow, Row
+from lupin_twin.journal.rows import PinRow, Row, newest_rows
 from lupin_twin.journal.runs import (
     CORRECTION_NS,
     FOREVER_NS,
     Carries,
     Clock,
     Run,
+    put_run,
     runs,
     simulation_goes_on,
 )
@@ -48,7 +48,6 @@ from lupin_twin.journal.schema import (
     set_meta,
     transaction,
 )
-from lupin_twin.journal.syncing import Syncing
 
 # A file up to this size is read through for damage as it is opened: a quarter of a second.
 _CHECKED_BYTES: Final = 64_000_000
@@ -83,7 +82,7 @@ _ROW_ERRORS: Final = (
 class JournalFile:
     """Open from construction to `close`.
 
-    A damaged file is set aside first and read as far as it goes; `set_aside` is its new name then.
+    A damaged file is quarantined first and read as far as it goes; `quarantined` is its new name.
     `is_sound`: None has it checked as it is opened, if it is not too large.
 
     Raises:
@@ -97,10 +96,10 @@ class JournalFile:
         self.holds_older = False
         self._path = path
         self._limits = limits
-        self.set_aside = ""
+        self.quarantined = ""
         self._salvaging: Iterator[None] | None = None
         if is_sound is False or (is_sound is None and self._is_damaged()):
-            self._set_aside()
+            self._quarantine()
         self._open()
 
     def close(self) -> None:
@@ -118,9 +117,11 @@ class JournalFile:
             return False
         return find_damage(self._path) is not None
 
-    def _set_aside(self) -> None:
+    def _quarantine(self) -> None:
         # Wall time, as whoever looks for the file reads it.
-        self.set_aside = str(quarantine(self._path, time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())))
+        self.quarantined = str(
+            quarantine(self._path, time.strftime("%Y%m%dT%H%M%SZ", time.gmtime()))
+        )
 
     def _open(self) -> None:
         try:
@@ -128,7 +129,7 @@ class JournalFile:
         except FILE_ERRORS as error:
             if not says_damaged(error):
                 raise
-            self._set_aside()
+            self._quarantine()
             self._connection = open_writer(self._path)
         try:
             self._salvage()
@@ -147,9 +148,9 @@ class JournalFile:
         self._inode = self._path.stat().st_ino
 
     def _salvage(self) -> None:
-        """Go on with what was set aside, now or before the last end."""
-        if self.set_aside:
-            set_meta(self._connection, _SALVAGE, Path(self.set_aside).name)
+        """Go on with what was quarantined, now or before the last end."""
+        if self.quarantined:
+            set_meta(self._connection, _SALVAGE, Path(self.quarantined).name)
         name = get_meta(self._connection, _SALVAGE)
         if not name:
             return
@@ -172,16 +173,16 @@ class JournalFile:
     def start(self, now: Clock, scans_per_series: int, *, is_believed: bool) -> Restored:
         """What a twin that starts now knows, in the run that it is in: the last one, or a new one.
 
-        A wall clock that is earlier than what the log has heard is doubted, unless `is_believed`:
+        A wall clock that is behind what the log has received is doubted, unless `is_believed`:
         nothing is begun then. Of a file that cannot be read what can be is salvaged, once.
         """
         try:
             return self._start(now, scans_per_series, is_believed=is_believed)
         except FILE_ERRORS as error:
-            if self.set_aside or not says_damaged(error):
+            if self.quarantined or not says_damaged(error):
                 raise
         self.close()
-        self._set_aside()
+        self._quarantine()
         self._open()
         return self._start(now, scans_per_series, is_believed=is_believed)
 
@@ -227,18 +228,7 @@ class JournalFile:
         with self._transaction():
             (number,) = execute("SELECT coalesce(max(run), 0) + 1 FROM run").fetchone()
             run = Run(number, now, self._appender.last_seq + 1, joins)
-            execute(
-                "INSERT INTO run VALUES (?, ?, ?, ?, ?, ?, ?, NULL)",
-                (
-                    LOCAL_SITE,
-                    run.id,
-                    int(now.is_simulated),
-                    now.stamp_ns,
-                    now.arrival_ns,
-                    run.begun_seq,
-                    joins,
-                ),
-            )
+            put_run(self._connection, run)
             if before is not None:
                 self._copy(before, run, carries)
                 if ended_ns is not None and before.root != run.root:
@@ -277,17 +267,8 @@ class JournalFile:
         if all(known.id != run.root for known in self._runs()):
             self._kept = None
             with self._transaction():
-                self._connection.execute(
-                    "INSERT INTO run VALUES (?, ?, ?, ?, ?, ?, NULL, NULL)",
-                    (
-                        LOCAL_SITE,
-                        run.root,
-                        int(run.begun.is_simulated),
-                        run.begun.stamp_ns,
-                        run.begun.arrival_ns,
-                        self._appender.last_seq + 1,
-                    ),
-                )
+                begun_seq = self._appender.last_seq + 1
+                put_run(self._connection, Run(run.root, run.begun, begun_seq))
                 since_ns = time.time_ns() - run.begun.arrival_ns
                 note_lost(self._connection, run.root, run.begun.stamp_ns + since_ns)
 
@@ -295,7 +276,7 @@ class JournalFile:
         return runs(self._connection.execute)
 
     def _last(self, run: Run) -> Clock:
-        """The last that was heard in a run."""
+        """The last that was received in a run."""
         last = run.begun
         # The rows of a run lie together at the end; only a latched one may be older than others.
         for text in (_LAST_SCANS, _LAST_LOOKS):
@@ -305,7 +286,7 @@ class JournalFile:
         return last
 
     def _go_on_with(self, run: int) -> None:
-        """One run goes on; another, whose end nobody saw, ended with the last heard in it."""
+        """One run goes on; another, whose end nobody saw, ended with the last received in it."""
         self._kept = None
         execute = self._connection.execute
         execute("UPDATE run SET ended_stamp_ns = NULL WHERE run = ?", (run,))
@@ -340,7 +321,9 @@ class JournalFile:
 
     def _append(self, rows: Sequence[tuple[Run, Row]]) -> int:
         with self._transaction():
-            written = sum(self._appender.append(run.root, (row,)) for run, row in rows)
+            written = 0
+            for root, of_run in groupby(rows, lambda entry: entry[0].root):
+                written += self._appender.append(root, [row for _, row in of_run])
             self._appender.flush()
         # What comes late may be of before the log.
         if self._kept and any(row.stamp_ns < self._kept[0][0] for _, row in rows):

@@ -7,20 +7,33 @@ each series its newest row by then counts, of equal stamps the one received late
 from __future__ import annotations
 
 import gc
+import math
 import sqlite3
-import threading
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import accumulate, chain, repeat
 from typing import Any, Final, TypeVar
 
-from lupin_twin.bounds import MAX_SENSORS_PER_TAG, MAX_TAGS
-from lupin_twin.journal.reading import flower_of, listed_rows, numbers_of, sensor_names
-from lupin_twin.journal.rows import KIND_READING, STATUS_OK, LookRow, PinRow, Row, ScanRow
+from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
+from lupin_twin.core.past import MAX_POINTS, SeriesPast, SeriesRequest
+from lupin_twin.core.state import NO_FLOWER, Attempt, Flower, Pose, Reading, Snapshot, TagState
+from lupin_twin.journal.queries import newest, series
+from lupin_twin.journal.rows import (
+    KIND_READING,
+    STATUS_OK,
+    InspectionRow,
+    PinRow,
+    Row,
+    ScanRow,
+    flower_of,
+    listed_rows,
+    numbers_of,
+    sensor_names,
+)
 from lupin_twin.journal.runs import FOREVER_NS, Carries, Run, runs, since_seq, span_at
 from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile
-from lupin_twin.state import NO_FLOWER, Pose, Reading, Snapshot, TagState, Try
 
 ValueT = TypeVar("ValueT")
 
@@ -42,8 +55,8 @@ _NEWEST: Final = (
 )
 _SCANS: Final = (
     "SELECT s.series, s.tag, s.kind, s.sensors, r.seq, r.stamp_ns, r.status, r.detail, r.readings"
-    " FROM series AS s CROSS JOIN scan AS r ON r.site = s.site AND r.seq = {newest}"
-    " WHERE s.site = :site AND s.run = :run {which}"
+    " FROM series AS s CROSS JOIN scan AS r"
+    " WHERE s.site = :site AND s.run = :run {which} AND r.site = s.site AND r.seq = {newest}"
 )
 _LOOKS: Final = (
     "SELECT s.series, s.tag, r.seq, r.stamp_ns, r.species, r.confidence, r.anomaly,"
@@ -75,7 +88,7 @@ class Restored:
 
     run: Run
     known: Known
-    rows: tuple[ScanRow | LookRow, ...]
+    rows: tuple[ScanRow | InspectionRow, ...]
     last_seq: int
     last_ns: int = 0
     is_doubted: bool = False
@@ -83,7 +96,7 @@ class Restored:
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """Tags in the order in which they were first heard of, and the numbers of what they rest on.
+    """Tags in the order in which they were first received, and the numbers of what they rest on.
 
     `observed` are those at which anything was observed: others have only failed attempts, or a
     place. `placed_ns` is from when each tag has its place.
@@ -93,13 +106,13 @@ class Known:
     observed: frozenset[str] = frozenset()
     placed_ns: Mapping[str, int] = field(default_factory=dict)
     scans: tuple[int, ...] = ()
-    looks: tuple[int, ...] = ()
+    inspections: tuple[int, ...] = ()
 
 
 def state_at(
     connection: sqlite3.Connection, at_ns: int, frame_id: str, site: str = LOCAL_SITE
 ) -> Snapshot:
-    """Every tag as of `at_ns`, ROS time, in the order in which the log first heard of them.
+    """Every tag as of `at_ns`, ROS time, in the order in which the log first received them.
 
     Of the run that the moment belongs to, all writes with a stamp up to then count, whenever they
     were received. Where others write meanwhile, ask within a transaction.
@@ -117,134 +130,114 @@ def fold(
     connection: sqlite3.Connection, run: int, at_ns: int, since: int, site: str = LOCAL_SITE
 ) -> Known:
     """What is known in a run as of a moment, of what has the seq `since` or a later one."""
-    gathering = _Gathering(connection, {"site": site, "run": run, "at": at_ns, "since": since})
-    with _NO_SEARCH:
-        scans = gathering.read_scans()
-        looks = gathering.read_looks()
-        placed_ns = gathering.read_places()
-        return gathering.known(scans, looks, placed_ns)
+    with _no_collection():
+        return _known(connection, {"site": site, "run": run, "at": at_ns, "since": since})
 
 
-class _NoSearch:
+@contextmanager
+def _no_collection() -> Iterator[None]:
     """Python looks for no garbage meanwhile: a hundred times in 90,000 new values, all alive."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._inside = 0
-        self._was_enabled = True
-
-    def __enter__(self) -> None:
-        with self._lock:
-            if not self._inside:
-                self._was_enabled = gc.isenabled()
-                gc.disable()
-            self._inside += 1
-
-    def __exit__(self, *_: object) -> None:
-        with self._lock:
-            self._inside -= 1
-            if not self._inside and self._was_enabled:
-                gc.enable()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()  # a second thread that is within goes on more slowly
 
 
-_NO_SEARCH: Final = _NoSearch()
+def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> Known:
+    execute = connection.execute
+    # By tag: the number of its first write, its last attempt, when it was observed, its readings.
+    first: dict[str, int] = {}
+    tried: dict[str, tuple[int, int, int, str]] = {}
+    observed: dict[str, int] = {}
+    found: dict[str, list[tuple[int, int, tuple[Reading, ...]]]] = {}
+    scans = execute(_SCANS.format(newest=_NEWEST.format(but=""), which=""), query).fetchall()
+    scans.sort()
+    # Of series without sensors the newest may be a failure, and an attempt before it none.
+    succeeded = _NEWEST.format(but=f"AND status = {STATUS_OK} AND readings = '[]' ")
+    which = f"AND s.kind = {KIND_READING} AND s.sensors = '[]'"
+    scans += execute(_SCANS.format(newest=succeeded, which=which), query).fetchall()
+    for row, readings in zip(scans, _readings(scans), strict=True):
+        series, tag, kind, _, seq, stamp_ns, status, detail, _ = row
+        first.setdefault(tag, series)
+        last = tried.get(tag)
+        if last is None or (stamp_ns, seq) >= last[:2]:
+            tried[tag] = (stamp_ns, seq, status, detail)
+        if readings or (kind == KIND_READING and status == STATUS_OK):
+            if stamp_ns > observed.get(tag, -1):
+                observed[tag] = stamp_ns
+            found.setdefault(tag, []).append((stamp_ns, seq, readings))
+    flowers: dict[str, tuple[int, Flower]] = {}
+    inspections = execute(_LOOKS, query).fetchall()
+    for series, tag, seq, stamp_ns, *flower in inspections:
+        first[tag] = min(series, first.get(tag, series))
+        tried[tag] = max((stamp_ns, seq, STATUS_OK, ""), tried.get(tag, (-1, 0, 0, "")))
+        observed[tag] = max(stamp_ns, observed.get(tag, -1))
+        flowers[tag] = (stamp_ns, flower_of(flower))
+    poses, placed_ns = _places(execute, query, first)
+    failed = {
+        tag: execute(_FIRST_FAILURE, query | {"tag": tag}).fetchone()[0]
+        for tag in tried.keys() - observed.keys()
+    }
+    tags = sorted(first, key=first.__getitem__)
+    attempts = [tried[tag] for tag in tags if tag in tried]
+    made = iter(_columns(Attempt, [(entry[0], *entry[2:]) for entry in attempts]))
+    states = make_many(
+        TagState,
+        len(tags),
+        tags,
+        map(poses.get, tags),
+        [_latest(found.get(tag, ())) for tag in tags],
+        [observed.get(tag, failed.get(tag)) for tag in tags],
+        [flowers[tag][1] if tag in flowers else NO_FLOWER for tag in tags],
+        [flowers[tag][0] if tag in flowers else None for tag in tags],
+        [next(made) if tag in tried else None for tag in tags],
+    )
+    return Known(
+        tuple(states),
+        frozenset(observed),
+        placed_ns,
+        tuple(dict.fromkeys(row[4] for row in scans)),
+        tuple(row[2] for row in inspections),
+    )
 
 
-class _Gathering:
-    """Tags as they are read out of the three tables; `asked` is run, moment and first seq."""
+def _places(
+    execute: Any, query: dict[str, Any], first: dict[str, int]
+) -> tuple[dict[str, Pose], dict[str, int]]:
+    """The place of each tag, that of its first write, and from when each has one."""
+    placed_ns: dict[str, int] = {}
+    rows: dict[str, tuple[Any, ...]] = {}
+    for row in execute(_PLACES, query).fetchall():
+        _, tag, stamp_ns = row[:3]
+        if tag not in rows:
+            rows[tag], placed_ns[tag] = row, stamp_ns
+        elif stamp_ns < placed_ns[tag]:
+            placed_ns[tag] = stamp_ns
+    known = [row for tag, row in rows.items() if placed_ns[tag] <= query["at"]]
+    for seq, tag, *_ in known:
+        if seq < first.get(tag, FOREVER_NS):
+            first[tag] = seq
+    poses = _columns(Pose, [row[3:] for row in known])
+    return {row[1]: pose for row, pose in zip(known, poses, strict=True)}, placed_ns
 
-    def __init__(self, connection: sqlite3.Connection, asked: dict[str, Any]) -> None:
-        self._execute = connection.execute
-        self._asked = asked
-        self._tags: dict[str, _Tag] = {}
 
-    def read_scans(self) -> tuple[int, ...]:
-        newest = _SCANS.format(newest=_NEWEST.format(but=""), which="")
-        rows = sorted(self._execute(newest, self._asked).fetchall())
-        # Of series without sensors the newest may be a failure, and an attempt before it none.
-        succeeded = _SCANS.format(
-            newest=_NEWEST.format(but=f"AND status = {STATUS_OK} "),
-            which=f"AND s.kind = {KIND_READING} AND s.sensors = '[]'",
-        )
-        rows += self._execute(succeeded, self._asked).fetchall()
-        for row, readings in zip(rows, _readings(rows), strict=True):
-            series, tag_id, kind, _, seq, stamp_ns, status, detail, _ = row
-            tag = self._tags.get(tag_id)
-            if tag is None:
-                tag = self._tags[tag_id] = _Tag(series)
-            tag.take(seq, stamp_ns, status, detail)
-            if readings or (kind == KIND_READING and status == STATUS_OK):
-                tag.read(seq, stamp_ns, readings)
-        return tuple(dict.fromkeys(row[4] for row in rows))
+def _columns(made: type[ValueT], rows: Sequence[tuple[Any, ...]]) -> list[ValueT]:
+    """A dataclass of each row."""
+    return make_many(made, len(rows), *zip(*rows, strict=True)) if rows else []
 
-    def read_looks(self) -> tuple[int, ...]:
-        rows = self._execute(_LOOKS, self._asked).fetchall()
-        for series, tag_id, seq, stamp_ns, *flower in rows:
-            tag = self._tags.get(tag_id)
-            if tag is None:
-                tag = self._tags[tag_id] = _Tag(series)
-            elif series < tag.first_seq:
-                tag.first_seq = series
-            tag.take(seq, stamp_ns, STATUS_OK, "")
-            tag.read(seq, stamp_ns, ())
-            tag.looked_ns, tag.flower = stamp_ns, flower_of(flower)
-        return tuple(row[2] for row in rows)
 
-    def read_places(self) -> dict[str, int]:
-        """From when each tag has its place; the pose is that of the first write."""
-        placed_ns: dict[str, int] = {}
-        first: list[tuple[Any, ...]] = []
-        for row in self._execute(_PLACES, self._asked).fetchall():
-            _, tag_id, stamp_ns = row[:3]
-            if tag_id not in placed_ns:
-                placed_ns[tag_id] = stamp_ns
-                first.append(row)
-            elif stamp_ns < placed_ns[tag_id]:
-                placed_ns[tag_id] = stamp_ns
-        at_ns = self._asked["at"]
-        first = [row for row in first if placed_ns[row[1]] <= at_ns]
-        poses = make_many(Pose, len(first), *list(zip(*first, strict=True))[3:]) if first else []
-        for row, pose in zip(first, poses, strict=True):
-            tag = self._tags.get(row[1])
-            if tag is None:
-                tag = self._tags[row[1]] = _Tag(row[0])
-            elif row[0] < tag.first_seq:
-                tag.first_seq = row[0]
-            tag.pose = pose
-        return placed_ns
-
-    def known(
-        self, scans: tuple[int, ...], looks: tuple[int, ...], placed_ns: dict[str, int]
-    ) -> Known:
-        tags = sorted(self._tags.items(), key=lambda entry: entry[1].first_seq)
-        for tag_id, tag in tags:
-            if tag.observed_ns is None and tag.tried is not None:
-                (tag.failed_ns,) = self._execute(
-                    _FIRST_FAILURE, self._asked | {"tag": tag_id}
-                ).fetchone()
-        every = [tag for _, tag in tags]
-        tried = [tag.tried for tag in every if tag.tried is not None]
-        tries = iter(
-            make_many(Try, len(tried), *list(zip(*tried, strict=True))[1:]) if tried else ()
-        )
-        states = make_many(
-            TagState,
-            len(tags),
-            [tag_id for tag_id, _ in tags],
-            [tag.pose for tag in every],
-            [tag.scans[0][2] if len(tag.scans) == 1 else tag.latest() for tag in every],
-            [tag.failed_ns if tag.observed_ns is None else tag.observed_ns for tag in every],
-            [tag.flower for tag in every],
-            [tag.looked_ns for tag in every],
-            [None if tag.tried is None else next(tries) for tag in every],
-        )
-        return Known(
-            tuple(states),
-            frozenset(tag_id for tag_id, tag in tags if tag.observed_ns is not None),
-            placed_ns,
-            scans,
-            looks,
-        )
+def _latest(scans: Sequence[tuple[int, int, tuple[Reading, ...]]]) -> tuple[Reading, ...]:
+    """The latest of each sensor, in the order in which the sensors were first received."""
+    if len(scans) == 1:
+        return scans[0][2]
+    latest: dict[str, tuple[int, int, Reading]] = {}
+    for stamp_ns, seq, readings in scans:
+        for reading in readings:
+            entry = latest.get(reading.name)
+            if entry is None or (stamp_ns, seq) >= entry[:2]:
+                latest[reading.name] = (stamp_ns, seq, reading)
+    return tuple(reading for *_, reading in latest.values())[:MAX_SENSORS_PER_TAG]
 
 
 def copies(connection: sqlite3.Connection, run: Run, carries: Carries) -> list[Row]:
@@ -254,11 +247,11 @@ def copies(connection: sqlite3.Connection, run: Run, carries: Carries) -> list[R
     they count, with the stamps that they have there.
     """
     known = fold(connection, run.root, FOREVER_NS, run.begun_seq)
-    found: dict[str, list[tuple[int, int, ScanRow | LookRow]]] = {
+    found: dict[str, list[tuple[int, int, ScanRow | InspectionRow]]] = {
         tag.tag_id: [] for tag in known.tags
     }
     if carries is Carries.ALL:
-        for seq, row in listed_rows(connection, run.root, known.scans, known.looks):
+        for seq, row in listed_rows(connection, run.root, known.scans, known.inspections):
             found[row.tag_id].append((row.stamp_ns, seq, row))
     rows: list[Row] = []
     for tag in known.tags:
@@ -273,63 +266,15 @@ def copies(connection: sqlite3.Connection, run: Run, carries: Carries) -> list[R
     return rows
 
 
-class _Tag:
-    """What is gathered of one tag."""
-
-    __slots__ = (
-        "failed_ns",
-        "first_seq",
-        "flower",
-        "looked_ns",
-        "observed_ns",
-        "pose",
-        "readings",
-        "scans",
-        "tried",
-    )
-
-    def __init__(self, first_seq: int) -> None:
-        self.first_seq = first_seq
-        self.pose: Pose | None = None
-        self.scans: list[tuple[int, int, tuple[Reading, ...]]] = []
-        self.observed_ns: int | None = None
-        self.failed_ns: int | None = None
-        self.looked_ns: int | None = None
-        self.flower = NO_FLOWER
-        self.tried: tuple[int, int, int, str] | None = None
-
-    def take(self, seq: int, stamp_ns: int, status: int, detail: str) -> None:
-        tried = self.tried
-        if tried is None or (stamp_ns, seq) >= (tried[1], tried[0]):
-            self.tried = (seq, stamp_ns, status, detail)
-
-    def read(self, seq: int, stamp_ns: int, readings: tuple[Reading, ...]) -> None:
-        if self.observed_ns is None or stamp_ns > self.observed_ns:
-            self.observed_ns = stamp_ns
-        if readings:
-            self.scans.append((stamp_ns, seq, readings))
-
-    def latest(self) -> tuple[Reading, ...]:
-        """The latest of each sensor, in the order in which the sensors were first heard of."""
-        kept: dict[str, tuple[int, int, Reading]] = {}
-        for stamp_ns, seq, readings in self.scans:
-            for reading in readings:
-                entry = kept.get(reading.name)
-                if entry is None or (stamp_ns, seq) >= entry[:2]:
-                    kept[reading.name] = (stamp_ns, seq, reading)
-        return tuple(reading for *_, reading in kept.values())[:MAX_SENSORS_PER_TAG]
-
-
 def _readings(rows: list[tuple[Any, ...]]) -> list[tuple[Reading, ...]]:
     """The readings of rows as `_SCANS` names them."""
-    sets = {text: sensor_names(text) for text in {row[3] for row in rows}}
-    names = [sets[row[3]] for row in rows]
+    names = [sensor_names(row[3]) for row in rows]
     values = numbers_of([row[8] for row in rows])
     lengths = [len(row) for row in values]
     if lengths != list(map(len, names)):
         raise DamagedFile("a scan has another number of readings than its series has sensors")
     stamps = [repeat(row[5], length) for row, length in zip(rows, lengths, strict=True)]
-    # 50,000 in a large house: most of what a state takes.
+    # 50,000 in a large greenhouse: most of what a state takes.
     made = make_many(
         Reading,
         sum(lengths),
@@ -339,3 +284,44 @@ def _readings(rows: list[tuple[Any, ...]]) -> list[tuple[Reading, ...]]:
     )
     ends = list(accumulate(lengths))
     return [tuple(made[end - length : end]) for end, length in zip(ends, lengths, strict=True)]
+
+
+# A tag's id, its place (m, map frame), and its readings: (ns of ROS time, value).
+TagLately = tuple[str, float, float, tuple[tuple[int, float], ...]]
+
+
+def recent_readings(
+    connection: sqlite3.Connection, sensor_type: str, at_ns: int, reach_ns: int, most: int
+) -> Iterator[TagLately]:
+    """The tags that had a place and a reading at `at_ns`, with their last finite readings.
+
+    `reach_ns` is how far back, `most` how many of all tags together. Where rows were deleted, the
+    means of stretches.
+    """
+    tags = [
+        tag
+        for tag in state_at(connection, at_ns, "").tags
+        if tag.pose is not None and any(reading.name == sensor_type for reading in tag.readings)
+    ]
+    each = max(most // max(len(tags), 1), 1)
+    for tag in tags:
+        if tag.pose is None:
+            continue
+        query = SeriesRequest(
+            tag.tag_id, sensor_type, max(1, at_ns - reach_ns), at_ns + 1, MAX_POINTS
+        )
+        found = newest(connection, query, each)
+        if found is None:
+            found = [
+                (min(stamp_ns, at_ns), value)
+                for stamp_ns, value in _values(series(connection, query, at_ns))
+            ]
+        if found:
+            yield tag.tag_id, tag.pose.x, tag.pose.y, tuple(found)
+
+
+def _values(past: SeriesPast) -> Iterator[tuple[int, float]]:
+    half_ns = (past.bucket_ns or 0) // 2
+    for stamp_ns, value in zip(past.stamps_ns, past.means, strict=True):
+        if math.isfinite(value):
+            yield stamp_ns + half_ns, value

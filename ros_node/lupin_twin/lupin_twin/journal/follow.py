@@ -1,5 +1,5 @@
 # ruff: noqa: S608  # SQL is put together of constants
-"""A log copied from where it left off: its rows as texts, and into a file of who copies it.
+"""A log by its numbers: copied from where it left off, and what was received, write by write.
 
 At least once on the way, exactly once in the file: a lot is one transaction, and rows that are
 there are known by their numbers. A file holds one journal and has its identity; of another journal
@@ -11,26 +11,38 @@ from __future__ import annotations
 
 import json
 import sqlite3
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from lupin_twin.core.state import sure_species
+from lupin_twin.core.writes import (
+    RECENT_COUNT,
+    PastWrite,
+    PastWrites,
+    RecentRequest,
+    RunSpan,
+    WritesRequest,
+    recent_of,
+)
 from lupin_twin.journal.appending import PURGED_SEQ
-from lupin_twin.journal.hours import WrittenLook, WrittenScan, count
-from lupin_twin.journal.reading import numbers_of
+from lupin_twin.journal.hours import WrittenInspection, WrittenScan, count
 from lupin_twin.journal.retention import Stretches, kept
+from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, numbers_of, sensor_names
+from lupin_twin.journal.runs import runs, span_at, spans
 from lupin_twin.journal.schema import (
     LOCAL_SITE,
     DamagedFile,
+    SiteLog,
     get_meta,
     open_reader,
     open_writer,
     set_meta,
     transaction,
 )
-from lupin_twin.journal.site_log import SiteLog
 
 MAX_ROWS: Final = 2_000
 _MAX_BYTES: Final = 1_000_000
@@ -83,14 +95,14 @@ def read(connection: sqlite3.Connection, after: int, most: int = MAX_ROWS) -> Lo
         last, weight = after, 0
         for place, (number, rank, row) in enumerate(found):
             if (place >= most or weight > _MAX_BYTES) and number != last:
-                return Lot(_journal_id(connection), tuple(texts), last, is_all=False)
+                return Lot(_journal_id(log), tuple(texts), last, is_all=False)
             texts.append(_text(_NUMBERED[rank], row))
             last, weight = number, weight + len(texts[-1])
-        return Lot(_journal_id(connection), tuple(texts), last, is_all=True)
+        return Lot(_journal_id(log), tuple(texts), last, is_all=True)
 
 
 def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Followed:
-    """Put a lot, which was asked for `behind` a number, into its journal's file, made if need be.
+    """Put a lot, which was read `behind` a number, into its journal's file, made if need be.
 
     `complete_ns` is up to when the journal had all, ROS time, before it was asked for the lot; None
     where more follows.
@@ -132,7 +144,9 @@ def followed(path: Path) -> Followed:
 
 def _followed(connection: sqlite3.Connection) -> Followed:
     complete_ns = int(get_meta(connection, _COMPLETE) or 0)
-    return Followed(_journal_id(connection), _last(connection), complete_ns, kept(connection))
+    return Followed(
+        _journal_id(SiteLog(connection)), _last(connection), complete_ns, kept(connection)
+    )
 
 
 def _last(connection: sqlite3.Connection) -> int:
@@ -175,8 +189,9 @@ def _text(table: str, row: Iterable[Any]) -> str:
     return json.dumps([table, *columns], separators=(",", ":"), ensure_ascii=False)
 
 
-def _journal_id(connection: sqlite3.Connection) -> str:
-    return get_meta(connection, "journal_id") or ""
+def _journal_id(log: SiteLog) -> str:
+    """One log's name among logs: what was quarantined has another in its place."""
+    return log.meta("journal_id") or ""
 
 
 # --- into a file ----------------------------------------------------------------------------------
@@ -185,7 +200,7 @@ def _journal_id(connection: sqlite3.Connection) -> str:
 def _put(connection: sqlite3.Connection, lot: Lot) -> None:
     after, log = _last(connection), SiteLog(connection)
     scans: list[WrittenScan] = []
-    looks: list[WrittenLook] = []
+    inspections: list[WrittenInspection] = []
     for table, *row in _rows(lot.rows):
         if table in {"scan", "look"} and row[0] <= after:
             continue
@@ -195,8 +210,10 @@ def _put(connection: sqlite3.Connection, lot: Lot) -> None:
         if table == "scan" and not row[9]:
             scans.append(_scan(connection, row))
         elif table == "look" and not row[13]:
-            looks.append(WrittenLook(row[1], row[2], row[0], row[3], bool(row[10]), row[12]))
-    count(log, scans, looks)
+            inspections.append(
+                WrittenInspection(row[1], row[2], row[0], row[3], bool(row[10]), row[12])
+            )
+    count(log, scans, inspections)
     purged = int(get_meta(connection, PURGED_SEQ) or 0)
     for table in ("scan", "look"):
         connection.execute(f"DELETE FROM {table} WHERE site = ? AND seq <= ?", (LOCAL_SITE, purged))
@@ -218,3 +235,120 @@ def _scan(connection: sqlite3.Connection, row: list[Any]) -> WrittenScan:
     ).fetchall()
     (values,) = numbers_of([row[10]])
     return WrittenScan(found[0], row[1], found[1], row[2], row[5], values)
+
+
+# What an answer of so many writes takes, about, s.
+WRITES_S: Final = 0.05
+
+_NEWEST: Final = "SELECT max(seq) FROM {} WHERE site = :site"
+_ARRIVAL: Final = (
+    "SELECT seq, arrival_ns FROM scan WHERE site = :site AND seq > :after ORDER BY seq LIMIT 1"
+)
+_SCANS: Final = (
+    "SELECT seq, run, tag, stamp_ns, kind, status, sensors, readings FROM scan JOIN series"
+    " ON series.site = scan.site AND series.series = scan.series"
+    " WHERE scan.site = :site AND seq > :after AND is_copy = 0 ORDER BY seq LIMIT :count"
+)
+_LOOKS: Final = (
+    "SELECT seq, run, tag, stamp_ns, species, confidence, anomaly, bug_count FROM look"
+    " WHERE site = :site AND seq > :after AND is_copy = 0 ORDER BY seq LIMIT :count"
+)
+# Of each series, or tag, from the stamp on of the last that is recent. With a limit neither engine
+# makes the search part of the join, where PostgreSQL would do it again for each row.
+_FIRST_RECENT: Final = (
+    "(SELECT s.*, coalesce((SELECT DISTINCT stamp_ns FROM {table} WHERE site = s.site"
+    " AND {which} AND stamp_ns <= :at AND is_copy = 0 ORDER BY stamp_ns DESC LIMIT 1 OFFSET :more),"
+    " 0) AS first_ns FROM series AS s WHERE s.site = :site AND s.run = :run AND {kind}"
+    " LIMIT 1000000) AS s CROSS JOIN {table} AS r"
+)
+_FIRST_SCAN: Final = _FIRST_RECENT.format(
+    table="scan", which="series = s.series", kind="s.kind = 0 AND s.sensors != '[]'"
+)
+_FIRST_LOOK: Final = _FIRST_RECENT.format(
+    table="look", which="run = s.run AND tag = s.tag", kind="s.kind = 1"
+)
+_IN_TIME: Final = "r.is_copy = 0 AND r.stamp_ns <= :at AND r.stamp_ns >= s.first_ns"
+_RECENT_SCANS: Final = (
+    "SELECT r.seq, s.run, s.tag, r.stamp_ns, s.kind,"
+    f" r.status, s.sensors, r.readings FROM {_FIRST_SCAN}"
+    f" WHERE r.site = s.site AND r.series = s.series AND {_IN_TIME}"
+)
+_RECENT_LOOKS: Final = (
+    "SELECT r.seq, r.run, r.tag, r.stamp_ns, r.species, r.confidence,"
+    f" r.anomaly, r.bug_count FROM {_FIRST_LOOK}"
+    f" WHERE r.site = s.site AND r.run = s.run AND r.tag = s.tag AND {_IN_TIME}"
+)
+
+
+def recent(
+    connection: Any, request: RecentRequest, site: str = LOCAL_SITE
+) -> tuple[PastWrite, ...]:
+    """What was recent at a moment."""
+    log = SiteLog(connection, site)
+    with log.one_view():
+        span = span_at(runs(log.execute, log.site), request.at_ns)
+        if span is None:
+            return ()
+        query = {
+            "run": span.run.id,
+            "at": request.at_ns,
+            "more": RECENT_COUNT - 1,
+        }
+        scans = log.execute(_RECENT_SCANS, query).fetchall()
+        inspections = log.execute(_RECENT_LOOKS, query).fetchall()
+        return recent_of([*_of_scans(scans), *_of_inspections(inspections)], request.at_ns)
+
+
+def writes(connection: Any, request: WritesRequest, site: str = LOCAL_SITE) -> PastWrites:
+    """The next writes, copies left out."""
+    log = SiteLog(connection, site)
+    with log.one_view():
+        newest = max(
+            log.execute(_NEWEST.format(table)).fetchone()[0] or 0 for table in ("scan", "look")
+        )
+        after = request.after or _beginning(log, request, newest)
+        query = {"after": after, "count": request.max_count}
+        scans = log.execute(_SCANS, query).fetchall()
+        inspections = log.execute(_LOOKS, query).fetchall()
+        found = sorted(
+            [*_of_scans(scans), *_of_inspections(inspections)], key=lambda write: write.number
+        )
+        is_all = len(found) < request.max_count
+        found = found[: request.max_count]
+        last = max(newest, after) if is_all else found[-1].number
+        axis = tuple(
+            RunSpan(s.run.id, s.start_ns, s.end_ns) for s in spans(runs(log.execute, log.site))
+        )
+        return PastWrites(_journal_id(log), axis, tuple(found), last, is_all)
+
+
+def _beginning(log: SiteLog, request: WritesRequest, newest: int) -> int:
+    """The number before the first write that is requested: arrivals ascend with numbers."""
+    low, high = 0, newest
+    if request.reach_count:
+        low = max(0, newest - request.reach_count)
+    if not request.reach_s:
+        return low
+    since_ns = time.time_ns() - int(request.reach_s * 1e9)
+    while low < high:
+        middle = (low + high) // 2
+        row = log.execute(_ARRIVAL, {"after": middle}).fetchone()
+        if row is None or row[1] >= since_ns:
+            high = middle
+        else:
+            low = row[0]
+    return low
+
+
+def _of_scans(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:
+    names = {text: sensor_names(text) for text in {row[6] for row in rows}}
+    every = numbers_of([row[7] for row in rows])
+    for row, values in zip(rows, every, strict=True):
+        seq, run, tag, stamp_ns, kind, status, sensors, _ = row
+        yield PastWrite(seq, run, tag, stamp_ns, kind, status, names[sensors], tuple(values))
+
+
+def _of_inspections(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:
+    for seq, run, tag, stamp_ns, species, confidence, anomaly, bug_count in rows:
+        seen = (sure_species(species, confidence), bool(anomaly), bug_count)
+        yield PastWrite(seq, run, tag, stamp_ns, KIND_FLOWER, STATUS_OK, (), (), True, *seen)

@@ -1,9 +1,10 @@
 # ruff: noqa: S608  # SQL is put together of constants
 """What long views need, upserted in the transaction that writes the rows it follows from.
 
-By the hour: readings of each sensor (`hour`), the site's scans, failures and looks (`tally`). One
-by one, for they are rare (`event`): pests seen and cleared, stretches without an attempt. All of it
-stays when rows are deleted, and none of it is ever computed anew: a row that comes late is added.
+By the hour: readings of each sensor (`hour`), the site's scans, failures and inspections (`tally`).
+One by one, for they are rare (`event`): pests seen and cleared, stretches without an attempt. All
+of it stays when rows are deleted, and none of it is ever computed anew: a row that comes late is
+added.
 """
 
 from __future__ import annotations
@@ -12,14 +13,15 @@ import json
 from collections.abc import Iterable, Sequence
 from typing import Any, Final, NamedTuple
 
+from lupin_twin.core.past import HOUR_NS, Event, Grid, SeriesPast
 from lupin_twin.journal.rows import KIND_READING, STATUS_OK
 from lupin_twin.journal.runs import Span
-from lupin_twin.journal.schema import DamagedFile
-from lupin_twin.journal.site_log import SiteLog
-from lupin_twin.past import HOUR_NS, Event, Grid, SeriesPast
+from lupin_twin.journal.schema import DamagedFile, SiteLog
 
 # Shorter stretches without an attempt are no silence, whatever is usual.
 SILENCE_NS: Final = 600 * 1_000_000_000
+# With the number of a run behind it: the last stamp of what was deleted of it.
+DELETED: Final = "purged_ns:"
 # What is counted by the hour.
 TALLIED: Final = (Event.SCANS, Event.FAILURES, Event.LOOKS)
 # A sum of larger readings could be beyond any number, which PostgreSQL refuses.
@@ -37,8 +39,8 @@ class WrittenScan(NamedTuple):
     values: Sequence[float]
 
 
-class WrittenLook(NamedTuple):
-    """A look as it stands in the table, no copy."""
+class WrittenInspection(NamedTuple):
+    """An inspection as it stands in the table, no copy."""
 
     run: int
     tag: str
@@ -53,7 +55,9 @@ def is_counted(value: float) -> bool:
     return -_LARGEST < value < _LARGEST
 
 
-def count(log: SiteLog, scans: Iterable[WrittenScan], looks: Sequence[WrittenLook]) -> None:
+def count(
+    log: SiteLog, scans: Iterable[WrittenScan], inspections: Sequence[WrittenInspection]
+) -> None:
     """Count rows that are in the tables now, each once, whatever its stamp."""
     hours: dict[tuple[int, int], list[Sequence[float]]] = {}
     tallies: dict[tuple[int, str, int], list[int]] = {}
@@ -67,16 +71,16 @@ def count(log: SiteLog, scans: Iterable[WrittenScan], looks: Sequence[WrittenLoo
             _tally(tallies, (run, Event.SCANS, hour), len(values), stamp_ns)
         if values:
             hours.setdefault((series, hour), []).append(values)
-    for look in looks:
-        stamps.setdefault(look.run, []).append(look.stamp_ns)
-        key = (look.run, Event.LOOKS, look.stamp_ns // HOUR_NS)
-        _tally(tallies, key, look.bug_count, look.stamp_ns)
+    for inspection in inspections:
+        stamps.setdefault(inspection.run, []).append(inspection.stamp_ns)
+        key = (inspection.run, Event.LOOKS, inspection.stamp_ns // HOUR_NS)
+        _tally(tallies, key, inspection.bug_count, inspection.stamp_ns)
     for run, of_run in stamps.items():
         _note_silences(log, run, sorted(of_run))
     _upsert_hours(log, hours)
     log.execute_many(_TALLY, [(log.site, *key, *entry) for key, entry in sorted(tallies.items())])
-    for look in looks:
-        _note_pests(log, look)
+    for inspection in inspections:
+        _note_pests(log, inspection)
 
 
 def extent(log: SiteLog, run: int) -> tuple[int, int] | None:
@@ -109,13 +113,13 @@ def delete_before(log: SiteLog, run: int, stamp_ns: int) -> None:
 class Buckets:
     """Counts, sums, least and largest by the bucket of a grid."""
 
-    def __init__(self, told: Grid) -> None:
-        self.told = told
+    def __init__(self, steps: Grid) -> None:
+        self.grid = steps
         self._found: dict[int, list[float]] = {}
 
     def are_hours(self) -> bool:
         """Whether each has whole hours."""
-        return self.told.bucket_ns % HOUR_NS == 0 and self.told.start_ns % HOUR_NS == 0
+        return self.grid.bucket_ns % HOUR_NS == 0 and self.grid.start_ns % HOUR_NS == 0
 
     def add(self, index: int, n: int, total: float, low: float, high: float) -> None:
         """Add some to a bucket."""
@@ -129,22 +133,29 @@ class Buckets:
 
     def add_value(self, stamp_ns: int, value: float) -> None:
         """Add one."""
-        index = (stamp_ns - self.told.start_ns) // self.told.bucket_ns
+        index = (stamp_ns - self.grid.start_ns) // self.grid.bucket_ns
         self.add(index, 1, value, value, value)
 
     def past(self) -> SeriesPast:
         """The answer. 12 digits are the same in whatever way, and on whichever engine, it came."""
-        told, found = self.told, sorted(self._found.items())
+        steps, found = self.grid, sorted(self._found.items())
         return SeriesPast(
-            told.start_ns,
-            told.end_ns,
-            told.bucket_ns,
-            tuple(told.start_ns + index * told.bucket_ns for index, _ in found),
+            steps.start_ns,
+            steps.end_ns,
+            steps.bucket_ns,
+            tuple(steps.start_ns + index * steps.bucket_ns for index, _ in found),
             tuple(int(n) for _, (n, *_) in found),
             tuple(_rounded(total / n) for _, (n, total, *_) in found),
             tuple(_rounded(low) for _, (*_, low, _) in found),
             tuple(_rounded(high) for _, (*_, high) in found),
         )
+
+
+def individually(found: Sequence[tuple[int, float]], start_ns: int, end_ns: int) -> SeriesPast:
+    """An answer of single (stamp, value), not of buckets."""
+    values = tuple(value for _, value in found)
+    stamps = tuple(stamp_ns for stamp_ns, _ in found)
+    return SeriesPast(start_ns, end_ns, None, stamps, (1,) * len(found), values, values, values)
 
 
 def _rounded(number: float) -> float:
@@ -153,10 +164,7 @@ def _rounded(number: float) -> float:
 
 def deleted_ns(log: SiteLog, run: int) -> int:
     """The last stamp of a run of which something was deleted; -1 if nothing was."""
-    found = log.execute(
-        "SELECT value FROM meta WHERE site = :site AND key = :key", {"key": f"purged_ns:{run}"}
-    ).fetchone()
-    return int(found[0]) if found else -1
+    return int(log.meta(f"{DELETED}{run}") or -1)
 
 
 def whole_hours(span: Span, horizon_ns: int) -> tuple[tuple[int, int], list[Span]]:
@@ -188,8 +196,8 @@ _HOUR: Final = (
     " low = excluded.low, high = excluded.high"
 )
 _OF_HOUR: Final = (
-    "SELECT CAST(n AS TEXT), CAST(total AS TEXT), CAST(low AS TEXT), CAST(high AS TEXT)"
-    " FROM hour WHERE site = :site AND series = :series AND hour = :hour"
+    "SELECT series, hour, CAST(n AS TEXT), CAST(total AS TEXT), CAST(low AS TEXT),"
+    " CAST(high AS TEXT) FROM hour WHERE site = :site AND series IN ({}) AND hour = :hour"
 )
 _TALLY: Final = (
     "INSERT INTO tally (site, run, event, hour, n, total, low, high, first_ns, last_ns)"
@@ -210,18 +218,10 @@ _LAST: Final = _ENDS.format("DESC")
 
 def _upsert_hours(log: SiteLog, hours: dict[tuple[int, int], list[Sequence[float]]]) -> None:
     rows: list[tuple[Any, ...]] = []
-    n: list[int]
-    total: list[float]
-    low: list[Any]  # None where there is nothing
-    high: list[Any]
+    found = _hours_of(log, hours)
     # In the order of the table: its pages are met once.
     for (series, hour), scans in sorted(hours.items()):
-        found = log.execute(_OF_HOUR, {"series": series, "hour": hour}).fetchone()
-        if found is None:
-            width = len(scans[0])
-            n, total, low, high = [0] * width, [0.0] * width, [None] * width, [None] * width
-        else:
-            n, total, low, high = _lists(found)
+        n, total, low, high = found.get((series, hour)) or _no_hour(len(scans[0]))
         for values in scans:
             for sensor, value in enumerate(values):
                 if not -_LARGEST < value < _LARGEST:  # nor NaN, see `is_counted`
@@ -237,21 +237,36 @@ def _upsert_hours(log: SiteLog, hours: dict[tuple[int, int], list[Sequence[float
                     n[sensor], total[sensor] = 1, value
                     low[sensor] = high[sensor] = value
         # What a sum has beyond 15 digits is noise, and takes room.
-        total = [float(f"{number:.15g}") for number in total]
-        rows.append((log.site, series, hour, *map(_json, (n, total, low, high))))
+        sums = ",".join([f"{number:.15g}" for number in total])
+        rows.append((log.site, series, hour, _json(n), f"[{sums}]", _json(low), _json(high)))
     log.execute_many(_HOUR, rows)
 
 
-def _lists(texts: Sequence[str]) -> list[list[Any]]:
+def _hours_of(log: SiteLog, keys: Iterable[tuple[int, int]]) -> dict[tuple[int, int], Any]:
+    """The lists of those hours of series that are there."""
+    by_hour: dict[int, list[int]] = {}
+    for series, hour in keys:
+        by_hour.setdefault(hour, []).append(series)
+    rows = [
+        row
+        for hour, of_hour in by_hour.items()
+        for row in log.execute(
+            _OF_HOUR.format(",".join(map(str, of_hour))), {"hour": hour}
+        ).fetchall()
+    ]
     try:
-        lists: list[list[Any]] = json.loads(f"[{','.join(texts)}]")
+        lists = json.loads("[" + ",".join([f"[{','.join(row[2:])}]" for row in rows]) + "]")
     except ValueError:
         raise DamagedFile("an hour in the journal is no list of numbers") from None
-    return lists
+    return {row[:2]: of_row for row, of_row in zip(rows, lists, strict=True)}
 
 
-def _json(numbers: object) -> str:
-    return json.dumps(numbers, separators=(",", ":"))
+def _no_hour(width: int) -> tuple[list[int], list[float], list[Any], list[Any]]:
+    return [0] * width, [0.0] * width, [None] * width, [None] * width
+
+
+def _json(numbers: list[Any]) -> str:
+    return f"[{','.join(map(repr, numbers))}]".replace("None", "null")
 
 
 def _tally(
@@ -288,8 +303,8 @@ _SILENCE_OVER: Final = (
 
 def silence_over(log: SiteLog, run: int, at_ns: int) -> tuple[int, int] | None:
     """The attempts between which a moment is, if they are far apart; the later may be then."""
-    asked = {"run": run, "event": Event.SILENCES, "at": at_ns}
-    found = log.execute(_SILENCE_OVER, asked).fetchone()
+    query = {"run": run, "event": Event.SILENCES, "at": at_ns}
+    found = log.execute(_SILENCE_OVER, query).fetchone()
     return (found[0], found[1]) if found and found[1] >= at_ns else None
 
 
@@ -329,21 +344,26 @@ _LAST_CHANGE: Final = (
 )
 
 
-def _note_pests(log: SiteLog, look: WrittenLook) -> None:
-    """Note what a look changes; one that comes late may make the next one a change, or none."""
-    within = {"run": look.run, "tag": look.tag, "at": look.stamp_ns, "seq": look.seq}
+def _note_pests(log: SiteLog, inspection: WrittenInspection) -> None:
+    """Note what an inspection changes; a late one may make the next one a change, or none."""
+    within = {
+        "run": inspection.run,
+        "tag": inspection.tag,
+        "at": inspection.stamp_ns,
+        "seq": inspection.seq,
+    }
     before = log.execute(_BEFORE, within).fetchone()
     if before is not None:
         had = bool(before[2])
     else:
-        # A tag without a look has no pest; that of a deleted one is known by what it changed.
+        # A tag without inspection has no pest; that of a deleted one is known by what it changed.
         change = log.execute(_LAST_CHANGE, within).fetchone()
         had = change is not None and change[0] == Event.PESTS_SEEN
-    _note_pest(log, within, look.bug_count, (had, look.anomaly))
+    _note_pest(log, within, inspection.bug_count, (had, inspection.anomaly))
     after = log.execute(_AFTER, within).fetchone()
     if after is not None:
         within |= {"at": after[0], "seq": after[1]}
-        _note_pest(log, within, after[3], (look.anomaly, bool(after[2])))
+        _note_pest(log, within, after[3], (inspection.anomaly, bool(after[2])))
 
 
 def _note_pest(log: SiteLog, at: dict[str, Any], bugs: int, pests: tuple[bool, bool]) -> None:

@@ -1,24 +1,27 @@
-"""One sensor of one tag over a period: its readings, or buckets of them.
+"""One sensor of one tag over a period, its readings or buckets of them; or all readings, in order.
 
 Buckets of an hour and more are made of hours; so are all where rows were deleted. Shorter ones, and
 readings, are read off the rows. What a bucket says has 12 digits, so that it is the same in
 whatever way, and on whatever engine, it was added up.
+
+An export reads a stretch of time in one short transaction, so that a reader that takes an hour over
+ten million rows keeps the log from being put into the file for no longer than that.
 """
 
 from __future__ import annotations
 
+import math
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from lupin_twin.journal.events import events
-from lupin_twin.journal.hours import Buckets, deleted_ns, is_counted, whole_hours
-from lupin_twin.journal.reading import numbers_of, sensor_names
-from lupin_twin.journal.rows import KIND_READING
-from lupin_twin.journal.runs import Span, runs, spans_within
-from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile
-from lupin_twin.journal.site_log import SiteLog
-from lupin_twin.past import HOUR_NS, SeriesPast, SeriesRequest, grid
+from lupin_twin.core.past import HOUR_NS, NotRemembered, PastRow, SeriesPast, SeriesRequest, grid
+from lupin_twin.journal.events import FROM_SCAN, events
+from lupin_twin.journal.hours import Buckets, deleted_ns, individually, is_counted, whole_hours
+from lupin_twin.journal.rows import KIND_READING, numbers_of, sensor_names
+from lupin_twin.journal.runs import Run, Span, runs, spans_within
+from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile, SiteLog
 
 # Scans that are read for one answer: a quarter of a second. Of more, the hours are reported.
 MAX_SCANS: Final = 50_000
@@ -53,7 +56,7 @@ class _Part:
     sensors: int
     deleted_ns: int
 
-    def asked(self, **more: int) -> Mapping[str, int]:
+    def query(self, **more: int) -> Mapping[str, int]:
         """What queries name."""
         within = {"start": self.span.start_ns, "end": self.span.end_ns}
         return {"series": self.series, "place": self.place} | within | more
@@ -66,7 +69,7 @@ class _Part:
 def series(
     connection: Any, request: SeriesRequest, now_ns: int, site: str = LOCAL_SITE
 ) -> SeriesPast:
-    """What a sensor gave, or the events that are asked for, see GetHistory.srv.
+    """What a sensor gave, or the events that are requested, see GetHistory.srv.
 
     Where rows were deleted, the answer is in buckets of whole hours.
     """
@@ -79,18 +82,18 @@ def series(
         parts = _parts(log, request, request.start_ns, end_ns)
         oldest = [at_ns for part in parts if (at_ns := _oldest(log, part)) is not None]
         start_ns = request.start_ns or min(oldest, default=end_ns)
-        told = grid(start_ns, end_ns, request.max_points)
+        steps = grid(start_ns, end_ns, request.max_points)
         # Of hours it need not be known how many scans there are, but for whether they are few.
-        limit = request.max_points if told.bucket_ns >= HOUR_NS else MAX_SCANS
+        limit = request.max_points if steps.bucket_ns >= HOUR_NS else MAX_SCANS
         scans = sum(_count(log, part, limit) for part in parts)
         are_deleted = any(part.is_deleted() and _has_hours(log, part) for part in parts)
         if not are_deleted and scans <= request.max_points:
             return _readings(log, parts, start_ns, end_ns)
         if are_deleted or scans > MAX_SCANS:
-            told = grid(start_ns, end_ns, request.max_points, HOUR_NS)
+            steps = grid(start_ns, end_ns, request.max_points, HOUR_NS)
         # The period is that of the buckets from here on.
-        parts = _parts(log, request, told.start_ns, told.end_ns)
-        buckets = Buckets(told)
+        parts = _parts(log, request, steps.start_ns, steps.end_ns)
+        buckets = Buckets(steps)
         for part in parts:
             _add(log, buckets, part)
         return buckets.past()
@@ -132,10 +135,10 @@ def _parts(log: SiteLog, request: SeriesRequest, start_ns: int, end_ns: int) -> 
 
 
 def _oldest(log: SiteLog, part: _Part) -> int | None:
-    (stamp_ns,) = log.execute(f"SELECT min(stamp_ns) {_WITHIN}", part.asked()).fetchone()
+    (stamp_ns,) = log.execute(f"SELECT min(stamp_ns) {_WITHIN}", part.query()).fetchone()
     known = [] if stamp_ns is None else [int(stamp_ns)]
     if part.is_deleted():
-        within = part.asked(
+        within = part.query(
             first=part.span.start_ns // HOUR_NS, last=-(-part.span.end_ns // HOUR_NS)
         )
         (hour,) = log.execute(f"SELECT min(hour) {_HOURS_WITHIN}", within).fetchone()
@@ -147,7 +150,7 @@ def _oldest(log: SiteLog, part: _Part) -> int | None:
 def _count(log: SiteLog, part: _Part, limit: int) -> int:
     (count,) = log.execute(
         f"SELECT count(*) FROM (SELECT 1 AS one {_WITHIN} LIMIT :limit) AS found",  # noqa: S608
-        part.asked(limit=limit + 1),
+        part.query(limit=limit + 1),
     ).fetchone()
     return int(count)
 
@@ -155,7 +158,7 @@ def _count(log: SiteLog, part: _Part, limit: int) -> int:
 def _has_hours(log: SiteLog, part: _Part) -> bool:
     """Whether an hour has what was deleted within the span."""
     last_ns = min(part.span.end_ns - 1, part.deleted_ns)
-    within = part.asked(first=part.span.start_ns // HOUR_NS, last=last_ns // HOUR_NS + 1)
+    within = part.query(first=part.span.start_ns // HOUR_NS, last=last_ns // HOUR_NS + 1)
     return log.execute(f"SELECT 1 {_HOURS_WITHIN} LIMIT 1", within).fetchone() is not None
 
 
@@ -166,7 +169,7 @@ def _values(log: SiteLog, part: _Part, span: Span) -> Iterator[tuple[int, int, f
     """(stamp, seq, value) of the readings in a part of the span."""
     found = log.execute(
         f"SELECT stamp_ns, seq, readings {_WITHIN}",
-        part.asked(start=span.start_ns, end=span.end_ns),
+        part.query(start=span.start_ns, end=span.end_ns),
     )
     return _read(part, found.fetchall())
 
@@ -186,7 +189,7 @@ def _last(log: SiteLog, part: _Part, most: int) -> list[tuple[int, int, float]]:
         rows = log.execute(
             f"SELECT stamp_ns, seq, readings {_WITHIN} AND (stamp_ns, seq) < (:at, :seq)"
             " ORDER BY stamp_ns DESC, seq DESC LIMIT :limit",
-            part.asked(limit=most, **at),
+            part.query(limit=most, **at),
         ).fetchall()
         found += [reading for reading in _read(part, rows) if is_counted(reading[2])]
         if len(rows) < most:
@@ -198,9 +201,7 @@ def _last(log: SiteLog, part: _Part, most: int) -> list[tuple[int, int, float]]:
 def _readings(log: SiteLog, parts: Sequence[_Part], start_ns: int, end_ns: int) -> SeriesPast:
     # Of one stamp, in the order of receiving.
     found = sorted(reading for part in parts for reading in _values(log, part, part.span))
-    values = tuple(value for *_, value in found)
-    stamps = tuple(stamp_ns for stamp_ns, *_ in found)
-    return SeriesPast(start_ns, end_ns, None, stamps, (1,) * len(found), values, values, values)
+    return individually([(stamp_ns, value) for stamp_ns, _, value in found], start_ns, end_ns)
 
 
 def _add(log: SiteLog, buckets: Buckets, part: _Part) -> None:
@@ -208,16 +209,151 @@ def _add(log: SiteLog, buckets: Buckets, part: _Part) -> None:
     rest = [part.span]
     if buckets.are_hours():
         hours, rest = whole_hours(part.span, part.deleted_ns)
-        asked = part.asked(
+        query = part.query(
             first=hours[0],
             last=hours[1],
-            origin=buckets.told.start_ns // HOUR_NS,
-            width=buckets.told.bucket_ns // HOUR_NS,
+            origin=buckets.grid.start_ns // HOUR_NS,
+            width=buckets.grid.bucket_ns // HOUR_NS,
         )
-        for index, n, *numbers in log.execute(_BUCKETS, asked).fetchall():
+        for index, n, *numbers in log.execute(_BUCKETS, query).fetchall():
             if n:
                 buckets.add(index, int(n), *numbers)
     for span in rest:
         for stamp_ns, _, value in _values(log, part, span):
             if is_counted(value):
                 buckets.add_value(stamp_ns, value)
+
+
+LOT: Final = 1_000
+# Readings that are read in one go, about, and what that costs, s.
+_STRETCH: Final = 40_000
+STRETCH_S: Final = 0.1
+_FIRST_STRETCH_NS: Final = 60 * 1_000_000_000
+_NOWHERE: Final = (math.nan, math.nan)
+_NO_READING: Final = (("", math.nan),)
+
+_SCANS: Final = f"SELECT stamp_ns, seq, tag, sensors, status, source, readings {FROM_SCAN}"
+_NEXT: Final = f"SELECT min(stamp_ns) {FROM_SCAN}"  # constants
+
+
+def rows(  # noqa: PLR0917
+    connection: Any,
+    start_ns: int,
+    end_ns: int,
+    tag_id: str | None = None,
+    sensor_type: str | None = None,
+    site: str = LOCAL_SITE,
+) -> Iterator[list[PastRow]]:
+    """Lots of at most `LOT` rows, see `Export`."""
+    export = Export(start_ns, end_ns, tag_id, sensor_type, site)
+    while (found := export.step(connection)) is not None:
+        yield from lots(found)
+
+
+def lots(found: list[PastRow]) -> Iterator[list[PastRow]]:
+    """Rows, `LOT` at a time."""
+    for first in range(0, len(found), LOT):
+        yield found[first : first + LOT]
+
+
+class Export:
+    """The rows of a period; None: of all tags; of all sensors, and of attempts without a reading.
+
+    Each step may be over another connection. An export that deleting has overtaken is not whole,
+    and does not look so.
+    """
+
+    def __init__(
+        self,
+        start_ns: int,
+        end_ns: int,
+        tag_id: str | None,
+        sensor_type: str | None,
+        site: str = LOCAL_SITE,
+    ) -> None:
+        self._period = (start_ns, end_ns)
+        self._tag_id = tag_id
+        self._sensor_type = sensor_type
+        self._site = site
+        self._spans: deque[Span] | None = None
+        self._at_ns = 0
+        self._length_ns = _FIRST_STRETCH_NS
+        self._run: Run | None = None
+        self._places: dict[str, tuple[float, float]] = {}
+        # The last stamp of each run that was deleted when the first row was given.
+        self._deleted_ns: dict[int, int] = {}
+        self._has_begun = False
+
+    def step(self, connection: Any) -> list[PastRow] | None:
+        """The rows of the next stretch of time, maybe none; None: that was all.
+
+        Raises:
+            NotRemembered: behind rows that were given, some are deleted since.
+
+        """
+        log = SiteLog(connection, self._site)
+        with log.one_view():
+            if self._spans is None:
+                self._spans = deque(spans_within(runs(log.execute, log.site), *self._period))
+            if not self._has_begun:
+                self._deleted_ns = {s.run.id: deleted_ns(log, s.run.id) for s in self._spans}
+            while self._spans and self._spans[0].end_ns <= self._at_ns:
+                self._spans.popleft()
+            return self._stretch(log, self._spans[0]) if self._spans else None
+
+    def _stretch(self, log: SiteLog, span: Span) -> list[PastRow]:
+        if self._run != span.run:
+            self._run, self._places = span.run, _places(log, span.run)
+        start_ns = max(self._at_ns, span.start_ns)
+        horizon_ns = deleted_ns(log, span.run.id)
+        if horizon_ns >= start_ns and horizon_ns > self._deleted_ns[span.run.id]:
+            why = "scans that come next were deleted while others were taken: begin again"
+            raise NotRemembered(why, is_lasting=False)
+        while True:
+            until_ns = min(start_ns + self._length_ns, span.end_ns)
+            # Of one stamp there are as many scans as there are.
+            limit = "" if self._length_ns == 1 else f" LIMIT {_STRETCH}"
+            scans = self._ask(log, _SCANS + limit, start_ns, until_ns)
+            read = sum(1 + scan[-1].count(",") for scan in scans)
+            if self._length_ns == 1 or read < _STRETCH:
+                break
+            self._length_ns = max(1, self._length_ns // 8)
+        self._at_ns = until_ns
+        if not scans:
+            ((next_ns,),) = self._ask(log, _NEXT, until_ns, span.end_ns)
+            self._at_ns = span.end_ns if next_ns is None else next_ns
+        more = _STRETCH / 4 / max(read, _STRETCH // 32)
+        self._length_ns = max(1, int(self._length_ns * more))
+        self._has_begun |= bool(scans)
+        return self._read(sorted(scans))
+
+    def _ask(self, log: SiteLog, sql: str, start_ns: int, end_ns: int) -> list[tuple[Any, ...]]:
+        assert self._run is not None
+        of_tag = "" if self._tag_id is None else " AND tag = :tag"
+        query = {"run": self._run.id, "tag": self._tag_id, "start": start_ns, "end": end_ns}
+        return list(log.execute(sql.replace("{tag}", of_tag), query).fetchall())
+
+    def _read(self, scans: list[tuple[Any, ...]]) -> list[PastRow]:
+        found: list[PastRow] = []
+        names = {text: sensor_names(text) for text in {scan[3] for scan in scans}}
+        every = numbers_of([scan[-1] for scan in scans])
+        for (stamp_ns, _, tag, sensors, status, source, _), values in zip(
+            scans, every, strict=True
+        ):
+            x, y = self._places.get(tag, _NOWHERE)
+            readings = zip(names[sensors], values, strict=True)
+            found += [
+                PastRow(stamp_ns, tag, x, y, sensor, value, status, source)
+                for sensor, value in (readings if values else _NO_READING)
+                if self._sensor_type in (None, sensor)
+            ]
+        return found
+
+
+def _places(log: SiteLog, run: Run) -> dict[str, tuple[float, float]]:
+    """Where tags are: what was known first holds, what was carried into the run before all."""
+    found = log.execute(
+        "SELECT tag, x, y FROM place WHERE site = :site AND run = :run ORDER BY seq DESC",
+        {"run": run.id},
+    )
+    return {tag: (x, y) for tag, x, y in found.fetchall()}

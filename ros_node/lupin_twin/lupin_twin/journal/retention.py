@@ -1,4 +1,4 @@
-"""What is given up, by age and by size, a little at a time: the oldest first.
+"""What is deleted: by age and by size, a little at a time, the oldest first; a tag on request.
 
 Rows go by ranges of their numbers, which lie together in the file; the pages they leave are used
 again, and what is left over is given back to the disk. Hours stay for ten years.
@@ -6,16 +6,28 @@ again, and what is left over is given back to the disk. Hours stay for ten years
 
 from __future__ import annotations
 
+import json
 import sqlite3
+from collections.abc import Iterator, Mapping
+from contextlib import closing
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
-from lupin_twin.journal.appending import PURGED_SEQ
-from lupin_twin.journal.hours import delete_before, extent
+from lupin_twin.core.past import HOUR_NS
+from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ, Appender
+from lupin_twin.journal.beside import InUse, Lock
+from lupin_twin.journal.hours import DELETED, delete_before, deleted_ns, extent
 from lupin_twin.journal.runs import runs, spans
-from lupin_twin.journal.schema import LOCAL_SITE, get_meta, set_meta
-from lupin_twin.journal.site_log import SiteLog
-from lupin_twin.past import HOUR_NS
+from lupin_twin.journal.schema import (
+    LOCAL_SITE,
+    SiteLog,
+    get_meta,
+    open_named,
+    open_writer,
+    set_meta,
+    transaction,
+)
 
 DAY_NS: Final = 24 * HOUR_NS
 _HOURS_DAYS: Final = 3652  # ten years
@@ -29,8 +41,7 @@ _FREE_PAGES: Final = 256
 # The limits stand in the file, for who looks at it without its twin.
 KEPT_NS: Final = "kept_ns"
 KEPT_BYTES: Final = "kept_bytes"
-# With the number of a run behind it: see `purged_ns`.
-_HORIZON: Final = "purged_ns:"
+# With the number of a run behind it.
 _LOST: Final = "lost_ns:"
 # Stretches that are reported at most, the last ones.
 _MAX_STRETCHES: Final = 16
@@ -41,7 +52,7 @@ Stretches = tuple[tuple[int, int], ...]
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """How long scans and looks are kept, and how large the file may be."""
+    """How long scans and inspections are kept, and how large the file may be."""
 
     days: float
     max_bytes: int
@@ -58,12 +69,6 @@ def used_bytes(connection: sqlite3.Connection) -> int:
     """What is in use of the file."""
     pages, free, size = _pages(connection)
     return (pages - free) * size
-
-
-def purged_ns(connection: sqlite3.Connection, run: int, site: str = LOCAL_SITE) -> int:
-    """The last stamp of a run of which something was given up; -1 if nothing was."""
-    found = get_meta(connection, f"{_HORIZON}{run}", site)
-    return -1 if found is None else int(found)
 
 
 def note_lost(connection: sqlite3.Connection, run: int, at_ns: int) -> None:
@@ -83,7 +88,7 @@ def kept(connection: sqlite3.Connection) -> Stretches:
     for number, span in enumerate(spans(every)):
         run = span.run.id
         lost_ns = int(get_meta(connection, f"{_LOST}{run}") or -1)
-        start_ns = max(span.start_ns, purged_ns(connection, run) + 1, lost_ns + 1)
+        start_ns = max(span.start_ns, deleted_ns(SiteLog(connection), run) + 1, lost_ns + 1)
         if number == 0 and start_ns == 0:
             begun = [each.begun.stamp_ns for each in every if each.root == run]
             start_ns = min(*begun, *(extent(log, run) or begun))
@@ -100,16 +105,8 @@ def horizon_ns(connection: sqlite3.Connection, limits: Limits, now_ns: int) -> i
     That clock may be ahead: what was received last tells how far it has come, and no more than a
     day of what is there goes at once.
     """
-    received = [
-        connection.execute(
-            f"SELECT arrival_ns FROM {table} WHERE site = ? ORDER BY seq {way} LIMIT 1",  # noqa: S608
-            (LOCAL_SITE,),
-        ).fetchone()
-        for way in ("ASC", "DESC")
-        for table in ("scan", "look")
-    ]
-    first = min((row[0] for row in received[:2] if row), default=now_ns)
-    last = max((row[0] for row in received[2:] if row), default=now_ns)
+    first = min(_arrivals(connection, "ASC"), default=now_ns)
+    last = max(_arrivals(connection, "DESC"), default=now_ns)
     return min(min(now_ns, last) - int(limits.days * DAY_NS), first + DAY_NS)
 
 
@@ -153,14 +150,19 @@ def purge_step(
 
 def holds_older(connection: sqlite3.Connection, before_ns: int) -> bool:
     """Whether rows are there that are too old: they wait to be forwarded."""
-    return any(
-        row[0] < before_ns
+    return any(arrival_ns < before_ns for arrival_ns in _arrivals(connection, "ASC"))
+
+
+def _arrivals(connection: sqlite3.Connection, way: str) -> list[int]:
+    """When the first (ASC) or last (DESC) scan and inspection were received that are there."""
+    return [
+        row[0]
         for table in ("scan", "look")
         for row in connection.execute(
-            f"SELECT arrival_ns FROM {table} WHERE site = ? ORDER BY seq LIMIT 1",  # noqa: S608
+            f"SELECT arrival_ns FROM {table} WHERE site = ? ORDER BY seq {way} LIMIT 1",  # noqa: S608
             (LOCAL_SITE,),
         )
-    )
+    ]
 
 
 def _keep_horizons(connection: sqlite3.Connection, last: int) -> None:
@@ -172,7 +174,7 @@ def _keep_horizons(connection: sqlite3.Connection, last: int) -> None:
         " GROUP BY run",
         {"site": LOCAL_SITE, "last": last},
     ).fetchall():
-        set_meta(connection, f"{_HORIZON}{run}", max(stamp_ns, purged_ns(connection, run)))
+        set_meta(connection, f"{DELETED}{run}", max(stamp_ns, deleted_ns(SiteLog(connection), run)))
 
 
 def purge_hours(connection: sqlite3.Connection, now_ns: int) -> None:
@@ -198,3 +200,94 @@ def _pages(connection: sqlite3.Connection) -> tuple[int, int, int]:
         for name in ("page_count", "freelist_count", "page_size")
     )
     return pages, free, size
+
+
+RECORD: Final = "forgotten:"
+_OF_TAG: Final = "site = :site AND tag = :tag"
+_OF_SERIES: Final = f"site = :site AND series IN (SELECT series FROM series WHERE {_OF_TAG})"  # noqa: S608
+
+
+class NotKnown(Exception):
+    """There is nothing of the tag to be forgotten; the message says so. The file is as it was."""
+
+
+@dataclass(frozen=True, slots=True)
+class Forgotten:
+    """How much of a tag is gone."""
+
+    scans: int
+    inspections: int
+    places: int
+
+
+def forget(path: Path, tag_id: str, *, pose_only: bool, by: str, at_ns: int) -> Forgotten:
+    """Delete a tag's places or all that is known of it, at `at_ns` of wall time.
+
+    Counts of the whole site (tallies) stay as they are.
+
+    Raises:
+        InUse: a twin has it.
+        NotKnown: the journal knows no such tag, or no place of it.
+        Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_named`.
+
+    """
+    # Not a thing is made beside a file that is no journal.
+    with closing(open_named(path)):
+        pass
+    try:
+        lock = Lock(path, "lupin-twin journal forget")
+    except InUse as error:
+        raise InUse(f"{error}: stop the twin first") from error
+    with lock, closing(open_writer(path)) as connection:
+        # What is deleted is overwritten: what is saved of a damaged file does not bring it back.
+        connection.execute("PRAGMA secure_delete = ON")
+        with transaction(connection):
+            _check_known(connection, path, tag_id)
+            # The numbers go on, also when the newest rows are gone.
+            last_seq = Appender(connection).last_seq
+            set_meta(connection, LAST_SEQ, last_seq)
+            forgotten = _delete(connection, tag_id, pose_only=pose_only)
+            if pose_only and not forgotten.places:
+                raise NotKnown(f"the journal {path} knows no place of tag {tag_id!r}")
+            what = "pose" if pose_only else "all"
+            record = {"tag": tag_id, "what": what, "by": by, "at": at_ns, "seq": last_seq}
+            number = 1 + sum(1 for _ in records(connection))
+            set_meta(connection, f"{RECORD}{number}", json.dumps(record))
+    return forgotten
+
+
+def records(connection: sqlite3.Connection) -> Iterator[Mapping[str, object]]:
+    """What was forgotten, the oldest first.
+
+    `tag`, `what`, `by`, `at`: ns of wall time, `seq`: the last number that was given before it.
+    """
+    found = connection.execute(
+        "SELECT value FROM meta WHERE key LIKE ? ORDER BY length(key), key", (f"{RECORD}%",)
+    )
+    return (json.loads(text) for (text,) in found)
+
+
+def _check_known(connection: sqlite3.Connection, path: Path, tag_id: str) -> None:
+    if get_meta(connection, "salvage"):
+        raise NotKnown(f"the journal {path} is being saved from damage: start its twin once")
+    query = {"site": LOCAL_SITE, "tag": tag_id}
+    for table in ("series", "place"):
+        found = connection.execute(f"SELECT 1 FROM {table} WHERE {_OF_TAG} LIMIT 1", query)  # noqa: S608
+        if found.fetchone() is not None:
+            return
+    raise NotKnown(f"the journal {path} knows no tag {tag_id!r}")
+
+
+def _delete(connection: sqlite3.Connection, tag_id: str, *, pose_only: bool) -> Forgotten:
+    def gone(table: str, which: str = _OF_TAG) -> int:
+        query = {"site": LOCAL_SITE, "tag": tag_id}
+        return connection.execute(f"DELETE FROM {table} WHERE {which}", query).rowcount  # noqa: S608
+
+    places = gone("place")
+    if pose_only:
+        return Forgotten(0, 0, places)
+    gone("hour", _OF_SERIES)
+    gone("event")
+    scans, inspections = gone("scan", _OF_SERIES), gone("look")
+    gone("series")
+    return Forgotten(scans, inspections, places)

@@ -1,13 +1,21 @@
-"""What the journal keeps, as plain values. Stamps are ROS time, arrivals wall time, both in ns.
+"""What the journal keeps, as plain values, and out of the texts of its tables.
 
-Pure. The ROS thread makes these, the writer thread writes them, restoring gives them back.
+Stamps are ROS time, arrivals wall time, both in ns. The ROS thread makes rows, the writer thread
+writes them, restoring gives them back.
 """
 
 from __future__ import annotations
 
+import json
+import math
+import sqlite3
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Final
 
-from lupin_twin.state import Flower, Pose, Reading
+from lupin_twin.core.state import Bloom, Flower, Pose, Reading
+from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile
 
 # lupin_msgs/Observation
 KIND_READING = 0
@@ -17,7 +25,7 @@ STATUS_OK = 0
 
 @dataclass(frozen=True, slots=True)
 class ScanRow:
-    """One try at a tag's sensors, or a look that failed; `kind` and `status` as in the message.
+    """An attempt at a tag's sensors, or a failed inspection; `kind`, `status` as in the message.
 
     `own_stamp_ns` is the stamp that it was sent with, None where that is `stamp_ns`, 0 for none.
     """
@@ -35,8 +43,8 @@ class ScanRow:
 
 
 @dataclass(frozen=True, slots=True)
-class LookRow:
-    """One look at a tag's flowers."""
+class InspectionRow:
+    """One inspection of a tag's flowers."""
 
     tag_id: str
     stamp_ns: int
@@ -49,7 +57,7 @@ class LookRow:
 
 @dataclass(frozen=True, slots=True)
 class PinRow:
-    """A tag got its place, by whatever write: a scan, a look or a discovery."""
+    """A tag got its place, by whatever write: a scan, an inspection or a discovery."""
 
     tag_id: str
     stamp_ns: int
@@ -57,13 +65,201 @@ class PinRow:
     pose: Pose
 
 
-Row = ScanRow | LookRow | PinRow
+Row = ScanRow | InspectionRow | PinRow
 
 
 def weight(row: Row) -> int:
     """What a row costs in memory, in readings or flowers."""
     if isinstance(row, ScanRow):
         return 1 + len(row.readings)
-    if isinstance(row, LookRow):
+    if isinstance(row, InspectionRow):
         return 1 + len(row.flower.blooms) + len(row.flower.footprint)
     return 1
+
+
+# Scans that are read at most for the histories of all tags.
+_MAX_SCANS: Final = 20_000
+_OF_RUN: Final = "r.site = :site AND r.run = :run"
+
+
+def newest_rows(
+    connection: sqlite3.Connection, run: int, per_series: int
+) -> list[ScanRow | InspectionRow]:
+    """The newest scans of each series, and the newest inspection of each tag of a run."""
+    query: dict[str, Any] = {"site": LOCAL_SITE, "run": run}
+    (count,) = connection.execute(
+        "SELECT count(*) FROM series WHERE site = :site AND run = :run", query
+    ).fetchone()
+    query["depth"] = max(1, min(per_series, _MAX_SCANS // max(1, count)))
+    newest = (
+        "series AS s CROSS JOIN {0} AS r ON r.site = s.site AND r.seq IN (SELECT seq FROM {0}"
+        " WHERE site = s.site AND {1} ORDER BY stamp_ns DESC, seq DESC LIMIT {2})"
+        " WHERE s.site = :site AND s.run = :run"
+    )
+    found = _rows(
+        connection,
+        newest.format("scan", "series = s.series", ":depth"),
+        newest.format("look", "run = s.run AND tag = s.tag", "1") + " AND s.kind = 1",
+        query,
+    )
+    return [row for _, row in sorted(found, key=lambda entry: entry[0])]
+
+
+def newest_of_tag(
+    connection: sqlite3.Connection, run: int, tag_id: str, per_series: int
+) -> list[ScanRow | InspectionRow]:
+    """The same of one tag; each series by itself, which is quick on both engines."""
+    asked: dict[str, Any] = {"site": LOCAL_SITE, "run": run, "tag": tag_id, "depth": per_series}
+    of_tag = "s.site = :site AND s.run = :run AND s.tag = :tag"
+    newest = " ORDER BY r.stamp_ns DESC, r.seq DESC LIMIT :depth"
+    found = _inspections(connection, f"look AS r WHERE {_OF_RUN} AND r.tag = :tag{newest}", asked)
+    of_tag = f"SELECT series FROM series AS s WHERE {of_tag}"  # noqa: S608
+    for (number,) in connection.execute(of_tag, asked).fetchall():
+        found += _scans(
+            connection,
+            "series AS s CROSS JOIN scan AS r WHERE s.site = :site AND s.series = :series"
+            f" AND r.site = s.site AND r.series = s.series{newest}",
+            asked | {"series": number},
+        )
+    return [row for _, row in sorted(found, key=lambda entry: entry[0])]
+
+
+# --- rows as they were handed over ----------------------------------------------------------------
+
+
+def listed_rows(
+    connection: sqlite3.Connection, run: int, scans: Sequence[int], inspections: Sequence[int]
+) -> list[tuple[int, ScanRow | InspectionRow]]:
+    """The scans and inspections of a run with these seqs, each with its own."""
+    query = {"site": LOCAL_SITE, "run": run, "scans": json.dumps(scans)}
+    query["looks"] = json.dumps(inspections)
+    return _rows(
+        connection,
+        "scan AS r CROSS JOIN series AS s ON s.site = r.site AND s.series = r.series"
+        " WHERE r.site = :site AND r.seq IN (SELECT value FROM json_each(:scans)) AND s.run = :run",
+        "look AS r WHERE r.site = :site AND r.seq IN (SELECT value FROM json_each(:looks))"
+        " AND r.run = :run",
+        query,
+    )
+
+
+def _rows(
+    connection: sqlite3.Connection, scans: str, inspections: str, query: dict[str, Any]
+) -> list[tuple[int, ScanRow | InspectionRow]]:
+    """Scans and inspections (`r`) with their seqs, out of these joins with the series (`s`)."""
+    return [*_scans(connection, scans, query), *_inspections(connection, inspections, query)]
+
+
+def _scans(
+    connection: sqlite3.Connection, joined: str, query: dict[str, Any]
+) -> list[tuple[int, ScanRow | InspectionRow]]:
+    found: list[tuple[int, ScanRow | InspectionRow]] = []
+    rows = connection.execute(
+        "SELECT seq, tag, kind, sensors, readings, stamp_ns, own_stamp_ns, arrival_ns, status,"  # noqa: S608
+        f" source, mission, detail FROM {joined}",
+        query,
+    ).fetchall()
+    for row, values in zip(rows, numbers_of([row[4] for row in rows]), strict=True):
+        seq, tag, kind, sensors, _, stamp_ns, own_ns, arrival_ns, *reported = row
+        status, source, mission, detail = reported
+        readings = tuple(map(Reading, sensor_names(sensors), values))
+        scan = ScanRow(
+            tag, stamp_ns, arrival_ns, readings, kind, status, detail, source, mission, own_ns
+        )
+        found.append((seq, scan))
+    return found
+
+
+def _inspections(
+    connection: sqlite3.Connection, joined: str, query: dict[str, Any]
+) -> list[tuple[int, ScanRow | InspectionRow]]:
+    found: list[tuple[int, ScanRow | InspectionRow]] = []
+    for seq, tag, stamp_ns, own_ns, arrival_ns, source, mission, *flower in connection.execute(
+        "SELECT seq, r.tag, stamp_ns, own_stamp_ns, arrival_ns, source, mission, species,"  # noqa: S608
+        f" confidence, anomaly, flower_count, bug_count, blooms, box FROM {joined}",
+        query,
+    ).fetchall():
+        inspection = InspectionRow(
+            tag, stamp_ns, arrival_ns, flower_of(flower), source, mission, own_ns
+        )
+        found.append((seq, inspection))
+    return found
+
+
+# --- texts of the tables as values ----------------------------------------------------------------
+
+
+def numbers_of(texts: Sequence[str]) -> list[list[float]]:
+    """Many JSON lists of numbers at once; null is NaN.
+
+    Raises:
+        DamagedFile: one of them is none.
+
+    """
+    joined = f"[{','.join(texts)}]"
+    try:
+        every: list[list[Any]] = json.loads(joined, parse_int=float)
+        if "null" in joined:
+            every = [[math.nan if value is None else value for value in row] for row in every]
+        sum(map(sum, every))  # what is no number cannot be added
+    except (ValueError, TypeError, RecursionError):
+        every = []
+    if len(every) != len(texts):
+        raise DamagedFile("readings in the journal are no lists of numbers")
+    return every
+
+
+@lru_cache(maxsize=4096)
+def sensor_names(text: str) -> tuple[str, ...]:
+    """The names of a series' sensors.
+
+    Raises:
+        DamagedFile: it is no list of names.
+
+    """
+    try:
+        names = json.loads(text)
+    except (ValueError, RecursionError):
+        names = None
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise DamagedFile(f"{text[:64]!r} is no list of sensors")
+    return tuple(names)
+
+
+def flower_of(row: Sequence[Any]) -> Flower:
+    """An inspection of flowers, its columns from species on, without `is_copy`.
+
+    Raises:
+        DamagedFile: its blooms or its box are none.
+
+    """
+    species, confidence, anomaly, flower_count, bug_count, blooms, box = row
+    try:
+        return Flower(
+            species,
+            _number(confidence),
+            bool(anomaly),
+            flower_count,
+            bug_count,
+            () if blooms == "[]" else tuple(_bloom(*bloom) for bloom in json.loads(blooms)),
+            () if box == "[]" else tuple(_point(*point) for point in json.loads(box)),
+        )
+    except (ValueError, TypeError, RecursionError):
+        raise DamagedFile("blooms or a box in the journal are none") from None
+
+
+def _bloom(  # noqa: PLR0917  # as it stands in the list
+    x: Any, y: Any, z: Any, height_m: Any, species: str, confidence: Any, anomaly: int
+) -> Bloom:
+    sure = _number(confidence)
+    return Bloom(
+        _number(x), _number(y), _number(z), _number(height_m), species, sure, bool(anomaly)
+    )
+
+
+def _point(x: Any, y: Any, z: Any) -> tuple[float, float, float]:
+    return _number(x), _number(y), _number(z)
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else float(value)

@@ -118,7 +118,7 @@ def spans(every: Iterable[Run]) -> tuple[Span, ...]:
         stamp_ns = run.begun.stamp_ns
         begun[run.root] = min(stamp_ns, begun.get(run.root, stamp_ns))
     waiting = sorted(roots, key=lambda run: (begun[run.id], run.id), reverse=True)
-    # A run holds its beginning at least, and the last moment that was heard.
+    # A run holds its beginning at least, and the last moment that was received.
     until = {
         run.id: FOREVER_NS if run.ended_ns is None else max(run.ended_ns, run.begun.stamp_ns) + 1
         for run in roots
@@ -149,17 +149,39 @@ def span_at(every: Iterable[Run], at_ns: int) -> Span | None:
     return found[index - 1] if index else None
 
 
-def spans_within(every: Iterable[Run], start_ns: int, end_ns: int) -> tuple[Span, ...]:
+def cut(axis: Iterable[Span], start_ns: int, end_ns: int) -> list[Span]:
     """The spans of `start_ns <= stamp < end_ns`, cut to that."""
-    return tuple(
+    return [
         Span(span.run, max(span.start_ns, start_ns), min(span.end_ns, end_ns))
-        for span in spans(every)
+        for span in axis
         if max(span.start_ns, start_ns) < min(span.end_ns, end_ns)
+    ]
+
+
+def spans_within(every: Iterable[Run], start_ns: int, end_ns: int) -> list[Span]:
+    """Which run holds in each part of a period."""
+    return cut(spans(every), start_ns, end_ns)
+
+
+def put_run(connection: Any, run: Run) -> None:
+    """Have a run in the file."""
+    connection.execute(
+        "INSERT INTO run VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+        (
+            LOCAL_SITE,
+            run.id,
+            int(run.begun.is_simulated),
+            run.begun.stamp_ns,
+            run.begun.arrival_ns,
+            run.begun_seq,
+            run.joins,
+            run.ended_ns,
+        ),
     )
 
 
 def simulation_goes_on(begun: Clock, last: Clock, now: Clock) -> bool:
-    """Whether a simulation that is heard `now` is the one last heard at `last`.
+    """Whether a simulation that is received `now` is the one last received at `last`.
 
     It is if its clock is further on than one could be that began after the last word of the old
     one: at twice the pace that the old one had, or the wall's. Where the wall's clock was set back

@@ -16,12 +16,18 @@ from pathlib import Path
 from types import NoneType
 from typing import IO, Any, Final
 
+from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ
-from lupin_twin.journal.hours import WrittenLook, WrittenScan, count
-from lupin_twin.journal.reading import flower_of, numbers_of, sensor_names
-from lupin_twin.journal.schema import LOCAL_SITE, PAGE_SIZE, DamagedFile, set_meta, transaction
-from lupin_twin.journal.site_log import SiteLog
-from lupin_twin.past import HOUR_NS
+from lupin_twin.journal.hours import WrittenInspection, WrittenScan, count
+from lupin_twin.journal.rows import flower_of, numbers_of, sensor_names
+from lupin_twin.journal.schema import (
+    LOCAL_SITE,
+    PAGE_SIZE,
+    DamagedFile,
+    SiteLog,
+    set_meta,
+    transaction,
+)
 
 _LEAF: Final = 0x0A
 _INNER: Final = 0x02
@@ -320,7 +326,7 @@ class Salvage:
         return run in self._runs and hour <= self._purged_ns.get(run, -1) // HOUR_NS
 
     def _write(self, table: str, rows: list[Record]) -> None:
-        scans, looks = [], []
+        scans, inspections = [], []
         for row in rows:
             if row[0] != LOCAL_SITE or row[1] <= self._purged_seq:
                 continue
@@ -333,8 +339,8 @@ class Salvage:
             if isinstance(written, WrittenScan):
                 scans.append(written)
             else:
-                looks.append(written)
-        count(self._log, scans, looks)
+                inspections.append(written)
+        count(self._log, scans, inspections)
 
     def _scan(self, row: Record) -> WrittenScan | None:
         run, kind, sensors = self._series.get(row[2], (0, 0, -1))
@@ -346,14 +352,14 @@ class Salvage:
             return None
         return WrittenScan(run, row[2], kind, row[3], row[6], values)
 
-    def _look(self, row: Record) -> WrittenLook | None:
+    def _look(self, row: Record) -> WrittenInspection | None:
         try:
             flower_of([*row[9:14], *row[15:17]])
         except DamagedFile:
             return None
         if row[2] not in self._runs or not 0 <= row[4] < _NEVER:
             return None
-        return WrittenLook(row[2], row[3], row[1], row[4], bool(row[11]), row[13])
+        return WrittenInspection(row[2], row[3], row[1], row[4], bool(row[11]), row[13])
 
     def _put(self, table: str, rows: Iterable[Record]) -> int:
         marks = ", ".join("?" * len(_KINDS[table]))

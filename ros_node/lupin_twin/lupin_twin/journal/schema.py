@@ -1,33 +1,35 @@
-"""The tables, for SQLite and PostgreSQL alike, and how a file with them is opened.
+"""The tables, for SQLite and PostgreSQL alike, how a file with them is opened, and one site's rows.
 
 Plain SQL that any tool reads. `site` leads every key; in a twin's own file there is one, `local`.
 Times are ns: stamps ROS time, arrivals wall time.
 
 `seq` is one sequence over scan, look and place, in the order in which things were received; the
-number of a series is the seq of its first write. Looks have one too, of kind 1 without sensors. A
-failed attempt is a scan with another status than 0, a failed look at flowers one of that series.
-`own_stamp_ns` is the stamp that was sent, where that could not be true (from the future; 0: none),
-NULL where it is `stamp_ns`, and -1 in a copy that is known by no stamp. A copy (`is_copy`) is what
-was known as a run or a step began; `begun_seq` is its first. A step is a row of `run` that `joins`
-another: the same run, whose clock was set a little. Rows refer to the run, never to the step.
-`ended_stamp_ns` is NULL in the run that goes on, and in a step.
+number of a series is the seq of its first write. Inspections have one too, of kind 1 without
+sensors. A failed attempt is a scan with another status than 0, a failed inspection of flowers one
+of that series. `own_stamp_ns` is the stamp that was sent, where that could not be true (from the
+future; 0: none), NULL where it is `stamp_ns`, and -1 in a copy that is known by no stamp. A copy
+(`is_copy`) is what was known as a run or a step began; `begun_seq` is its first. A step is a row of
+`run` that `joins` another: the same run, whose clock was set a little. Rows refer to the run, never
+to the step. `ended_stamp_ns` is NULL in the run that goes on, and in a step.
 
 What follows from the rows is written with them, copies left out, and outlives them (see `hours`).
 `hour` has the finite readings of each sensor, in the order of `sensors`, as JSON lists: how many,
-their sum, least and largest. `tally` has the same of the site's scans, failures and looks, with the
-first stamp and the last. `event` has what is rare: pests seen and cleared, with the number of bugs,
-and stretches of more than ten minutes without an attempt, in ns.
+their sum, least and largest. `tally` has the same of the site's scans, failures and inspections,
+with the first stamp and the last. `event` has what is rare: pests seen and cleared, with the number
+of bugs, and stretches of more than ten minutes without an attempt, in ns.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 from urllib.parse import quote
 
 APPLICATION_ID: Final = 0x4C55504A  # "LUPJ"
@@ -38,6 +40,7 @@ LOCAL_SITE: Final = "local"
 PAGE_SIZE: Final = 1024
 
 # {key}: what SQLite keeps a table by, PostgreSQL has no such thing. {json}: both have `->>` for it.
+# {months}: PostgreSQL has large tables in parts by month of the stamp, which is in the key then.
 _TABLES: Final = """
 CREATE TABLE meta (
     site TEXT NOT NULL, key TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (site, key)
@@ -57,19 +60,20 @@ CREATE TABLE scan (
     site TEXT NOT NULL, seq BIGINT NOT NULL, series BIGINT NOT NULL, stamp_ns BIGINT NOT NULL,
     own_stamp_ns BIGINT, arrival_ns BIGINT NOT NULL, status INTEGER NOT NULL,
     source TEXT NOT NULL, mission TEXT NOT NULL, detail TEXT NOT NULL, is_copy INTEGER NOT NULL,
-    readings TEXT NOT NULL, PRIMARY KEY (site, seq)
-){key};
+    readings TEXT NOT NULL, PRIMARY KEY (site, seq{stamp})
+){months};
 CREATE INDEX scan_at ON scan (site, series, stamp_ns, seq);
 CREATE INDEX scan_sent ON scan (site, series, own_stamp_ns) WHERE own_stamp_ns IS NOT NULL;
 CREATE INDEX scan_failed ON scan (site, series, stamp_ns) WHERE status != 0;
+CREATE INDEX scan_bare ON scan (site, series, stamp_ns, seq) WHERE status = 0 AND readings = '[]';
 CREATE TABLE look (
     site TEXT NOT NULL, seq BIGINT NOT NULL, run BIGINT NOT NULL, tag TEXT NOT NULL,
     stamp_ns BIGINT NOT NULL, own_stamp_ns BIGINT, arrival_ns BIGINT NOT NULL,
     source TEXT NOT NULL, mission TEXT NOT NULL, species TEXT NOT NULL,
     confidence DOUBLE PRECISION, anomaly INTEGER NOT NULL, flower_count INTEGER NOT NULL,
     bug_count INTEGER NOT NULL, is_copy INTEGER NOT NULL, blooms TEXT NOT NULL, box TEXT NOT NULL,
-    PRIMARY KEY (site, seq)
-){key};
+    PRIMARY KEY (site, seq{stamp})
+){months};
 CREATE INDEX look_at ON look (site, run, tag, stamp_ns, seq);
 CREATE INDEX look_when ON look (site, run, stamp_ns);
 CREATE INDEX look_sent ON look (site, run, tag, own_stamp_ns) WHERE own_stamp_ns IS NOT NULL;
@@ -103,8 +107,12 @@ CREATE TABLE note (
     PRIMARY KEY (site, id)
 ){key};
 """
-SQLITE_TABLES: Final = _TABLES.format(key=" WITHOUT ROWID", json="TEXT")
-POSTGRESQL_TABLES: Final = _TABLES.format(key="", json="JSON")
+_KEYED: Final = " WITHOUT ROWID"
+SQLITE_TABLES: Final = _TABLES.format(key=_KEYED, months=_KEYED, stamp="", json="TEXT")
+# Its parts are made by the archive.
+POSTGRESQL_TABLES: Final = _TABLES.format(
+    key="", months=" PARTITION BY RANGE (stamp_ns)", stamp=", stamp_ns", json="JSON"
+)
 
 _MAGIC: Final = b"SQLite format 3\0"
 # Errors that say that the file itself is no longer what was written.
@@ -148,7 +156,7 @@ def open_writer(path: Path) -> sqlite3.Connection:
     """The one connection that writes, in the calling thread; makes the file where there is none.
 
     A commit goes to the write-ahead log and is not waited for: whoever holds the connection
-    syncs that. Nothing is checkpointed unless asked for.
+    syncs that. Nothing is checkpointed unless requested.
 
     Raises:
         Foreign: the file is somebody else's, `Older`: it is of an older version.
@@ -161,7 +169,8 @@ def open_writer(path: Path) -> sqlite3.Connection:
         connection.execute("PRAGMA mmap_size = 0")
         if is_new:
             _create(connection, path)
-        _check_identity(connection, path)
+        for index in _check_identity(connection, path):
+            connection.execute(index.decode())
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = NORMAL")
         connection.execute("PRAGMA wal_autocheckpoint = 0")
@@ -275,7 +284,8 @@ def _starts_as_something_else(path: Path) -> bool:
         return file.read(len(_MAGIC)) not in {b"", _MAGIC}
 
 
-def _check_identity(connection: sqlite3.Connection, path: Path) -> None:
+def _check_identity(connection: sqlite3.Connection, path: Path) -> frozenset[bytes]:
+    """The indexes that an earlier release has not made: queries need none of them."""
     # This first: all that a file that is being made is to hold comes at once.
     if connection.execute("PRAGMA page_count").fetchone() == (0,):
         raise Empty(f"{path} is empty: a journal that is just being made, or none")
@@ -293,19 +303,22 @@ def _check_identity(connection: sqlite3.Connection, path: Path) -> None:
         )
     if version != VERSION:
         raise Foreign(f"{path} is a journal of version {version}, this is version {VERSION}")
-    if connection.execute(_SCHEMA).fetchall() != _own_tables():
+    found = {sql for (sql,) in connection.execute(_SCHEMA)}
+    lacking = _own_tables() - found
+    if found - _own_tables() or any(sql.startswith(b"CREATE TABLE") for sql in lacking):
         raise DamagedFile(f"the tables of {path} are not those of a journal")
+    return lacking
 
 
 # Tables and indexes, word for word: no other check sees a flipped letter in them.
-_SCHEMA: Final = "SELECT CAST(sql AS BLOB) FROM sqlite_schema WHERE sql != '' ORDER BY sql"
+_SCHEMA: Final = "SELECT CAST(sql AS BLOB) FROM sqlite_schema WHERE sql != ''"
 
 
 @cache
-def _own_tables() -> list[tuple[bytes]]:
+def _own_tables() -> frozenset[bytes]:
     with closing(sqlite3.connect(":memory:")) as new:
         new.executescript(SQLITE_TABLES)
-        return new.execute(_SCHEMA).fetchall()
+        return frozenset(sql for (sql,) in new.execute(_SCHEMA))
 
 
 # --- facts about the log as a whole, by name ------------------------------------------------------
@@ -314,7 +327,7 @@ def _own_tables() -> list[tuple[bytes]]:
 def get_meta(connection: sqlite3.Connection, key: str, site: str = LOCAL_SITE) -> str | None:
     """A noted fact, None where it is not noted."""
     found = connection.execute(
-        "SELECT value FROM meta WHERE site = ? AND key = ?", (site, key)
+        "SELECT value FROM meta WHERE site = :site AND key = :key", {"site": site, "key": key}
     ).fetchone()
     return None if found is None else str(found[0])
 
@@ -326,3 +339,52 @@ def set_meta(connection: sqlite3.Connection, key: str, value: object) -> None:
         " value = excluded.value",
         (LOCAL_SITE, key, str(value)),
     )
+
+
+_NOTHING: Final[Mapping[str, Any]] = {}
+_META: Final = "SELECT value FROM meta WHERE site = :site AND key = :key"
+_NAME: Final = re.compile(r":([a-z_]+)")
+
+
+@dataclass(frozen=True, slots=True)
+class SiteLog:
+    """Where queries go to; each may name `:site`, and other values as `:name`."""
+
+    connection: Any
+    site: str = LOCAL_SITE
+
+    def execute(self, sql: str, values: Mapping[str, Any] = _NOTHING) -> Any:
+        """A cursor; its rows come as tuples."""
+        return self.connection.execute(self._of_engine(sql), {**values, "site": self.site})
+
+    def execute_many(self, sql: str, rows: Sequence[tuple[Any, ...]]) -> None:
+        """The same statement for many rows of values, each for a `?`."""
+        if rows:
+            self.connection.cursor().executemany(self._of_engine(sql), rows)
+
+    def meta(self, key: str) -> str | None:
+        """A noted fact about the log as a whole, None where it is not noted."""
+        found = self.execute(_META, {"key": key}).fetchone()
+        return None if found is None else str(found[0])
+
+    @contextmanager
+    def one_view(self) -> Iterator[None]:
+        """All that is read within is of one moment; keep it short, for the log grows meanwhile."""
+        if isinstance(self.connection, sqlite3.Connection):
+            with one_view(self.connection):
+                yield
+            return
+        if self.connection.info.transaction_status:  # it is in one, as `one_view` has it
+            yield
+            return
+        with self.connection.transaction():
+            self.connection.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ")
+            yield
+
+    def _of_engine(self, sql: str) -> str:
+        return sql if isinstance(self.connection, sqlite3.Connection) else _for_psycopg(sql)
+
+
+@cache
+def _for_psycopg(sql: str) -> str:
+    return _NAME.sub(r"%(\1)s", sql).replace("?", "%s")

@@ -18,13 +18,12 @@ from contextlib import suppress
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
+from lupin_twin.core.past import HOUR_NS, SLOT_NS, Event
+from lupin_twin.core.state import Bloom, Flower, Pose, Reading
 from lupin_twin.journal.hours import SILENCE_NS
-from lupin_twin.journal.reading import sensor_names
-from lupin_twin.journal.rows import KIND_READING, LookRow, PinRow, Row, ScanRow
+from lupin_twin.journal.rows import KIND_READING, InspectionRow, PinRow, Row, ScanRow, sensor_names
 from lupin_twin.journal.runs import Carries, Clock
 from lupin_twin.journal.schema import DamagedFile, says_damaged
-from lupin_twin.past import HOUR_NS, SLOT_NS, Event
-from lupin_twin.state import Bloom, Flower, Pose, Reading
 
 VERSION: Final = 3
 
@@ -122,7 +121,9 @@ class Version3:
 
     def rows(self) -> Iterator[tuple[int, int, Row]]:
         """(number, run, row) of each write, in the order in which they were received."""
-        yield from heapq.merge(self._scans(), self._looks(), self._pins(), key=lambda row: row[0])
+        yield from heapq.merge(
+            self._scans(), self._inspections(), self._pins(), key=lambda row: row[0]
+        )
 
     def last_id(self) -> int:
         """The number of the last write, about."""
@@ -136,7 +137,7 @@ class Version3:
     def hours(self, run: int) -> Iterator[OldHour]:
         """Of the hours in which scans were deleted, what is not in the scans that are left."""
         horizon = self.purged_ns(run) // HOUR_NS
-        # Tags in the order in which they were first heard of.
+        # Tags in the order in which they were first received.
         for number, series in sorted(self._series.items(), key=lambda entry: entry[1].tag):
             if series.run != run or horizon < 0 or not series.sensors:
                 continue
@@ -227,7 +228,7 @@ class Version3:
             last = last_ns
 
     def pests(self, run: int) -> Iterator[tuple[int, str, int, bool, int]]:
-        """(number, tag, stamp, whether one was seen, bugs) of changes whose looks are deleted."""
+        """(number, tag, stamp, whether one was seen, bugs) of changes without their inspection."""
         for number, tag, stamp_ns, anomaly, bugs in self._all(
             "SELECT id, tag, stamp_ns, anomaly, bug_count FROM change WHERE run = ?"
             " AND id NOT IN (SELECT id FROM look)",
@@ -237,7 +238,7 @@ class Version3:
                 yield number, self._tags[tag], stamp_ns, bool(anomaly), bugs
 
     def _all(self, sql: str, values: tuple[object, ...]) -> list[tuple[Any, ...]]:
-        """What was counted of deleted rows; where that is damaged, none of it is told."""
+        """What was counted of deleted rows; where that is damaged, none of it is reported."""
         try:
             return self._connection.execute(sql, values).fetchall()
         except sqlite3.Error as error:
@@ -268,8 +269,8 @@ class Version3:
             number, run, tag, kind, status, source, sensors = row
             known = (run in self.runs, tag in self._tags, source in self._names, sensors in sets)
             if all(known):
-                told = (self._tags[tag], kind, status, self._names[source], sets[sensors])
-                yield number, _Series(run, tag, *told)
+                reported = (self._tags[tag], kind, status, self._names[source], sets[sensors])
+                yield number, _Series(run, tag, *reported)
 
     # --- rows ---------------------------------------------------------------------------------
 
@@ -295,7 +296,7 @@ class Version3:
             except (_BadRow, KeyError):
                 self.damaged += 1
 
-    def _looks(self) -> Iterator[tuple[int, int, Row]]:
+    def _inspections(self) -> Iterator[tuple[int, int, Row]]:
         what = (
             "id, series, stamp_ns, own_stamp_ns, lag_us, mission, species, anomaly, flower_count,"
             " bug_count, shape"
@@ -310,8 +311,8 @@ class Version3:
                 flower = Flower(name, confidence, bool(anomaly), count, bugs, blooms, box)
                 arrival_ns = stamp_ns + self._leads[series.run] + 1000 * lag_us
                 at = (series.tag_id, stamp_ns, arrival_ns)
-                told = (series.source, self._names[mission], own_stamp_ns)
-                yield number, series.run, LookRow(*at, flower, *told)
+                reported = (series.source, self._names[mission], own_stamp_ns)
+                yield number, series.run, InspectionRow(*at, flower, *reported)
             except (_BadRow, KeyError):
                 self.damaged += 1
 
@@ -423,7 +424,7 @@ def _without(bucket: Bucket, value: float) -> Bucket:
 def _shape(
     packed: bytes,
 ) -> tuple[float, tuple[Bloom, ...], tuple[tuple[float, float, float], ...]]:
-    """(confidence, blooms, box) of a look."""
+    """(confidence, blooms, box) of an inspection."""
     try:
         bloom_count, corner_count, species_count = _SHAPE.unpack_from(packed)
         at = _SHAPE.size

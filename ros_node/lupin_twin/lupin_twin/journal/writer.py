@@ -1,4 +1,4 @@
-"""The journal as the twin sees it: hand over, and be told what was known before.
+"""The journal as the twin sees it: hand over, and get what was known before.
 
 One thread opens, writes, checkpoints and looks after the file; another syncs it. Whatever happens
 to the disk happens to them: nothing here raises, waits or grows without bound on the caller's
@@ -11,20 +11,111 @@ import math
 import shutil
 import threading
 import time
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from lupin_twin.journal.condition import Condition, JournalState
+from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.journal.appending import Stretch
+from lupin_twin.journal.beside import InUse, Lock
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import Restored
-from lupin_twin.journal.lock import InUse, Lock
-from lupin_twin.journal.pending import MAX_WEIGHT, Entry, Pending
-from lupin_twin.journal.prefilling import Stretch
+from lupin_twin.journal.rebuild import is_version3, upgrade
 from lupin_twin.journal.retention import Limits, Stretches
-from lupin_twin.journal.rows import Row
+from lupin_twin.journal.rows import Row, weight
 from lupin_twin.journal.runs import Carries, Clock, Run, Turn
 from lupin_twin.journal.schema import DamagedFile, Foreign, says_damaged
-from lupin_twin.journal.upgrade import is_version3, upgrade
+
+# Readings, flowers and rows together: some 60 MB, twenty minutes of the largest greenhouse.
+MAX_WEIGHT: Final = 200_000
+
+
+class Entry(NamedTuple):
+    """A row, the clock it was received by (1: the first), and when: steady clock, and ROS time."""
+
+    era: int
+    row: Row
+    handed_over_s: float
+    at_ns: int
+
+
+class Pending:
+    """A queue between two threads. When it is full the oldest are lost, and counted.
+
+    What is newest is what a twin that starts again needs.
+    """
+
+    def __init__(self, max_weight: int = MAX_WEIGHT) -> None:
+        self.arrived = threading.Event()
+        self._max_weight = max_weight
+        self._lock = threading.Lock()
+        self._entries: deque[Entry] = deque()
+        self._weight = 0
+        self._lost = 0
+        self._lost_ns: tuple[int, int] | None = None
+        self._taken: list[Entry] = []
+
+    def put(self, entry: Entry) -> None:
+        """Hand over; takes microseconds, whatever the disk does."""
+        with self._lock:
+            self._entries.append(entry)
+            self._weight += weight(entry.row)
+            if self._weight > self._max_weight:
+                self._shed()
+        if not self.arrived.is_set():
+            self.arrived.set()
+
+    def take(self, count: int) -> list[Entry]:
+        """At most so many of the oldest; they wait still, until something is put back."""
+        self.arrived.clear()
+        with self._lock:
+            taken = [self._entries.popleft() for _ in range(min(count, len(self._entries)))]
+            self._weight -= sum(weight(entry.row) for entry in taken)
+            self._taken = taken
+            if self._entries:
+                self.arrived.set()
+        return taken
+
+    def put_back(self, entries: Sequence[Entry]) -> None:
+        """What was taken and could not be written is the oldest again; the rest is done with."""
+        with self._lock:
+            self._taken = []
+            self._entries.extendleft(reversed(entries))
+            self._weight += sum(weight(entry.row) for entry in entries)
+            if self._weight > self._max_weight:
+                self._shed()
+
+    def _shed(self) -> None:
+        while self._weight > self._max_weight and len(self._entries) > 1:
+            lost = self._entries.popleft()
+            self._weight -= weight(lost.row)
+            self._lost += 1
+            first_ns, last_ns = self._lost_ns or (lost.at_ns, lost.at_ns)
+            self._lost_ns = min(first_ns, lost.at_ns), max(last_ns, lost.at_ns)
+
+    def counts(self) -> tuple[int, int, float | None]:
+        """(waiting, lost, when the oldest that waits was handed over)."""
+        with self._lock:
+            oldest = self._entries[0].handed_over_s if self._entries else None
+            return len(self._entries) + len(self._taken), self._lost, oldest
+
+    @property
+    def complete_ns(self) -> int | None:
+        """When the first was received that waits or was lost, ROS time; None: there is none."""
+        with self._lock:
+            found = [entry.at_ns for entry in (*self._taken[:1], *islice(self._entries, 1))]
+            found += (self._lost_ns or ())[:1]
+            return min(found, default=None)
+
+    def take_lost(self) -> int | None:
+        """When the last of those was received that were lost since this was asked; None: none."""
+        with self._lock:
+            lost_ns, self._lost_ns = self._lost_ns, None
+        return None if lost_ns is None else lost_ns[1]
+
 
 # Rows wait so long for others to share a commit with, from when the first of them was handed over;
 # half of the 100 ms in which they are safe from a killed process. Late ones do not wait.
@@ -35,7 +126,7 @@ _SLOW_S: Final = 1.0
 _RETRY_S: Final = (0.5, 1.0, 2.0, 5.0, 10.0)
 # With nothing to write: how often the file is looked after.
 _IDLE_S: Final = 1.0
-# What readers say has a file set aside no oftener: were it their fault, copies would fill the disk.
+# Readers have a file quarantined no oftener: were it their fault, copies would fill the disk.
 _HEAL_EVERY_S: Final = 86_400.0
 
 
@@ -79,7 +170,7 @@ class Journal:
         self._stop = threading.Event()
         self._was_tried = threading.Event()
         self._restored: Restored | None = None
-        self._told = Condition(JournalState.STARTING, "opening the journal", str(path))
+        self._reported = Condition(JournalState.STARTING, "opening the journal", str(path))
         # The writer thread's own.
         self._runs: list[Run] = []
         self._lock: Lock | None = None
@@ -88,9 +179,9 @@ class Journal:
         self._failures = 0
         self._met_damage = ""
         self._heals_from_s = -math.inf
-        self._set_aside = ""
+        self._quarantined = ""
         self._left_out = ""
-        # What was heard last, as the log has it, where the clock contradicts that.
+        # What was received last, as the log has it, where the clock contradicts that.
         self._doubted_ns: int | None = None
         self._simulated: Stretch | None = None
         self._kept: Stretches = ()
@@ -140,37 +231,29 @@ class Journal:
         """How it is doing; for any thread. Where nothing waits, it is complete up to now."""
         waiting, lost, oldest_s = self._pending.counts()
         behind_s = 0.0 if oldest_s is None else time.monotonic() - oldest_s
-        told = self._told
-        state, detail = told.state, told.detail
+        last = self._reported
+        state, detail = last.state, last.detail
         if state in _WELL and behind_s > _SLOW_S:
             state = JournalState.SLOW
             detail = f"the disk is slow: the journal is {behind_s:.0f} s behind"
         if lost and state not in _WELL:
             detail += f"; {lost} observations were lost to it"
-        return Condition(
+        return replace(
+            last,
             state=state,
             detail=detail,
-            path=told.path,
-            written=told.written,
-            repeated=told.repeated,
             waiting=waiting,
             behind_s=behind_s,
             lost=lost,
-            refused=told.refused,
-            file_bytes=told.file_bytes,
-            set_aside=told.set_aside,
-            simulated_ns=told.simulated_ns,
             complete_ns=self._pending.complete_ns,
-            kept_ns=told.kept_ns,
-            journal_id=told.journal_id,
         )
 
     def heal(self, damage: str) -> None:
-        """Have the file set aside, as somebody has met damage in it; for any thread.
+        """Have the file quarantined, as somebody has met damage in it; for any thread.
 
         What can be read of it is read, as at a start. That is done once a day at most.
         """
-        if self._told.state in _HEALED_IN and time.monotonic() >= self._heals_from_s:
+        if self._reported.state in _HEALED_IN and time.monotonic() >= self._heals_from_s:
             self._met_damage = damage
             self._pending.arrived.set()
 
@@ -190,7 +273,7 @@ class Journal:
                 self._record()
                 break
             except Exception as error:  # noqa: BLE001  # the twin goes on, whatever it is
-                self._tell_failure(error)
+                self._report_failure(error)
                 self._was_tried.set()
                 if says_damaged(error):
                     self._is_sound = False
@@ -206,13 +289,13 @@ class Journal:
         self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         if self._lock is None:
             self._lock = Lock(self._path, self._holder)
-        # One that cannot be read is set aside like any other.
+        # One that cannot be read is quarantined like any other.
         if self._is_sound is not False and is_version3(self._path):
-            self._left_out = upgrade(self._path, self._tell_progress)
+            self._left_out = upgrade(self._path, self._report_progress)
         file = JournalFile(self._path, self._limits, is_sound=self._is_sound)
         try:
             self._is_sound = True
-            self._set_aside = file.set_aside or self._set_aside
+            self._quarantined = file.quarantined or self._quarantined
             self._simulated = file.simulated
             self._journal_id = file.journal_id
             if self._runs:
@@ -226,7 +309,7 @@ class Journal:
                 has_more = not is_last and file.look_after(may_purge=bool(self._runs))
                 self._kept = file.kept()
                 self._holds_older = file.holds_older
-                self._tell_well(file.size())
+                self._report_well(file.size())
                 if not is_last and not self._pending.arrived.wait(0.0 if has_more else _IDLE_S):
                     continue
                 # Others may be about to come.
@@ -244,20 +327,20 @@ class Journal:
         # Two may have met it, one of them a little later.
         if damage and time.monotonic() >= self._heals_from_s:
             self._heals_from_s = time.monotonic() + _HEAL_EVERY_S
-            raise DamagedFile(f"it is damaged ({damage}), and is being set aside")
+            raise DamagedFile(f"it is damaged ({damage}), and is being quarantined")
 
     def _catch_up(self, file: JournalFile) -> None:
         """Give each clock that the twin has followed its run; the first one restores."""
         while len(self._runs) < len(self._eras):
             era = self._eras[len(self._runs)]
             if self._runs:
-                # A run begins with what was known: all that was heard before it is written first.
+                # A run begins with what was known: what was received before it is written first.
                 self._write(file, all_that_waits=True)
                 self._runs.append(self._next_run(file, self._runs[-1], era))
                 continue
             believed = era.turn is Turn.BELIEVED
             restored = file.start(era.clock, era.scans, is_believed=believed)
-            self._set_aside = file.set_aside or self._set_aside
+            self._quarantined = file.quarantined or self._quarantined
             self._doubted_ns = restored.last_ns if restored.is_doubted else None
             if restored.is_doubted:
                 del self._eras[0]
@@ -301,55 +384,54 @@ class Journal:
             if later or not all_that_waits:
                 return
 
-    # --- telling ------------------------------------------------------------------------------
+    # --- reporting ----------------------------------------------------------------------------
 
     def _summary(self) -> str:
         if self._is_temporary:
             return "what is observed is kept in a temporary file, which goes at the end"
-        if self._set_aside:
-            return f"recording; a damaged journal was set aside as {self._set_aside}"
+        if self._quarantined:
+            return f"recording; a damaged journal was quarantined as {self._quarantined}"
         if self._holds_older:
             return "recording; what is older than journal_days is kept until it is forwarded"
         return f"recording; {self._left_out}" if self._left_out else "recording"
 
-    def _tell_progress(self, share: float) -> None:
+    def _report_progress(self, share: float) -> None:
         detail = f"the journal {self._path} is being upgraded: {share:.0%} is done"
-        self._tell(JournalState.UPGRADING, detail)
+        self._report(JournalState.UPGRADING, detail)
 
-    def _tell_well(self, file_bytes: int) -> None:
+    def _report_well(self, file_bytes: int) -> None:
         if self._doubted_ns is None:
             state = JournalState.OFF if self._is_temporary else JournalState.RECORDING
-            self._tell(state, self._summary(), file_bytes)
+            self._report(state, self._summary(), file_bytes)
             return
         until = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(self._doubted_ns // 10**9))
         detail = (
             f"the clock contradicts the journal {self._path}, which was written until {until}:"
             " nothing is written before they agree, or ten minutes have passed"
         )
-        self._tell(JournalState.DOUBTING, detail, file_bytes)
+        self._report(JournalState.DOUBTING, detail, file_bytes)
 
-    def _tell(self, state: JournalState, detail: str, file_bytes: int | None = None) -> None:
-        self._told = Condition(
+    def _report_failure(self, error: Exception) -> None:
+        match error:
+            case InUse():
+                self._report(JournalState.IN_USE, str(error))
+            case Foreign():
+                self._report(JournalState.FOREIGN, str(error))
+            case _:
+                detail = f"the journal {self._path} cannot be written: {error}"
+                self._report(JournalState.FAILING, detail)
+
+    def _report(self, state: JournalState, detail: str, file_bytes: int | None = None) -> None:
+        self._reported = Condition(
             state=state,
             detail=detail,
             path=str(self._path),
             written=self._written,
             repeated=self._repeated,
             refused=self._refused,
-            file_bytes=self._told.file_bytes if file_bytes is None else file_bytes,
-            set_aside=self._set_aside,
+            file_bytes=self._reported.file_bytes if file_bytes is None else file_bytes,
+            set_aside=self._quarantined,
             simulated_ns=self._simulated,
             kept_ns=self._kept,
             journal_id=self._journal_id,
         )
-
-    def _tell_failure(self, error: Exception) -> None:
-        match error:
-            case InUse():
-                self._tell(JournalState.IN_USE, str(error))
-            case Foreign():
-                self._tell(JournalState.FOREIGN, str(error))
-            case _:
-                self._tell(
-                    JournalState.FAILING, f"the journal {self._path} cannot be written: {error}"
-                )

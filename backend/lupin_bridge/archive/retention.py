@@ -1,0 +1,82 @@
+# ruff: noqa: S608  # SQL is put together of constants, and of names of tables
+"""What the archive gives up by age: scans and inspections. What was counted of them stays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from typing import Any, Final
+
+from lupin_bridge.archive.database import META_AGAIN, ArchiveError
+
+_SITES: Final = (
+    "SELECT site FROM site WHERE %(site)s::text IS NULL OR site = %(site)s ORDER BY site"
+)
+# What a simulation said is as old as its arrival.
+_RUNS: Final = (
+    "SELECT run, CASE is_simulated WHEN 0 THEN 0 ELSE begun_arrival_ns - begun_stamp_ns END"
+    " FROM run WHERE site = %s AND joins IS NULL ORDER BY run"
+)
+# Parts of the tables that are over, each with both of its names.
+_MONTHS: Final = (
+    "SELECT relname, replace(relname, 'scan', 'look') FROM pg_class WHERE oid IN"
+    " (SELECT inhrelid FROM pg_inherits WHERE inhparent = 'scan'::regclass)"
+    " AND relname ~ '^scan_[0-9]{4}_[0-9]{2}$'"
+    " AND to_date(right(relname, 7), 'YYYY_MM') + INTERVAL '1 month' <= %s ORDER BY relname"
+)
+_OTHERS: Final = (
+    "SELECT EXISTS (SELECT FROM {0} WHERE site <> %(site)s)"
+    " OR EXISTS (SELECT FROM {1} WHERE site <> %(site)s)"
+)
+_UPTO: Final = (
+    "INSERT INTO meta SELECT site, 'purged_ns:' || run, max(stamp_ns)::text FROM"
+    " (SELECT site, run, stamp_ns FROM {0} JOIN series USING (site, series)"
+    " UNION ALL SELECT site, run, stamp_ns FROM {1}) AS gone GROUP BY site, run "
+) + META_AGAIN
+_DELETE: Final = (
+    "WITH scans AS (DELETE FROM scan USING series WHERE scan.site = %(site)s"
+    " AND series.site = %(site)s AND scan.series = series.series AND run = %(run)s"
+    " AND stamp_ns < %(before)s RETURNING stamp_ns),"
+    " looks AS (DELETE FROM look WHERE site = %(site)s AND run = %(run)s"
+    " AND stamp_ns < %(before)s RETURNING stamp_ns)"
+    " SELECT count(*), max(stamp_ns) FROM (TABLE scans UNION ALL TABLE looks) AS gone"
+)
+
+
+def retain(connection: Any, days: float, site: str | None) -> Iterator[str]:
+    """Delete what is older than so many days, of a site or of all; a line for each that had any.
+
+    A month that is over goes as a whole where nothing else is in it, at once.
+
+    Raises:
+        ArchiveError: there is no such site.
+        psycopg.Error: whatever the database says.
+
+    """
+    before = datetime.now(UTC) - timedelta(days=days)
+    sites = [name for (name,) in connection.execute(_SITES, {"site": site}).fetchall()]
+    if site is not None and not sites:
+        raise ArchiveError(f"the archive has no site {site!r}")
+    for names in connection.execute(_MONTHS, (before,)).fetchall():
+        with connection.transaction():
+            others = {"site": site}
+            if site and connection.execute(_OTHERS.format(*names), others).fetchone()[0]:
+                continue
+            connection.execute(_UPTO.format(*names))
+            connection.execute("DROP TABLE {}, {}".format(*names))
+        yield f"{names[0][-7:].replace('_', '-')}: the whole month"
+    for name in sites:
+        count = sum(_of_runs(connection, name, int(before.timestamp() * 10**9)))
+        if count:
+            yield f"{name}: {count:,} scans and inspections"
+
+
+def _of_runs(connection: Any, site: str, before_ns: int) -> Iterator[int]:
+    for run, lead_ns in connection.execute(_RUNS, (site,)).fetchall():
+        gone = {"site": site, "run": run, "before": before_ns - lead_ns}
+        with connection.transaction():
+            count, upto_ns = connection.execute(_DELETE, gone).fetchone()
+            if count:
+                row = (site, f"purged_ns:{run}", str(upto_ns))
+                connection.execute(f"INSERT INTO meta VALUES (%s, %s, %s) {META_AGAIN}", row)
+        yield count

@@ -1,0 +1,1 @@
+"""The command `lupin-twin`, its roles, and its configuration."""

@@ -1,0 +1,245 @@
+"""The command `lupin-twin`: its options, and one clear line where something is wrong with them."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import math
+import os
+import signal
+import sys
+import tempfile
+from collections.abc import Sequence
+from typing import NoReturn
+
+from lupin_bridge import __version__, logs
+from lupin_bridge.cli import archive, journal
+from lupin_bridge.cli.configuration import (
+    CONFIG_VARIABLE,
+    settings_from,
+    strange_variables,
+    take_secrets,
+)
+from lupin_bridge.settings import SettingError, Settings, limits_of, option, table
+from lupin_twin.runtime.process import exit_after, limit_blas_threads, return_large_blocks
+
+log = logging.getLogger(__name__)
+
+USAGE_ERROR = 2
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a role; returns the process's exit code."""
+    limit_blas_threads()
+    return_large_blocks()
+    own, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
+    options = parser().parse_args(own)
+    if options.role == "journal":
+        if ros_args:
+            _fail("journal takes no arguments of ROS: name its file with --journal or --namespace")
+        return journal.run(options, os.environ)
+    if options.role in {"archive", "forward"}:
+        if ros_args:
+            _fail(f"{options.role} takes no arguments of ROS")
+        return archive.run(options, os.environ)
+    play_args = _play_args(options)
+    try:
+        settings = _settings_from(options)
+        # Before anything slow is imported, and before the first thread: Ctrl-C and SIGTERM wait
+        # until the server asks for them, so that neither can end in a traceback.
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+        _prepare_process()
+        logs.set_up(settings.log_format, settings.log_level)
+        for warning in strange_variables(os.environ):
+            log.warning("%s", warning)
+        secrets = take_secrets(settings, os.environ)
+        if options.role == "fleet":
+            from lupin_bridge.cli.fleet import run as run_fleet  # noqa: PLC0415  # without ROS
+
+            run_fleet(settings, secrets, ros_args)
+            return 0
+        from lupin_bridge.cli.roles import run  # noqa: PLC0415  # see above
+
+        run(
+            options.role,
+            settings,
+            secrets,
+            ros_args,
+            _patrol_args(options),
+            recording=getattr(options, "recording", None) or [],
+            play_args=play_args,
+        )
+    except SettingError as error:
+        _fail(str(error))
+    return 0
+
+
+def command() -> NoReturn:
+    """`main` as a process of its own."""
+    exit_after(main)
+
+
+def split_ros_args(argv: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Our own arguments, and ROS's: from `--ros-args` to `--` or the end, as ROS defines it."""
+    own: list[str] = []
+    ros: list[str] = []
+    in_ros = False
+    for argument in argv:
+        if argument == "--ros-args":
+            in_ros = True
+        elif in_ros and argument == "--":
+            ros.append(argument)
+            in_ros = False
+            continue
+        (ros if in_ros else own).append(argument)
+    return own, ros
+
+
+ROLES = {
+    "serve": "the twin and the bridge in one process",
+    "demo": "serve, plus a simulated patrol in a second process",
+    "web": "the bridge alone, for a twin elsewhere; as many of these as needed",
+    "fleet": "every greenhouse of an archive on one page; as many of these as needed",
+}
+
+
+# Handed on to the patrol, which checks their ranges; what is no number is refused here already.
+PATROL_OPTIONS: dict[str, tuple[type[int | float], str]] = {
+    "speed": (
+        float,
+        "how fast the patrol goes, or the recording, its seconds a second (default: 1)",
+    ),
+    "seed": (int, "another seed, another patrol (default: 0)"),
+}
+
+
+def _patrol_args(options: argparse.Namespace) -> list[str]:
+    given = {name: getattr(options, name, None) for name in PATROL_OPTIONS}
+    return [f"--{name}={value}" for name, value in given.items() if value is not None]
+
+
+# Recorded seconds a second.
+PLAYER_SPEEDS = (0.1, 100.0)
+
+
+def _play_args(options: argparse.Namespace) -> list[str]:
+    """What `demo --from` hands on to the player; nothing without."""
+    if options.role != "demo":
+        return []
+    given = [f"--start={options.start}"] if options.start is not None else []
+    given += ["--loop"] if options.loop else []
+    given += [f"--skip-gaps={options.skip_gaps}"] if options.skip_gaps < math.inf else []
+    if options.recording is None:
+        if given:
+            _fail(f"{given[0].partition('=')[0]} is for --from FILE.mcap")
+        return []
+    if options.seed is not None:
+        _fail("--seed is the patrol's, which --from FILE.mcap does without")
+    if options.speed is not None:
+        low, high = PLAYER_SPEEDS
+        if not low <= options.speed <= high:
+            _fail(f"--speed is {options.speed:g}, for a recording it must be {low:g} to {high:g}")
+        given.append(f"--speed={options.speed!r}")
+    return given
+
+
+def _settings_from(options: argparse.Namespace) -> Settings:
+    given = {spec.name: getattr(options, spec.name) for spec in table()}
+    return settings_from(
+        {name: value for name, value in given.items() if value is not None},
+        os.environ,
+        options.config,
+    )
+
+
+def parser() -> argparse.ArgumentParser:
+    """The options of all commands."""
+    made = argparse.ArgumentParser(
+        prog="lupin-twin",
+        description="Digital twin of a greenhouse: ROS 2 node, web bridge and browser HMI.",
+        epilog="Everything from --ros-args on goes to ROS: --ros-args -p idw_power:=3.0. A setting "
+        "may also stand in the environment (LUPIN_PORT for --port) or in the file of --config.",
+    )
+    made.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
+    roles = made.add_subparsers(dest="role", required=True, metavar="ROLE")
+    common = argparse.ArgumentParser(add_help=False)
+    common.add_argument(
+        "--config",
+        metavar="FILE",
+        help=f"TOML file with any of these settings, by their names with _ "
+        f"(default: {CONFIG_VARIABLE}, or none)",
+    )
+    for group in dict.fromkeys(spec.metadata["group"] for spec in table()):
+        arguments = common.add_argument_group(group)
+        for spec in table():
+            if spec.metadata["group"] == group:
+                limits = limits_of(spec.name)
+                arguments.add_argument(
+                    option(spec.name),
+                    action="append" if spec.default == () else "store",
+                    # None: not given here, and so for the environment or the file to say.
+                    default=None,
+                    metavar=spec.name.rpartition("_")[2].upper(),
+                    help=f"{spec.metadata['help']}{limits and f', {limits}'} "
+                    f"(default: {spec.default or 'none'})",
+                )
+    for role, text in ROLES.items():
+        # No abbreviations: what one means would change with the next setting.
+        own = roles.add_parser(
+            role, parents=[common], help=text, description=text, allow_abbrev=False
+        )
+        if role == "demo":
+            for name, (kind, help_text) in PATROL_OPTIONS.items():
+                own.add_argument(f"--{name}", type=kind, metavar=name.upper(), help=help_text)
+            own.add_argument(
+                "--from",
+                dest="recording",
+                metavar="FILE.mcap",
+                nargs="+",
+                help="show this recording and not the patrol: a file, or all of its files, or the "
+                "folder that they are in. It goes to a twin of its own, with the time of the "
+                "recording and a journal that ends with it",
+            )
+            own.add_argument(
+                "--start",
+                type=_seconds,
+                metavar="SECONDS",
+                help="begin the recording so long after its first message; what came before is "
+                "published at once (default: 0)",
+            )
+            own.add_argument("--loop", action="store_true", help="begin it again at its end")
+            own.add_argument(
+                "--skip-gaps",
+                type=_seconds,
+                default=math.inf,
+                metavar="SECONDS",
+                help="jump over its silences of more than so many seconds (default: wait)",
+            )
+    journal.add_parser(roles)
+    archive.add_parsers(roles)
+    return made
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value <= 1e9:
+        raise argparse.ArgumentTypeError(f"{text!r} must be a number from 0 to 1e9")
+    return value
+
+
+def _prepare_process() -> None:
+    # rcl wants a place for its logs; without a home directory it would refuse to start.
+    if not (os.environ.get("ROS_LOG_DIR") or os.environ.get("HOME")):
+        os.environ["ROS_LOG_DIR"] = tempfile.mkdtemp(prefix="lupin-twin-log-")
+
+
+def _fail(message: str) -> NoReturn:
+    print(f"lupin-twin: {message}", file=sys.stderr)  # noqa: T201  # there is no logger yet
+    raise SystemExit(USAGE_ERROR)
+
+
+if __name__ == "__main__":
+    command()

@@ -1,0 +1,447 @@
+"""`lupin-twin journal`: what is in a journal, is it whole, its rows, a copy, less of it.
+
+Everything but `forget` and `vacuum` reads, also while a twin writes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import getpass
+import os
+import sqlite3
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import closing
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any, Final
+
+from lupin_bridge.bags.recording import SUFFIX
+from lupin_bridge.cli.output import (
+    FAILED,
+    CannotWrite,
+    Roles,
+    Write,
+    add_actions,
+    backup,
+    standard,
+    writing,
+)
+from lupin_bridge.console import Progress, say
+from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.past import bodies
+from lupin_bridge.past.query import MAX_SECONDS, moment
+from lupin_twin.core.past import NotRemembered, PastRefused, PastRow, seconds
+from lupin_twin.journal.beside import InUse, holder_of
+from lupin_twin.journal.checking import Overview, RunExtent, find_all_damage, overview
+from lupin_twin.journal.queries import rows
+from lupin_twin.journal.rebuild import NotPossible, hear_interrupts, vacuum
+from lupin_twin.journal.retention import NotKnown, forget
+from lupin_twin.journal.schema import FILE_ERRORS, Empty, Foreign, open_named, says_damaged
+from lupin_twin.runtime.memory import demo_journal_path, journal_path
+from lupin_twin.runtime.process import INTERRUPTED
+
+ACTIONS: Final[Mapping[str, str]] = {
+    "info": "what is in it: size, rows, tags, sensors, how far back, runs of the clock",
+    "check": "read all of it for damage; exit code 1 if there is any",
+    "export": "its readings and failed tries as CSV, or its observations as a recording",
+    "backup": "copy it to a new file, also while its twin writes",
+    "forget": "forget a tag, or its place alone, so that it is pinned anew; stop its twin first",
+    "vacuum": "make a whole file as small as what is in it; its twin has to be stopped",
+}
+_MAX_SHOWN: Final = 20
+_RUNS_SHOWN: Final = 10
+# ROS has ports for no more.
+_MAX_DOMAIN: Final = 232
+# Past every stamp.
+_END_NS: Final = (MAX_SECONDS + 1) * 10**9
+_EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
+# Where a systemd service keeps it: backend/deploy/lupin-twin.service.
+SERVICE_FOLDER: Final = Path("/var/lib/lupin-twin")
+
+
+class JournalError(Exception):
+    """It cannot be done; the message is the one line that says why."""
+
+
+# Errors whose text is the message.
+_SHOWN: Final = (
+    JournalError,
+    CannotWrite,
+    PastRefused,
+    NotRemembered,
+    InUse,
+    Empty,
+    Foreign,
+    NotKnown,
+    NotPossible,
+)
+
+
+def add_parser(roles: Roles) -> None:
+    """Add `journal` and its actions to the command's options."""
+    text = "what a twin remembers: info, check, export, backup, forget, vacuum"
+    for action, own in add_actions(roles, "journal", text, ACTIONS):
+        add_which(own)
+        if action == "backup":
+            own.add_argument("target", metavar="FILE", type=Path, help="must not be there yet")
+        if action == "forget":
+            own.add_argument("tag", metavar="TAG", help="its id")
+            own.add_argument("--pose", action="store_true", help="its place alone")
+        if action == "export":
+            own.add_argument(
+                "recording",
+                metavar="FILE.mcap",
+                nargs="?",
+                type=Path,
+                help="not CSV: the observations themselves, for ROS's own tools",
+            )
+            when = "seconds of ROS time, or ISO 8601 with an offset"
+            own.add_argument("--from", dest="start", metavar="TIME", help=f"from then on: {when}")
+            own.add_argument("--to", dest="end", metavar="TIME", help=f"until before then: {when}")
+            own.add_argument("--tag", metavar="ID", help="one tag alone")
+            own.add_argument("--sensor", metavar="NAME", help="one sensor alone")
+            own.add_argument(
+                "--output",
+                metavar="FILE",
+                help="not to the standard output but to this file, which must not be there yet",
+            )
+
+
+def add_which(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say which journal, for `path_of`."""
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--journal", metavar="PATH", help="the file")
+    which.add_argument(
+        "--demo", metavar="SEED", type=int, help="that of the demo with this seed (make run: 0)"
+    )
+    which.add_argument(
+        "--namespace", default="", help="that of the twin in this namespace (default: none)"
+    )
+    parser.add_argument(
+        "--domain",
+        type=int,
+        metavar="ID",
+        help=f"that of the twin in this ROS domain, 0 to {_MAX_DOMAIN}"
+        " (default: ROS_DOMAIN_ID, or 0)",
+    )
+
+
+def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
+    """Run the action, to the standard output; returns the process's exit code."""
+    try:
+        path = path_of(options, environ)
+        if options.action == "export":
+            code = _export(path, options)
+        elif options.action == "backup":
+            code = _backup(path, options.target)
+        elif options.action == "forget":
+            code = _forget(path, options)
+        else:
+            code = {"info": _info, "check": _check, "vacuum": _vacuum}[options.action](path)
+    except BrokenPipeError:
+        # The reader has closed the pipe.
+        return FAILED
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except _SHOWN as error:
+        return _fail(str(error))
+    except (*FILE_ERRORS, OSError) as error:
+        if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_INTERRUPT:
+            return INTERRUPTED
+        wrong = "is damaged" if says_damaged(error) else "cannot be read or written"
+        return _fail(f"the journal {path} {wrong}: {error}")
+    return code
+
+
+# --- which file ----------------------------------------------------------------------------------
+
+
+def path_of(options: argparse.Namespace, environ: Mapping[str, str]) -> Path:
+    """The journal that the options name.
+
+    Raises:
+        JournalError: there is none.
+
+    """
+    named = f"--demo {options.demo}" if options.demo is not None else options.journal
+    if named and options.domain is not None:
+        raise JournalError(f"--domain {options.domain} is for a twin's own file, not with {named}")
+    path: Path | None
+    try:
+        if options.demo is not None:
+            path = demo_journal_path(environ, options.demo)
+        else:
+            domain = 0 if named else _domain(options, environ)
+            path = journal_path(options.journal or "", environ, domain, options.namespace)
+    except RuntimeError as error:
+        raise JournalError(f"there is no home to look for a journal in: {error}") from error
+    if path is None:
+        raise JournalError("--journal is 'off', must be a file")
+    for file in (path,) if named else (path, SERVICE_FOLDER / path.name):
+        try:
+            if file.is_file():
+                return file
+        except OSError as error:
+            raise JournalError(f"cannot look for the journal {file}: {error.strerror}") from error
+    others = sorted(file.name for file in path.parent.glob("*.sqlite"))
+    there = f"; in its folder there are {', '.join(others[:9])}" if others else ""
+    raise JournalError(f"there is no journal {path}{there}")
+
+
+def _domain(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
+    given = environ.get("ROS_DOMAIN_ID") or "0"
+    what, domain = "ROS_DOMAIN_ID", options.domain
+    if domain is not None:
+        what = "--domain"
+    elif given.isdecimal():
+        domain = int(given)
+    else:
+        raise JournalError(f"ROS_DOMAIN_ID is {given!r}, must be a whole number")
+    if not 0 <= domain <= _MAX_DOMAIN:
+        raise JournalError(f"{what} is {domain}, must be from 0 to {_MAX_DOMAIN}")
+    return int(domain)
+
+
+def _reader(path: Path) -> sqlite3.Connection:
+    try:
+        connection = open_named(path)
+    except sqlite3.OperationalError:
+        # SQLite wants to write beside a file that it reads. Where nobody can, nobody writes it.
+        if path.with_name(path.name + "-wal").exists() or holder_of(path) is not None:
+            raise
+        connection = open_named(path, is_still=True)
+    hear_interrupts(connection)
+    return connection
+
+
+# --- info ----------------------------------------------------------------------------------------
+
+
+def _info(path: Path) -> int:
+    with closing(_reader(path)) as connection:
+        found = overview(connection, path)
+    lines = [("file", f"{path}"), *_lines(found, holder_of(path))]
+    width = max(len(what) for what, _ in lines)
+    _say(*(f"{what:<{width}}  {text}" for what, text in lines))
+    return 0
+
+
+def _lines(found: Overview, holder: str | None) -> list[tuple[str, str]]:
+    rows = found.rows
+    extents = [extent for extent in found.runs if extent.first_ns is not None]
+    hidden = max(0, len(found.runs) - _RUNS_SHOWN)
+    return [
+        ("size", f"{_mb(found.file_bytes)}, {_mb(found.free_bytes)} of it free"),
+        ("log", _mb(found.log_bytes)),
+        ("recording", holder or "nobody"),
+        ("scans", f"{rows['scan']:,}, of them {found.failures:,} failed"),
+        ("looks", f"{rows['look']:,}"),
+        ("places", f"{rows['place']:,}"),
+        ("tags", f"{rows['tag']:,}"),
+        ("sensors", ", ".join(found.sensors) or "none"),
+        ("reach", _reach(extents)),
+        ("hours", f"{rows['hour']:,} of a tag's sensors{_hours(found.hours_ns)}"),
+        ("retention", _retention(found)),
+        (
+            "runs",
+            f"{len(found.runs):,} of the clock" + (f", the last {_RUNS_SHOWN}" if hidden else ""),
+        ),
+        *(("", _run_line(extent)) for extent in found.runs[hidden:]),
+        *(("quarantined", f"{name}, {_mb(size)}") for name, size in found.quarantined),
+        *(("forgotten", _forgotten_line(record)) for record in found.forgotten),
+    ]
+
+
+def _reach(extents: list[RunExtent]) -> str:
+    of_wall = [extent for extent in extents if not extent.run.begun.is_simulated]
+    if not of_wall:
+        return "simulated clocks alone, see runs" if extents else "nothing"
+    first = min(extent.first_ns or 0 for extent in of_wall)
+    last = max(extent.last_ns or 0 for extent in of_wall)
+    return f"{_iso(first)} to {_iso(last)}"
+
+
+def _hours(stretch_ns: tuple[int, int] | None) -> str:
+    return "" if stretch_ns is None else f", {_iso(stretch_ns[0])} to {_iso(stretch_ns[1])}"
+
+
+def _retention(found: Overview) -> str:
+    if not found.kept_ns:
+        return "not written yet by its twin"
+    return (
+        f"{found.kept_ns / 86_400e9:g} days and {_mb(found.kept_bytes)} at most;"
+        " hours for ten years"
+    )
+
+
+def _run_line(extent: RunExtent) -> str:
+    begun = extent.run.begun
+    if extent.first_ns is None or extent.last_ns is None:
+        stretch = "nothing is in it"
+    elif begun.is_simulated:
+        stretch = f"second {extent.first_ns / 1e9:.3f} to {extent.last_ns / 1e9:.3f}"
+    else:
+        stretch = f"{_iso(extent.first_ns)} to {_iso(extent.last_ns)}"
+    clock = "simulated clock" if begun.is_simulated else "wall clock"
+    return f"{extent.run.id}: {clock}, begun {_iso(begun.arrival_ns)}: {stretch}"
+
+
+def _forgotten_line(record: Mapping[str, Any]) -> str:
+    what = "the pose of tag" if record["what"] == "pose" else "all of tag"
+    return f"{what} {record['tag']!r}, by {record['by']}, {_iso(record['at'])}"
+
+
+# --- check ---------------------------------------------------------------------------------------
+
+
+def _check(path: Path) -> int:
+    found = 0
+    progress = Progress()
+    with closing(_reader(path)) as connection:
+        for wrong in find_all_damage(connection, progress.tell):
+            found += 1
+            if found <= _MAX_SHOWN:
+                progress.clear()
+                _say(wrong)
+    progress.clear()
+    if found > _MAX_SHOWN:
+        _say(f"and {found - _MAX_SHOWN:,} more")
+    _say(f"{path} is {f'damaged in {found:,} places' if found else 'whole'}")
+    return FAILED if found else 0
+
+
+# --- export --------------------------------------------------------------------------------------
+
+
+def _export(path: Path, options: argparse.Namespace) -> int:
+    start_ns = 0 if options.start is None else moment("--from", options.start)
+    end_ns = _END_NS if options.end is None else moment("--to", options.end)
+    if end_ns < start_ns:
+        raise JournalError(f"--to is {seconds(end_ns)}, before --from, {seconds(start_ns)}")
+    if options.recording is not None:
+        return _record(path, options, start_ns, end_ns)
+    _check_output(options.output)
+    with closing(_reader(path)) as connection:
+        lots = rows(connection, start_ns, end_ns, options.tag, options.sensor)
+        if options.output is None:
+            _write_csv(lots, standard)
+        else:
+            with writing(options.output, path) as write:
+                _write_csv(lots, write)
+    return 0
+
+
+def _check_output(output: str | None) -> None:
+    if output == "":
+        raise JournalError("--output is '', must name a file")
+    if output is not None and output.lower().endswith(SUFFIX):
+        raise JournalError(
+            f"--output {output} would be CSV: for a recording name it without --output,"
+            f" lupin-twin journal export {output}"
+        )
+
+
+def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int) -> int:
+    target: Path = options.recording
+    for name in ("tag", "sensor", "output"):
+        if getattr(options, name) is not None:
+            raise JournalError(f"--{name} is for CSV: {target} has whole observations")
+    if target.suffix != SUFFIX:
+        raise JournalError(f"{target} does not end in {SUFFIX}: that is how its form is known")
+    try:
+        # Here, where it is needed: it knows ROS.
+        from lupin_bridge.bags.journal_export import export  # noqa: PLC0415
+
+        with closing(_reader(path)) as connection:
+            made = export(connection, target, start_ns, end_ns, options.namespace)
+    except FileExistsError as error:
+        raise JournalError(f"{target} is there already, and nothing is overwritten") from error
+    except (OSError, LookupError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise JournalError(f"cannot make {target}: {why}") from error
+    if not made.observations + made.tags:
+        raise JournalError(f"the journal {path} holds nothing of that period")
+    _say(
+        f"{made.observations:,} observations and {made.tags:,} messages of discovered tags are in"
+        f" {target}"
+    )
+    return 0
+
+
+def _write_csv(lots: Iterable[Sequence[PastRow]], write: Write) -> None:
+    sensors = own_sensors()
+    write(bodies.CSV_HEADER)
+    for lot in lots:
+        write(bodies.csv_lines(lot, sensors))
+
+
+# --- backup --------------------------------------------------------------------------------------
+
+
+def _backup(path: Path, target: Path) -> int:
+    progress = Progress()
+    with closing(_reader(path)) as connection:
+        size = backup(connection, target, lambda share: progress.tell("copying", share))
+    progress.clear()
+    _say(f"{target}: {_mb(size)}, a copy of {path}")
+    return 0
+
+
+# --- forget --------------------------------------------------------------------------------------
+
+
+def _forget(path: Path, options: argparse.Namespace) -> int:
+    gone = forget(path, options.tag, pose_only=options.pose, by=_user(), at_ns=time.time_ns())
+    if options.pose:
+        _say(f"{path}: the pose of tag {options.tag!r} is forgotten; the next twin pins it anew")
+    else:
+        _say(
+            f"{path}: tag {options.tag!r} is forgotten: {gone.scans:,} scans,"
+            f" {gone.inspections:,} inspections, {gone.places:,} places;"
+            " counts of the timeline still have them"
+        )
+    return 0
+
+
+def _user() -> str:
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):
+        return f"user {os.getuid()}"
+
+
+# --- vacuum --------------------------------------------------------------------------------------
+
+
+def _vacuum(path: Path) -> int:
+    progress = Progress()
+    before, after = vacuum(path, "lupin-twin journal vacuum", progress.tell)
+    progress.clear()
+    _say(f"{path}: {_mb(before)} before, {_mb(after)} after")
+    return 0
+
+
+# --- output --------------------------------------------------------------------------------------
+
+
+def _say(*lines: str) -> None:
+    # A name of a file need not be UTF-8.
+    standard("".join(f"{line}\n" for line in lines).encode(errors="surrogateescape"))
+
+
+def _mb(count: int) -> str:
+    return f"{count / 1e6:,.1f} MB"
+
+
+def _iso(stamp_ns: int) -> str:
+    try:
+        moment = _EPOCH + timedelta(microseconds=stamp_ns // 1000)
+    except OverflowError:
+        return f"second {stamp_ns // 10**9}"
+    return moment.isoformat(timespec="seconds").replace("+00:00", "Z")
+
+
+def _fail(message: str) -> int:
+    say(message)
+    return FAILED

@@ -1,0 +1,158 @@
+"""Every sensor's report, every few seconds: which tags have changed, which estimates to trust.
+
+Nothing here is on the way of a frame: what was found is passed to the judge when it is there.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+import time
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from lupin_bridge.feed.shared_work import Shared
+from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
+from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.state import Snapshot
+from lupin_twin.field.engine import FieldRefused
+from lupin_twin.runtime.estimate_rounds import Report, ReportRequest
+from lupin_twin.runtime.workers import in_turns
+
+# A twin's next round comes no sooner.
+FRESH_S: Final = 2.0
+MAX_KEPT: Final = 64
+
+
+class Reports:
+    """The reports of a source. Belongs to the event loop."""
+
+    def __init__(self, source: TwinSource) -> None:
+        self._source = source
+        self._asking: Shared[Report] = Shared()
+        self._kept: OrderedDict[ReportRequest, tuple[float, Report]] = OrderedDict()
+
+    async def of(self, request: ReportRequest) -> Report:
+        """What is known of a sensor's estimates.
+
+        Raises:
+            Exception: see `TwinSource.estimate_report`.
+
+        """
+        kept = self._kept.get(request)
+        if kept is not None and time.monotonic() - kept[0] < FRESH_S:
+            return kept[1]
+        return await self._asking.get(request, lambda: self._ask(request))
+
+    async def _ask(self, request: ReportRequest) -> Report:
+        report = await self._source.estimate_report(request)
+        self._kept[request] = time.monotonic(), report
+        self._kept.move_to_end(request)
+        if len(self._kept) > MAX_KEPT:
+            self._kept.popitem(last=False)
+        return report
+
+
+log = logging.getLogger(__name__)
+
+# A round of estimates comes every 30 s (`estimate_rounds.ROUND_REST_S`).
+PERIOD_S: Final = 15.0
+# A greenhouse has a handful of sensors; of more, the first in the alphabet.
+MAX_SENSORS: Final = 32
+# What collecting the names of sensors takes for each tag, roughly and at worst.
+_NAMES_TAG_S: Final = 5e-6
+
+# By tag and sensor: the reading since which it holds, ns of ROS time.
+Changed = Mapping[str, Mapping[str, int]]
+
+
+class EstimateFollower:
+    """Fetches reports from `start` to `stop`. Belongs to the event loop.
+
+    `snapshot` gives the newest state; `on_changed` gets the tags that have changed, each time that
+    they are others than before.
+    """
+
+    def __init__(
+        self,
+        source: TwinSource,
+        reports: Reports,
+        snapshot: Callable[[], Snapshot | None],
+        on_changed: Callable[[Changed], None],
+        period_s: float = PERIOD_S,
+    ) -> None:
+        self.known: dict[str, Report] = {}
+        self._source = source
+        self._reports = reports
+        self._snapshot = snapshot
+        self._on_changed = on_changed
+        self._period_s = period_s
+        self._changed: Changed = {}
+        self._task: asyncio.Task[None] | None = None
+
+    def start(self) -> None:
+        """Begin; the first answer comes after a period."""
+        self._task = asyncio.create_task(self._follow(), name="estimates")
+
+    async def stop(self) -> None:
+        """End."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.wait((self._task,))
+
+    async def update(self) -> None:
+        """Fetch the report of each sensor, one after the other."""
+        snapshot = self._snapshot()
+        if snapshot is None:
+            return
+        newest = await asyncio.wrap_future(
+            self._source.workers.submit(
+                lambda _: newest_of(snapshot), len(snapshot.tags) * _NAMES_TAG_S
+            )
+        )
+        known: dict[str, Report] = {}
+        for sensor in sorted(newest)[:MAX_SENSORS]:
+            try:
+                known[sensor] = await self._reports.of(ReportRequest(sensor))
+            except (FieldRefused, NotRemembered, TwinUnavailableError) as error:
+                log.debug("what estimates of %s are worth is not known: %s", sensor, error)
+                if sensor in self.known:
+                    known[sensor] = self.known[sensor]
+        self.known = known
+        changed = changed_of(known)
+        if changed != self._changed:
+            self._changed = changed
+            self._on_changed(changed)
+
+    async def _follow(self) -> None:
+        while True:
+            await asyncio.sleep(self._period_s)
+            try:
+                await self.update()
+            except Exception:  # nobody waits for this task, and it goes on
+                log.exception("what estimates are worth is not known")
+
+
+def newest_of(snapshot: Snapshot) -> dict[str, int]:
+    """When each sensor was read last anywhere, ns; for a worker."""
+    newest: dict[str, int] = {}
+    for tag in in_turns(snapshot.tags):
+        if tag.pose is None:
+            continue
+        for reading in tag.readings:
+            if math.isfinite(reading.value):
+                at_ns = reading.observed_at_ns or 0
+                newest[reading.name] = max(newest.get(reading.name, 0), at_ns)
+    return newest
+
+
+def changed_of(known: Mapping[str, Report]) -> Changed:
+    """The tags that estimates do without, by tag and sensor."""
+    changed: dict[str, dict[str, int]] = {}
+    for sensor, report in known.items():
+        for tag in report.tags:
+            if tag.changed_since_ns is not None:
+                changed.setdefault(tag.tag_id, {})[sensor] = tag.changed_since_ns
+    return changed

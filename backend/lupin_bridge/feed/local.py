@@ -1,0 +1,247 @@
+"""The source of `serve`: a twin in this process, in a thread of its own; its past in another."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+import uuid
+from collections.abc import Awaitable, Callable, Sequence
+from concurrent.futures import Future
+from contextlib import nullcontext
+from typing import Any, TypeVar
+
+from lupin_bridge.feed.log_reader import LogReader
+from lupin_bridge.feed.past_child import Now
+from lupin_bridge.feed.past_process import PastProcess
+from lupin_bridge.feed.relay import Relay
+from lupin_bridge.feed.relay_ros import RelayRos, names_of
+from lupin_bridge.feed.revisions import RevisedEstimate, RevisionCache, revised
+from lupin_bridge.feed.ros_thread import RosThread
+from lupin_bridge.feed.shared_work import Shared
+from lupin_bridge.feed.source import CacheCounts, RevisedGrid, TwinTimeoutError, TwinUpdate
+from lupin_bridge.feed.topics import TwinNames
+from lupin_twin.core.history import TagHistory
+from lupin_twin.core.journal_condition import Condition
+from lupin_twin.core.parameters import World
+from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
+from lupin_twin.estimate.engine import EstimateRequest, TagPast
+from lupin_twin.field.engine import FieldJob, FieldRequest, FieldRules
+from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.field.grid import FieldGrid
+from lupin_twin.ros.estimate_service import Task
+from lupin_twin.ros.node import TwinNode
+from lupin_twin.runtime.estimate_rounds import ADVICE_S, Report, ReportRequest
+from lupin_twin.runtime.workers import SMALL_S, Workers
+
+# A third of what counts as silence (`status.STALE_AFTER_S`).
+HEARTBEAT_S = 1.0
+ResultT = TypeVar("ResultT")
+
+
+class LocalTwin(LogReader):
+    """`TwinSource` over a `TwinNode` of this process."""
+
+    def __init__(
+        self,
+        *,
+        ros_args: Sequence[str],
+        timeout_s: float,
+        world: World = World(),
+    ) -> None:
+        self._ros_args = ros_args
+        self._world = world
+        self.timeout_s = timeout_s
+        # A restarted server must never match an ETag of its predecessor, whose counts it repeats.
+        self._identity = uuid.uuid4().hex[:12]
+        self.thread: RosThread[TwinNode, TwinUpdate]
+        self.update: TwinUpdate
+        self._rules: FieldRules
+        # The same for as long as the node lives.
+        self._names: TwinNames
+        self.past = PastProcess()
+        self.workers = Workers("work")
+        self.relay = Relay(lambda: self.thread, RelayRos())
+        self._computing: Shared[FieldGrid] = Shared()
+        self._estimating: Shared[RevisedEstimate] = Shared()
+        self._revisions = RevisionCache()
+        # One at a time: fields have the other workers, and frames the other cores.
+        self._large_estimate = asyncio.Semaphore(1)
+
+    async def start(
+        self, on_state: Callable[[TwinUpdate], None], on_death: Callable[[], None]
+    ) -> None:
+        """Start the ROS thread with its node; see `TwinSource.start`."""
+
+        def make_node(context: Any, post: Callable[[TwinUpdate], None]) -> TwinNode:
+            node = TwinNode(context=context, world=self._world)
+
+            def notify(snapshot: Snapshot) -> None:
+                post(
+                    TwinUpdate(
+                        snapshot,
+                        self._revision_of(node),
+                        node.twins.value,
+                        node.occupancy_map,
+                        node.utilities.counts(),
+                        cache=_cache_counts(node),
+                        journal=node.memory.condition,
+                        rules=node.fields.rules,
+                        origin=node.origin,
+                        input_problems=node.utilities.input_problems,
+                    )
+                )
+
+            node.add_listener(notify, HEARTBEAT_S)
+            return node
+
+        def on_update(update: TwinUpdate) -> None:
+            self.update = update
+            if update.rules is not None:
+                self._rules = update.rules
+            on_state(update)
+
+        self.thread = RosThread(
+            make_node, ros_args=self._ros_args, on_event=on_update, on_death=on_death
+        )
+        await self.thread.start()
+        self._rules, self._names = await self.thread.call(
+            lambda node: (node.fields.rules, names_of(node))
+        )
+        self.past.start()
+
+    async def stop(self) -> None:
+        """Stop the ROS thread, the workers and the process that looks back."""
+        self.workers.close()
+        await asyncio.gather(self.past.stop(), self.thread.stop())
+
+    @property
+    def identity(self) -> str:
+        """Of this process: its counts start over with the next one."""
+        return self._identity
+
+    def revision(self) -> str:
+        """The process's identity, the observation count and the map's revision, as updated last.
+
+        What a call brings from the ROS thread is never newer: what has changed is posted at once.
+        """
+        return self.update.revision
+
+    def field_revision(self, request: FieldRequest) -> str | None:  # noqa: ARG002  # all alike
+        """The revision now: here every field is made of the store as it stands."""
+        return self.update.revision
+
+    def rules(self) -> FieldRules:
+        """The node's parameters for fields."""
+        return self._rules
+
+    def names(self) -> TwinNames:
+        """The twin's, as ROS resolves and remaps them."""
+        return self._names
+
+    def journal(self) -> Condition:
+        """The node's journal."""
+        return self.update.journal
+
+    def cache_counts(self) -> CacheCounts:
+        """The node's cache of fields, as of the last update."""
+        return self.update.cache
+
+    def occupancy_map(self) -> OccupancyMap | None:
+        """The latest map that the node accepted."""
+        return self.update.occupancy_map
+
+    async def field(self, request: FieldRequest) -> RevisedGrid:
+        """A hit from the node's cache, or the field computed on a worker and handed back to it."""
+        return await self._in_time(self._field(request))
+
+    def estimate_revision(self, request: EstimateRequest) -> str | None:
+        """That of the last answer, as long as no update could have changed it."""
+        return self._revisions.revision(request, self.update.revision)
+
+    async def estimate(self, request: EstimateRequest) -> RevisedEstimate:
+        """The node says of what, and by which model; it is computed on a worker."""
+        key = (self.update.revision, request)
+        return await self._in_time(self._estimating.get(key, lambda: self._estimate(request)))
+
+    async def estimate_report(self, request: ReportRequest) -> Report:
+        """What the node knows; where another tag helps is worked out on a worker."""
+        return await self._in_time(self._report(request))
+
+    async def history(self, tag_id: str) -> TagHistory | None:
+        """The last `buffer_len` scans, and as many tries, of a tag."""
+        return await self._in_time(self.thread.call(lambda node: node.history_of(tag_id)))
+
+    @property
+    def now_ns(self) -> int:
+        """ROS time now: the last update may be a heartbeat old."""
+        now = self.update.snapshot
+        if now.clock != "running":
+            return now.stamp_ns
+        return now.stamp_ns + int((time.monotonic() - self.update.made_s) * NANOSECONDS_PER_SECOND)
+
+    async def _found(self) -> None:
+        """It is the node's, from its start."""
+
+    def now(self) -> Now:
+        """What who looks back has to know of now."""
+        update = self.update
+        return Now(self.now_ns, update.snapshot.frame_id, update.journal)
+
+    async def _field(self, request: FieldRequest) -> RevisedGrid:
+        def look_up(node: TwinNode) -> tuple[FieldGrid | FieldJob, str]:
+            answer = node.fields.lookup(request, node.store, node.occupancy_map)
+            return answer, self._revision_of(node)
+
+        answer, revision = await self.thread.call(look_up)
+        if isinstance(answer, FieldJob):
+            job = answer
+            answer = await self._computing.get(job.key, lambda: self._compute(job))
+        return RevisedGrid(answer, revision)
+
+    async def _compute(self, job: FieldJob) -> FieldGrid:
+        grid = await asyncio.wrap_future(self.workers.submit(job.compute, job.cost_s))
+        await self.thread.call(lambda node: node.fields.keep(job, grid))
+        return grid
+
+    async def _estimate(self, request: EstimateRequest) -> RevisedEstimate:
+        def begin(node: TwinNode) -> tuple[Task, Future[Sequence[TagPast]]]:
+            task = node.estimates.prepare(request)
+            return task, task.look_up()
+
+        epoch = self.update.revision
+        task, looking_up = await self.thread.call(begin)
+        found = await asyncio.wrap_future(looking_up)
+        async with self._large_estimate if task.cost_s > SMALL_S else nullcontext():
+            result = await asyncio.wrap_future(
+                self.workers.submit(
+                    lambda should_stop: revised(task.make(found, should_stop)), task.cost_s
+                )
+            )
+        if epoch == self.update.revision:
+            self._revisions.put(request, epoch, result.revision)
+        return result
+
+    async def _report(self, request: ReportRequest) -> Report:
+        work = await self.thread.call(lambda node: node.estimates.report(request))
+        return await asyncio.wrap_future(self.workers.submit(lambda _: work(), ADVICE_S))
+
+    async def _in_time(self, answer: Awaitable[ResultT]) -> ResultT:
+        try:
+            async with asyncio.timeout(self.timeout_s):
+                return await answer
+        except TimeoutError:
+            raise TwinTimeoutError(f"the twin did not answer within {self.timeout_s:g} s") from None
+        except NotRemembered as error:
+            damage = error.damage
+            if damage:
+                await self.thread.call(lambda node: node.memory.heal(damage))
+            raise
+
+    def _revision_of(self, node: TwinNode) -> str:
+        return "-".join((self._identity, *map(str, node.revision)))
+
+
+def _cache_counts(node: TwinNode) -> CacheCounts:
+    cache = node.fields.cache
+    return CacheCounts(cache.hits, cache.misses, len(cache), cache.bytes)

@@ -1,0 +1,120 @@
+"""What ROS does for the relay: raw subscriptions, and what is published."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from diagnostic_msgs import msg as diagnostic
+from lupin_msgs import msg as lupin
+from nav_msgs import msg as nav
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.qos import QoSProfile
+from sensor_msgs import msg as sensor
+from visualization_msgs import msg as visualization
+
+from lupin_bridge.feed.relay import RosTime, Sample
+from lupin_bridge.feed.topics import Topic, TwinNames
+from lupin_twin.core import interfaces
+from lupin_twin.core.drops import Drop
+from lupin_twin.ros import message_limits
+from lupin_twin.ros.base_node import latched, read_message
+
+# A name that comes from outside imports nothing.
+_PACKAGES: Final[Mapping[str, Any]] = {
+    "diagnostic_msgs": diagnostic,
+    "lupin_msgs": lupin,
+    "nav_msgs": nav,
+    "sensor_msgs": sensor,
+    "visualization_msgs": visualization,
+}
+# What is also made into messages here: the topics of `names.topics_of`.
+_SHAPES: Final = {
+    "lupin_msgs/msg/TwinState": message_limits.STATE,
+    "lupin_msgs/msg/Observation": message_limits.OBSERVATION,
+    "lupin_msgs/msg/DiscoveredTags": message_limits.DISCOVERED_TAGS,
+    "nav_msgs/msg/OccupancyGrid": message_limits.MAP,
+    "diagnostic_msgs/msg/DiagnosticArray": message_limits.DIAGNOSTICS,
+}
+
+
+def message_class(type_name: str) -> Any:
+    """The class of a message, such as `nav_msgs/msg/OccupancyGrid`.
+
+    Raises:
+        LookupError: it is not installed, or of a package that is not relayed.
+
+    """
+    package, _, name = type_name.partition("/msg/")
+    # A message begins with a capital; what a module has beside its messages does not.
+    if package not in _PACKAGES or not name[:1].isupper() or not hasattr(_PACKAGES[package], name):
+        raise LookupError(f"there is no message {type_name!r} in {', '.join(_PACKAGES)}")
+    return getattr(_PACKAGES[package], name)
+
+
+class RelayRos:
+    """`relay.Ros` over rclpy."""
+
+    def subscribe(
+        self, node: Any, topic: Topic, take: Callable[[Sample], None]
+    ) -> Callable[[], None]:
+        """Subscribe raw: nothing is made of the bytes in this thread."""
+        message_type = message_class(topic.type_name)
+        clock = node.get_clock()
+
+        def hand_over(data: bytes) -> None:
+            take(Sample(data, clock.now().nanoseconds))
+
+        try:
+            subscription = node.create_subscription(
+                message_type,
+                topic.name,
+                hand_over,
+                latched(topic.depth) if topic.latched else QoSProfile(depth=topic.depth),
+                raw=True,
+            )
+        except InvalidTopicNameException as error:
+            raise ValueError(" ".join(str(error).split())) from error
+        return lambda: node.destroy_subscription(subscription)
+
+    def published(self, node: Any, is_wanted: Callable[[str, str], bool]) -> Mapping[str, str]:
+        """Topics that somebody publishes as a type that is wanted, and that type.
+
+        Whoever else uses the name with another type, or only listens to it, changes nothing.
+        """
+        return {
+            name: type_name
+            for name, types in node.get_topic_names_and_types()
+            for type_name in types
+            if is_wanted(name, type_name)
+            and any(one.topic_type == type_name for one in node.get_publishers_info_by_topic(name))
+        }
+
+    def time(self, node: Any) -> RosTime:
+        """By the node's clock."""
+        clock = node.get_clock()
+        return RosTime(clock.now().nanoseconds, bool(clock.ros_time_is_active))
+
+    def read(self, topic: Topic, data: bytes) -> Any:
+        """As the nodes read it: lengths are checked before anything is made of it."""
+        message = read_message(data, _SHAPES[topic.type_name])
+        if isinstance(message, Drop):
+            raise ValueError(message.why)  # noqa: TRY004  # it is no wrong call
+        return message
+
+
+def names_of(node: Any) -> TwinNames:
+    """What a twin's topics and service are called, as a node of ours resolves them."""
+    parameters = node.parameters
+    resolve = node.resolve_topic_name
+    return TwinNames(
+        state_topic=resolve(parameters.state_topic),
+        field_service=node.resolve_service_name(parameters.field_service_name),
+        observations_topic=resolve(parameters.observations_topic),
+        discovered_tags_topic=resolve(parameters.discovered_tags_topic),
+        map_topic=resolve(parameters.map_topic),
+        diagnostics_topic=resolve(interfaces.DIAGNOSTICS.name),
+        field_layers=resolve(interfaces.LAYERS_BELOW + "x")[:-1],
+        tags_layer=resolve(interfaces.TAGS.name),
+        planters_layer=resolve(interfaces.PLANTERS.name),
+    )

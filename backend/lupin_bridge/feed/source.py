@@ -1,0 +1,222 @@
+"""What the routes need of a twin, wherever it runs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import AsyncIterator, Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final, Protocol, TypeVar
+
+from lupin_bridge.feed.query import Question
+from lupin_bridge.feed.relay import Relay
+from lupin_bridge.feed.revisions import RevisedEstimate
+from lupin_bridge.feed.topics import TwinNames
+from lupin_twin.core.diagnostics import Origin
+from lupin_twin.core.drops import Counts, Recent
+from lupin_twin.core.history import TagHistory
+from lupin_twin.core.journal_condition import UNKNOWN, Condition
+from lupin_twin.core.past import PastRow, SeriesPast, SeriesRequest
+from lupin_twin.core.state import Snapshot
+from lupin_twin.core.writes import PastWrites, WritesRequest
+from lupin_twin.estimate.engine import EstimateRequest
+from lupin_twin.field.engine import FieldRequest, FieldRules
+from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.field.grid import FieldGrid
+from lupin_twin.runtime.estimate_rounds import Report, ReportRequest
+from lupin_twin.runtime.workers import Workers
+
+ResultT = TypeVar("ResultT")
+
+# What a callback may take at worst, on a slow machine: the largest state there is takes a second.
+STUCK_AFTER_S: Final = 10.0
+
+
+class TwinUnavailableError(RuntimeError):
+    """The twin cannot answer now: it is not there, or it took too long."""
+
+
+class TwinTimeoutError(TwinUnavailableError):
+    """The twin took too long for an answer."""
+
+
+@dataclass(frozen=True, slots=True)
+class CacheCounts:
+    """How the cache of fields does."""
+
+    hits: int = 0
+    misses: int = 0
+    entries: int = 0
+    bytes: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class TwinUpdate:
+    """All that the ROS thread tells the loop, as of one moment; immutable.
+
+    `revision` is the snapshot's, `twin_count` how many nodes publish the state, `made_s` when it
+    was told (monotonic clock). `counts` is what the twin dropped, lost and met; None: it does not
+    say. `own_counts` is the same of a node of ours that is not the twin; `cache` is that of a twin
+    in this process, and `rules` are its own; `journal` is the twin's, wherever it is, as far as
+    that tells, and so are `origin`, where its observations come from, and `input_problems`, why it
+    does not hear all of what is published for it. `silent_s` is for how long the twin has been
+    silent, where it was so before this was told; 0: it is live.
+    """
+
+    snapshot: Snapshot
+    revision: str
+    twin_count: int = 1
+    occupancy_map: OccupancyMap | None = None
+    counts: Counts | None = None
+    own_counts: Counts | None = None
+    cache: CacheCounts = field(default_factory=CacheCounts)
+    journal: Condition = UNKNOWN
+    rules: FieldRules | None = None
+    origin: Origin = "unknown"
+    input_problems: tuple[str, ...] = ()
+    made_s: float = field(default_factory=time.monotonic, compare=False)
+    silent_s: float = 0.0
+
+    @property
+    def drops(self) -> tuple[Recent, ...]:
+        """What was dropped or lost lately, by the twin and then by a node of ours."""
+        theirs = () if self.counts is None else self.counts.recent
+        ours = () if self.own_counts is None else self.own_counts.recent
+        return theirs + tuple(replace(drop, message=f"web: {drop.message}") for drop in ours)
+
+
+@dataclass(frozen=True, slots=True)
+class RevisedGrid:
+    """A field and its revision: that of what it was computed from, or of its content."""
+
+    grid: FieldGrid
+    revision: str
+
+
+class TwinSource(Protocol):
+    """A twin in this process, or one elsewhere. Everything here is called on the event loop.
+
+    `workers` is where this process does what takes longer than a tick; `stop` closes it. `relay`
+    is where ROS topics are listened to as they are on the wire.
+    """
+
+    workers: Workers
+    relay: Relay
+
+    async def start(
+        self, on_state: Callable[[TwinUpdate], None], on_death: Callable[[], None]
+    ) -> None:
+        """Start; `on_state` gets every change (the newest, where they come fast)."""
+
+    async def stop(self) -> None:
+        """Stop and release everything."""
+
+    @property
+    def identity(self) -> str:
+        """Tells the counts of one process from another's; empty where revisions are digests."""
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether the thread behind this source runs."""
+
+    @property
+    def stuck_s(self) -> float:
+        """How long the thread has not answered a heartbeat, s; 0 between two."""
+
+    @property
+    def calls_waiting(self) -> int:
+        """Calls that wait for the ROS thread now."""
+
+    @property
+    def callback_errors(self) -> int:
+        """Errors met by ROS callbacks so far, as of the last heartbeat through the thread."""
+
+    def revision(self) -> str:
+        """The revision now: opaque, changes exactly when a field could."""
+
+    def field_revision(self, request: FieldRequest) -> str | None:
+        """The revision of the field asked for now; None: only the answer will tell.
+
+        What is claimed here holds for the field: two different ones never have the same.
+        """
+
+    def rules(self) -> FieldRules:
+        """The rules by which fields are made, and their limit."""
+
+    def names(self) -> TwinNames:
+        """What the twin's topics and service are called."""
+
+    def cache_counts(self) -> CacheCounts:
+        """How the cache of fields does; all 0 where it is not in this process."""
+
+    def journal(self) -> Condition:
+        """How the twin's journal does, as far as it tells."""
+
+    def occupancy_map(self) -> OccupancyMap | None:
+        """The latest map, if any has come."""
+
+    async def field(self, request: FieldRequest) -> RevisedGrid:
+        """Compute a field.
+
+        Raises:
+            lupin_twin.field.engine.FieldRefused: a bad request.
+            TwinUnavailableError: nobody there to compute it.
+
+        """
+
+    def estimate_revision(self, request: EstimateRequest) -> str | None:
+        """The revision of the estimate asked for now; None: only the answer will tell."""
+
+    async def estimate(self, request: EstimateRequest) -> RevisedEstimate:
+        """Estimate a sensor over a box.
+
+        Raises:
+            lupin_twin.field.engine.FieldRefused: a bad request, or nothing to make an estimate of.
+            lupin_twin.core.past.NotRemembered: there is no journal, or it cannot be read now.
+            TwinUnavailableError: nobody there to compute it.
+
+        """
+
+    async def estimate_report(self, request: ReportRequest) -> Report:
+        """What a sensor's estimates are worth.
+
+        Raises:
+            TwinUnavailableError: nobody there to say.
+
+        """
+
+    async def history(self, tag_id: str) -> TagHistory | None:
+        """The last scans and tries of a tag; None: no such tag."""
+
+    # --- the past; each may raise `PastRefused`, `NotRemembered` or `TwinUnavailableError` --------
+
+    async def ask(self, question: Question[ResultT], cost_s: float) -> ResultT:
+        """The answer to a question; `cost_s` estimates all that it takes, s of one core."""
+
+    async def series(self, request: SeriesRequest) -> SeriesPast:
+        """Readings of one sensor of one tag, or events, as they were or in buckets."""
+
+    async def writes(self, request: WritesRequest) -> PastWrites:
+        """What was heard, scan by scan and look by look, in the order of hearing."""
+
+    def rows(
+        self,
+        start_ns: int,
+        end_ns: int,
+        tag_id: str | None,
+        sensor_type: str | None,
+        write: Callable[[Sequence[PastRow]], ResultT],
+    ) -> AsyncIterator[ResultT]:
+        """Every reading and failed try of a period, at the pace of whoever takes them.
+
+        They come in lots, each through `write`, which may be called in another process. None: all
+        tags, all sensors.
+        """
+
+
+def ailment(source: TwinSource) -> str | None:
+    """What is wrong with the thread behind a source so that only a restart helps; None: nothing."""
+    if not source.is_alive:
+        return "The ROS thread has ended. Restart."
+    if source.stuck_s >= STUCK_AFTER_S:
+        return f"The ROS thread has been stuck in a callback for {source.stuck_s:.0f} s. Restart."
+    return None

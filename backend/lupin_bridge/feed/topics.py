@@ -1,0 +1,57 @@
+"""What a twin's topics and service are called in ROS, and how its topics are to be heard. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from lupin_twin.core import interfaces
+
+# What is the largest that a twin itself takes in, see `lupin_twin.ros.message_limits`.
+_LARGEST: Final = 64_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class TwinNames:
+    """From the root on and after remapping; `field_layers` is what those of fields begin with."""
+
+    state_topic: str
+    field_service: str
+    observations_topic: str = "/floranova/observations"
+    discovered_tags_topic: str = "/perception/discovered_tags"
+    map_topic: str = "/map"
+    diagnostics_topic: str = "/diagnostics"
+    field_layers: str = "/twin/field/"
+    tags_layer: str = "/twin/tags"
+    planters_layer: str = "/twin/planters"
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A topic and how it is to be heard.
+
+    `name` is from the root on, `type_name` such as `lupin_msgs/msg/TwinState`. `latched`: reliable
+    and transient local, so that the last ones come to who is late; otherwise as ROS has it by
+    default. What is held of it are `depth` samples and `max_bytes` in all, at most.
+    """
+
+    name: str
+    type_name: str
+    latched: bool = True
+    depth: int = 1
+    max_bytes: int = _LARGEST
+
+
+def topics_of(names: TwinNames) -> tuple[Topic, ...]:
+    """A twin's state, what it listens to, and what it says of itself."""
+    return (
+        _heard(names.state_topic, interfaces.STATE),
+        _heard(names.observations_topic, interfaces.OBSERVATIONS, 8_000_000),
+        _heard(names.discovered_tags_topic, interfaces.DISCOVERED_TAGS, 16_000_000),
+        _heard(names.map_topic, interfaces.MAP),
+        _heard(names.diagnostics_topic, interfaces.DIAGNOSTICS, 4_000_000),
+    )
+
+
+def _heard(name: str, topic: interfaces.Topic, max_bytes: int = _LARGEST) -> Topic:
+    return Topic(name, topic.type_name, topic.is_latched, topic.depth, max_bytes)

@@ -1,0 +1,380 @@
+"""The ROS side of `lupin-twin web`: a consumer of a twin elsewhere, over its ROS contracts."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from enum import Enum
+from hashlib import blake2b
+from operator import is_
+from typing import Any, Final
+
+from lupin_msgs.srv import (
+    GetEstimate,
+    GetEstimateReport,
+    GetField,
+    GetWrites,
+)
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+
+from lupin_bridge.feed.pairing import Pairing
+from lupin_twin.core import ingest, interfaces
+from lupin_twin.core.clock import StampWatch
+from lupin_twin.core.diagnostics import Origin, SelfReport, self_report
+from lupin_twin.core.drops import Counts, Drop, Reason
+from lupin_twin.core.history import History, TagHistory
+from lupin_twin.core.journal_condition import Condition
+from lupin_twin.core.parameters import TwinParameters
+from lupin_twin.core.state import Snapshot, TagState
+from lupin_twin.field.engine import FieldRules
+from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.ros import convert, message_limits
+from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities
+from lupin_twin.ros.convert import findings_of
+from lupin_twin.ros.inputs import TwinCount
+from lupin_twin.ros.parameters import (
+    AdjustableNode,
+    declare,
+    naming,
+    naming_own_parameters,
+)
+
+NODE_NAME: Final = "lupin_web"
+
+
+class Service(Enum):
+    """What a twin is asked for."""
+
+    FIELD = GetField
+    WRITES = GetWrites
+    ESTIMATE = GetEstimate
+    REPORT = GetEstimateReport
+
+
+# DDS finds a twin's publisher and its services each on its own, one at times a little later: of
+# what is lost on the way it tells again after 3 s.
+NEW_TWIN_S: Final = 5.0
+
+# How long a state waits for the times that a twin publishes right behind it. Without them it is
+# shown all the same, and when what was observed is not known.
+TIMES_PATIENCE_S: Final = 0.5
+
+# What a twin said of itself, once a second, stands for so long, s.
+REPORT_HOLDS_S: Final = 5.0
+
+# The twin's parameters that a consumer has to know too. They are not on the wire: where the twin's
+# are not the defaults, give both the same parameter file.
+SHARED_PARAMETERS: Final = (
+    "state_topic",
+    "field_service_name",
+    "observations_topic",
+    "discovered_tags_topic",
+    "map_topic",
+    "frame_id",
+    "buffer_len",
+    "idw_power",
+    "idw_falloff_radius_m",
+    "idw_max_distance_m",
+    "max_grid_cells",
+)
+
+
+def _digest_of_map(occupancy: OccupancyMap) -> int:
+    """A map's revision: the same in all replicas, and for each copy of a map that has not changed.
+
+    SLAM publishes it anew every few seconds, with another stamp each time.
+    """
+    digest = blake2b(repr(occupancy.place).encode("utf-8", "surrogatepass"), digest_size=6)
+    digest.update(occupancy.cells.data)
+    return int.from_bytes(digest.digest())
+
+
+def _are_the_very_same(before: Sequence[TagState], after: Sequence[TagState]) -> bool:
+    return len(before) == len(after) and all(map(is_, before, after))
+
+
+def _digest_of_publishers(publishers: Iterable[Any]) -> str:
+    """The same in all replicas: DDS gives a publisher one id for all who see it."""
+    ids = sorted(bytes(info.endpoint_gid) for info in publishers)
+    return blake2b(b"".join(ids), digest_size=6).hexdigest()
+
+
+class WebNode(AdjustableNode):
+    """Follows `/twin/state` with its `/twin/times`, and `/map`, and asks the twin's services.
+
+    Of `/diagnostics`, which all nodes of a domain share, it takes what the twin says of itself that
+    publishes this state, and nothing else.
+
+    `on_state(snapshot)` is called for each state, once its times are there. Its tags are the very
+    same values as in the one before where nothing has changed. `on_map()` is called for each map
+    that is another.
+
+    Raises:
+        lupin_twin.core.parameters.ParameterError: a parameter out of its range.
+
+    """
+
+    def __init__(
+        self,
+        on_state: Callable[[Snapshot], None],
+        on_map: Callable[[], None] = lambda: None,
+        *,
+        context: Any = None,
+    ) -> None:
+        with naming_own_parameters():
+            super().__init__(NODE_NAME, context=context)
+        self.utilities = NodeUtilities(self)
+        self.report = self.utilities.report
+        self.parameters = declare(self, SHARED_PARAMETERS)
+        self.rules = FieldRules.of(self.parameters)
+        self.adjust_by(self._adjust)
+        self.twins = TwinCount()
+        self.occupancy_map: OccupancyMap | None = None
+        self.digest = ""
+        self.publishers_digest = ""
+        # Counts the changes heard of that a field may depend on.
+        self.epoch = 0
+        self._changes = 0
+        self._publishers_since_s = -math.inf
+        self._on_state = on_state
+        self._on_map = on_map
+        self._newest: Snapshot | None = None
+        self._pairing = Pairing()
+        self._stamp_watch = StampWatch()
+        self._report = SelfReport()
+        self._reported_s = -math.inf
+        self._digests: dict[str, tuple[TagState, bytes]] = {}
+        self._topics: dict[str, str] = {}
+        group = MutuallyExclusiveCallbackGroup()
+        p = self.parameters
+        self._history = History(p.buffer_len)
+        for parameter, topic, shape, callback, on_number in (
+            ("state_topic", p.state_topic, message_limits.STATE, self._take_state, self.twins.add),
+            ("times", interfaces.TIMES.name, message_limits.TIMES, self._take_times, None),
+            ("map_topic", p.map_topic, message_limits.MAP, self._take_map, None),
+        ):
+            self._topics[parameter] = self.utilities.subscribe(
+                parameter,
+                topic,
+                shape,
+                depth=1,
+                group=group,
+                callback=callback,
+                on_number=on_number,
+            )
+        self.utilities.subscribe(
+            "diagnostics",
+            interfaces.DIAGNOSTICS.name,
+            message_limits.DIAGNOSTICS,
+            depth=50,
+            group=group,
+            callback=self._take_diagnostics,
+            is_wanted=lambda data: self._topics["state_topic"].encode() in data,
+        )
+        with naming("field_service_name", p.field_service_name):
+            self.clients_of_twin = {
+                service: self.create_client(
+                    service.value, name, qos_profile=SERVICE_QOS, callback_group=group
+                )
+                for service, name in (
+                    (Service.FIELD, p.field_service_name),
+                    (Service.WRITES, interfaces.GET_WRITES.name),
+                    (Service.ESTIMATE, interfaces.GET_ESTIMATE.name),
+                    (Service.REPORT, interfaces.GET_ESTIMATE_REPORT.name),
+                )
+            }
+        self._patience = self.utilities.every(
+            group, TIMES_PATIENCE_S, "the wait for times", self._show_without_times
+        )
+        self._patience.cancel()
+
+    # --- for the source, on this node's thread ------------------------------------------------
+
+    @property
+    def callback_errors(self) -> int:
+        """Errors met by callbacks so far."""
+        return self.utilities.callback_errors
+
+    @property
+    def revision(self) -> str:
+        """Digests of who publishes the state, of poses and readings, and of the map.
+
+        The twin's count is not on the wire, nor are its parameters: but one that was started with
+        others is another publisher. Of this node's own they are part, once they are changed.
+        """
+        map_revision = 0 if self.occupancy_map is None else self.occupancy_map.revision
+        known = f"{self.publishers_digest}-{self.digest}-{map_revision:x}"
+        return f"{known}-{self._changes}" if self._changes else known
+
+    @property
+    def has_new_twin(self) -> bool:
+        """Whether a twin has come so lately that its service may not have been found yet."""
+        return time.monotonic() - self._publishers_since_s < NEW_TWIN_S
+
+    @property
+    def twin_counts(self) -> Counts | None:
+        """What the twin says that it dropped, lost and met; None: it says nothing."""
+        return self._self_report(time.monotonic()).counts
+
+    @property
+    def journal(self) -> Condition:
+        """What the twin says of its journal."""
+        return self._self_report(time.monotonic()).journal
+
+    @property
+    def origin(self) -> Origin:
+        """Where the twin says that its observations come from."""
+        return self._self_report(time.monotonic()).origin
+
+    @property
+    def input_problems(self) -> tuple[str, ...]:
+        """Why the twin says that it does not hear all."""
+        return self._self_report(time.monotonic()).input_problems
+
+    def offers(self, service: Service) -> bool:
+        """Whether a twin offers it now."""
+        return bool(self.clients_of_twin[service].service_is_ready())
+
+    def why_not(self, service: Service) -> str:
+        """What is to be said where no twin offers it: its name, and where to look."""
+        if self.offers(Service.FIELD):
+            guess = "is it an older one?"
+        elif self.count_publishers(self._topics["state_topic"]):
+            guess = "its state is heard, so ask again; or does it have another name there?"
+        else:
+            guess = "is it running?"
+        return f"no twin offers {self.clients_of_twin[service].service_name}: {guess}"
+
+    def ask(self, service: Service, request: Any) -> Any:
+        """Ask the twin; returns the rclpy Future of its response."""
+        return self.clients_of_twin[service].call_async(request)
+
+    def forget(self, service: Service, future: Any) -> None:
+        """Drop a request that nobody waits for any more, or it would be kept for ever."""
+        self.clients_of_twin[service].remove_pending_request(future)
+
+    def history_of(self, tag_id: str) -> TagHistory | None:
+        """The last scans and tries of a tag that were seen from here; None: no such tag."""
+        if self._newest is None or all(tag.tag_id != tag_id for tag in self._newest.tags):
+            return None
+        return self._history.of(tag_id) if self._newest.has_times else TagHistory(is_known=False)
+
+    # --- callbacks ----------------------------------------------------------------------------
+
+    def _take_state(self, msg: Any) -> None:
+        times = self._pairing.take_state(convert.nanoseconds(msg.header.stamp), msg)
+        if times is not None:
+            self._show(msg, times)
+        elif not self.count_publishers(self._topics["times"]):
+            self._show_without_times()
+        elif self._patience.is_canceled():
+            self._patience.reset()
+
+    def _take_times(self, msg: Any) -> None:
+        state = self._pairing.take_times(convert.nanoseconds(msg.header.stamp), msg)
+        if state is not None:
+            self._show(state, msg)
+
+    def _show_without_times(self) -> None:
+        state = self._pairing.give_up_waiting()
+        if state is not None:
+            self._show(state, None)
+
+    def _show(self, msg: Any, times: Any) -> None:
+        self._patience.cancel()
+        self._look_at_publishers()
+        before = self._newest
+        snapshot = convert.snapshot_of(msg, before, times)
+        now_s = time.monotonic()
+        clock = self._stamp_watch.update(
+            snapshot.stamp_ns,
+            now_s,
+            ages_are_known=not any(math.isnan(tag.stale_seconds) for tag in msg.tags),
+            reported=self._self_report(now_s).clock,
+        )
+        snapshot = replace(snapshot, clock=clock)
+        if snapshot.has_times:
+            known = set() if before is None else set(map(id, before.tags))
+            went_back = before is not None and snapshot.stamp_ns < before.stamp_ns
+            for tag in snapshot.tags:
+                if id(tag) not in known:
+                    self._history.follow(tag, clock_went_back=went_back)
+        self._newest = snapshot
+        self.digest = self._digest_of(snapshot.tags)
+        if before is None or not _are_the_very_same(before.tags, snapshot.tags):
+            self.epoch += 1
+        if len(self._digests) > len(snapshot.tags):
+            self._forget_all_but(snapshot.tags)
+        self._on_state(snapshot)
+
+    def _look_at_publishers(self) -> None:
+        topic = self._topics["state_topic"]
+        publishers = self.get_publishers_info_by_topic(topic)
+        publishers_digest = _digest_of_publishers(publishers)
+        if publishers_digest != self.publishers_digest:
+            self.publishers_digest = publishers_digest
+            self.epoch += 1
+            self._publishers_since_s = time.monotonic()
+        if self.twins.see(int(self.count_publishers(topic))):
+            self.utilities.warn(
+                ("twins", 0),
+                f"{self.twins.value} nodes publish {topic}: what is shown is a mixture; "
+                "stop all twins but one, or give them ROS domains of their own",
+            )
+
+    def _take_map(self, msg: Any) -> None:
+        # Kept, and told with the next state: a map is no sign of life of the twin.
+        topic = self._topics["map_topic"]
+        if dropped := ingest.wrong_frame(msg.header.frame_id, self.parameters.frame_id):
+            self.utilities.drop(dropped, topic)
+            return
+        try:
+            new = convert.map_of(msg, 0)
+        except ValueError as error:
+            self.utilities.drop(Drop(Reason.MAP, f"{error}; the last one stays", "a map"), topic)
+            return
+        if self.occupancy_map is None or not new.shows_the_same_as(self.occupancy_map):
+            self.occupancy_map = replace(new, revision=_digest_of_map(new))
+            self.epoch += 1
+            self._on_map()
+
+    def _take_diagnostics(self, msg: Any) -> None:
+        # Told with the next state, like the map: a twin that publishes none is none to show.
+        said = list(findings_of(msg, self._topics["state_topic"]))
+        if said:
+            self._report = self_report(said)
+            self._reported_s = time.monotonic()
+
+    def _adjust(self, now: TwinParameters) -> None:
+        # A twin's own are not on the wire: they are set here as there.
+        self.rules = FieldRules.of(now)
+        self._changes += 1
+        self.epoch += 1
+        self._on_map()
+
+    # --- small parts --------------------------------------------------------------------------
+
+    def _forget_all_but(self, tags: Sequence[TagState]) -> None:
+        ids = {tag.tag_id for tag in tags}
+        self._history.forget_all_but(ids)
+        self._digests = {tag_id: kept for tag_id, kept in self._digests.items() if tag_id in ids}
+
+    def _self_report(self, now_s: float) -> SelfReport:
+        """What the twin that is followed said of itself lately."""
+        is_recent = now_s - self._reported_s < REPORT_HOLDS_S
+        return self._report if is_recent else SelfReport()
+
+    def _digest_of(self, tags: Sequence[TagState]) -> str:
+        total = blake2b(digest_size=12)
+        for tag in tags:
+            kept = self._digests.get(tag.tag_id)
+            if kept is None or kept[0] is not tag:
+                readings = [(reading.name, reading.value) for reading in tag.readings]
+                text = repr((tag.tag_id, tag.pose, readings))
+                digest = blake2b(text.encode("utf-8", "surrogatepass"), digest_size=12).digest()
+                kept = (tag, digest)
+                self._digests[tag.tag_id] = kept
+            total.update(kept[1])
+        return total.hexdigest()

@@ -1,0 +1,138 @@
+"""What the overview says of a site, and how that is put on the wire. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from hashlib import blake2b
+from typing import Any, Final
+
+import orjson
+
+from lupin_bridge.judge.verdict import Verdict
+from lupin_bridge.stream.frames import text_frame
+from lupin_bridge.stream.state_json import stamp
+
+# A forwarder says every two seconds that it lives; this long after the last time it counts as gone.
+LIVE_S: Final = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """A site as its log and its forwarder have it. Times are ns of the archive's clock.
+
+    `last_seq` grows with every row, `heard_ns` is when the forwarder was heard last, 0: never.
+    `last_received_ns` is when the twin received its newest row, by the clock of its machine.
+    `verdict` and `active_alarms` are None while they are being worked out.
+    """
+
+    site: str
+    name: str = ""
+    last_seq: int = 0
+    heard_ns: int = 0
+    is_live: bool = False
+    last_received_ns: int | None = None
+    verdict: Verdict | None = None
+    active_alarms: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Archive:
+    """Whether the archive answers; where it does not, `message` says why, and since when (ns)."""
+
+    is_reachable: bool
+    message: str = ""
+    since_ns: int = 0
+
+
+def site_json(site: Site, archive: Archive, now_ns: int) -> dict[str, Any]:
+    """An entry of `/api/sites`: of a site that is silent nobody knows how it is."""
+    is_live = site.is_live and archive.is_reachable
+    return {
+        "site": site.site,
+        "name": site.name or site.site,
+        "verdict": (site.verdict or Verdict.UNKNOWN) if is_live else Verdict.UNKNOWN,
+        "last_verdict": site.verdict,
+        "active_alarms": site.active_alarms,
+        "last_received": None if site.last_received_ns is None else stamp(site.last_received_ns),
+        "lag_s": None if not site.heard_ns else round(max(0, now_ns - site.heard_ns) / 1e9, 1),
+        "is_live": is_live,
+    }
+
+
+def etag(sites: Mapping[str, Site], archive: Archive) -> str:
+    """The same from every replica that has seen the same; how long ago that was is left out."""
+    said = [(*_lasting(site),) for site in sites.values()]
+    text = repr((said, archive.is_reachable)).encode()
+    return f'W/"{blake2b(text, digest_size=12).hexdigest()}"'
+
+
+def _lasting(site: Site) -> tuple[object, ...]:
+    return (
+        *(site.site, site.name, site.last_seq, site.is_live),
+        *(site.verdict, site.active_alarms, site.last_received_ns),
+    )
+
+
+def is_news(before: Site | None, now: Site) -> bool:
+    """Whether browsers have to be told of a site; that it still lives is none."""
+    return before is None or _lasting(before) != _lasting(now)
+
+
+class SitesFrame:
+    """All sites, or what is not as in `base`, on its way to every browser; written once."""
+
+    def __init__(
+        self,
+        sites: Mapping[str, Site],
+        archive: Archive,
+        now_ns: int,
+        base: SitesFrame | None = None,
+    ) -> None:
+        self.seq: int = 1 if base is None else base.seq + 1
+        self.base = base
+        self._sites = sites
+        self._archive = archive
+        self._now_ns = now_ns
+        self._wires: dict[bool, bytes] = {}
+        if base is not None:
+            base.base = None
+
+    def full(self) -> bytes:
+        """Every site."""
+        return self._wire(self._sites.values(), (), is_whole=True)
+
+    def delta(self) -> bytes:
+        """What is not as in the frame before; all of it, where the archive comes or goes."""
+        assert self.base is not None  # the hub asks only then
+        before = self.base
+        changed = [
+            site
+            for name, site in self._sites.items()
+            if self._archive.is_reachable != before._archive.is_reachable  # noqa: SLF001  # its own
+            or is_news(before._sites.get(name), site)  # noqa: SLF001
+        ]
+        gone = [name for name in before._sites if name not in self._sites]  # noqa: SLF001
+        return self._wire(changed, gone, is_whole=False)
+
+    def _wire(self, sites: Any, gone: Any, *, is_whole: bool) -> bytes:
+        if is_whole not in self._wires:
+            archive = self._archive
+            body = {
+                "type": "sites",
+                "is_whole": is_whole,
+                "archive": archive_json(archive),
+                "sites": [site_json(site, archive, self._now_ns) for site in sites],
+                "gone": list(gone),
+            }
+            self._wires[is_whole] = text_frame(orjson.dumps(body))
+        return self._wires[is_whole]
+
+
+def archive_json(archive: Archive) -> dict[str, Any]:
+    """Whether it answers."""
+    return {
+        "is_reachable": archive.is_reachable,
+        "message": archive.message,
+        "since": stamp(archive.since_ns) if archive.since_ns else None,
+    }

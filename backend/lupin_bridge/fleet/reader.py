@@ -1,0 +1,186 @@
+"""The process that reads the sites' logs: `past_child`, over the archive in place of a journal.
+
+One process answers for all sites that are open here. Which site a question is of stands where the
+path of a journal does otherwise.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import sqlite3
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, Final, TypeVar
+
+from lupin_bridge.archive.database import ArchiveError, explained
+from lupin_bridge.feed import past_child
+from lupin_bridge.feed.past_child import Child, Now, Step
+from lupin_bridge.feed.query import Question, Work
+from lupin_bridge.fleet.site_log import SiteConnection, open_archive
+from lupin_bridge.settings import variable
+from lupin_twin.core.history import History, TagHistory
+from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.state import Snapshot
+from lupin_twin.journal.appending import simulated
+from lupin_twin.journal.fold import state_at
+from lupin_twin.journal.retention import Stretches, kept
+from lupin_twin.journal.rows import newest_of_tag
+from lupin_twin.journal.runs import FOREVER_NS, runs, span_at
+from lupin_twin.runtime.journal_queries import Recall
+from lupin_twin.runtime.memory import write_of
+from lupin_twin.runtime.workers import ShouldStop
+
+AnswerT = TypeVar("AnswerT")
+
+# Scans and attempts of a tag's history, as a twin keeps them by default.
+_HISTORY: Final = 32
+_ARRIVED: Final = (
+    "SELECT max(stamp_ns), max(arrival_ns) FROM (SELECT stamp_ns, arrival_ns FROM scan"
+    " WHERE site = :site ORDER BY seq DESC LIMIT 1) AS last"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Latest:
+    """What a site's twin would report now, as far as its log has come here."""
+
+    frame_id: str
+
+
+@dataclass(frozen=True, slots=True)
+class Reported:
+    """All tags as of the site's time now; what is kept of the past, and what of it is simulated.
+
+    `is_walls`: that time is the wall's, so it goes on also while nothing comes.
+    """
+
+    snapshot: Snapshot
+    is_walls: bool
+    kept_ns: Stretches
+    simulated_ns: tuple[int, int] | None
+
+
+@dataclass(frozen=True, slots=True)
+class OfTag:
+    """The history of a tag."""
+
+    tag_id: str
+
+
+class ArchiveChild(Child):
+    """Answers questions about sites."""
+
+    def __init__(self, peer: socket.socket) -> None:
+        super().__init__(peer, ArchiveRecall)
+
+    def _search(
+        self, question: Question[Any] | Step | Latest | OfTag, now: Now
+    ) -> Callable[[Any, ShouldStop], Work[Any]]:
+        site = now.condition.path
+        if isinstance(question, Latest | OfTag):
+            return lambda connection, _: _done(_of_site(SiteConnection(connection, site), question))
+        found = super()._search(question, now)
+        return lambda connection, stop: found(_as_journal(connection, site), stop)
+
+
+def _as_journal(connection: Any, site: str) -> sqlite3.Connection:
+    return SiteConnection(connection, site)  # type: ignore[return-value]  # whose queries are of both
+
+
+def _done(found: Any) -> Work[Any]:
+    return Work(0.0, lambda _: found)
+
+
+def _of_site(log: SiteConnection, asked: Latest | OfTag) -> Reported | TagHistory:
+    return _latest(log, asked) if isinstance(asked, Latest) else _history(log, asked)
+
+
+def _latest(log: SiteConnection, asked: Latest) -> Reported:
+    journal: Any = log
+    every = runs(log.execute)
+    span = span_at(every, FOREVER_NS)
+    is_walls = span is None or not span.run.begun.is_simulated
+    (now_ns,) = log.execute(
+        "SELECT CAST(extract(epoch FROM now()) * 1000000000 AS BIGINT)"
+    ).fetchone()
+    stamp_ns, arrival_ns = log.execute(_ARRIVED).fetchone()
+    if not is_walls:
+        now_ns = (stamp_ns or 0) + max(0, now_ns - (arrival_ns or now_ns))
+    # Also what a robot's clock, a little ahead of this one, has stamped: it was received.
+    known = state_at(journal, FOREVER_NS, asked.frame_id)
+    found = simulated(journal)
+    return Reported(
+        Snapshot(max(now_ns, stamp_ns or 0), asked.frame_id, known.tags),
+        is_walls,
+        kept(journal),
+        None if found is None else (found.start_ns, found.end_ns),
+    )
+
+
+def _history(log: SiteConnection, asked: OfTag) -> TagHistory:
+    journal: Any = log
+    span = span_at(runs(log.execute), FOREVER_NS)
+    history = History(_HISTORY)
+    if span is not None:
+        for row in newest_of_tag(journal, span.run.id, asked.tag_id, _HISTORY):
+            history.add(write_of(row))
+    return history.of(asked.tag_id)
+
+
+class ArchiveRecall(Recall):
+    """Asks the archive: each question in a transaction, over connections that are kept."""
+
+    def _answer(
+        self, question: Callable[[Any, ShouldStop], AnswerT], is_abandoned: ShouldStop
+    ) -> AnswerT:
+        import psycopg  # noqa: PLC0415  # the extra `fleet`
+
+        try:
+            connection = self._connection()
+            try:
+                with connection.transaction():
+                    answer = question(connection, is_abandoned)
+            except BaseException as error:
+                if isinstance(error, psycopg.Error):
+                    connection.close()
+                else:
+                    self._idle_archive.append(connection)
+                raise
+        except psycopg.Error as error:
+            raise NotRemembered(str(explained(error)), is_lasting=False) from error
+        except ArchiveError as error:
+            raise NotRemembered(str(error), is_lasting=False) from error
+        self._idle_archive.append(connection)
+        return answer
+
+    def _connection(self) -> Any:
+        while True:
+            with suppress(IndexError):
+                connection = self._idle_archive.pop()
+                # One whose server has gone says so only when it is used.
+                if connection.closed or not _is_alive(connection):
+                    continue
+                return connection
+            return open_archive(os.environ[variable("archive_url")], "lupin-twin fleet")
+
+    @property
+    def _idle_archive(self) -> list[Any]:
+        return self._idle  # of psycopg here
+
+
+def _is_alive(connection: Any) -> bool:
+    import psycopg  # noqa: PLC0415  # the extra `fleet`
+
+    try:
+        connection.execute("SELECT 1")
+    except psycopg.Error:
+        connection.close()
+        return False
+    return True
+
+
+def main() -> None:
+    """Answer the parent until it ends."""
+    past_child.main(ArchiveChild)

@@ -1,0 +1,64 @@
+"""One site's log in the archive, in the place of a connection to a twin's own journal.
+
+Every query of the log names its site `:site` and is understood by both engines. So whoever reads a
+journal reads a site of the archive, and gets the same answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from lupin_bridge.archive.database import ArchiveError, check_version, connect, explained
+from lupin_twin.journal.schema import SiteLog
+
+_NOTHING: Final[Mapping[str, Any]] = {}
+# A question that takes longer is given up: nobody waits for its answer any more.
+_MAX_MS: Final = 10_000
+
+
+@dataclass(frozen=True, slots=True)
+class SiteConnection:
+    """Reads one site by a connection of psycopg, whatever site a query names."""
+
+    connection: Any
+    site: str
+
+    def execute(self, sql: str, values: Mapping[str, Any] = _NOTHING) -> Any:
+        """A cursor; its rows come as tuples."""
+        return SiteLog(self.connection, self.site).execute(sql, values)
+
+    def transaction(self) -> Any:
+        """See psycopg."""
+        return self.connection.transaction()
+
+    @property
+    def info(self) -> Any:
+        """See psycopg: whether a transaction is open."""
+        return self.connection.info
+
+
+def open_archive(url: str, name: str) -> Any:
+    """A connection that cannot write, to the primary or to a standby.
+
+    Raises:
+        ArchiveError: there is no archive that can be read; `UsageError`: no later try helps.
+
+    """
+    import psycopg  # noqa: PLC0415  # the extra `fleet`
+
+    connection = connect(url, name, session="any")
+    try:
+        connection.read_only = True
+        # All that is read in one transaction is of one moment.
+        connection.isolation_level = psycopg.IsolationLevel.REPEATABLE_READ
+        connection.execute(f"SET statement_timeout = {_MAX_MS}")
+        check_version(connection)
+    except psycopg.Error as error:
+        connection.close()
+        raise explained(error) from error
+    except ArchiveError:
+        connection.close()
+        raise
+    return connection

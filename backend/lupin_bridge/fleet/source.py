@@ -1,0 +1,291 @@
+"""The source of one site's page: its twin as its log in the archive has it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import time
+from collections.abc import Awaitable, Callable
+from dataclasses import replace
+from typing import Any, Final, TypeVar, cast
+
+from lupin_bridge.feed.log_reader import LogReader
+from lupin_bridge.feed.past_child import Now
+from lupin_bridge.feed.past_process import PastProcess
+from lupin_bridge.feed.relay import Relay, Ros
+from lupin_bridge.feed.revisions import RevisedEstimate
+from lupin_bridge.feed.shared_work import Shared
+from lupin_bridge.feed.source import (
+    CacheCounts,
+    RevisedGrid,
+    TwinTimeoutError,
+    TwinUnavailableError,
+    TwinUpdate,
+)
+from lupin_bridge.feed.topics import TwinNames
+from lupin_bridge.fleet.overview import Site
+from lupin_bridge.fleet.reader import Latest, OfTag, Reported
+from lupin_bridge.fleet.watching import Watching
+from lupin_twin.core.history import TagHistory
+from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.parameters import TwinParameters
+from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.state import samples_of
+from lupin_twin.estimate.engine import EstimateRequest
+from lupin_twin.field.engine import FieldRequest, FieldRules, check_request, compute_field, cost_s
+from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.runtime.estimate_rounds import Report, ReportRequest
+from lupin_twin.runtime.workers import Workers
+
+log = logging.getLogger(__name__)
+ResultT = TypeVar("ResultT")
+
+HEARTBEAT_S: Final = 1.0
+_RETRY_S: Final = 1.0
+_FIRST_S: Final = 5.0
+_NO_ESTIMATES: Final = "estimates are made by the twin of the greenhouse itself, not of the archive"
+
+
+class SiteTwin(LogReader):
+    """`TwinSource` over a site's log; `past` is the process that reads those of all sites."""
+
+    def __init__(self, site: str, watching: Watching, past: PastProcess, timeout_s: float) -> None:
+        self.site = site
+        self.past = past
+        self.timeout_s = timeout_s
+        self.workers = Workers("work")
+        self.relay = Relay(_no_ros, cast("Ros", None))
+        self._watching = watching
+        # The parameters of a twin are not in its log: where they are others there, fields differ.
+        self._parameters = TwinParameters()
+        self._rules = FieldRules.of(self._parameters)
+        self._computing: Shared[RevisedGrid] = Shared()
+        self._told: TwinUpdate | None = None
+        self._reported: Reported | None = None
+        self._read_ns = 0
+        self._seq = -1
+        self._was_live: bool | None = None
+        self._wake = asyncio.Event()
+        self._task: asyncio.Task[None] | None = None
+
+    async def start(
+        self,
+        on_state: Callable[[TwinUpdate], None],
+        on_death: Callable[[], None],  # noqa: ARG002  # there is no thread that could die
+    ) -> None:
+        """Begin to follow the site; who opens it first waits for what is known of it."""
+        with contextlib.suppress(TimeoutError, NotRemembered, TwinUnavailableError):
+            await asyncio.wait_for(self._read(), _FIRST_S)
+        self._tell(on_state)
+        self._task = asyncio.create_task(self._follow(on_state), name=f"site {self.site}")
+
+    async def stop(self) -> None:
+        """End; the process that reads goes on for others."""
+        if self._task is not None:
+            self._task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._task
+        self.workers.close()
+
+    def on_news(self) -> None:
+        """The overview has changed: maybe this site."""
+        site = self._site
+        if site.last_seq != self._seq or self._is_live != self._was_live:
+            self._wake.set()
+
+    @property
+    def _site(self) -> Site:
+        return self._watching.sites.get(self.site, Site(self.site))
+
+    @property
+    def _is_live(self) -> bool:
+        return self._watching.archive.is_reachable and self._site.is_live
+
+    async def _follow(self, on_state: Callable[[TwinUpdate], None]) -> None:
+        """Read what is new; and meanwhile say that the site is live, however long that takes."""
+        reading = asyncio.create_task(self._keep_reading(on_state), name=f"read {self.site}")
+        try:
+            while True:
+                await asyncio.sleep(HEARTBEAT_S)
+                self._tell(on_state)
+        finally:
+            reading.cancel()
+
+    async def _keep_reading(self, on_state: Callable[[TwinUpdate], None]) -> None:
+        while True:
+            try:
+                await self._read()
+                self._tell(on_state)
+            except (NotRemembered, TwinUnavailableError) as error:
+                log.info("site %s is as it was: %s", self.site, error)
+                await asyncio.sleep(_RETRY_S)
+                continue
+            except Exception:  # nobody waits for this task, and the site's page depends on it
+                log.exception("site %s is as it was", self.site)
+                await asyncio.sleep(_RETRY_S)
+                continue
+            await self._wake.wait()
+            self._wake.clear()
+
+    async def _read(self) -> None:
+        last_seq = self._site.last_seq
+        if last_seq != self._seq and self._watching.archive.is_reachable:
+            self._reported = await self._in_time(self._reading(Latest(self._parameters.frame_id)))
+            self._read_ns = time.monotonic_ns()
+            self._seq = last_seq
+
+    def _tell(self, on_state: Callable[[TwinUpdate], None]) -> None:
+        site, is_live = self._site, self._is_live
+        reported = self._reported
+        if reported is None or not (is_live or is_live != self._was_live):
+            return
+        self._was_live = is_live
+        ago_s = max(0.0, (self._watching.now_ns - site.heard_ns) / 1e9) if site.heard_ns else 0.0
+        archive = self._watching.archive
+        stamp_ns = self._now_ns(reported)
+        if not is_live and reported.is_walls:
+            # As of when it was last heard: who shows it adds for how long that was ago.
+            stamp_ns = site.heard_ns
+        self._told = TwinUpdate(
+            replace(reported.snapshot, stamp_ns=stamp_ns, tags=self._tags(reported)),
+            self.revision(),
+            journal=self._condition(reported),
+            rules=self._rules,
+            input_problems=() if archive.is_reachable else (f"The archive: {archive.message}.",),
+            silent_s=0.0 if is_live else ago_s,
+        )
+        on_state(self._told)
+
+    def _tags(self, reported: Reported) -> tuple[Any, ...]:
+        """The very same values as before where nothing has changed."""
+        before = () if self._told is None else self._told.snapshot.tags
+        known = {tag.tag_id: tag for tag in before}
+        return tuple(
+            known[tag.tag_id] if known.get(tag.tag_id) == tag else tag
+            for tag in reported.snapshot.tags
+        )
+
+    def _now_ns(self, reported: Reported) -> int:
+        """The site's ROS time now; that of a simulation goes on only while it is live."""
+        passed_ns = time.monotonic_ns() - self._read_ns
+        goes_on = reported.is_walls or self._is_live
+        return reported.snapshot.stamp_ns + (passed_ns if goes_on else 0)
+
+    def _condition(self, reported: Reported | None) -> Condition:
+        """As a journal's; its path is the site."""
+        site = self._site
+        complete_ns = None
+        if reported is not None:
+            complete_ns = site.heard_ns if reported.is_walls else reported.snapshot.stamp_ns
+        return Condition(
+            JournalState.RECORDING,
+            path=self.site,
+            written=site.last_seq,
+            simulated_ns=None if reported is None else reported.simulated_ns,
+            complete_ns=complete_ns,
+            kept_ns=() if reported is None else reported.kept_ns,
+            journal_id=self.site,
+        )
+
+    # --- see `TwinSource` ---------------------------------------------------------------------
+
+    identity = ""
+    is_alive = True
+    stuck_s = 0.0
+    calls_waiting = 0
+    callback_errors = 0
+
+    def revision(self) -> str:
+        """Of what was read: the same in all replicas."""
+        return f"{self.site}-{self._seq}"
+
+    def field_revision(self, request: FieldRequest) -> str | None:  # noqa: ARG002  # all alike
+        """The revision now."""
+        return self.revision()
+
+    def rules(self) -> FieldRules:
+        """A twin's own, unless it was given others."""
+        return self._rules
+
+    def names(self) -> TwinNames:
+        """As a twin's are called unless they are renamed; nobody is heard by them here."""
+        return TwinNames("/twin/state", "/twin/get_field")
+
+    def cache_counts(self) -> CacheCounts:
+        """Nothing: answers alone are kept."""
+        return CacheCounts()
+
+    def journal(self) -> Condition:
+        """The site's log."""
+        return self._condition(self._reported)
+
+    def occupancy_map(self) -> OccupancyMap | None:
+        """None: maps are not in the log."""
+        return None
+
+    async def field(self, request: FieldRequest) -> RevisedGrid:
+        """The field of the newest state, computed on a worker."""
+        check_request(request, self._rules.max_grid_cells)
+        key = (self.revision(), request)
+        return await self._in_time(self._computing.get(key, lambda: self._compute(request)))
+
+    async def _compute(self, request: FieldRequest) -> RevisedGrid:
+        revision = self.revision()
+        tags = () if self._told is None else self._told.snapshot.tags
+        samples = samples_of(tags, request.sensor_type)
+        grid = await asyncio.wrap_future(
+            self.workers.submit(
+                lambda stop: compute_field(request, samples, None, self._rules, stop),
+                cost_s(request, len(samples), self._rules),
+            )
+        )
+        return RevisedGrid(grid, revision)
+
+    def estimate_revision(self, request: EstimateRequest) -> str | None:  # noqa: ARG002  # none
+        """None: there are no estimates."""
+        return None
+
+    async def estimate(self, request: EstimateRequest) -> RevisedEstimate:  # noqa: ARG002  # none
+        """None are made of the archive."""
+        raise NotRemembered(_NO_ESTIMATES, is_lasting=True)
+
+    async def estimate_report(self, request: ReportRequest) -> Report:  # noqa: ARG002  # none
+        """None are made of the archive."""
+        raise NotRemembered(_NO_ESTIMATES, is_lasting=True)
+
+    async def history(self, tag_id: str) -> TagHistory | None:
+        """The last scans and attempts of a tag."""
+        tags = () if self._told is None else self._told.snapshot.tags
+        if all(tag.tag_id != tag_id for tag in tags):
+            return None
+        found: TagHistory = await self._in_time(self._reading(OfTag(tag_id)))
+        return found
+
+    def now(self) -> Now:
+        """What who looks back has to know of now."""
+        reported = self._reported
+        if reported is None:
+            raise TwinUnavailableError("the site has not been read yet")
+        now_ns = self._now_ns(reported)
+        return Now(now_ns, self._parameters.frame_id, self._condition(reported))
+
+    async def _reading(self, question: Any) -> Any:
+        about = Now(0, self._parameters.frame_id, self._condition(None))
+        return await self.past.ask(question, about, 0.0)
+
+    async def _found(self) -> None:
+        """It is where it is."""
+
+    async def _in_time(self, answer: Awaitable[ResultT]) -> ResultT:
+        try:
+            async with asyncio.timeout(self.timeout_s):
+                return await answer
+        except TimeoutError:
+            raise TwinTimeoutError(
+                f"the archive did not answer within {self.timeout_s:g} s"
+            ) from None
+
+
+def _no_ros() -> Any:
+    raise TwinUnavailableError("the archive has no topics of ROS")

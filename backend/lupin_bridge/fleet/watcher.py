@@ -1,0 +1,304 @@
+"""The process that watches the archive: what is new of which site, and how each one is.
+
+It writes to its standard output a JSON line a look: the sites that are not as before, or why the
+archive cannot be read. A site's verdict and its alarms are worked out where its last number has
+changed, by the judge that every bridge has, from the rows that have come since.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import closing, suppress
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+import orjson
+
+from lupin_bridge.archive.database import CHANNEL, ArchiveError, explained
+from lupin_bridge.fleet.overview import LIVE_S, Site
+from lupin_bridge.fleet.site_log import SiteConnection, open_archive
+from lupin_bridge.judge.alarm_fold import Follower
+from lupin_bridge.judge.judging import Judge
+from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.verdict import Verdict
+from lupin_bridge.serving.admission import Limits
+from lupin_bridge.settings import Settings
+from lupin_twin.core.state import Snapshot, TagState
+from lupin_twin.core.writes import RecentRequest, WritesRequest
+from lupin_twin.journal.fold import state_at
+from lupin_twin.journal.follow import recent, writes
+from lupin_twin.journal.runs import FOREVER_NS, runs, span_at
+
+log = logging.getLogger(__name__)
+
+# A forwarder's word that there is something new wakes it at once; that may be lost, so it looks.
+LOOK_S: Final = 2.0
+# Of what came together, the rest goes along.
+_GATHER_S: Final = 0.05
+# So long it judges before it looks again: a site's freshness waits for no other site's verdict.
+_JUDGING_S: Final = 1.0
+# What grows old does so by itself; how soon that is said.
+_AGE_S: Final = 10.0
+_LOT: Final = 2_000
+# As many as a bridge reads of the past, see `alarms.feed`.
+_REACH_COUNT: Final = 300_000
+_RETRY_S: Final = 1.0
+
+_FACTS: Final = (
+    "SELECT site.site, site.name, coalesce(CAST(extract(epoch FROM heard_at) * 1e9 AS BIGINT), 0),"
+    " coalesce(heard_at > now() - make_interval(secs => %s), false),"
+    " coalesce((SELECT seq_offset + forwarded_seq FROM epoch WHERE epoch.site = site.site"
+    " ORDER BY epoch DESC LIMIT 1), 0)"
+    " FROM site LEFT JOIN forwarder ON forwarder.site = site.site ORDER BY site.site"
+)
+_NEWEST: Final = (
+    "(SELECT arrival_ns FROM {0} WHERE {0}.site = asked.site ORDER BY seq DESC LIMIT 1)"
+)
+_RECEIVED: Final = (
+    "SELECT asked.site, greatest("  # noqa: S608  # constants
+    + ", ".join(_NEWEST.format(table) for table in ("scan", "look", "place"))
+    + ") FROM unnest(%s::text[]) AS asked (site)"
+)
+_NOW: Final = "SELECT CAST(extract(epoch FROM now()) * 1e9 AS BIGINT)"
+
+
+@dataclass(slots=True)
+class _Judged:
+    """What is kept of a site to judge it again; `seq` is up to where that was done."""
+
+    judge: Judge
+    snapshot: Snapshot | None = None
+    is_simulated: bool = False
+    follower: Follower | None = None
+    after: int = 0
+    seq: int = -1
+    is_caught_up: bool = False
+    is_failing: bool = False
+    judged_s: float = field(default_factory=time.monotonic)
+
+
+class Watcher:
+    """Looks at the sites of an archive, over one connection."""
+
+    def __init__(self, connection: Any, criteria: Criteria) -> None:
+        self._connection = connection
+        self._criteria = criteria
+        self.sites: dict[str, Site] = {}
+        self._judged: dict[str, _Judged] = {}
+
+    def look(self) -> int:
+        """See who lives, and whose log has grown; returns the time of the archive's clock, ns."""
+        execute = self._connection.execute
+        ((now_ns,),) = execute(_NOW).fetchall()
+        before, self.sites = self.sites, {}
+        for site, name, heard_ns, is_live, last_seq in execute(_FACTS, (LIVE_S,)).fetchall():
+            known = before.get(site, Site(site))
+            self.sites[site] = replace(
+                known, name=name, heard_ns=heard_ns, is_live=is_live, last_seq=last_seq
+            )
+        grown = [
+            name
+            for name, site in self.sites.items()
+            if name not in before or before[name].last_seq != site.last_seq
+        ]
+        if grown:
+            for name, received_ns in execute(_RECEIVED, (grown,)).fetchall():
+                self.sites[name] = replace(self.sites[name], last_received_ns=received_ns)
+        self._judged = {name: it for name, it in self._judged.items() if name in self.sites}
+        return int(now_ns)
+
+    def judge(self, now_ns: int) -> Iterator[str]:
+        """Judge the sites whose turn it is, the longest ago first; gives each name when done."""
+        for name in sorted(self.sites, key=self._turn):
+            judged = self._judged.get(name)
+            if judged is None:
+                judged = self._judged[name] = _Judged(self._judge_of())
+            elif not self._is_due(name, judged):
+                continue
+            self._judge_safely(name, judged, now_ns)
+            yield name
+
+    def _judge_of(self) -> Judge:
+        criteria = self._criteria
+        return Judge(criteria.sensors, criteria.day, criteria.recent_s)
+
+    def has_more(self) -> bool:
+        """Whether somebody's turn has come."""
+        return any(
+            name not in self._judged or self._is_due(name, self._judged[name])
+            for name in self.sites
+        )
+
+    def _turn(self, name: str) -> float:
+        judged = self._judged.get(name)
+        return 0.0 if judged is None else judged.judged_s
+
+    def _is_due(self, name: str, judged: _Judged) -> bool:
+        is_behind = judged.seq != self.sites[name].last_seq or not judged.is_caught_up
+        return (is_behind and not judged.is_failing) or time.monotonic() - judged.judged_s >= _AGE_S
+
+    def _judge_safely(self, name: str, judged: _Judged, now_ns: int) -> None:
+        """Judge a site; one that cannot be judged is unknown, and costs no other its status."""
+        import psycopg  # noqa: PLC0415  # the extra `fleet`
+
+        try:
+            self._judge(name, judged, now_ns)
+        except psycopg.Error:
+            raise  # of the archive, not of the site
+        except Exception:  # whatever is in its rows
+            if not judged.is_failing:
+                log.exception("site %s cannot be judged: its status is unknown", name)
+            # Tried again from its first row on, when others are judged for their age.
+            self._judged[name] = _Judged(self._judge_of(), is_failing=True)
+            self.sites[name] = replace(self.sites[name], verdict=None, active_alarms=None)
+        else:
+            judged.is_failing = False
+
+    def _judge(self, name: str, judged: _Judged, now_ns: int) -> None:
+        site = self.sites[name]
+        log: Any = SiteConnection(self._connection, name)
+        with self._connection.transaction():
+            if judged.seq != site.last_seq:
+                self._read(log, judged)
+                judged.seq = site.last_seq
+            if not judged.is_caught_up or judged.after < site.last_seq:
+                self._follow(log, judged)
+        if judged.snapshot is None:
+            return
+        # A simulation's time stands between two looks.
+        moment_ns = judged.snapshot.stamp_ns if judged.is_simulated else now_ns
+        said = judged.judge.see(replace(judged.snapshot, stamp_ns=moment_ns))
+        alarms = site.active_alarms
+        if judged.is_caught_up:
+            reach_ns = int(Limits().alarm_days * 86_400e9)
+            found = (
+                ()
+                if judged.follower is None
+                else judged.follower.found(moment_ns, max(0, moment_ns - reach_ns)).alarms
+            )
+            alarms = sum(alarm.is_active for alarm in found)
+        judged.judged_s = time.monotonic()
+        self.sites[name] = replace(site, verdict=said.house.verdict, active_alarms=alarms)
+
+    def _read(self, log: Any, judged: _Judged) -> None:
+        span = span_at(runs(log.execute), FOREVER_NS)
+        judged.is_simulated = span is not None and span.run.begun.is_simulated
+        found = state_at(log, FOREVER_NS, "")
+        before = judged.snapshot
+        known = {} if before is None else {tag.tag_id: tag for tag in before.tags}
+        # The very same value where nothing has changed: that is judged no second time.
+        tags = tuple(_same(known.get(tag.tag_id), tag) for tag in found.tags)
+        newest_ns = max((tag.last_observed_ns or 0 for tag in tags), default=0)
+        judged.snapshot = replace(found, stamp_ns=newest_ns, tags=tags)
+        if before is None and tags:
+            judged.judge.see(judged.snapshot)
+            judged.judge.learn(recent(log, RecentRequest(newest_ns)))
+
+    def _follow(self, log: Any, judged: _Judged) -> None:
+        asked = WritesRequest(judged.after, Limits().alarm_days * 86_400, _REACH_COUNT, _LOT)
+        past = writes(log, asked)
+        if judged.follower is None or judged.follower.spans != past.spans:
+            if judged.follower is not None:
+                judged.follower, judged.after, judged.is_caught_up = None, 0, False
+                past = writes(log, replace(asked, after=0))
+            day = self._criteria.day
+            judged.follower = Follower(
+                self._criteria.sensors,
+                lambda light, at_ns: day(light, at_ns).is_day,
+                past.spans,
+                self._criteria.recent_s,
+            )
+        judged.follower.take(past.writes)
+        judged.after, judged.is_caught_up = past.last, past.is_all
+
+
+def _same(before: TagState | None, now: TagState) -> TagState:
+    return before if before is not None and before == now else now
+
+
+# --- the process ----------------------------------------------------------------------------------
+
+
+def main() -> None:
+    """Watch until the parent is gone."""
+    logging.getLogger("psycopg").setLevel(logging.CRITICAL)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    settings = Settings(**orjson.loads(sys.stdin.readline()))
+    threading.Thread(target=_end_with_input, name="end", daemon=True).start()
+    criteria = Criteria.of(settings)
+    while True:
+        try:
+            with closing(open_archive(settings.archive_url, "lupin-twin fleet")) as connection:
+                _watch(connection, criteria)
+        except ArchiveError as error:
+            _write({"down": str(error)})
+        time.sleep(_RETRY_S)
+
+
+def _watch(connection: Any, criteria: Criteria) -> None:
+    import psycopg  # noqa: PLC0415  # the extra `fleet`
+
+    watcher = Watcher(connection, criteria)
+    try:
+        with suppress(psycopg.errors.ReadOnlySqlTransaction):
+            connection.execute(f"LISTEN {CHANNEL}")  # a standby knows no such thing
+        told: dict[str, Site] = {}
+        is_first = True
+        while True:
+            now_ns = watcher.look()
+            told = _tell(watcher, told, now_ns, is_first=is_first)
+            is_first = False
+            until_s = time.monotonic() + _JUDGING_S
+            for _ in watcher.judge(now_ns):
+                if time.monotonic() >= until_s:
+                    break
+            told = _tell(watcher, told, now_ns)
+            if not watcher.has_more():
+                _wait(connection)
+    except psycopg.Error as error:
+        raise explained(error) from error
+
+
+def _wait(connection: Any) -> None:
+    """Until somebody says that there is something new, or it is time to look."""
+    is_told = False
+    for _ in connection.notifies(timeout=LOOK_S, stop_after=1):
+        is_told = True
+    if is_told:
+        for _ in connection.notifies(timeout=_GATHER_S):
+            pass
+
+
+def _tell(
+    watcher: Watcher, told: dict[str, Site], now_ns: int, *, is_first: bool = False
+) -> dict[str, Site]:
+    news = [site for name, site in watcher.sites.items() if told.get(name) != site]
+    gone = [name for name in told if name not in watcher.sites]
+    _write({"now_ns": now_ns, "is_whole": is_first, "sites": news, "gone": gone})
+    return dict(watcher.sites)
+
+
+def _write(line: dict[str, Any]) -> None:
+    sys.stdout.buffer.write(orjson.dumps(line) + b"\n")
+    sys.stdout.buffer.flush()
+
+
+def read_site(found: dict[str, Any]) -> Site:
+    """A site of a line."""
+    verdict = found.pop("verdict")
+    return Site(**found, verdict=None if verdict is None else Verdict(verdict))
+
+
+def _end_with_input() -> None:
+    sys.stdin.read()
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,1 +1,0 @@
-"""The read-only part of Foxglove's WebSocket protocol."""

@@ -1,0 +1,319 @@
+"""From the log, write by write, to the alarms of all tags and of the greenhouse. Pure.
+
+The alarms are the same whatever the order of receiving, however often anything was received, and
+however that was divided: they follow from the log, the ranges, and the moment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+from statistics import median
+from typing import Final
+
+from lupin_bridge.judge.alarm import HOUSE, Alarm, alarm_id
+from lupin_bridge.judge.daylight import DayLine
+from lupin_bridge.judge.episodes import TagEpisodes
+from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.judge.scan_interval import LONGEST_NS, SHORTEST_NS, Stretches
+from lupin_bridge.judge.tag_log import Gap, TagPast, is_long
+from lupin_bridge.judge.verdict import Kind, Reason, Verdict
+from lupin_twin.core.writes import PastWrite, RunSpan
+
+# Writes that are kept, of all tags about; of a tag its share of these.
+KEPT: Final = 100_000
+# What is over and not reported any more is dropped as often as that.
+FORGET_EVERY_NS: Final = 3600 * 1_000_000_000
+_NEVER: Final = 2**63 - 1
+# What the light said, if anything, and the moment: whether it was day.
+DayOf = Callable[[bool | None, int], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """All alarms, in no order, the very same tuple where none is another than before.
+
+    At `due_ns` they may be others by themselves.
+    """
+
+    alarms: tuple[Alarm, ...]
+    due_ns: int = _NEVER
+
+
+@dataclass(slots=True)
+class _Run:
+    """One run of the clock."""
+
+    begun_ns: int
+    tags: dict[str, TagPast] = field(default_factory=dict)
+    stretches: Stretches = field(default_factory=Stretches)
+    days: DayLine = field(default_factory=DayLine)
+    alarms: dict[str, tuple[Alarm, ...]] = field(default_factory=dict)
+    overdue: dict[str, tuple[Alarm, ...]] = field(default_factory=dict)
+    limits: dict[int, int] = field(default_factory=dict)
+    news: dict[str, None] = field(default_factory=dict)
+    house: tuple[Alarm, ...] = ()
+    # Whether the pauses of before are others, and with them what was overdue.
+    is_late: bool = False
+    # When the tags whose gap is open will be overdue.
+    due: dict[str, int] = field(default_factory=dict)
+
+
+class Follower:
+    """Belongs to one thread at a time.
+
+    `recent_s` fixes how long readings hold, None: it is learnt. `day_of` says whether it was day.
+    `spans` are the runs of the clock; of other ones another follower has to be made. `kept` is how
+    many writes are kept, about.
+
+    `missed` counts what was older than what is kept of its tag; it was not taken in.
+    """
+
+    def __init__(
+        self,
+        sensors: Sensors,
+        day_of: DayOf,
+        spans: Sequence[RunSpan],
+        recent_s: float | None = None,
+        *,
+        kept: int = KEPT,
+    ) -> None:
+        self._kept = kept
+        self.missed = 0
+        self._forgotten_ns = 0
+        self.spans = tuple(spans)
+        self._spans_of: dict[int, list[RunSpan]] = {}
+        for span in self.spans:
+            self._spans_of.setdefault(span.run, []).append(span)
+        self._sensors = sensors
+        self._day_of = day_of
+        self._recent_ns = None if recent_s is None else int(recent_s * 1e9)
+        self._runs: dict[int, _Run] = {}
+        self._tags = 0
+        self._is_other = True
+        self._alarms: tuple[Alarm, ...] = ()
+
+    def take(self, writes: Iterable[PastWrite]) -> None:
+        """Take in what was received."""
+        for write in writes:
+            if write.stamp_ns < self._forgotten_ns:
+                self.missed += 1
+                continue
+            if not self._is_told(write):
+                continue
+            run = self._runs.get(write.run)
+            if run is None:
+                run = self._runs[write.run] = _Run(self._spans_of[write.run][0].start_ns)
+            self._take(run, write)
+        for run in self._runs.values():
+            self._settle(run)
+
+    def found(self, now_ns: int, since_ns: int = 0) -> Found:
+        """The alarms at `now_ns`.
+
+        Those that were over before `since_ns` may be among them; they are forgotten by and by.
+        """
+        if since_ns > self._forgotten_ns + FORGET_EVERY_NS:
+            self._forget(since_ns)
+        due_ns = _NEVER
+        newest = self.spans[-1].run if self.spans else None
+        for number, run in self._runs.items():
+            is_on = number == newest
+            self._judge(run, is_on=is_on)
+            house, due = self._stops(run, now_ns if is_on else None, since_ns)
+            self._is_other |= run.house != house
+            run.house = house
+            due_ns = min(due_ns, due)
+        if self._is_other:
+            self._is_other = False
+            self._alarms = tuple(chain.from_iterable(map(_all_of, self._runs.values())))
+        return Found(self._alarms, due_ns)
+
+    # --- taking in -----------------------------------------------------------------------------
+
+    def _take(self, run: _Run, write: PastWrite) -> None:
+        tag = run.tags.get(write.tag_id)
+        if tag is None:
+            self._tags += 1
+            episodes = TagEpisodes(
+                write.tag_id, run.begun_ns, self._sensors, self._recent_ns, self._clock
+            )
+            tag = run.tags[write.tag_id] = TagPast(
+                episodes, self._recent_ns, _matters(run), self._is_day(run)
+            )
+        newest_ns = run.stretches.newest_ns
+        if newest_ns is not None and write.stamp_ns <= newest_ns:
+            # How long a pause may be follows from the scans before it: of earlier ones it stands.
+            run.limits = {at: ns for at, ns in run.limits.items() if at < write.stamp_ns}
+            run.is_late |= run.stretches.add(write.stamp_ns)
+        else:
+            run.stretches.add(write.stamp_ns)
+        run.news[write.tag_id] = None
+        if not tag.add(write):
+            self.missed += 1
+
+    def _settle(self, run: _Run) -> None:
+        """Work out what each tag's news say of the day, and forget what there is no room for."""
+        changed_ns = _NEVER
+        for tag_id in run.news:
+            at_ns = run.days.put(tag_id, run.tags[tag_id].trail.turns)
+            changed_ns = changed_ns if at_ns is None else min(changed_ns, at_ns)
+        if changed_ns != _NEVER:
+            for tag_id, tag in run.tags.items():
+                if tag.last_ns >= changed_ns:
+                    run.news[tag_id] = None
+                    tag.judge_anew(changed_ns)
+        keep = max(1, self._kept // max(1, self._tags))
+        for tag_id in run.news:
+            run.tags[tag_id].keep(keep)
+
+    def _forget(self, before_ns: int) -> None:
+        """What was over before is reported no more, and must not grow as long as this runs."""
+        self._forgotten_ns = before_ns
+        for number, run in list(self._runs.items()):
+            newest_ns = run.stretches.newest_ns
+            if number != self.spans[-1].run and newest_ns is not None and newest_ns < before_ns:
+                self._tags -= len(run.tags)
+                self._is_other = True
+                del self._runs[number]
+                continue
+            oldest_ns = min(tag.forget(before_ns) for tag in run.tags.values())
+            known_ns = run.stretches.forget(min(before_ns, oldest_ns))
+            self._forgotten_ns = max(self._forgotten_ns, known_ns)
+            run.days.forget(before_ns, {name: tag.trail.turns for name, tag in run.tags.items()})
+            run.limits = {at: ns for at, ns in run.limits.items() if at >= known_ns}
+
+    def _is_told(self, write: PastWrite) -> bool:
+        """Whether its moment is that of its run: where two overlap, the newer one is told."""
+        spans = self._spans_of.get(write.run, ())
+        return any(span.start_ns <= write.stamp_ns < span.end_ns for span in spans)
+
+    def _clock(self, at_ns: int) -> bool:
+        return self._day_of(None, at_ns)
+
+    def _is_day(self, run: _Run) -> Callable[[int], bool]:
+        return lambda at_ns: self._day_of(run.days.is_day(at_ns), at_ns)
+
+    # --- telling -------------------------------------------------------------------------------
+
+    def _judge(self, run: _Run, *, is_on: bool) -> None:
+        last_ns = run.stretches.newest_ns or 0
+        # Of a run that is over, what is overdue ends with the last that was received in it.
+        is_all = run.is_late or (run.news and not is_on)
+        due = [tag_id for tag_id, due_ns in run.due.items() if due_ns <= last_ns]
+        ask = dict.fromkeys(run.tags) if is_all else run.news | dict.fromkeys(due)
+        for tag_id in run.news:
+            tag = run.tags[tag_id]
+            ended_ns = None if is_on else tag.last_ns
+            self._put(run.alarms, tag_id, tuple(tag.episodes.alarms(ended_ns)))
+        for tag_id in ask:
+            self._put(run.overdue, tag_id, tuple(self._overdue(run, tag_id, last_ns, is_on=is_on)))
+        run.is_late = False
+        run.news = {}
+
+    def _put(
+        self, table: dict[str, tuple[Alarm, ...]], tag_id: str, alarms: tuple[Alarm, ...]
+    ) -> None:
+        if table.get(tag_id, ()) != alarms:
+            self._is_other = True
+            table[tag_id] = alarms
+
+    def _overdue(self, run: _Run, tag_id: str, last_ns: int, *, is_on: bool) -> Iterator[Alarm]:
+        """Of a tag that is not scanned, while others are: pauses of the greenhouse do not count."""
+        run.due.pop(tag_id, None)
+        for gap in run.tags[tag_id].gaps:
+            due_ns = run.stretches.overdue_ns(gap.start_ns, gap.holds_ns) + 1
+            end_ns = gap.end_ns
+            if due_ns > last_ns or (end_ns is not None and due_ns >= end_ns):
+                if end_ns is None:
+                    run.due[tag_id] = due_ns
+                continue
+            reason = Reason(
+                Kind.OLD,
+                Verdict.UNKNOWN,
+                limit=gap.holds_ns / 1e9,
+                since_ns=gap.start_ns,
+            )
+            if end_ns is None and not is_on:
+                end_ns = last_ns
+            yield Alarm(
+                alarm_id(tag_id, Kind.OLD, "", run.begun_ns, gap.start_ns),
+                reason,
+                tag_id,
+                due_ns,
+                end_ns,
+            )
+
+    def _stops(self, run: _Run, now_ns: int | None, since_ns: int) -> tuple[tuple[Alarm, ...], int]:
+        """When nothing was tried anywhere for longer than the tags' own scan intervals allow."""
+        found: list[Alarm] = []
+        due_ns = _NEVER
+        last_ns = run.stretches.newest_ns
+        pauses: list[tuple[int, int | None]] = [*run.stretches.pauses(since_ns - 1)]
+        if last_ns is not None and now_ns is not None:
+            if is_long(last_ns, now_ns):
+                pauses.append((last_ns, None))
+            else:
+                due_ns = last_ns + SHORTEST_NS + 1
+        for start_ns, end_ns in pauses:
+            limit_ns = self._limit_ns(run, start_ns)
+            raised_ns = start_ns + limit_ns + 1
+            until_ns = now_ns if end_ns is None else end_ns
+            if until_ns is not None and raised_ns <= until_ns:
+                found.append(_stop(run, start_ns, end_ns, limit_ns))
+            elif end_ns is None:
+                due_ns = raised_ns
+        return tuple(found), due_ns
+
+    def _limit_ns(self, run: _Run, at_ns: int) -> int:
+        """How long nothing may be tried after a moment: as long as half of the tags may wait.
+
+        Pauses come one behind the other; that of a moment does not change any more.
+        """
+        limit_ns = run.limits.get(at_ns)
+        if limit_ns is None:
+            holds = [
+                gap.holds_ns
+                for tag in run.tags.values()
+                if (gap := _gap_at(tag, at_ns)) is not None
+            ]
+            limit_ns = run.limits[at_ns] = int(median(holds)) if holds else LONGEST_NS
+        return limit_ns
+
+
+def _matters(run: _Run) -> Callable[[int, int, int], bool]:
+    def matters(start_ns: int, end_ns: int, holds_ns: int) -> bool:
+        return is_long(start_ns, end_ns) and (
+            end_ns - start_ns > holds_ns or run.stretches.has_pause_within(start_ns, end_ns)
+        )
+
+    return matters
+
+
+def _all_of(run: _Run) -> Iterator[Alarm]:
+    yield from chain.from_iterable(run.alarms.values())
+    yield from chain.from_iterable(run.overdue.values())
+    yield from run.house
+
+
+def _gap_at(tag: TagPast, at_ns: int) -> Gap | None:
+    """The gap between scans that a moment lies in, its start included."""
+    return next(
+        (
+            gap
+            for gap in reversed(tag.gaps)
+            if gap.start_ns <= at_ns and (gap.end_ns is None or at_ns < gap.end_ns)
+        ),
+        None,
+    )
+
+
+def _stop(run: _Run, start_ns: int, end_ns: int | None, limit_ns: int) -> Alarm:
+    return Alarm(
+        alarm_id(HOUSE, Kind.STOPPED, "", run.begun_ns, start_ns),
+        Reason(Kind.STOPPED, Verdict.UNKNOWN, limit=limit_ns / 1e9, since_ns=start_ns),
+        HOUSE,
+        start_ns + limit_ns + 1,
+        end_ns,
+    )

@@ -1,0 +1,109 @@
+"""What the operator chose: the file of sensors, how long readings hold, when it is day."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from datetime import time, tzinfo
+from importlib.resources import files
+from pathlib import Path
+from typing import Final
+from zoneinfo import ZoneInfo
+
+from lupin_bridge.judge.daylight import ClockDay, Day, judge_day
+from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.settings import SettingError, Settings
+
+# Nobody writes this much; a device given by mistake is not read to its end.
+MAX_FILE_BYTES: Final = 1_000_000
+_HOUR: Final = r"((?:[01]\d|2[0-3]):[0-5]\d)"
+_HOURS: Final = re.compile(f"{_HOUR}-{_HOUR}")
+
+
+@dataclass(frozen=True, slots=True)
+class Criteria:
+    """What readings are judged by."""
+
+    sensors: Sensors
+    recent_s: float | None
+    clock: ClockDay
+
+    @classmethod
+    def of(cls, settings: Settings) -> Criteria:
+        """As the settings have it.
+
+        Raises:
+            SettingError: a file that cannot be read or says what cannot be, a zone nobody knows,
+                hours that are none.
+
+        """
+        return cls(_sensors(settings), settings.reading_validity_s or None, _clock(settings))
+
+    def day(self, light: bool | None, stamp_ns: int) -> Day:
+        """Whether it was day at a moment of ROS time at which the light said so, or None."""
+        return judge_day(light, self.clock, unix_s(stamp_ns))
+
+    def is_day(self, stamp_ns: int) -> bool:
+        """Whether it was day by the clock alone."""
+        return self.day(None, stamp_ns).is_day
+
+
+def own_sensors() -> Sensors:
+    """The file that comes with the bridge."""
+    from lupin_bridge.judge.sensors_file import parse  # noqa: PLC0415  # nothing of the past needs it
+
+    return parse(files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8"))
+
+
+def _sensors(settings: Settings) -> Sensors:
+    if not settings.sensors:
+        return own_sensors()
+    from lupin_bridge.judge.sensors_file import SensorsError, parse  # noqa: PLC0415  # as above
+
+    called = f"{settings.called('sensors')} {settings.sensors}"
+    try:
+        with Path(settings.sensors).open("rb") as file:
+            found = file.read(MAX_FILE_BYTES + 1)
+    except OSError as error:
+        raise SettingError(f"{called} cannot be read: {error.strerror}") from error
+    if len(found) > MAX_FILE_BYTES:
+        raise SettingError(f"{called} is longer than {MAX_FILE_BYTES} bytes, the limit")
+    try:
+        return parse(found.decode("utf-8"))
+    except UnicodeDecodeError as error:
+        raise SettingError(f"{called} is no UTF-8: {error.reason} at byte {error.start}") from error
+    except SensorsError as error:
+        raise SettingError(f"{called}: {error}") from error
+
+
+def _clock(settings: Settings) -> ClockDay:
+    hours = _HOURS.fullmatch(settings.day_hours)
+    if hours is None:
+        raise SettingError(
+            f"{settings.called('day_hours')} is {settings.day_hours!r}, not such as 06:00-20:00"
+        )
+    begins, ends = (time.fromisoformat(hour) for hour in hours.groups())
+    return ClockDay(_zone(settings), begins, ends)
+
+
+def _zone(settings: Settings) -> tzinfo | None:
+    """None: this machine's, which changes with summer and winter."""
+    if not settings.time_zone:
+        return None
+    try:
+        return ZoneInfo(settings.time_zone)
+    except (KeyError, OSError, ValueError) as error:
+        raise SettingError(
+            f"{settings.called('time_zone')} is {settings.time_zone!r}, which this machine does "
+            f"not know: {error}"
+        ) from error
+
+
+def unix_s(stamp_ns: int) -> float | None:
+    """The wall's time of a moment in ROS time; None: that is simulated, and has no such hours."""
+    seconds = stamp_ns / 1e9
+    return seconds if seconds > _OLDEST_S else None
+
+
+# No robot drove before; simulations begin at 0.
+_OLDEST_S: Final = 1.4e9

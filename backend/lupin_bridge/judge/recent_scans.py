@@ -1,0 +1,241 @@
+"""The recent scans of each tag, and by what each is judged: the day and the plants of its own time.
+
+Pure. Of the state and of what was recent in the log it is worked out for any moment; while states
+come one by one, scan by scan.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+
+from lupin_bridge.judge.daylight import LEFT_OUT_NS, LIGHT, Day, Light
+from lupin_bridge.judge.scan_interval import INTERVALS
+from lupin_twin.core.state import TagState, sure_species
+from lupin_twin.core.writes import PastWrite
+
+# Whether it was day at a moment, ns, at which the light said so, or None: nothing.
+DayOf = Callable[[bool | None, int], Day]
+
+
+@dataclass(frozen=True, slots=True)
+class Scanned:
+    """One scan: the values of its sensors, and by what they are judged."""
+
+    stamp_ns: int
+    values: Mapping[str, float]
+    is_day: bool = True
+    species: str = ""
+
+
+@dataclass(slots=True)
+class Recent:
+    """Of one tag, its scans, oldest first, and its inspections."""
+
+    scans: tuple[Scanned, ...] = ()
+    looks: tuple[tuple[int, str], ...] = ()
+
+    @property
+    def stamps_ns(self) -> tuple[int, ...]:
+        """When it was scanned, the last times."""
+        return tuple(scan.stamp_ns for scan in self.scans[-INTERVALS - 1 :])
+
+    def see(self, looks: Iterable[tuple[int, str]]) -> None:
+        """Take in inspections; of one moment the last counts."""
+        known = dict(self.looks)
+        known.update(looks)
+        found = tuple(sorted(known.items()))[-INTERVALS - 1 :]
+        if found != self.looks:
+            self.looks = found
+            self.scans = tuple(
+                replace(scan, species=self.species_at(scan.stamp_ns)) for scan in self.scans
+            )
+
+    def put(self, tag: TagState, at_ns: int, values: Mapping[str, float]) -> None:
+        """Take in a scan; those that nothing is judged by any more go."""
+        scans = {scan.stamp_ns: scan for scan in self.scans}
+        scans[at_ns] = Scanned(at_ns, values, species=self.species_at(at_ns))
+        newest = sorted(scans)
+        kept = {*newest[-INTERVALS - 1 :], *(r.observed_at_ns for r in tag.readings)}
+        self.scans = tuple(scans[stamp_ns] for stamp_ns in newest if stamp_ns in kept)
+
+    def decide(self, at_ns: int, *, is_day: bool) -> bool:
+        """It was day, or night, at the scan of that moment; whether that is another."""
+        for index, scan in enumerate(self.scans):
+            if scan.stamp_ns == at_ns and scan.is_day is not is_day:
+                now = replace(scan, is_day=is_day)
+                self.scans = (*self.scans[:index], now, *self.scans[index + 1 :])
+                return True
+        return False
+
+    def light_at(self, at_ns: int) -> float | None:
+        """What the light read at a moment; None: it was left out for long, or never told."""
+        by_then = [scan for scan in self.scans if scan.stamp_ns <= at_ns]
+        told = next((scan for scan in reversed(by_then) if LIGHT in scan.values), None)
+        if told is None or by_then[-1].stamp_ns - told.stamp_ns > LEFT_OUT_NS:
+            return None
+        return told.values[LIGHT]
+
+    def news(self, tag: TagState) -> dict[int, dict[str, float]]:
+        """The scans of a state that are not known so, by their stamps."""
+        known = {scan.stamp_ns: scan.values for scan in self.scans}
+        found: dict[int, dict[str, float]] = {}
+        for reading in tag.readings:
+            at_ns = reading.observed_at_ns
+            if at_ns is None:
+                continue
+            # What is no number is not equal to itself.
+            before = known.get(at_ns, {})
+            if repr(before.get(reading.name)) != repr(reading.value):
+                found.setdefault(at_ns, dict(before))[reading.name] = reading.value
+        return found
+
+    def species_at(self, at_ns: int) -> str:
+        """The last species by then of which the camera was sure."""
+        by_then = self.looks[: bisect_right(self.looks, at_ns, key=lambda look: look[0])]
+        return next((species for _, species in reversed(by_then) if species), "")
+
+
+class RecentScans:
+    """Those of all tags of a state. `day_of` says whether it was day.
+
+    In whatever order scans are taken in: each is judged by the light of its own time, which is what
+    every tag's last scan by then says.
+    """
+
+    def __init__(self, day_of: DayOf) -> None:
+        self._day_of = day_of
+        self._tags: dict[str, Recent] = {}
+        self._light = Light()
+        self._newest_ns = -1
+
+    @classmethod
+    def of(
+        cls, tags: Sequence[TagState], writes: Iterable[PastWrite], day_of: DayOf
+    ) -> RecentScans:
+        """Those of a state; `writes` is what the log has of them, see `RecentRequest`."""
+        found = cls(day_of)
+        scans: dict[tuple[int, str], dict[str, float]] = {}
+        looks: dict[str, list[tuple[int, str]]] = {}
+        for write in writes:
+            if write.has_seen:
+                looks.setdefault(write.tag_id, []).append((write.stamp_ns, write.species))
+            else:
+                scan = scans.setdefault((write.stamp_ns, write.tag_id), {})
+                scan.update(zip(write.sensors, write.values, strict=True))
+        for tag in tags:
+            for reading in tag.readings:
+                if reading.observed_at_ns is not None:
+                    # What the state has is what counts.
+                    key = reading.observed_at_ns, tag.tag_id
+                    scans.setdefault(key, {})[reading.name] = reading.value
+            found.tag(tag.tag_id).see((*looks.get(tag.tag_id, ()), *_inspection_of(tag)))
+        by_id = {tag.tag_id: tag for tag in tags}
+        found._take_all(
+            [(at_ns, by_id[name], it) for (at_ns, name), it in scans.items() if name in by_id]
+        )
+        return found
+
+    def tag(self, tag_id: str) -> Recent:
+        """What is recent of a tag."""
+        return self._tags.setdefault(tag_id, Recent())
+
+    def stamps_ns(self) -> Iterator[int]:
+        """When any tag was scanned."""
+        return (scan.stamp_ns for recent in self._tags.values() for scan in recent.scans)
+
+    def day(self, at_ns: int) -> Day:
+        """Whether it is day at a moment, by the last scans of all tags."""
+        return self._day_of(self._light.is_day, at_ns)
+
+    def see(self, tags: Iterable[TagState]) -> tuple[set[str], list[int]]:
+        """Take in tags that have changed; whose scans are judged otherwise, and the new stamps."""
+        scans: list[TakenScan] = []
+        for tag in tags:
+            recent = self.tag(tag.tag_id)
+            recent.see(_inspection_of(tag))
+            scans += [(at_ns, tag, values) for at_ns, values in recent.news(tag).items()]
+        return self.take(scans), [at_ns for at_ns, *_ in scans]
+
+    def take(self, scans: Sequence[TakenScan]) -> set[str]:
+        """Take scans in; the tags with one that is judged by another light than before."""
+        others: set[str] = set()
+        for at_ns, group in groupby(sorted(scans, key=_in_time), key=lambda scan: scan[0]):
+            taken = list(group)
+            before = self._light.is_day
+            for _, tag, values in taken:
+                recent = self.tag(tag.tag_id)
+                recent.put(tag, at_ns, values)
+                self._light.put(tag.tag_id, recent.light_at(recent.scans[-1].stamp_ns))
+            if at_ns > self._newest_ns:
+                self._newest_ns = at_ns
+                is_day = self.day(at_ns).is_day
+                for _, tag, _ in taken:
+                    self.tag(tag.tag_id).decide(at_ns, is_day=is_day)
+            else:
+                others |= self._decide_since(at_ns, all_of_it=self._light.is_day is not before)
+        return others
+
+    def _take_all(self, scans: Sequence[TakenScan]) -> None:
+        """The same where none is known: each is gone through once, in the order of time."""
+        mine: dict[str, list[Scanned]] = {}
+        told_ns: dict[str, int] = {}
+        for at_ns, group in groupby(sorted(scans, key=_in_time), key=lambda scan: scan[0]):
+            taken = list(group)
+            for _, tag, values in taken:
+                if LIGHT in values:
+                    told_ns[tag.tag_id] = at_ns
+                    self._light.put(tag.tag_id, values[LIGHT])
+                elif at_ns - told_ns.get(tag.tag_id, at_ns) > LEFT_OUT_NS:
+                    self._light.put(tag.tag_id, None)
+            self._newest_ns = at_ns
+            is_day = self.day(at_ns).is_day
+            for _, tag, values in taken:
+                species = self.tag(tag.tag_id).species_at(at_ns)
+                scan = Scanned(at_ns, values, is_day, species)
+                mine.setdefault(tag.tag_id, []).append(scan)
+        for tag_id, found in mine.items():
+            self.tag(tag_id).scans = tuple(found)
+
+    def forget(self, tag_id: str) -> None:
+        """Of a tag that is gone."""
+        self._tags.pop(tag_id, None)
+        self._light.put(tag_id, None)
+
+    def _decide_since(self, at_ns: int, *, all_of_it: bool) -> set[str]:
+        """Something came late: what was scanned at that moment, and since, is judged anew."""
+        until_ns = self._newest_ns if all_of_it else at_ns
+        stamps = {
+            scan.stamp_ns
+            for recent in self._tags.values()
+            for scan in recent.scans
+            if at_ns <= scan.stamp_ns <= until_ns
+        }
+        others: set[str] = set()
+        for stamp_ns in stamps:
+            light = Light()
+            for tag_id, recent in self._tags.items():
+                light.put(tag_id, recent.light_at(stamp_ns))
+            is_day = self._day_of(light.is_day, stamp_ns).is_day
+            others |= {
+                tag_id
+                for tag_id, recent in self._tags.items()
+                if recent.decide(stamp_ns, is_day=is_day)
+            }
+        return others
+
+
+# When, of which tag, and what it read.
+TakenScan = tuple[int, TagState, Mapping[str, float]]
+
+
+def _in_time(scan: TakenScan) -> tuple[int, str]:
+    return scan[0], scan[1].tag_id
+
+
+def _inspection_of(tag: TagState) -> Sequence[tuple[int, str]]:
+    if tag.looked_at_ns is None:
+        return ()
+    return ((tag.looked_at_ns, sure_species(tag.flower.species, tag.flower.confidence)),)

@@ -1,0 +1,304 @@
+"""One tag's log in one run of the clock, and what follows of it by itself. Pure.
+
+What comes in order is added to what is known. What comes late finds its place, and all behind it
+is worked out again. What the log has no room for any more is kept as what it led to.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from typing import Final, Generic, TypeVar
+
+from lupin_bridge.judge.daylight import DAY_FROM_LX, LEFT_OUT_NS, LIGHT, Turn
+from lupin_bridge.judge.derived import IsDay
+from lupin_bridge.judge.episodes import TagEpisodes, readings_of
+from lupin_bridge.judge.scan_interval import INTERVALS, SHORTEST_NS, holds_ns, interval_ns
+from lupin_twin.core.writes import PastWrite
+
+# So many occasions lie between two states of a tag that are kept to begin again from.
+MARK: Final = 64
+StateT = TypeVar("StateT")
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """From one scan to the next, or to none yet; `holds_ns` is how long readings held then."""
+
+    start_ns: int
+    end_ns: int | None
+    holds_ns: int
+
+
+# Whether a gap matters for ever: one that is too long, or in which the greenhouse paused.
+Matters = Callable[[int, int, int], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Trail:
+    """What a tag's scans say of its scan interval and of its light, up to one of them."""
+
+    scans_ns: tuple[int, ...] = ()
+    gaps: tuple[Gap, ...] = ()
+    turns: tuple[Turn, ...] = ()
+    light_ns: int = -1
+
+    def after(self, writes: Sequence[PastWrite], recent_ns: int | None, matters: Matters) -> Trail:
+        """The trail with one more occasion."""
+        readings = readings_of(writes)
+        if not readings:
+            return self
+        stamp_ns, gaps, turns = writes[0].stamp_ns, self.gaps, self.turns
+        if self.scans_ns:
+            gap = self._gap(stamp_ns, recent_ns)
+            if matters(gap.start_ns, stamp_ns, gap.holds_ns):
+                gaps = (*gaps, gap)
+        said, light_ns = turns[-1][1] if turns else None, self.light_ns
+        light = next((reading.value for reading in readings if reading.name == LIGHT), None)
+        if light is not None:
+            says, light_ns = light >= DAY_FROM_LX if math.isfinite(light) else None, stamp_ns
+        else:
+            says = None if stamp_ns - light_ns > LEFT_OUT_NS else said
+        if says is not said:
+            turns = (*turns, (stamp_ns, says))
+        return Trail((*self.scans_ns, stamp_ns)[-INTERVALS - 1 :], gaps, turns, light_ns)
+
+    def since(self, before_ns: int) -> Trail:
+        """The trail without what nobody asks for any more: what was over before."""
+        gaps = tuple(gap for gap in self.gaps if gap.end_ns is None or gap.end_ns >= before_ns)
+        first = bisect_right(self.turns, before_ns, key=lambda turn: turn[0])
+        return replace(self, gaps=gaps, turns=self.turns[max(0, first - 1) :])
+
+    def holds_ns(self, recent_ns: int | None) -> int:
+        """How long readings hold after the last scan; a fixed time goes before what is learnt."""
+        return holds_ns(interval_ns(self.scans_ns)) if recent_ns is None else recent_ns
+
+    def open_gap(self, recent_ns: int | None) -> Gap | None:
+        """The gap since the last scan; None: there was none."""
+        if not self.scans_ns:
+            return None
+        return self._gap(None, recent_ns)
+
+    def _gap(self, end_ns: int | None, recent_ns: int | None) -> Gap:
+        return Gap(self.scans_ns[-1], end_ns, self.holds_ns(recent_ns))
+
+
+class TagLog:
+    """The writes of one tag, ordered by stamp and number; a hundred bytes each."""
+
+    def __init__(self) -> None:
+        self._stamps_ns = array("q")
+        self._numbers = array("q")
+        self._values: list[bytes] = []
+        # All else of a write is most often as it was before.
+        self._others: list[PastWrite] = []
+        self._known: dict[PastWrite, PastWrite] = {}
+
+    def __len__(self) -> int:
+        return len(self._stamps_ns)
+
+    @property
+    def last_ns(self) -> int:
+        """The stamp of the newest; -1: there is none."""
+        return self._stamps_ns[-1] if self._stamps_ns else -1
+
+    def put(self, write: PastWrite) -> bool:
+        """Put a write where it belongs; False: it is there already."""
+        stamp_ns, number = write.stamp_ns, write.number
+        at = bisect_right(self._stamps_ns, stamp_ns)
+        while at and self._stamps_ns[at - 1] == stamp_ns and self._numbers[at - 1] >= number:
+            if self._numbers[at - 1] == number:
+                return False
+            at -= 1
+        other = PastWrite(
+            0,
+            write.run,
+            write.tag_id,
+            0,
+            write.kind,
+            write.status,
+            write.sensors,
+            (),
+            write.has_seen,
+            write.species,
+            write.anomaly,
+            write.bug_count,
+        )
+        self._stamps_ns.insert(at, stamp_ns)
+        self._numbers.insert(at, number)
+        self._values.insert(at, array("d", write.values).tobytes())
+        self._others.insert(at, self._known.setdefault(other, other))
+        return True
+
+    def occasions(self, after_ns: int, until_ns: int | None = None) -> Iterator[list[PastWrite]]:
+        """The writes of each stamp, oldest first."""
+        first = bisect_right(self._stamps_ns, after_ns)
+        end = len(self) if until_ns is None else bisect_right(self._stamps_ns, until_ns)
+        for _, group in groupby(range(first, end), key=self._stamps_ns.__getitem__):
+            yield [self._write(index) for index in group]
+
+    def newest(self, count: int) -> int:
+        """A stamp behind which lie about so many writes."""
+        return self._stamps_ns[-count - 1] if count < len(self) else -1
+
+    def drop(self, until_ns: int) -> None:
+        """Without what is not later."""
+        count = bisect_right(self._stamps_ns, until_ns)
+        del self._stamps_ns[:count], self._numbers[:count]
+        del self._values[:count], self._others[:count]
+        if len(self._known) > len(self._others):
+            self._known = {other: other for other in self._others}
+
+    def _write(self, index: int) -> PastWrite:
+        other = self._others[index]
+        return PastWrite(
+            self._numbers[index],
+            other.run,
+            other.tag_id,
+            self._stamps_ns[index],
+            other.kind,
+            other.status,
+            other.sensors,
+            tuple(array("d", self._values[index])),
+            other.has_seen,
+            other.species,
+            other.anomaly,
+            other.bug_count,
+        )
+
+
+class Replay(Generic[StateT]):
+    """What a log leads to, occasion by occasion: `step` makes one state of another.
+
+    The first of the states that are kept is what the log has no room for any more.
+    """
+
+    def __init__(
+        self,
+        state: StateT,
+        step: Callable[[StateT, Sequence[PastWrite]], StateT],
+        copy: Callable[[StateT], StateT],
+    ) -> None:
+        self._step, self._copy = step, copy
+        self._marks = [(-1, copy(state))]
+        self._at_ns, self._state, self._since_mark = -1, state, 0
+
+    def state(self, log: TagLog) -> StateT:
+        """The state behind all of the log; the caller only reads it."""
+        for group in log.occasions(self._at_ns):
+            self._state = self._step(self._state, group)
+            self._at_ns = group[0].stamp_ns
+            self._since_mark += 1
+            if self._since_mark >= MARK:
+                self._since_mark = 0
+                mark = self._at_ns, self._copy(self._state)
+                self._marks = [self._marks[0], *self._marks[1:][-1:], mark]
+        return self._state
+
+    def back_to(self, before_ns: int) -> None:
+        """What is not earlier is worked out again."""
+        if before_ns > self._at_ns:
+            return
+        while len(self._marks) > 1 and self._marks[-1][0] >= before_ns:
+            self._marks.pop()
+        self._at_ns, state = self._marks[-1]
+        self._state, self._since_mark = self._copy(state), 0
+
+    def each(self, change: Callable[[StateT], StateT]) -> None:
+        """Change every state that is kept."""
+        self._marks = [(at_ns, change(state)) for at_ns, state in self._marks]
+        self._state = change(self._state)
+
+    def settle(self, log: TagLog, until_ns: int) -> None:
+        """The log will be without what is not later than `until_ns`."""
+        at_ns, state = self._marks[0]
+        for group in log.occasions(at_ns, until_ns):
+            state = self._step(state, group)
+        self._marks = [(until_ns, state), *(m for m in self._marks[1:] if m[0] > until_ns)]
+        if self._at_ns < until_ns:
+            self.back_to(self._at_ns)
+
+
+class TagPast:
+    """One tag in one run. `recent_ns` fixes how long readings hold; None: it is learnt."""
+
+    def __init__(
+        self, episodes: TagEpisodes, recent_ns: int | None, matters: Matters, is_day: IsDay
+    ) -> None:
+        self._recent_ns = recent_ns
+        self._log = TagLog()
+        self._settled_ns = -1
+
+        def stepped(before: TagEpisodes, group: Sequence[PastWrite]) -> TagEpisodes:
+            before.step(group, is_day)
+            return before
+
+        self._trail: Replay[Trail] = Replay(
+            Trail(), lambda trail, group: trail.after(group, recent_ns, matters), lambda it: it
+        )
+        self._episodes: Replay[TagEpisodes] = Replay(episodes, stepped, TagEpisodes.copy)
+
+    @property
+    def last_ns(self) -> int:
+        """The stamp of its newest write; -1: none is kept."""
+        return self._log.last_ns
+
+    @property
+    def trail(self) -> Trail:
+        """What its scans say of its scan interval and of its light."""
+        return self._trail.state(self._log)
+
+    @property
+    def episodes(self) -> TagEpisodes:
+        """What was wrong with it when; the caller only reads it."""
+        return self._episodes.state(self._log)
+
+    def add(self, write: PastWrite) -> bool:
+        """Take a write in; False: it belongs to what the log has no room for any more."""
+        if write.stamp_ns <= self._settled_ns:
+            return False
+        if self._log.put(write):
+            self._trail.back_to(write.stamp_ns)
+            self._episodes.back_to(write.stamp_ns)
+        return True
+
+    def judge_anew(self, from_ns: int) -> None:
+        """What was day is night from a moment on."""
+        self._episodes.back_to(from_ns)
+
+    def keep(self, count: int) -> None:
+        """Have the log keep about so many writes, once there are a quarter more."""
+        if len(self._log) > count + max(1, count // 4):
+            self._settle(self._log.newest(count))
+
+    def forget(self, before_ns: int) -> int:
+        """Drop what was over before; returns when the oldest gap begins that is kept."""
+        self._trail.state(self._log)
+        self._settle(before_ns - 1)
+        self._trail.each(lambda trail: trail.since(before_ns))
+        return min((gap.start_ns for gap in self.gaps), default=before_ns)
+
+    @property
+    def gaps(self) -> Sequence[Gap]:
+        """Those that matter, and the one since the last scan."""
+        trail = self.trail
+        last = trail.open_gap(self._recent_ns)
+        return trail.gaps if last is None else (*trail.gaps, last)
+
+    def _settle(self, until_ns: int) -> None:
+        until_ns = min(until_ns, self._log.last_ns)
+        if until_ns <= self._settled_ns:
+            return
+        self._trail.settle(self._log, until_ns)
+        self._episodes.settle(self._log, until_ns)
+        self._settled_ns = until_ns
+        self._log.drop(until_ns)
+
+
+def is_long(start_ns: int, end_ns: int) -> bool:
+    """Whether it is longer than readings hold at least."""
+    return end_ns - start_ns > SHORTEST_NS

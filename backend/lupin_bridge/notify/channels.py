@@ -1,0 +1,97 @@
+"""All channels together, for the bridge: started, watched and stopped with it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from typing import Protocol
+
+from lupin_bridge.alarms.board import AlarmBoard
+from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.notify.destinations import Targets
+from lupin_bridge.notify.messages import GreenhouseState
+from lupin_bridge.notify.mirror import Mirror
+from lupin_bridge.notify.mqtt import Mqtt
+from lupin_bridge.notify.webhook import Webhook
+from lupin_bridge.stream.status import Outward
+from lupin_twin.core.diagnostics import Origin
+
+
+class DetachedThreads(ThreadPoolExecutor):
+    """Threads whose work is not waited for at the end.
+
+    A name server that does not answer holds a thread for half a minute, and asyncio waits for all
+    of them as it ends. Here it goes on; what is left ends with the process (`runtime.process`).
+    """
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: ARG002
+        """End the idle threads, and wait for none."""
+        super().shutdown(wait=False, cancel_futures=True)
+
+
+class Source(Protocol):
+    """What the channels need of the bridge."""
+
+    alarms: AlarmBoard
+
+    def seen(self) -> GreenhouseState:
+        """The state of now."""
+
+    @property
+    def ros_time_ns(self) -> int | None:
+        """ROS time now; None: it is not known."""
+
+    @property
+    def origin(self) -> Origin:
+        """Where observations come from."""
+
+
+class Channels:
+    """The channels that the operator wants. They look at the state by themselves.
+
+    Belongs to the event loop.
+    """
+
+    def __init__(self, targets: Targets | None = None) -> None:
+        self._targets = targets or Targets()
+        self._mqtt: Mqtt | None = None
+        self._webhook: Webhook | None = None
+
+    def start(self, source: Source, sensors: Sensors) -> None:
+        """Begin to notify."""
+        targets = self._targets
+        if targets.mqtt is None and targets.webhook is None:
+            return
+        asyncio.get_running_loop().set_default_executor(
+            DetachedThreads(thread_name_prefix="notify")
+        )
+        if targets.mqtt is not None:
+            self._mqtt = Mqtt(targets.mqtt, Mirror(targets.mqtt.topics, sensors))
+            self._mqtt.start(source.seen)
+        if targets.webhook is not None:
+            self._webhook = Webhook(targets.webhook)
+            self._webhook.start(source.alarms, lambda: source.ros_time_ns, lambda: source.origin)
+
+    async def stop(self) -> None:
+        """Stop all at once."""
+        await asyncio.gather(*(channel.stop() for channel in self._running))
+
+    def status(self) -> tuple[Outward, ...]:
+        """The condition of each, in a line."""
+        return tuple(
+            Outward(it.name, bool(it.condition.detail), it.condition.detail) for it in self._running
+        )
+
+    def counts(self) -> Iterator[tuple[str, Mapping[str, int]]]:
+        """The same in numbers, by metric and channel."""
+        conditions = {it.name: it.condition for it in self._running}
+        yield "lupin_outward_connected", {k: int(it.is_connected) for k, it in conditions.items()}
+        yield "lupin_outward_waiting", {k: it.waiting for k, it in conditions.items()}
+        yield "lupin_outward_sent", {k: it.sent for k, it in conditions.items()}
+        yield "lupin_outward_failed", {k: it.failed for k, it in conditions.items()}
+        yield "lupin_outward_dropped", {k: it.dropped for k, it in conditions.items()}
+
+    @property
+    def _running(self) -> tuple[Mqtt | Webhook, ...]:
+        return tuple(it for it in (self._mqtt, self._webhook) if it is not None)

@@ -1,0 +1,263 @@
+"""Where notifications are sent, as the operator chose it, and how each channel does."""
+
+from __future__ import annotations
+
+import logging
+import re
+import ssl
+from dataclasses import dataclass, field
+from typing import Final
+from urllib.parse import SplitResult, urlsplit
+
+from lupin_bridge.notify.messages import Topics
+from lupin_bridge.settings import Secrets, SettingError, Settings, one_of
+
+log = logging.getLogger(__name__)
+
+# What the page and the log say of a failure is one short line, whatever a library has to say.
+MAX_DETAIL: Final = 200
+
+
+@dataclass(slots=True)
+class Condition:
+    """Counts since the start, and what is wrong: `detail` is empty where nothing is.
+
+    `sent` was taken by the other side, `failed` are tries that were not, `dropped` was given up or
+    gave way to something newer. `is_connected`: the last try was taken, or is about to be.
+    """
+
+    is_connected: bool = False
+    detail: str = ""
+    sent: int = 0
+    failed: int = 0
+    waiting: int = 0
+    dropped: int = 0
+
+    def taken(self, number: int = 1) -> None:
+        """So many were taken by the other side."""
+        self.is_connected, self.detail = True, ""
+        self.sent += number
+
+    def failing(self, why: str) -> None:
+        """A try failed."""
+        self.is_connected = False
+        self.detail = " ".join(why.split())[:MAX_DETAIL] or "it failed without a reason"
+        self.failed += 1
+
+
+class Backoff:
+    """Twice as long after each failure, from `first_s` up to `most_s`; a half of it by chance.
+
+    Chance keeps those that lost the same broker at the same time from coming back as one.
+    """
+
+    def __init__(self, first_s: float, most_s: float) -> None:
+        self._first_s, self._most_s = first_s, most_s
+        self._failures = 0
+
+    def wait_s(self, chance: float) -> float:
+        """How long to wait after one more failure; `chance` is 0 to 1."""
+        # The exponent is bounded, or days of failures would make a number that no float holds.
+        whole_s = min(self._most_s, self._first_s * 2.0 ** min(self._failures, 32))
+        self._failures += 1
+        return whole_s * (0.5 + 0.5 * chance)
+
+    def succeeded(self) -> None:
+        """The next failure is the first again."""
+        self._failures = 0
+
+
+MIN_SECRET_LENGTH: Final = 16
+MAX_PREFIX: Final = 128
+MAX_URL: Final = 2_000
+_MQTT_PORTS: Final = {"mqtt": 1883, "mqtts": 8883}
+_HTTP_PORTS: Final = {"http": 80, "https": 443}
+# What an address may be made of (RFC 3986): nothing that would end a line of HTTP.
+_ADDRESS: Final = re.compile(r"[!-~]+")
+# MQTT 5, section 4.7: `+` and `#` are for subscribers, what begins with `$` is the broker's own.
+_PREFIX: Final = re.compile(r"[^$/+#\x00-\x1f\x7f]([^+#\x00-\x1f\x7f]*[^/+#\x00-\x1f\x7f])?")
+
+
+@dataclass(frozen=True, slots=True)
+class MqttTarget:
+    """A broker, and the topics to publish at it."""
+
+    host: str
+    port: int
+    topics: Topics
+    user: str | None = None
+    password: str | None = field(default=None, repr=False)
+    tls: ssl.SSLContext | None = None
+
+    @property
+    def called(self) -> str:
+        """The broker's address, for a person to read."""
+        return f"{'mqtt' if self.tls is None else 'mqtts'}://{_authority(self.host, self.port)}"
+
+
+@dataclass(frozen=True, slots=True)
+class WebhookTarget:
+    """The receiver of alarms; `path` holds the query too, and may be a secret."""
+
+    host: str
+    port: int
+    path: str = field(repr=False)
+    authority: str
+    secret: bytes = field(repr=False)
+    tls: ssl.SSLContext | None = None
+
+    @property
+    def called(self) -> str:
+        """The receiver's address without its path, for a person to read."""
+        return f"{'http' if self.tls is None else 'https'}://{_authority(self.host, self.port)}"
+
+
+@dataclass(frozen=True, slots=True)
+class Targets:
+    """Where the operator wants notifications; None: nowhere."""
+
+    mqtt: MqttTarget | None = None
+    webhook: WebhookTarget | None = None
+
+    @classmethod
+    def of(cls, settings: Settings, secrets: Secrets) -> Targets:
+        """As the settings have it.
+
+        Raises:
+            SettingError: an address, a prefix or a secret that cannot be, or one without the other.
+
+        """
+        return cls(_mqtt(settings, secrets.mqtt_password), _webhook(settings, secrets))
+
+
+def _mqtt(settings: Settings, password: str | None) -> MqttTarget | None:
+    if not settings.mqtt_url:
+        _needs(settings, "mqtt_url", "mqtt_user", "mqtt_password_file", "mqtt_ca")
+        return None
+    url, port = _address(settings, "mqtt_url", _MQTT_PORTS)
+    if url.path not in ("", "/") or url.query:
+        raise SettingError(
+            f"{settings.called('mqtt_url')} has a path: topics go below "
+            f"{settings.called('mqtt_prefix')}"
+        )
+    if password is not None and not settings.mqtt_user:
+        raise SettingError(
+            f"a password is given for {settings.called('mqtt_url')}, but no "
+            f"{settings.called('mqtt_user')}"
+        )
+    prefix, discovery = _prefix(settings, "mqtt_prefix"), settings.mqtt_discovery_prefix
+    if discovery:
+        discovery = _prefix(settings, "mqtt_discovery_prefix")
+    if discovery == prefix:
+        raise SettingError(
+            f"{settings.called('mqtt_prefix')} and {settings.called('mqtt_discovery_prefix')} are "
+            f"both {prefix!r}, must differ"
+        )
+    tls = _tls(settings, "mqtt_ca", is_wanted=url.scheme == "mqtts", url="mqtt_url")
+    if password is not None and tls is None:
+        log.warning(
+            "%s is without TLS: whoever sees the packets can read the password, use mqtts://",
+            settings.called("mqtt_url"),
+        )
+    return MqttTarget(
+        host=url.hostname or "",
+        port=port,
+        topics=Topics(prefix, discovery),
+        user=settings.mqtt_user or None,
+        password=password,
+        tls=tls,
+    )
+
+
+def _webhook(settings: Settings, secrets: Secrets) -> WebhookTarget | None:
+    if not settings.webhook_url:
+        _needs(settings, "webhook_url", "webhook_secret_file", "webhook_ca")
+        return None
+    url, port = _address(settings, "webhook_url", _HTTP_PORTS)
+    if url.fragment:
+        raise SettingError(f"{settings.called('webhook_url')} has a fragment (#), must have none")
+    secret = secrets.webhook_secret
+    if secret is None:
+        raise SettingError(
+            f"{settings.called('webhook_url')} is given without a secret to sign with: name its "
+            "file with --webhook-secret-file"
+        )
+    if len(secret) < MIN_SECRET_LENGTH:
+        raise SettingError(
+            f"the webhook's secret has {len(secret)} characters, must have at least "
+            f"{MIN_SECRET_LENGTH}: make one with `openssl rand -hex 32`"
+        )
+    return WebhookTarget(
+        host=url.hostname or "",
+        port=port,
+        path=(url.path or "/") + (f"?{url.query}" if url.query else ""),
+        authority=url.netloc,
+        secret=secret.encode(),
+        tls=_tls(settings, "webhook_ca", is_wanted=url.scheme == "https", url="webhook_url"),
+    )
+
+
+def _address(settings: Settings, name: str, ports: dict[str, int]) -> tuple[SplitResult, int]:
+    """An address and its port. What may be secret in it is in no message."""
+    called, text = settings.called(name), getattr(settings, name)
+    schemes = one_of([f"{scheme}://" for scheme in ports])
+    if len(text) > MAX_URL or not _ADDRESS.fullmatch(text):
+        raise SettingError(
+            f"{called} is longer than {MAX_URL} characters, or has one that no address may: write "
+            "it in ASCII, without spaces"
+        )
+    try:
+        url = urlsplit(text)
+        port, host = url.port, url.hostname
+    except ValueError as error:
+        raise SettingError(f"{called} is no address: {error}") from None
+    if url.scheme not in ports:
+        raise SettingError(f"{called} has to begin with {schemes}")
+    if "@" in url.netloc:
+        raise SettingError(
+            f"{called} has a user or a password in it: others can read a command line, they have "
+            "settings and files of their own"
+        )
+    if not host:
+        raise SettingError(f"{called} names no host")
+    if port == 0:
+        raise SettingError(f"{called} has the port 0, must be from 1 to 65535")
+    return url, port or ports[url.scheme]
+
+
+def _prefix(settings: Settings, name: str) -> str:
+    prefix: str = getattr(settings, name)
+    if len(prefix) > MAX_PREFIX or not _PREFIX.fullmatch(prefix):
+        raise SettingError(
+            f"{settings.called(name)} is {prefix[:MAX_PREFIX]!r}, must be 1 to {MAX_PREFIX} "
+            "characters without + and #, that begin and end with no /, and begin with no $"
+        )
+    return prefix
+
+
+def _tls(settings: Settings, ca: str, *, is_wanted: bool, url: str) -> ssl.SSLContext | None:
+    file = getattr(settings, ca)
+    if not is_wanted:
+        if file:
+            raise SettingError(
+                f"{settings.called(ca)} is given, but {settings.called(url)} is without TLS"
+            )
+        return None
+    try:
+        return ssl.create_default_context(cafile=file or None)
+    except ssl.SSLError:  # before OSError, which it is
+        raise SettingError(f"{settings.called(ca)} {file} holds no PEM certificate") from None
+    except OSError as error:
+        raise SettingError(f"{settings.called(ca)} {file}: {error.strerror}") from None
+
+
+def _needs(settings: Settings, url: str, *names: str) -> None:
+    for name in names:
+        if getattr(settings, name):
+            raise SettingError(
+                f"{settings.called(name)} is given without {settings.called(url)}, and has no use"
+            )
+
+
+def _authority(host: str, port: int) -> str:
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"

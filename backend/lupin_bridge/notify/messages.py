@@ -1,0 +1,284 @@
+"""What is published at a broker: topics, payloads, and Home Assistant's discovery. Pure.
+
+A part of a topic is letters, digits, `-` and `_` alone: `/`, `+` and `#` mean something to a
+broker, and Home Assistant takes no other characters in what it discovers. A payload does not change
+while nothing happens, and is then not sent again: so it has no ages, but the moments that they
+count from. Discovery is one device a tag and one for the greenhouse, a message an entity:
+https://www.home-assistant.io/integrations/mqtt/#discovery-messages
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any, Final
+
+from lupin_bridge.alarms.board import Board
+from lupin_bridge.judge.alarm import Alarm
+from lupin_bridge.judge.judging import NOTHING_JUDGED, Judged
+from lupin_bridge.judge.ranges import Sensor
+from lupin_bridge.judge.verdict import Health, Verdict
+from lupin_bridge.past.query import iso
+from lupin_bridge.stream.health_json import alarm_json, reason_json
+from lupin_bridge.stream.state_json import moment
+from lupin_twin.core.diagnostics import Origin
+from lupin_twin.core.state import Reading, Snapshot
+
+MAX_PLAIN: Final = 64
+_KEPT_OF_LONG: Final = 24
+_UNSAFE: Final = re.compile(rb"[^A-Za-z0-9-]")
+
+
+@lru_cache(maxsize=50_000)
+def safe(name: str) -> str:
+    """The name as a part of a topic: no two names have the same.
+
+    What is no letter, digit or `-` becomes `_` and two hexadecimal digits a byte of UTF-8. Of a
+    name that gets too long, the beginning is kept, and a digest of all of it stands behind `__`,
+    which no other has.
+    """
+    raw = name.encode("utf-8", "surrogatepass")
+    plain = _UNSAFE.sub(lambda found: b"_%02X" % found[0][0], raw).decode("ascii")
+    if 0 < len(plain) <= MAX_PLAIN:
+        return plain
+    digest = hashlib.blake2b(raw, digest_size=16).hexdigest()
+    # Never half of an escape: the beginning is for people to read.
+    return f"{re.sub(r'_.?$', '', plain[:_KEPT_OF_LONG])}__{digest}"
+
+
+@dataclass(frozen=True, slots=True)
+class Topics:
+    """The topics below one prefix; `discovery` is Home Assistant's prefix, empty: no discovery."""
+
+    prefix: str
+    discovery: str
+
+    @property
+    def status(self) -> str:
+        """`online` while the bridge is connected; its last will says `offline`."""
+        return f"{self.prefix}/status"
+
+    @property
+    def birth(self) -> str:
+        """Where Home Assistant says that it has started."""
+        return f"{self.discovery}/status"
+
+    @property
+    def twin(self) -> str:
+        """Whether the twin is live."""
+        return f"{self.prefix}/house/twin"
+
+    def of(self, tag_id: str | None, what: str) -> str:
+        """Something of a tag, or of the greenhouse (None), such as `health`."""
+        return f"{self.prefix}/{'house' if tag_id is None else f'tags/{safe(tag_id)}'}/{what}"
+
+    def reading(self, tag_id: str, sensor: str) -> str:
+        """One sensor of one tag."""
+        return self.of(tag_id, f"readings/{safe(sensor)}")
+
+    def device(self, tag_id: str | None) -> str:
+        """What Home Assistant knows a tag, or the greenhouse (None), by."""
+        return f"{safe(self.prefix)}_{'house' if tag_id is None else f'tag_{safe(tag_id)}'}"
+
+    def config(self, component: str, tag_id: str | None, what: str) -> str:
+        """Where an entity is announced; `what` is a part of a topic already."""
+        place = "house" if tag_id is None else f"tag_{safe(tag_id)}"
+        return f"{self.discovery}/{component}/{safe(self.prefix)}/{place}_-_{what}/config"
+
+
+@dataclass(frozen=True, slots=True)
+class GreenhouseState:
+    """The greenhouse as the bridge knows it at one moment.
+
+    `now_ns` is ROS time, None where it is not known; `holds_ns` is for how long each tag's readings
+    hold. `twin` is why the twin is live or not (`stream.status.Reason`), `message` says so.
+    `origin` is where what was observed comes from.
+    """
+
+    snapshot: Snapshot | None = None
+    judged: Judged = NOTHING_JUDGED
+    board: Board = field(default_factory=Board)
+    holds_ns: Mapping[str, int] = field(default_factory=dict)
+    now_ns: int | None = None
+    is_live: bool = False
+    twin: str = ""
+    message: str = ""
+    origin: Origin = "unknown"
+
+
+def holds(reading: Reading, holds_ns: int, now_ns: int | None) -> bool:
+    """Whether a reading still says something about now."""
+    return (
+        now_ns is not None
+        and reading.observed_at_ns is not None
+        and now_ns - reading.observed_at_ns <= holds_ns
+    )
+
+
+def reading_payload(
+    reading: Reading, sensor: Sensor, holds_ns: int, now_ns: int | None
+) -> dict[str, Any]:
+    """One reading with its own time; `value` is null where it failed or does not hold any more."""
+    is_known = holds(reading, holds_ns, now_ns) and math.isfinite(reading.value)
+    observed_ns = reading.observed_at_ns
+    return {
+        "value": reading.value if is_known else None,
+        "unit": sensor.unit,
+        "observed_at": None if observed_ns is None else iso(observed_ns),
+        "stamp": moment(observed_ns),
+        "sensor": reading.name,
+    }
+
+
+def health_payload(health: Health) -> dict[str, Any]:
+    """A verdict and its reasons, as `/api/health` has them."""
+    return {
+        "verdict": health.verdict,
+        "reasons": [reason_json(reason) for reason in health.reasons],
+    }
+
+
+def greenhouse_payload(judged: Judged) -> dict[str, Any]:
+    """The same of the greenhouse, and whether it is day."""
+    day = {"is_day": judged.day.is_day, "source": judged.day.source}
+    return {**health_payload(judged.house), "day": day}
+
+
+def twin_payload(seen: GreenhouseState) -> dict[str, Any]:
+    """Whether the twin is live, and why not."""
+    state = "ON" if seen.is_live else "OFF"
+    return {"state": state, "reason": seen.twin, "message": seen.message}
+
+
+def alarms_payload(count: int, worst: Iterable[Alarm], *, is_known: bool) -> dict[str, Any]:
+    """How many are active, and the worst of them; `state` is null before that is known."""
+    return {
+        "state": ("ON" if count else "OFF") if is_known else None,
+        "count": count,
+        "alarms": [alarm_json(alarm) for alarm in worst],
+    }
+
+
+# A class of Home Assistant's with the units that it takes for it; with another unit there is none.
+_CLASSES: Final = {
+    "temperature": ("temperature", {"°C", "°F", "K"}),
+    "dew_point": ("temperature", {"°C", "°F", "K"}),
+    "humidity": ("humidity", {"%"}),
+    "soil_moisture": ("moisture", {"%"}),
+    "co2": ("carbon_dioxide", {"ppm"}),
+    "light": ("illuminance", {"lx"}),
+    "vpd": ("pressure", {"kPa", "Pa", "hPa"}),
+}
+# How long Home Assistant shows a reading that nothing follows, s. In steps, or a tag's rhythm would
+# have its entities announced anew after each scan.
+STEPS_S: Final = (
+    *(minutes * 60 for minutes in (10, 15, 20, 30, 45, 60, 90)),
+    *(hours * 3600 for hours in (2, 3, 4, 6, 8, 12, 18, 24, 48, 96, 168)),
+)
+_STATE: Final = "{{ value_json.state }}"
+# Its "unknown" is no option, but the absence of all.
+_VERDICT: Final = "{{ value_json.verdict if value_json.verdict != 'unknown' else None }}"
+_IS_LIVE: Final = "{{ 'online' if value_json.state == 'ON' else 'offline' }}"
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """A tag, or the greenhouse (None), and its device in Home Assistant."""
+
+    tag_id: str | None
+    device: dict[str, Any]
+
+
+def expire_after_s(holds_ns: int) -> int:
+    """The step that is no shorter than readings hold; s."""
+    return next((step for step in STEPS_S if step * 1_000_000_000 >= holds_ns), STEPS_S[-1])
+
+
+def tag_configs(
+    topics: Topics, tag_id: str, sensors: Sequence[Sensor], holds_ns: int
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Topic and payload of each entity of a tag; an entity of no sensor is not announced."""
+    device = {
+        "identifiers": [topics.device(tag_id)],
+        "name": f"Tag {tag_id}",
+        "manufacturer": "lupin-twin",
+        "model": "Tag",
+        "via_device": topics.device(None),
+    }
+    place = _Place(tag_id, device)
+    for sensor in sensors:
+        what = f"reading_{safe(sensor.name)}"
+        found, units = _CLASSES.get(sensor.name, ("", set[str]()))
+        own = {
+            "name": sensor.label,
+            "state_topic": topics.reading(tag_id, sensor.name),
+            "state_class": "measurement",
+            "value_template": "{{ value_json.value }}",
+            # The bridge publishes when a reading does not hold any more; this is for when it is
+            # not connected.
+            "expire_after": expire_after_s(holds_ns),
+            **({"unit_of_measurement": sensor.unit} if sensor.unit else {}),
+            **({"device_class": found} if sensor.unit in units else {}),
+        }
+        yield _config(topics, "sensor", place, what, own)
+    yield from _verdict_and_alarm(topics, place)
+
+
+def greenhouse_configs(topics: Topics) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The same of the greenhouse."""
+    device = {
+        "identifiers": [topics.device(None)],
+        "name": f"Greenhouse {topics.prefix}",
+        "manufacturer": "lupin-twin",
+        "model": "Greenhouse",
+    }
+    place = _Place(None, device)
+    own = {
+        "name": "Twin",
+        "state_topic": topics.twin,
+        "device_class": "connectivity",
+        "value_template": _STATE,
+    }
+    yield _config(topics, "binary_sensor", place, "twin", own)
+    yield from _verdict_and_alarm(topics, place)
+
+
+def _verdict_and_alarm(topics: Topics, place: _Place) -> Iterator[tuple[str, dict[str, Any]]]:
+    own: dict[str, Any] = {
+        "name": "Verdict",
+        "state_topic": topics.of(place.tag_id, "health"),
+        "device_class": "enum",
+        "options": [verdict for verdict in Verdict if verdict != Verdict.UNKNOWN],
+        "value_template": _VERDICT,
+    }
+    yield _config(topics, "sensor", place, "verdict", own)
+    own = {
+        "name": "Alarm",
+        "state_topic": topics.of(place.tag_id, "alarms"),
+        "device_class": "problem",
+        "value_template": _STATE,
+    }
+    yield _config(topics, "binary_sensor", place, "alarm", own)
+
+
+def _config(
+    topics: Topics, component: str, place: _Place, what: str, own: dict[str, Any]
+) -> tuple[str, dict[str, Any]]:
+    availability: list[dict[str, str]] = [{"topic": topics.status}]
+    if place.tag_id is not None and what in ("verdict", "alarm"):
+        # Of a twin that is silent, nobody knows how its tags are.
+        availability.append({"topic": topics.twin, "value_template": _IS_LIVE})
+    return topics.config(component, place.tag_id, what), {
+        "unique_id": f"{topics.device(place.tag_id)}_-_{what}",
+        "json_attributes_topic": own["state_topic"],
+        "availability": availability,
+        "availability_mode": "all",
+        "qos": 1,
+        "device": place.device,
+        "origin": {"name": "lupin-twin"},
+        **own,
+    }

@@ -1,0 +1,429 @@
+"""The webhook: changes of alarms, one POST after the other, each until it is taken.
+
+A change has one id however often it is sent, also after a restart: changes of the day before are
+sent once more, and a receiver drops the ids that it has had. A POST has a connection of its own,
+and of its answer only the status is read. h11 is there for the server already: a client library
+would bring proxies, redirects, cookies and bodies of any size.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import hashlib
+import hmac
+import logging
+import os
+import random
+import time
+from collections import OrderedDict, deque
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import h11
+import orjson
+
+from lupin_bridge.alarms.board import AlarmBoard
+from lupin_bridge.alarms.ledger import Change, happened_ns
+from lupin_bridge.judge.alarm import Alarm
+from lupin_bridge.notify.destinations import Backoff, Condition, WebhookTarget
+from lupin_bridge.stream.health_json import alarm_json
+from lupin_twin.core.diagnostics import Origin
+
+log = logging.getLogger(__name__)
+
+CONNECT_S: Final = 5.0
+ANSWER_S: Final = 10.0
+# Of the answer's head. Its body is not read.
+MAX_HEAD_BYTES: Final = 16_384
+
+
+class PostError(RuntimeError):
+    """There was no answer; the message says why, in a few words."""
+
+
+@dataclass(frozen=True, slots=True)
+class PostAnswer:
+    """The status, and for how long the receiver wants to be left alone, s."""
+
+    status: int
+    retry_after_s: int = 0
+
+
+async def post(
+    target: WebhookTarget,
+    headers: Mapping[str, str],
+    body: bytes,
+    connect_s: float = CONNECT_S,
+    answer_s: float = ANSWER_S,
+) -> PostAnswer:
+    """Send it, and wait for the answer's head. Redirects are not followed.
+
+    Raises:
+        PostError: no connection, no valid TLS, no answer in time, or none of HTTP.
+
+    """
+    try:
+        async with asyncio.timeout(connect_s):
+            reader, writer = await asyncio.open_connection(
+                target.host, target.port, ssl=target.tls, limit=MAX_HEAD_BYTES
+            )
+    except TimeoutError:
+        raise PostError(f"no connection within {connect_s:g} s") from None
+    except OSError as error:
+        raise PostError(_words_of(error)) from None
+    except UnicodeError:  # of a label that is empty or too long
+        raise PostError("its host is no name that can be looked up") from None
+    try:
+        async with asyncio.timeout(answer_s):
+            return await _exchange(target, headers, body, reader, writer)
+    except TimeoutError:
+        raise PostError(f"no answer within {answer_s:g} s") from None
+    except OSError as error:
+        raise PostError(_words_of(error)) from None
+    except h11.RemoteProtocolError as error:
+        raise PostError(f"no answer of HTTP: {error}") from None
+    finally:
+        # At once: what more it has to say is not wanted.
+        writer.transport.abort()
+
+
+async def _exchange(
+    target: WebhookTarget,
+    headers: Mapping[str, str],
+    body: bytes,
+    reader: asyncio.StreamReader,
+    writer: asyncio.StreamWriter,
+) -> PostAnswer:
+    http = h11.Connection(h11.CLIENT, max_incomplete_event_size=MAX_HEAD_BYTES)
+    head = h11.Request(
+        method="POST",
+        target=target.path,
+        headers=[
+            ("Host", target.authority),
+            ("User-Agent", "lupin-twin"),
+            ("Content-Type", "application/json"),
+            ("Content-Length", str(len(body))),
+            ("Connection", "close"),
+            *headers.items(),
+        ],
+    )
+    for part in (head, h11.Data(data=body), h11.EndOfMessage()):
+        writer.write(http.send(part) or b"")
+    await writer.drain()
+    while True:
+        event = http.next_event()
+        if isinstance(event, h11.Response):
+            # As many digits as matter: Python reads no number of thousands.
+            given = dict(event.headers).get(b"retry-after", b"")[:9]
+            return PostAnswer(event.status_code, int(given) if given.isdigit() else 0)
+        if event is h11.NEED_DATA:
+            got = await reader.read(MAX_HEAD_BYTES)
+            if not got:
+                raise PostError("the connection was closed before an answer")
+            http.receive_data(got)
+
+
+def _words_of(error: OSError) -> str:
+    # asyncio and OpenSSL have words of their own, and errors of theirs have numbers of theirs.
+    if isinstance(error, ConnectionError) and error.errno:
+        return os.strerror(error.errno)
+    return error.strerror or str(error) or type(error).__name__
+
+
+MAX_WAITING: Final = 1_000
+# Alarms whose last change is known; far more than are active at once.
+MAX_KNOWN: Final = 20_000
+# Changes of so long before the start are sent again.
+RESENT_NS: Final = 24 * 3600 * 1_000_000_000
+
+What = Literal["raised", "worse", "cleared", "withdrawn"]
+
+
+@dataclass(slots=True)
+class Delivery:
+    """One change of one alarm; `id` is the same however often it is sent.
+
+    `origin` is where observations came from when it was received.
+    """
+
+    id: str
+    change: What
+    alarm: Alarm
+    origin: Origin
+    refusals: int = 0
+
+    def body(self, lost: int, origin: Origin) -> bytes:
+        """What is posted; `lost` changes were given up since the last one that was taken.
+
+        `origin` is where observations come from now, for who did not know it then.
+        """
+        return orjson.dumps(
+            {
+                "id": self.id,
+                "change": self.change,
+                "alarm": alarm_json(self.alarm),
+                "lost": lost,
+                "origin": origin if self.origin == "unknown" else self.origin,
+            }
+        )
+
+
+class Deliveries:
+    """What waits, oldest first. Past `MAX_WAITING`, the oldest is given up and counted."""
+
+    def __init__(self, max_waiting: int = MAX_WAITING) -> None:
+        self._max = max_waiting
+        self._waiting: deque[Delivery] = deque()
+        # Of each alarm that was sent: when it was cleared, None: it was active; and whether it was
+        # worse than as it was raised.
+        self._sent: OrderedDict[str, tuple[int | None, bool]] = OrderedDict()
+        self.dropped = 0
+        self.lost = 0
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    @property
+    def first(self) -> Delivery | None:
+        """The next one; it goes on waiting until it is `over`."""
+        return self._waiting[0] if self._waiting else None
+
+    def over(self, delivery: Delivery, *, taken: bool, lost: int = 0) -> None:
+        """It was taken, and with it that so many were `lost`; or it was given up.
+
+        Meanwhile it may have given way to newer ones, and more may have been lost.
+        """
+        if taken:
+            self.lost -= lost
+            if self.first is not delivery:
+                self.lost -= 1  # this one, after all, was not
+        if self._waiting and self._waiting[0] is delivery:
+            self._waiting.popleft()
+            if not taken:
+                self._give_up()
+
+    def put(self, change: Change, now_ns: int | None, origin: Origin) -> None:
+        """Take what is to be sent of a change; `now_ns` is ROS time, None: not known.
+
+        `origin` is where observations come from.
+        """
+        changed: Iterable[Alarm] = change.changed
+        if change.is_past:
+            newest_ns = max(map(happened_ns, changed), default=0)
+            after_ns = (newest_ns if now_ns is None else now_ns) - RESENT_NS
+            changed = (it for it in changed if it.is_active or happened_ns(it) >= after_ns)
+        for alarm in sorted(changed, key=happened_ns):
+            self._put_alarm(alarm, origin)
+        for alarm in change.withdrawn:
+            if alarm.id in self._sent:
+                del self._sent[alarm.id]
+                self._wait(Delivery(f"{alarm.id}.withdrawn", "withdrawn", alarm, origin))
+
+    def _put_alarm(self, alarm: Alarm, origin: Origin) -> None:
+        before = self._sent.get(alarm.id)
+        now = (alarm.cleared_at_ns, alarm.is_worse)
+        if before == now:
+            return  # a new worst value alone is nothing that anybody has to be called for
+        self._sent[alarm.id] = now
+        self._sent.move_to_end(alarm.id)
+        if len(self._sent) > MAX_KNOWN:
+            self._sent.popitem(last=False)
+        was_cleared_ns, was_worse = before or (None, False)
+        if alarm.cleared_at_ns is not None:
+            if before is None or alarm.cleared_at_ns != was_cleared_ns:
+                self._wait(
+                    Delivery(f"{alarm.id}.cleared.{alarm.cleared_at_ns}", "cleared", alarm, origin)
+                )
+            return
+        if was_cleared_ns is not None:  # a late write shows that it went on
+            self._wait(Delivery(f"{alarm.id}.raised.{was_cleared_ns}", "raised", alarm, origin))
+        elif before is None:
+            self._wait(Delivery(f"{alarm.id}.raised", "raised", alarm, origin))
+        if alarm.is_worse and not was_worse:
+            verdict = alarm.reason.verdict
+            self._wait(Delivery(f"{alarm.id}.worse.{verdict}", "worse", alarm, origin))
+
+    def _wait(self, delivery: Delivery) -> None:
+        self._waiting.append(delivery)
+        if len(self._waiting) > self._max:
+            self._waiting.popleft()
+            self._give_up()
+
+    def _give_up(self) -> None:
+        self.dropped += 1
+        self.lost += 1
+
+
+def signed(secret: bytes, delivery_id: str, now_s: int, body: bytes) -> dict[str, str]:
+    """The headers by which a receiver knows who sent it, and when (s since the epoch).
+
+    https://github.com/standard-webhooks/standard-webhooks, version 1: the HMAC-SHA256 of id, time
+    and body, with a full stop between them.
+    """
+    mac = hmac.new(secret, f"{delivery_id}.{now_s}.".encode() + body, hashlib.sha256).digest()
+    return {
+        "webhook-id": delivery_id,
+        "webhook-timestamp": str(now_s),
+        "webhook-signature": f"v1,{base64.b64encode(mac).decode('ascii')}",
+    }
+
+
+FIRST_WAIT_S: Final = 1.0
+MOST_WAIT_S: Final = 300.0
+# A twin elsewhere says once a second where observations come from, and one of before never does.
+ORIGIN_S: Final = 10.0
+ORIGIN_LOOK_S: Final = 0.1
+# What the receiver will not have, however often it comes: this message, not the receiver, is the
+# trouble. Others wait behind it, so it is given up.
+REFUSALS: Final = frozenset({400, 405, 409, 410, 413, 414, 415, 422, 431})
+MAX_REFUSALS: Final = 5
+# Alarms that are gone through in one turn of the loop: a millisecond.
+AT_ONCE: Final = 200
+
+
+class Webhook:
+    """Belongs to the event loop. `now_ns` returns ROS time, None: not known."""
+
+    name: Final = "webhook"
+
+    def __init__(
+        self,
+        target: WebhookTarget,
+        first_wait_s: float = FIRST_WAIT_S,
+        origin_s: float = ORIGIN_S,
+    ) -> None:
+        self.condition = Condition(is_connected=True)
+        self._target = target
+        self._deliveries = Deliveries()
+        self._backoff = Backoff(first_wait_s, MOST_WAIT_S)
+        self._is_news = asyncio.Event()
+        self._changes: deque[Change] = deque()
+        self._is_change = asyncio.Event()
+        self._tasks: list[asyncio.Task[None]] = []
+        self._unsubscribe: Callable[[], None] = lambda: None
+        self._origin: Callable[[], Origin] = lambda: "unknown"
+        self._origin_s = origin_s
+        # Since when a delivery has waited for the origin alone.
+        self._unknown_since_s: float | None = None
+
+    def start(
+        self, alarms: AlarmBoard, now_ns: Callable[[], int | None], origin: Callable[[], Origin]
+    ) -> None:
+        """Tell of every change from now on, and of what is active already.
+
+        `origin` returns where observations come from.
+        """
+        self._origin = origin
+
+        def receive(change: Change) -> None:
+            if len(change.changed) + len(change.withdrawn) <= AT_ONCE and not self._changes:
+                self._take(change, now_ns())
+            else:
+                self._changes.append(change)
+                self._is_change.set()
+
+        self._unsubscribe = alarms.subscribe(receive)
+        receive(Change(tuple(sorted(alarms.now.alarms, key=happened_ns)), is_past=True))
+        self._tasks = [
+            asyncio.create_task(self._run(), name="webhook"),
+            asyncio.create_task(self._take_many(now_ns), name="webhook's changes"),
+        ]
+
+    def _take(self, change: Change, now_ns: int | None) -> None:
+        self._deliveries.put(change, now_ns, self._origin())
+        self._count()
+        self._is_news.set()
+
+    async def _take_many(self, now_ns: Callable[[], int | None]) -> None:
+        """What is too much for one turn of the loop, such as a past, part by part."""
+        while True:
+            await self._is_change.wait()
+            self._is_change.clear()
+            while self._changes:
+                change = self._changes[0]
+                newest_ns = happened_ns(change.changed[-1]) if change.changed else None
+                for part in change.parts(AT_ONCE):
+                    self._take(part, newest_ns if (now := now_ns()) is None else now)
+                    await asyncio.sleep(0)
+                self._changes.popleft()
+
+    async def stop(self) -> None:
+        """End at once; what was not taken is sent after the next start."""
+        self._unsubscribe()
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    def _count(self) -> None:
+        self.condition.waiting = len(self._deliveries)
+        self.condition.dropped = self._deliveries.dropped
+
+    async def _run(self) -> None:
+        while True:
+            try:
+                wait_s = await self._try_next()
+            except Exception as error:
+                log.exception("the webhook met an error and goes on")
+                self.condition.failing(f"{type(error).__name__} ({self._target.called})")
+                wait_s = MOST_WAIT_S
+            self._count()
+            await asyncio.sleep(wait_s)
+
+    async def _try_next(self) -> float:
+        """Send the first that waits; returns how long to wait before the next, s."""
+        while (delivery := self._deliveries.first) is None:
+            self._is_news.clear()
+            await self._is_news.wait()
+        if delivery.origin == "unknown" and self._is_origin_to_come():
+            return ORIGIN_LOOK_S
+        lost = self._deliveries.lost
+        body = delivery.body(lost, self._origin())
+        headers = signed(self._target.secret, delivery.id, int(time.time()), body)
+        try:
+            answer = await post(self._target, headers, body, answer_s=ANSWER_S)
+        except PostError as error:
+            return self._failed(str(error))
+        if 200 <= answer.status < 300:
+            self._deliveries.over(delivery, taken=True, lost=lost)
+            self._backoff.succeeded()
+            if self.condition.detail:
+                log.info("the webhook's receiver at %s takes alarms again", self._target.called)
+            self.condition.taken()
+            return 0.0
+        if answer.status in REFUSALS:
+            delivery.refusals += 1
+            if delivery.refusals >= MAX_REFUSALS:
+                log.error(
+                    "the webhook's receiver at %s refused %s with %d, %d times: it is given up",
+                    self._target.called,
+                    delivery.id,
+                    answer.status,
+                    delivery.refusals,
+                )
+                self._deliveries.over(delivery, taken=False)
+        return self._failed(_problem(answer), answer.retry_after_s)
+
+    def _is_origin_to_come(self) -> bool:
+        """Whether it may still come: not known yet, and not for so long."""
+        if self._origin() != "unknown":
+            self._unknown_since_s = None
+            return False
+        now_s = time.monotonic()
+        if self._unknown_since_s is None:
+            self._unknown_since_s = now_s
+        return now_s - self._unknown_since_s < self._origin_s
+
+    def _failed(self, why: str, at_least_s: float = 0.0) -> float:
+        before = self.condition.detail
+        self.condition.failing(f"{why} ({self._target.called})")
+        problem = self.condition.detail
+        if problem != before:
+            log.warning("the webhook's receiver takes no alarms: %s; it is tried again", problem)
+        return max(self._backoff.wait_s(random.random()), min(at_least_s, MOST_WAIT_S))  # noqa: S311
+
+
+def _problem(answer: PostAnswer) -> str:
+    is_elsewhere = 300 <= answer.status < 400
+    return f"answered {answer.status}{', which is not followed' if is_elsewhere else ''}"

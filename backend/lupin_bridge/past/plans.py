@@ -1,0 +1,422 @@
+"""Queries of the past: each yields what it needs of the log, and returns the plan of its answer.
+
+Queries are values: they are pickled and sent to the process that reads the log. Back come the ETag
+and the body, for clients without it. A moment that has passed does not change, and its ETag is made
+of content: it is the same in every replica and after a restart, until a late write changes both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from hashlib import blake2b
+from pickle import PickleBuffer
+from typing import Any, Final, Protocol
+
+import orjson
+
+from lupin_bridge.feed.query import Found, Need, Work
+from lupin_bridge.field import formats
+from lupin_bridge.field import query as field_query
+from lupin_bridge.field.formats import FieldFormat
+from lupin_bridge.field.query import FieldQuery
+from lupin_bridge.judge.derived import DAILY, DERIVED
+from lupin_bridge.judge.judging import judge_once
+from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.verdict import Reason, with_derived
+from lupin_bridge.past import bodies, derived
+from lupin_bridge.past.query import PeriodQuery
+from lupin_bridge.serving.admission import REVALIDATE, Answer
+from lupin_bridge.stream.health_json import HealthJson
+from lupin_bridge.stream.state_json import StateJson
+from lupin_twin.core.journal_condition import Condition
+from lupin_twin.core.past import (
+    DEFAULT_POINTS,
+    EVERY_TAG,
+    MAX_POINTS,
+    Event,
+    SeriesPast,
+    SeriesRequest,
+)
+from lupin_twin.core.state import Snapshot, samples_of
+from lupin_twin.core.writes import PastWrite, RecentRequest
+from lupin_twin.field.engine import (
+    FieldRefused,
+    FieldRequest,
+    FieldRules,
+    check_request,
+    compute_field,
+    cost_s,
+    default_box,
+)
+from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.field.grid import far_off_tags
+from lupin_twin.journal.fold import STATE_S_PER_TAG
+from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG
+from lupin_twin.runtime.workers import ShouldStop
+
+JSON_TYPE: Final = "application/json"
+# A larger body is sent as a buffer of its own, and not copied.
+_LARGE_BYTES: Final = 65_536
+# Costs, s of one core, at worst: to plan an answer and to write it, for each tag; to write a cell
+# or pixel of a field; to judge a tag, and a tag of a field; to write a reading or a bucket.
+PLAN_TAG_S: Final = 10e-6
+_WRITE_TAG_S: Final = 20e-6
+WRITE_CELL_S: Final = 50e-9
+_HEALTH_TAG_S: Final = 200e-6
+JUDGE_TAG_S: Final = 20e-6
+_WRITE_ENTRY_S: Final = 5e-6
+# Of a field too large to estimate, or one that will be refused.
+_LARGE_S: Final = 1.0
+
+
+class NoSuchTag(LookupError):
+    """The tag was not known then; `known` others were."""
+
+    def __init__(self, tag_id: str, known: int) -> None:
+        super().__init__(tag_id, known)
+        self.tag_id, self.known = tag_id, known
+
+    def __str__(self) -> str:
+        return f"no tag {self.tag_id[:64]!r} is known ({self.known} others are)"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """An answer that is not written yet: its ETag, the cost of writing it, s, and how."""
+
+    etag: str
+    cost_s: float
+    write: Callable[[ShouldStop], Answer]
+
+
+class Query(Protocol):
+    """A query of the past. Equal ones share one answer while it is made. It can be pickled."""
+
+    def cost_s(self, tags: int) -> float:
+        """The cost of the lookups and of the answer with so many tags, s of one core."""
+
+    def look(self) -> Generator[Need, Found, Plan]:
+        """Yield each need, receive what was found, return the plan of the answer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """The ETag of an answer; `answer` is None where the client has it already."""
+
+    etag: str
+    answer: Answer | None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Send a large body as a buffer of its own."""
+        if self.answer is None:
+            return Answered, (self.etag, None)
+        body, *rest = self.answer.body, self.answer.media_type, self.answer.headers
+        sent = PickleBuffer(body) if len(body) > _LARGE_BYTES else body
+        return _answered, (self.etag, sent, *rest)
+
+
+def _answered(etag: str, *answer: Any) -> Answered:
+    return Answered(etag, Answer(*answer))
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionalQuery:
+    """A query of a client that has the answers of these ETags (a value of If-None-Match)."""
+
+    query: Query
+    if_none_match: str = ""
+
+    def look(self) -> Generator[Need, Found, Work[Answered]]:
+        """See `feed.query.Question`."""
+        plan = yield from self.query.look()
+        if field_query.matches(self.if_none_match, plan.etag):
+            return Work(0.0, lambda _: Answered(plan.etag, None))
+        return Work(plan.cost_s, lambda stop: Answered(plan.etag, plan.write(stop)))
+
+
+# --- as of a moment -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class StateQuery:
+    """A query of the state as of a moment, ns of ROS time. None: the caller has the snapshot."""
+
+    at_ns: int | None
+
+    def cost_s(self, tags: int) -> float:
+        """See `Query`."""
+        return tags * (STATE_S_PER_TAG + PLAN_TAG_S) + self.write_s(tags)
+
+    def write_s(self, tags: int) -> float:
+        """The cost of writing the answer with so many tags, s of one core."""
+        return tags * _WRITE_TAG_S
+
+    def look(self) -> Generator[Need, Found, Plan]:
+        """See `Query`."""
+        snapshot: Snapshot = yield self.at_ns or 0
+        return self.plan(snapshot)
+
+    def plan(self, snapshot: Snapshot) -> Plan:
+        """The plan of the answer from a snapshot."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, slots=True)
+class WholeState(StateQuery):
+    """`schema.TwinState`: every tag."""
+
+    def plan(self, snapshot: Snapshot) -> Plan:
+        """See `StateQuery`."""
+        etag = _etag("state", (snapshot.stamp_ns, snapshot.frame_id, snapshot.tags))
+        cost = len(snapshot.tags) * _WRITE_TAG_S
+        return _plan(etag, lambda _: StateJson().state(snapshot), cost)
+
+
+@dataclass(frozen=True, slots=True)
+class OneTag(StateQuery):
+    """`schema.TwinTagState` of one tag."""
+
+    tag_id: str
+
+    def write_s(self, tags: int) -> float:  # noqa: ARG002
+        """See `StateQuery`."""
+        return _WRITE_TAG_S
+
+    def plan(self, snapshot: Snapshot) -> Plan:
+        """See `StateQuery`.
+
+        Raises:
+            NoSuchTag: it was not known then.
+
+        """
+        found = next((tag for tag in snapshot.tags if tag.tag_id == self.tag_id), None)
+        if found is None:
+            raise NoSuchTag(self.tag_id, len(snapshot.tags))
+        etag = _etag("tag", (snapshot.stamp_ns, found))
+        return _plan(etag, lambda _: StateJson().tag(found, snapshot.now_ns), _WRITE_TAG_S)
+
+
+@dataclass(frozen=True, slots=True)
+class Health(StateQuery):
+    """`schema.Judgement` by these criteria, and by what was recent in the log then.
+
+    `days` as in `reasons_of_days`.
+    """
+
+    criteria: Criteria = field(compare=False)
+    days: tuple[tuple[str, tuple[Reason, ...]], ...] = ()
+
+    def write_s(self, tags: int) -> float:
+        """See `StateQuery`."""
+        return tags * _HEALTH_TAG_S
+
+    def look(self) -> Generator[Need, Found, Plan]:
+        """See `Query`."""
+        snapshot: Snapshot = yield self.at_ns or 0
+        recent: tuple[PastWrite, ...] = yield RecentRequest(self.at_ns or 0)
+        by = self.criteria
+        judged = judge_once(snapshot, recent, by.sensors, by.day, by.recent_s, days=dict(self.days))
+        body = HealthJson().whole(judged)
+        return _plan(_etag("health", (snapshot.stamp_ns, body.decode())), lambda _: body)
+
+
+@dataclass(frozen=True, slots=True)
+class Field(StateQuery):
+    """A field in a format (None: its quality), by these rules, on the map of now.
+
+    Without a box, it is that of the tags as they were pinned then. Quantities of a day are made of
+    each tag's readings of a day; whether it was day is decided by the clock.
+    """
+
+    query: FieldQuery
+    field_format: FieldFormat | None
+    rules: FieldRules
+    occupancy: OccupancyMap | None = field(compare=False)
+    criteria: Criteria = field(compare=False)
+
+    def check(self) -> None:
+        """Refuse what can be refused without a snapshot.
+
+        Raises:
+            lupin_twin.field.engine.FieldRefused: a bad request.
+
+        """
+        self._check(self.query.request((0.0, 0.0, 0.0, 0.0), self.rules.max_grid_cells))
+
+    def write_s(self, tags: int) -> float:
+        """See `StateQuery`; without a box, as if the tags stood side by side."""
+        side_m = 2.0 * self.rules.max_distance_m * math.sqrt(max(tags, 1))
+        request = self.query.request((0.0, 0.0, side_m, side_m), self.rules.max_grid_cells)
+        is_daily = self.query.sensor_type in DAILY
+        daily_s = tags * _series_s("", MAX_POINTS, tags) if is_daily else 0.0
+        try:
+            return daily_s + cost_s(request, tags, self.rules) + self._writing_s(request)
+        except FieldRefused:
+            return daily_s + _LARGE_S
+
+    def look(self) -> Generator[Need, Found, Plan]:
+        """See `Query`."""
+        at_ns = self.at_ns or 0
+        snapshot: Snapshot = yield at_ns
+        daily = DAILY.get(self.query.sensor_type)
+        if daily is not None:
+            tags = yield from derived.with_daily(snapshot.tags, daily, at_ns, self.criteria.is_day)
+            snapshot = replace(snapshot, tags=tuple(tags))
+        return self.plan(snapshot)
+
+    def plan(self, snapshot: Snapshot) -> Plan:
+        """See `StateQuery`.
+
+        Raises:
+            lupin_twin.field.engine.FieldRefused: a bad request.
+
+        """
+        places = [(tag.pose.x, tag.pose.y) for tag in snapshot.tags if tag.pose is not None]
+        box = default_box(places, self.rules.max_distance_m)
+        request = self.query.request(box, self.rules.max_grid_cells)
+        self._check(request)
+        sensor, sensors = self.criteria.sensors.named(request.sensor_type), self.criteria.sensors
+        tags = with_derived(snapshot.tags, request.sensor_type)
+        samples = samples_of(tags, request.sensor_type)
+        far_off = far_off_tags(snapshot.tags)
+        # By content: the revision of a map is one process's own.
+        digest = None if self.occupancy is None else _digest_of_map(self.occupancy)
+        conditions = (self.rules, digest, sensors.text)
+        cost = cost_s(request, len(samples), self.rules)
+
+        def quality(should_stop: ShouldStop) -> bytes:
+            grid = compute_field(request, samples, self.occupancy, self.rules, should_stop)
+            return formats.write_quality(grid, tags, sensor, self.rules, should_stop)
+
+        if self.field_format is None:
+            of = [tag.tag_id for tag in tags if samples_of((tag,), request.sensor_type)]
+            etag = _etag("quality", (request, samples, of, far_off, *conditions))
+            return _plan(etag, quality, cost + len(tags) * JUDGE_TAG_S)
+        field_format, scale = self.field_format, self.query.scale
+        etag = _etag(f"field {field_format.name} {scale}", (request, samples, far_off, *conditions))
+
+        def write(should_stop: ShouldStop) -> Answer:
+            grid = compute_field(request, samples, self.occupancy, self.rules, should_stop)
+            metadata = {**formats.metadata(grid, sensor), **formats.far_off(far_off)}
+            headers = field_query.headers(metadata, f"{request.sensor_type}.{field_format.name}")
+            body = formats.write(grid, field_format, request.sensor_type, sensors, scale)
+            return Answer(body, field_format.media_type, {**headers, "ETag": etag, **REVALIDATE})
+
+        return Plan(etag, cost + self._writing_s(request), write)
+
+    def _check(self, request: FieldRequest) -> None:
+        width, height = check_request(request, self.rules.max_grid_cells)
+        field_format = self.field_format or formats.JSON
+        field_query.check_scale(self.query, field_format, width * height, self.rules.max_grid_cells)
+
+    def _writing_s(self, request: FieldRequest) -> float:
+        width, height = check_request(request, self.rules.max_grid_cells)
+        return width * height * self.query.scale**2 * WRITE_CELL_S
+
+
+# --- over a period --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """One sensor of one tag, measured or derived, or one event."""
+
+    request: SeriesRequest
+    now_ns: int | None = field(compare=False)
+    criteria: Criteria = field(compare=False)
+    journal: Condition = field(compare=False)
+
+    def cost_s(self, tags: int) -> float:
+        """See `Query`."""
+        request = self.request
+        own_s = _series_s(request.tag_id, request.max_points, tags)
+        if request.sensor_type not in DERIVED and request.sensor_type not in DAILY:
+            return own_s
+        # Both of its parts are read, and again for buckets.
+        return own_s + 4 * _series_s(request.tag_id, MAX_POINTS, tags)
+
+    def look(self) -> Generator[Need, Found, Plan]:
+        """See `Query`."""
+        past = yield from derived.series(self.request, self.criteria.is_day)
+        sensors = self.criteria.sensors
+        return _of_content(
+            bodies.history_body(self.request, past, self.now_ns, sensors, self.journal)
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Timeline:
+    """What happened when."""
+
+    query: PeriodQuery
+    journal: Condition = field(compare=False)
+
+    def cost_s(self, tags: int) -> float:
+        """See `Query`: as if every event had to be counted twice."""
+        counted_s = _series_s(self._tag_id, self.query.points, tags)
+        runs_s = _series_s(EVERY_TAG, DEFAULT_POINTS, tags)
+        silences_s = _series_s(self._tag_id, MAX_POINTS, tags)
+        return runs_s + 2 * len(bodies.COUNTED) * counted_s + silences_s
+
+    def look(self) -> Generator[Need, Found, Plan]:
+        """See `Query`: the runs, every event over the one period, the silences."""
+        runs: SeriesPast = yield SeriesRequest(EVERY_TAG, Event.RUNS)
+        period = bodies.timeline_period(self.query, runs)
+        counted = yield from self._counted(period.start_ns, period.end_ns)
+        coarsest = bodies.coarsest(period, counted.values())
+        if coarsest != period:
+            # The wider period also holds single events outside the first one.
+            period = coarsest
+            counted = yield from self._counted(period.start_ns, period.end_ns)
+        # What is not written yet may be no silence.
+        until_ns = bodies.complete_to(self.journal, period.end_ns)
+        until_ns = max(period.start_ns, period.end_ns if until_ns is None else until_ns)
+        silences: SeriesPast = yield SeriesRequest(
+            self._tag_id, Event.SILENCES, period.start_ns, until_ns, MAX_POINTS
+        )
+        return _of_content(bodies.timeline_body(runs, period, counted, silences, self.journal))
+
+    def _counted(
+        self, start_ns: int, end_ns: int
+    ) -> Generator[Need, Found, dict[Event, SeriesPast]]:
+        counted = {}
+        for event in bodies.COUNTED.values():
+            counted[event] = yield SeriesRequest(
+                self._tag_id, event, start_ns, end_ns, self.query.points
+            )
+        return counted
+
+    @property
+    def _tag_id(self) -> str:
+        return self.query.tag_id or EVERY_TAG
+
+
+def _series_s(tag_id: str, points: int, tags: int) -> float:
+    """The cost of looking a series up and writing it, s of one core."""
+    looked_at = tags if tag_id == EVERY_TAG else 0
+    return SERIES_S + looked_at * SERIES_S_PER_TAG + points * _WRITE_ENTRY_S
+
+
+def _plan(etag: str, write: Callable[[ShouldStop], bytes], cost: float = 0.0) -> Plan:
+    headers = {"ETag": etag, **REVALIDATE}
+    return Plan(etag, cost, lambda stop: Answer(write(stop), JSON_TYPE, headers))
+
+
+def _of_content(body: Mapping[str, Any]) -> Plan:
+    text = orjson.dumps(body)
+    return _plan(f'"{blake2b(text, digest_size=12).hexdigest()}"', lambda _: text)
+
+
+@lru_cache(maxsize=1)
+def _digest_of_map(occupancy: OccupancyMap) -> str:
+    return blake2b(occupancy.cells.data, digest_size=12).hexdigest() + repr(occupancy.place)
+
+
+def _etag(kind: str, content: object) -> str:
+    """A strong ETag of content; NaN and infinity are the same in it, as they are in JSON."""
+    digest = blake2b(kind.encode(), digest_size=12)
+    digest.update(orjson.dumps(content))
+    return f'"{digest.hexdigest()}"'

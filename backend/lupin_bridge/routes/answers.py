@@ -1,0 +1,366 @@
+"""One path from a request to its response: known already, cached, under way, or computed.
+
+A request is admitted first. Its answer is computed once for all clients that wait for the same one,
+within a time limit, and only while somebody waits. The cache serves later requests at no cost.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable, Coroutine, Hashable, Mapping
+from contextlib import ExitStack
+from typing import Any, Final, TypeVar, cast
+
+import orjson
+from fastapi import APIRouter, FastAPI, Request, Response
+from starlette.types import Receive, Scope, Send
+
+from lupin_bridge.access.middleware import client_of
+from lupin_bridge.bridge import Bridge
+from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
+from lupin_bridge.field import query as field_query
+from lupin_bridge.past import bodies
+from lupin_bridge.past.plans import (
+    PLAN_TAG_S,
+    Answered,
+    ConditionalQuery,
+    NoSuchTag,
+    Query,
+    StateQuery,
+)
+from lupin_bridge.serving.admission import REVALIDATE, AdmissionError, Answer, BusyError
+from lupin_bridge.stream import schema
+from lupin_twin.core.past import NotRemembered, PastRefused
+from lupin_twin.field.idw import never
+from lupin_twin.runtime.workers import SMALL_S, ShouldStop
+
+NEVER_STORE: Final = {"Cache-Control": "no-store"}
+NO_TWIN: Final = "no twin has been heard yet"
+# nginx's "client closed request"; nobody receives it.
+CLIENT_GONE: Final = 499
+# Shorter work is done on the loop: to hand it to a worker takes longer.
+_AT_ONCE_S: Final = 1e-3
+
+TOO_MUCH: Final[dict[int | str, dict[str, Any]]] = {
+    429: {"model": schema.ErrorMessage, "description": "this client asks for too much"}
+}
+# What `add_refusals` makes of refusals, for the OpenAPI document.
+NOT_REMEMBERED: Final[dict[int | str, dict[str, Any]]] = {
+    304: {"description": "the ETag still holds"},
+    400: {"model": schema.ErrorMessage, "description": "refused; detail says why"},
+    404: {"model": schema.ErrorMessage, "description": "nothing of the past is kept here"},
+    **TOO_MUCH,
+    503: {"model": schema.ErrorMessage, "description": "it cannot be read now, or too much is"},
+    504: {"model": schema.ErrorMessage, "description": "it took too long"},
+}
+
+ResultT = TypeVar("ResultT")
+RouteT = TypeVar("RouteT", bound=Callable[..., Any])
+
+
+def read_route(router: APIRouter, path: str, **documentation: Any) -> Callable[[RouteT], RouteT]:
+    """Register a function for GET and, undocumented, for HEAD (the server drops the body)."""
+
+    def register(function: RouteT) -> RouteT:
+        router.get(path, response_class=Response, **documentation)(function)
+        router.head(path, response_class=Response, include_in_schema=False)(function)
+        return function
+
+    return register
+
+
+def bridge_of(request: Request) -> Bridge:
+    """The application's bridge."""
+    return cast("Bridge", request.app.state.bridge)
+
+
+def list_header(request: Request, name: str) -> str:
+    """All lines of a header that is a list, as one (RFC 9110, section 5.3)."""
+    return ", ".join(request.headers.getlist(name))
+
+
+def json_response(
+    body: bytes, status_code: int = 200, headers: Mapping[str, str] | None = None
+) -> Response:
+    """JSON that is already text; never stored by anyone unless the headers say so."""
+    return Response(body, status_code, headers or NEVER_STORE, "application/json")
+
+
+def error_response(
+    detail: str, status_code: int, headers: Mapping[str, str] | None = None
+) -> Response:
+    """`schema.ErrorMessage`."""
+    return json_response(orjson.dumps({"detail": detail}), status_code, headers)
+
+
+REFUSALS: Final = (AdmissionError, NotRemembered, NoSuchTag, PastRefused, TwinUnavailableError)
+
+
+def add_refusals(app: FastAPI) -> None:
+    """Turn the `REFUSALS` that routes raise into responses."""
+
+    async def refuse(_request: Request, error: Exception) -> Response:
+        return refusal(error)
+
+    for kind in REFUSALS:
+        app.add_exception_handler(kind, refuse)
+
+
+def refusal(error: Exception) -> Response:
+    """The response to one of the `REFUSALS`."""
+    status, headers = 400, None
+    retry = {"Retry-After": "3"}
+    match error:
+        case AdmissionError():
+            status, headers = (503 if isinstance(error, BusyError) else 429), error.headers
+        case NotRemembered():
+            status, headers = (404, None) if error.is_lasting else (503, retry)
+        case NoSuchTag():
+            status = 404
+        case TwinTimeoutError():
+            status = 504
+        case TwinUnavailableError():
+            status, headers = 503, retry
+    return error_response(str(error), status, headers)
+
+
+# --- answers that are computed --------------------------------------------------------------------
+
+
+class CachedResponse(Response):
+    """A response that calls `release` once its client has received it, or left."""
+
+    def __init__(self, answer: Answer, release: Callable[[], None]) -> None:
+        super().__init__(answer.body, headers=dict(answer.headers), media_type=answer.media_type)
+        self.release = release
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send it."""
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            self.release()
+
+
+async def respond(
+    request: Request,
+    key: Hashable,
+    compute: Callable[[], Coroutine[Any, Any, Answer]],
+    etag: str | None = None,
+) -> Response:
+    """The answer under a key. `etag` names it in the cache, where it is known beforehand.
+
+    Raises:
+        AdmissionError: past a limit of the client.
+        Exception: whatever `compute` raised.
+
+    """
+    bridge = bridge_of(request)
+    if etag is not None and has_etag(request, etag):
+        return not_modified(etag)
+    response = cached(bridge, etag or key) or await admitted(
+        request, lambda: bridge.answering.get(key, compute)
+    )
+    found = response.headers.get("etag")
+    if found is not None and response.status_code == 200 and has_etag(request, found):
+        if isinstance(response, CachedResponse):
+            response.release()
+        return not_modified(found)
+    return response
+
+
+def cached(bridge: Bridge, key: Hashable) -> CachedResponse | None:
+    """The answer in the cache; None: there is none."""
+    lent = bridge.cache.lend(key)
+    return None if lent is None else CachedResponse(*lent)
+
+
+async def admitted(request: Request, work: Callable[[], Awaitable[Answer | Response]]) -> Response:
+    """What `work` gives. It counts as one request until the client has received it.
+
+    Raises:
+        AdmissionError: past a limit of the client.
+        Exception: whatever `work` raised.
+
+    """
+    bridge = bridge_of(request)
+    with ExitStack() as held:
+        held.enter_context(bridge.admission.request(client_of(request), time.monotonic()))
+        answer = await while_client_waits(request, within_time(bridge, work()))
+        if answer is None:
+            return Response(status_code=CLIENT_GONE)
+        if isinstance(answer, Response):
+            return answer
+        return CachedResponse(answer, held.pop_all().close)
+
+
+def has_etag(request: Request, etag: str) -> bool:
+    """Whether the client says that it has the answer of this ETag."""
+    return field_query.matches(list_header(request, "if-none-match"), etag)
+
+
+def not_modified(etag: str) -> Response:
+    """The response to a client that has the answer already."""
+    return Response(status_code=304, headers={"ETag": etag, **REVALIDATE})
+
+
+async def within_time(bridge: Bridge, work: Awaitable[ResultT]) -> ResultT:
+    """What `work` gives, within `Limits.answer_timeout_s`.
+
+    Raises:
+        TwinTimeoutError: it took longer; it is cancelled.
+
+    """
+    limit_s = bridge.limits.answer_timeout_s
+    try:
+        async with asyncio.timeout(limit_s):
+            return await work
+    except TimeoutError:
+        raise TwinTimeoutError(f"the answer was not there within {limit_s:g} s") from None
+
+
+async def while_client_waits(
+    request: Request, work: Coroutine[Any, Any, ResultT]
+) -> ResultT | None:
+    """What `work` gives; None: the client has left, and the work was cancelled."""
+    working = asyncio.create_task(work)
+    disconnect = asyncio.create_task(client_left(request))
+    try:
+        await asyncio.wait((working, disconnect), return_when=asyncio.FIRST_COMPLETED)
+        return await working if working.done() else None
+    finally:
+        disconnect.cancel()
+        if not working.done():
+            working.cancel()
+            # What it works on is free when this returns.
+            await asyncio.wait((working,))
+            if not working.cancelled():
+                working.exception()
+
+
+async def client_left(request: Request) -> None:
+    """Return when the client has left."""
+    while (await request.receive())["type"] != "http.disconnect":
+        pass
+
+
+async def on_worker(
+    bridge: Bridge, work: Callable[[ShouldStop], ResultT], cost_s: float = 0.0
+) -> ResultT:
+    """What `work(should_stop)` gives, off the loop."""
+    return await asyncio.wrap_future(bridge.source.workers.submit(work, cost_s))
+
+
+async def computed(
+    request: Request,
+    key: Hashable,
+    write: Callable[[], bytes],
+    media_type: str,
+    *,
+    cost_s: float = 0.0,
+    headers: Mapping[str, str] = NEVER_STORE,
+) -> Answer:
+    """What `write` makes on a worker, put into the cache.
+
+    Raises:
+        BusyError: one computation too many.
+
+    """
+    bridge = bridge_of(request)
+    with bridge.admission.computing(client_of(request), is_large=cost_s > SMALL_S):
+        body = await on_worker(bridge, lambda _: write(), cost_s)
+    answer = Answer(body, media_type, headers)
+    bridge.cache.put(key, answer)
+    return answer
+
+
+# --- answers of the past --------------------------------------------------------------------------
+
+
+async def respond_newest(request: Request, query: StateQuery) -> Response:
+    """A query of the newest state, which is answered in this process.
+
+    Raises:
+        AdmissionError: past a limit.
+        Exception: what the query raised.
+
+    """
+    bridge = bridge_of(request)
+
+    async def run(work: Callable[[ShouldStop], ResultT], cost_s: float) -> ResultT:
+        return work(never) if cost_s <= _AT_ONCE_S else await on_worker(bridge, work, cost_s)
+
+    async def work() -> Answer | Response:
+        if bridge.latest is None:
+            raise TwinUnavailableError(NO_TWIN)
+        snapshot = bridge.latest.snapshot
+        plan = await run(lambda _: query.plan(snapshot), len(snapshot.tags) * PLAN_TAG_S)
+        if has_etag(request, plan.etag):
+            return not_modified(plan.etag)
+
+        async def write() -> Answer:
+            with bridge.admission.computing(client_of(request), is_large=plan.cost_s > SMALL_S):
+                answer = await run(plan.write, plan.cost_s)
+            bridge.cache.put(plan.etag, answer)
+            return answer
+
+        return cached(bridge, plan.etag) or await bridge.answering.get(plan.etag, write)
+
+    return await admitted(request, work)
+
+
+async def respond_as_of(request: Request, query: Query, at_ns: int) -> Response:
+    """A query as of a moment; headers say how far the answer is complete.
+
+    Raises:
+        AdmissionError: past a limit.
+        Exception: what the source or the query raised.
+
+    """
+    # Of before the answer. Headers, because the body stays the same when older rows are deleted.
+    headers = bodies.moment_headers(bridge_of(request).source.journal(), at_ns)
+    response = await respond_past(request, query, "state")
+    response.headers.update(headers)
+    return response
+
+
+async def respond_past(request: Request, query: Query, kind: str) -> Response:
+    """A query of the past; `kind` is its name in the metrics.
+
+    Raises:
+        AdmissionError: past a limit.
+        Exception: what the source or the query raised.
+
+    """
+    bridge = bridge_of(request)
+    header = list_header(request, "if-none-match")
+
+    async def ask(has: str) -> Answered:
+        tags = 0 if bridge.latest is None else len(bridge.latest.snapshot.tags)
+        cost_s = query.cost_s(tags)
+        with (
+            bridge.admission.computing(client_of(request), is_large=cost_s > SMALL_S),
+            bridge.metrics.past_seconds.labels(kind).time(),
+        ):
+            answered = await bridge.source.ask(ConditionalQuery(query, has), cost_s)
+        if answered.answer is not None:
+            bridge.cache.put(answered.etag, answered.answer)
+        return answered
+
+    async def work() -> Answer | Response:
+        # The other process need not write what is cached here. If that is dropped meanwhile, the
+        # query is repeated.
+        while True:
+            has = ", ".join((header, *bridge.cache.newest_tags()))
+            key = (kind, query, header, bridge.state_number)
+            answered = await bridge.looking_back.get(key, lambda has=has: ask(has))  # type: ignore[misc]
+            if has_etag(request, answered.etag):
+                return not_modified(answered.etag)
+            response = cached(bridge, answered.etag)
+            if response is not None:
+                return response
+            if answered.answer is not None:
+                return answered.answer
+
+    return await admitted(request, work)

@@ -1,0 +1,364 @@
+"""Pages of the bridge's own: sign-in, `/docs`, `/openapi.json`, the guide, `/` without a page."""
+
+from __future__ import annotations
+
+import re
+import secrets
+import time
+from collections.abc import Callable, Collection
+from functools import cache
+from html import escape
+from pathlib import Path
+from typing import Any, Final, Literal, TypedDict
+
+import orjson
+from fastapi import APIRouter, FastAPI, Request, Response
+from starlette.responses import RedirectResponse
+from starlette.staticfiles import StaticFiles
+from starlette.types import Scope
+
+from lupin_bridge.access.credentials import SESSION_S, BrowserSession
+from lupin_bridge.access.middleware import CONTENT_POLICY, SESSION_KEY, Access
+from lupin_bridge.bridge import Bridge
+from lupin_bridge.routes.answers import (
+    NEVER_STORE,
+    computed,
+    error_response,
+    json_response,
+    list_header,
+    read_route,
+    respond,
+)
+from lupin_bridge.serving.admission import REVALIDATE
+from lupin_bridge.stream import schema
+
+router = APIRouter()
+# In the application only where the page was not built.
+no_page_router = APIRouter()
+
+# What writing either document takes, roughly, s.
+_WRITE_S: Final = 0.02
+
+GUIDE_PATH: Final = "/docs/guide"
+_NO_GUIDE: Final = "the guide was not built: run `make docs` in the clone, or install a release"
+# Its theme has styles in the pages themselves; scripts are files, as everywhere.
+_GUIDE_POLICY: Final = f"{CONTENT_POLICY}; style-src 'self' 'unsafe-inline'"
+
+HOW_TO_BUILD: Final = (
+    "build it with `npm ci && npm run build` in the project's folder, install the bridge again "
+    "(`pip install .`) unless it is installed with -e, and restart it"
+)
+_NO_PAGE: Final = (
+    '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+    '<meta name="viewport" content="width=device-width"><title>Lupin twin: no page</title></head>'
+    "<body><main><h1>The page was not built</h1>"
+    f"<p>The bridge runs, but was installed without its page: {escape(HOW_TO_BUILD)}.</p>"
+    '<p>The data is there: <a href="docs">docs</a>, <a href="api/state">api/state</a>.</p>'
+    "</main></body></html>"
+)
+
+
+@read_route(router, "/openapi.json", include_in_schema=False)
+async def openapi(request: Request) -> Response:
+    """The OpenAPI document."""
+    app, prefix = request.app, request.scope.get("root_path", "")
+
+    def write() -> bytes:
+        document = app.openapi()
+        if prefix:
+            document = {**document, "servers": [{"url": prefix}]}
+        return orjson.dumps(document, option=orjson.OPT_INDENT_2)
+
+    return await _written_once(request, f"openapi {prefix}", write, "application/json")
+
+
+@read_route(router, "/docs", include_in_schema=False)
+async def docs(request: Request) -> Response:
+    """The OpenAPI document for people."""
+    app, base_url = request.app, str(request.base_url).rstrip("/")
+
+    def write() -> bytes:
+        return render(app.openapi(), base_url).encode()
+
+    return await _written_once(request, f"docs {base_url}", write, "text/html; charset=utf-8")
+
+
+async def _written_once(
+    request: Request, key: str, write: Callable[[], bytes], media_type: str
+) -> Response:
+    bridge: Bridge | None = request.app.state.bridge
+    if bridge is None:
+        return Response(write(), headers=REVALIDATE, media_type=media_type)
+
+    return await respond(
+        request,
+        key,
+        lambda: computed(request, key, write, media_type, cost_s=_WRITE_S, headers=REVALIDATE),
+    )
+
+
+def render(document: dict[str, Any], base_url: str) -> str:
+    """An OpenAPI document as one HTML page: routes, parameters, answers, and lines for curl."""
+    info = document["info"]
+    routes = "".join(
+        _route(path, operations["get"], base_url) for path, operations in document["paths"].items()
+    )
+    schemas = "".join(
+        _schema(name, described) for name, described in document["components"]["schemas"].items()
+    )
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width">'
+        f"<title>{escape(info['title'])}: API</title></head><body><main>"
+        f"<h1>{escape(info['title'])}: API</h1><p>{escape(info['summary'])}</p>"
+        f"<p>{escape(info['description'])}</p>"
+        '<p>As a document for tools: <a href="openapi.json">/openapi.json</a></p>'
+        '<p>For people, with tutorials: <a href="docs/guide/">the guide</a></p>'
+        f"<h2>Routes</h2>{routes}<h2>Types</h2>{schemas}</main></body></html>"
+    )
+
+
+def _route(path: str, operation: dict[str, Any], base_url: str) -> str:
+    parameters = operation.get("parameters", [])
+    required = [p for p in parameters if p.get("required") and p["in"] == "query"]
+    query = "&".join(f"{p['name']}=…" for p in required)
+    rows = "".join(
+        f"<tr><td><code>{escape(p['name'])}</code></td><td>{escape(p['schema'].get('type', ''))}"
+        f"{' (required)' if p.get('required') else ''}</td>"
+        f"<td>{escape(p.get('description', ''))}</td></tr>"
+        for p in parameters
+    )
+    answers = "".join(
+        f"<li>{escape(code)}: {escape(answer['description'])} {_types(answer)}</li>"
+        for code, answer in operation["responses"].items()
+    )
+    url = f"{base_url}{path}{'?' + query if query else ''}"
+    return (
+        f"<section><h3><code>GET {escape(path)}</code></h3>"
+        f"<p>{escape(operation.get('summary', ''))}. {escape(operation.get('description', ''))}</p>"
+        f"<pre>curl '{escape(url)}'</pre>"
+        + (f"<table border='1'>{rows}</table>" if rows else "")
+        + f"<ul>{answers}</ul></section>"
+    )
+
+
+def _types(answer: dict[str, Any]) -> str:
+    names = []
+    for media_type, content in answer.get("content", {}).items():
+        name = content.get("schema", {}).get("$ref", "").rpartition("/")[2]
+        link = f' <a href="#{escape(name)}">{escape(name)}</a>' if name else ""
+        names.append(f"<code>{escape(media_type)}</code>{link}")
+    return ", ".join(names)
+
+
+def _schema(name: str, described: dict[str, Any]) -> str:
+    rows = "".join(
+        f"<tr><td><code>{escape(field)}</code></td><td>{_type_of(prop)}</td>"
+        f"<td>{escape(prop.get('description', ''))}</td></tr>"
+        for field, prop in described.get("properties", {}).items()
+    )
+    return (
+        f'<section id="{escape(name)}"><h3>{escape(name)}</h3>'
+        f"<p>{escape(described.get('description', ''))}</p>"
+        f"<table border='1'>{rows}</table></section>"
+    )
+
+
+def _type_of(prop: dict[str, Any]) -> str:
+    if "$ref" in prop:
+        name = prop["$ref"].rpartition("/")[2]
+        return f'<a href="#{escape(name)}">{escape(name)}</a>'
+    if "anyOf" in prop:
+        return " or ".join(_type_of(option) for option in prop["anyOf"])
+    if prop.get("type") == "array":
+        return f"list of {_type_of(prop['items'])}"
+    if "enum" in prop:
+        return ", ".join(escape(repr(value)) for value in prop["enum"])
+    return escape(str(prop.get("const", prop.get("type", ""))))
+
+
+# --- the guide -----------------------------------------------------------------------------------
+
+
+class _Guide(StaticFiles):
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        response = await super().get_response(path, scope)
+        response.headers["Content-Security-Policy"] = _GUIDE_POLICY
+        return response
+
+
+@read_route(router, GUIDE_PATH, include_in_schema=False)
+async def to_guide(request: Request) -> Response:
+    """The documentation, as HTML."""
+    return RedirectResponse(f"{request.scope.get('root_path', '')}{GUIDE_PATH}/")
+
+
+async def _no_guide(_request: Request) -> Response:
+    return error_response(_NO_GUIDE, 404)
+
+
+def add_guide(app: FastAPI, folder: Path) -> None:
+    """Serve the built guide, or say how to build it."""
+    if (folder / "index.html").is_file():
+        app.mount(GUIDE_PATH, _Guide(directory=folder, html=True), name="guide")
+    else:
+        app.add_route(f"{GUIDE_PATH}/{{path:path}}", _no_guide, include_in_schema=False)
+
+
+@read_route(no_page_router, "/", include_in_schema=False)
+async def no_page() -> Response:
+    """503: the page can be built."""
+    return Response(_NO_PAGE, 503, NEVER_STORE, "text/html; charset=utf-8")
+
+
+# RFC 9110, section 12.5.4; what is no weight counts as 1, which is what browsers leave out.
+_WEIGHT: Final = re.compile(r";\s*q=(0(?:\.\d{0,3})?)\s*$")
+
+
+def language_of(wanted: str | None, accepted: str, known: Collection[str]) -> str:
+    """One of `known`: what `?lang=` asks for, else the best of `Accept-Language`, else English.
+
+    As in the HMI, "de-AT" and "DE" are German, and an unknown language is English.
+    """
+    if wanted is not None:
+        return _known_language(wanted, known) or "en"
+    found = "en", 0.0
+    for part in accepted.split(","):
+        language = _known_language(part.partition(";")[0], known)
+        weight = _WEIGHT.search(part)
+        share = 1.0 if weight is None else float(weight.group(1))
+        if language is not None and share > found[1]:  # of equals the first
+            found = language, share
+    return found[0]
+
+
+def _known_language(tag: str, known: Collection[str]) -> str | None:
+    name = tag.strip().partition("-")[0].lower()
+    return name if name in known else None
+
+
+# Not in the folder of the HMI, which its build empties, and needed before the HMI may be read.
+_SIGNIN_FOLDER: Final = Path(__file__).parent / "signin_page"
+
+
+@router.post("/api/signin", include_in_schema=False)
+async def sign_in(request: Request) -> Response:
+    """Trade the token, which `AccessControl` has looked at, for a session cookie.
+
+    For the page below: programs send `Authorization: Bearer` with every request instead.
+    """
+    access = _access_of(request)
+    if access.credentials is None:
+        return error_response("this bridge asks for no token: there is nothing to sign in to", 404)
+    if "authorization" not in request.headers:  # a session must not renew itself
+        return error_response(
+            "send the token as Authorization: Bearer", 401, {"WWW-Authenticate": "Bearer"}
+        )
+    response = Response(status_code=204, headers=NEVER_STORE)
+    response.set_cookie(
+        access.credentials.cookie_name,
+        access.credentials.cookie(secrets.token_hex(16), time.time()),
+        max_age=SESSION_S,
+        **_place_of(request),
+    )
+    return response
+
+
+@router.post("/api/signout", include_in_schema=False)
+async def sign_out(request: Request) -> Response:
+    """End the session that the request comes with, and everything that it has open."""
+    access = _access_of(request)
+    if access.credentials is None:
+        return error_response("this bridge asks for no token: there is nothing to sign out of", 404)
+    session = _session_of(request)
+    if session is not None:
+        access.sessions.sign_out(session, time.time())
+    response = Response(status_code=204, headers=NEVER_STORE)
+    response.delete_cookie(access.credentials.cookie_name, **_place_of(request))
+    return response
+
+
+@read_route(
+    router,
+    "/api/session",
+    summary="Is this a session that can be signed out of?",
+    responses={200: {"model": schema.Session}},
+)
+async def session_route(request: Request) -> Response:
+    """Whether the request came with a session, and how long that still lasts."""
+    session = _session_of(request)
+    left_s = None if session is None else max(0.0, session.ends_s - time.time())
+    body = {"can_sign_out": session is not None, "seconds_left": left_s}
+    return json_response(orjson.dumps(body))
+
+
+@read_route(router, "/signin", include_in_schema=False)
+async def page(request: Request) -> Response:
+    """The page; without a token, on to the HMI."""
+    if _access_of(request).credentials is None:
+        return Response(status_code=303, headers={"Location": "./", **NEVER_STORE})
+    language = language_of(
+        request.query_params.get("lang"), list_header(request, "accept-language"), _words()
+    )
+    headers = {**REVALIDATE, "Content-Language": language, "Vary": "Accept-Language"}
+    return Response(_page_in(language), headers=headers, media_type="text/html; charset=utf-8")
+
+
+@read_route(router, "/signin.css", include_in_schema=False)
+async def style() -> Response:
+    """The page's style."""
+    return _file("signin.css", "text/css; charset=utf-8")
+
+
+@read_route(router, "/signin.js", include_in_schema=False)
+async def script() -> Response:
+    """The page's script."""
+    return _file("signin.js", "text/javascript; charset=utf-8")
+
+
+class _Place(TypedDict):
+    path: str
+    secure: bool
+    httponly: bool
+    samesite: Literal["strict"]
+
+
+def _place_of(request: Request) -> _Place:
+    """Where a browser keeps the cookie, and when it sends it along."""
+    return {
+        "path": f"{request.scope.get('root_path', '')}/",
+        "secure": request.scope["scheme"] == "https",
+        "httponly": True,
+        "samesite": "strict",
+    }
+
+
+def _session_of(request: Request) -> BrowserSession | None:
+    session: BrowserSession | None = request.scope["state"].get(SESSION_KEY)
+    return session
+
+
+def _access_of(request: Request) -> Access:
+    access: Access = request.app.state.access
+    return access
+
+
+def _file(name: str, media_type: str) -> Response:
+    return Response(_read_file(name), headers=REVALIDATE, media_type=media_type)
+
+
+@cache
+def _words() -> dict[str, dict[str, str]]:
+    words: dict[str, dict[str, str]] = orjson.loads(_read_file("words.json"))
+    return words
+
+
+@cache
+def _page_in(language: str) -> str:
+    words = {key: escape(text) for key, text in _words()[language].items()}
+    return _read_file("signin.html").decode().format(lang=language, **words)
+
+
+@cache
+def _read_file(name: str) -> bytes:
+    return (_SIGNIN_FOLDER / name).read_bytes()

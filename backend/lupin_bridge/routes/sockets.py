@@ -1,0 +1,386 @@
+"""The sockets of viewers: `/foxglove`, and `/rosbridge` for roslib clients.
+
+Foxglove and Lichtblick read the twin's topics as ROS has them on the wire. A client that does not
+read as fast as messages come gets the newest of each channel. Nothing more is read from one that
+has not taken the answer to its last message.
+
+A roslib client reads the twin as it would through rosbridge. One connection has `MAX_OPEN_CALLS`
+calls under way at most, `MAX_RUNNING_CALLS` of them with the twin; others wait. A call ends with
+`result` false when it takes longer than `Limits.answer_timeout_s` or its own `timeout`, or is past
+the limits of computed answers, which are those of HTTP.
+
+A client that takes nothing for `Limits.client_timeout_s` is closed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections import deque
+from contextlib import ExitStack
+from functools import partial
+from typing import Any, Final
+
+from fastapi import APIRouter, WebSocket
+
+from lupin_bridge.access.middleware import client_of
+from lupin_bridge.bridge import Bridge
+from lupin_bridge.feed.relay import Listening, NotRelayedError, Sample
+from lupin_bridge.feed.source import TwinUnavailableError
+from lupin_bridge.field import formats as field_formats
+from lupin_bridge.field import query as field_query
+from lupin_bridge.field.formats import JSON
+from lupin_bridge.routes.answers import error_response
+from lupin_bridge.routes.field import field_answer
+from lupin_bridge.serving.admission import AdmissionError
+from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection, TooManyMessages
+from lupin_bridge.stream.frames import binary_head, text_frame
+from lupin_bridge.stream.hub import CLOSE_POLICY, CLOSE_TRY_AGAIN_LATER, Client, Hub
+from lupin_bridge.viewers import foxglove_protocol, foxglove_session
+from lupin_bridge.viewers.foxglove_protocol import SUBPROTOCOLS, Channel
+from lupin_bridge.viewers.rosbridge_protocol import service_failure, service_response
+from lupin_bridge.viewers.rosbridge_services import FieldCall
+from lupin_bridge.viewers.rosbridge_session import Feeds, Writer
+from lupin_bridge.viewers.rosbridge_session import Session as RosbridgeSession
+from lupin_twin.field.engine import FieldRefused, FieldRequest
+
+log = logging.getLogger(__name__)
+router = APIRouter()
+
+MAX_OPEN_CALLS: Final = 32
+MAX_RUNNING_CALLS: Final = 2
+_WRONG_SUBPROTOCOL: Final = f"Sec-WebSocket-Protocol must offer one of {', '.join(SUBPROTOCOLS)}"
+
+
+async def has_place(websocket: WebSocket, hub: Hub) -> bool:
+    """Whether one more client may join; if not, its socket is closed with the reason."""
+    if hub.make_place(client_of(websocket)):
+        return True
+    reason = f"{hub.max_clients} clients are connected, the limit"
+    await websocket.close(CLOSE_TRY_AGAIN_LATER, reason)
+    return False
+
+
+async def next_message(websocket: WebSocket) -> str | bytes | None:
+    """The client's next message; None: it has gone."""
+    event = await websocket.receive()
+    if event["type"] == "websocket.disconnect":
+        return None
+    text: str | None = event.get("text")
+    message: str | bytes = event["bytes"] if text is None else text
+    return message
+
+
+async def dismiss(websocket: WebSocket, connection: Connection, error: TooManyMessages) -> None:
+    """Close with the reason, and ignore what the client sends until it has gone."""
+    connection.dismiss(CLOSE_POLICY, str(error))
+    while await next_message(websocket) is not None:
+        await asyncio.sleep(0)
+
+
+class _Conversation:
+    """One client of a viewer's protocol, until it has gone."""
+
+    def __init__(self, websocket: WebSocket, bridge: Bridge, **options: Any) -> None:
+        self._websocket = websocket
+        self._bridge = bridge
+        self._connection: Connection = getattr(websocket.state, CONNECTION_KEY)
+        self._client = Client(
+            self._connection,
+            address=client_of(websocket),
+            wants_status=False,
+            wants_alarms=False,
+            wants_state=False,
+            **options,
+        )
+
+    async def run(self) -> None:
+        """Until the client has gone."""
+        self._connection.on_writable = self._on_writable
+        self._bridge.join(self._client)
+        try:
+            await self._converse()
+        except TooManyMessages as error:
+            await dismiss(self._websocket, self._connection, error)
+        finally:
+            self._connection.on_writable = None
+            self._bridge.hub.leave(self._client)
+            self._end()
+
+    async def _converse(self) -> None:
+        raise NotImplementedError
+
+    def _end(self) -> None:
+        raise NotImplementedError
+
+    def _on_writable(self) -> None:
+        raise NotImplementedError
+
+    async def _send(self, message: bytes) -> None:
+        await self._write_when_free(text_frame(message))
+
+    async def _write_when_free(self, frame: bytes) -> None:
+        """Write once the socket has taken all before; until then the client counts as blocked.
+
+        What waits counts for all clients together, see `Hub.hold`.
+        """
+        hub, client = self._bridge.hub, self._client
+        if not self._connection.can_take:
+            hub.hold(client, frame)
+            if client.blocked_since_s is None:
+                client.blocked_since_s = time.monotonic()
+        await self._connection.write_when_free(frame)
+        if not self._connection.can_take:
+            hub.hold(client, frame)
+
+
+# --- Foxglove -------------------------------------------------------------------------------------
+
+
+@router.websocket("/foxglove")
+async def foxglove(websocket: WebSocket) -> None:
+    """The read-only part of Foxglove's WebSocket protocol."""
+    bridge: Bridge = websocket.app.state.bridge
+    subprotocol = foxglove_protocol.chosen(websocket.scope["subprotocols"])
+    if subprotocol is None:
+        await websocket.send_denial_response(error_response(_WRONG_SUBPROTOCOL, 400))
+        return
+    await websocket.accept(subprotocol=subprotocol)
+    if not await has_place(websocket, bridge.hub):
+        return
+    await _FoxgloveConversation(websocket, bridge).run()
+
+
+class _FoxgloveConversation(_Conversation):
+    """A Foxglove client: the topics it listens to, and what is written to it."""
+
+    def __init__(self, websocket: WebSocket, bridge: Bridge) -> None:
+        super().__init__(websocket, bridge)
+        self._offer = bridge.offer
+        self._session = foxglove_session.Session(bridge.offer.counts)
+        self._listening: dict[int, Listening] = {}
+        # Messages that answer nothing, such as notes and advertisements.
+        self._due: deque[bytes] = deque()
+        self._offer_is_due = False
+
+    async def _converse(self) -> None:
+        await self._offer.look()
+        info = foxglove_protocol.server_info(self._offer.session_id, has_time=self._offer.has_time)
+        await self._send(info)
+        with self._offer.followed(self._on_news):
+            self._on_news(None)
+            await self._receive_all()
+
+    def _end(self) -> None:
+        for listening in self._listening.values():
+            listening.close()
+
+    async def _receive_all(self) -> None:
+        while (message := await next_message(self._websocket)) is not None:
+            reaction = self._session.receive(message, time.monotonic())
+            self._stop_listening(reaction)
+            for key, channel in reaction.begun:
+                await self._begin(key, channel)
+            for reply in reaction.replies:
+                await self._send(reply)
+            # What one client has sent at once must not hold up the others.
+            await asyncio.sleep(0)
+
+    async def _begin(self, key: int, channel: Channel) -> None:
+        try:
+            topic = self._offer.topics[channel.id]
+            async with asyncio.timeout(self._bridge.limits.answer_timeout_s):
+                listening = await self._bridge.source.relay.listen(
+                    topic, partial(self._on_sample, key)
+                )
+        except (KeyError, NotRelayedError, TwinUnavailableError, TimeoutError) as error:
+            self._session.give_up(key)
+            text = f"channel {channel.id} cannot be served now: {str(error) or 'ROS is busy'}"
+            await self._send(foxglove_protocol.status(foxglove_protocol.ERROR, text))
+            return
+        if self._session.has(key, channel):
+            self._listening[key] = listening
+        else:
+            listening.close()  # the channel has gone meanwhile
+
+    def _stop_listening(self, reaction: foxglove_session.Reaction) -> None:
+        for key in reaction.ended:
+            if (listening := self._listening.pop(key, None)) is not None:
+                listening.close()
+
+    # --- what is written ------------------------------------------------------------------------
+
+    def _on_sample(self, key: int, sample: Sample) -> None:
+        note = self._session.put(key, foxglove_session.Message(sample.data, sample.stamp_ns))
+        if note is not None:
+            self._due.append(note)
+        self._write_all()
+
+    def _on_news(self, time_ns: int | None) -> None:
+        if time_ns is None:
+            self._offer_is_due = True
+        else:
+            self._session.put_time(time_ns)
+        self._write_all()
+
+    def _on_writable(self) -> None:
+        self._bridge.hub.is_free(self._client)
+        self._write_all()
+
+    def _write_all(self) -> None:
+        """Write what waits, as far as the socket takes it."""
+        while self._connection.can_take:
+            if self._offer_is_due:
+                self._offer_is_due = False
+                reaction = self._session.offer(self._offer.channels, self._offer.wires)
+                self._stop_listening(reaction)
+                self._due.extend(reaction.replies)
+            elif self._due:
+                self._write(text_frame(self._due.popleft()))
+            elif (message := self._session.next()) is not None:
+                head, payload = message
+                self._write(binary_head(len(head) + len(payload)) + head, payload)
+            else:
+                return
+
+    def _write(self, frame: bytes, rest: bytes = b"") -> None:
+        self._connection.write_shared(frame, rest)
+        self._bridge.hub.bytes_sent += len(frame) + len(rest)
+        if not self._connection.can_take:
+            self._bridge.hub.hold(self._client, rest or frame)
+
+
+# --- rosbridge ------------------------------------------------------------------------------------
+
+
+@router.websocket("/rosbridge")
+async def rosbridge(websocket: WebSocket) -> None:
+    """The read-only part of the rosbridge v2 protocol."""
+    bridge: Bridge = websocket.app.state.bridge
+    await websocket.accept()
+    if not await has_place(websocket, bridge.hub):
+        return
+    await _RosbridgeConversation(websocket, bridge).run()
+
+
+def writer_of(state: Any, bridge: Bridge) -> Writer:
+    """The one writer of an application."""
+    if not hasattr(state, "rosbridge_writer"):
+        state.rosbridge_writer = Writer(bridge.source.relay, bridge.source.workers)
+    writer: Writer = state.rosbridge_writer
+    return writer
+
+
+class _RosbridgeConversation(_Conversation):
+    """A roslib client: its session, and its calls under way."""
+
+    def __init__(self, websocket: WebSocket, bridge: Bridge) -> None:
+        session = self._session = RosbridgeSession(bridge.source.names())
+        super().__init__(
+            websocket,
+            bridge,
+            strict_interval=True,
+            wire=lambda _client, frame: session.wire(frame),
+        )
+        self._feeds = Feeds(writer_of(websocket.app.state, bridge), self._write_when_free)
+        self._calls: set[asyncio.Task[None]] = set()
+        self._running = asyncio.Semaphore(MAX_RUNNING_CALLS)
+
+    async def _converse(self) -> None:
+        while (message := await next_message(self._websocket)) is not None:
+            await self._take(message)
+
+    def _end(self) -> None:
+        self._feeds.close()
+        for call in self._calls:
+            call.cancel()
+
+    async def _take(self, message: str | bytes) -> None:
+        reaction = self._session.receive(message, time.monotonic())
+        for reply in reaction.replies:
+            await self._send(reply)
+        if reaction.field_call is not None:
+            await self._open(reaction.field_call)
+        self._follow_subscriptions(reaction.state_is_due)
+        self._feeds.follow(self._session.feeds, reaction.subscribed)
+        # What one client has sent at once must not hold up the others.
+        await asyncio.sleep(0)
+
+    def _follow_subscriptions(self, state_is_due: bool) -> None:
+        client = self._client
+        client.wants_state = self._session.is_subscribed
+        client.min_interval_s = self._session.min_interval_s
+        if state_is_due:
+            client.sent_seq = 0
+            client.next_due_s = 0.0
+            self._bridge.serve(client)
+
+    def _on_writable(self) -> None:
+        # Here and not in the hub, which looks only when a state is due: a reply may have filled
+        # the socket.
+        self._bridge.hub.is_free(self._client)
+        self._bridge.serve(self._client)
+
+    # --- calls of GetField --------------------------------------------------------------------
+
+    async def _open(self, field_call: FieldCall) -> None:
+        call = field_call.call
+        if len(self._calls) >= MAX_OPEN_CALLS:
+            text = f"{MAX_OPEN_CALLS} calls are under way, the limit for one client"
+            await self._send(service_failure(call.id, call.service, text))
+            return
+        limit_s = self._bridge.limits.answer_timeout_s
+        if call.timeout_s is not None:
+            limit_s = min(limit_s, call.timeout_s)
+        task = asyncio.create_task(self._answer(field_call, limit_s))
+        self._calls.add(task)
+        task.add_done_callback(self._calls.discard)
+
+    async def _answer(self, field_call: FieldCall, limit_s: float) -> None:
+        deadline_s = asyncio.get_running_loop().time() + limit_s
+        async with self._running:
+            with ExitStack() as held:
+                # Only the frame waits here: what it was made of is as large, and freed.
+                await self._write_when_free(
+                    await self._reply(field_call, limit_s, deadline_s, held)
+                )
+
+    async def _reply(
+        self, field_call: FieldCall, limit_s: float, deadline_s: float, held: ExitStack
+    ) -> bytes:
+        call = field_call.call
+        try:
+            async with asyncio.timeout_at(deadline_s):
+                values = await self._values(field_call.request, held)
+            response = service_response(call.id, call.service, values, result=True)
+        except TimeoutError:
+            text = f"{call.service} did not answer within {limit_s:g} s"
+            response = service_failure(call.id, call.service, text)
+        except FieldRefused as error:
+            # The service has answered, and the answer is no: as over ROS, `ok` says so.
+            values = field_formats.refusal_json(str(error))
+            response = service_response(call.id, call.service, values, result=True)
+        except (AdmissionError, TwinUnavailableError) as error:
+            response = service_failure(call.id, call.service, str(error))
+        except Exception:  # nobody awaits this task: the client gets the error, as over HTTP
+            log.exception("a call of %s met an error", call.service)
+            text = "the bridge met an error of its own, see its log"
+            response = service_failure(call.id, call.service, text)
+        return text_frame(response)
+
+    async def _values(self, request: FieldRequest, held: ExitStack) -> bytes:
+        bridge = self._bridge
+        # Under the key of the same field over HTTP: it is the same body.
+        revision = bridge.source.field_revision(request)
+        tag = revision and field_query.etag(revision, request, JSON.name, 1)
+        if tag and (lent := bridge.cache.lend(tag)) is not None:
+            answer, give_back = lent
+            give_back()  # the reply holds a copy of its own
+            return bytes(answer.body)
+        held.enter_context(bridge.admission.request(self._client.address, time.monotonic()))
+        key = (bridge.source.revision(), request, JSON.name, 1)
+        answer = await bridge.answering.get(
+            key, lambda: field_answer(bridge, self._client.address, request, JSON)
+        )
+        return bytes(answer.body)

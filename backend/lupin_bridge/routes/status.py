@@ -1,0 +1,312 @@
+"""The greenhouse's map, status, sensors and alarms; health of the bridge itself, and metrics."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Callable
+from hashlib import blake2b
+from itertools import islice
+from typing import Final
+
+import numpy as np
+import orjson
+from fastapi import APIRouter, Request, Response
+
+from lupin_bridge.access.middleware import client_of
+from lupin_bridge.feed.source import ailment
+from lupin_bridge.judge.alarm import Alarm, reasons_of_days
+from lupin_bridge.metrics import CONTENT_TYPE
+from lupin_bridge.past import query as past_query
+from lupin_bridge.past.plans import Health
+from lupin_bridge.past.query import PeriodQuery
+from lupin_bridge.query_string import parameters_of
+from lupin_bridge.routes.answers import (
+    NEVER_STORE,
+    NO_TWIN,
+    NOT_REMEMBERED,
+    TOO_MUCH,
+    bridge_of,
+    computed,
+    error_response,
+    has_etag,
+    json_response,
+    not_modified,
+    on_worker,
+    read_route,
+    respond,
+    respond_as_of,
+)
+from lupin_bridge.serving.admission import REVALIDATE, Answer
+from lupin_bridge.stream import schema
+from lupin_bridge.stream.health_json import alarms_body
+from lupin_bridge.stream.state_json import header, stamp
+from lupin_twin.field.explored import OccupancyMap
+
+# Grey of a free and of an occupied cell; unknown is transparent. The page decides what is below.
+_FREE_GREY = 236
+_OCCUPIED_GREY = 70
+_UNKNOWN_INDEX = 101
+
+
+def map_json(occupancy: OccupancyMap) -> bytes:
+    """`schema.OccupancyGrid`: where the map is and how large, without its cells."""
+    half_yaw = occupancy.origin_yaw / 2
+    return orjson.dumps(
+        {
+            "header": header(occupancy.stamp_ns, occupancy.frame_id),
+            "info": {
+                "map_load_time": stamp(0),
+                "resolution": occupancy.resolution,
+                "width": occupancy.width,
+                "height": occupancy.height,
+                "origin": {
+                    "position": {"x": occupancy.origin_x, "y": occupancy.origin_y, "z": 0.0},
+                    "orientation": {
+                        "x": 0.0,
+                        "y": 0.0,
+                        "z": math.sin(half_yaw),
+                        "w": math.cos(half_yaw),
+                    },
+                },
+            },
+        }
+    )
+
+
+def map_png(occupancy: OccupancyMap) -> bytes:
+    """One pixel a cell, the grid's last row on top (the row flip), unknown transparent.
+
+    The picture is in the grid's own axes: a map whose origin has a yaw is turned by the viewer.
+    A map without a cell is one transparent pixel, for PNG knows no empty picture.
+    """
+    # Pillow takes megabytes, and only a bridge with a map needs it.
+    from PIL import Image  # noqa: PLC0415
+
+    cells = occupancy.cells
+    if cells.size == 0:
+        cells = np.full((1, 1), -1, dtype=np.int8)
+    known = (cells >= 0) & (cells <= 100)
+    indices = np.flipud(np.where(known, cells, _UNKNOWN_INDEX)).astype(np.uint8)
+    image = Image.fromarray(np.ascontiguousarray(indices), mode="P")
+    greys = np.rint(np.linspace(_FREE_GREY, _OCCUPIED_GREY, 101)).astype(int).tolist()
+    image.putpalette([grey for grey in [*greys, 0] for _ in range(3)])
+    buffer = io.BytesIO()
+    image.save(buffer, format="PNG", transparency=b"\xff" * 101 + b"\x00", compress_level=1)
+    return buffer.getvalue()
+
+
+router = APIRouter()
+
+# What drawing a cell takes, roughly and at worst.
+_DRAW_CELL_S: Final = 50e-9
+
+_NO_MAP = {
+    304: {"description": "the ETag still holds"},
+    404: {"model": schema.ErrorMessage, "description": "no map has come yet"},
+    **TOO_MUCH,
+    503: {"model": schema.ErrorMessage, "description": "the twin is not there, or busy"},
+}
+
+
+@read_route(
+    router,
+    "/api/map",
+    summary="Frame, place and size of the occupancy grid",
+    responses={200: {"model": schema.OccupancyGrid}, **_NO_MAP},
+)
+async def occupancy_map(request: Request) -> Response:
+    """The map without its cells."""
+    return await _map(request, "json")
+
+
+@read_route(
+    router,
+    "/api/map.png",
+    summary="The occupancy grid as a picture",
+    responses={
+        200: {"content": {"image/png": {"schema": {"type": "string", "format": "binary"}}}},
+        **_NO_MAP,
+    },
+)
+async def map_picture(request: Request) -> Response:
+    """One pixel a cell, the grid's last row on top, unknown cells transparent."""
+    return await _map(request, "png")
+
+
+async def _map(request: Request, kind: str) -> Response:
+    bridge = bridge_of(request)
+    occupancy = bridge.source.occupancy_map()
+    if occupancy is None:
+        return error_response("no map has come yet on the twin's map_topic", 404)
+    # A replica that started later has the same map with a later stamp, which is in the JSON.
+    which = occupancy.stamp_ns if kind == "json" else kind
+    etag = f'"{bridge.source.identity}-{occupancy.revision}-{which}"'
+    headers = {"ETag": etag, **REVALIDATE}
+    if kind == "json":
+        if has_etag(request, etag):
+            return not_modified(etag)
+        return Response(map_json(occupancy), headers=headers, media_type="application/json")
+    cost_s = occupancy.cells.size * _DRAW_CELL_S
+    return await respond(
+        request,
+        etag,
+        lambda: computed(
+            request, etag, lambda: map_png(occupancy), "image/png", cost_s=cost_s, headers=headers
+        ),
+        etag,
+    )
+
+
+MAX_ALARMS: Final = 2_000
+# What going through an alarm and writing it take, roughly and at worst.
+_WRITE_ALARM_S: Final = 10e-6
+
+
+@read_route(
+    router,
+    "/api/health",
+    summary="The status of the greenhouse and of each tag, and why",
+    responses={
+        **NOT_REMEMBERED,
+        200: {"model": schema.Judgement},
+        503: {"model": schema.ErrorMessage, "description": "no twin was found yet, or it is busy"},
+    },
+    openapi_extra={"parameters": parameters_of(past_query.OfMoment)},
+)
+async def health(request: Request) -> Response:
+    """The verdicts that stand in the frames of `/ws/state`, with the reasons for each.
+
+    As of a moment that has passed, what was known then is judged by the ranges of now, and by the
+    scans of each tag up to then; a reason's `since` is the observation of then that says so.
+    """
+    bridge = bridge_of(request)
+    at_ns = past_query.at(request.query_params.multi_items(), bridge.ros_time_ns)
+    if at_ns is not None:
+        days = tuple(reasons_of_days(bridge.alarms.now.alarms, at_ns).items())
+        return await respond_as_of(request, Health(at_ns, bridge.criteria, days), at_ns)
+    if bridge.latest is None:
+        return error_response(NO_TWIN, 503)
+    judged = bridge.judged
+
+    async def compute() -> Answer:
+        return Answer(bridge.frames.health.whole(judged), "application/json", NEVER_STORE)
+
+    key = ("health", judged.number, bridge.status.is_live)
+    return await respond(request, key, compute)
+
+
+@read_route(
+    router,
+    "/api/sensors",
+    summary="The file of sensors that is in force: labels, units, colours, ranges",
+    responses={200: {"content": {"application/json": {"schema": {"type": "object"}}}}},
+)
+async def sensors(request: Request) -> Response:
+    """`sensors.json`, or the file that the operator gave instead, as it stands."""
+    body = bridge_of(request).criteria.sensors.text.encode()
+    etag = f'"{blake2b(body, digest_size=12).hexdigest()}"'
+    if has_etag(request, etag):
+        return not_modified(etag)
+    return json_response(body, headers={"ETag": etag, **REVALIDATE})
+
+
+@read_route(
+    router,
+    "/api/alarms",
+    summary="What was wrong, where, from when to when, and how bad at worst",
+    responses={200: {"model": schema.Alarms}, **NOT_REMEMBERED},
+    openapi_extra={"parameters": parameters_of(past_query.OfAlarms)},
+)
+async def alarms_route(request: Request) -> Response:
+    """Alarms that were active at any time of the period, the newest first and 2,000 at most.
+
+    They follow from what was observed and the ranges of now, the same in every replica.
+    """
+    bridge = bridge_of(request)
+    query = past_query.period(
+        past_query.OfAlarms, request.query_params.multi_items(), bridge.ros_time_ns
+    )
+    board = bridge.alarms.now
+    alarms = board.active if query.active else board.alarms
+
+    def body() -> bytes:
+        found = list(islice(filter(_is_in(query), alarms), MAX_ALARMS))
+        return orjson.dumps(alarms_body(found, board.source, board.since_ns))
+
+    async def compute() -> Answer:
+        with bridge.admission.computing(client_of(request)):
+            text = await on_worker(bridge, lambda _: body(), len(alarms) * _WRITE_ALARM_S)
+        return Answer(text, "application/json", NEVER_STORE)
+
+    return await respond(request, ("alarms", board.number, query), compute)
+
+
+def _is_in(query: PeriodQuery) -> Callable[[Alarm], bool]:
+    def is_in(alarm: Alarm) -> bool:
+        if query.active is not None and alarm.is_active is not query.active:
+            return False
+        if query.end_ns and alarm.raised_at_ns >= query.end_ns:
+            return False
+        cleared_ns = alarm.cleared_at_ns
+        return cleared_ns is None or cleared_ns >= query.start_ns
+
+    return is_in
+
+
+@read_route(
+    router,
+    "/healthz",
+    summary="Is the bridge itself alive?",
+    responses={
+        200: {"model": schema.Health},
+        503: {
+            "model": schema.Health,
+            "description": "the ROS thread has ended, or is stuck: restart",
+        },
+    },
+)
+async def healthz(request: Request) -> Response:
+    """503 when the ROS thread has ended or hangs in a callback, for whoever restarts services."""
+    source = bridge_of(request).source
+    wrong = ailment(source)
+    body = {
+        "ok": wrong is None,
+        "message": wrong or "The ROS thread runs.",
+        "callback_errors": source.callback_errors,
+    }
+    return json_response(orjson.dumps(body), 200 if wrong is None else 503)
+
+
+@read_route(
+    router,
+    "/metrics",
+    summary="Metrics for Prometheus",
+    responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
+)
+async def metrics(request: Request) -> Response:
+    """Clients, frames, latencies, fields, and the ROS thread, in Prometheus' text format."""
+    bridge = bridge_of(request)
+
+    async def compute() -> Answer:
+        return Answer(bridge.metrics.text(), CONTENT_TYPE, NEVER_STORE)
+
+    return await respond(request, "metrics", compute)
+
+
+@read_route(
+    router,
+    "/readyz",
+    summary="Is there a live twin behind the bridge?",
+    responses={
+        200: {"model": schema.StatusFrame},
+        503: {"model": schema.StatusFrame, "description": "never seen, silent, or dead"},
+    },
+)
+async def readyz(request: Request) -> Response:
+    """The status as WebSocket clients receive it; 503 while the twin is offline.
+
+    A journal that cannot be written is reported, and no reason for 503: the twin goes on.
+    """
+    status = bridge_of(request).status
+    return json_response(orjson.dumps(status.frame()), 200 if status.is_live else 503)

@@ -1,0 +1,302 @@
+"""Connections below their protocols: accepted, evicted, bounded, torn down.
+
+Connections are taken off the listening socket as long as there are files for them. asyncio's own
+server knows no limit: out of files, it logs an error for each place in its backlog and tries all of
+them again a second later, 97 MB of log in half a minute.
+
+An open connection costs a file. A connection that has requested nothing yet, or does not take what
+it requested, is evicted before any new one is refused. The address with the most connections loses
+its own first, so however many it opens, it evicts none but itself.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import heapq
+import logging
+import resource
+import socket
+import ssl
+import struct
+from asyncio.sslproto import SSLProtocol
+from collections import Counter, defaultdict
+from collections.abc import Callable, Collection, Iterable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Protocol
+
+import orjson
+
+from lupin_bridge.serving.admission import client_key
+from lupin_twin.core.drops import Throttle
+
+log = logging.getLogger(__name__)
+
+# Not `http.HTTPStatus`: its names for 414 and 431 depend on the version of Python.
+_PHRASES: Final = {
+    400: "Bad Request",
+    413: "Content Too Large",
+    414: "URI Too Long",
+    431: "Request Header Fields Too Large",
+}
+
+
+def refusal(status: int, detail: str) -> bytes:
+    """A whole HTTP answer (`schema.ErrorMessage`), after which the connection ends."""
+    body = orjson.dumps({"detail": detail})
+    head = (
+        f"HTTP/1.1 {status} {_PHRASES[status]}\r\n"
+        "Content-Type: application/json\r\n"
+        f"Content-Length: {len(body)}\r\n"
+        "Cache-Control: no-store\r\n"
+        "X-Content-Type-Options: nosniff\r\n"
+        "Connection: close\r\n\r\n"
+    )
+    return head.encode() + body
+
+
+# What the kernel may hold that the network has not taken; what is under way does not count. On its
+# own it would hold 4 MB (tcp_wmem): for a slow reader, minutes of old states.
+UNSENT_BYTES: Final = 128 * 1024
+
+# How long a client may read the reason for a close before its socket is torn down. Closed at once,
+# with more of the client's bytes on their way, the socket would be reset, and the reason lost.
+CLOSE_GRACE_S: Final = 1.0
+
+
+def bound_unsent(transport: asyncio.BaseTransport) -> None:
+    """Let a connection's socket take no more than `UNSENT_BYTES` ahead of the network."""
+    connection: socket.socket = transport.get_extra_info("socket")
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT_BYTES)
+
+
+def tear_down(transport: asyncio.WriteTransport) -> None:
+    """End a connection now; one whose other side does not read is reset.
+
+    Closed, its socket would go on offering what nobody reads for another four minutes.
+    """
+    if _is_detached(transport):
+        return
+    if transport.get_write_buffer_size() > 0:
+        reset(transport)
+    else:
+        transport.abort()
+
+
+def reset(transport: asyncio.WriteTransport) -> None:
+    """End a connection now, and so that its other side takes it for no proper end."""
+    if _is_detached(transport):
+        return
+    no_lingering = struct.pack("ii", 1, 0)
+    connection: socket.socket = transport.get_extra_info("socket")
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, no_lingering)
+    transport.abort()
+
+
+def _is_detached(transport: asyncio.WriteTransport) -> bool:
+    """Whether it is one of asyncio's for TLS that was closed when its connection had ended.
+
+    Any call then, even how much is unsent, is an AttributeError.
+    """
+    return getattr(transport, "_ssl_protocol", transport) is None
+
+
+class Evictable(Protocol):
+    """A connection, or a handshake of TLS."""
+
+    @property
+    def address(self) -> str:
+        """The client that it comes from (`rate_limit.client_key`)."""
+
+    @property
+    def waiting_since_s(self) -> float | None:
+        """Since when it has only waited, s; None: it is being served."""
+
+    def abort(self) -> None:
+        """End it now."""
+
+
+def choose_evicted(connections: Iterable[Evictable], number: int) -> list[Evictable]:
+    """At most `number` waiting connections: of the largest addresses, the longest waiting first.
+
+    After each one its address has one less. Of two addresses with as many connections, the one with
+    the longest waiting connection comes first.
+    """
+    sizes: Counter[str] = Counter()
+    waiting: defaultdict[str, list[tuple[float, int, Evictable]]] = defaultdict(list)
+    for order, connection in enumerate(connections):
+        sizes[connection.address] += 1
+        since_s = connection.waiting_since_s
+        if since_s is not None:
+            waiting[connection.address].append((since_s, order, connection))
+    # The next of an address is evicted when the address is smaller by those before it.
+    ranked = [
+        (earlier - sizes[address], *entry)
+        for address, own in waiting.items()
+        for earlier, entry in enumerate(sorted(own, key=lambda entry: entry[:2]))
+    ]
+    chosen = heapq.nsmallest(number, ranked, key=lambda entry: entry[:3])
+    return [connection for *_, connection in chosen]
+
+
+# Files that stay free for the rest of the process: DDS, the page's files.
+SPARE_FILES: Final = 64
+# However few files there are: with fewer connections the bridge would serve nobody.
+MIN_CONNECTIONS: Final = 8
+# Connections accepted in one turn of the event loop.
+AT_ONCE: Final = 64
+# Share of connections evicted at once when full: each choice looks at all of them.
+EVICTED_SHARE: Final = 1 / 16
+# asyncio's buffer for each connection over TLS, from its first moment on. Its default is 256 kB,
+# which a stranger could have thousands of times. A record of TLS has 16 kB at most.
+TLS_BUFFER_BYTES: Final = 32 * 1024
+RETRY_S: Final = 0.25
+WARNING_PERIOD_S: Final = 30.0
+
+_NO_FILES: Final = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
+
+
+def room_for_connections() -> int:
+    """How many connections this process's limit on open files leaves room for."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if limit == resource.RLIM_INFINITY:
+        limit = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+    if limit == resource.RLIM_INFINITY:
+        return 1 << 20
+    return max(MIN_CONNECTIONS, limit - len(list(Path("/proc/self/fd").iterdir())) - SPARE_FILES)
+
+
+@dataclass(eq=False, slots=True)
+class _Handshake:
+    """A connection that has no protocol yet: TLS is being agreed on."""
+
+    address: str
+    waiting_since_s: float | None
+    task: asyncio.Task[None] | None = None
+
+    def abort(self) -> None:
+        if self.task is not None:
+            self.task.cancel()
+
+
+class Acceptor:
+    """Accepts and evicts connections; uvicorn closes it as it would an `asyncio.Server`.
+
+    `connections` are all that have a protocol. A handshake of TLS, and its end, may take
+    `timeout_s`.
+    """
+
+    def __init__(
+        self,
+        listener: socket.socket,
+        make_protocol: Callable[[], asyncio.BaseProtocol],
+        connections: Collection[Evictable],
+        *,
+        room: int,
+        tls: ssl.SSLContext | None,
+        timeout_s: float,
+    ) -> None:
+        self._listener = listener
+        self._make_protocol = make_protocol
+        self._connections = connections
+        self._room = room
+        self._options: dict[str, Any] = {}
+        if tls is not None:
+            SSLProtocol.max_size = TLS_BUFFER_BYTES
+            self._options = {
+                "ssl": tls,
+                "ssl_handshake_timeout": timeout_s,
+                "ssl_shutdown_timeout": timeout_s,
+            }
+        self._handshakes: set[_Handshake] = set()
+        self._warnings = Throttle(WARNING_PERIOD_S)
+        self._retry: asyncio.TimerHandle | None = None
+        self._loop = asyncio.get_running_loop()
+        self._resume()
+
+    def close(self) -> None:
+        """Accept no more, and end the handshakes."""
+        if self._retry is not None:
+            self._retry.cancel()
+        self._loop.remove_reader(self._listener)
+        for handshake in self._handshakes:
+            handshake.abort()
+
+    async def wait_closed(self) -> None:
+        """Until they have ended."""
+        tasks = [handshake.task for handshake in self._handshakes if handshake.task is not None]
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    def _resume(self) -> None:
+        self._retry = None
+        self._loop.add_reader(self._listener, self._take)
+
+    def _pause(self) -> None:
+        self._loop.remove_reader(self._listener)
+        self._retry = self._loop.call_later(RETRY_S, self._resume)
+
+    def _take(self) -> None:
+        """Accept what waits in the backlog."""
+        if self._is_full():
+            # Evicted connections are gone by the next turn of the event loop.
+            if not self._make_room():
+                self._pause()
+            return
+        for _ in range(AT_ONCE):
+            try:
+                connection, _ = self._listener.accept()
+            except (BlockingIOError, InterruptedError, ConnectionAbortedError):
+                return
+            except OSError as error:
+                if error.errno not in _NO_FILES:
+                    raise
+                self._warn("no new connections for now: %s", error.strerror)
+                self._make_room()
+                self._pause()
+                return
+            connection.setblocking(False)
+            self._admit(connection)
+            if self._is_full():
+                return  # evict only when another connection is known to wait
+
+    def _is_full(self) -> bool:
+        return len(self._connections) + len(self._handshakes) >= self._room
+
+    def _admit(self, connection: socket.socket) -> None:
+        handshake = _Handshake(_address_of(connection), self._loop.time())
+        self._handshakes.add(handshake)
+        handshake.task = self._loop.create_task(self._handshake(connection))
+        handshake.task.add_done_callback(lambda _: self._handshakes.discard(handshake))
+
+    async def _handshake(self, connection: socket.socket) -> None:
+        with suppress(OSError):  # no TLS, none in time, or closed: asyncio has closed it
+            await self._loop.connect_accepted_socket(
+                self._make_protocol, connection, **self._options
+            )
+
+    def _make_room(self) -> bool:
+        all_open: list[Evictable] = [*self._connections, *self._handshakes]
+        chosen = choose_evicted(all_open, max(1, int(self._room * EVICTED_SHARE)))
+        for connection in chosen:
+            connection.abort()
+        self._warn(
+            "%d connections are open, and there are files for %d: evicted the %d that have "
+            "waited longest",
+            len(all_open),
+            self._room,
+            len(chosen),
+        )
+        return bool(chosen)
+
+    def _warn(self, text: str, *values: object) -> None:
+        if self._warnings.allow(text, self._loop.time()) is not None:
+            log.warning(text, *values)
+
+
+def _address_of(connection: socket.socket) -> str:
+    try:
+        return client_key(connection.getpeername()[0])
+    except OSError:
+        return ""  # it has gone already

@@ -1,1 +1,0 @@
-"""Sources of state: a twin in this process or elsewhere, and the one crossing of threads."""

@@ -1,0 +1,321 @@
+"""The channels for Foxglove's clients, and one client: its subscriptions, and what waits for it.
+
+Channels are a twin's topics, and the layers that somebody publishes now. They are looked up while
+there are clients, once for all of them. A slow client gets the newest message of each subscription
+next: older ones that could not be written are dropped. The time is an argument, seconds that never
+jump.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import uuid
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from itertools import count
+from typing import Final
+
+from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
+from lupin_bridge.feed.topics import Topic, TwinNames, topics_of
+from lupin_bridge.message_schemas import schema_text
+from lupin_bridge.serving.ws_protocol import ClientPace, shown
+from lupin_bridge.viewers import foxglove_protocol as protocol
+from lupin_bridge.viewers.foxglove_protocol import MAX_SUBSCRIPTIONS, Channel, Refused, Subscribe
+
+log = logging.getLogger(__name__)
+
+# The largest message that one client is sent: a map of 4,000 × 4,000 cells has 16 MB, a layer of a
+# million points 20. What waits for one that does not read is one such message.
+MAX_MESSAGE_BYTES: Final = 24_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A message on its way: its payload is the relay's own bytes, shared with everybody."""
+
+    payload: bytes
+    stamp_ns: int
+
+
+@dataclass(slots=True)
+class Counts:
+    """Messages that were written to clients, and those that gave way to newer ones."""
+
+    sent: int = 0
+    skipped: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Reaction:
+    """What a message leads to: replies, and subscriptions (id and channel) to begin or to end."""
+
+    replies: tuple[bytes, ...] = ()
+    begun: tuple[tuple[int, Channel], ...] = ()
+    ended: tuple[int, ...] = ()
+
+
+class Session:
+    """The state of one connection."""
+
+    def __init__(self, counts: Counts) -> None:
+        self._counts = counts
+        self._pace = ClientPace()
+        self._subscriptions: dict[int, Channel] = {}
+        self._advertised: dict[int, Channel] = {}
+        self._waiting: dict[int, Message] = {}
+        self._too_large: set[int] = set()
+        self._time_ns: int | None = None
+
+    def receive(self, message: str | bytes, now_s: float) -> Reaction:
+        """Take one message from the client.
+
+        Raises:
+            TooManyMessages: the client is to be closed.
+
+        """
+        self._pace.take(now_s)
+        try:
+            request = protocol.parse(message)
+        except Refused as refused:
+            return Reaction((protocol.status(protocol.ERROR, str(refused)),))
+        if isinstance(request, Subscribe):
+            return self._subscribe(request)
+        return self._unsubscribe(request.ids)
+
+    def offer(self, channels: Mapping[int, Channel], wires: Mapping[int, bytes]) -> Reaction:
+        """What the client needs of the channels that there are now.
+
+        Subscriptions to those that are gone end.
+        """
+        gone = self._advertised.keys() - channels.keys()
+        new = [channel_id for channel_id in channels if channel_id not in self._advertised]
+        replies = []
+        if gone:
+            replies.append(protocol.unadvertise(gone))
+        if new or not self._advertised:
+            replies.append(protocol.advertise(wires[channel_id] for channel_id in new))
+        self._advertised = dict(channels)
+        ended = [key for key, channel in self._subscriptions.items() if channel.id in gone]
+        for key in ended:
+            self._end(key)
+        return Reaction(tuple(replies), ended=tuple(ended))
+
+    def has(self, subscription_id: int, channel: Channel) -> bool:
+        """Whether this subscription is open."""
+        return self._subscriptions.get(subscription_id) is channel
+
+    def give_up(self, subscription_id: int) -> None:
+        """A subscription cannot be served after all."""
+        if subscription_id in self._subscriptions:
+            self._end(subscription_id)
+
+    def put(self, subscription_id: int, message: Message) -> bytes | None:
+        """A message has come for a subscription; returns a reply, if there is something to say."""
+        channel = self._subscriptions.get(subscription_id)
+        if channel is None:
+            return None
+        if len(message.payload) > MAX_MESSAGE_BYTES:
+            return self._leave_out(channel, len(message.payload))
+        self._counts.skipped += subscription_id in self._waiting
+        # Behind the others that wait: one fast channel must not keep them from their turn.
+        self._waiting.pop(subscription_id, None)
+        self._waiting[subscription_id] = message
+        return None
+
+    def put_time(self, stamp_ns: int) -> None:
+        """Simulated time goes on."""
+        self._time_ns = stamp_ns
+
+    def next(self) -> tuple[bytes, bytes] | None:
+        """What is to be written next, as a binary message in two parts; None: nothing waits."""
+        if self._time_ns is not None:
+            head = protocol.time(self._time_ns)
+            self._time_ns = None
+            return head, b""
+        if not self._waiting:
+            return None
+        subscription_id = next(iter(self._waiting))
+        message = self._waiting.pop(subscription_id)
+        self._counts.sent += 1
+        return protocol.message_head(subscription_id, message.stamp_ns), message.payload
+
+    def _subscribe(self, request: Subscribe) -> Reaction:
+        begun: list[tuple[int, Channel]] = []
+        errors = []
+        for key, channel_id in request.subscriptions:
+            channel = self._advertised.get(channel_id)
+            if channel is None:
+                errors.append(f"there is no channel {channel_id}")
+            elif key in self._subscriptions:
+                errors.append(f"subscription {key} is in use")
+            elif channel in self._subscriptions.values():
+                errors.append(f"channel {channel_id} is subscribed to already")
+            elif len(self._subscriptions) >= MAX_SUBSCRIPTIONS:
+                errors.append(f"{MAX_SUBSCRIPTIONS} subscriptions are open, the limit")
+            else:
+                self._subscriptions[key] = channel
+                begun.append((key, channel))
+        return Reaction(_errors(errors), begun=tuple(begun))
+
+    def _unsubscribe(self, ids: tuple[int, ...]) -> Reaction:
+        ended = [key for key in dict.fromkeys(ids) if key in self._subscriptions]
+        for key in ended:
+            self._end(key)
+        errors = [f"there is no subscription {key}" for key in ids if key not in ended]
+        return Reaction(_errors(errors), ended=tuple(ended))
+
+    def _end(self, subscription_id: int) -> None:
+        del self._subscriptions[subscription_id]
+        self._waiting.pop(subscription_id, None)
+
+    def _leave_out(self, channel: Channel, size: int) -> bytes | None:
+        if channel.id in self._too_large:
+            return None  # said once
+        self._too_large.add(channel.id)
+        return protocol.status(
+            protocol.WARNING,
+            f"messages on {shown(channel.topic)} are left out while they are larger than "
+            f"{MAX_MESSAGE_BYTES} bytes: this one has {size}",
+        )
+
+
+def _errors(errors: list[str]) -> tuple[bytes, ...]:
+    # One for all: the answer is never longer than the request.
+    return (protocol.status(protocol.ERROR, "; ".join(errors)),) if errors else ()
+
+
+# How often layers are looked for, s.
+LOOK_S: Final = 2.0
+# How often simulated time is sent, s: often enough to look as if it ran.
+TICK_S: Final = 0.1
+MAX_LAYERS: Final = 64
+
+_POINTS: Final = "sensor_msgs/msg/PointCloud2"
+_MARKERS: Final = "visualization_msgs/msg/MarkerArray"
+
+
+class Offer:
+    """What clients may subscribe to; belongs to the event loop.
+
+    `channels`, `wires` (the same as they are advertised) and `topics` go by the channels' ids.
+    `has_time`: time is simulated.
+    """
+
+    def __init__(self, source: TwinSource) -> None:
+        self.session_id = uuid.uuid4().hex
+        self.channels: dict[int, Channel] = {}
+        self.wires: dict[int, bytes] = {}
+        self.topics: dict[int, Topic] = {}
+        self.has_time = False
+        self._sent_ns: int | None = None
+        self.counts = Counts()
+        self._source = source
+        self._ids = count(1)
+        self._known: dict[Topic, Channel] = {}
+        self._missing: set[str] = set()
+        self._followers: dict[Callable[[int | None], None], None] = {}
+        self._following: list[asyncio.Task[None]] = []
+        self._looking: asyncio.Task[None] | None = None
+
+    @contextmanager
+    def followed(self, on_news: Callable[[int | None], None]) -> Iterator[None]:
+        """Have `on_news` called when channels come or go (None), or time does (ROS time, ns).
+
+        Of time that stands, at once: the others have it, and it may never go on.
+        """
+        self._followers[on_news] = None
+        if self._following:
+            if self._sent_ns is not None:
+                on_news(self._sent_ns)
+        else:
+            self._sent_ns = None
+            self._following = [
+                asyncio.create_task(self._keep_looking(), name="foxglove channels"),
+                asyncio.create_task(self._follow_time(), name="foxglove time"),
+            ]
+        try:
+            yield
+        finally:
+            del self._followers[on_news]
+            if not self._followers:
+                for task in self._following:
+                    task.cancel()
+                self._following = []
+
+    async def look(self) -> None:
+        """Bring the channels up to date; concurrent callers share one look."""
+        if self._looking is None or self._looking.done():
+            self._looking = asyncio.create_task(self._look(), name="foxglove look")
+        await asyncio.shield(self._looking)
+
+    async def _look(self) -> None:
+        names = self._source.names()
+        wanted = list(topics_of(names))
+        try:
+            published = await self._source.relay.published(partial(_is_layer, names))
+            self.has_time = (await self._source.relay.time()).is_simulated
+        except TwinUnavailableError:
+            published = {}
+        wanted += [Topic(name, kind) for name, kind in sorted(published.items())[:MAX_LAYERS]]
+        known = {}
+        for topic in wanted:
+            channel = self._known.get(topic) or await self._channel(topic)
+            if channel is not None:
+                known[topic] = channel
+        if self._known == known:
+            return
+        self._known = known
+        self.topics = {channel.id: topic for topic, channel in known.items()}
+        self.channels = {channel.id: channel for channel in known.values()}
+        self.wires = {
+            key: self.wires.get(key) or channel.json() for key, channel in self.channels.items()
+        }
+        self._notify(None)
+
+    async def _channel(self, topic: Topic) -> Channel | None:
+        if topic.type_name in self._missing:
+            return None
+        try:
+            text = await asyncio.to_thread(schema_text, topic.type_name)
+        except LookupError as error:
+            self._missing.add(topic.type_name)
+            log.warning("%s is not offered to viewers: %s", topic.name, error)
+            return None
+        return Channel(next(self._ids), topic.name, topic.type_name, text)
+
+    async def _keep_looking(self) -> None:
+        while True:
+            await asyncio.sleep(LOOK_S)
+            try:
+                await self.look()
+            except Exception:  # nobody awaits this task: the next look comes whatever it was
+                log.exception("looking for layers met an error and goes on")
+
+    async def _follow_time(self) -> None:
+        while True:
+            await asyncio.sleep(TICK_S)
+            if not self.has_time:
+                continue
+            try:
+                now_ns = (await self._source.relay.time()).now_ns
+            except TwinUnavailableError:
+                continue
+            if now_ns not in (0, self._sent_ns):  # 0: there is no time yet
+                self._sent_ns = now_ns
+                self._notify(now_ns)
+
+    def _notify(self, time_ns: int | None) -> None:
+        for on_news in list(self._followers):
+            try:
+                on_news(time_ns)
+            except Exception:  # whatever it is: the other followers are notified all the same
+                log.exception("a viewer met an error")
+
+
+def _is_layer(names: TwinNames, topic: str, type_name: str) -> bool:
+    if type_name == _POINTS:
+        return topic.startswith(names.field_layers)
+    return type_name == _MARKERS and topic in (names.tags_layer, names.planters_layer)

@@ -1,0 +1,338 @@
+"""One rosbridge client: its subscriptions, how fast it may send, and the ROS topics that it gets.
+
+A message of a ROS topic is written once for all its clients, by a worker: a map of millions of
+cells takes tenths of a second. Of what waits for a client, the topic's depth is kept: the newest
+map, the newest 50 observations; of a topic that is throttled the newest alone. Nor is it more than
+the topic's bytes. The time is an argument, seconds of a clock that never jumps.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import OrderedDict
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Final
+
+from lupin_bridge.feed.relay import Bounded, NotRelayedError, Relay, Sample
+from lupin_bridge.feed.shared_work import Shared
+from lupin_bridge.feed.source import TwinUnavailableError
+from lupin_bridge.feed.topics import Topic, TwinNames, topics_of
+from lupin_bridge.serving.ws_protocol import ClientPace, shown
+from lupin_bridge.stream.frames import StateFrame, text_frame
+from lupin_bridge.viewers.rosbridge_protocol import (
+    LEVELS,
+    CallService,
+    Id,
+    Level,
+    Refused,
+    SetLevel,
+    Subscribe,
+    Unsubscribe,
+    parse,
+    publish,
+    service_failure,
+    service_response,
+    status,
+)
+from lupin_bridge.viewers.rosbridge_services import FieldCall, absolute, answer, is_type, json_of
+from lupin_twin.runtime.workers import Workers
+
+log = logging.getLogger(__name__)
+
+MAX_SUBSCRIPTIONS: Final = 32
+
+
+@dataclass(frozen=True, slots=True)
+class Feed:
+    """A subscription to a topic that the client spells `name`."""
+
+    topic: Topic
+    name: str
+    min_interval_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Reaction:
+    """What a message leads to: replies to send now, a state that is due now, a field to compute.
+
+    `subscribed` is the topic, as the client spells it, whose newest messages are due.
+    """
+
+    replies: tuple[bytes, ...] = ()
+    state_is_due: bool = False
+    subscribed: str | None = None
+    field_call: FieldCall | None = None
+
+
+class Session:
+    """The state of one connection."""
+
+    def __init__(self, names: TwinNames) -> None:
+        self._names = names
+        self._level: Level = "warning"
+        self._pace = ClientPace()
+        self._topics = {topic.name: topic for topic in topics_of(names)}
+        # By (topic as the client spells it, subscription's id); the last made is the last.
+        self._subscriptions: dict[tuple[str, Id], Subscribe] = {}
+
+    @property
+    def is_subscribed(self) -> bool:
+        """Whether the client wants the state, which is written for everybody at once."""
+        return bool(self._states())
+
+    @property
+    def min_interval_s(self) -> float:
+        """The least time between two states: that of the subscription in the greatest hurry."""
+        wanted = self._states()
+        return min((self._interval_s(name) for name in wanted), default=0.0)
+
+    @property
+    def feeds(self) -> dict[str, Feed]:
+        """Its other topics, which come from the relay, by their spelling."""
+        return {
+            name: Feed(self._topic(name), name, self._interval_s(name))
+            for name, _ in self._subscriptions
+            if not self._is_state(name)
+        }
+
+    def _topic(self, name: str) -> Topic:
+        return self._topics[absolute(name)]
+
+    def _is_state(self, name: str) -> bool:
+        return self._topic(name).name == self._names.state_topic
+
+    def _interval_s(self, name: str) -> float:
+        rates = [
+            one.throttle_rate_ms for (topic, _), one in self._subscriptions.items() if topic == name
+        ]
+        return min(rates) / 1000.0
+
+    def _states(self) -> dict[str, None]:
+        """The spellings of the state's topic under which it is wanted."""
+        return {name: None for name, _ in self._subscriptions if self._is_state(name)}
+
+    def receive(self, message: str | bytes, now_s: float) -> Reaction:
+        """Take one frame from the client.
+
+        Raises:
+            TooManyMessages: the client is to be closed.
+
+        """
+        self._pace.take(now_s)
+        try:
+            request = parse(message)
+            match request:
+                case Subscribe():
+                    return self._subscribe(request)
+                case Unsubscribe():
+                    return self._unsubscribe(request)
+                case CallService():
+                    return self._call_service(request)
+                case SetLevel():
+                    self._level = request.level
+                    return Reaction()
+        except Refused as refused:
+            return Reaction(self._refusal(refused))
+
+    def wire(self, frame: StateFrame) -> bytes:
+        """A state as this client reads it: once under each spelling of the topic it subscribed to.
+
+        Written once for all clients that spell it alike.
+        """
+        spellings = self._states()
+        return b"".join(
+            frame.wire(f"rosbridge {topic}", partial(_published, topic, frame))
+            for topic in spellings
+        )
+
+    def _subscribe(self, request: Subscribe) -> Reaction:
+        topic = self._topics.get(absolute(request.topic))
+        if topic is None:
+            raise Refused(
+                f"topic {shown(request.topic)} is not served, "
+                f"expected one of {', '.join(self._topics)}",
+                request.id,
+            )
+        if request.type and not is_type(request.type, topic.type_name):
+            raise Refused(f"type is {shown(request.type)}, expected {topic.type_name}", request.id)
+        key = (request.topic, request.id)
+        if key not in self._subscriptions and len(self._subscriptions) >= MAX_SUBSCRIPTIONS:
+            raise Refused(
+                f"{len(self._subscriptions)} subscriptions are open, the limit", request.id
+            )
+        self._subscriptions.pop(key, None)
+        self._subscriptions[key] = request
+        return Reaction(
+            self._warn(request.warnings, request.id),
+            state_is_due=self._is_state(request.topic),
+            subscribed=request.topic,
+        )
+
+    def _unsubscribe(self, request: Unsubscribe) -> Reaction:
+        ended = [
+            (topic, message_id)
+            for topic, message_id in self._subscriptions
+            if topic == request.topic and request.id in (None, message_id)
+        ]
+        for key in ended:
+            del self._subscriptions[key]
+        if ended:
+            return Reaction()
+        text = f"there is no such subscription to topic {shown(request.topic)}"
+        return Reaction(self._warn((text,), request.id))
+
+    def _call_service(self, request: CallService) -> Reaction:
+        warnings = self._warn(request.warnings, request.id)
+        reply = answer(request, self._names)
+        if isinstance(reply, FieldCall):
+            return Reaction(warnings, field_call=reply)
+        response = service_response(request.id, request.service, reply, result=True)
+        return Reaction((*warnings, response))
+
+    def _refusal(self, refused: Refused) -> tuple[bytes, ...]:
+        if refused.service is not None:
+            return (service_failure(refused.id, refused.service, str(refused)),)
+        return self._status("error", str(refused), refused.id)
+
+    def _warn(self, texts: tuple[str, ...], message_id: Id) -> tuple[bytes, ...]:
+        return tuple(reply for text in texts for reply in self._status("warning", text, message_id))
+
+    def _status(self, level: Level, text: str, message_id: Id) -> tuple[bytes, ...]:
+        if LEVELS.index(level) > LEVELS.index(self._level):
+            return ()
+        return (status(level, text, message_id),)
+
+
+def _published(topic: str, frame: StateFrame) -> bytes:
+    return publish(topic, frame.message_json)
+
+
+# The largest message that is sent, bytes of CDR: twice as much in JSON, and more.
+MAX_MESSAGE_BYTES: Final = 24_000_000
+# Frames in the cache for clients that want the same one a little later, bytes.
+MAX_CACHE_BYTES: Final = 32_000_000
+# What writing takes, roughly and at worst, s a byte of CDR.
+_WRITE_S: Final = 1e-7
+
+
+class Writer:
+    """Samples as frames; belongs to the event loop, and one to all clients."""
+
+    def __init__(self, relay: Relay, workers: Workers) -> None:
+        self.relay = relay
+        self._workers = workers
+        self._writing: Shared[bytes] = Shared()
+        # With the sample, whose id is the key.
+        self._cache: OrderedDict[tuple[str, int], tuple[Sample, bytes]] = OrderedDict()
+        self._cache_bytes = 0
+
+    async def frame(self, feed: Feed, sample: Sample) -> bytes:
+        """The sample as that feed's client reads it.
+
+        Raises:
+            ValueError: it is none of its type, or too large.
+
+        """
+        key = (feed.name, id(sample))
+        cached = self._cache.get(key)
+        if cached is not None:
+            return cached[1]
+        return await self._writing.get(key, lambda: self._write(key, feed, sample))
+
+    async def _write(self, key: tuple[str, int], feed: Feed, sample: Sample) -> bytes:
+        frame = await asyncio.wrap_future(
+            self._workers.submit(
+                lambda _: _written(self.relay, feed, sample), len(sample.data) * _WRITE_S
+            )
+        )
+        self._cache[key] = (sample, frame)
+        self._cache_bytes += len(frame)
+        while self._cache_bytes > MAX_CACHE_BYTES:
+            _, (_, oldest) = self._cache.popitem(last=False)
+            self._cache_bytes -= len(oldest)
+        return frame
+
+
+def _written(relay: Relay, feed: Feed, sample: Sample) -> bytes:
+    message = relay.read(feed.topic, sample)
+    try:
+        return text_frame(publish(feed.name, json_of(message)))
+    except TypeError as error:
+        raise ValueError(str(error)) from error
+
+
+class Feeds:
+    """One client's feeds: each is a task that waits for the client and never for another."""
+
+    def __init__(self, writer: Writer, send: Callable[[bytes], Awaitable[None]]) -> None:
+        self._writer = writer
+        self._send = send
+        self._tasks: dict[str, tuple[Feed, asyncio.Task[None]]] = {}
+        # Logged once for each topic: nonsense on a topic must not fill the log.
+        self._logged: set[tuple[str, bool]] = set()
+
+    def follow(self, feeds: dict[str, Feed], renewed: str | None) -> None:
+        """Have these, by their spelling, and no others; one that is `renewed` begins anew."""
+        for name, (feed, task) in list(self._tasks.items()):
+            if feeds.get(name) != feed or name == renewed:
+                task.cancel()
+                del self._tasks[name]
+        for name, feed in feeds.items():
+            if name not in self._tasks:
+                task = asyncio.create_task(self._feed(feed), name=f"rosbridge {name}")
+                self._tasks[name] = (feed, task)
+
+    def close(self) -> None:
+        """End all of them."""
+        self.follow({}, None)
+
+    async def _feed(self, feed: Feed) -> None:
+        waiting = Bounded(replace(feed.topic, depth=1) if feed.min_interval_s else feed.topic)
+        has_come = asyncio.Event()
+
+        def take(sample: Sample) -> None:
+            waiting.put(sample)
+            has_come.set()
+
+        try:
+            listening = await self._writer.relay.listen(feed.topic, take)
+        except (NotRelayedError, TwinUnavailableError) as error:
+            await self._report(feed, str(error))
+            return
+        try:
+            while True:
+                await has_come.wait()
+                has_come.clear()
+                while waiting:
+                    await self._send_sample(feed, waiting.take())
+                    if feed.min_interval_s:
+                        await asyncio.sleep(feed.min_interval_s)
+        finally:
+            listening.close()
+
+    async def _send_sample(self, feed: Feed, sample: Sample) -> None:
+        if len(sample.data) > MAX_MESSAGE_BYTES:
+            await self._report(
+                feed,
+                f"a message of topic {shown(feed.name)} is left out: it has {len(sample.data)} "
+                f"bytes, the limit is {MAX_MESSAGE_BYTES}",
+            )
+            return
+        try:
+            frame = await self._writer.frame(feed, sample)
+        except ValueError as error:
+            await self._report(feed, f"a message of topic {shown(feed.name)} is none: {error}")
+        except Exception as error:  # noqa: BLE001  # nobody awaits this task: the next one comes
+            await self._report(feed, "the bridge met an error of its own, see its log", error)
+        else:
+            await self._send(frame)
+
+    async def _report(self, feed: Feed, text: str, unforeseen: Exception | None = None) -> None:
+        about = feed.name, unforeseen is None
+        if about not in self._logged:
+            self._logged.add(about)
+            log.warning("rosbridge, %s: %s", feed.topic.name, text, exc_info=unforeseen)
+        await self._send(text_frame(status("error", text)))

@@ -1,0 +1,47 @@
+import { StrictMode } from 'react';
+import { createRoot } from 'react-dom/client';
+
+import '../styles/tokens.css';
+import '../styles/base.css';
+import '../styles/health.css';
+import '../styles/fleet.css';
+import { LANGUAGE } from '../strings';
+import { fleetWordsOf } from '../words/fleet';
+import { follow } from './follow';
+import { Overview } from './Overview';
+
+const words = fleetWordsOf(LANGUAGE);
+const isKiosk = new URLSearchParams(window.location.search).has('kiosk');
+const system = window.matchMedia('(prefers-color-scheme: dark)');
+const theme = (): void => {
+  document.documentElement.dataset['theme'] = system.matches ? 'dark' : 'light';
+};
+
+document.documentElement.lang = LANGUAGE;
+document.title = words.title;
+system.addEventListener('change', theme);
+theme();
+
+const element = document.getElementById('root');
+if (element) {
+  const root = createRoot(element);
+  const address = new URL('ws/sites', window.location.href);
+  address.protocol = address.protocol.replace('http', 'ws');
+  address.search = address.hash = '';
+  follow(address.href, (seen) => {
+    root.render(
+      <StrictMode>
+        <Overview seen={seen} words={words} isKiosk={isKiosk} />
+      </StrictMode>,
+    );
+  });
+  root.render(
+    <StrictMode>
+      <Overview
+        seen={{ sites: new Map(), archive: null, lostAt: null }}
+        words={words}
+        isKiosk={isKiosk}
+      />
+    </StrictMode>,
+  );
+}

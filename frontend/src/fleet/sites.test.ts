@@ -1,0 +1,78 @@
+import { expect, test } from 'vitest';
+
+import { chosen, countsOf, parseSites, withFrame, type Site, type SitesFrame } from './sites';
+
+const site = (name: string, more: Partial<Site> = {}): Site => ({
+  site: name,
+  name,
+  verdict: 'healthy',
+  last_verdict: 'healthy',
+  active_alarms: 0,
+  last_received: { sec: 1_700_000_000, nanosec: 0 },
+  lag_s: 0.5,
+  is_live: true,
+  ...more,
+});
+const frame = (sites: readonly Site[], more: Partial<SitesFrame> = {}): SitesFrame => ({
+  type: 'sites',
+  is_whole: true,
+  archive: { is_reachable: true, message: '', since: null },
+  sites,
+  gone: [],
+  ...more,
+});
+const of = (...sites: Site[]): ReadonlyMap<string, Site> => withFrame(new Map(), frame(sites));
+
+test('the worst come first, then the most alarms, then as people count', () => {
+  const sites = of(
+    site('gh10'),
+    site('gh2'),
+    site('dark', { verdict: 'unknown', is_live: false }),
+    site('b', { verdict: 'stressed', active_alarms: 1 }),
+    site('a', { verdict: 'stressed', active_alarms: 3 }),
+    site('worst', { verdict: 'critical' }),
+  );
+  const shown = chosen(sites, 'all', '').map(({ name }) => name);
+  expect(shown).toEqual(['worst', 'a', 'b', 'dark', 'gh2', 'gh10']);
+});
+
+test('search and filter go together', () => {
+  const sites = of(
+    site('north-1', { name: 'Noord 1' }),
+    site('north-2', { verdict: 'critical' }),
+    site('south', { verdict: 'unknown', is_live: false }),
+  );
+  expect(chosen(sites, 'critical', '')).toHaveLength(1);
+  expect(chosen(sites, 'all', ' NOORD ').map(({ site: id }) => id)).toEqual(['north-1']);
+  expect(chosen(sites, 'silent', 'north')).toEqual([]);
+  expect(countsOf(sites.values())).toEqual({
+    ...{ all: 3, critical: 1, stressed: 0, silent: 1, healthy: 1 },
+  });
+});
+
+test('a frame changes what it names, and one that is whole takes the place of all', () => {
+  const first = of(site('a'), site('b'));
+  const second = withFrame(
+    first,
+    frame([site('b', { verdict: 'critical' })], { is_whole: false, gone: ['a'] }),
+  );
+  expect([...second.values()].map(({ site: id, verdict }) => [id, verdict])).toEqual([
+    ['b', 'critical'],
+  ]);
+  expect([...withFrame(second, frame([site('c')])).keys()]).toEqual(['c']);
+});
+
+test.each([
+  [null],
+  [new ArrayBuffer(1)],
+  ['{'],
+  ['{"type":"state"}'],
+  [JSON.stringify({ ...frame([]), sites: [{ site: 'a' }] })],
+  [JSON.stringify({ ...frame([]), archive: null })],
+])('%j is no frame', (data) => {
+  expect(parseSites(data)).toBeNull();
+});
+
+test('a frame of the server is one', () => {
+  expect(parseSites(JSON.stringify(frame([site('a')])))?.sites).toHaveLength(1);
+});

@@ -1,0 +1,122 @@
+/** What the server says of all sites, and in which order and choice it is shown. Pure. */
+import type { Verdict } from '../contract/types';
+
+export interface Time {
+  readonly sec: number;
+  readonly nanosec: number;
+}
+
+/** An entry of `/api/sites`; see the server's `overview.py`. */
+export interface Site {
+  readonly site: string;
+  readonly name: string;
+  readonly verdict: Verdict;
+  /** That of a silent site as it was known last; null: it is being worked out. */
+  readonly last_verdict: Verdict | null;
+  readonly active_alarms: number | null;
+  readonly last_received: Time | null;
+  readonly lag_s: number | null;
+  readonly is_live: boolean;
+}
+
+export interface Archive {
+  readonly is_reachable: boolean;
+  readonly message: string;
+  readonly since: Time | null;
+}
+
+export interface SitesFrame {
+  readonly type: 'sites';
+  readonly is_whole: boolean;
+  readonly archive: Archive;
+  readonly sites: readonly Site[];
+  readonly gone: readonly string[];
+}
+
+export type Sites = ReadonlyMap<string, Site>;
+
+export const FILTERS = ['all', 'critical', 'stressed', 'silent', 'healthy'] as const;
+export type Filter = (typeof FILTERS)[number];
+
+const VERDICTS: readonly unknown[] = ['critical', 'stressed', 'unknown', 'healthy'];
+const ORDER: Readonly<Record<Verdict, number>> = {
+  critical: 0,
+  stressed: 1,
+  unknown: 2,
+  healthy: 3,
+};
+
+const isObject = (value: unknown): value is Record<string, unknown> =>
+  typeof value === 'object' && value !== null;
+
+function isSite(value: unknown): value is Site {
+  return (
+    isObject(value) &&
+    typeof value['site'] === 'string' &&
+    typeof value['name'] === 'string' &&
+    VERDICTS.includes(value['verdict']) &&
+    typeof value['is_live'] === 'boolean'
+  );
+}
+
+/** null: it is no frame of the contract. */
+export function parseSites(data: unknown): SitesFrame | null {
+  if (typeof data !== 'string') return null;
+  let frame: unknown;
+  try {
+    frame = JSON.parse(data);
+  } catch {
+    return null;
+  }
+  if (!isObject(frame) || frame['type'] !== 'sites') return null;
+  const { sites, gone, archive } = frame;
+  if (!Array.isArray(sites) || !Array.isArray(gone) || !isObject(archive)) return null;
+  return sites.every(isSite) ? (frame as unknown as SitesFrame) : null;
+}
+
+/** The sites after a frame. */
+export function withFrame(before: Sites, frame: SitesFrame): Sites {
+  const sites = new Map(frame.is_whole ? [] : before);
+  for (const name of frame.gone) sites.delete(name);
+  for (const site of frame.sites) sites.set(site.site, site);
+  return sites;
+}
+
+/** Which button it counts for; one that is live and not judged yet counts for none. */
+export function filterOf(site: Site): Filter {
+  if (!site.is_live) return 'silent';
+  return site.verdict === 'unknown' ? 'all' : site.verdict;
+}
+
+export function countsOf(sites: Iterable<Site>): Readonly<Record<Filter, number>> {
+  const counts = { all: 0, critical: 0, stressed: 0, silent: 0, healthy: 0 };
+  for (const site of sites) {
+    counts.all += 1;
+    const filter = filterOf(site);
+    if (filter !== 'all') counts[filter] += 1;
+  }
+  return counts;
+}
+
+const names = new Intl.Collator('en', { numeric: true, sensitivity: 'base' });
+
+/** By status, then the most alarms, then by name, as people count. */
+function worstFirst(a: Site, b: Site): number {
+  return (
+    ORDER[a.verdict] - ORDER[b.verdict] ||
+    (b.active_alarms ?? 0) - (a.active_alarms ?? 0) ||
+    names.compare(a.name, b.name)
+  );
+}
+
+/** The sites to show, the worst first. */
+export function chosen(sites: Sites, filter: Filter, search: string): readonly Site[] {
+  const wanted = search.trim().toLowerCase();
+  return [...sites.values()]
+    .filter((site) => filter === 'all' || filterOf(site) === filter)
+    .filter(
+      ({ site, name }) =>
+        !wanted || name.toLowerCase().includes(wanted) || site.toLowerCase().includes(wanted),
+    )
+    .sort(worstFirst);
+}

@@ -1,0 +1,327 @@
+"""The greenhouse's floor plan: walls, planter tables, tags, aisles, and the ways through them.
+
+Read from the simulator's own configuration. Metres, map frame: the origin is the corner of the
+greenhouse inside the walls, x along the short side (right), y along the long one (up). The
+shortest way between two points among rectangles bends only at their corners (visibility graph).
+The tables are grown by the robot's clearance first, so a way never touches one.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import atan2, dist
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Point = tuple[float, float]
+
+# Touching an edge is not crossing it: a robot slides along a table at its clearance, and the
+# camera sees along a table's side. One micrometre is far above float noise.
+TOUCH_M = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Rect:
+    """Axis-aligned rectangle, x0 < x1 and y0 < y1, metres."""
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+
+    def grown(self, margin_m: float) -> Rect:
+        """Return the rectangle widened by a margin on every side; a negative one shrinks it."""
+        return Rect(self.x0 - margin_m, self.y0 - margin_m, self.x1 + margin_m, self.y1 + margin_m)
+
+    def contains(self, point: Point) -> bool:
+        """Whether the point lies inside, the edges excluded."""
+        x, y = point
+        return (
+            self.x0 + TOUCH_M < x < self.x1 - TOUCH_M and self.y0 + TOUCH_M < y < self.y1 - TOUCH_M
+        )
+
+    def nearest(self, point: Point) -> Point:
+        """Return the point of the rectangle (edges included) that is nearest to the given one."""
+        return (
+            min(max(point[0], self.x0), self.x1),
+            min(max(point[1], self.y0), self.y1),
+        )
+
+    @property
+    def corners(self) -> tuple[Point, Point, Point, Point]:
+        """The four corners, counter-clockwise from (x0, y0)."""
+        return (self.x0, self.y0), (self.x1, self.y0), (self.x1, self.y1), (self.x0, self.y1)
+
+
+def crossings(
+    origin: Point, targets: NDArray[np.float64], rects: Sequence[Rect]
+) -> NDArray[np.bool_]:
+    """Tell which straight lines from `origin` to the targets pass through which rectangles.
+
+    `targets` has shape (n, 2); the result has shape (n, len(rects)). The slab method (Kay and
+    Kajiya, 1986): a line is inside a rectangle where it is between both pairs of edges at once.
+    """
+    edges = np.array(
+        [(r.x0, r.y0, r.x1, r.y1) for r in (rect.grown(-TOUCH_M) for rect in rects)],
+        dtype=np.float64,
+    ).reshape(-1, 4)
+    start = np.asarray(origin, dtype=np.float64)
+    step = targets - start
+    # A line parallel to an edge gets a quotient of ±infinity, which is what the method needs;
+    # only 0/0 has to be kept out.
+    step = np.where(step == 0.0, 1e-300, step)[:, np.newaxis, :]
+    with np.errstate(over="ignore"):
+        low = (edges[:, :2] - start) / step
+        high = (edges[:, 2:] - start) / step
+    enter = np.minimum(low, high).max(axis=2)
+    leave = np.maximum(low, high).min(axis=2)
+    crossed: NDArray[np.bool_] = np.maximum(enter, 0.0) < np.minimum(leave, 1.0)
+    return crossed
+
+
+def length_of(points: Sequence[Point]) -> float:
+    """Length of a polyline, m."""
+    return sum(dist(a, b) for a, b in pairwise(points))
+
+
+def walk(points: Sequence[Point], step_m: float, length_m: float) -> Iterator[tuple[Point, float]]:
+    """Yield positions along a polyline and the way since the last one, at most `step_m` apart.
+
+    Ends after `length_m`, or at the polyline's end if that comes first; yields at least one.
+    """
+    remaining = min(length_m, length_of(points))
+    position, ahead = points[0], list(points[1:])
+    while True:
+        wanted = covered = min(step_m, max(remaining, 0.0))
+        while ahead and wanted >= dist(position, ahead[0]):
+            wanted -= dist(position, ahead[0])
+            position = ahead.pop(0)
+        if ahead and wanted > 0.0:
+            part = wanted / dist(position, ahead[0])
+            position = (
+                position[0] + part * (ahead[0][0] - position[0]),
+                position[1] + part * (ahead[0][1] - position[1]),
+            )
+        remaining -= covered
+        yield position, covered
+        if remaining <= TOUCH_M:
+            return
+
+
+# Half the width of the robot (0.3 m) and a hand's breadth: its centre keeps this far from tables
+# and walls. The narrowest aisle of the default greenhouse is 0.45 m.
+CLEARANCE_M = 0.2
+# Where the robot's centre stands to read a tag, measured from the table's edge: as far as the
+# aisle allows, because the camera then sees all of the planter.
+STAND_OFFS_M = (0.4, 0.35, 0.3, 0.25, 0.2)
+
+# Heights above the floor: of the soil in the planters, and of the tags on the tables' edges.
+TABLE_HEIGHT_M = 0.35
+TAG_HEIGHT_M = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A planter: a table that is one box of plants."""
+
+    name: str
+    rect: Rect
+
+
+@dataclass(frozen=True, slots=True)
+class Tag:
+    """An AprilTag with its climate sensors.
+
+    `edge` is the point of its table's outline nearest to it, `facing` the unit vector from there
+    into the aisle, `stop` where the robot's centre stands to read it.
+    """
+
+    tag_id: str
+    position: Point
+    sensors: tuple[str, ...]
+    table: Table
+    edge: Point
+    facing: Point
+    stop: Point
+
+    @property
+    def yaw(self) -> float:
+        """Direction of `facing`, rad from x towards y."""
+        return atan2(self.facing[1], self.facing[0])
+
+
+@dataclass(frozen=True, slots=True)
+class Greenhouse:
+    """Everything that stands still."""
+
+    interior: Rect
+    tables: tuple[Table, ...]
+    tags: tuple[Tag, ...]
+
+    def is_free(self, point: Point) -> bool:
+        """Whether the robot's centre may be there."""
+        return _is_free(point, self.interior, self.tables)
+
+    def tag(self, tag_id: str) -> Tag:
+        """Return the tag of that id."""
+        return next(tag for tag in self.tags if tag.tag_id == tag_id)
+
+
+def read_greenhouse(simulator: Any) -> Greenhouse:
+    """Read the layout of a `greenhouse_sim.simulator.GreenhouseSimulator`.
+
+    Raises ValueError when a tag has no aisle that the robot fits into.
+    """
+    size = simulator.sim_config["visualization"]
+    interior = Rect(0.0, 0.0, float(size["greenhouse_width_m"]), float(size["greenhouse_height_m"]))
+    # The simulator's tag manager drops the tables when it loads this file.
+    layout = json.loads(Path(simulator.tag_manager.file_path).read_text(encoding="utf-8"))
+    tables = tuple(
+        Table(name, Rect(float(box["x0"]), float(box["y0"]), float(box["x1"]), float(box["y1"])))
+        for name, box in layout["tables"].items()
+    )
+    tags = tuple(
+        _place_tag(tag_id, (float(tag["x"]), float(tag["y"])), tag["sensors"], interior, tables)
+        for tag_id, tag in simulator.tag_manager.get_tags().items()
+    )
+    return Greenhouse(interior, tables, tags)
+
+
+def _place_tag(
+    tag_id: str,
+    position: Point,
+    sensors: list[str],
+    interior: Rect,
+    tables: tuple[Table, ...],
+) -> Tag:
+    """Put a tag on the side of its table that it is nearest to; at a corner, the roomier one."""
+    table = min(tables, key=lambda candidate: dist(position, candidate.rect.nearest(position)))
+    sides = []
+    for order, (edge, facing) in enumerate(_sides(table.rect, position)):
+        for stand_off_m in STAND_OFFS_M:
+            stop = (edge[0] + facing[0] * stand_off_m, edge[1] + facing[1] * stand_off_m)
+            if _is_free(stop, interior, tables):
+                away_m = round(dist(position, edge), 3)
+                sides.append((away_m, -stand_off_m, order, edge, facing, stop))
+                break
+    if not sides:
+        raise ValueError(
+            f"tag {tag_id} at {position}: no aisle beside {table.name} is as wide as"
+            f" {2 * CLEARANCE_M} m"
+        )
+    *_, edge, facing, stop = min(sides)
+    return Tag(tag_id, position, tuple(sensors), table, edge, facing, stop)
+
+
+def _sides(rect: Rect, position: Point) -> list[tuple[Point, Point]]:
+    """For each side of a table: its point nearest to the tag, and its outward normal."""
+    x, y = rect.nearest(position)
+    return [
+        ((rect.x0, y), (-1.0, 0.0)),
+        ((rect.x1, y), (1.0, 0.0)),
+        ((x, rect.y0), (0.0, -1.0)),
+        ((x, rect.y1), (0.0, 1.0)),
+    ]
+
+
+def _is_free(point: Point, interior: Rect, tables: tuple[Table, ...]) -> bool:
+    floor = interior.grown(TOUCH_M - CLEARANCE_M)
+    return floor.nearest(point) == point and not any(
+        table.rect.grown(CLEARANCE_M).contains(point) for table in tables
+    )
+
+
+class Roadmap:
+    """Shortest ways between any two free points of a greenhouse."""
+
+    def __init__(self, greenhouse: Greenhouse) -> None:
+        self._obstacles = [table.rect.grown(CLEARANCE_M) for table in greenhouse.tables]
+        self._corners = np.array(
+            [
+                corner
+                for obstacle in self._obstacles
+                for corner in obstacle.corners
+                if greenhouse.is_free(corner)
+            ]
+        ).reshape(-1, 2)
+        self._length, self._next = self._shortest_between_corners()
+
+    def way(self, start: Point, goal: Point) -> list[Point]:
+        """Return the shortest way as a polyline from start to goal, both included.
+
+        Raises ValueError when no way leads there.
+        """
+        if not crossings(start, np.array([goal]), self._obstacles).any():
+            return [start, goal]
+        total = (
+            self._straight(start)[:, np.newaxis] + self._length + self._straight(goal)[np.newaxis]
+        )
+        if not np.isfinite(total).any():
+            raise ValueError(f"no way from {start} to {goal} is {2 * CLEARANCE_M} m wide")
+        first, last = np.unravel_index(np.argmin(total), total.shape)
+        corner, bends = int(first), []
+        while corner != last:
+            bends.append(corner)
+            corner = int(self._next[corner, last])
+        bends.append(corner)
+        return [start, *((float(x), float(y)) for x, y in self._corners[bends]), goal]
+
+    def _straight(self, point: Point) -> NDArray[np.float64]:
+        """Distance from a point to each corner in a straight line, infinite where one is hidden."""
+        away: NDArray[np.float64] = np.hypot(*(self._corners - np.asarray(point)).T)
+        away[crossings(point, self._corners, self._obstacles).any(axis=1)] = np.inf
+        return away
+
+    def _shortest_between_corners(self) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+        """Floyd and Warshall: lengths between all corners, and the next corner on each way."""
+        count = len(self._corners)
+        length = np.array([self._straight((x, y)) for x, y in self._corners]).reshape(count, count)
+        following = np.tile(np.arange(count), (count, 1))
+        for via in range(count):
+            detour = length[:, [via]] + length[[via], :]
+            shorter = detour < length
+            length = np.where(shorter, detour, length)
+            following = np.where(shorter, following[:, [via]], following)
+        return length, following
+
+
+def tour(roadmap: Roadmap, start: Point, stops: Sequence[Point]) -> list[int]:
+    """Order the stops into a short round trip from `start`; returns their indices.
+
+    Nearest neighbour, then 2-opt until nothing gets shorter: for some dozens of stops that is
+    within a few percent of the best and takes milliseconds.
+    """
+    places = [start, *stops]
+    length = np.array([[length_of(roadmap.way(a, b)) for b in places] for a in places])
+    order, left = [0], set(range(1, len(places)))
+    while left:
+        nearest = min(left, key=lambda place: (length[order[-1], place], place))
+        order.append(nearest)
+        left.remove(nearest)
+    order.append(0)
+    while _untangle(order, length):
+        pass
+    return [place - 1 for place in order[1:-1]]
+
+
+def _untangle(order: list[int], length: NDArray[np.float64]) -> bool:
+    """Reverse the first stretch of the round trip whose reversal makes it shorter."""
+    for i in range(1, len(order) - 2):
+        for j in range(i + 1, len(order) - 1):
+            before, first, last, after = order[i - 1], order[i], order[j], order[j + 1]
+            gain = (
+                length[before, first]
+                + length[last, after]
+                - length[before, last]
+                - length[first, after]
+            )
+            if gain > 1e-9:
+                order[i : j + 1] = order[i : j + 1][::-1]
+                return True
+    return False

@@ -1,0 +1,345 @@
+"""What a twin reports on `/diagnostics`: its state, what it received, lost and dropped. Pure.
+
+Also what a consumer reads of it again. Times are seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Final, Literal, get_args
+
+from lupin_twin.core.drops import LATE, LOST, Counts, Reason, Recent
+from lupin_twin.core.journal_condition import UNKNOWN as UNKNOWN_JOURNAL
+from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.state import ClockState
+
+# What a source calls itself is its own affair, and so is how long that is.
+MAX_SHOWN: Final = 500
+
+# Under this key a twin names the state it publishes: by it a consumer knows its own twin. Not by
+# the node's name, which DDS sends once: after a gap in the link longer than its lease, never again.
+STATE_TOPIC: Final = "state topic"
+
+_REASONS: Final = (*(reason.value for reason in Reason), LOST, LATE)
+_RECENTLY: Final = "lately: "
+_LAST: Final = "last: "
+_ERRORS: Final = "callback errors"
+_MAX_DIGITS: Final = 15
+_PROBLEM: Final = "problem "
+# Of what is wrong with inputs no more is reported: a broken network may have any number.
+MAX_PROBLEMS: Final = 8
+
+# diagnostic_msgs/DiagnosticStatus
+OK: Final = 0
+WARN: Final = 1
+ERROR: Final = 2
+STALE: Final = 3
+
+_CLOCK: Final[Mapping[ClockState, tuple[int, str]]] = {
+    "running": (OK, "ROS time runs"),
+    "paused": (WARN, "ROS time is paused"),
+    "stopped": (ERROR, "ROS time has stopped: ages are not known"),
+    "none": (ERROR, "there is no ROS time: ages are not known"),
+    "doubted": (ERROR, "ROS time contradicts the journal: ages are not known; set the clock"),
+}
+
+
+# Where observations come from, as far as a twin says. sim_time: it goes by `/clock`, and so they
+# come from a simulation or from a recording that is played.
+Origin = Literal["unknown", "robot", "simulated", "recorded", "sim_time"]
+_ORIGIN: Final[Mapping[Origin, str]] = {
+    "unknown": "nobody says where observations come from",
+    "robot": "observations are a robot's",
+    "simulated": "observations are simulated",
+    "recorded": "observations are played from a recording",
+    "sim_time": "time is that of /clock: a simulation's, or that of a recording that is played",
+}
+
+
+def origin_of(name: str, *, is_simulated: bool) -> Origin:
+    """The origin of that name; and by a clock that is simulated (`is_simulated`) no robot works."""
+    origin: Origin = next((one for one in get_args(Origin) if one == name), "unknown")
+    return "sim_time" if is_simulated and origin == "robot" else origin
+
+
+@dataclass(frozen=True, slots=True)
+class Estimates:
+    """How the estimates do: what is wrong with fits, by sensor, and whose intervals are too narrow.
+
+    `fits_failed` is since the start.
+    """
+
+    problems: Mapping[str, str] = field(default_factory=dict)
+    distrusted: tuple[str, ...] = ()
+    fits_failed: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Layers:
+    """What is published for viewers: messages so far by topic, and of how many topics it is wanted.
+
+    `problems` says of a topic why there is nothing on it.
+    """
+
+    published: Mapping[str, int] = field(default_factory=dict)
+    watched: int = 0
+    problems: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """What is looked at. `inputs` is how many publish on each topic that is listened to.
+
+    `input_problems` says why not all of what they publish is received, with the remedy.
+    `observed_ago_s` is how long ago the last observation was taken in; None: none was. `late` is
+    how many observations each source gave behind its own earlier ones.
+    """
+
+    clock: ClockState
+    counts: Counts
+    inputs: Mapping[str, int]
+    observed_ago_s: float | None
+    late: Mapping[str, int]
+    twins: int
+    state_topic: str
+    fields_computing: int
+    fields_computed: int
+    slowest_field_s: float
+    journal: Condition = UNKNOWN_JOURNAL
+    estimates: Estimates = Estimates()
+    layers: Layers = Layers()
+    origin: Origin = "robot"
+    input_problems: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One diagnostic_msgs/DiagnosticStatus, its name without the node's."""
+
+    name: str
+    level: int
+    message: str
+    values: Mapping[str, str]
+
+
+def findings(health: Health) -> Iterator[Finding]:
+    """All that is reported, one by one."""
+    level, message = _CLOCK[health.clock]
+    yield Finding("clock", level, message, {"state": health.clock})
+    yield Finding("origin", OK, _ORIGIN[health.origin], {"origin": health.origin})
+    yield _inputs(health)
+    counts = health.counts
+    recent = [drop for drop in counts.recent if drop.reason != LOST]
+    yield Finding(
+        "drops",
+        WARN if recent or counts.callback_errors else OK,
+        "; ".join(f"{drop.count} lately: {_shown(drop.message)}" for drop in recent)
+        or "nothing lately",
+        {
+            **{str(why): str(count) for why, count in counts.dropped.items() if why != LOST},
+            **_recent_readings(recent),
+            _ERRORS: str(counts.callback_errors),
+        },
+    )
+    lost = [drop for drop in counts.recent if drop.reason == LOST]
+    yield Finding(
+        "queues",
+        WARN if lost else OK,
+        f"{lost[0].count} messages lost lately" if lost else "nothing lost lately",
+        {LOST: str(counts.dropped.get(LOST, 0)), **_recent_readings(lost)},
+    )
+    late = {_shown(source): str(count) for source, count in health.late.items()}
+    yield Finding(
+        "stamps",
+        WARN if late else OK,
+        f"stamps behind their own earlier ones from {_shown(', '.join(late))}"
+        if late
+        else "no stamps too late",
+        late,
+    )
+    yield Finding(
+        "fields",
+        OK,
+        f"{health.fields_computing} being computed",
+        {"computed": str(health.fields_computed), "slowest, s": f"{health.slowest_field_s:.3f}"},
+    )
+    yield _estimates(health.estimates)
+    layers = health.layers
+    wrong = "; ".join(f"{topic}: {why}" for topic, why in layers.problems.items())
+    yield Finding(
+        "layers",
+        WARN if wrong else OK,
+        _shown(wrong) or f"{layers.watched} of {len(layers.published)} topics have subscribers",
+        {topic: str(count) for topic, count in layers.published.items()},
+    )
+    journal = health.journal
+    yield Finding(
+        "journal",
+        OK if journal.is_well else ERROR,
+        journal.detail,
+        {
+            "state": journal.state.value,
+            "file": journal.path,
+            "written": str(journal.written),
+            "waiting": str(journal.waiting),
+            "lost": str(journal.lost),
+            "refused": str(journal.refused),
+            "set aside": journal.set_aside,
+            # Start and end of what no robot observed, ns of ROS time; so are those that follow.
+            "simulated": _stretches((journal.simulated_ns,) if journal.simulated_ns else ()),
+            "complete to": "" if journal.complete_ns is None else str(journal.complete_ns),
+            "kept": _stretches(journal.kept_ns),
+            "id": journal.journal_id,
+        },
+    )
+    several = health.twins > 1
+    yield Finding(
+        "twins",
+        ERROR if several else OK,
+        f"{health.twins} twins publish on the same topic" if several else "no other twin",
+        {"twins": str(health.twins), STATE_TOPIC: health.state_topic},
+    )
+
+
+def _estimates(estimates: Estimates) -> Finding:
+    wrong = [f"{sensor}: {why}" for sensor, why in estimates.problems.items()]
+    wrong += [
+        f"{sensor}: too sure of itself, by what it predicted" for sensor in estimates.distrusted
+    ]
+    return Finding(
+        "estimates",
+        WARN if wrong else OK,
+        _shown("; ".join(wrong)) or "nothing is wrong",
+        {"fits failed": str(estimates.fits_failed)},
+    )
+
+
+def _inputs(health: Health) -> Finding:
+    values = {topic: str(count) for topic, count in health.inputs.items()}
+    observed_ago_s = health.observed_ago_s
+    if observed_ago_s is not None:
+        values["last observation, s ago"] = f"{observed_ago_s:.1f}"
+    problems = [_shown(problem) for problem in health.input_problems]
+    values |= {f"{_PROBLEM}{number}": problem for number, problem in enumerate(problems, 1)}
+    silent = [topic for topic, count in health.inputs.items() if not count]
+    if problems:
+        return Finding("inputs", WARN, "; ".join(problems), values)
+    if observed_ago_s is None:
+        return Finding("inputs", STALE, "no observation has been taken in yet", values)
+    if silent:
+        return Finding("inputs", WARN, f"nobody publishes {', '.join(silent)}", values)
+    return Finding("inputs", OK, "all inputs are there", values)
+
+
+def _recent_readings(recent: Iterable[Recent]) -> dict[str, str]:
+    values = {}
+    for drop in recent:
+        values[_RECENTLY + drop.reason] = str(drop.count)
+        values[_LAST + drop.reason] = _shown(drop.message)
+    return values
+
+
+def _shown(text: str) -> str:
+    return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 1] + "…"
+
+
+# --- read again -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class SelfReport:
+    """How a twin's clock does, and what it dropped, lost and met; None: it does not say.
+
+    `origin` is where its observations come from; `journal` has of its counts those that are
+    published; `input_problems` is why it does not receive all.
+    """
+
+    clock: ClockState | None = None
+    counts: Counts | None = None
+    journal: Condition = UNKNOWN_JOURNAL
+    origin: Origin = "unknown"
+    input_problems: tuple[str, ...] = ()
+
+
+def self_report(reported: Iterable[Finding]) -> SelfReport:
+    """What `findings` reported, as far as it can be read; unknown reasons are left out."""
+    by_name = {finding.name: finding for finding in reported}
+    values = {name: finding.values for name, finding in by_name.items()}
+    journal = _journal(by_name["journal"]) if "journal" in by_name else UNKNOWN_JOURNAL
+    clock = next((state for state in _CLOCK if state == values.get("clock", {}).get("state")), None)
+    origin = origin_of(values.get("origin", {}).get("origin", ""), is_simulated=False)
+    inputs = values.get("inputs", {})
+    problems = tuple(
+        _shown(inputs[key])
+        for number in range(1, MAX_PROBLEMS + 1)
+        if (key := f"{_PROBLEM}{number}") in inputs
+    )
+    if "drops" not in values:
+        return SelfReport(clock, journal=journal, origin=origin, input_problems=problems)
+    both = {**values["drops"], **values.get("queues", {})}
+    dropped = {reason: _number(both, reason) for reason in _REASONS}
+    recent = tuple(
+        Recent(reason, _shown(both.get(_LAST + reason, "")), count)
+        for reason in _REASONS
+        if (count := _number(both, _RECENTLY + reason))
+    )
+    return SelfReport(
+        clock,
+        Counts(
+            MappingProxyType({reason: count for reason, count in dropped.items() if count}),
+            _number(both, _ERRORS),
+            recent,
+        ),
+        journal,
+        origin,
+        problems,
+    )
+
+
+def _journal(finding: Finding) -> Condition:
+    values = finding.values
+    state = next((state for state in JournalState if state == values.get("state")), None)
+    if state is None:
+        return UNKNOWN_JOURNAL
+    simulated = _read_stretches(values.get("simulated", ""))
+    complete = values.get("complete to", "")
+    return Condition(
+        state,
+        _shown(finding.message),
+        path=_shown(values.get("file", "")),
+        written=_number(values, "written"),
+        waiting=_number(values, "waiting"),
+        lost=_number(values, "lost"),
+        refused=_number(values, "refused"),
+        set_aside=_shown(values.get("set aside", "")),
+        simulated_ns=simulated[0] if len(simulated) == 1 else None,
+        complete_ns=int(complete) if _are_stamps(complete) else None,
+        kept_ns=_read_stretches(values.get("kept", "")),
+        journal_id=_shown(values.get("id", "")),
+    )
+
+
+def _stretches(stretches: Iterable[tuple[int, int]]) -> str:
+    return " ".join(str(stamp_ns) for stretch in stretches for stamp_ns in stretch)
+
+
+def _read_stretches(text: str) -> tuple[tuple[int, int], ...]:
+    """Pairs of stamps; none where the text is anything else."""
+    words = text.split(" ") if len(text) <= MAX_SHOWN * 2 else []
+    if len(words) % 2 or not _are_stamps(*words):
+        return ()
+    stamps = [int(word) for word in words]
+    return tuple(zip(stamps[::2], stamps[1::2], strict=True))
+
+
+def _are_stamps(*texts: str) -> bool:
+    # As of numbers below: no stamp has more digits.
+    return all(text.isascii() and text.isdigit() and len(text) <= 19 for text in texts)
+
+
+def _number(values: Mapping[str, str], key: str) -> int:
+    text = values.get(key, "")
+    # No count has more digits; and of some texts that are digits int() makes nothing.
+    return int(text) if text.isascii() and text.isdigit() and len(text) <= _MAX_DIGITS else 0

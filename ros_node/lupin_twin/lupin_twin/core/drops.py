@@ -1,0 +1,178 @@
+"""What is not taken in: bounds on what one robot may make us keep, reasons, counts, warnings.
+
+A greenhouse compartment has hundreds of tags and a tag carries a handful of sensors; the bounds are
+far above that and keep memory finite when a producer is broken or hostile. Pure.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from types import MappingProxyType
+from typing import Final
+
+MAX_TAGS = 20_000
+MAX_SENSORS_PER_TAG = 64
+MAX_TEXT_LENGTH = 256
+MAX_BLOOMS_PER_TAG = 2_000
+MAX_FOOTPRINT_POINTS = 64
+# And on all of it together, for those multiply: each reading, flower and footprint point counted,
+# 20,000 tags with ten sensors and forty flowers. A reading with its name is some hundred bytes.
+MAX_ITEMS = 1_000_000
+
+
+class Rejected(ValueError):
+    """A write that the store refuses; the message names the field, the value and the limit."""
+
+
+def check_texts(*texts: str) -> None:
+    """Raise `Rejected` for a text longer than `MAX_TEXT_LENGTH` characters."""
+    for text in texts:
+        if len(text) > MAX_TEXT_LENGTH:
+            raise Rejected(
+                f"text {text[:24]!r}… has {len(text)} characters, the limit is {MAX_TEXT_LENGTH}"
+            )
+
+
+def check_length(what: str, length: int, limit: int) -> None:
+    """Raise `Rejected` where `length` of `what` is past `limit`."""
+    if length > limit:
+        raise Rejected(f"{what}: {length}, the limit is {limit}")
+
+
+# What is reported to an operator as recent, s.
+RECENT_S: Final = 300.0
+_BUCKET_S: Final = 10.0
+LOST: Final = "lost"
+LATE: Final = "late_stamp"
+
+
+@dataclass(frozen=True, slots=True)
+class Recent:
+    """How often one reason came up recently, and what it was the last time, for a person."""
+
+    reason: str
+    message: str
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """Everything counted since the start, immutable: it crosses between threads as it is."""
+
+    dropped: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
+    callback_errors: int = 0
+    recent: tuple[Recent, ...] = ()
+
+
+class Tally:
+    """Counts; belongs to one thread."""
+
+    def __init__(self) -> None:
+        self.callback_errors = 0
+        self._dropped: dict[str, int] = {}
+        self._texts: dict[str, str] = {}
+        # By reason, (when the bucket began, how many): 30 buckets at most.
+        self._buckets: dict[str, deque[tuple[float, int]]] = {}
+
+    def drop(self, drop: Drop, topic: str, now_s: float) -> None:
+        """Count something that was dropped."""
+        self._count(drop.reason.value, drop.on(topic), 1, now_s)
+
+    def lose(self, count: int, topic: str, now_s: float) -> None:
+        """Count messages that came faster than they were read."""
+        self._count(LOST, f"lost messages on {topic}: they came too fast", count, now_s)
+
+    def late(self, count: int, text: str, now_s: float) -> None:
+        """Count observations whose stamps are behind their producer's own earlier ones."""
+        self._count(LATE, text, count, now_s)
+
+    def value(self, now_s: float) -> Counts:
+        """The counts now."""
+        return Counts(
+            MappingProxyType(dict(self._dropped)),
+            self.callback_errors,
+            tuple(
+                Recent(reason, self._texts[reason], count)
+                for reason in self._buckets
+                if (count := self._recent(reason, now_s))
+            ),
+        )
+
+    def _count(self, reason: str, text: str, count: int, now_s: float) -> None:
+        self._dropped[reason] = self._dropped.get(reason, 0) + count
+        self._texts[reason] = text
+        buckets = self._buckets.setdefault(reason, deque())
+        if buckets and now_s < buckets[-1][0] + _BUCKET_S:
+            began_s, before = buckets[-1]
+            buckets[-1] = (began_s, before + count)
+        else:
+            buckets.append((now_s, count))
+        self._forget(buckets, now_s)
+
+    def _recent(self, reason: str, now_s: float) -> int:
+        buckets = self._buckets[reason]
+        self._forget(buckets, now_s)
+        return sum(count for _, count in buckets)
+
+    @staticmethod
+    def _forget(buckets: deque[tuple[float, int]], now_s: float) -> None:
+        while buckets and buckets[0][0] + RECENT_S <= now_s:
+            buckets.popleft()
+
+
+class Reason(StrEnum):
+    """Why a message, or an entry of one, was dropped. What is counted is counted by these."""
+
+    KIND = "kind"
+    FRAME = "frame"
+    TAG_ID = "tag_id"
+    POSE = "pose"
+    MAP = "map"
+    SIZE = "size"
+    UNREADABLE = "unreadable"
+    REJECTED = "rejected"
+
+
+@dataclass(frozen=True, slots=True)
+class Drop:
+    """One thing that was dropped: `what` it was, and `why` in words that name the value.
+
+    `case` tells cases of one reason apart that should not hide each other; it is of a small set.
+    """
+
+    reason: Reason
+    why: str
+    what: str = "a message"
+    case: str = ""
+
+    def on(self, topic: str) -> str:
+        """The text for the operator."""
+        return f"dropped {self.what} on {topic}: {self.why}"
+
+
+class Throttle:
+    """Lets one message per key through in each period; pure, the time is an argument.
+
+    rclpy's own throttle goes by the line of code that logs, so that two different reasons logged
+    by one line would hide each other. Keys have to come from a small set: they stay.
+    """
+
+    def __init__(self, period_s: float) -> None:
+        self._period_s = period_s
+        self._last_s: dict[Hashable, float] = {}
+        self._held_back: dict[Hashable, int] = {}
+
+    def allow(self, key: Hashable, now_s: float) -> int | None:
+        """How many were held back since the last time, or None: hold this one back too.
+
+        `now_s` is seconds of a clock that never jumps.
+        """
+        last = self._last_s.get(key)
+        if last is not None and now_s - last < self._period_s:
+            self._held_back[key] = self._held_back.get(key, 0) + 1
+            return None
+        self._last_s[key] = now_s
+        return self._held_back.pop(key, 0)

@@ -1,0 +1,214 @@
+"""The node's parameters: names, defaults, ranges and meaning, in one table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Final
+
+from lupin_twin.core.diagnostics import Origin
+
+# The greatest `max_pose_m`: what is beyond is far off, wherever the others are.
+FARTHEST_M: Final = 1_000_000.0
+# Of a parameter that is a list.
+MAX_NAMES: Final = 16
+# Characters of a value that a complaint repeats.
+MAX_SHOWN: Final = 80
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """What is observed: a robot's greenhouse, or what a demo makes of one. No user chooses it.
+
+    `day_length_s` is how long a day takes, s of ROS time: what comes daily is estimated by it.
+    """
+
+    origin: Origin = "robot"
+    day_length_s: float = 86_400.0
+
+
+class ParameterError(ValueError):
+    """A parameter out of its range; the message names it, its value and the limit."""
+
+
+def _parameter(
+    default: Any,
+    description: str,
+    low: float | None = None,
+    high: float = math.inf,
+    *,
+    may_be_empty: bool = False,
+    fixed: str = "",
+) -> Any:
+    return field(
+        default=default,
+        metadata={
+            "description": description,
+            "low": low,
+            "high": high,
+            "may_be_empty": may_be_empty,
+            "fixed": fixed,
+        },
+    )
+
+
+# Why a parameter is read at the start and never again.
+_NAMED: Final = "what others have found under this name cannot follow: start the twin anew"
+_MEANING: Final = "what is known already was taken in by it: start the twin anew"
+_MADE: Final = "room was made by it as the twin started: start the twin anew"
+
+
+@dataclass(frozen=True, slots=True)
+class TwinParameters:
+    """Every parameter of `lupin_twin`, checked at construction.
+
+    Lengths are metres, rates hertz. Ranges are closed; a name must not be empty. Of a list, which
+    ROS cannot distinguish from nothing when it is empty, empty names do not count. Those that are
+    not `fixed` may be changed while the twin runs.
+
+    Raises:
+        ParameterError: a value of the wrong type, not finite, or out of its range.
+
+    """
+
+    observations_topic: str = _parameter(
+        "floranova/observations", "topic of lupin_msgs/Observation to subscribe to", fixed=_NAMED
+    )
+    discovered_tags_topic: str = _parameter(
+        "perception/discovered_tags",
+        "topic of lupin_msgs/DiscoveredTags to subscribe to",
+        fixed=_NAMED,
+    )
+    map_topic: str = _parameter(
+        "map", "topic of nav_msgs/OccupancyGrid to subscribe to", fixed=_NAMED
+    )
+    state_topic: str = _parameter(
+        "twin/state", "topic of lupin_msgs/TwinState to publish", fixed=_NAMED
+    )
+    field_service_name: str = _parameter(
+        "twin/get_field", "name of the GetField service", fixed=_NAMED
+    )
+    state_publish_rate_hz: float = _parameter(
+        1.0, "how often the state is published, by the steady clock", 0.01, 100.0
+    )
+    frame_id: str = _parameter("map", "the frame that every pose has to be in", fixed=_MEANING)
+    max_pose_m: float = _parameter(
+        1000.0,
+        "a pose with a coordinate farther than this from the frame's origin is dropped, m",
+        0.001,
+        FARTHEST_M,
+    )
+    buffer_len: int = _parameter(32, "scans kept per tag for its history", 1, 10_000, fixed=_MADE)
+    idw_power: float = _parameter(2.0, "exponent of the distance in the weights", 0.01, 100.0)
+    idw_falloff_radius_m: float = _parameter(
+        1.5, "tags up to this distance are averaged, m", 0.001, 10_000.0
+    )
+    idw_max_distance_m: float = _parameter(
+        1.5, "a cell whose nearest tag is farther is NaN, m", 0.001, 10_000.0
+    )
+    max_grid_cells: int = _parameter(
+        1_000_000, "largest field served, cells", 1, 100_000_000, fixed=_MADE
+    )
+
+    layers: tuple[str, ...] = _parameter(
+        (), "sensors whose fields are published as points for viewers such as RViz", fixed=_NAMED
+    )
+
+    journal: str = _parameter(
+        "",
+        "file that keeps what was observed; off: none; empty: the user's, by domain and namespace",
+        may_be_empty=True,
+        fixed=_MADE,
+    )
+    journal_days: float = _parameter(
+        90.0, "how long the journal keeps scans and inspections, days", 0.01, 36_500.0, fixed=_MADE
+    )
+    journal_max_mb: float = _parameter(
+        4000.0, "size past which the journal deletes its oldest scans, MB", 10.0, 1e7, fixed=_MADE
+    )
+
+    def __post_init__(self) -> None:
+        for spec in fields(self):
+            value = _checked(spec.name, getattr(self, spec.name), spec.default, spec.metadata)
+            object.__setattr__(self, spec.name, value)
+
+
+def _checked(name: str, value: object, default: object, metadata: Any) -> object:
+    if isinstance(default, tuple):
+        return _names(name, value)
+    expected: Final = type(default)
+    # YAML and the command line read 2 as an integer; where a number is meant, so it is a number.
+    if name == "journal" and value is False:
+        value = "off"  # what YAML makes of a plain off
+    if expected is float and type(value) is int:
+        value = float(value)
+    if type(value) is not expected:
+        raise ParameterError(
+            f"parameter {name} is {_shown(value)} ({type(value).__name__}), "
+            f"expected {expected.__name__}"
+        )
+    if isinstance(value, str) and not value and not metadata["may_be_empty"]:
+        raise ParameterError(f"parameter {name} is empty, expected a name")
+    if isinstance(value, int | float):
+        low, high = metadata["low"], metadata["high"]
+        if not low <= value <= high:  # false for NaN too
+            raise ParameterError(f"parameter {name} is {value}, expected {low} to {high}")
+    return value
+
+
+def _names(name: str, value: object) -> tuple[str, ...]:
+    if value is None or isinstance(value, str):
+        value = [value or ""]
+    if not isinstance(value, list | tuple) or not all(isinstance(one, str) for one in value):
+        raise ParameterError(f"parameter {name} is {_shown(value)}, expected a list of names")
+    names = tuple(filter(None, value))
+    if len(names) > MAX_NAMES:
+        raise ParameterError(
+            f"parameter {name} is {len(names)} names, expected {MAX_NAMES} at most"
+        )
+    return names
+
+
+def _shown(value: object) -> str:
+    """What was given, and of what is long its beginning: a reason goes back to who set it."""
+    text = repr(value)
+    return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}…"
+
+
+@dataclass(frozen=True, slots=True)
+class Described:
+    """The description of a parameter; `low` None: it has no range. `fixed` empty: it may change."""
+
+    description: str
+    low: float | None
+    high: float
+    fixed: str
+
+    @property
+    def range(self) -> str:
+        """The allowed range in words; empty, where there is none."""
+        return "" if self.low is None else f"{self.low} to {self.high}"
+
+
+def describe(name: str) -> Described:
+    """What `ros2 param describe` and the docs show of a parameter."""
+    spec = next(spec for spec in fields(TwinParameters) if spec.name == name)
+    metadata = spec.metadata
+    return Described(metadata["description"], metadata["low"], metadata["high"], metadata["fixed"])
+
+
+def changed(now: TwinParameters, wanted: Mapping[str, object]) -> TwinParameters:
+    """The parameters with some changed while the twin runs.
+
+    Raises:
+        ParameterError: one that is fixed, or a value that the twin could not start with either.
+
+    """
+    for name, value in wanted.items():
+        if why := describe(name).fixed:
+            raise ParameterError(
+                f"parameter {name} is {getattr(now, name)!r} and cannot become {_shown(value)} "
+                f"while the twin runs: {why}"
+            )
+    return replace(now, **wanted)  # type: ignore[arg-type]  # checked there

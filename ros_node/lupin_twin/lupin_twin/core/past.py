@@ -1,0 +1,243 @@
+"""Queries about the past: what may be requested, and the answers. Pure.
+
+Times are nanoseconds of ROS time, intervals `start <= stamp < end`. Where the clock has gone
+back, a moment belongs to the newest run that holds it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import partial
+from typing import Any, Final
+
+from lupin_twin.core.drops import MAX_TEXT_LENGTH
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND
+
+# How a message ends of what may be answered a little later, if it is requested again.
+ASK_AGAIN: Final = "ask again later"
+# How one begins of what stays so until a setting of the twin is changed.
+NOT_REMEMBERED: Final = "not remembered: "
+
+
+def may_pass(message: str) -> bool:
+    """Whether a message says that the same may be requested again."""
+    return message.endswith(ASK_AGAIN)
+
+
+def lasts(message: str) -> str | None:
+    """Why nobody remembers it, of a message that says so; None: it does not."""
+    return message.removeprefix(NOT_REMEMBERED) if message.startswith(NOT_REMEMBERED) else None
+
+
+DEFAULT_POINTS: Final = 500
+MAX_POINTS: Final = 5_000
+# Longer buckets begin on whole ones.
+SLOT_NS: Final = 300 * 1_000_000_000
+# What is counted as it is written.
+HOUR_NS: Final = 3_600 * 1_000_000_000
+# The `tag_id` of a query for events of the whole site.
+EVERY_TAG: Final = "*"
+
+
+class Event(StrEnum):
+    """Requested like a sensor; units and values stand in GetHistory.srv."""
+
+    SCANS = "~scans"
+    FAILURES = "~failures"
+    LOOKS = "~looks"
+    PESTS_SEEN = "~pests_seen"
+    PESTS_CLEARED = "~pests_cleared"
+    SILENCES = "~silences"
+    RUNS = "~runs"
+
+
+class PastRefused(ValueError):
+    """A question that cannot be answered; the message names the field, the value and the limit."""
+
+
+class NotRemembered(RuntimeError):
+    """Nobody remembers that far back; the message says why.
+
+    `is_lasting`: until a setting is changed (there is no journal); else it may pass (the file
+    cannot be read now). `damage` is what is wrong with the file, if something is.
+    """
+
+    def __init__(self, why: str, *, is_lasting: bool, damage: str = "") -> None:
+        super().__init__(why)
+        self.is_lasting = is_lasting
+        self.damage = damage
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """So that another process may say it."""
+        return partial(NotRemembered, is_lasting=self.is_lasting, damage=self.damage), self.args
+
+
+def check_moment(at_ns: int, now_ns: int) -> None:
+    """Refuse a moment that has not come yet, by ROS time, or that no clock can show.
+
+    Raises:
+        PastRefused: see above.
+
+    """
+    if at_ns < 0:
+        raise PastRefused(f"at is {seconds(at_ns)} s, before 0")
+    if at_ns > now_ns:
+        raise PastRefused(f"at is {seconds(at_ns)} s, later than now, {seconds(now_ns)} s")
+
+
+def seconds(stamp_ns: int) -> str:
+    """A moment in seconds of ROS time, every digit of it."""
+    whole, part = divmod(abs(stamp_ns), NANOSECONDS_PER_SECOND)
+    return f"{'-' if stamp_ns < 0 else ''}{whole}.{part:09d}"
+
+
+def message_of(error: Exception) -> str:
+    """Why there is no answer, as a service's `error_message` that `error_of` reads again."""
+    if isinstance(error, PastRefused):
+        return str(error)
+    if isinstance(error, NotRemembered):
+        why = str(error)
+        if error.is_lasting:
+            return NOT_REMEMBERED + why
+    else:
+        why = f"the twin failed to answer: {error}"
+    return why if may_pass(why) else f"{why}: {ASK_AGAIN}"
+
+
+def error_of(message: str) -> PastRefused | NotRemembered:
+    """What a service's `error_message` says: the other direction of `message_of`."""
+    why = lasts(message)
+    if why is not None:
+        return NotRemembered(why, is_lasting=True)
+    if may_pass(message):
+        return NotRemembered(message, is_lasting=False)
+    return PastRefused(message)
+
+
+@dataclass(frozen=True, slots=True)
+class SeriesRequest:
+    """One sensor of one tag, or one event, see GetHistory.srv: `end_ns` 0 is now, `start_ns` 0 all.
+
+    Raises:
+        PastRefused: an empty name, an interval that is inverted, more points than are given.
+
+    """
+
+    tag_id: str
+    sensor_type: str
+    start_ns: int = 0
+    end_ns: int = 0
+    max_points: int = DEFAULT_POINTS
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be answered."""
+        if not self.tag_id:
+            raise PastRefused("tag_id is empty")
+        if not self.sensor_type:
+            raise PastRefused("sensor_type is empty")
+        for name in ("tag_id", "sensor_type"):
+            text = getattr(self, name)
+            if len(text) > MAX_TEXT_LENGTH:
+                raise PastRefused(
+                    f"{name} {text[:24]!r}… has {len(text)} characters, "
+                    f"the limit is {MAX_TEXT_LENGTH}"
+                )
+        self._check_event()
+        if self.start_ns < 0 or self.end_ns < 0:
+            raise PastRefused(f"start or end is {min(self.start_ns, self.end_ns)} ns, before 0")
+        if self.end_ns and self.end_ns < self.start_ns:
+            raise PastRefused(f"end {self.end_ns} ns is before start {self.start_ns} ns")
+        if not 1 <= self.max_points <= MAX_POINTS:
+            raise PastRefused(f"max_points is {self.max_points}, the limits are 1 and {MAX_POINTS}")
+
+    def _check_event(self) -> None:
+        if self.sensor_type.startswith("~") and self.sensor_type not in set(Event):
+            raise PastRefused(
+                f"sensor_type {self.sensor_type[:64]!r} is none of {', '.join(Event)}"
+            )
+        if self.event is Event.RUNS and self.tag_id != EVERY_TAG:
+            raise PastRefused(
+                f"tag_id is {self.tag_id[:64]!r}, and ~runs are those of {EVERY_TAG!r}"
+            )
+        if self.event is None and self.tag_id == EVERY_TAG:
+            raise PastRefused(
+                f"tag_id is {EVERY_TAG!r}, which has events alone, and sensor_type is "
+                f"{self.sensor_type[:64]!r}: expected one tag, or one of {', '.join(Event)}"
+            )
+
+    @property
+    def event(self) -> Event | None:
+        """The event that is requested, None for a sensor."""
+        return Event(self.sensor_type) if self.sensor_type.startswith("~") else None
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Buckets of one length that cover a period: the first begins at `start_ns`."""
+
+    start_ns: int
+    end_ns: int
+    bucket_ns: int
+
+
+def grid(start_ns: int, end_ns: int, max_points: int, least_ns: int = 0) -> Grid:
+    """At most `max_points` buckets of at least `least_ns` over a period.
+
+    Up to five minutes they begin at `start_ns` and are as short as they can be. Longer ones are of
+    whole five minutes, beyond an hour of whole hours, and the period is widened to those: what is
+    counted already is not read again.
+    """
+    needed_ns = max(1, -(-(end_ns - start_ns) // max_points))
+    if max(needed_ns, least_ns) < SLOT_NS:
+        return Grid(start_ns, end_ns, needed_ns)
+    for unit_ns in (SLOT_NS, HOUR_NS):
+        start = start_ns // unit_ns * unit_ns
+        end = -(-end_ns // unit_ns) * unit_ns
+        needed_ns = max(1, -(-(end - start) // max_points))
+        bucket_ns = -(-max(needed_ns, least_ns) // unit_ns) * unit_ns
+        if bucket_ns < HOUR_NS:
+            break
+    return Grid(start, end, bucket_ns)
+
+
+@dataclass(frozen=True, slots=True)
+class SeriesPast:
+    """Readings, or buckets of `bucket_ns` from `start_ns` on; all tuples have one length.
+
+    Of a reading the count is 1, and mean, minimum and maximum are its value, which may be NaN. A
+    bucket counts finite readings; one without any is absent. Stamps ascend. The period of buckets
+    is that of their `grid`: it may begin earlier and end later than what was requested.
+    """
+
+    start_ns: int
+    end_ns: int
+    bucket_ns: int | None = None
+    stamps_ns: tuple[int, ...] = ()
+    counts: tuple[int, ...] = ()
+    means: tuple[float, ...] = ()
+    minima: tuple[float, ...] = ()
+    maxima: tuple[float, ...] = ()
+
+    @property
+    def is_bucketed(self) -> bool:
+        """Whether entries are buckets."""
+        return self.bucket_ns is not None
+
+
+@dataclass(frozen=True, slots=True)
+class PastRow:
+    """One reading, or one try that brought none (`sensor` is empty, `value` NaN), for an export.
+
+    `x` and `y` are m in the map frame, NaN for a tag without a place. `status` and `source` as in
+    lupin_msgs/Observation; `source` is empty where it is not known.
+    """
+
+    stamp_ns: int
+    tag_id: str
+    x: float
+    y: float
+    sensor: str
+    value: float
+    status: int
+    source: str

@@ -1,0 +1,230 @@
+"""GetEstimate without ROS: which readings count, and what an answer is.
+
+Pure. An `EstimateJob` that was handed out is immutable, and any thread may compute it. Metres in
+the map frame, times ns of ROS time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from lupin_twin.core.state import FLOAT32_MAX, NANOSECONDS_PER_SECOND
+from lupin_twin.estimate import (
+    MAX_EXACT,
+    MAX_PER_TAG,
+    PER_TAG,
+    EstimateGrid,
+    FitFailed,
+    Model,
+    Readings,
+    fit,
+)
+from lupin_twin.field.engine import FieldRefused, FieldRequest, check_request
+from lupin_twin.field.idw import Abandoned, never
+
+MAX_TAGS: Final = 10_000
+# An estimate of now is one of the last whole minute of a day of so many, or of the newest reading.
+MINUTES_A_DAY: Final = 1_440
+# A tag's newest readings that are retained, and of how many parts of a day the newest one each: as
+# many as count of one tag (`Readings.recent`).
+NEWEST: Final = MAX_PER_TAG // 4
+PARTS_A_DAY: Final = 24
+# What answers take, roughly and at worst, s of one core: for each pair of readings or, of many
+# tags, for each of these; and for each cell.
+_PAIR_S: Final = 0.3e-6
+_TAG_S: Final = 500e-6
+_CELL_S: Final = 0.1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class EstimateRequest:
+    """A sensor over a box, as in GetField, as of a moment; `at_ns` 0 is now."""
+
+    box: FieldRequest
+    at_ns: int = 0
+
+    def check(self, now_ns: int, max_grid_cells: int) -> None:
+        """Refuse what cannot be answered.
+
+        Raises:
+            FieldRefused: names the field, the value and the limit.
+
+        """
+        check_request(self.box, max_grid_cells)
+        if self.at_ns < 0 or self.at_ns > now_ns:
+            at_s, now_s = self.at_ns / NANOSECONDS_PER_SECOND, now_ns / NANOSECONDS_PER_SECOND
+            raise FieldRefused(f"at is {at_s} s, the limits are 0 and now, {now_s} s")
+
+
+@dataclass(frozen=True, slots=True)
+class TagPast:
+    """A tag's place, and its readings of one sensor: (ns, value), in any order."""
+
+    tag_id: str
+    x: float
+    y: float
+    readings: tuple[tuple[int, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """An answer: the grid, and how many tags and readings it was made of."""
+
+    grid: EstimateGrid
+    sample_count: int
+    reading_count: int
+
+
+def is_usable(value: float) -> bool:
+    """Whether an estimate, whose numbers become float32, can take a value; NaN it cannot."""
+    return abs(value) <= FLOAT32_MAX
+
+
+class RecentReadings:
+    """Each tag's newest readings, and the newest of each part of the day before them."""
+
+    def __init__(self, day_length_s: float) -> None:
+        self._part_ns = max(int(day_length_s * NANOSECONDS_PER_SECOND) // PARTS_A_DAY, 1)
+        # Of tag and sensor: immutable, so that any thread may read them.
+        self._read: dict[tuple[str, str], tuple[tuple[int, float], ...]] = {}
+
+    def add(self, tag_id: str, sensor: str, stamp_ns: int, value: float) -> None:
+        """Add a reading, if an estimate can use it and it is not known."""
+        known = self.of(tag_id, sensor)
+        if not is_usable(value) or (stamp_ns, value) in known:
+            return
+        readings = sorted((*known, (stamp_ns, value)))
+        older, newest = readings[:-NEWEST], readings[-NEWEST:]
+        of_parts = {ns // self._part_ns: (ns, value) for ns, value in older}
+        self._read[tag_id, sensor] = (*list(of_parts.values())[-PARTS_A_DAY:], *newest)
+
+    def of(self, tag_id: str, sensor: str) -> tuple[tuple[int, float], ...]:
+        """Those of a tag and a sensor: (ns, value), in order."""
+        return self._read.get((tag_id, sensor), ())
+
+    def hold_to(self, now_ns: int) -> None:
+        """Follow a clock that has gone back: what is later is forgotten."""
+        self._read = {
+            key: tuple(one for one in known if one[0] <= now_ns)
+            for key, known in self._read.items()
+        }
+
+
+def moment_of(tags: Sequence[TagPast], now_ns: int, day_length_s: float) -> int:
+    """The moment that an estimate of now is made for, not later than `now_ns`.
+
+    A minute of the day changes nothing that anybody could see; but of the same readings the same
+    estimate is made throughout it, to the last bit.
+    """
+    minute_ns = int(day_length_s / MINUTES_A_DAY * NANOSECONDS_PER_SECOND)
+    stamps_ns = (ns for tag in tags for ns, _ in tag.readings if ns <= now_ns)
+    return max(now_ns - now_ns % minute_ns, max(stamps_ns, default=0))
+
+
+def readings_of(tags: Sequence[TagPast], at_ns: int, day_length_s: float) -> Readings:
+    """Those that count as of `at_ns`, by seconds from then on (they are not greater than 0).
+
+    A day's, as many of each tag as all tags together may have; tag numbers are those of `tags`.
+
+    Raises:
+        FieldRefused: no reading within a day, or more tags than can be computed with.
+
+    """
+    all_of = Readings(
+        np.array([(ns - at_ns) / NANOSECONDS_PER_SECOND for tag in tags for ns, _ in tag.readings]),
+        np.array([index for index, tag in enumerate(tags) for _ in tag.readings], dtype=np.int64),
+        np.array([value for tag in tags for _, value in tag.readings]),
+        np.array([(tag.x, tag.y) for tag in tags]).reshape(-1, 2),
+    )
+    those = thinned(all_of, 0.0, day_length_s)
+    present = len(np.unique(those.tag))
+    if present > MAX_TAGS:
+        raise FieldRefused(
+            f"{present} tags have this sensor, an estimate is made of {MAX_TAGS} at most"
+        )
+    if not present:
+        raise FieldRefused(f"no tag has a reading of the {day_length_s:g} s before that moment")
+    return those
+
+
+def thinned(readings: Readings, at_s: float, day_length_s: float) -> Readings:
+    """Those of a day that count: as many of each tag as can be solved at once, or a few of each."""
+    age_s = at_s - readings.time_s
+    tags = len(np.unique(readings.tag[(age_s >= 0.0) & (age_s <= day_length_s)]))
+    per_tag = max(MAX_EXACT // max(tags, 1), PER_TAG)
+    return readings.recent(at_s, day_length_s=day_length_s, per_tag=min(per_tag, MAX_PER_TAG))
+
+
+@dataclass(frozen=True, slots=True)
+class EstimateJob:
+    """An estimate that is not computed yet; without a model, one is fitted for it alone.
+
+    `changed` are the tags whose sensor has changed: what they have read since then does not count.
+    """
+
+    request: EstimateRequest
+    model: Model | None
+    day_length_s: float
+    changed: Mapping[str, int] = field(default_factory=dict)
+
+    def compute(
+        self, tags: Sequence[TagPast], now_ns: int, should_stop: Callable[[], bool] = never
+    ) -> Estimate:
+        """The estimate of what `tags` remember, as of the moment requested.
+
+        Raises:
+            FieldRefused: see `readings_of`; or there are numbers among them that nothing can be
+                made of.
+            Abandoned: `should_stop`, called between the steps, was true.
+
+        """
+        at_ns = self.request.at_ns or moment_of(tags, now_ns, self.day_length_s)
+        readings = readings_of(unchanged(tags, self.changed), at_ns, self.day_length_s)
+        box = self.request.box
+        try:
+            model = self.model
+            if model is None:
+                model = fit(readings, day_length_s=self.day_length_s, should_stop=should_stop)
+            _go_on_unless(should_stop)
+            grid = model.posterior(readings, 0.0, should_stop).grid(
+                bbox_min_x=box.bbox_min_x,
+                bbox_min_y=box.bbox_min_y,
+                bbox_max_x=box.bbox_max_x,
+                bbox_max_y=box.bbox_max_y,
+                resolution=box.resolution,
+            )
+        except (FitFailed, np.linalg.LinAlgError) as error:
+            raise FieldRefused(f"these readings cannot be computed with: {error}") from error
+        return Estimate(grid, len(np.unique(readings.tag)), len(readings))
+
+
+def unchanged(tags: Sequence[TagPast], changed: Mapping[str, int]) -> list[TagPast]:
+    """The same tags without what was read since their sensor has changed, ns."""
+    return [
+        tag
+        if tag.tag_id not in changed
+        else TagPast(
+            tag.tag_id,
+            tag.x,
+            tag.y,
+            tuple(one for one in tag.readings if one[0] < changed[tag.tag_id]),
+        )
+        for tag in tags
+    ]
+
+
+def _go_on_unless(should_stop: Callable[[], bool]) -> None:
+    if should_stop():
+        raise Abandoned
+
+
+def cost_s(request: EstimateRequest, tags: int, max_grid_cells: int) -> float:
+    """About how long an estimate of so many tags takes, s of one core."""
+    width, height = check_request(request.box, max_grid_cells)
+    readings = min(MAX_EXACT, MAX_PER_TAG * tags)
+    is_exact = tags * PER_TAG <= MAX_EXACT
+    return (readings**2 * _PAIR_S if is_exact else tags * _TAG_S) + width * height * _CELL_S

@@ -1,0 +1,1 @@
+"""Heat maps by inverse distance weighting: grid, explored ground, cache, quality. Pure."""

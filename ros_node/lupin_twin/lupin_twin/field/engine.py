@@ -1,0 +1,361 @@
+"""GetField without ROS: its checks, the clipping to explored ground, and the cache.
+
+Pure. `FieldEngine` belongs to the store's thread; a `FieldJob` it hands out is immutable, and any
+thread may compute it. Metres in the map frame throughout.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple, Self
+
+import numpy as np
+
+from lupin_twin.core.drops import MAX_TEXT_LENGTH
+from lupin_twin.core.parameters import TwinParameters
+from lupin_twin.core.state import TwinStore
+from lupin_twin.field.explored import OccupancyMap, explored_mask
+from lupin_twin.field.grid import FieldGrid, grid_dimensions, reach_of
+from lupin_twin.field.idw import compute_idw_field, never
+
+MAX_ENTRIES: Final = 64
+MAX_BYTES: Final = 64_000_000
+
+
+# m, where a request names none.
+DEFAULT_RESOLUTION_M: Final = 0.1
+
+# What computing takes, roughly and at worst: for each cell, and for each pair of a cell and a
+# sample that reaches it, at power 2 or any other.
+_CELL_S: Final = 20e-9
+_PAIR_S: Final = 5e-9
+_POWER_PAIR_S: Final = 15e-9
+
+
+class FieldRefused(ValueError):
+    """A request that gets no field; the message names the field, the value and the limit."""
+
+
+@dataclass(frozen=True, slots=True)
+class FieldRequest:
+    """What to reconstruct: a sensor over a box (m, map frame) in cells of `resolution` (m).
+
+    The numbers are rounded to float32, GetField's wire type: a request over HTTP and the same one
+    over ROS are the same request then, with the same field. `past_float32` names the first number
+    that float32 does not hold, as it was sent; `check_request` refuses it.
+    """
+
+    sensor_type: str
+    resolution: float
+    bbox_min_x: float
+    bbox_min_y: float
+    bbox_max_x: float
+    bbox_max_y: float
+    past_float32: str = field(default="", init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        with np.errstate(over="ignore", under="ignore"):
+            for name in ("resolution", "bbox_min_x", "bbox_min_y", "bbox_max_x", "bbox_max_y"):
+                sent = getattr(self, name)
+                rounded = float(np.float32(sent))
+                object.__setattr__(self, name, rounded)
+                is_lost = name == "resolution" and sent != 0.0 and rounded == 0.0
+                if (is_lost or math.isinf(rounded) > math.isinf(sent)) and not self.past_float32:
+                    object.__setattr__(self, "past_float32", f"{name} is {sent}")
+
+    @property
+    def cells(self) -> tuple[float, float, float, float, float]:
+        """The box, min and max x and y as in `grid_dimensions`, and the resolution; m."""
+        return (
+            self.bbox_min_x,
+            self.bbox_min_y,
+            self.bbox_max_x,
+            self.bbox_max_y,
+            self.resolution,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class FieldRules:
+    """The node's parameters for fields; distances in metres.
+
+    Raises:
+        ValueError: a rule out of its range, named with its value and the limit.
+
+    """
+
+    idw_power: float
+    falloff_radius_m: float
+    max_distance_m: float
+    max_grid_cells: int
+
+    @classmethod
+    def of(cls, parameters: TwinParameters) -> Self:
+        """As the parameters have them."""
+        return cls(
+            idw_power=parameters.idw_power,
+            falloff_radius_m=parameters.idw_falloff_radius_m,
+            max_distance_m=parameters.idw_max_distance_m,
+            max_grid_cells=parameters.max_grid_cells,
+        )
+
+    def __post_init__(self) -> None:
+        for name in ("idw_power", "falloff_radius_m", "max_distance_m"):
+            number = getattr(self, name)
+            if not (math.isfinite(number) and number >= 0.0):
+                raise ValueError(f"{name} is {number}, must be finite and not less than 0")
+        if self.max_grid_cells < 1:
+            raise ValueError(f"max_grid_cells is {self.max_grid_cells}, must not be less than 1")
+
+
+class FieldKey(NamedTuple):
+    """Everything that a field depends on; `rules` are those by which it is made.
+
+    `observation_count` stands for the store's whole content. `map_revision` is None where no map
+    has come.
+    """
+
+    request: FieldRequest
+    observation_count: int
+    map_revision: int | None
+    rules: FieldRules
+
+
+class FieldCache:
+    """An LRU of at most `max_entries` fields whose values take at most `max_bytes` together."""
+
+    def __init__(self, max_bytes: int = MAX_BYTES, max_entries: int = MAX_ENTRIES) -> None:
+        """Raises ValueError for a bound below 0."""
+        if max_bytes < 0:
+            raise ValueError(f"max_bytes is {max_bytes}, must not be less than 0")
+        if max_entries < 0:
+            raise ValueError(f"max_entries is {max_entries}, must not be less than 0")
+        self.max_bytes = max_bytes
+        self.max_entries = max_entries
+        self.hits = 0
+        self.misses = 0
+        self.bytes = 0
+        self._grids: OrderedDict[FieldKey, FieldGrid] = OrderedDict()
+
+    def __len__(self) -> int:
+        return len(self._grids)
+
+    def get(self, key: FieldKey) -> FieldGrid | None:
+        """The cached field of `key`, which becomes the most recently used; counted either way."""
+        grid = self._grids.get(key)
+        if grid is None:
+            self.misses += 1
+            return None
+        self._grids.move_to_end(key)
+        self.hits += 1
+        return grid
+
+    def put(self, key: FieldKey, grid: FieldGrid) -> None:
+        """Cache `grid`, dropping the least recently used; not one past the whole bound."""
+        if grid.values.nbytes > self.max_bytes:
+            return
+        replaced = self._grids.pop(key, None)
+        if replaced is not None:
+            self.bytes -= replaced.values.nbytes
+        self._grids[key] = grid
+        self.bytes += grid.values.nbytes
+        while len(self._grids) > self.max_entries or self.bytes > self.max_bytes:
+            _, dropped = self._grids.popitem(last=False)
+            self.bytes -= dropped.values.nbytes
+
+
+def cost_s(request: FieldRequest, samples: int, rules: FieldRules) -> float:
+    """About how long a field of so many samples takes, seconds of one core; for ordering work.
+
+    As if all samples lay within the box: one outside costs less.
+
+    Raises:
+        FieldRefused: see `check_request`.
+
+    """
+    width, height = check_request(request, rules.max_grid_cells)
+    reach = 2.0 * max(rules.falloff_radius_m, rules.max_distance_m) / request.resolution
+    pairs = samples * min(width, reach) * min(height, reach)
+    pair_s = _PAIR_S if rules.idw_power == 2.0 else _POWER_PAIR_S
+    return width * height * _CELL_S + pairs * pair_s
+
+
+def check_sensor_type(name: str) -> None:
+    """See that a sensor is named.
+
+    Raises:
+        FieldRefused: the name is empty, or longer than any that is taken.
+
+    """
+    if not name:
+        raise FieldRefused("sensor_type is empty, must name a sensor")
+    if len(name) > MAX_TEXT_LENGTH:
+        raise FieldRefused(
+            f"sensor_type {name[:24]!r}… has {len(name)} characters, the limit is {MAX_TEXT_LENGTH}"
+        )
+
+
+def check_request(request: FieldRequest, max_grid_cells: int) -> tuple[int, int]:
+    """(width, height) of the grid that `request` asks for; nothing is allocated.
+
+    Raises:
+        FieldRefused: the request names no sensor, its numbers make no grid, or a grid of more than
+            `max_grid_cells` cells.
+
+    """
+    check_sensor_type(request.sensor_type)
+    if request.past_float32:
+        raise FieldRefused(f"{request.past_float32} m, must fit into float32 (1.4e-45 to 3.4e38)")
+    try:
+        width, height = grid_dimensions(*request.cells)
+    except ValueError as error:
+        raise FieldRefused(str(error)) from error
+    if width * height > max_grid_cells:
+        # As floats: a hostile request has sides of dozens of digits.
+        raise FieldRefused(
+            f"resolution {request.resolution:g} m makes {float(width):.10g} x {float(height):.10g} "
+            f"cells, the limit is {max_grid_cells} in all (max_grid_cells)"
+        )
+    return width, height
+
+
+def compute_field(
+    request: FieldRequest,
+    samples: Sequence[tuple[float, float, float]],
+    occupancy: OccupancyMap | None,
+    rules: FieldRules,
+    should_stop: Callable[[], bool] = never,
+) -> FieldGrid:
+    """The field of `samples`; with a map, cells that it does not know are NaN.
+
+    Raises:
+        FieldRefused: see `check_request`.
+        lupin_twin.field.idw.Abandoned: `should_stop`, called now and then, was true.
+
+    """
+    mask = None
+    if occupancy is not None:
+        width, height = check_request(request, rules.max_grid_cells)
+        mask = explored_mask(
+            occupancy,
+            width=width,
+            height=height,
+            origin_x=request.bbox_min_x,
+            origin_y=request.bbox_min_y,
+            resolution=request.resolution,
+        )
+    return compute_idw_field(
+        samples,
+        bbox_min_x=request.bbox_min_x,
+        bbox_min_y=request.bbox_min_y,
+        bbox_max_x=request.bbox_max_x,
+        bbox_max_y=request.bbox_max_y,
+        resolution=request.resolution,
+        falloff_radius_m=rules.falloff_radius_m,
+        max_distance_m=rules.max_distance_m,
+        power=rules.idw_power,
+        explored_mask=mask,
+        should_stop=should_stop,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FieldJob:
+    """A field to be computed: all it depends on, immutable, so that any thread may do it.
+
+    `occupancy` is the map to clip to, and None before one has come.
+    """
+
+    request: FieldRequest
+    key: FieldKey
+    samples: tuple[tuple[float, float, float], ...]
+    occupancy: OccupancyMap | None
+    rules: FieldRules
+
+    @property
+    def cost_s(self) -> float:
+        """About how long `compute` takes, seconds of one core."""
+        return cost_s(self.request, len(self.samples), self.rules)
+
+    def compute(self, should_stop: Callable[[], bool] = never) -> FieldGrid:
+        """`compute_field` of all this."""
+        return compute_field(self.request, self.samples, self.occupancy, self.rules, should_stop)
+
+
+class FieldEngine:
+    """Answers a request from the cache, or with the job that computes it.
+
+    Belongs to the thread of the store. The computing does not: hand the job to any thread, bring
+    the grid back and `keep` it here.
+    """
+
+    def __init__(self, rules: FieldRules, cache: FieldCache) -> None:
+        self.rules = rules
+        self.cache = cache
+
+    def lookup(
+        self, request: FieldRequest, store: TwinStore, occupancy: OccupancyMap | None
+    ) -> FieldGrid | FieldJob:
+        """The field as it was computed before, or a job; `occupancy` is the latest map, if any.
+
+        Raises:
+            FieldRefused: see `check_request`.
+
+        """
+        check_request(request, self.rules.max_grid_cells)
+        revision = None if occupancy is None else occupancy.revision
+        key = FieldKey(request, store.observation_count, revision, self.rules)
+        grid = self.cache.get(key)
+        if grid is not None:
+            return grid
+        return FieldJob(
+            request=request,
+            key=key,
+            samples=store.samples_for_sensor(request.sensor_type),
+            occupancy=occupancy,
+            rules=self.rules,
+        )
+
+    def keep(self, job: FieldJob, grid: FieldGrid) -> None:
+        """Remember what `job` computed."""
+        self.cache.put(job.key, grid)
+
+
+def default_box(
+    positions: Iterable[tuple[float, float]], max_distance_m: float
+) -> tuple[float, float, float, float]:
+    """(min_x, min_y, max_x, max_y) for a request without a box: all that can be painted.
+
+    The box of the tags' `positions` (x, y), wider by `max_distance_m` on every side; without a tag
+    the same around the origin. Tags that are far off (`far_off`) have no say.
+    """
+    positions = list(positions)
+    reach = reach_of(positions)
+    positions = [(x, y) for x, y in positions if reach.holds(x, y)]
+    xs, ys = zip(*positions, strict=True) if positions else ((0.0,), (0.0,))
+    return (
+        min(xs) - max_distance_m,
+        min(ys) - max_distance_m,
+        max(xs) + max_distance_m,
+        max(ys) + max_distance_m,
+    )
+
+
+def default_request(
+    sensor_type: str, box: tuple[float, float, float, float], max_cells: int
+) -> FieldRequest:
+    """The field over a default box, where a request names no resolution either.
+
+    Cells are `DEFAULT_RESOLUTION_M` wide, or 2, 4, 8... times as wide where they would be more than
+    `max_cells`.
+    """
+    resolution = DEFAULT_RESOLUTION_M
+    while True:
+        request = FieldRequest(sensor_type, resolution, *box)
+        width, height = grid_dimensions(*request.cells)
+        if width * height <= max_cells:
+            return request
+        resolution *= 2.0

@@ -1,0 +1,440 @@
+"""Field reconstruction: inverse distance weighting of the tags' readings onto a regular grid.
+
+Pure: numpy and the standard library only, no ROS, no clock, no state; any thread may call it.
+
+Positions, distances and the resolution are metres in the map frame, values are in the sensor's
+own unit. Cell `(i, j)` is column `i` (along x) and row `j` (along y), its centre lies at
+`bbox_min + (index + 0.5) * resolution`. Row 0 is at `bbox_min_y`; `values` is row-major. NaN is
+"unknown" and never a reading.
+
+The definition (Shepard, "A two-dimensional interpolation function for irregularly-spaced data",
+1968, with a gate and a radius), per cell and in this order:
+
+1. unexplored (mask given and false): NaN;
+2. nearest sample farther than `max_distance_m`: NaN, the honesty gate;
+3. nearest sample closer than `COINCIDENT_EPS_M`: exactly its value;
+4. samples within `falloff_radius_m`: sum(v / d**p) / sum(1 / d**p);
+5. none within: the nearest sample's value.
+
+A distance is the float64 `sqrt(dx * dx + dy * dy)`; of equally near samples the first one counts.
+
+How it is computed: the grid is split into parts, and those again, and each part has only the
+samples that reach it, until its pairs of a cell and a sample fit the processor's cache; there the
+definition is evaluated for all pairs at once. A part that nothing reaches is dropped on the way.
+So the cost follows the painted cells, and memory beyond the grid's own is that of one part.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from itertools import chain, pairwise
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from lupin_twin.field.grid import (
+    BoolArray,
+    FieldGrid,
+    FloatArray,
+    cell_centres,
+    check_finite,
+    grid_dimensions,
+)
+
+COINCIDENT_EPS_M: Final = 1e-3
+
+# So many pairs of a part are evaluated at once: two float64 arrays of that size stay in the
+# second-level cache, and numpy's work on them is several times the cost of calling it.
+_MAX_PAIRS: Final = 51_200
+_MIN_PAIRS: Final = 4_096
+# A small grid takes smaller parts, so that all of it stays within ten times the grid's own bytes:
+# 4 a cell, 25 a pair at most, and numpy's buffers whatever the size.
+_PAIR_BYTES: Final = 25
+_SPARE_BYTES_PER_CELL: Final = 10 * 4 - 4
+_BUFFER_BYTES: Final = 200_000
+# Parts are planned to come to this share of it, since samples never lie as evenly as assumed.
+_PLANNED_SHARE: Final = 0.8
+# With fewer points than this to a sample, numpy's loops are all overhead. It takes memory past
+# _MAX_PAIRS only where more than a thousand samples reach one part.
+_MIN_POINTS: Final = 32
+# A part is split into so many pieces along a side at most; it bounds what a split itself takes.
+_MAX_PIECES: Final = 8
+
+# 1/d² is used as it is up to here; past it (and for any power but 2) the weights are scaled by
+# the nearest distance of the cell, so that none overflows and the largest is exactly 1.
+_MAX_PLAIN_REACH_M: Final = 1e6
+
+# Larger readings count as this one: far past float32 both, and Σ(v/dᵖ) cannot overflow.
+_LARGEST_VALUE: Final = 1e280
+
+# What a sample closer than COINCIDENT_EPS_M weighs at least, at power 2, a rounding apart.
+_COINCIDENT_WEIGHT: Final = 0.999 / COINCIDENT_EPS_M**2
+
+IndexArray = npt.NDArray[np.intp]
+
+
+def _largest_square_within(radius: float) -> float:
+    """The largest float64 whose square root is not greater than `radius`.
+
+    `sqrt(square) <= radius` and `square <= _largest_square_within(radius)` are the same then, to
+    the bit, and the root need not be taken for every pair.
+    """
+    square = min(radius * radius, sys.float_info.max)
+    while math.sqrt(following := math.nextafter(square, math.inf)) <= radius:
+        square = following
+    return square
+
+
+# The largest squared distance that is closer than COINCIDENT_EPS_M, which itself is not.
+_COINCIDENT_SQUARE: Final = _largest_square_within(math.nextafter(COINCIDENT_EPS_M, 0.0))
+
+
+class Abandoned(Exception):
+    """A computation that ended before its result, for nobody waits for it any more."""
+
+
+def never() -> bool:
+    """The `should_stop` of a computation that is always waited for."""
+    return False
+
+
+class FieldSample(NamedTuple):
+    """One reading at its place: x and y in metres (map frame), the value in the sensor's unit."""
+
+    x: float
+    y: float
+    value: float
+
+
+def compute_idw_field(
+    samples: Sequence[tuple[float, float, float]],
+    *,
+    bbox_min_x: float,
+    bbox_min_y: float,
+    bbox_max_x: float,
+    bbox_max_y: float,
+    resolution: float,
+    falloff_radius_m: float,
+    max_distance_m: float,
+    power: float,
+    explored_mask: BoolArray | None = None,
+    should_stop: Callable[[], bool] = never,
+) -> FieldGrid:
+    """The field of `samples` over the box, by the module's definition.
+
+    `samples` are (x, y, value) in the order they were recorded; `FieldSample` is one. No samples
+    make a field without a value, which is no error. `explored_mask` has the grid's shape,
+    (height, width). `should_stop()` is called every millisecond or so.
+
+    Raises:
+        ValueError: an argument out of its range, named with its value and the limit.
+        Abandoned: `should_stop` was true.
+
+    """
+    width, height = grid_dimensions(bbox_min_x, bbox_min_y, bbox_max_x, bbox_max_y, resolution)
+    if explored_mask is not None and (
+        explored_mask.shape != (height, width) or explored_mask.dtype != np.bool_
+    ):
+        raise ValueError(
+            f"explored_mask is {explored_mask.dtype} of shape {explored_mask.shape}, must be bool "
+            f"of shape {(height, width)} (height, width)"
+        )
+    x, y, value = sample_columns(samples)
+    idw = PairwiseIdw(
+        falloff_radius_m=falloff_radius_m,
+        max_distance_m=max_distance_m,
+        power=power,
+        max_pairs=_pairs_at_once(width * height),
+    )
+    values = np.full((height, width), np.nan, dtype=np.float32)
+    painter = _Painter(
+        samples=(x, y, value),
+        cell_x=cell_centres(bbox_min_x, width, resolution),
+        cell_y=cell_centres(bbox_min_y, height, resolution),
+        resolution=resolution,
+        idw=idw,
+        explored=explored_mask,
+        values=values,
+        should_stop=should_stop,
+    )
+    with np.errstate(all="ignore"):
+        painter.paint()
+        value_min, value_max = _finite_range(values)
+    values.setflags(write=False)
+    return FieldGrid(
+        width=width,
+        height=height,
+        origin_x=float(bbox_min_x),
+        origin_y=float(bbox_min_y),
+        resolution=float(resolution),
+        values=values.reshape(-1),
+        value_min=value_min,
+        value_max=value_max,
+        sample_count=len(samples),
+    )
+
+
+def _pairs_at_once(cells: int) -> int:
+    within_memory = (_SPARE_BYTES_PER_CELL * cells - _BUFFER_BYTES) // _PAIR_BYTES
+    return min(max(within_memory, _MIN_PAIRS), _MAX_PAIRS)
+
+
+def sample_columns(
+    samples: Sequence[tuple[float, float, float]],
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The samples' x and y (m) and values, as arrays; values past `_LARGEST_VALUE` count as that.
+
+    Raises:
+        ValueError: a sample that is not three finite numbers.
+
+    """
+    flat = np.fromiter(chain.from_iterable(samples), dtype=np.float64)
+    if flat.size != 3 * len(samples):
+        raise ValueError(f"samples hold {flat.size} numbers, must be 3 each of {len(samples)}")
+    finite = np.isfinite(flat)
+    if not finite.all():
+        index = int(np.argmin(finite))
+        raise ValueError(
+            f"samples[{index // 3}].{FieldSample._fields[index % 3]} is {flat[index]}, "
+            "must be finite"
+        )
+    x, y, value = np.ascontiguousarray(flat.reshape(-1, 3).T)
+    return x, y, np.clip(value, -_LARGEST_VALUE, _LARGEST_VALUE)
+
+
+def _finite_range(values: npt.NDArray[np.float32]) -> tuple[float, float]:
+    low, high = np.fmin.reduce(values, axis=None), np.fmax.reduce(values, axis=None)
+    if np.isinf(low) or np.isinf(high):
+        finite = values[np.isfinite(values)]
+        low, high = finite.min(initial=np.inf), finite.max(initial=-np.inf)
+    if not np.isfinite(low):
+        return 0.0, 0.0
+    return float(low), float(high)
+
+
+class PairwiseIdw:
+    """The definition's rules 2 to 5 for any points, given their squared distances to the samples.
+
+    Not to be shared between threads: the intermediate arrays are reused by the next evaluation.
+
+    Raises:
+        ValueError: a rule out of its range, named with its value and the limit.
+
+    """
+
+    def __init__(
+        self, *, falloff_radius_m: float, max_distance_m: float, power: float, max_pairs: int
+    ) -> None:
+        for name, number in (
+            ("falloff_radius_m", falloff_radius_m),
+            ("max_distance_m", max_distance_m),
+            ("power", power),
+        ):
+            check_finite(name, number)
+            if number < 0.0:
+                raise ValueError(f"{name} is {number}, must not be less than 0")
+        self.power = power
+        self.falloff_radius = falloff_radius_m
+        self.max_distance = max_distance_m
+        self.falloff_square = _largest_square_within(falloff_radius_m)
+        self.max_square = _largest_square_within(max_distance_m)
+        self.reach_square = max(self.falloff_square, self.max_square)
+        self._equal_radii = falloff_radius_m == max_distance_m
+        self._plain_weights = power == 2.0 and falloff_radius_m <= _MAX_PLAIN_REACH_M
+        self.max_pairs = max_pairs
+        self._allocate(max_pairs)
+
+    def _allocate(self, pairs: int) -> None:
+        # In one block: the allocator gives it back to the next field instead of to the system,
+        # and a fifth of a small field's time, page faults, is saved.
+        self._square, self._weight = np.empty((2, pairs))
+        self._within = np.empty(pairs, dtype=np.bool_)
+
+    def fits(self, samples: int, points: int) -> bool:
+        """Whether so many are better evaluated at once than in parts."""
+        return samples * points <= self.max_pairs or points <= _MIN_POINTS
+
+    def squares(self, samples: int, points: int) -> FloatArray:
+        """An array (samples, points) to put the squared distances (m²) into, for `evaluate`."""
+        pairs = samples * points
+        if pairs > self._square.size:
+            self._allocate(pairs)
+        return self._square[:pairs].reshape(samples, points)
+
+    def evaluate(self, square: FloatArray, value: FloatArray) -> FloatArray:
+        """The points' values, NaN behind the gate; `square` is `squares()`, filled, and is spent.
+
+        A sample that does not count for a point has an infinite squared distance to it. Call it
+        with numpy's floating point warnings off: 0/0 is a point that nothing reaches, 1/0 a sample
+        on a point.
+        """
+        weight = self._weight[: square.size].reshape(square.shape)
+        within = self._within[: square.size].reshape(square.shape)
+        np.less_equal(square, self.falloff_square, out=within)
+        weight.fill(0.0)
+        if self._plain_weights:
+            return self._evaluate_plain(square, value, weight, within)
+        return self._evaluate_normalised(square, value, weight, within)
+
+    def _evaluate_plain(
+        self, square: FloatArray, value: FloatArray, weight: FloatArray, within: BoolArray
+    ) -> FloatArray:
+        """Power 2: 1/d² needs no root, and the nearest sample is seldom needed."""
+        np.divide(1.0, square, out=weight, where=within)
+        total = np.ones(value.size).dot(weight)
+        points: FloatArray = value.dot(weight)
+        points /= total
+        # With equal radii a point out of reach is 0/0 by now, and the nearest sample matters only
+        # where the weights are so large that one may be coincident.
+        if self._equal_radii and np.maximum.reduce(total) < _COINCIDENT_WEIGHT:
+            return points
+        shortest = np.minimum.reduce(square, axis=0)
+        special = np.flatnonzero((shortest <= _COINCIDENT_SQUARE) | (total == 0.0))
+        if special.size:
+            # Of the root: two squares a rounding apart can be the same distance, and of equally
+            # near samples the first one counts.
+            distance = square[:, special]
+            np.sqrt(distance, out=distance)
+            points[special] = value[distance.argmin(axis=0)]
+        points[shortest > self.max_square] = np.nan
+        return points
+
+    def _evaluate_normalised(
+        self, square: FloatArray, value: FloatArray, weight: FloatArray, within: BoolArray
+    ) -> FloatArray:
+        """Any power: the weights are (nearest/d)ᵖ, so that the largest is 1 and none overflows."""
+        distance = np.sqrt(square, out=square)
+        shortest = np.minimum.reduce(distance, axis=0)
+        np.divide(shortest, distance, out=weight, where=within)
+        np.power(weight, self.power, out=weight, where=within)
+        points: FloatArray = value.dot(weight)
+        points /= np.ones(value.size).dot(weight)
+        special = np.flatnonzero((shortest < COINCIDENT_EPS_M) | (shortest > self.falloff_radius))
+        if special.size:
+            points[special] = value[distance[:, special].argmin(axis=0)]
+        points[shortest > self.max_distance] = np.nan
+        return points
+
+
+class _Part(NamedTuple):
+    """Rows `top` to `bottom`, columns `left` to `right` (exclusive), and the samples near them."""
+
+    top: int
+    bottom: int
+    left: int
+    right: int
+    reaching: IndexArray
+
+    @property
+    def rows(self) -> int:
+        return self.bottom - self.top
+
+    @property
+    def columns(self) -> int:
+        return self.right - self.left
+
+
+class _Painter:
+    """Evaluates the definition part by part; `values` (height, width) is NaN at the start."""
+
+    def __init__(
+        self,
+        *,
+        samples: tuple[FloatArray, FloatArray, FloatArray],
+        cell_x: FloatArray,
+        cell_y: FloatArray,
+        resolution: float,
+        idw: PairwiseIdw,
+        explored: BoolArray | None,
+        values: npt.NDArray[np.float32],
+        should_stop: Callable[[], bool],
+    ) -> None:
+        self.x, self.y, self.value = samples
+        self.cell_x, self.cell_y = cell_x, cell_y
+        self.idw = idw
+        self.reach_in_cells = 2.0 * math.sqrt(idw.reach_square) / resolution
+        self.explored = explored
+        self.values = values
+        self.should_stop = should_stop
+
+    def paint(self) -> None:
+        """Fill `values`, part by part."""
+        height, width = self.values.shape
+        whole = _Part(0, height, 0, width, np.arange(self.value.size))
+        parts = list(self._split(whole, 1, 1)) if self.value.size else []
+        while parts:
+            if self.should_stop():
+                raise Abandoned
+            part = parts.pop()
+            if self.idw.fits(part.reaching.size, part.rows * part.columns):
+                self._evaluate(part)
+            else:
+                parts.extend(self._split(part, *self._pieces(part)))
+
+    def _pieces(self, part: _Part) -> tuple[int, int]:
+        """How many pieces down and across: the fewest that should be small enough.
+
+        As if the samples lay evenly over the part and its surroundings within their reach; where
+        they do not, a piece is split again.
+        """
+        around = self.reach_in_cells
+        density = part.reaching.size / ((part.rows + around) * (part.columns + around))
+        down, across = (2, 1) if part.rows > part.columns else (1, 2)
+        for pieces in range(2, _MAX_PIECES + 1):
+            rows, columns = part.rows / down, part.columns / across
+            reaching = density * (rows + around) * (columns + around)
+            if reaching * rows * columns <= _PLANNED_SHARE * self.idw.max_pairs:
+                break
+            side = max(part.rows, part.columns) / pieces
+            down = min(part.rows, math.ceil(part.rows / side))
+            across = min(part.columns, math.ceil(part.columns / side))
+        return down, across
+
+    def _split(self, part: _Part, down: int, across: int) -> Iterator[_Part]:
+        """`part` in `down` times `across` pieces, without those that stay NaN as a whole.
+
+        A piece has the samples that reach the nearest point of its cells. Rounding is monotonic,
+        so no cell's own squared distance is below that point's, and none is lost to float noise.
+        """
+        rows, columns = _edges(part.top, part.bottom, down), _edges(part.left, part.right, across)
+        x_gaps = _gap_squares(self.x.take(part.reaching), self.cell_x, columns)
+        y_gaps = _gap_squares(self.y.take(part.reaching), self.cell_y, rows)
+        for (top, bottom), y_gap in zip(pairwise(rows), y_gaps, strict=True):
+            for (left, right), x_gap in zip(pairwise(columns), x_gaps, strict=True):
+                if self.explored is not None and not self.explored[top:bottom, left:right].any():
+                    continue
+                gap = x_gap + y_gap
+                if gap.min() <= self.idw.max_square:
+                    reaching = part.reaching[gap <= self.idw.reach_square]
+                    yield _Part(top, bottom, left, right, reaching)
+
+    def _evaluate(self, part: _Part) -> None:
+        cells = slice(part.top, part.bottom), slice(part.left, part.right)
+        rows, columns = part.rows, part.columns
+        dx = self.x.take(part.reaching)[:, None] - self.cell_x[cells[1]]
+        dy = self.y.take(part.reaching)[:, None] - self.cell_y[cells[0]]
+        dx *= dx
+        dy *= dy
+        square = self.idw.squares(part.reaching.size, rows * columns)
+        np.add(dy[:, :, None], dx[:, None, :], out=square.reshape(-1, rows, columns))
+        points = self.idw.evaluate(square, self.value.take(part.reaching)).reshape(rows, columns)
+        if self.explored is not None:
+            points[~self.explored[cells]] = np.nan
+        self.values[cells] = points
+
+
+def _edges(first: int, end: int, pieces: int) -> list[int]:
+    return [first + (end - first) * piece // pieces for piece in range(pieces + 1)]
+
+
+def _gap_squares(position: FloatArray, centres: FloatArray, edges: list[int]) -> FloatArray:
+    """(pieces, positions): squared distance (m²) along one axis from each piece's cells."""
+    low = centres[edges[:-1]][:, None]
+    high = centres[[edge - 1 for edge in edges[1:]]][:, None]
+    gap: FloatArray = np.maximum(position, low)
+    np.minimum(gap, high, out=gap)
+    np.subtract(gap, position, out=gap)
+    return np.square(gap, out=gap)

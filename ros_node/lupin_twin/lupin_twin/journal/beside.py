@@ -1,0 +1,165 @@
+"""What lies beside a journal: its lock, how far it is in the archive, the log that has to last."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import threading
+from pathlib import Path
+from typing import Final, Self
+
+from lupin_twin.journal.schema import sync_folder
+
+
+class InUse(Exception):
+    """Another process writes this journal; the message names it."""
+
+
+class Lock:
+    """Held from construction to `release`.
+
+    Raises:
+        InUse: another process holds it.
+        OSError: the folder cannot be written.
+
+    """
+
+    def __init__(self, journal: Path, holder: str) -> None:
+        self._descriptor = os.open(_beside(journal), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            other = _name_in(self._descriptor)
+            os.close(self._descriptor)
+            raise InUse(f"the journal {journal} is in use by {other}") from None
+        except BaseException:
+            os.close(self._descriptor)
+            raise
+        # Who holds it is only for the message: on a full disk the lock holds all the same.
+        try:
+            os.ftruncate(self._descriptor, 0)
+            os.pwrite(self._descriptor, f"{holder} (process {os.getpid()})\n".encode(), 0)
+        except OSError:
+            pass
+
+    def release(self) -> None:
+        """Let others write."""
+        os.close(self._descriptor)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+
+def holder_of(journal: Path) -> str | None:
+    """Who writes a journal, None if nobody does; for a moment it holds the lock with others.
+
+    Raises:
+        OSError: the lock is there and may not be read.
+
+    """
+    try:
+        descriptor = os.open(_beside(journal), os.O_RDONLY | os.O_CLOEXEC)
+    except FileNotFoundError:
+        return None
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return _name_in(descriptor)
+    finally:
+        os.close(descriptor)
+    return None
+
+
+def _beside(journal: Path) -> Path:
+    return journal.with_name(journal.name + ".lock")
+
+
+def _name_in(descriptor: int) -> str:
+    return os.read(descriptor, 512).decode("utf-8", "replace").strip() or "another process"
+
+
+def mark_of(journal: Path) -> Path:
+    """The file: the journal's identity, and the last `seq` that is in the archive."""
+    return journal.with_name(journal.name + ".forwarded")
+
+
+def note_forwarded(journal: Path, journal_id: str, seq: int) -> None:
+    """Have it there.
+
+    Raises:
+        OSError: it cannot be written.
+
+    """
+    mark = mark_of(journal)
+    new = mark.with_name(mark.name + ".new")
+    new.write_text(f"{journal_id} {seq}\n", encoding="ascii")
+    new.replace(mark)
+
+
+def forwarded_seq(journal: Path, journal_id: str | None) -> int | None:
+    """The last number that is in the archive, of another journal 0; None: nobody forwards it."""
+    try:
+        words = mark_of(journal).read_text(encoding="ascii").split()
+    except FileNotFoundError:
+        return None
+    except (OSError, UnicodeDecodeError):
+        return 0
+    is_ours = len(words) == 2 and words[0] == journal_id and words[1].isdecimal()
+    return int(words[1]) if is_ours else 0
+
+
+# Half of what is promised; the other half is for the disk.
+_PERIOD_S: Final = 0.5
+
+
+class Syncing:
+    """Syncs the log of an open journal until it is closed.
+
+    Raises:
+        OSError: the log cannot be opened.
+
+    """
+
+    def __init__(self, journal: Path, period_s: float = _PERIOD_S) -> None:
+        log = journal.with_name(journal.name + "-wal")
+        self._descriptor = os.open(log, os.O_RDWR | os.O_CLOEXEC)
+        self._period_s = period_s
+        self._is_dirty = threading.Event()
+        self._stop = threading.Event()
+        self._error: OSError | None = None
+        # The name of a new log has to last too.
+        sync_folder(journal.parent)
+        self._thread = threading.Thread(target=self._run, name="journal sync", daemon=True)
+        self._thread.start()
+
+    def has_written(self) -> None:
+        """The log has grown.
+
+        Raises:
+            OSError: the last sync failed: nobody knows what of it is on the disk.
+
+        """
+        if self._error is not None:
+            raise self._error
+        self._is_dirty.set()
+
+    def close(self) -> None:
+        """End the thread; a sync that hangs is left to itself."""
+        self._stop.set()
+        self._is_dirty.set()
+        self._thread.join(timeout=1.0)
+
+    def _run(self) -> None:
+        try:
+            while not self._stop.is_set():
+                self._is_dirty.wait()
+                self._stop.wait(self._period_s)
+                self._is_dirty.clear()
+                os.fdatasync(self._descriptor)
+        except OSError as error:
+            self._error = error
+        finally:
+            os.close(self._descriptor)

@@ -1,0 +1,358 @@
+# ruff: noqa: S608  # SQL is put together of constants
+"""A new file in a journal's place: one of version 3 upgraded, or one without gaps.
+
+It is built beside the journal, synced, and takes its name: whoever is killed meanwhile has the old
+one whole. The old one of an upgrade stays beside it as `NAME.v3`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sqlite3
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from lupin_twin.core.past import Event
+from lupin_twin.journal.appending import Appender, held
+from lupin_twin.journal.beside import Lock
+from lupin_twin.journal.checking import Progress, find_all_damage
+from lupin_twin.journal.fold import copies
+from lupin_twin.journal.hours import DELETED
+from lupin_twin.journal.retention import KEPT_BYTES, KEPT_NS, used_bytes
+from lupin_twin.journal.runs import Carries, Run, put_run
+from lupin_twin.journal.schema import (
+    APPLICATION_ID,
+    LOCAL_SITE,
+    DamagedFile,
+    open_named,
+    open_writer,
+    set_meta,
+    sync_folder,
+    transaction,
+)
+from lupin_twin.journal.version3 import VERSION, Bucket, OldRun, Version3
+
+_ROWS: Final = 5_000
+# A new file is about as large as the old one; indexes and what is counted may take more.
+_ROOM: Final = 1.5
+_NUMBERS: Final = (KEPT_NS, KEPT_BYTES, "simulated_from_ns", "simulated_until_ns")
+
+
+def is_version3(path: Path) -> bool:
+    """Whether a file is a journal of that version; one that cannot be read is none.
+
+    Only its first bytes are read (https://www.sqlite.org/fileformat2.html, 1.3).
+    """
+    try:
+        with path.open("rb") as file:
+            header = file.read(100)
+    except FileNotFoundError:
+        return False
+    numbers = (int.from_bytes(header[at : at + 4], "big") for at in (60, 68))
+    return tuple(numbers) == (VERSION, APPLICATION_ID)
+
+
+def upgrade(path: Path, report: Callable[[float], None]) -> str:
+    """Upgrade a journal of version 3, which the caller holds the lock of.
+
+    `report(share)` is called as the work goes on. Returns in words what was left out, for it was
+    not what had been written: nothing, mostly.
+
+    Raises:
+        sqlite3.Error, DamagedFile, OSError: it is as it was: somebody reads it, say, or the disk
+            is full.
+
+    """
+    new = path.with_name(path.name + ".upgrade")
+    _remove(new)
+    with closing(sqlite3.connect(path, isolation_level=None, timeout=5.0)) as connection:
+        # All of it in the one file: the log beside it would be taken for one of the new file.
+        ((is_busy, *_),) = connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+        if is_busy:
+            raise sqlite3.OperationalError(f"somebody reads {path}, which is to be upgraded")
+        connection.execute("PRAGMA query_only = 1")
+        _check_room(path, int(path.stat().st_size * _ROOM), "its upgrade takes up to")
+        try:
+            with closing(open_writer(new)) as target:
+                # Of what is begun again if it fails, nothing has to be safe before it is done.
+                target.execute("PRAGMA journal_mode = MEMORY")
+                target.execute("PRAGMA synchronous = OFF")
+                damaged = _Upgrade(Version3(connection), target, report).run()
+            _sync(new)
+        except sqlite3.OperationalError as error:
+            _remove(new)
+            if str(error).startswith("no such"):
+                raise DamagedFile(f"the tables of {path} are not those of a journal") from error
+            raise
+        except BaseException:
+            _remove(new)
+            raise
+    kept = _keep(path)
+    # Empty by now, but of the old file: who still reads that has them open, and keeps them.
+    for end in ("-wal", "-shm"):
+        path.with_name(path.name + end).unlink(missing_ok=True)
+    new.chmod(path.stat().st_mode & 0o777)
+    new.replace(path)
+    sync_folder(path.parent)
+    return f"{damaged:,} rows of {kept} are damaged and left out" if damaged else ""
+
+
+def _remove(new: Path) -> None:
+    for end in ("", "-wal", "-shm", "-journal"):
+        new.with_name(new.name + end).unlink(missing_ok=True)
+
+
+def _check_room(path: Path, needed: int, what: str) -> None:
+    free = shutil.disk_usage(path.parent).free
+    if free < needed:
+        raise OSError(
+            f"the disk of {path} has {free / 1e6:.1f} MB free, and {what} {needed / 1e6:.1f} MB"
+        )
+
+
+def _keep(path: Path) -> Path:
+    """Give the old file a second name, and return it; nothing that has one is overwritten."""
+    number = 0
+    while True:
+        kept = path.with_name(f"{path.name}.v{VERSION}" + (f"-{number}" if number else ""))
+        if not kept.exists():
+            break
+        if kept.samefile(path):  # killed between this and the end
+            return kept
+        number += 1
+    try:
+        os.link(path, kept)
+    except OSError:  # a file system without links
+        part = path.with_name(path.name + ".upgrade-copy")
+        shutil.copyfile(path, part)
+        _sync(part)
+        part.rename(kept)
+    sync_folder(path.parent)
+    return kept
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+class _Upgrade:
+    """From the one open file to the other."""
+
+    def __init__(
+        self, old: Version3, target: sqlite3.Connection, report: Callable[[float], None]
+    ) -> None:
+        self._old = old
+        self._target = target
+        self._report = report
+        self._appender = Appender(target)
+        self._begun: dict[int, Run] = {}
+
+    def run(self) -> int:
+        last_id = self._old.last_id()
+        rows = iter(self._old.rows())
+        is_done = False
+        while not is_done:
+            with transaction(self._target):
+                for _ in range(_ROWS):
+                    entry = next(rows, None)
+                    if entry is None:
+                        is_done = True
+                        break
+                    number, run, row = entry
+                    self._begin_until(run)
+                    self._appender.append(run, (row,))
+                self._appender.flush()
+            if not is_done:
+                self._report(min(1.0, number / last_id))
+        with transaction(self._target):
+            self._begin_until(max(self._old.runs, default=0))
+            for key in _NUMBERS:
+                if value := self._old.meta(key):
+                    set_meta(self._target, key, value)
+        return self._old.damaged
+
+    def _begin_until(self, last: int) -> None:
+        """Begin the runs up to one: those before it, in which nothing was received, too."""
+        if last not in self._begun:
+            for number in sorted(self._old.runs):
+                if number <= last and number not in self._begun:
+                    self._begin(self._old.runs[number])
+
+    def _begin(self, old: OldRun) -> None:
+        self._appender.flush()
+        run = Run(old.id, old.begun, self._appender.last_seq + 1, None, old.ended_ns)
+        self._begun[old.id] = run
+        put_run(self._target, run)
+        self._carry_counts(run)
+        before = None if old.follows is None else self._begun.get(old.follows)
+        if before is None or old.carries is Carries.NOTHING:
+            return
+        rows = [
+            held(
+                replace(row, arrival_ns=run.begun.arrival_ns),
+                run.begun.stamp_ns,
+                keeps_key=not run.begun.is_simulated,
+            )
+            for row in copies(self._target, before, old.carries)
+        ]
+        self._appender.append(run.id, rows, are_copies=True)
+        self._appender.flush()
+
+    def _carry_counts(self, run: Run) -> None:
+        """What was counted of rows that are deleted."""
+        old, horizon_ns = self._old, self._old.purged_ns(run.id)
+        if horizon_ns < 0:
+            return
+        set_meta(self._target, f"{DELETED}{run.id}", horizon_ns)
+        add = self._target.executemany
+        add(f"INSERT INTO hour VALUES ({_marks(7)})", self._hours(run))
+        tallies = [(LOCAL_SITE, run.id, *tally) for tally in old.tallies(run.id)]
+        add(f"INSERT INTO tally VALUES ({_marks(10)})", tallies)
+        events: list[tuple[object, ...]] = [
+            (Event.SILENCES, start_ns, 0, "", end_ns - start_ns)
+            for start_ns, end_ns in old.silences(run.id)
+        ]
+        events += [
+            (Event.PESTS_SEEN if is_seen else Event.PESTS_CLEARED, stamp_ns, number, tag_id, bugs)
+            for number, tag_id, stamp_ns, is_seen, bugs in old.pests(run.id)
+        ]
+        add(
+            f"INSERT INTO event VALUES ({_marks(7)})",
+            [(LOCAL_SITE, run.id, *event) for event in events],
+        )
+
+    def _hours(self, run: Run) -> list[tuple[object, ...]]:
+        """Rows of `hour`: several series of the old file are one here, that of any source."""
+        numbers: dict[tuple[str, int, tuple[str, ...]], int] = {}
+        found: dict[tuple[int, int], list[Bucket]] = {}
+        for tag_id, kind, sensors, hour, buckets in self._old.hours(run.id):
+            key = (tag_id, kind, sensors)
+            if key not in numbers:
+                self._appender.last_seq += 1
+                numbers[key] = self._appender.last_seq
+                self._target.execute(
+                    f"INSERT INTO series VALUES ({_marks(6)})",
+                    (LOCAL_SITE, numbers[key], run.id, tag_id, kind, _json(sensors)),
+                )
+            at = (numbers[key], hour)
+            found[at] = list(map(_joined, found[at], buckets)) if at in found else buckets
+        return [
+            (LOCAL_SITE, *at, *map(_json, zip(*map(_finite, buckets), strict=True)))
+            for at, buckets in sorted(found.items())
+            if any(n for n, *_ in buckets)
+        ]
+
+
+def _joined(one: Bucket, other: Bucket) -> Bucket:
+    """What both have counted."""
+    low, high = min(one[2], other[2]), max(one[3], other[3])
+    return one[0] + other[0], one[1] + other[1], low, high
+
+
+def _finite(bucket: Bucket) -> tuple[float | None, ...]:
+    """As it stands in `hour`: without a reading there is no least and no largest."""
+    return bucket if bucket[0] else (0, 0.0, None, None)
+
+
+def _json(values: Sequence[object]) -> str:
+    return json.dumps(values, separators=(",", ":"))
+
+
+def _marks(count: int) -> str:
+    return ", ".join("?" * count)
+
+
+_INSTRUCTIONS: Final = 100_000
+# The copy and as much as the file system itself takes for it.
+_VACUUM_ROOM: Final = 1.02
+
+
+class NotPossible(Exception):
+    """It cannot be made smaller now; the message says why. The file is as it was."""
+
+
+def vacuum(path: Path, holder: str, report: Progress) -> tuple[int, int]:
+    """Make the file small; returns its bytes before and after.
+
+    All of it is read for damage first: a copy without gaps would have lost what is still to be
+    saved of a damaged one. `report(what, share)` is called as the work goes on.
+
+    Raises:
+        InUse: a twin has it.
+        NotPossible: it is damaged, no room on its disk, or somebody reads it.
+        Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_named`.
+
+    """
+    # Not a thing is made beside a file that is no journal.
+    with closing(open_named(path)):
+        pass
+    copy = path.with_name(path.name + ".vacuum")
+    with Lock(path, holder):
+        _refuse_damaged(path, report)
+        before = path.stat().st_size
+        try:
+            _copy(path, copy, report)
+            copy.chmod(path.stat().st_mode & 0o777)
+            with closing(open_writer(copy)) as connection:
+                connection.execute("SELECT count(*) FROM scan").fetchone()
+            _sync(copy)
+            copy.replace(path)
+            sync_folder(path.parent)
+        except BaseException:
+            copy.unlink(missing_ok=True)
+            raise
+        return before, path.stat().st_size
+
+
+def hear_interrupts(connection: sqlite3.Connection) -> None:
+    """Have Ctrl-C end what takes SQLite minutes: Python sees it only in Python."""
+    connection.set_progress_handler(lambda: 0, _INSTRUCTIONS)
+
+
+def _refuse_damaged(path: Path, report: Progress) -> None:
+    with closing(open_named(path)) as connection:
+        hear_interrupts(connection)
+        with closing(find_all_damage(connection, report)) as found:
+            first = next(found, None)
+    if first is not None:
+        raise NotPossible(
+            f"{path} is damaged and left as it is ({first});"
+            " lupin-twin journal check tells all that is"
+        )
+
+
+def _copy(path: Path, copy: Path, report: Progress) -> None:
+    with closing(open_writer(path)) as connection:
+        hear_interrupts(connection)
+        # Without a log nobody who comes later finds one that is not of the new file. SQLite does
+        # this alone when nobody else has the file open.
+        try:
+            connection.execute("PRAGMA busy_timeout = 0")
+            (mode,) = connection.execute("PRAGMA journal_mode = DELETE").fetchone()
+        except sqlite3.OperationalError:
+            mode = "locked"
+        if mode != "delete":
+            raise NotPossible(f"somebody reads {path}: try again when nobody does")
+        needed = int(used_bytes(connection) * _VACUUM_ROOM)
+        try:
+            _check_room(path, needed, "a copy of what is in it takes")
+        except OSError as error:
+            raise NotPossible(str(error)) from error
+        copy.unlink(missing_ok=True)
+
+        def go_on() -> int:
+            if copy.exists():
+                report("copying", min(1.0, copy.stat().st_size / needed))
+            return 0
+
+        connection.set_progress_handler(go_on, 20 * _INSTRUCTIONS)
+        connection.execute("VACUUM INTO ?", (str(copy),))

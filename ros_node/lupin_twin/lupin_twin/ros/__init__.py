@@ -1,0 +1,1 @@
+"""The node and its services: the only code of the twin that knows ROS."""

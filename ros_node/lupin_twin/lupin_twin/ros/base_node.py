@@ -1,0 +1,348 @@
+"""What every node of the project shares: latched QoS, guarded callbacks, warnings, spinning.
+
+Messages are read raw, so that their lengths are checked before they become objects, and one that
+cannot be read is reported with its topic.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from time import sleep
+from typing import Any, Final
+
+from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.exceptions import InvalidHandle
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+
+from lupin_twin.core.clock import Late
+from lupin_twin.core.diagnostics import MAX_PROBLEMS
+from lupin_twin.core.drops import Counts, Drop, Reason, Tally, Throttle
+from lupin_twin.core.interfaces import SERVICE_DEPTH, Topic
+from lupin_twin.ros.inputs import Input
+from lupin_twin.ros.message_limits import MessageShape, TooManyError
+from lupin_twin.ros.parameters import naming
+
+WARNING_PERIOD_S: Final = 5.0
+# So long, s, messages that wait are taken one right behind the other before others have their turn.
+DRAIN_S: Final = 0.02
+# A message that waited for longer, s, before it was read shows that the thread is too slow:
+# at 200 a second, ten of the fifty that may wait. It is believed for as long as says the other.
+BEHIND_S: Final = 0.05
+BELIEVED_S: Final = 0.25
+# As ROS has it by default, reliable and volatile, but for the depth.
+SERVICE_QOS: Final = QoSProfile(depth=SERVICE_DEPTH)
+
+
+def waker(condition: Any) -> Callable[[], None]:
+    """What wakes a node's thread by a guard condition; nothing, where the node is gone by then.
+
+    Work that was begun for a node may end after it.
+    """
+
+    def wake() -> None:
+        with suppress(InvalidHandle):
+            condition.trigger()
+
+    return wake
+
+
+def latched(depth: int) -> QoSProfile:
+    """RELIABLE and TRANSIENT_LOCAL: a late subscriber still gets the last `depth` messages.
+
+    Fixed, never inferred from the graph: a profile chosen before the other side is there misses
+    what the other side has latched.
+    """
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    )
+
+
+def qos_of(topic: Topic) -> QoSProfile:
+    """How a topic of the table of interfaces is published, and subscribed to."""
+    if topic.is_latched:
+        return latched(topic.depth)
+    reliability = ReliabilityPolicy.RELIABLE if topic.is_reliable else ReliabilityPolicy.BEST_EFFORT
+    return QoSProfile(depth=topic.depth, reliability=reliability)
+
+
+def read_message(data: bytes, shape: MessageShape) -> Any | Drop:
+    """The message that `data` holds, serialised; a drop, where it is too large or none.
+
+    Its lengths are checked first: ROS would make room for whatever they claim.
+    """
+    try:
+        shape.check(data)
+        return deserialize_message(data, shape.message_type)
+    except TooManyError as error:
+        return Drop(Reason.SIZE, str(error))
+    except Exception as error:  # noqa: BLE001  # rclpy raises several kinds
+        return Drop(Reason.UNREADABLE, str(error), "an unreadable message")
+
+
+class NodeUtilities:
+    """What one node says and counts; belongs to its thread."""
+
+    def __init__(self, node: Node) -> None:
+        self.tally = Tally()
+        # How long before it was received the message in hand was published, s, by the two clocks.
+        self.published_ago_s = 0.0
+        self.node = node
+        self._inputs: list[Input] = []
+        # As it was looked at last.
+        self.input_problems: tuple[str, ...] = ()
+        self._drains: list[Callable[[], None]] = []
+        self._behind_until_s = -math.inf
+        self._throttle = Throttle(WARNING_PERIOD_S)
+
+    def subscribe(
+        self,
+        parameter: str,
+        topic: str,
+        shape: MessageShape,
+        *,
+        depth: int,
+        group: Any,
+        callback: Callable[[Any], None],
+        on_number: Callable[[int], None] | None = None,
+        is_wanted: Callable[[bytes], bool] | None = None,
+    ) -> str:
+        """Have `callback(message)` called, guarded, for each message on a latched topic.
+
+        Publishers that do not latch it, or are not reliable, are matched too, as soon as DDS
+        reports one that it has matched with no subscription: see `inputs`.
+
+        With `is_wanted` the topic is one that is not latched and that many share: what is not
+        wanted, serialised as it is, or is lost of it, is nothing to be counted.
+
+        `parameter` is what gave the name. Returns the topic as ROS has resolved and remapped it:
+        that is the name in its graph, and in warnings. `on_number` gets the number that each
+        message has from its publisher, counted from 1. What is past the limits of `shape` is
+        dropped before a single object is made of it.
+
+        Raises:
+            lupin_twin.core.parameters.ParameterError: a name that ROS does not take.
+
+        """
+        source = Input(depth)
+
+        def read(data: bytes, info: dict[str, Any]) -> None:
+            if not (is_wanted(data) if is_wanted is not None else source.is_new(info)):
+                return
+            self._see_wait(info["received_timestamp"])
+            self.published_ago_s = (info["received_timestamp"] - info["source_timestamp"]) / 1e9
+            number = info["publication_sequence_number"]
+            if on_number is not None and number is not None:
+                on_number(number)
+            # Of depth 1, the newest is wanted and nothing else.
+            if depth > 1 and number is not None and is_wanted is None:
+                lost = source.gaps.see(number, lambda: int(self.node.count_publishers(name)))
+                if lost:
+                    self.lose(lost, name)
+            message = read_message(data, shape)
+            if isinstance(message, Drop):
+                self.drop(message, name)
+            else:
+                self.guarded(name, callback)(message)
+
+        def listen(qos: QoSProfile, events: SubscriptionEventCallbacks | None) -> str:
+            subscription = self.node.create_subscription(
+                shape.message_type,
+                topic,
+                read,
+                qos,
+                callback_group=group,
+                raw=True,
+                event_callbacks=events,
+            )
+            if depth > 1:
+                self._drain_behind(subscription, read, depth)
+            return str(subscription.topic_name)
+
+        with naming(parameter, topic):
+            if is_wanted is not None:
+                name = listen(QoSProfile(depth=depth), None)
+            else:
+                name = source.topic = self._subscribe_all(source, listen)
+                self._inputs.append(source)
+        return name
+
+    def _subscribe_all(
+        self, source: Input, listen: Callable[[QoSProfile, SubscriptionEventCallbacks], str]
+    ) -> str:
+        """Subscribe, and once more as soon as DDS reports a publisher that was not matched."""
+        level = source.subscriptions
+
+        def on_unmatched(_: object) -> None:
+            if source.subscriptions == level + 1 < len(source.profiles):
+                self._subscribe_all(source, listen)
+
+        source.subscriptions += 1
+        guarded = self.guarded("a publisher that was not matched", on_unmatched)
+        return listen(source.profiles[level], SubscriptionEventCallbacks(incompatible_qos=guarded))
+
+    def every(self, group: Any, period_s: float, what: str, callback: Callable[[], None]) -> Any:
+        """A timer by the steady clock: a paused simulation is no reason to look dead."""
+        return self.node.create_timer(
+            period_s,
+            self.guarded(what, callback),
+            callback_group=group,
+            clock=Clock(clock_type=ClockType.STEADY_TIME),
+        )
+
+    def check_inputs(self) -> tuple[str, ...]:
+        """What is wrong with what publishes on latched topics; what is new of it is logged."""
+        before, now_s = self.input_problems, time.monotonic()
+        domain = self.node.context.get_domain_id()
+        self.input_problems = tuple(
+            problem
+            for each in self._inputs
+            for problem in each.check(
+                self.node.get_publishers_info_by_topic(each.topic), domain, now_s
+            )
+        )[:MAX_PROBLEMS]
+        for problem in self.input_problems:
+            if problem not in before:
+                self.warn(("input", problem), problem)
+        return self.input_problems
+
+    def _drain_behind(
+        self, subscription: Any, read: Callable[[bytes, dict[str, Any]], None], depth: int
+    ) -> None:
+        """Take, behind each message, those that wait.
+
+        The executor brings one message a round, beside whatever else is due: where that takes its
+        time, more come than are taken, and the queue overruns.
+        """
+
+        def drain(most: float, most_s: float) -> None:
+            until_s = time.monotonic() + most_s
+            handle, kind = subscription.handle, subscription.msg_type
+            taken = 0
+            with handle:
+                while (more := handle.take_message(kind, True)) is not None:
+                    read(*more)
+                    taken += 1
+                    if taken >= most or time.monotonic() > until_s:
+                        return
+
+        def take(data: bytes, info: dict[str, Any]) -> None:
+            read(data, info)
+            drain(math.inf, DRAIN_S)
+
+        subscription.callback = take
+        self._drains.append(lambda: drain(depth, math.inf))
+
+    def drain(self) -> None:
+        """Take the messages that wait, before something that takes the thread for long.
+
+        All that there is room for, however long that takes: so nothing waits when that begins.
+        """
+        for drain in self._drains:
+            drain()
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether messages have recently waited for long: what can wait should."""
+        return time.monotonic() < self._behind_until_s
+
+    def _see_wait(self, received_ns: int) -> None:
+        # By the clock that the middleware stamped it with, if it did.
+        if received_ns and time.time_ns() - received_ns > BEHIND_S * 1e9:
+            self._behind_until_s = time.monotonic() + BELIEVED_S
+
+    def drop(self, drop: Drop, topic: str) -> None:
+        """Count and report something that was dropped."""
+        self.tally.drop(drop, topic, time.monotonic())
+        self.warn((drop.reason, (topic, drop.case)), drop.on(topic))
+
+    @property
+    def callback_errors(self) -> int:
+        """Errors met by callbacks so far."""
+        return self.tally.callback_errors
+
+    def counts(self) -> Counts:
+        """All that was dropped, lost and met so far."""
+        return self.tally.value(time.monotonic())
+
+    def lose(self, count: int, topic: str) -> None:
+        """Count and report messages that came faster than they were read."""
+        self.tally.lose(count, topic, time.monotonic())
+        self.warn(
+            ("lost", topic),
+            f"lost {count} messages on {topic}: they came too fast to be read",
+        )
+
+    def late(self, late: Late, topic: str) -> None:
+        """Count and report a producer whose stamps stay behind its own earlier ones."""
+        text = f"late stamps on {topic}: {late}"
+        self.tally.late(late.news, text, time.monotonic())
+        self.warn(("late", late.counted_as), text)
+
+    def warn(self, key: tuple[str, object], text: str) -> None:
+        """Log a warning, at most one a period for each key, and how many were held back."""
+        held_back = self._throttle.allow(key, time.monotonic())
+        if held_back is not None:
+            more = f" ({held_back} more since the last warning)" if held_back else ""
+            self.node.get_logger().warning(text + more)
+
+    def guarded(self, what: str, callback: Callable[..., None]) -> Callable[..., None]:
+        """`callback`, whose errors are reported: one bad message must not end the node."""
+
+        def run(*args: Any) -> None:
+            try:
+                callback(*args)
+            except Exception as error:  # noqa: BLE001  # see above
+                self.report(what, error)
+
+        return run
+
+    def report(self, what: str, error: Exception) -> None:
+        """Count and log an error of a callback, with its trace, throttled."""
+        self.tally.callback_errors += 1
+        if self._throttle.allow(("error", what), time.monotonic()) is not None:
+            trace = "".join(traceback.format_exception(error))
+            self.node.get_logger().error(
+                f"error number {self.callback_errors}, in {what}:\n{trace}"
+            )
+
+
+# Between an error and the next try: an executor that fails at once must not take a whole core.
+PAUSE_S: Final = 0.05
+
+
+def spin_until_shutdown(executor: Any, on_error: Callable[[str, Exception], None]) -> None:
+    """Spin until the executor or its context is shut down.
+
+    An exception that leaves a callback ends rclpy's own `spin`, and with it a thread that nobody
+    watches. Here it goes to `on_error(what, exception)`, and the spinning goes on.
+    """
+    while True:
+        try:
+            executor.spin()
+        except ExternalShutdownException:
+            return
+        except Exception as error:  # noqa: BLE001  # whatever it is
+            on_error("a callback", error)
+            sleep(PAUSE_S)
+        else:
+            return
+
+
+def end_spinning(executor: Any) -> None:
+    """Ask the spinning to end, once, from any thread; a callback that runs now ends first.
+
+    rclpy's `shutdown` takes apart what a spin that is just about to wait still needs, so it has
+    to run where nothing waits: in the spinning thread itself.
+    """
+    executor.create_task(executor.shutdown)

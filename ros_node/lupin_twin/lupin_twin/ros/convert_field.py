@@ -1,0 +1,253 @@
+"""Fields and estimates, and the requests for them, as messages and as values."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from lupin_msgs.srv import GetEstimate, GetEstimateReport, GetField
+
+from lupin_twin.core.drops import MAX_TAGS
+from lupin_twin.estimate import EstimateGrid, Place
+from lupin_twin.estimate.engine import Estimate, EstimateRequest
+from lupin_twin.estimate.grading import Record, Tally
+from lupin_twin.field.engine import FieldRequest
+from lupin_twin.field.grid import FieldGrid
+from lupin_twin.ros import convert
+from lupin_twin.ros.convert_past import NotAnAnswerError
+from lupin_twin.runtime.estimate_rounds import (
+    DEFAULT_PLACES,
+    MAX_PLACES,
+    Report,
+    ReportRequest,
+    TagCheck,
+)
+
+
+def field_request_of(msg: Any) -> FieldRequest:
+    """GetField.Request as a value; of GetEstimate.Request, what it shares with that."""
+    return FieldRequest(
+        sensor_type=msg.sensor_type,
+        resolution=float(msg.resolution),
+        bbox_min_x=float(msg.bbox_min_x),
+        bbox_min_y=float(msg.bbox_min_y),
+        bbox_max_x=float(msg.bbox_max_x),
+        bbox_max_y=float(msg.bbox_max_y),
+    )
+
+
+def field_request_message(request: FieldRequest) -> Any:
+    """The other direction of `field_request_of`."""
+    return GetField.Request(**box_fields(request))
+
+
+def box_fields(request: FieldRequest) -> dict[str, Any]:
+    """The fields that the requests of GetField and GetEstimate share."""
+    return {
+        "sensor_type": request.sensor_type,
+        "resolution": float(request.resolution),
+        "bbox_min_x": float(request.bbox_min_x),
+        "bbox_min_y": float(request.bbox_min_y),
+        "bbox_max_x": float(request.bbox_max_x),
+        "bbox_max_y": float(request.bbox_max_y),
+    }
+
+
+def fill_response(response: Any, grid: FieldGrid) -> Any:
+    """Fill a GetField.Response from a grid, whose values are copied."""
+    response.ok = True
+    response.error_message = ""
+    response.values = convert.floats(grid.values)
+    response.width = int(grid.width)
+    response.height = int(grid.height)
+    response.origin_x = float(grid.origin_x)
+    response.origin_y = float(grid.origin_y)
+    response.resolution_used = float(grid.resolution)
+    response.value_min = float(grid.value_min)
+    response.value_max = float(grid.value_max)
+    response.sample_count = int(grid.sample_count)
+    return response
+
+
+def grid_of(response: Any) -> FieldGrid:
+    """A GetField.Response that is `ok` as a grid: the other direction of `fill_response`."""
+    values = np.array(response.values, dtype=np.float32)
+    values.setflags(write=False)
+    return FieldGrid(
+        width=int(response.width),
+        height=int(response.height),
+        origin_x=float(response.origin_x),
+        origin_y=float(response.origin_y),
+        resolution=float(response.resolution_used),
+        values=values,
+        value_min=float(response.value_min),
+        value_max=float(response.value_max),
+        sample_count=int(response.sample_count),
+    )
+
+
+def estimate_request_of(msg: Any) -> EstimateRequest:
+    """GetEstimate.Request as a value."""
+    return EstimateRequest(field_request_of(msg), convert.nanoseconds(msg.at))
+
+
+def estimate_request_message(request: EstimateRequest) -> Any:
+    """The other direction of `estimate_request_of`."""
+    return GetEstimate.Request(**box_fields(request.box), at=convert.time_msg(request.at_ns))
+
+
+def response_of(estimate: Estimate) -> Any:
+    """An estimate as GetEstimate.Response."""
+    grid = estimate.grid
+    return GetEstimate.Response(
+        ok=True,
+        mean=convert.floats(grid.mean),
+        sd=convert.floats(grid.sd),
+        width=grid.width,
+        height=grid.height,
+        origin_x=grid.origin_x,
+        origin_y=grid.origin_y,
+        resolution_used=grid.resolution,
+        sd_known=grid.sd_known,
+        sample_count=estimate.sample_count,
+        reading_count=estimate.reading_count,
+    )
+
+
+def estimate_of(response: Any) -> Estimate:
+    """A GetEstimate.Response that is `ok`: the other direction of `response_of`.
+
+    Raises:
+        NotAnAnswerError: it has not as many means or sds as cells, or some that are no numbers.
+
+    """
+    shape = int(response.height), int(response.width)
+    cells = []
+    for name in ("mean", "sd"):
+        values = np.array(getattr(response, name), dtype=np.float32)
+        if values.size != shape[0] * shape[1] or not values.size:
+            raise NotAnAnswerError(f"{values.size} values of {name}, of {shape[1]} x {shape[0]}")
+        if not np.isfinite(values).all():
+            raise NotAnAnswerError(f"a value of {name} is no number")
+        cells.append(values.reshape(shape))
+    mean, sd = cells
+    grid = EstimateGrid(
+        width=shape[1],
+        height=shape[0],
+        origin_x=float(response.origin_x),
+        origin_y=float(response.origin_y),
+        resolution=float(response.resolution_used),
+        mean=mean,
+        sd=sd,
+        known=sd < response.sd_known,
+        sd_known=float(response.sd_known),
+    )
+    return Estimate(grid, int(response.sample_count), int(response.reading_count))
+
+
+# --- what an estimate is worth --------------------------------------------------------------
+
+
+def report_request_of(msg: Any) -> ReportRequest:
+    """GetEstimateReport.Request as a value.
+
+    Raises:
+        FieldRefused: see `ReportRequest`.
+
+    """
+    return ReportRequest(msg.sensor_type, int(msg.max_places) or DEFAULT_PLACES)
+
+
+def report_request_message(request: ReportRequest) -> Any:
+    """The other direction of `report_request_of`."""
+    return GetEstimateReport.Request(
+        sensor_type=request.sensor_type, max_places=request.max_places or 0
+    )
+
+
+def report_response(report: Report) -> Any:
+    """A report as GetEstimateReport.Response."""
+    record, tags, places = report.record, report.tags, report.places
+    return GetEstimateReport.Response(
+        ok=True,
+        at=convert.time_msg(report.at_ns),
+        fitted_at=convert.time_msg(report.fitted_at_ns or 0),
+        fit_problem=report.fit_problem,
+        graded_since=convert.time_msg(record.since_ns or 0),
+        day_scans=record.day.scans,
+        day_inside=record.day.inside,
+        week_scans=record.week.scans,
+        week_inside=record.week.inside,
+        tag_ids=[tag.tag_id for tag in tags],
+        measured=[tag.measured for tag in tags],
+        observed_at=[convert.time_msg(tag.observed_at_ns) for tag in tags],
+        expected=[tag.expected for tag in tags],
+        expected_sd=[tag.expected_sd for tag in tags],
+        z=[tag.z for tag in tags],
+        offset=[tag.offset for tag in tags],
+        left_out=[tag.changed_since_ns is not None for tag in tags],
+        changed_since=[convert.time_msg(tag.changed_since_ns or 0) for tag in tags],
+        place_x=[place.x for place in places],
+        place_y=[place.y for place in places],
+        error_ratio=[place.error_ratio for place in places],
+    )
+
+
+def report_of(response: Any) -> Report:
+    """A GetEstimateReport.Response that is `ok`: the other direction of `report_response`.
+
+    Raises:
+        NotAnAnswerError: its lists are not of one length, or are longer than a twin's.
+
+    """
+    tags = (
+        response.tag_ids,
+        response.measured,
+        response.observed_at,
+        response.expected,
+        response.expected_sd,
+        response.z,
+        response.offset,
+        response.left_out,
+        response.changed_since,
+    )
+    places = response.place_x, response.place_y, response.error_ratio
+    for what, columns, most in (("tags", tags, MAX_TAGS), ("places", places, MAX_PLACES)):
+        lengths = {len(column) for column in columns}
+        if len(lengths) > 1 or max(lengths) > most:
+            raise NotAnAnswerError(f"lists of {what} are {sorted(lengths)} long, {most} at most")
+    checks = tuple(
+        TagCheck(
+            tag_id,
+            measured,
+            convert.nanoseconds(observed_at),
+            expected,
+            expected_sd,
+            z,
+            offset,
+            convert.nanoseconds(since) if is_left_out else None,
+        )
+        for (
+            tag_id,
+            measured,
+            observed_at,
+            expected,
+            expected_sd,
+            z,
+            offset,
+            is_left_out,
+            since,
+        ) in zip(*tags, strict=True)
+    )
+    return Report(
+        convert.nanoseconds(response.at),
+        convert.nanoseconds(response.fitted_at) or None,
+        response.fit_problem,
+        Record(
+            convert.nanoseconds(response.graded_since) or None,
+            Tally(int(response.day_scans), int(response.day_inside)),
+            Tally(int(response.week_scans), int(response.week_inside)),
+        ),
+        checks,
+        tuple(Place(*map(float, place)) for place in zip(*places, strict=True)),
+    )

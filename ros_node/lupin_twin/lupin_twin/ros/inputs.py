@@ -1,0 +1,260 @@
+"""A latched topic as one node receives it: publishers of any QoS, each message once; its problems.
+
+Fast DDS says nothing when a queue overruns: its event for lost messages stays silent. But each
+writer numbers what it writes. Which writer a message is from is not known, so numbers are matched
+to writers by where each of them left off.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from lupin_msgs.msg import TwinState
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from lupin_twin.runtime.process import FOLDER, ports
+
+# What rclpy calls a node whose name DDS does not know (rmw_dds_common, graph_cache.cpp).
+_NO_NAME: Final = "_NODE_NAME_UNKNOWN_"
+# What was latched comes as a publisher is found; what is lost on the way comes again within 3 s.
+SETTLED_S: Final = 5.0
+# rmw_fastrtps makes its own transports for LOCALHOST (8.4.3, participant.cpp).
+_HINT: Final = (
+    "shared memory does not cross users. Run both as one user, or set "
+    "FASTDDS_BUILTIN_TRANSPORTS=UDPv4, without ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST"
+)
+
+
+def _profiles(depth: int) -> tuple[QoSProfile, ...]:
+    """How a latched topic is subscribed to, the best first; each matches more publishers.
+
+    The first is the contract's: RELIABLE and TRANSIENT_LOCAL. DDS matches it with no publisher of
+    ROS's default, which is VOLATILE, nor the second with one that is BEST_EFFORT.
+    """
+    reliable, best_effort = ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT
+    latched, volatile = DurabilityPolicy.TRANSIENT_LOCAL, DurabilityPolicy.VOLATILE
+    return tuple(
+        QoSProfile(depth=depth, reliability=reliability, durability=durability)
+        for reliability, durability in (
+            (reliable, latched),
+            (reliable, volatile),
+            (best_effort, volatile),
+        )
+    )
+
+
+# Writers followed at once; with more, the one that was silent longest is forgotten.
+MAX_WRITERS: Final = 16
+
+
+class Gaps:
+    """Follows the numbers on one topic; `lost` counts what is known to be lost, never too much."""
+
+    def __init__(self) -> None:
+        self.lost = 0
+        self._next: list[int] = []  # of each writer, the last one at the end
+
+    def see(self, number: int, writers: Callable[[], int]) -> int:
+        """Note a message's number; returns how many were lost before it.
+
+        `writers` counts those that are there now; called only where the number is not one expected.
+        A number that may be the first of a new writer is taken for that.
+        """
+        if number in self._next:
+            self._next.remove(number)
+            self._next.append(number + 1)
+            return 0
+        lost = 0
+        before = [expected for expected in self._next if expected < number]
+        if before and len(self._next) >= writers():
+            nearest = max(before)
+            lost = number - nearest
+            self._next.remove(nearest)
+        self._next.append(number + 1)
+        del self._next[:-MAX_WRITERS]
+        self.lost += lost
+        return lost
+
+    def settle(self, writers: int) -> None:
+        """Note that of so many writers those without a message by now have published none yet."""
+        self._next[:0] = [1] * (writers - len(self._next))
+
+    def unsettle(self) -> None:
+        """Note that other writers are there than before: whoever is new may begin anywhere."""
+        self._next = [expected for expected in self._next if expected != 1]
+
+
+class Input:
+    """Follows the messages and publishers of a topic; belongs to its node's thread."""
+
+    def __init__(self, depth: int) -> None:
+        self.topic = ""
+        self.gaps = Gaps()
+        self.profiles = _profiles(depth)
+        # How many of these are subscribed with.
+        self.subscriptions = 0
+        self._has_received = False
+        # What was received last: of so many messages none is in two subscriptions' queues.
+        self._last: deque[tuple[int, int]] = deque(maxlen=4 * depth)
+        self._publishers: frozenset[bytes] = frozenset()
+        self._since_s = -math.inf
+
+    def is_new(self, info: dict[str, Any]) -> bool:
+        """Whether a message was not received yet; a second subscription receives it again."""
+        self._has_received = True
+        if self.subscriptions <= 1:
+            return True
+        # A message has these two from its publisher, the same in every subscription.
+        key = info["source_timestamp"], info["publication_sequence_number"]
+        if key in self._last:
+            return False
+        self._last.append(key)
+        return True
+
+    def check(self, publishers: Sequence[Any], domain: int, now_s: float) -> Iterator[str]:
+        """What is wrong with the publishers, rclpy's TopicEndpointInfo, and the remedy."""
+        before, self._publishers = self._publishers, frozenset(_id(one) for one in publishers)
+        if before != self._publishers:
+            self._since_s = now_s
+            self.gaps.unsettle()
+        unlike = [one for one in publishers if _faults(one)]
+        has_settled = now_s - self._since_s >= SETTLED_S
+        if has_settled and not unlike:
+            self.gaps.settle(len(publishers))
+        for one in unlike:
+            why, remedies = zip(*_faults(one), strict=True)
+            yield (
+                f"{_name(one)} publishes {self.topic} with another QoS than the contract's: "
+                f"{', '.join(why)}; use {' and '.join(remedies)}"
+            )
+        if publishers and has_settled and not self._has_received:
+            others = other_users(domain)
+            if others:
+                yield (
+                    f"nothing has come yet from the publisher of {self.topic}, and another user "
+                    f"({', '.join(others)}) has processes in this ROS domain: {_HINT}"
+                )
+
+
+def other_users(domain: int, folder: Path = FOLDER, own: int | None = None) -> list[str]:
+    """Users other than `own` (None: this process's) whose processes take part in a ROS domain.
+
+    By who owns the ports that Fast DDS has in shared memory: nobody else can write to them.
+    """
+    found = set()
+    for port in ports(domain):
+        try:
+            owner = (folder / f"fastrtps_port{port}").stat().st_uid
+        except OSError:
+            continue
+        if owner != (os.geteuid() if own is None else own):
+            found.add(owner)
+    return [f"uid {uid}" for uid in sorted(found)]
+
+
+def _faults(publisher: Any) -> list[tuple[str, str]]:
+    offered = publisher.qos_profile
+    faults = []
+    if offered.durability == DurabilityPolicy.VOLATILE:
+        why = "VOLATILE, so a twin that starts later misses what was published before"
+        faults.append((why, "TRANSIENT_LOCAL"))
+    if offered.reliability == ReliabilityPolicy.BEST_EFFORT:
+        faults.append(("BEST_EFFORT, so what is lost on the way is not sent again", "RELIABLE"))
+    return faults
+
+
+def _id(publisher: Any) -> bytes:
+    return bytes(publisher.endpoint_gid)
+
+
+def _name(publisher: Any) -> str:
+    if publisher.node_name == _NO_NAME:
+        return "somebody"
+    return f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
+
+
+# More publishers than this on one topic are counted as the graph shows them.
+MAX_ROWS: Final = 8
+
+
+class TwinCount:
+    """Counts a second twin as soon as states of two have come by turns."""
+
+    def __init__(self) -> None:
+        self.value = 1
+        # The last number of each row, in the order in which the rows began.
+        self._rows: list[int] = []
+        self._by_turns = False
+
+    def add(self, number: int) -> None:
+        """Note the number that its publisher gave to a state, counted from 1."""
+        # The newest first: a twin that was started anew passes the number at which the last ended.
+        for index in reversed(range(len(self._rows))):
+            if self._rows[index] == number - 1:
+                self._rows[index] = number
+                self._by_turns |= index < len(self._rows) - 1
+                return
+        self._rows = [*self._rows[1 - MAX_ROWS :], number]
+
+    def see(self, publishers: int) -> bool:
+        """Note how many publishers the graph shows; returns whether there are several twins.
+
+        `value` is the count to believe in.
+        """
+        if publishers <= 1:
+            self._rows = self._rows[-1:]
+            self._by_turns = False
+        is_several = publishers > 1 and self._by_turns
+        self.value = publishers if is_several else 1
+        return is_several
+
+
+class OtherTwins:
+    """Counts who publishes the topic `name`, the node's own state; subscribes where it is several.
+
+    Its own states come too then; a dead twin, still in the graph, publishes nothing.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        utilities: Any,
+        count: TwinCount,
+        name: str,
+        *,
+        group: Any,
+    ) -> None:
+        self._node, self._utilities, self._count = node, utilities, count
+        self._name, self._group = name, group
+        self._subscription: Any = None
+
+    def check(self, topic: str) -> None:
+        """Count who publishes it; `topic` is the name as ROS has resolved it."""
+        publishers = int(self._node.count_publishers(topic))
+        self._subscribe(publishers > 1)
+        if self._count.see(publishers):
+            self._utilities.warn(
+                ("twins", 0),
+                f"{self._count.value} nodes publish {topic}: consumers get a mixture; "
+                "stop all twins but one, or give them ROS domains of their own",
+            )
+
+    def _subscribe(self, wanted: bool) -> None:
+        if wanted and self._subscription is None:
+            self._subscription = self._node.create_subscription(
+                TwinState,
+                self._name,
+                lambda _, info: self._count.add(int(info["publication_sequence_number"])),
+                QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE),
+                callback_group=self._group,
+                raw=True,
+            )
+        elif not wanted and self._subscription is not None:
+            self._node.destroy_subscription(self._subscription)
+            self._subscription = None

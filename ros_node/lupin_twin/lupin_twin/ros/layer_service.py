@@ -1,0 +1,287 @@
+"""What viewers such as RViz are shown: fields as points, tags and planters as markers; on topics.
+
+Nothing is computed or published while nobody subscribes. What is computed is made on a thread of
+its own, one after the other, and not while messages wait for the node: no request to the twin
+waits for a picture.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, Final
+
+from sensor_msgs.msg import PointCloud2
+from visualization_msgs.msg import MarkerArray
+
+from lupin_twin.core.diagnostics import Layers
+from lupin_twin.core.interfaces import LAYERS, PLANTERS, TAGS
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot, TwinStore
+from lupin_twin.estimate.engine import MINUTES_A_DAY, EstimateRequest, TagPast
+from lupin_twin.field.engine import FieldEngine, FieldJob, FieldRefused, FieldRequest
+from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.field.grid import FieldGrid
+from lupin_twin.field.idw import Abandoned
+from lupin_twin.ros.base_node import NodeUtilities, qos_of
+from lupin_twin.ros.estimate_service import EstimateService, Task
+from lupin_twin.ros.layers import (
+    MarkerArrays,
+    cloud,
+    layer_request,
+    planter_markers,
+    planter_marks,
+    points,
+    tag_markers,
+    tag_marks,
+    topics_of,
+)
+from lupin_twin.ros.parameters import naming
+from lupin_twin.runtime.workers import JobQueue, Query, ShouldStop, Workers
+
+# How often subscriptions and changes are checked, s.
+LAYERS_PERIOD_S: Final = 0.2
+# A topic is published no more often than this, s, and only when something has changed.
+PERIOD_S: Final = 1.0
+# All of it is taken to be large, s of one core: then one is made after the other.
+_COST_S: Final = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Made:
+    """A message, None where it is the one before; and a field that others may ask for too."""
+
+    data: bytes | None
+    job: FieldJob | None = None
+    grid: FieldGrid | None = None
+
+
+# What a topic's message is made of and by: a search that the node's thread begins, if there is
+# one, and what makes the message of its result on a worker.
+_Search = Callable[[], Future[Any]]
+_Plan = tuple[_Search | None, Callable[[Any, ShouldStop], _Made]]
+
+
+@dataclass(slots=True)
+class _Topic:
+    """While `key_of()` is the same, the message would be the same; None: not known before."""
+
+    publisher: Any
+    key_of: Callable[[], object]
+    plan: Callable[[], _Plan]
+    forget: Callable[[], None] = lambda: None
+    key: object = None
+    begun_s: float = -math.inf
+    is_wanted: bool = False
+    is_under_way: bool = False
+    published: int = 0
+    problem: str = ""
+
+
+@dataclass(slots=True)
+class _Marked:
+    """Markers of one kind: belongs to the thread that makes them."""
+
+    marks: Callable[[Snapshot], Sequence[Any]]
+    arrays: MarkerArrays
+    before: Sequence[Any] | None = None
+
+    def make(self, snapshot: Snapshot) -> _Made:
+        """The array, if it is another than the one before."""
+        marks = self.marks(snapshot)
+        if marks == self.before:
+            return _Made(None)
+        self.before = marks
+        return _Made(self.arrays.build(marks))
+
+
+@dataclass(slots=True)
+class LayerService:
+    """The topics of one node; belongs to the node's thread.
+
+    `wake()` is called in another one when `deliver` has something to do.
+    """
+
+    utilities: NodeUtilities
+    store: TwinStore
+    fields: FieldEngine
+    estimates: EstimateService
+    occupancy: Callable[[], OccupancyMap | None]
+    snapshot: Callable[[], Snapshot]
+    now_ns: Callable[[], int]
+    day_length_s: float
+    wake: Callable[[], None]
+    _workers: Workers = field(
+        default_factory=lambda: Workers("layers", large_threads=1, small_threads=0)
+    )
+    _topics: list[_Topic] = field(default_factory=list)
+    _queue: JobQueue = field(init=False)
+    _whole: tuple[object, FieldRequest] | None = None
+
+    def __post_init__(self) -> None:
+        self._queue = JobQueue(self._workers, self.wake, lambda: self.utilities.is_behind)
+
+    def offer(self, node: Any, sensors: Sequence[str], frame_id: str) -> None:
+        """Have `node` offer the topics, by names relative to its namespace.
+
+        Raises:
+            ParameterError: sensors that make no topics, or two that make the same.
+
+        """
+        for topic, sensor in topics_of(sensors).items():
+            with naming("layers", sensor):
+                publisher = node.create_publisher(PointCloud2, topic, qos_of(LAYERS))
+            self._topics.append(
+                _Topic(
+                    publisher,
+                    partial(self._key_of_layer, sensor),
+                    partial(self._plan_layer, sensor, frame_id),
+                )
+            )
+        for kind, marks, make in (
+            (TAGS, tag_marks, tag_markers),
+            (PLANTERS, planter_marks, planter_markers),
+        ):
+            marked = _Marked(marks, MarkerArrays(make, frame_id))
+            publisher = node.create_publisher(MarkerArray, kind.name, qos_of(kind))
+            # They age: whether they are the same is found where they are made.
+            self._topics.append(
+                _Topic(
+                    publisher,
+                    lambda: None,
+                    partial(self._plan_marks, marked),
+                    marked.arrays.forget,
+                )
+            )
+
+    def check(self) -> None:
+        """Begin what is wanted and may have changed; to be called every `LAYERS_PERIOD_S`."""
+        self._queue.go_on()
+        now_s = time.monotonic()
+        for topic in self._topics:
+            topic.is_wanted = topic.publisher.get_subscription_count() > 0
+            if topic.is_under_way:
+                continue
+            if not topic.is_wanted:
+                topic.forget()
+            elif now_s - topic.begun_s >= PERIOD_S:
+                self._begin(topic, now_s)
+
+    def _begin(self, topic: _Topic, now_s: float) -> None:
+        key = topic.key_of()
+        if self.utilities.is_behind or (key is not None and key == topic.key):
+            return
+        topic.key, topic.begun_s = key, now_s
+        try:
+            plan = topic.plan()
+        except ValueError as error:  # a field that is refused
+            self._refuse(topic, error)
+            return
+        topic.is_under_way = True
+        search, make = plan
+
+        def made(found: Any) -> _Made:
+            return make(found, lambda: not topic.is_wanted)
+
+        self._queue.ask(
+            Query(search or self._nothing, partial(self._publish, topic), made, _COST_S)
+        )
+
+    def _publish(self, topic: _Topic, made: _Made | Exception) -> None:
+        topic.is_under_way = False
+        if isinstance(made, Abandoned):
+            topic.key = None
+        elif isinstance(made, FieldRefused):
+            self._refuse(topic, made)
+        elif isinstance(made, Exception):
+            self.utilities.report(topic.publisher.topic_name, made)
+        else:
+            if made.job is not None and made.grid is not None:
+                self.fields.keep(made.job, made.grid)
+            topic.problem = ""
+            if made.data is not None:
+                self.utilities.drain()  # a large one takes this thread for a while
+                topic.publisher.publish(made.data)
+                topic.published += 1
+
+    def _refuse(self, topic: _Topic, error: ValueError) -> None:
+        topic.problem = str(error)
+        self.utilities.warn(
+            ("layers", topic.publisher.topic_name),
+            f"nothing on {topic.publisher.topic_name}: {error}",
+        )
+
+    # --- what is made -----------------------------------------------------------------------
+
+    def _key_of_layer(self, sensor: str) -> object:
+        occupancy, fit = self.occupancy(), self.estimates.watch.fit(sensor)
+        revision = None if occupancy is None else occupancy.revision
+        key = self.store.observation_count, self.fields.rules, revision
+        if fit.model is None:
+            return key
+        # An estimate goes on from minute to minute, with nothing received: its error grows.
+        minute_ns = int(self.day_length_s / MINUTES_A_DAY * NANOSECONDS_PER_SECOND)
+        return key, fit.at_ns, self.now_ns() // minute_ns
+
+    def _plan_layer(self, sensor: str, frame_id: str) -> _Plan:
+        snapshot = self.snapshot()
+        request = self._request(sensor, snapshot)
+        answer = self.fields.lookup(request, self.store, self.occupancy())
+        task: Task | None = None
+        if self.estimates.watch.fit(sensor).model is not None:
+            task = self.estimates.prepare(EstimateRequest(request))
+
+        def make(found: Sequence[TagPast], should_stop: ShouldStop) -> _Made:
+            job = answer if isinstance(answer, FieldJob) else None
+            grid = answer if isinstance(answer, FieldGrid) else answer.compute(should_stop)
+            estimate = None
+            if task is not None:
+                with suppress(FieldRefused):  # no reading of a day: nothing is known of the error
+                    estimate = task.make(found, should_stop).grid
+            data = cloud(points(grid, estimate), snapshot.stamp_ns, frame_id)
+            return _Made(data, job, grid)
+
+        return None if task is None else task.look_up, make
+
+    def _request(self, sensor: str, snapshot: Snapshot) -> FieldRequest:
+        """The same for all sensors: the box is that of all tags with a place."""
+        rules = self.fields.rules
+        key = self.store.observation_count, rules
+        if self._whole is None or self._whole[0] != key:
+            places = ((tag.pose.x, tag.pose.y) for tag in snapshot.tags if tag.pose is not None)
+            whole = layer_request(sensor, places, rules.max_distance_m, rules.max_grid_cells)
+            self._whole = key, whole
+        return replace(self._whole[1], sensor_type=sensor)
+
+    def _plan_marks(self, marked: _Marked) -> _Plan:
+        snapshot = self.snapshot()
+        return None, lambda _, __: marked.make(snapshot)
+
+    def _nothing(self) -> Future[Any]:
+        nothing: Future[Any] = Future()
+        nothing.set_result(None)
+        return nothing
+
+    # --- the node's -------------------------------------------------------------------------
+
+    def deliver(self) -> None:
+        """Publish what was made."""
+        self._queue.deliver()
+
+    def state(self) -> Layers:
+        """What is published, for the twin's diagnostics."""
+        return Layers(
+            published={topic.publisher.topic_name: topic.published for topic in self._topics},
+            watched=sum(topic.is_wanted for topic in self._topics),
+            problems={t.publisher.topic_name: t.problem for t in self._topics if t.problem},
+        )
+
+    def close(self) -> None:
+        """End the thread; what it makes is for nobody then."""
+        for topic in self._topics:
+            topic.is_wanted = False
+        self._workers.close()

@@ -1,0 +1,325 @@
+"""The messages that are subscribed to, and the limits of each, checked on the serialised bytes.
+
+A deserialiser makes room for as many elements as a message claims, and only then finds that they
+are not there: eight megabytes that claim to be eight million tags cost it more than a gigabyte.
+Here the bytes are walked by the message's shape, and nothing is made of them: a length that cannot
+fit into the bytes left, or is past a limit of ours, is refused.
+
+The encoding is plain CDR as ROS 2 has it on the wire (OMG DDSI-RTPS 2.5, 10.5, and CORBA 3.0,
+15.3): four bytes that name the byte order, then every number aligned to its own size, counted from
+behind those four; a text or a sequence has its length before it as a uint32.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+from builtin_interfaces import msg as builtin
+from diagnostic_msgs import msg as diagnostic
+from geometry_msgs import msg as geometry
+from lupin_msgs import msg as lupin
+from nav_msgs import msg as nav
+from std_msgs import msg as std
+
+from lupin_twin.core.drops import (
+    MAX_BLOOMS_PER_TAG,
+    MAX_FOOTPRINT_POINTS,
+    MAX_ITEMS,
+    MAX_SENSORS_PER_TAG,
+    MAX_TAGS,
+)
+
+# The two encapsulations of plain CDR, and how a uint32 is read in each.
+_LENGTHS: Final = {b"\x00\x00": struct.Struct(">I"), b"\x00\x01": struct.Struct("<I")}
+_HEADER_BYTES: Final = 4
+_ALIGNMENTS: Final = 8
+
+_SIZES: Final = {
+    **dict.fromkeys(("boolean", "octet", "byte", "char", "int8", "uint8"), 1),
+    **dict.fromkeys(("int16", "uint16"), 2),
+    **dict.fromkeys(("int32", "uint32", "float"), 4),
+    **dict.fromkeys(("int64", "uint64", "double"), 8),
+}
+_TEXT: Final = re.compile(r"string(?:<(?P<limit>\d+)>)?")
+_SEQUENCE: Final = re.compile(r"sequence<(?P<element>.+?)(?:, (?P<limit>\d+))?>")
+_ARRAY: Final = re.compile(r"(?P<element>.+)\[(?P<count>\d+)\]")
+
+
+class MalformedError(ValueError):
+    """Bytes that are no message of this shape, or one past a limit; says where and by how much."""
+
+
+class TooManyError(MalformedError):
+    """A message past a limit of ours; says which, and by how much."""
+
+
+class _Reader:
+    """One message on the way through its shape: the bytes, and what may still be claimed."""
+
+    __slots__ = ("data", "elements_left", "end", "length_at")
+
+    def __init__(self, data: bytes, max_elements: int) -> None:
+        length = _LENGTHS.get(bytes(data[:2]))
+        if length is None or len(data) < _HEADER_BYTES:
+            raise MalformedError(f"its first bytes are {bytes(data[:4]).hex()!r}, not plain CDR's")
+        self.data = data
+        self.end = len(data)
+        self.length_at = length.unpack_from
+        self.elements_left = max_elements
+
+    def length(self, at: int, what: str) -> int:
+        if at + 4 > self.end:
+            raise MalformedError(f"it ends within the length of {what}")
+        return int(self.length_at(self.data, at)[0])
+
+
+# Takes a reader and where a value begins; returns where the next one does.
+_Walk = Callable[[_Reader, int], int]
+
+
+class _Part(NamedTuple):
+    """How to walk over a value, and the fewest bytes that one takes.
+
+    `steps` is there for a value of fixed size: how many bytes it takes, padding included, by where
+    (modulo 8) it begins.
+    """
+
+    walk: _Walk
+    min_bytes: int
+    steps: tuple[int, ...] | None = None
+
+
+class MessageShape:
+    """A message type as it is serialised, and the most that one message of it may hold.
+
+    `packages` holds the modules of messages, by the name of the package, that its fields are of.
+    `max_bytes` bounds it as a whole, `limits` the elements of a sequence, by its path
+    (`tag_reading.readings`), `max_elements` those of all sequences of messages in it together;
+    sequences of plain numbers take no more than their bytes.
+
+    Raises:
+        TypeError: the type has a field of a kind that is not known here, or none by a limit's path.
+
+    """
+
+    def __init__(
+        self,
+        message_type: Any,
+        packages: Mapping[str, Any],
+        *,
+        max_bytes: int,
+        limits: Mapping[str, int] | None = None,
+        max_elements: int = 2**32,
+    ) -> None:
+        self.message_type = message_type
+        self.max_bytes = max_bytes
+        self._packages = packages
+        self._limits = dict(limits or {})
+        self._max_elements = max_elements
+        self._walk = self._message(message_type, "").walk
+        if self._limits:
+            raise TypeError(f"{message_type.__name__} has no sequences {sorted(self._limits)}")
+
+    def check(self, data: bytes) -> int:
+        """How many bytes the message takes; what comes behind it is nobody's.
+
+        Raises:
+            MalformedError: a length in `data` cannot be.
+            TooManyError: it is past a limit.
+
+        """
+        if len(data) > self.max_bytes:
+            raise TooManyError(f"{len(data)} bytes, the limit is {self.max_bytes}")
+        reader = _Reader(data, self._max_elements)
+        end = self._walk(reader, _HEADER_BYTES)
+        if end > reader.end:
+            raise MalformedError(f"it has {reader.end} bytes, its fields need {end}")
+        return end
+
+    def _message(self, message_type: Any, path: str) -> _Part:
+        fields = message_type.get_fields_and_field_types()
+        # ROS puts one byte into a message that has no field.
+        parts = [
+            self._field(kind, f"{path}.{name}" if path else name) for name, kind in fields.items()
+        ] or [_fixed(1, 1)]
+        return _in_a_row(parts)
+
+    def _field(self, kind: str, path: str) -> _Part:
+        if kind in _SIZES:
+            return _fixed(_SIZES[kind], 1)
+        if text := _TEXT.fullmatch(kind):
+            return _text(path, _number(text["limit"]))
+        if sequence := _SEQUENCE.fullmatch(kind):
+            limit = self._limits.pop(path, _number(sequence["limit"]))
+            element = sequence["element"]
+            return _sequence(path, self._field(element, path), limit, element not in _SIZES)
+        if array := _ARRAY.fullmatch(kind):
+            count, element = int(array["count"]), array["element"]
+            if element in _SIZES:
+                return _fixed(_SIZES[element], count)
+            return _in_a_row([self._field(element, path)] * count)
+        package, _, name = kind.partition("/")
+        if package not in self._packages:
+            raise TypeError(f"{path} is of type {kind!r}, which is not known here")
+        return self._message(getattr(self._packages[package], name), path)
+
+
+def _number(text: str | None) -> int | None:
+    return None if text is None else int(text)
+
+
+def _fixed(size: int, count: int) -> _Part:
+    """So many numbers of `size` bytes one behind the other."""
+    # Aligned from behind the header, which has half the size of the largest number.
+    return _of_steps(
+        tuple(
+            (_HEADER_BYTES - begin) % size + size * count if count else 0
+            for begin in range(_ALIGNMENTS)
+        ),
+        size * count,
+    )
+
+
+def _of_steps(steps: tuple[int, ...], min_bytes: int) -> _Part:
+    return _Part(lambda _, at: at + steps[at % _ALIGNMENTS], min_bytes, steps)
+
+
+def _in_a_row(parts: Sequence[_Part]) -> _Part:
+    """Parts one behind the other; neighbours of fixed size become one step."""
+    merged: list[_Part] = []
+    for part in parts:
+        last = merged[-1] if merged else None
+        if last is not None and last.steps is not None and part.steps is not None:
+            steps = tuple(
+                step + part.steps[(begin + step) % _ALIGNMENTS]
+                for begin, step in enumerate(last.steps)
+            )
+            merged[-1] = _of_steps(steps, last.min_bytes + part.min_bytes)
+        else:
+            merged.append(part)
+    if len(merged) == 1:
+        return merged[0]
+    walks = tuple(part.walk for part in merged)
+
+    def walk(reader: _Reader, at: int) -> int:
+        for one in walks:
+            at = one(reader, at)
+        return at
+
+    return _Part(walk, sum(part.min_bytes for part in merged))
+
+
+def _text(path: str, limit: int | None) -> _Part:
+    def walk(reader: _Reader, at: int) -> int:
+        at += -at % 4
+        length = reader.length(at, path)
+        at += 4 + length
+        if at > reader.end:
+            left = reader.end - at + length
+            raise MalformedError(f"{path} claims {length} bytes, {left} bytes are left")
+        if limit is not None and length > limit + 1:
+            raise TooManyError(f"{path} has {length - 1} bytes, the limit is {limit}")
+        return at
+
+    return _Part(walk, 4)
+
+
+def _sequence(path: str, element: _Part, limit: int | None, is_counted: bool) -> _Part:
+    min_bytes, steps, walk_element = element.min_bytes, element.steps, element.walk
+
+    def walk(reader: _Reader, at: int) -> int:
+        at += -at % 4
+        count = reader.length(at, path)
+        at += 4
+        if limit is not None and count > limit:
+            raise TooManyError(f"{path}: {count}, the limit is {limit}")
+        if count * min_bytes > reader.end - at:
+            raise MalformedError(
+                f"{path}: {count} of at least {min_bytes} bytes are claimed, "
+                f"{reader.end - at} bytes are left"
+            )
+        if is_counted:
+            reader.elements_left -= count
+            if reader.elements_left < 0:
+                raise TooManyError(f"{path}: more elements in all sequences than the limit")
+        if steps is not None:
+            return at + _total(steps, at, count)
+        for _ in range(count):
+            at = walk_element(reader, at)
+        return at
+
+    return _Part(walk, 4)
+
+
+def _total(steps: tuple[int, ...], begin: int, count: int) -> int:
+    """The bytes of `count` values of fixed size, the first of which begins at `begin`.
+
+    By doubling: one, two, four... values at once, so that a map of a billion cells takes 30 turns.
+    """
+    total = 0
+    while count:
+        if count % 2:
+            total += steps[(begin + total) % _ALIGNMENTS]
+        count //= 2
+        steps = tuple(step + steps[(at + step) % _ALIGNMENTS] for at, step in enumerate(steps))
+    return total
+
+
+MAX_STATUSES: Final = 1_000
+MAX_STATUS_VALUES: Final = 10_000
+
+_PACKAGES: Final = {
+    "builtin_interfaces": builtin,
+    "diagnostic_msgs": diagnostic,
+    "geometry_msgs": geometry,
+    "lupin_msgs": lupin,
+    "nav_msgs": nav,
+    "std_msgs": std,
+}
+
+# An observation with 2,000 flowers has some 150 kB.
+OBSERVATION: Final = MessageShape(
+    lupin.Observation,
+    _PACKAGES,
+    max_bytes=1_000_000,
+    limits={
+        "tag_reading.readings": MAX_SENSORS_PER_TAG,
+        "flower.flowers": MAX_BLOOMS_PER_TAG,
+        "flower.box_footprint.points": MAX_FOOTPRINT_POINTS,
+    },
+)
+# A discovery of 20,000 tags has 2.5 MB.
+DISCOVERED_TAGS: Final = MessageShape(
+    lupin.DiscoveredTags, _PACKAGES, max_bytes=8_000_000, limits={"tags": MAX_TAGS}
+)
+# A map of 4,000 × 4,000 cells has 16 MB.
+MAP: Final = MessageShape(nav.OccupancyGrid, _PACKAGES, max_bytes=64_000_000)
+# 20,000 tags with ten sensors and forty flowers each have 48 MB. How many a single tag has is for
+# the twin to bound that publishes it.
+STATE: Final = MessageShape(
+    lupin.TwinState,
+    _PACKAGES,
+    max_bytes=64_000_000,
+    limits={"tags": MAX_TAGS},
+    max_elements=MAX_TAGS + MAX_ITEMS,
+)
+# As many tags and readings, each reading with its name and its time.
+TIMES: Final = MessageShape(
+    lupin.TwinTimes,
+    _PACKAGES,
+    max_bytes=64_000_000,
+    limits={"tags": MAX_TAGS},
+    max_elements=MAX_TAGS + 2 * MAX_ITEMS,
+)
+# A twin says seven things of itself, with a few dozen values, in some kB. Whoever collects those of
+# a whole robot has more; it is published on a topic that all nodes share.
+DIAGNOSTICS: Final = MessageShape(
+    diagnostic.DiagnosticArray,
+    _PACKAGES,
+    max_bytes=1_000_000,
+    limits={"status": MAX_STATUSES},
+    max_elements=MAX_STATUSES + MAX_STATUS_VALUES,
+)

@@ -1,0 +1,448 @@
+"""The rclpy node `lupin_twin`: parameters, QoS, callbacks, and nothing that can be tested without.
+
+Everything here runs on one thread, in one callback group: the store and the cache need no lock.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, Final
+
+from diagnostic_msgs.msg import DiagnosticArray
+from lupin_msgs.msg import TwinState, TwinTimes
+from lupin_msgs.srv import GetField
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rosgraph_msgs.msg import Clock as ClockMessage
+
+from lupin_twin.core import ingest, interfaces
+from lupin_twin.core.clock import CLOCK_TEXTS, LATCHED_AFTER_S, ClockWatch, Lateness
+from lupin_twin.core.diagnostics import Health, Origin, findings, origin_of
+from lupin_twin.core.drops import Drop, Reason
+from lupin_twin.core.history import History, TagHistory, kind_of
+from lupin_twin.core.parameters import ParameterError, TwinParameters, World
+from lupin_twin.core.state import ClockState, Inspection, Scan, Snapshot, TwinStore
+from lupin_twin.field.engine import FieldCache, FieldEngine, FieldJob, FieldRules
+from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.journal.runs import Clock as RunClock
+from lupin_twin.ros import convert, convert_field, message_limits
+from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities, qos_of, waker
+from lupin_twin.ros.convert import diagnostics
+from lupin_twin.ros.estimate_service import EstimateService
+from lupin_twin.ros.inputs import OtherTwins, TwinCount
+from lupin_twin.ros.layer_service import LAYERS_PERIOD_S, LayerService
+from lupin_twin.ros.parameters import AdjustableNode, declare, naming, naming_own_parameters
+from lupin_twin.ros.past_service import PastService
+from lupin_twin.ros.responses import RETRY_S, Responses, answer_later, refusal
+from lupin_twin.runtime.memory import Memory, journal_path, open_journal
+from lupin_twin.runtime.workers import LARGE_THREADS, JobQueue, Query, Workers
+
+NODE_NAME: Final = "lupin_twin"
+# How often ROS time is checked, s, however rarely the state is published.
+CLOCK_PERIOD_S: Final = 0.5
+DIAGNOSTICS_PERIOD_S: Final = 1.0
+ROUNDS_PERIOD_S: Final = 1.0  # how often a round of estimates may begin
+
+
+class TwinNode(AdjustableNode):
+    """Fuses observations and discovered tags into `/twin/state` and `/twin/get_field`.
+
+    Raises:
+        ParameterError: a parameter out of its range; nothing was subscribed to.
+
+    """
+
+    def __init__(
+        self,
+        *,
+        context: Any = None,
+        cli_args: Sequence[str] | None = None,
+        world: World = World(),
+    ) -> None:
+        with naming_own_parameters():
+            super().__init__(NODE_NAME, context=context, cli_args=cli_args)
+        self.utilities = NodeUtilities(self)
+        self.report = self.utilities.report
+        self.parameters = declare(self)
+        self._world = world
+        self.store = TwinStore()
+        self.history = History(self.parameters.buffer_len)
+        self.memory = self._memory()
+        self.lateness = Lateness()
+        self.fields = FieldEngine(FieldRules.of(self.parameters), FieldCache())
+        self.occupancy_map: OccupancyMap | None = None
+        self.twins = TwinCount()
+        self._clock_watch = ClockWatch()
+        self._observed_s: float | None = None
+        self._clock_subscription: Any = None
+        self._clock_reported: ClockState = "running"
+        self._map_revision = 0
+        self._rules_revision = 0
+        self._topics: dict[str, str] = {}
+        self._listeners: list[Callable[[Snapshot], None]] = []
+        self._states = convert.StateMessages()
+        self._times = convert.TimesMessages()
+        self._group = MutuallyExclusiveCallbackGroup()
+        self._workers = Workers("field")
+        done = self.create_guard_condition(
+            self.utilities.guarded("an answer", self._deliver), self._group
+        )
+        wake = waker(done)
+        self._field_queue = JobQueue(self._workers, wake, large_at_once=LARGE_THREADS)
+        self._past_queue = JobQueue(self._workers, wake, lambda: self.utilities.is_behind)
+        self.estimates = EstimateService(
+            self.utilities,
+            self.store,
+            self.memory.recall,
+            occupancy=lambda: self.occupancy_map,
+            day_length_s=world.day_length_s,
+            max_grid_cells=self.parameters.max_grid_cells,
+            now_ns=self.now_ns,
+            wake=wake,
+        )
+        self.layers = LayerService(
+            self.utilities,
+            self.store,
+            self.fields,
+            self.estimates,
+            occupancy=lambda: self.occupancy_map,
+            snapshot=self.snapshot,
+            now_ns=self.now_ns,
+            day_length_s=world.day_length_s,
+            wake=wake,
+        )
+        self._connect()
+        self._log_start()
+        self._publish_state()
+
+    # --- for the bridge, on this node's thread ----------------------------------------------
+
+    @property
+    def callback_errors(self) -> int:
+        """Errors met by callbacks so far."""
+        return self.utilities.callback_errors
+
+    @property
+    def revision(self) -> tuple[int, int, int]:
+        """(observation_count, map revision, rules revision): changes exactly when a field could."""
+        return self.store.observation_count, self._map_revision, self._rules_revision
+
+    def add_listener(self, listener: Callable[[Snapshot], None], heartbeat_s: float) -> None:
+        """Call `listener(snapshot)` on this thread now, after each change, and as a heartbeat.
+
+        The heartbeat goes by the steady clock and does not depend on `state_publish_rate_hz`: a
+        listener can tell a quiet greenhouse from a dead twin, however rarely the topic is
+        published.
+        """
+        self._listeners.append(listener)
+        listener(self.snapshot())
+        self.utilities.every(
+            self._group, heartbeat_s, "heartbeat", lambda: listener(self.snapshot())
+        )
+
+    def snapshot(self) -> Snapshot:
+        """Every tag, now by ROS time, and whether that runs."""
+        snapshot = self.store.snapshot(self.now_ns(), self.parameters.frame_id)
+        return replace(snapshot, clock=self._clock_state)
+
+    def history_of(self, tag_id: str) -> TagHistory | None:
+        """The last scans and attempts of a tag; None: no such tag."""
+        return self.history.of(tag_id) if self.store.knows(tag_id) else None
+
+    # --- set-up -----------------------------------------------------------------------------
+
+    def _memory(self) -> Memory:
+        p = self.parameters
+        try:
+            path = journal_path(
+                p.journal, os.environ, self.context.get_domain_id(), self.get_namespace()
+            )
+        except RuntimeError as error:
+            raise ParameterError(
+                f"parameter journal is empty, and there is no home to keep one in: {error}"
+            ) from error
+        journal = open_journal(
+            path, self.get_fully_qualified_name(), p.journal_days, p.journal_max_mb
+        )
+        return Memory(self.store, self.history, journal, p.buffer_len)
+
+    def _connect(self) -> None:
+        p, group = self.parameters, self._group
+        responses = Responses(self.utilities.warn, self.utilities.drain)
+        for topic, shape, on_message in (
+            (interfaces.OBSERVATIONS, message_limits.OBSERVATION, self._on_observation),
+            (interfaces.DISCOVERED_TAGS, message_limits.DISCOVERED_TAGS, self._on_discovered_tags),
+            (interfaces.MAP, message_limits.MAP, self._on_map),
+        ):
+            name = getattr(p, topic.parameter)
+            self._topics[topic.parameter] = self.utilities.subscribe(
+                topic.parameter, name, shape, depth=topic.depth, group=group, callback=on_message
+            )
+        state, times, own = interfaces.STATE, interfaces.TIMES, interfaces.DIAGNOSTICS
+        with naming("state_topic", p.state_topic):
+            self._state_publisher = self.create_publisher(TwinState, p.state_topic, qos_of(state))
+        self._times_publisher = self.create_publisher(TwinTimes, times.name, qos_of(times))
+        kind, name, answer = GetField, p.field_service_name, self._on_get_field
+        with naming("field_service_name", name):
+            self.create_service(kind, name, answer, qos_profile=SERVICE_QOS, callback_group=group)
+        PastService(
+            self.utilities,
+            self._past_queue,
+            self.memory.recall,
+            self.store,
+            now_ns=self.now_ns,
+            frame_id=p.frame_id,
+        ).offer(self, group)
+        self.estimates.offer(self, group)
+        self.layers.offer(self, p.layers, p.frame_id)
+        for service in self.services:  # those of its parameters too
+            responses.watch(service)
+        self._others = OtherTwins(self, self.utilities, self.twins, p.state_topic, group=group)
+        self._diagnostics = self.create_publisher(DiagnosticArray, own.name, qos_of(own))
+        for period_s, what, callback in (
+            (DIAGNOSTICS_PERIOD_S, "diagnostics", self._publish_diagnostics),
+            (CLOCK_PERIOD_S, "clock", self._check_clock),
+            (ROUNDS_PERIOD_S, "estimate", self.estimates.go_on),
+            (LAYERS_PERIOD_S, "layers", self.layers.check),
+            (RETRY_S, "responses", responses.go_on),
+        ):
+            self.utilities.every(group, period_s, f"{what} timer", callback)
+        self._state_timer = self._publish_at(p.state_publish_rate_hz)
+        self.adjust_by(self._adjust)
+
+    def _log_start(self) -> None:
+        # Names and domain: a mistake in one of them is why a twin receives nothing.
+        self.get_logger().info(
+            f"{self.get_fully_qualified_name()} in ROS domain {self.context.get_domain_id()} "
+            f"subscribes to {', '.join(self._topics.values())} and publishes "
+            f"{self._state_publisher.topic_name}; poses are in frame "
+            f"{self.parameters.frame_id!r}"
+        )
+
+    def _publish_at(self, rate_hz: float) -> Any:
+        return self.utilities.every(self._group, 1.0 / rate_hz, "state timer", self._publish_state)
+
+    def _adjust(self, now: TwinParameters) -> None:
+        if self._state_timer.timer_period_ns != int(1e9 / now.state_publish_rate_hz):
+            self.destroy_timer(self._state_timer)
+            self._state_timer = self._publish_at(now.state_publish_rate_hz)
+        if (rules := FieldRules.of(now)) != self.fields.rules:
+            self.fields.rules = rules
+            self._rules_revision += 1
+            self.notify_listeners()
+
+    # --- callbacks --------------------------------------------------------------------------
+
+    def _on_observation(self, msg: Any) -> None:
+        topic = self._topics["observations_topic"]
+        write = ingest.observation(convert.received(msg), self.parameters.frame_id, self.now_ns())
+        if isinstance(write, Drop):
+            self.utilities.drop(write, topic)
+            return
+        is_news = self.history.news(write) is not None
+        if self._apply(write, topic, msg.mission_id):
+            self._observed_s = time.monotonic()
+            if is_news:
+                self._check_lateness(write, topic)
+            self.notify_listeners()
+
+    def _check_lateness(self, write: Scan | Inspection, topic: str) -> None:
+        late = self.lateness.see(
+            write.source,
+            kind_of(write),
+            write.stamp_ns,
+            was_latched=self.utilities.published_ago_s > LATCHED_AFTER_S,
+            now_s=time.monotonic(),
+        )
+        if late is not None:
+            self.utilities.late(late, topic)
+
+    def _on_discovered_tags(self, msg: Any) -> None:
+        topic = self._topics["discovered_tags_topic"]
+        before = self.store.observation_count
+        for write in ingest.discoveries(
+            convert.received_tags(msg), self.parameters.frame_id, self.store.is_pinned
+        ):
+            self._apply(write, topic)
+        if self.store.observation_count != before:
+            self.notify_listeners()
+
+    def _on_map(self, msg: Any) -> None:
+        topic = self._topics["map_topic"]
+        if dropped := ingest.wrong_frame(msg.header.frame_id, self.parameters.frame_id):
+            self.utilities.drop(dropped, topic)
+            return
+        try:
+            new = convert.map_of(msg, self._map_revision + 1)
+        except ValueError as error:
+            self.utilities.drop(Drop(Reason.MAP, f"{error}; the last one stays", "a map"), topic)
+            return
+        if self.occupancy_map is not None and new.shows_the_same_as(self.occupancy_map):
+            return
+        self.occupancy_map = new
+        self._map_revision += 1
+        self.notify_listeners()
+
+    def _on_get_field(self, request: Any, response: Any) -> Any:
+        def refused(error: Exception) -> Any:
+            return refusal(response, error, self.report)
+
+        try:
+            found = self.fields.lookup(
+                convert_field.field_request_of(request), self.store, self.occupancy_map
+            )
+        except Exception as error:  # noqa: BLE001  # no client waits for ever
+            return refused(error)
+        if not isinstance(found, FieldJob):
+            return convert_field.fill_response(response, found)
+        job = found
+
+        def prepare(reply: Callable[[Any], None]) -> Query:
+            def keep(grid: Any) -> None:
+                if not isinstance(grid, Exception):
+                    self.fields.keep(job, grid)
+                    grid = convert_field.fill_response(response, grid)
+                reply(grid)
+
+            # Longer than a tick, perhaps: not on this thread, where messages wait.
+            return Query(
+                lambda: self._workers.submit(job.compute, job.cost_s),
+                keep,
+                cost_s=job.cost_s,
+                key=job.key,
+            )
+
+        return answer_later(self._field_queue, prepare, refused)
+
+    def _deliver(self) -> None:
+        self.utilities.drain()
+        self._field_queue.deliver()
+        self._past_queue.deliver()
+        self.estimates.deliver()
+        self.layers.deliver()
+
+    def destroy_node(self) -> None:
+        """End the workers and the journal too; what they compute is for nobody then."""
+        self._workers.close()
+        self.estimates.close()
+        self.layers.close()
+        self.memory.close()
+        super().destroy_node()
+
+    def _publish_diagnostics(self) -> None:
+        now_s = time.monotonic()
+        health = Health(
+            journal=self.memory.condition,
+            clock=self._clock_state,
+            counts=self.utilities.counts(),
+            inputs={topic: int(self.count_publishers(topic)) for topic in self._topics.values()},
+            observed_ago_s=None if self._observed_s is None else now_s - self._observed_s,
+            late=self.lateness.counts,
+            twins=self.twins.value,
+            state_topic=self._state_publisher.topic_name,
+            fields_computing=self._field_queue.waiting,
+            fields_computed=self._field_queue.answered,
+            slowest_field_s=self._field_queue.slowest_s,
+            estimates=self.estimates.state(),
+            layers=self.layers.state(),
+            origin=self.origin,
+            input_problems=self.utilities.check_inputs(),
+        )
+        self._diagnostics.publish(
+            diagnostics(findings(health), self.get_fully_qualified_name(), self.now_ns())
+        )
+
+    def _publish_state(self) -> None:
+        # Of a large greenhouse each of the two takes this thread for tenths of a second.
+        self.utilities.drain()
+        snapshot = self.snapshot()
+        self._state_publisher.publish(self._states.build(snapshot))
+        self.utilities.drain()
+        self._times_publisher.publish(self._times.build(snapshot))
+        self._others.check(self._state_publisher.topic_name)
+
+    @property
+    def _clock_state(self) -> ClockState:
+        return "doubted" if self.memory.is_clock_doubted else self._clock_watch.state
+
+    @property
+    def origin(self) -> Origin:
+        """Where what is observed comes from."""
+        return origin_of(self._world.origin, is_simulated=self.get_clock().ros_time_is_active)
+
+    # --- small parts ------------------------------------------------------------------------
+
+    def _apply(self, write: ingest.Write | Drop, topic: str, mission: str = "") -> bool:
+        near, dropped = ingest.near(write, self.parameters.max_pose_m)
+        refused = None if near is None else self.memory.apply(near, time.time_ns(), mission)
+        for drop in filter(None, (dropped, refused)):
+            self.utilities.drop(drop, topic)
+        if near is None or refused is not None:
+            return False
+        self.estimates.add(near)
+        return True
+
+    def notify_listeners(self) -> None:
+        """Give all of them the state as it is."""
+        if self._listeners:
+            snapshot = self.snapshot()
+            for listener in self._listeners:
+                listener(snapshot)
+
+    def _check_clock(self) -> None:
+        self._past_queue.go_on()
+        before = self._clock_watch.state
+        self.now_ns()
+        if self._clock_watch.state != before:
+            self.notify_listeners()
+        condition = self.memory.condition
+        if not condition.is_well:
+            self.utilities.warn(("journal", condition.state), f"journal: {condition.detail}")
+
+    def _watch_clock(self, now_ns: int, *, is_simulated: bool) -> None:
+        watch = self._clock_watch
+        state = watch.update(now_ns, time.monotonic(), is_simulated=is_simulated)
+        if state != self._clock_reported:
+            self._clock_reported = state
+            # Two lines: rclpy lets one line log at one level only.
+            if state in ("none", "stopped"):
+                self.get_logger().warning(CLOCK_TEXTS[state])
+            else:
+                self.get_logger().info(CLOCK_TEXTS[state])
+        # Only while it stands: a simulator that runs may publish the time a thousand times a
+        # second.
+        if watch.should_subscribe and self._clock_subscription is None:
+            self._clock_subscription = self.create_subscription(
+                ClockMessage,
+                interfaces.CLOCK.name,
+                lambda _: watch.add_message(time.monotonic()),
+                qos_of(interfaces.CLOCK),
+                callback_group=self._group,
+                raw=True,
+            )
+        elif not watch.should_subscribe and self._clock_subscription is not None:
+            self.destroy_subscription(self._clock_subscription)
+            self._clock_subscription = None
+
+    def now_ns(self) -> int:
+        """ROS time; what follows from a clock that has gone back is done."""
+        clock = self.get_clock()
+        now_ns = int(clock.now().nanoseconds)
+        is_simulated = bool(clock.ros_time_is_active)
+        self._watch_clock(now_ns, is_simulated=is_simulated)
+        self._follow(RunClock(now_ns, time.time_ns(), is_simulated))
+        return now_ns
+
+    def _follow(self, now: RunClock) -> None:
+        if restored := self.memory.follow(now):
+            self.get_logger().info(restored)
+            self.estimates.restore()
+        if self.memory.hold_to(now):
+            self.lateness.hold_to(now.stamp_ns)
+            self.estimates.hold_to(now.stamp_ns)
+            self.utilities.warn(
+                ("clock", 0),
+                "ROS time has gone back: all observations from later than now age from here on",
+            )

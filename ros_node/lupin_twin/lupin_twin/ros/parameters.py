@@ -1,0 +1,148 @@
+"""Parameters out of ROS: declared from the table in `parameters`; every complaint names one.
+
+For the twin's node, and for whoever else reads some of the twin's parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import fields
+from typing import Any, Final
+
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.exceptions import (
+    InvalidParameterTypeException,
+    InvalidServiceNameException,
+    InvalidTopicNameException,
+)
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from lupin_twin.core.parameters import ParameterError, TwinParameters, changed, describe
+
+ALL_NAMES: Final = tuple(spec.name for spec in fields(TwinParameters))
+
+
+def declare(node: Any, names: Iterable[str] = ALL_NAMES) -> TwinParameters:
+    """Declare these of the twin's parameters on a node and read them; the others keep defaults.
+
+    Warns of each override that is no parameter at all: most likely a name with a typing error.
+
+    Raises:
+        ParameterError: a value of the wrong type or out of its range.
+
+    """
+    defaults, given = TwinParameters(), _overrides(node)
+    # Before ROS sees one: its own complaint about a range is another. And what another node of the
+    # twin's reads from the same file has to be right here as well.
+    TwinParameters(**{name: given[name] for name in ALL_NAMES if name in given})
+    values = {}
+    for name in names:
+        default = getattr(defaults, name)
+        values[name] = node.declare_parameter(
+            name, _for_ros(default), _descriptor(name, default)
+        ).value
+    for name in unknown_overrides(node):
+        node.get_logger().warning(f"parameter {name} is unknown and has no effect")
+    return TwinParameters(**values)
+
+
+def _for_ros(value: Any) -> Any:
+    """A list without anything in it has no type in ROS: one empty name stands for it."""
+    return [*value] or [""] if isinstance(value, tuple) else value
+
+
+def _descriptor(name: str, default: object) -> ParameterDescriptor:
+    described = describe(name)
+    descriptor = ParameterDescriptor(
+        description=described.description,
+        additional_constraints=described.fixed and f"read only: {described.fixed}",
+        read_only=bool(described.fixed),
+        # `idw_power: 2` is an integer to YAML; our own check takes it.
+        dynamic_typing=True,
+    )
+    if described.low is not None:
+        if isinstance(default, int):
+            descriptor.integer_range = [
+                IntegerRange(from_value=int(described.low), to_value=int(described.high))
+            ]
+        else:
+            descriptor.floating_point_range = [
+                FloatingPointRange(from_value=float(described.low), to_value=float(described.high))
+            ]
+    return descriptor
+
+
+class AdjustableNode(Node):  # type: ignore[misc]  # rclpy is not typed
+    """A node of which some parameters may be changed while it runs.
+
+    `ros2 param set` comes to the methods below. They ask before rclpy does: that refuses what is
+    read only, or out of its range, in words that name neither the reason nor the limit.
+    """
+
+    parameters = TwinParameters()
+    _on_change: Callable[[TwinParameters], None] | None = None
+
+    def adjust_by(self, on_change: Callable[[TwinParameters], None]) -> None:
+        """Have `on_change(parameters)` called after each change; `declare` comes before."""
+        self._on_change = on_change
+
+    def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
+        """One after the other."""
+        return [self.set_parameters_atomically([one]) for one in parameter_list]
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """All of them or, with the reason, none."""
+        wanted = {one.name: one.value for one in parameter_list if one.name in ALL_NAMES}
+        try:
+            new = changed(self.parameters, wanted)
+        except ParameterError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        result = super().set_parameters_atomically(parameter_list)
+        if result.successful and new != self.parameters:
+            self.parameters = new
+            if self._on_change is not None:
+                self._on_change(new)
+        return result
+
+
+def unknown_overrides(node: Any) -> list[str]:
+    """Names that were set for a node (`-p`, a file) and that neither it nor the twin has."""
+    return sorted(
+        name for name in _overrides(node) if name not in ALL_NAMES and not node.has_parameter(name)
+    )
+
+
+def _overrides(node: Any) -> dict[str, Any]:
+    # rclpy has no public way to see an override without declaring it.
+    overrides = node._parameter_overrides  # noqa: SLF001
+    return {name: parameter.value for name, parameter in overrides.items()}
+
+
+@contextmanager
+def naming(parameter: str, value: str) -> Iterator[None]:
+    """Turn rclpy's complaint about a topic's name into one that names the parameter."""
+    try:
+        yield
+    except (InvalidTopicNameException, InvalidServiceNameException) as error:
+        reason = " ".join(str(error).split())
+        raise ParameterError(f"parameter {parameter} is {value!r}: {reason}") from error
+
+
+@contextmanager
+def naming_own_parameters() -> Iterator[None]:
+    """Turn rclpy's complaint about its own parameters, made with the node, into one of ours.
+
+    They are `use_sim_time` and `start_type_description_service`.
+    """
+    try:
+        yield
+    except InvalidParameterTypeException as error:
+        name = str(error).rpartition(": ")[2]
+        raise ParameterError(f"parameter {name} is no bool: {error}") from error

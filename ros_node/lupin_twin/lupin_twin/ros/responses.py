@@ -1,0 +1,180 @@
+"""A service's responses that are sent later than rclpy would: made elsewhere, or not sent yet.
+
+A service may get a request before its middleware has found the reader of the response: where a
+machine is busy that takes seconds. The middleware waits 0.1 s, then drops the response; rclpy says
+so in a Python warning, once in the life of a process, and the client waits for ever. Known as
+ros2/rmw_fastrtps issue 842; of a client that came to a twin beside four busy processes, the first
+request met it once in 162. So such a response is tried again for a while.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+import warnings
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+
+from lupin_twin.core.past import NotRemembered, PastRefused, message_of
+from lupin_twin.field.engine import FieldRefused
+from lupin_twin.runtime.workers import JobQueue, Query
+
+# How rclpy's warning begins (7.1.6), that the middleware has dropped a response.
+UNSENT: Final = "failed to send response (timeout)"
+# How often responses are tried again, s, and for how long. Discovery that lost a message makes up
+# for it within some 3 s, more on a busy machine.
+RETRY_S: Final = 0.5
+PATIENCE_S: Final = 30.0
+# Responses that are retained; what took longer to try, s, needs too much memory (60 MB took 0.5 s).
+MAX_UNSENT: Final = 8
+MAX_ATTEMPT_S: Final = 0.5
+# A failed attempt blocks the node's thread: then none for so many times as long.
+_REST: Final = 4.0
+
+Send = Callable[[Any, Any], None]
+
+
+class Later:
+    """What a callback returns in place of its response. Belongs to the executor's thread."""
+
+    def __init__(self) -> None:
+        self._send: Callable[[Any], None] | None = None
+        self._response: Any = None
+
+    def answer(self, response: Any) -> None:
+        """Send the response: now, or as soon as rclpy has named the client."""
+        if self._send is None:
+            self._response = response
+        else:
+            self._send(response)
+
+    def goes_to(self, send: Callable[[Any], None]) -> None:
+        """Have the response sent by `send(response)`."""
+        self._send = send
+        if self._response is not None:
+            send(self._response)
+
+
+def answer_later(
+    queue: JobQueue,
+    prepare: Callable[[Callable[[Any], None]], Query],
+    refused: Callable[[Exception], Any],
+) -> Any:
+    """What a service's callback returns: the response to come of a query, or a refusal.
+
+    `prepare(reply)` makes the query, or raises; `refused(error)` makes the response that says why
+    there is no answer, so that no client waits for ever.
+    """
+    later = Later()
+
+    def reply(answer: Any) -> None:
+        later.answer(refused(answer) if isinstance(answer, Exception) else answer)
+
+    try:
+        queue.ask(prepare(reply))
+    except Exception as error:  # noqa: BLE001  # see above
+        return refused(error)
+    return later
+
+
+def refusal(response: Any, error: Exception, report: Callable[[str, Exception], None]) -> Any:
+    """A fresh response of the same type, empty but for why; what nobody expected is reported."""
+    if isinstance(error, FieldRefused):
+        return type(response)(error_message=str(error))
+    if not isinstance(error, PastRefused | NotRemembered):
+        report(type(response).__qualname__, error)
+    return type(response)(error_message=message_of(error))
+
+
+class _Unsent(NamedTuple):
+    name: str
+    send: Send
+    response: Any
+    header: Any
+    since_s: float
+
+
+class Responses:
+    """Sends the responses of one node's services; belongs to the node's thread.
+
+    `warn(key, text)` reports a response that was given up; `drain()` takes the messages that came
+    during an attempt: observations must not be lost for a client that is never found.
+    """
+
+    def __init__(
+        self, warn: Callable[[tuple[str, object], str], None], drain: Callable[[], None]
+    ) -> None:
+        self._warn = warn
+        self._drain = drain
+        self._unsent: deque[_Unsent] = deque()  # the first is tried next
+        self._rests_until_s = 0.0
+        warnings.filterwarnings("error", re.escape(UNSENT), RuntimeWarning)
+
+    def __len__(self) -> int:
+        """How many responses wait to be sent again."""
+        return len(self._unsent)
+
+    def watch(self, service: Any) -> None:
+        """Let the callback of an rclpy Service return a `Later`; retry what cannot be sent."""
+        send_now: Send = service.send_response
+
+        def send(response: Any, header: Any) -> None:
+            began_s = time.monotonic()
+            if not _was_sent(send_now, response, header):
+                unsent = _Unsent(service.service_name, send_now, response, header, began_s)
+                self._retain(unsent, time.monotonic() - began_s)
+                self._drain()
+
+        def send_response(response: Any, header: Any) -> None:
+            if isinstance(response, Later):
+                response.goes_to(lambda answer: send(answer, header))
+            else:
+                send(response, header)
+
+        service.send_response = send_response
+
+    def go_on(self) -> None:
+        """Try again until an attempt fails; to be called every `RETRY_S`.
+
+        The newest first, and what failed goes to the end: one that can be sent does not wait long
+        behind others that never will be.
+        """
+        while self._unsent and time.monotonic() >= self._rests_until_s:
+            one, began_s = self._unsent.popleft(), time.monotonic()
+            if began_s - one.since_s >= PATIENCE_S:
+                self._give_up(one, f"for {PATIENCE_S:g} s DDS has found no reader for it")
+            elif not _was_sent(one.send, one.response, one.header):
+                now_s = time.monotonic()
+                self._rests_until_s = now_s + _REST * (now_s - began_s)
+                self._unsent.append(one)
+                self._drain()
+                return
+
+    def _retain(self, new: _Unsent, took_s: float) -> None:
+        if took_s > MAX_ATTEMPT_S:
+            self._give_up(new, "it is too large to be retained")
+            return
+        self._unsent.appendleft(new)
+        if len(self._unsent) > MAX_UNSENT:
+            self._give_up(self._unsent.pop(), "too much else waits to be sent again")
+
+    def _give_up(self, unsent: _Unsent, why: str) -> None:
+        self._warn(
+            ("unsent", unsent.name),
+            f"gave up a response of {unsent.name}: {why}; is the QoS of a client another than the "
+            "default of services?",
+        )
+
+
+def _was_sent(send: Send, response: Any, header: Any) -> bool:
+    try:
+        send(response, header)
+    except (RuntimeWarning, SystemError) as error:
+        # Of a warning that is an error, Python makes the cause of a SystemError where it comes out
+        # of C++ that does not look for one.
+        for each in (error, error.__cause__):
+            if isinstance(each, RuntimeWarning) and str(each).startswith(UNSENT):
+                return False
+        raise
+    return True

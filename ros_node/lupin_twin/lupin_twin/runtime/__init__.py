@@ -1,0 +1,1 @@
+"""Threads, processes, signals, and what runs on them beside the node."""

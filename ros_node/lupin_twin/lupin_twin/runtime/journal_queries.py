@@ -1,0 +1,186 @@
+"""Asking the journal about the past: in threads of its own, over connections that cannot write.
+
+Small queries wait for no large one, what nobody waits for any more ends, and what cannot be
+answered is refused with what to do about it. Nothing has to be started again when the cause is
+gone: each search checks whether the file is still the one that is open.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import CancelledError, Future
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, TypeVar
+
+from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.past import NotRemembered
+from lupin_twin.journal.schema import FILE_ERRORS, Foreign, open_reader, says_damaged
+from lupin_twin.runtime.workers import ShouldStop, Workers
+
+# Queries that wait at most; each is a few hundred bytes, and its asker's time-out ends it.
+MAX_WAITING: Final = 100
+# A query that takes longer is ended, whoever waits: while it reads, the log cannot be reused.
+MAX_S: Final = 60.0
+# So many steps of SQLite's machine lie between two checks whether to stop: about a millisecond.
+_STEPS: Final = 20_000
+# So long the end waits for queries that run to stop, for the log to go with the last connection.
+_END_S: Final = 1.0
+_CACHE_KB: Final = 8_000
+
+AnswerT = TypeVar("AnswerT")
+# Any function of a connection, which calls `should_stop` between steps of its own.
+Search = Callable[[sqlite3.Connection, ShouldStop], AnswerT]
+
+
+@dataclass(frozen=True, slots=True)
+class _Open:
+    """A connection and the file that it is to."""
+
+    connection: sqlite3.Connection
+    file: tuple[int, int]
+
+
+class Recall:
+    """Answers from construction to `close`; any thread may ask.
+
+    `condition` gives, on any thread, the state of the journal and where it is; `heal(damage)` is
+    called where damage is found, on any thread.
+    """
+
+    def __init__(
+        self,
+        condition: Callable[[], Condition],
+        max_s: float = MAX_S,
+        heal: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        self._condition = condition
+        self._heal = heal
+        self._max_s = max_s
+        self._workers = Workers("memory")
+        self._changed = threading.Condition()
+        self._idle: list[_Open] = []
+        self._running = 0
+        self._is_closed = False
+
+    def query(self, search: Search[AnswerT], cost_s: float = 0.0) -> Future[AnswerT]:
+        """The answer to come of `search`, which is estimated to take `cost_s` of one core.
+
+        It sees the journal as of one moment. The future may have `NotRemembered`, or what the
+        search raises; cancel it when nobody waits any more.
+        """
+        refused: Future[AnswerT] = Future()
+        if self._workers.waiting >= MAX_WAITING:
+            why = f"{MAX_WAITING} queries about the past are waiting, the limit; ask again"
+            refused.set_exception(NotRemembered(why, is_lasting=False))
+            return refused
+        try:
+            return self._workers.submit(lambda stop: self._answer(search, stop), cost_s)
+        except RuntimeError:
+            refused.set_exception(NotRemembered("the twin is ending", is_lasting=False))
+            return refused
+
+    def close(self) -> None:
+        """End: what waits is dropped, what runs has to stop and is waited for a little."""
+        self._workers.close()
+        with self._changed:
+            self._is_closed = True
+            self._changed.wait_for(lambda: not self._running, _END_S)
+            idle, self._idle = self._idle, []
+        for opened in idle:
+            opened.connection.close()
+
+    # --- in a thread of the workers -----------------------------------------------------------
+
+    def _answer(self, search: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
+        until_s = time.monotonic() + self._max_s
+
+        def should_stop() -> bool:
+            return is_abandoned() or time.monotonic() > until_s
+
+        path = self._path()
+        try:
+            answer = self._run(path, search, should_stop)
+        except (*FILE_ERRORS, Foreign, OSError) as error:
+            if not should_stop():
+                if says_damaged(error):
+                    self._heal(str(error))
+                raise _why_not(path, error) from error
+        else:
+            if not should_stop():
+                return answer
+        if is_abandoned():
+            raise CancelledError
+        raise NotRemembered(
+            f"the journal did not answer within {self._max_s:g} s; ask for less", is_lasting=False
+        )
+
+    def _path(self) -> Path:
+        condition = self._condition()
+        if condition.state is JournalState.IN_USE:
+            raise NotRemembered(f"{condition.detail}: ask that twin", is_lasting=False)
+        return Path(condition.path)
+
+    def _run(self, path: Path, search: Search[AnswerT], should_stop: ShouldStop) -> AnswerT:
+        with self._changed:
+            self._running += 1
+        opened = None
+        try:
+            opened = self._take(path)
+            connection = opened.connection
+            connection.set_progress_handler(should_stop, _STEPS)
+            connection.execute("BEGIN")
+            answer = search(connection, should_stop)
+            connection.execute("ROLLBACK")
+            connection.set_progress_handler(None, _STEPS)
+        except BaseException:
+            self._put_back(opened, is_sound=False)
+            raise
+        self._put_back(opened, is_sound=True)
+        return answer
+
+    def _take(self, path: Path) -> _Open:
+        status = path.stat()
+        file = (status.st_dev, status.st_ino)
+        while True:
+            with self._changed:
+                opened = self._idle.pop() if self._idle else None
+            if opened is None:
+                break
+            if opened.file == file:
+                return opened
+            opened.connection.close()
+        connection = open_reader(path)
+        connection.execute(f"PRAGMA cache_size = -{_CACHE_KB}")
+        return _Open(connection, file)
+
+    def _put_back(self, opened: _Open | None, *, is_sound: bool) -> None:
+        with self._changed:
+            if opened is not None and is_sound and not self._is_closed:
+                self._idle.append(opened)
+            elif opened is not None:
+                opened.connection.close()
+            self._running -= 1
+            self._changed.notify_all()
+
+
+def _why_not(path: Path, error: Exception) -> Exception:
+    """What is wrong with the file and what to do; an error of the search's own stays as it is."""
+    if isinstance(error, Foreign):
+        why = f"{error}; name another file by the parameter journal"
+    elif isinstance(error, FileNotFoundError):
+        why = f"the journal {path} is not there; the twin makes one as soon as it can write it"
+    elif says_damaged(error):
+        why = (
+            f"the journal {path} is damaged ({error}); the twin quarantines it and retains what"
+            " can be read of it, but once a day: else restart the twin"
+        )
+        return NotRemembered(why, is_lasting=False, damage=str(error))
+    elif getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_ERROR:
+        return error
+    else:
+        why = f"the journal {path} cannot be read now: {error}"
+    return NotRemembered(why, is_lasting=False)

@@ -1,0 +1,376 @@
+"""What the twin knows, and its journal: each write handed over, each start restored.
+
+A wall clock that contradicts the log is doubted (`_Doubt`): what was known is shown as it was, what
+is observed is shown and waits. Once the clock agrees it is written, moved by what the clock jumped.
+
+No ROS; time and environment are arguments. Everything here runs on the thread that the store
+belongs to, and takes microseconds, but for the start: that waits for what was known before.
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from lupin_twin.core import ingest
+from lupin_twin.core.drops import MAX_TEXT_LENGTH, Drop
+from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING, History
+from lupin_twin.core.ingest import Pin
+from lupin_twin.core.journal_condition import Condition
+from lupin_twin.core.state import Inspection, Scan, TwinStore
+from lupin_twin.journal.fold import Restored
+from lupin_twin.journal.retention import Limits
+from lupin_twin.journal.rows import InspectionRow, PinRow, Row, ScanRow
+from lupin_twin.journal.runs import CORRECTION_NS, Clock, Turn, turn_of
+from lupin_twin.journal.writer import Journal
+from lupin_twin.runtime.journal_queries import Recall
+
+NO_JOURNAL: Final = "off"
+
+# So long a start waits for what was known before; what comes later is taken in as it comes.
+_START_WAIT_S: Final = 10.0
+
+# Two simulations on one /clock make it go back dozens of times a second, and each run stays in the
+# file: so many may begin within such a time, by the wall's clock.
+MAX_NEW_RUNS: Final = 10
+NEW_RUNS_NS: Final = 100 * 1_000_000_000
+# A clock that has contradicted the log for so long, by the steady clock, is believed.
+DOUBT_NS: Final = 600 * 1_000_000_000
+# Writes that are buffered at most while the log is read at the start.
+MAX_EARLY: Final = 20_000
+
+
+def journal_path(
+    given: str, environ: Mapping[str, str], domain: int, namespace: str
+) -> Path | None:
+    """Where the journal is, None where there is none.
+
+    By default it is a file of the user's, named by domain and namespace.
+
+    Raises:
+        RuntimeError: there is no home to keep it in.
+
+    """
+    if given == NO_JOURNAL:
+        return None
+    if given:
+        return Path(given).expanduser().absolute()
+    names = [f"domain-{domain}", *re.findall("[^/]+", namespace)]
+    return state_folder(environ) / f"{'.'.join(names)}.sqlite"
+
+
+def demo_journal_path(environ: Mapping[str, str], seed: int) -> Path:
+    """Where the journal of a demo is: apart from a real twin's, and each seed for itself.
+
+    Raises:
+        RuntimeError: there is no home to keep it in.
+
+    """
+    return state_folder(environ) / f"demo-seed-{seed}.sqlite"
+
+
+def state_folder(environ: Mapping[str, str]) -> Path:
+    """The user's folder for what outlives a process (XDG Base Directory Specification).
+
+    Raises:
+        RuntimeError: there is no home to keep it in.
+
+    """
+    given = Path(environ.get("XDG_STATE_HOME", ""))
+    # A relative path there is invalid and to be ignored.
+    home = given if given.is_absolute() else Path("~/.local/state").expanduser()
+    return home / "lupin-twin"
+
+
+class _Early(NamedTuple):
+    """A write that was taken in before the log's last word was known; when, by the steady clock.
+
+    `lead_ns` is what the wall's clock was ahead of the steady one then.
+    """
+
+    write: ingest.Write
+    arrival_ns: int
+    mission: str
+    lead_ns: int
+
+
+class _Doubt(NamedTuple):
+    """A wall clock that contradicts the log, from `clock` on; the log knows `last_ns`."""
+
+    clock: Clock
+    since_ns: int
+    last_ns: int
+
+
+class Memory:
+    """A store, its history, and the journal of both; `recall` queries that.
+
+    `buffer_len` scans of a series are restored at most; `steady_ns` is a clock that never jumps.
+    """
+
+    def __init__(
+        self,
+        store: TwinStore,
+        history: History,
+        journal: Journal,
+        buffer_len: int,
+        steady_ns: Callable[[], int] = time.monotonic_ns,
+    ) -> None:
+        self._store = store
+        self._history = history
+        self._journal = journal
+        self._buffer_len = buffer_len
+        self._steady_ns = steady_ns
+        self._clock: Clock | None = None
+        # What the wall's clock is ahead of the steady one.
+        self._lead_ns = 0
+        self._begun_ns: deque[int] = deque(maxlen=MAX_NEW_RUNS)
+        # From when each tag has its place.
+        self._placed_ns: dict[str, int] = {}
+        self._early: deque[_Early] | None = deque(maxlen=MAX_EARLY)
+        self._lost = 0
+        self._doubt: _Doubt | None = None
+        self._is_requested = False
+        self._agrees = False
+        self.recall = Recall(lambda: self.condition, heal=self.heal)
+
+    def follow(self, now: Clock) -> str | None:
+        """Keep to a clock: the first moment of it restores, one that goes back begins a new run.
+
+        Returns what of the journal is known again, in words, once it is. A moment of 0 is a
+        simulated clock that has not started: nothing is known then of when anything was. One that
+        goes back time and again stays in a run, as at its latest, until it may begin another
+        (`MAX_NEW_RUNS`).
+        """
+        if now.stamp_ns <= 0:
+            return None
+        before, lead_before_ns = self._clock, self._lead_ns
+        lead_ns = now.arrival_ns - self._steady_ns()
+        if before is None:
+            self._clock, self._lead_ns = now, lead_ns
+            self._journal.begin(now, self._buffer_len)
+            return self._take(self._journal.take_restored(_START_WAIT_S), now)
+        if self._doubt is not None:
+            self._clock, self._lead_ns = now, lead_ns
+            return self._check_doubt(self._doubt, now)
+        turn = turn_of(before, now, lead_ns - lead_before_ns)
+        if turn in {None, Turn.AHEAD} or self._may_begin(now.arrival_ns):
+            self._clock, self._lead_ns = now, lead_ns
+            if turn is not None:
+                self._journal.begin(now, turn=turn, before_ns=before.stamp_ns)
+                self._hold_places(now)
+        return self._take(self._journal.take_restored(), now)
+
+    def apply(self, write: ingest.Write, arrival_ns: int, mission: str = "") -> Drop | None:
+        """Write what is now and what was, and hand it over; returns what the store refused."""
+        if self._early is not None:
+            self._lost += len(self._early) == MAX_EARLY
+            self._early.append(_Early(write, arrival_ns, mission, self._lead_ns))
+        dropped = ingest.apply(write, self._store, self._history)
+        if dropped is None and self._doubt is None:
+            self._hand_over(write, arrival_ns, mission)
+        return dropped
+
+    @property
+    def is_clock_doubted(self) -> bool:
+        """Whether the clock contradicts the journal, so that ages are not known."""
+        return self._doubt is not None
+
+    @property
+    def condition(self) -> Condition:
+        """How the journal is doing."""
+        condition, early = self._journal.condition, self._early
+        if condition.complete_ns is None and self._clock is not None:
+            condition = replace(condition, complete_ns=self._clock.stamp_ns)
+        if self._doubt is None or early is None:
+            return condition
+        last_ns = self._doubt.last_ns
+        return replace(condition, waiting=len(early), lost=self._lost, complete_ns=last_ns)
+
+    def heal(self, damage: str) -> None:
+        """Have a journal in which somebody has met damage set aside; from any thread."""
+        self._journal.heal(damage)
+
+    def close(self) -> None:
+        """Answer nothing more, and write what is waiting."""
+        self.recall.close()
+        self._journal.close()
+
+    def _may_begin(self, arrival_ns: int) -> bool:
+        begun = self._begun_ns
+        if len(begun) == MAX_NEW_RUNS and abs(arrival_ns - begun[0]) < NEW_RUNS_NS:
+            return False
+        begun.append(arrival_ns)
+        return True
+
+    def _hand_over(self, write: ingest.Write, arrival_ns: int, mission: str) -> None:
+        now_ns = 0 if self._clock is None else self._clock.stamp_ns
+        if write.pose is not None:
+            # A place belongs to the moment of the scan that brought it, as its readings do.
+            stamp_ns = now_ns if isinstance(write, Pin) else write.stamp_ns
+            pose = self._store.pose_of(write.tag_id)
+            placed_ns = self._placed_ns.get(write.tag_id)
+            if pose is not None and (placed_ns is None or stamp_ns < placed_ns):
+                self._placed_ns[write.tag_id] = stamp_ns
+                self._journal.write(PinRow(write.tag_id, stamp_ns, arrival_ns, pose), now_ns)
+        if not isinstance(write, Pin):
+            self._journal.write(_row(write, arrival_ns, mission[:MAX_TEXT_LENGTH]), now_ns)
+
+    def _hold_places(self, now: Clock) -> None:
+        self._placed_ns = {
+            tag_id: min(at_ns, now.stamp_ns) for tag_id, at_ns in self._placed_ns.items()
+        }
+
+    # --- what was known before ----------------------------------------------------------------
+
+    def _take(self, restored: Restored | None, now: Clock) -> str | None:
+        """Begin with what the log knows, and what came meanwhile on top of it."""
+        if restored is None:
+            return None
+        doubt, early = self._doubt, self._early or ()
+        self._is_requested = False
+        self._doubt = None
+        if restored.is_doubted:
+            self._doubt = doubt or _Doubt(now, self._steady_ns(), 0)
+            self._doubt = self._doubt._replace(last_ns=restored.last_ns)
+        else:
+            self._early = None
+        self._restore(restored)
+        for entry in early:
+            if doubt is not None and self._agrees:
+                entry = _moved(entry, self._lead_ns - entry.lead_ns)  # noqa: PLW2901
+            ingest.apply(entry.write, self._store, self._history)
+            if doubt is not None and self._doubt is None:
+                self._hand_over(entry.write, entry.arrival_ns, entry.mission)
+        self.hold_to(now)
+        return f"journal {self.condition.path}: {_summary(restored, now)}"
+
+    def _restore(self, restored: Restored) -> None:
+        count = self._store.observation_count
+        self._store.restore(restored.known.tags, restored.known.observed)
+        self._history.clear()
+        for row in restored.rows:
+            self._history.add(write_of(row))
+        # From before what was handed over meanwhile, if it was earlier.
+        placed = dict(restored.known.placed_ns)
+        for tag_id, at_ns in self._placed_ns.items():
+            placed[tag_id] = min(at_ns, placed.get(tag_id, at_ns))
+        self._placed_ns = placed
+        # The count goes on where it was: it never falls, over a restart either.
+        self._store.observation_count = max(
+            self._store.observation_count, count + 1, restored.last_seq
+        )
+
+    def hold_to(self, now: Clock) -> bool:
+        """Follow a clock that has gone back; returns whether anything was later than now.
+
+        What a simulation says again is new; a wall clock comes to no moment twice.
+        """
+        if not self._store.hold_to(now.stamp_ns):
+            return False
+        self._history.hold_to(now.stamp_ns, retains_keys=not now.is_simulated)
+        return True
+
+    def _check_doubt(self, doubt: _Doubt, now: Clock) -> str | None:
+        """Ask the log again once the clock agrees with it, or has contradicted it for long."""
+        if self._is_requested:
+            return self._take(self._journal.take_restored(), now)
+        self._agrees = now.is_simulated or now.arrival_ns >= doubt.last_ns - CORRECTION_NS
+        if self._agrees:
+            self._journal.begin(now, self._buffer_len)
+        elif self._steady_ns() - doubt.since_ns >= DOUBT_NS:
+            self._journal.begin(doubt.clock, self._buffer_len, Turn.BELIEVED)
+        else:
+            return None
+        self._is_requested = True
+        return self._take(self._journal.take_restored(_START_WAIT_S), now)
+
+
+def open_journal(path: Path | None, holder: str, days: float, max_mb: float) -> Journal:
+    """A journal at work; without a path it is in a temporary file, gone at the end.
+
+    `holder` names this process to others.
+    """
+    limits = Limits(days, int(max_mb * 1e6))
+    if path is not None:
+        return Journal(path, holder, limits)
+    folder = Path(tempfile.mkdtemp(prefix="lupin-twin-"))
+    return Journal(folder / "journal.sqlite", holder, limits, is_temporary=True)
+
+
+def _moved(early: _Early, by_ns: int) -> _Early:
+    """What was taken in by a clock that was wrong by so much, as of the right one.
+
+    Where the producer's own clock was right, it is as old as its stamp.
+    """
+    write = early.write
+    if not isinstance(write, Pin):
+        stamp_ns, own_ns = write.stamp_ns + by_ns, write.own_stamp_ns
+        was_right = write.stamp_ns < own_ns <= stamp_ns
+        write = replace(write, stamp_ns=own_ns if was_right else stamp_ns)
+    return early._replace(write=write, arrival_ns=early.arrival_ns + by_ns)
+
+
+def _summary(restored: Restored, now: Clock) -> str:
+    tags = restored.known.tags
+    if not tags:
+        return "nothing was known before"
+    counts = {
+        "places": sum(tag.pose is not None for tag in tags),
+        "readings": sum(len(tag.readings) for tag in tags),
+        "inspections": sum(tag.looked_at_ns is not None for tag in tags),
+    }
+    what = ", ".join(f"{count:,} {name}" for name, count in counts.items())
+    times = [r.observed_at_ns for tag in tags for r in tag.readings if r.observed_at_ns is not None]
+    times += [tag.last_observed_ns for tag in tags if tag.last_observed_ns is not None]
+    oldest = f"; the oldest is of {_moment(min(times), now)}" if times else ""
+    return f"{len(tags):,} tags are known again, of {what}{oldest}"
+
+
+def _moment(stamp_ns: int, now: Clock) -> str:
+    try:
+        moment = datetime.fromtimestamp(stamp_ns / 1e9, UTC)
+    except (OverflowError, ValueError):
+        return f"second {stamp_ns // 10**9}"
+    return f"second {stamp_ns / 1e9:.3f}" if now.is_simulated else f"{moment:%Y-%m-%dT%H:%M:%SZ}"
+
+
+def _row(write: Scan | Inspection, arrival_ns: int, mission: str) -> Row:
+    own = None if write.own_stamp_ns == write.stamp_ns else write.own_stamp_ns
+    if isinstance(write, Inspection) and write.flower is not None:
+        return InspectionRow(
+            write.tag_id, write.stamp_ns, arrival_ns, write.flower, write.source, mission, own
+        )
+    return ScanRow(
+        tag_id=write.tag_id,
+        stamp_ns=write.stamp_ns,
+        arrival_ns=arrival_ns,
+        readings=write.readings if isinstance(write, Scan) else (),
+        kind=KIND_TAG_READING if isinstance(write, Scan) else KIND_FLOWER,
+        status=write.status,
+        detail=write.status_detail,
+        source=write.source,
+        mission=mission,
+        own_stamp_ns=own,
+    )
+
+
+def write_of(row: ScanRow | InspectionRow) -> Scan | Inspection:
+    """What was accepted, of the row that was written of it."""
+    own = row.stamp_ns if row.own_stamp_ns is None else row.own_stamp_ns
+    if isinstance(row, InspectionRow):
+        return Inspection(row.tag_id, row.stamp_ns, row.flower, source=row.source, own_stamp_ns=own)
+    if row.kind == KIND_FLOWER:
+        return Inspection(
+            row.tag_id, row.stamp_ns, None, None, row.status, row.detail, row.source, own
+        )
+    return Scan(
+        row.tag_id, row.stamp_ns, row.readings, None, row.status, row.detail, row.source, own
+    )

@@ -1,0 +1,245 @@
+"""How a process begins and ends: its threads for BLAS, its stop signals, its last moments.
+
+Ctrl-C and SIGTERM are waited for, never handled asynchronously: neither ends in a traceback.
+Standard library alone, so that a command can call `block` before it imports anything slow.
+
+And stale shared memory of Fast DDS, which stops every later start in its domain for ever: a process
+that is killed while it creates the memory of a port leaves it marked as unfinished. Whoever opens
+it next waits in C++, with Python's lock held: there is no node, no log line, no signal handler
+(https://github.com/eProsima/Fast-DDS/issues/1144). So it is removed before a node is made.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import faulthandler
+import logging
+import os
+import signal
+import stat
+import struct
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Final, NoReturn, TextIO
+
+# An idle worker ends at once when it is closed; what takes longer is at work.
+IDLE_WORKERS_END_S: Final = 0.1
+# What a shell says of a command that Ctrl-C has ended: 128 and the signal's number.
+INTERRUPTED: Final = 130
+# What Python says where the last of the standard output could not be written.
+NOT_WRITTEN: Final = 120
+
+
+def exit_after(main: Callable[[], int]) -> NoReturn:
+    """Run `main` and `exit_process` with what it returns, and in the same way where it raises.
+
+    As Python puts itself away, no thread may be within SQLite or a disk that hangs. Ctrl-C ends it
+    quietly, also before `main` waits for it: what it imports takes its time.
+    """
+    try:
+        open_standard_files()
+        code = main()
+    except KeyboardInterrupt:
+        code = INTERRUPTED
+    except SystemExit as ended:
+        if isinstance(ended.code, str):
+            with suppress(OSError):
+                sys.stderr.write(f"{ended.code}\n")
+        code = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
+    except BaseException as error:  # noqa: BLE001  # as Python itself would end
+        sys.excepthook(type(error), error, error.__traceback__)
+        code = 1
+    exit_process(code)
+
+
+def open_standard_files() -> None:
+    """Open /dev/null for each of the three that whoever started this process has closed.
+
+    The next file that is opened would get its number, and whatever a library in C prints would be
+    written into it. Python has None for it, and `sys.stderr.write` would raise.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            # The lowest number that is free: this one. Children are to have it too.
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: PTH123, SIM115
+
+
+def exit_process(code: int) -> NoReturn:
+    """End the process, whatever its other threads are computing.
+
+    Python waits at its end for every worker of a pool, daemon or not, and numpy cannot be
+    interrupted: a large field would hold up Ctrl-C for as long as it takes. So where, and only
+    where, a thread is still at work, the process ends without Python's (and DDS's) tidying up.
+    """
+    deadline_s = time.monotonic() + IDLE_WORKERS_END_S
+    others = [thread for thread in threading.enumerate() if thread is not threading.main_thread()]
+    for thread in others:
+        thread.join(max(0.0, deadline_s - time.monotonic()))
+    if any(thread.is_alive() for thread in others):
+        logging.shutdown()
+        os._exit(_flushed(code))
+    sys.exit(_flushed(code))
+
+
+def _flushed(code: int) -> int:
+    """Write what still waits to be; the exit code then.
+
+    Where the standard output fails, that is reported. That the standard error does is no failure of
+    the command: Python itself would take it for one, and finds nothing to write any more.
+    """
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        discard_output(sys.stdout)
+        if code == 0:
+            code = NOT_WRITTEN
+            with suppress(OSError):
+                sys.stderr.write(f"cannot write to the standard output: {error.strerror}\n")
+    try:
+        sys.stderr.flush()
+    except OSError:
+        discard_output(sys.stderr)
+    return code
+
+
+def discard_output(stream: TextIO) -> None:
+    """Have /dev/null take what a stream could not write, and will try again."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
+
+
+_VARIABLE: Final = "OPENBLAS_NUM_THREADS"
+
+
+def limit_blas_threads() -> None:
+    """Have OpenBLAS start no threads, here and in children, unless the environment says so."""
+    os.environ.setdefault(_VARIABLE, "1")
+
+
+_M_MMAP_THRESHOLD: Final = -3
+_LARGE_BYTES: Final = 1_000_000
+
+
+def return_large_blocks() -> None:
+    """Have glibc give the memory of a large array back to the system as soon as it is freed.
+
+    By default it comes to keep those of up to 32 MB: a round of estimates left 50 MB behind.
+    """
+    with suppress(AttributeError, OSError):  # another C library
+        ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, _LARGE_BYTES)
+
+
+STOP_SIGNALS: Final = frozenset({signal.SIGINT, signal.SIGTERM})
+
+# So long an end may take, s, whatever hangs: five times as long as it is meant to.
+END_S: Final = 10
+_STDERR: Final = 2
+_PR_SET_PDEATHSIG: Final = 1
+
+
+def block() -> None:
+    """Hold the stop signals back until `wait` takes them.
+
+    To be called first of all, before ROS starts its threads: they inherit this.
+    """
+    signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
+
+
+def wait(end_within_s: int = END_S) -> None:
+    """Return when a stop signal has come; from then on the process has to end (`must_end`).
+
+    Not by sigtimedwait: after a SIGSTOP and a SIGCONT, CPython returns from it without a signal.
+    """
+    signal.sigwait(STOP_SIGNALS)
+    must_end(end_within_s)
+
+
+def must_end(within_s: int = END_S) -> None:
+    """From now on the process ends within so long, even if the middleware never comes back.
+
+    The traceback of every thread is printed. Neither of the two needs the interpreter: a call that
+    hangs may keep it. The second is there for what runs after Python has ended.
+    """
+    faulthandler.dump_traceback_later(within_s, exit=True, file=_STDERR)
+    signal.alarm(within_s + 1)
+
+
+def end_with_parent() -> None:
+    """Have the kernel send SIGTERM when the process that started this one is gone (prctl(2))."""
+    parent = os.getppid()
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != parent:  # it went before the kernel was asked
+        sys.exit(0)
+
+
+FOLDER: Final = Path("/dev/shm")  # noqa: S108  # where Linux keeps it
+# Making one takes milliseconds.
+YOUNG_S: Final = 5.0
+# The RTPS specification's default port numbers, 9.6.1.1: where a domain's begin, and how many.
+_PORT_BASE: Final = 7400
+_PORTS_PER_DOMAIN: Final = 250
+# The first word of a managed segment of Boost.Interprocess: not begun, being made, made, corrupted.
+_STATE: Final = struct.Struct("=I")
+_MADE: Final = 2
+
+log = logging.getLogger(__name__)
+
+
+def ports(domain: int) -> range:
+    """The ports of a ROS domain."""
+    first = _PORT_BASE + _PORTS_PER_DOMAIN * domain
+    return range(first, first + _PORTS_PER_DOMAIN)
+
+
+def remove_stale_shared_memory(domain: int, folder: Path = FOLDER) -> list[str]:
+    """Remove what killed processes left unfinished of a domain's ports; returns the file names.
+
+    What cannot be removed, another user's, is logged as an error: the start may hang on it.
+    """
+    removed = []
+    for path in _unfinished(domain, folder):
+        try:
+            path.unlink()
+        except FileNotFoundError:
+            continue
+        except OSError as error:
+            log.error(  # noqa: TRY400  # the line says it all
+                "%s was left unfinished by a killed process and cannot be removed (%s): if the "
+                "start hangs now, remove it, or set FASTDDS_BUILTIN_TRANSPORTS=UDPv4",
+                path,
+                error.strerror,
+            )
+            continue
+        log.warning("removed %s, left unfinished by a killed process", path)
+        removed.append(path.name)
+    return removed
+
+
+def _unfinished(domain: int, folder: Path) -> Iterator[Path]:
+    for port in ports(domain):
+        path = folder / f"fastrtps_port{port}"
+        try:
+            file = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+        except OSError:
+            continue
+        try:
+            about = os.fstat(file)
+            is_old = time.time() - about.st_mtime > YOUNG_S
+            if stat.S_ISREG(about.st_mode) and is_old and not _is_made(os.read(file, _STATE.size)):
+                yield path
+        finally:
+            os.close(file)
+
+
+def _is_made(begin: bytes) -> bool:
+    return len(begin) == _STATE.size and _STATE.unpack(begin)[0] >= _MADE

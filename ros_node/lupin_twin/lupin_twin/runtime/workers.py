@@ -1,0 +1,367 @@
+"""Threads for what takes longer than a tick, so ordered that the small never waits for the large.
+
+A job is due at its arrival plus `PATIENCE` times its estimated cost, and the earliest due goes
+first. So a dear job lets cheap ones pass, but only those that come within `PATIENCE` times its own
+cost: none starves, whatever comes later. One thread takes nothing but small jobs (`SMALL_S`): they
+need not wait for a large one to end either.
+
+Work that nobody waits for ends: `Job.cancel` takes it off the queue, and where it runs already,
+its `should_stop` turns true, which long computations ask between their steps.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Hashable, Iterable, Iterator
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from queue import Empty, SimpleQueue
+from typing import Any, Final, Generic, TypeVar
+
+from lupin_twin.core.past import NotRemembered
+
+# Estimates are seconds of one core. A small job costs what nobody notices: those of a few clients
+# that ask at the rate they may do not keep the threads busy.
+SMALL_S: Final = 0.02
+PATIENCE: Final = 2.0
+# Threads that take any job; two, so that one heavy job does not hold up all other large ones.
+LARGE_THREADS: Final = 2
+SMALL_THREADS: Final = 1
+
+# What is made in plain Python keeps all other threads waiting: so long, s, before it rests.
+TURN_S: Final = 0.002
+
+ResultT = TypeVar("ResultT")
+ItemT = TypeVar("ItemT")
+ShouldStop = Callable[[], bool]
+
+
+class Job(Future[ResultT], Generic[ResultT]):
+    """The result to come of `work(should_stop)`, which is estimated to take `cost_s`."""
+
+    def __init__(
+        self,
+        work: Callable[[ShouldStop], ResultT],
+        cost_s: float,
+        arrived_s: float,
+        on_cancel: Callable[[Job[ResultT]], None],
+    ) -> None:
+        super().__init__()
+        self.cost_s = cost_s
+        self.due_s = arrived_s + PATIENCE * cost_s
+        self._work = work
+        self._on_cancel = on_cancel
+        self._is_abandoned = False
+
+    @property
+    def is_small(self) -> bool:
+        """Whether the threads for small jobs take it too."""
+        return self.cost_s <= SMALL_S
+
+    def should_stop(self) -> bool:
+        """Whether nobody waits for the result any more; any thread may ask."""
+        return self._is_abandoned
+
+    def cancel(self) -> bool:
+        """Nobody waits any more: take it off the queue, or let it end soon where it runs."""
+        if not self.done() and not self._is_abandoned:
+            self._is_abandoned = True
+            self._on_cancel(self)
+        return super().cancel()
+
+    def run(self) -> None:
+        """Do the work, in a worker's thread."""
+        if not self.set_running_or_notify_cancel():
+            return
+        try:
+            result = self._work(self.should_stop)
+        except BaseException as error:  # noqa: BLE001  # handed to whoever waits
+            self.set_exception(error)
+        else:
+            self.set_result(result)
+        # What it was made of must not live as long as its result.
+        del self._work
+
+
+class Workers:
+    """The threads and the jobs that wait for one. Any thread may call it.
+
+    The threads start with the first job. `clock` tells seconds and never jumps.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        clock: Callable[[], float] = time.monotonic,
+        large_threads: int = LARGE_THREADS,
+        small_threads: int = SMALL_THREADS,
+    ) -> None:
+        self.abandoned = 0
+        self._name = name
+        self._clock = clock
+        self._only_small = [False] * large_threads + [True] * small_threads
+        self._waiting: list[Job[object]] = []
+        self._running: set[Job[object]] = set()
+        self._changed = threading.Condition()
+        self._threads: list[threading.Thread] = []
+        self._is_closed = False
+
+    @property
+    def waiting(self) -> int:
+        """Jobs that no thread has taken yet."""
+        return len(self._waiting)
+
+    @property
+    def running(self) -> int:
+        """Jobs that a thread is at."""
+        return len(self._running)
+
+    def submit(self, work: Callable[[ShouldStop], ResultT], cost_s: float = 0.0) -> Future[ResultT]:
+        """Have `work(should_stop)` done; `cost_s` is an estimate, in seconds of one core.
+
+        Raises:
+            RuntimeError: the workers were closed.
+
+        """
+        job: Job[ResultT] = Job(work, cost_s, self._clock(), self._forget)
+        with self._changed:
+            if self._is_closed:
+                raise RuntimeError("the workers were closed")
+            if not self._threads:
+                self._start()
+            self._waiting.append(job)  # type: ignore[arg-type]  # whatever its result
+            self._changed.notify_all()
+        return job
+
+    def close(self) -> None:
+        """End: drop what waits, and ask what runs to stop. Waits for nothing."""
+        with self._changed:
+            self._is_closed = True
+            left = [*self._waiting, *self._running]
+            self._changed.notify_all()
+        for job in left:
+            job.cancel()
+
+    def _forget(self, job: Job[ResultT]) -> None:
+        with self._changed:
+            self.abandoned += 1
+            if job in self._waiting:
+                self._waiting.remove(job)  # type: ignore[arg-type]
+
+    def _start(self) -> None:
+        for number, only_small in enumerate(self._only_small):
+            thread = threading.Thread(
+                target=self._run, args=(only_small,), name=f"{self._name}_{number}", daemon=True
+            )
+            self._threads.append(thread)
+            thread.start()
+
+    def _run(self, only_small: bool) -> None:
+        while (job := self._take(only_small)) is not None:
+            job.run()
+            with self._changed:
+                self._running.discard(job)
+            del job  # or its result would live until the next one
+
+    def _take(self, only_small: bool) -> Job[object] | None:
+        with self._changed:
+            while not self._is_closed:
+                mine = [job for job in self._waiting if job.is_small or not only_small]
+                if mine:
+                    job = min(mine, key=lambda job: job.due_s)  # of equals, the first that came
+                    self._waiting.remove(job)
+                    self._running.add(job)
+                    return job
+                self._changed.wait()
+            return None
+
+
+def in_turns(
+    items: Iterable[ItemT],
+    clock: Callable[[], float] = time.perf_counter,
+    rest: Callable[[float], None] = time.sleep,
+) -> Iterator[ItemT]:
+    """The items, with a rest after each `TURN_S` in which something was made of them, as long.
+
+    The interpreter lets one thread run at a time, and takes it from the one only after 5 ms: who
+    makes half a million objects would leave a node's thread, which waits for it at each message,
+    next to nothing.
+    """
+    begun_s = clock()
+    for item in items:
+        yield item
+        if clock() - begun_s >= TURN_S:
+            rest(TURN_S)
+            begun_s = clock()
+
+
+# Queries that wait for their answer, and those of a sort that are dealt with at once.
+MAX_QUERIES: Final = 32
+LARGE_AT_ONCE: Final = 1
+SMALL_AT_ONCE: Final = 4
+# While the owner's thread is behind, so much time, s, lies between two of a sort.
+PACE_S: Final = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Query:
+    """What is looked up, what is made of the result, and who gets it.
+
+    `look_up` begins the search; `make`, if there is one, is called on a worker with its result, as
+    `cost_s` estimates, s of one core. `reply` gets the answer, or the exception. Queries of one
+    `key` that are under way at the same time share one search.
+    """
+
+    look_up: Callable[[], Future[Any]]
+    reply: Callable[[Any], None]
+    make: Callable[[Any], Any] | None = None
+    cost_s: float = 0.0
+    key: Hashable = None
+
+
+class JobQueue:
+    """Work of more than a tick for one thread, which owns the queue and gets the answers.
+
+    Large queries are taken `large_at_once`, each when the one before has been delivered: what is
+    made for the largest takes some 200 MB. Small ones do not wait behind them. While `is_behind()`
+    says that messages wait for the owner's thread, queries wait too, but for one a second.
+    `wake()` is called in another thread when `deliver` has something to do; `clock` tells seconds
+    and never jumps. `answered` counts answers, `slowest_s` is the longest that one took.
+    """
+
+    def __init__(
+        self,
+        workers: Workers,
+        wake: Callable[[], None],
+        is_behind: Callable[[], bool] = lambda: False,
+        clock: Callable[[], float] = time.monotonic,
+        large_at_once: int = LARGE_AT_ONCE,
+    ) -> None:
+        self.answered = 0
+        self.slowest_s = 0.0
+        self._workers = workers
+        self._wake = wake
+        self._is_behind = is_behind
+        self._clock = clock
+        self._lanes = (_Lane(SMALL_AT_ONCE), _Lane(large_at_once))
+        self._under_way: dict[Hashable, _Waiting] = {}
+        self._done: SimpleQueue[tuple[_Waiting, Any]] = SimpleQueue()
+
+    @property
+    def waiting(self) -> int:
+        """Queries whose answer has not been delivered yet; those of one key count once."""
+        return sum(len(lane.waiting) + lane.under_way for lane in self._lanes)
+
+    def ask(self, query: Query) -> None:
+        """Have the query answered by `deliver`.
+
+        Raises:
+            NotRemembered: too many wait.
+
+        """
+        shared = self._under_way.get(query.key)
+        if shared is not None:
+            shared.replies.append(query.reply)
+            return
+        if self.waiting >= MAX_QUERIES:
+            raise NotRemembered(
+                f"{MAX_QUERIES} requests wait, which is the limit", is_lasting=False
+            )
+        waiting = _Waiting(query, [query.reply], time.monotonic())
+        if query.key is not None:
+            self._under_way[query.key] = waiting
+        lane = self._lane(query)
+        lane.waiting.append(waiting)
+        self._begin(lane)
+
+    def go_on(self) -> None:
+        """Begin what may be begun by now; to be called now and then."""
+        for lane in self._lanes:
+            self._begin(lane)
+
+    def deliver(self) -> None:
+        """Hand out one answer; where there are more, `wake` is called for the next.
+
+        Sending a large one takes a while, and what else waits for this thread comes in between.
+        """
+        try:
+            waiting, answer = self._done.get_nowait()
+        except Empty:
+            return
+        if not self._done.empty():
+            self._wake()
+        if not isinstance(answer, Exception):
+            self.answered += 1
+            self.slowest_s = max(self.slowest_s, time.monotonic() - waiting.since_s)
+        self._under_way.pop(waiting.query.key, None)
+        try:
+            for reply in waiting.replies:
+                reply(answer)
+        finally:
+            lane = self._lane(waiting.query)
+            lane.under_way -= 1
+            self._begin(lane)
+
+    def _lane(self, query: Query) -> _Lane:
+        return self._lanes[query.cost_s > SMALL_S]
+
+    def _begin(self, lane: _Lane) -> None:
+        while lane.waiting and lane.under_way < lane.at_once:
+            now_s = self._clock()
+            if self._is_behind() and now_s - lane.begun_s < PACE_S:
+                return
+            lane.begun_s = now_s
+            lane.under_way += 1
+            self._look_up(lane.waiting.popleft())
+
+    def _look_up(self, waiting: _Waiting) -> None:
+        query = waiting.query
+
+        def put(answer: Any) -> None:
+            self._done.put((waiting, answer))
+            self._wake()
+
+        def put_result(future: Future[Any]) -> None:
+            try:
+                answer = future.result()
+            except Exception as error:  # noqa: BLE001  # handed to whoever waits
+                answer = error
+            put(answer)
+
+        def make(search: Future[Any]) -> None:
+            # In whichever thread searched: that one is not for making messages.
+            try:
+                found, made = search.result(), query.make
+                assert made is not None
+                making = self._workers.submit(lambda _: made(found), query.cost_s)
+            except Exception as error:  # noqa: BLE001  # handed to whoever waits
+                put(error)
+            else:
+                making.add_done_callback(put_result)
+
+        try:
+            search = query.look_up()
+        except Exception as error:  # noqa: BLE001  # handed to whoever waits
+            put(error)
+        else:
+            search.add_done_callback(put_result if query.make is None else make)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Waiting:
+    query: Query
+    replies: list[Callable[[Any], None]]
+    since_s: float
+
+
+@dataclass(slots=True)
+class _Lane:
+    """Queries of a sort, how many are dealt with at once, and when the last was begun."""
+
+    at_once: int
+    under_way: int = 0
+    begun_s: float = -math.inf
+    waiting: deque[_Waiting] = field(default_factory=deque)

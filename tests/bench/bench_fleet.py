@@ -1,0 +1,273 @@
+"""The archive of a fleet: lag of many forwarders, a state as of a moment, and how it grows.
+
+Lag: from the arrival of a scan at its twin until the archive has committed it. Journals, forwarders
+and PostgreSQL (fsync on) share this machine; forwarders are threads of a few processes, which run
+the code of `lupin-twin forward`. Growth: rows as forwarders write them, made by SQL, five sensors,
+a scan of each of 30 tags every two minutes. `--quick`: a few sites, few days.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import random
+import sqlite3
+import statistics
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+import psycopg
+
+from lupin_bridge.archive.forwarding import Forwarder
+from lupin_bridge.archive.sink import Sink
+from lupin_bridge.archive.source import Batch, Epoch
+from lupin_twin.core.past import SeriesRequest
+from lupin_twin.journal.fold import state_at
+from lupin_twin.journal.queries import series
+from lupin_twin.journal.runs import Clock
+from lupin_twin.journal.schema import SiteLog
+from tests.support.archive import Archive
+from tests.support.journal import SECOND, kept, scan
+from tests.support.postgres import server
+
+TAGS, EVERY_S, PROCESSES = 30, 120, 2
+SENSORS = ("temperature", "humidity", "co2", "light", "moisture")
+# What comes before is not counted: 200 connections, and journals that are just begun.
+WARM_S, MEASURED_S = 15.0, 20.0
+DAY = 86_400 * SECOND
+# A midnight.
+BEGUN = 1_767_225_600 * SECOND
+
+
+# --- lag ------------------------------------------------------------------------------------------
+
+
+class _TimedSink(Sink):
+    """The sink, which notes for each scan how long after its arrival it is committed."""
+
+    lags: list[tuple[float, float]] = []  # noqa: RUF012  # one for all
+
+    def put(self, batch: Batch, epoch: Epoch) -> Epoch:
+        """Append a batch."""
+        put = super().put(batch, epoch)
+        now_ns = time.time_ns()
+        lags = [(now_ns / 1e9, (now_ns - row[5]) / 1e9) for row in batch.rows.get("scan", ())]
+        self.lags.extend(lags)
+        return put
+
+
+def forward(folder: Path, urls: Sequence[str]) -> None:
+    """Forward the journals of a folder until the input ends; then print moments and lags, s."""
+    from lupin_bridge.archive import forwarding
+
+    setattr(forwarding, "Sink", _TimedSink)  # noqa: B010
+    for url in urls:
+        site = url.partition("//")[2].partition("@")[0]
+        forwarder = Forwarder(url, site, lambda site=site: folder / site, lambda line: None)  # type: ignore[misc]
+        threading.Thread(target=forwarder.run, daemon=True).start()
+    sys.stdin.read()
+    json.dump(list(_TimedSink.lags), sys.stdout)
+
+
+class _Twin:
+    """A journal that receives a scan of each tag at once, with less work than a twin has of it.
+
+    Its hours stay as the first scans left them; they are forwarded with each scan nevertheless.
+    """
+
+    def __init__(self, path: Path) -> None:
+        now_ns = time.time_ns()
+        values = dict.fromkeys(SENSORS, 20.0)
+        rows = [
+            scan(str(tag), now_ns - 1000 + tag, source="robot", **values) for tag in range(TAGS)
+        ]
+        kept(path, rows, Clock(now_ns, now_ns, is_simulated=False))
+        self._connection = sqlite3.connect(path, isolation_level=None)
+        self._connection.execute("PRAGMA synchronous = OFF")
+        self._series = [row[0] for row in self._connection.execute("SELECT series FROM series")]
+        (self._seq,) = self._connection.execute("SELECT max(seq) FROM scan").fetchone()
+
+    def record(self) -> None:
+        """Write them in one transaction."""
+        now_ns = time.time_ns()
+        self._connection.execute("BEGIN")
+        self._connection.executemany(
+            "INSERT INTO scan VALUES ('local', ?, ?, ?, NULL, ?, 0, 'robot', 'm1', '', 0,"
+            " '[21.52,55.1,410.0,300.5,42.21]')",
+            [
+                (self._seq + n, series, now_ns - 1000, now_ns)
+                for n, series in enumerate(self._series, 1)
+            ],
+        )
+        self._connection.execute("COMMIT")
+        self._seq += TAGS
+
+
+def record(twins: Sequence[_Twin], seconds: float) -> float:
+    """Have each record once a second, one after the other; returns how late the last was, s."""
+    begun_s, number = time.time(), 0
+    while (at_s := number / len(twins)) < seconds:
+        time.sleep(max(0.0, begun_s + at_s - time.time()))
+        twins[number % len(twins)].record()
+        number += 1
+    return time.time() - begun_s - seconds
+
+
+def lag(sites: int) -> None:
+    """Print how far the archive is behind."""
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        archive = Archive(stack.enter_context(server(fsync=True, connections=sites + 20)), "gh0")
+        names = [f"gh{number}" for number in range(sites)]
+        for name in names:
+            archive.add_user(name)
+        twins = [_Twin(folder / name) for name in names]
+        processes = []
+        for n in range(PROCESSES):
+            urls = [archive.url(name) for name in names[n::PROCESSES]]
+            words = [
+                sys.executable,
+                "-m",
+                "tests.bench.bench_fleet",
+                "--forward",
+                str(folder),
+                *urls,
+            ]
+            processes.append(
+                stack.enter_context(
+                    subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+                )
+            )
+        late_s = record(twins, WARM_S + MEASURED_S)
+        ended_s = time.time()
+        time.sleep(3.0)
+        found = [lag for process in processes for lag in json.loads(process.communicate()[0])]
+        lags = sorted(lag for at_s, lag in found if at_s > ended_s - MEASURED_S)
+    print(
+        f"{sites} sites x {TAGS} tags, a scan a second each, {MEASURED_S:.0f} s: {len(lags):,} of"
+        f" {int(sites * TAGS * MEASURED_S):,} scans; lag p50 {lags[len(lags) // 2]:.2f} s,"
+        f" p99 {lags[len(lags) * 99 // 100]:.2f} s, most {lags[-1]:.2f} s; the twins {late_s:.1f} s"
+        " late",
+        flush=True,
+    )
+
+
+# --- growth ---------------------------------------------------------------------------------------
+
+_SCANS = f"""
+INSERT INTO scan SELECT %(site)s, %(first)s + n, series, %(begun)s + n * {EVERY_S * SECOND // TAGS},
+    NULL, %(begun)s + n * {EVERY_S * SECOND // TAGS} + 200000, 0, 'robot', 'm1', '', 0,
+    format('[%%s,%%s,%%s,%%s,%%s]', round((20 + 5 * random())::numeric, 2),
+        round((50 + 9 * random())::numeric, 1), round((400 + 99 * random())::numeric),
+        round((300 * random())::numeric, 1), round((40 + random())::numeric, 2))
+FROM generate_series(1, %(count)s) AS n
+JOIN series ON site = %(site)s AND run = 1 AND kind = 0 AND tag = (n %% {TAGS})::text
+"""
+_HOURS = """
+INSERT INTO hour SELECT site, series, %(hour)s + n, '[30,30,30,30,30]',
+    '[675.21,1634.2,13485,4501.3,1215.22]', '[20.01,50.1,400,0.2,40.01]', '[24.9,58.8,499,299,40.9]'
+FROM series, generate_series(0, %(hours)s - 1) AS n WHERE site = %(site)s ON CONFLICT DO NOTHING
+"""
+
+
+def grow(archive: Archive, site: str, days: range) -> None:
+    """Add days to a site, as they would be after forwarding."""
+    count = 86_400 // EVERY_S * TAGS
+    with psycopg.connect(archive.owner, autocommit=True) as connection:
+        for day in days:
+            begun = BEGUN + day * DAY
+            connection.execute("SELECT make_months(%s)", (begun // SECOND,))
+            connection.execute(
+                _SCANS,
+                {"site": site, "first": 10_000 + day * count, "begun": begun, "count": count},
+            )
+            connection.execute(_HOURS, {"site": site, "hour": begun // (DAY // 24), "hours": 24})
+
+
+def measure(archive: Archive, sites: int, days: int) -> None:
+    """Print rows, bytes, and what questions take."""
+    chance = random.Random(7)
+    with psycopg.connect(archive.owner, autocommit=True) as connection:
+        connection.execute("VACUUM ANALYZE")
+        ((size,),) = connection.execute(
+            "SELECT sum(pg_total_relation_size(oid)) FROM pg_class WHERE relkind = 'r'"
+            " AND relnamespace = 'public'::regnamespace"
+        ).fetchall()
+        states, past = [], []
+        for _ in range(40):
+            site = f"gh{chance.randrange(sites)}"
+            at_ns = BEGUN + DAY // 24 + int(chance.random() * (days * DAY - DAY // 12))
+            start = time.perf_counter()
+            found = state_at(SiteLog(connection, site), at_ns, "map", site)  # type: ignore[arg-type]
+            states.append((time.perf_counter() - start) * 1e3)
+            assert len(found.tags) == TAGS, len(found.tags)
+            asked = SeriesRequest("7", "co2", BEGUN, BEGUN + days * DAY, 500)
+            start = time.perf_counter()
+            series(connection, asked, BEGUN + days * DAY, site)
+            past.append((time.perf_counter() - start) * 1e3)
+    rows = sites * days * 86_400 // EVERY_S * TAGS
+    print(
+        f"{sites:>5}{days:>6}{rows:>12,}{float(size) / 1e6:>9.0f}{float(size) / rows:>8.0f}"
+        f"{min(states):>13.1f}{statistics.median(states):>9.1f}{min(past):>12.1f}",
+        flush=True,
+    )
+
+
+def growth(*, quick: bool) -> None:
+    """Print how the archive grows with days and with sites; of a sensor the least time too, ms."""
+    print(
+        "sites  days       scans       MB  B/scan  state ms: least, median  a sensor, all days",
+        flush=True,
+    )
+    few, many = (2, 5) if quick else (10, 100)
+    with server(fsync=True) as postgresql, tempfile.TemporaryDirectory() as folder:
+        for of_days in (True, False):
+            archive, done = Archive(postgresql, "gh0"), 0
+            for count in (1, few, many):
+                for number in range(done, count):
+                    site = "gh0" if of_days else f"gh{number}"
+                    if number == 0 or not of_days:
+                        begin(archive, site, Path(folder) / f"{of_days}{site}")
+                    grow(archive, site, range(number, number + 1) if of_days else range(1))
+                done = count
+                measure(archive, *((1, count) if of_days else (count, 1)))
+
+
+def begin(archive: Archive, site: str, journal: Path) -> None:
+    """Forward a first scan of each tag: the run, and its series."""
+    own = archive.of_site(site)
+    values = dict.fromkeys(SENSORS, 20.0)
+    clock = Clock(BEGUN, BEGUN, is_simulated=False)
+    kept(
+        journal,
+        [scan(str(tag), BEGUN + tag, source="robot", **values) for tag in range(TAGS)],
+        clock,
+    )
+    assert Forwarder(own.url(), site, lambda: journal, lambda _: None).run(once=True)
+
+
+def main(arguments: Sequence[str] = ()) -> None:
+    """Print the figures."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--lag", action="store_true", help="this alone")
+    parser.add_argument("--growth", action="store_true", help="this alone")
+    parser.add_argument("--forward", nargs="+", help=argparse.SUPPRESS)
+    options = parser.parse_args(arguments)
+    if options.forward:
+        forward(Path(options.forward[0]), options.forward[1:])
+        return
+    if not options.growth:
+        lag(20 if options.quick else 200)
+    if not options.lag:
+        growth(quick=options.quick)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,167 @@
+"""The log: what it takes to write it, how large it is, and how fast it answers.
+
+Times are those of one core; the first call over a connection of its own, and the median of more.
+A greenhouse of 30 tags with five sensors is scanned for a year, every 48 minutes; one of 10,000
+tags in two days, four times. `--quick`: a month, and fewer scans written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from itertools import islice
+from pathlib import Path
+from typing import Final
+
+from lupin_twin.core.history import History
+from lupin_twin.core.past import EVERY_TAG, Event, SeriesRequest
+from lupin_twin.core.state import TwinStore
+from lupin_twin.journal.file import JournalFile
+from lupin_twin.journal.fold import state_at
+from lupin_twin.journal.queries import rows as exported
+from lupin_twin.journal.queries import series
+from lupin_twin.journal.rows import Row, ScanRow
+from lupin_twin.journal.runs import Clock
+from lupin_twin.journal.schema import open_reader
+from lupin_twin.journal.writer import Journal
+from lupin_twin.runtime.memory import Memory
+from tests.bench.journal_double import BEGUN_NS, LIMITS, Filled, House, filled
+
+YEAR: Final = House(tags=30, days=365.0, every_s=2880.0)
+QUICK: Final = House(tags=30, days=30.0, every_s=2880.0)
+# The largest: 10,000 tags with five sensors each, every ten minutes.
+MANY: Final = House(tags=10_000, days=2.0, every_s=43_200.0, look_days=0.0, failing=0)
+DAY: Final = House(tags=10_000, days=1.0, every_s=600.0)
+SCANS: Final = 60_000
+# Scans that share a commit where the writer has to catch up.
+LOT: Final = 500
+TIMELINE: Final = (
+    Event.SCANS, Event.FAILURES, Event.LOOKS, Event.PESTS_SEEN, Event.PESTS_CLEARED,
+    Event.SILENCES, Event.RUNS,
+)  # fmt: skip
+
+
+def main(arguments: Sequence[str] = ()) -> None:
+    """Print the figures beside those that are asked for."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--quick", action="store_true")
+    is_quick = parser.parse_args(arguments).quick
+    with tempfile.TemporaryDirectory(prefix="lupin-twin-log-") as folder:
+        write(Path(folder), SCANS // 10 if is_quick else SCANS)
+    ask(filled(QUICK if is_quick else YEAR), filled(MANY))
+    restart(filled(MANY))
+
+
+def report(what: str, figure: str, asked: str) -> None:
+    print(f"{what:58}{figure:>26}   (asked {asked})", flush=True)
+
+
+def write(folder: Path, scans: int) -> None:
+    heard = DAY.rows()
+    # The first scan of each tag makes its series; it is made once.
+    before = list(islice(heard, DAY.tags * 2))
+    told = list(islice(heard, scans))
+    paced = list(islice(heard, 2_000))
+    path = folder / "log.sqlite"
+    file = JournalFile(path, LIMITS, is_sound=True)
+    with closing(file):
+        run = file.start(Clock(BEGUN_NS, BEGUN_NS, is_simulated=False), 1, is_believed=True).run
+
+        def commit(lot: Sequence[Row]) -> None:
+            file.append([(run, row) for row in lot])
+            while file.look_after(may_purge=True):
+                pass
+
+        def size() -> int:
+            file._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+            return path.stat().st_size
+
+        def in_lots(rows: Sequence[Row], lot: int) -> None:
+            for first in range(0, len(rows), lot):
+                commit(rows[first : first + lot])
+
+        in_lots(before, LOT)
+        first_bytes = size()
+        begun_s = time.process_time()
+        in_lots(told, LOT)
+        rate = readings(told) / (time.process_time() - begun_s)
+        report("readings written a second", f"{rate:,.0f}", "100,000")
+        each = (size() - first_bytes) / readings(told)
+        report("bytes a reading in the file", f"{each:.1f}", "20")
+        begun_bytes = handed_to_disk()
+        in_lots(paced, 1)
+        size()
+        each = (handed_to_disk() - begun_bytes) / readings(paced)
+        report("bytes handed to the disk, each, a commit a scan", f"{each:,.0f}", "1,000")
+
+
+def readings(rows: Sequence[Row]) -> int:
+    return sum(len(row.readings) for row in rows if isinstance(row, ScanRow))
+
+
+def handed_to_disk() -> int:
+    """What this process has given the system to write (`wchar`)."""
+    lines = Path("/proc/self/io").read_text(encoding="ascii").splitlines()
+    return int(dict(line.split(": ") for line in lines)["wchar"])
+
+
+def ask(year: Filled, many: Filled) -> None:
+    begin, end = BEGUN_NS, year.house.end_ns
+    for house, asked in ((year, "3"), (many, "60")):
+        at_ns = (BEGUN_NS + house.house.end_ns) // 2
+        with closing(open_reader(house.path)) as reader:
+            assert len(state_at(reader, at_ns, "map").tags) == house.house.tags
+        report(
+            f"state as of a moment, {house.house.tags:,} tags, ms",
+            timed(house.path, lambda log, at_ns=at_ns: state_at(log, at_ns, "map")),  # type: ignore[misc]
+            asked,
+        )
+    sensor = SeriesRequest("7", "temperature", begin, end)
+    what = f"one sensor of {year.house.scans:,} scans as 500 buckets, ms"
+    report(what, timed(year.path, lambda log: series(log, sensor, end)), "10")
+
+    def timeline(log: object) -> None:
+        for event in TIMELINE:
+            series(log, SeriesRequest(EVERY_TAG, event, begin, end), end)
+
+    what = f"timeline of {year.house.days:g} days, {year.readings:,} readings, ms"
+    report(what, timed(year.path, timeline), "15")
+    with closing(open_reader(many.path)) as reader:
+        begun_s = time.process_time()
+        count = sum(map(len, exported(reader, BEGUN_NS, many.house.end_ns)))
+        rate = count / (time.process_time() - begun_s)
+    report("readings exported a second", f"{rate:,.0f}", "-")
+
+
+def timed(path: Path, question: Callable[[object], object]) -> str:
+    """Ms of one core: the first over a connection, and the median of nine."""
+    took = []
+    with closing(open_reader(path)) as reader:
+        for _ in range(9):
+            begun_s = time.thread_time()
+            question(reader)
+            took.append((time.thread_time() - begun_s) * 1e3)
+    return f"{took[0]:.2f}, then {statistics.median(took):.2f}"
+
+
+def restart(many: Filled) -> None:
+    store, end_ns = TwinStore(), many.house.end_ns
+    begun_s, used_s = time.perf_counter(), time.process_time()
+    journal = Journal(many.path, "/bench/lupin_twin", LIMITS)
+    try:
+        memory = Memory(store, History(32), journal, 32)
+        memory.follow(Clock(end_ns, end_ns, is_simulated=False))
+        took = time.perf_counter() - begun_s, time.process_time() - used_s
+        assert len(store.snapshot(end_ns, "map").tags) == many.house.tags
+    finally:
+        journal.close(60.0)
+    report("restart with 10,000 tags, s; of one core", f"{took[0]:.2f}; {took[1]:.2f}", "1.6")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

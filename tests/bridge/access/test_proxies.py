@@ -1,0 +1,247 @@
+"""Proxies and the path prefix: whose word counts, and what the application sees."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lupin_bridge.access.policy import BehindProxies, Proxies, path_of
+from lupin_bridge.settings import SettingError, Settings
+from tests.support.access import BEARER, OWN, TOKEN, Served, refused_start, served
+from tests.support.processes import limits
+from tests.support.waiting import wait_for
+
+BEHIND_TWO = Proxies.of(Settings(trusted_proxy=("10.0.0.7", "192.168.0.0/24", "fd00::/64")))
+
+
+def seen(proxies: Proxies, path: str = "/", kind: str = "http", **scope: Any) -> Any:
+    """The scope that the application behind `proxies` is called with."""
+    scopes: list[Any] = []
+
+    async def app(scope: Any, *_: Any) -> None:
+        scopes.append(scope)
+
+    plain = {"type": kind, "path": path, "headers": [], "client": ("10.0.0.7", 9), "scheme": "http"}
+    asyncio.run(BehindProxies(app, proxies)({**plain, **scope}, None, None))  # type: ignore[arg-type]
+    return scopes[0]
+
+
+# --- whose word counts ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("peer", "forwarded", "client"),
+    [
+        ("10.0.0.7", ["203.0.113.5"], "203.0.113.5"),
+        ("10.0.0.7", ["6.6.6.6, 203.0.113.5"], "203.0.113.5"),  # the left one is its own claim
+        ("10.0.0.7", ["6.6.6.6", "203.0.113.5"], "203.0.113.5"),  # lines are one list
+        ("10.0.0.7", ["203.0.113.5, 192.168.0.2"], "203.0.113.5"),  # through both proxies
+        ("10.0.0.7", ["192.168.0.3, 192.168.0.2"], "192.168.0.3"),  # a proxy asks for itself
+        ("10.0.0.7", ["203.0.113.5:4711"], "203.0.113.5"),
+        ("10.0.0.7", ["[2001:db8::1]:4711"], "2001:db8::1"),
+        ("10.0.0.7", ["2001:db8::1"], "2001:db8::1"),
+        ("10.0.0.7", ["::ffff:203.0.113.5"], "203.0.113.5"),
+        ("::ffff:10.0.0.7", ["203.0.113.5"], "203.0.113.5"),
+        ("fd00::1%eth0", ["203.0.113.5"], "203.0.113.5"),
+        ("10.0.0.7", ["203.0.113.5, unknown"], "10.0.0.7"),
+        ("10.0.0.7", ["203.0.113.5, "], "10.0.0.7"),
+        ("10.0.0.7", [], "10.0.0.7"),
+        ("10.0.0.8", ["203.0.113.5"], "10.0.0.8"),  # not a proxy that was named
+        ("", ["203.0.113.5"], ""),
+    ],
+)
+def test_the_client_is_the_nearest_that_no_trusted_proxy_stands_for(
+    peer: str, forwarded: list[str], client: str
+) -> None:
+    assert BEHIND_TWO.client(peer, forwarded) == client
+    headers = [(b"x-forwarded-for", line.encode()) for line in forwarded]
+    scope = seen(BEHIND_TWO, client=(peer, 9), headers=headers)
+    assert scope["client"][0] == client
+
+
+@given(st.lists(st.text(max_size=20), max_size=5))
+def test_no_claim_breaks_anything_nor_makes_a_stranger_another(lines: list[str]) -> None:
+    assert BEHIND_TWO.client("203.0.113.5", lines) == "203.0.113.5"
+    assert isinstance(BEHIND_TWO.client("10.0.0.7", lines), str)
+
+
+@pytest.mark.parametrize(
+    ("kind", "lines", "scheme"),
+    [
+        ("http", ["https"], "https"),
+        ("websocket", ["https"], "wss"),
+        ("http", ["HTTPS "], "https"),
+        ("http", ["https, http"], "http"),
+        ("http", ["http", "https"], "https"),
+        ("http", ["gopher"], "http"),
+        ("http", [], "http"),
+    ],
+)
+def test_the_scheme_is_the_nearest_proxys_word(kind: str, lines: list[str], scheme: str) -> None:
+    headers = [(b"x-forwarded-proto", line.encode()) for line in lines]
+    assert seen(BEHIND_TWO, kind=kind, headers=headers)["scheme"] == scheme
+    assert seen(BEHIND_TWO, client=("6.6.6.6", 9), headers=headers)["scheme"] == "http"
+    assert seen(Proxies(), headers=headers)["scheme"] == "http"
+
+
+@pytest.mark.parametrize("proxy", ["", "proxy.example", "10.0.0.1/8", "10.0.0.0/33", "10.0.0.7:80"])
+def test_a_proxy_is_an_address_or_a_network(proxy: str) -> None:
+    with pytest.raises(SettingError, match=r"^LUPIN_TRUSTED_PROXY is .* must be an address") as it:
+        Proxies.of(
+            Settings(trusted_proxy=(proxy,), given_as={"trusted_proxy": "LUPIN_TRUSTED_PROXY"})
+        )
+    assert repr(proxy) in str(it.value)
+
+
+# --- the prefix -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("path", "whole"),
+    [
+        ("/gh1/api/state", "/gh1/api/state"),  # a proxy that leaves it on
+        ("/api/state", "/gh1/api/state"),  # one that cuts it off
+        ("/gh1", "/gh1"),
+        ("/gh1/", "/gh1/"),
+        ("/", "/gh1/"),
+        ("/gh12", "/gh1/gh12"),
+    ],
+)
+def test_the_prefix_may_be_cut_off_or_not(path: str, whole: str) -> None:
+    scope = seen(Proxies(path_prefix="/gh1"), path)
+    assert (scope["path"], scope["root_path"]) == (whole, "/gh1")
+    assert path_of(scope) == whole.removeprefix("/gh1")
+    assert path_of(seen(Proxies(), path)) == path
+
+
+@pytest.mark.parametrize("prefix", ["/gh1", "/a/b.c/~d_e-f", "/.well", "/..."])
+def test_a_prefix_is_a_path(prefix: str) -> None:
+    assert Proxies.of(Settings(path_prefix=prefix)).path_prefix == prefix
+
+
+@pytest.mark.parametrize(
+    "prefix", ["gh1", "/", "/gh1/", "//gh1", "/gh 1", "/..", "/a/./b", "/a?b", "http://x/gh1", "/ä"]
+)
+def test_what_is_no_path_is_refused(prefix: str) -> None:
+    with pytest.raises(
+        SettingError, match=r"--path-prefix is .* must be a path such as /gh1"
+    ) as it:
+        Proxies.of(Settings(path_prefix=prefix))
+    assert repr(prefix) in str(it.value)
+
+
+def test_both_mistakes_end_the_start() -> None:
+    assert refused_start("--path-prefix", "gh1").startswith("lupin-twin: --path-prefix is 'gh1'")
+    assert refused_start("--trusted-proxy", "me").startswith("lupin-twin: --trusted-proxy is 'me'")
+
+
+# --- the bridge -----------------------------------------------------------------------------------
+
+PROXY, STRANGER = "127.0.0.3", "127.0.0.4"
+
+
+@pytest.fixture(scope="module")
+def live() -> Iterator[Served]:
+    with served(
+        "--trusted-proxy", PROXY, "--path-prefix", "/gh1", "--allow-host", "twin.example",
+        LUPIN_TOKEN=TOKEN,
+    ) as running:  # fmt: skip
+        yield running
+
+
+def status(live: Served, address: str, path: str = "/api/state", **headers: str) -> int:
+    named = {name.replace("_", "-"): value for name, value in headers.items()}
+    with live.client(address) as client:
+        return client.get(path, headers={**BEARER, **named}).status_code
+
+
+def guess(live: Served, address: str, claims: Iterable[str]) -> None:
+    """Send wrong tokens until no more are taken: ten, or more where that takes its time."""
+    for tries, claim in enumerate(claims):
+        said = status(live, address, Authorization="Bearer " + "x" * 32, X_Forwarded_For=claim)
+        if said == 429:
+            return
+        assert said == 401
+        assert tries < 200
+
+
+def test_wrong_tokens_are_counted_for_whom_the_proxy_names(live: Served) -> None:
+    def is_held_back() -> bool:
+        guess(live, PROXY, itertools.repeat("203.0.113.66"))
+        return status(live, PROXY, X_Forwarded_For="6.6.6.6, 203.0.113.66") == 429
+
+    wait_for(is_held_back, "the right token to be held back")
+    assert status(live, PROXY, X_Forwarded_For="203.0.113.67") == 200
+    assert "wrong token from 203.0.113.66" in live.process.output
+
+
+def test_a_stranger_names_nobody(live: Served) -> None:
+    def is_held_back() -> bool:
+        guess(live, STRANGER, (f"203.0.113.{number}" for number in itertools.count()))
+        return status(live, STRANGER, X_Forwarded_For="203.0.113.99") == 429
+
+    wait_for(is_held_back, "the right token to be held back")
+    assert f"wrong token from {STRANGER}" in live.process.output
+
+
+def test_fields_are_limited_for_whom_the_proxy_names() -> None:
+    one, other = "203.0.113.1", "203.0.113.2"
+
+    def path(right: int) -> str:
+        """A field that nobody has asked for: what is kept passes."""
+        box = f"bbox_min_x=0&bbox_min_y=0&bbox_max_x={right}&bbox_max_y=1"
+        return f"/api/field?sensor_type=co2&{box}"
+
+    with served("--trusted-proxy", PROXY, *limits(answers_per_s=0.01)) as live:
+        assert status(live, PROXY, path(1), X_Forwarded_For=one) == 200
+        assert status(live, PROXY, path(2), X_Forwarded_For=one) == 429
+        assert status(live, PROXY, path(2), X_Forwarded_For=f"6.6.6.6, {one}") == 429
+        assert status(live, PROXY, path(2), X_Forwarded_For=other) == 200
+
+
+def test_the_scheme_in_origins_and_cookies_is_the_proxys(live: Served) -> None:
+    ours = {"Host": "twin.example", "Origin": "https://twin.example"}
+    assert status(live, PROXY, X_Forwarded_Proto="https", **ours) == 200
+    assert status(live, PROXY, X_Forwarded_Proto="http", **ours) == 403
+    assert status(live, STRANGER, X_Forwarded_Proto="https", X_Forwarded_For="1.1.1.1", **ours) in (
+        403,
+        429,
+    )
+    with live.client(PROXY) as client:
+        answer = client.post(
+            "/gh1/api/signin", headers={**BEARER, **OWN, "X-Forwarded-Proto": "https"}
+        )
+        cookie = [part.strip() for part in answer.headers["set-cookie"].split(";")]
+        assert {"Secure", "Path=/gh1/"} <= set(cookie)
+        answer = client.post("/gh1/api/signin", headers={**BEARER, **OWN})
+        assert "Secure" not in answer.headers["set-cookie"]
+
+
+def test_everything_is_found_with_the_prefix_and_without(live: Served) -> None:
+    for prefix in ("", "/gh1"):
+        assert live.get(f"{prefix}/healthz").status_code == 200
+        assert live.get(f"{prefix}/api/state").status_code == 401
+        assert live.get(f"{prefix}/api/state", BEARER).status_code == 200
+        assert live.get(f"{prefix}/", BEARER).status_code == 200
+        assert live.get(f"{prefix}/lupin.svg", BEARER).status_code == 200
+        assert live.get(f"{prefix}/nowhere", BEARER).status_code == 404
+        assert live.handshake(f"{prefix}/ws/state", BEARER) == 101
+    assert live.get("/gh1/gh1/healthz", BEARER).status_code == 404
+
+
+def test_what_leads_elsewhere_stays_below_the_prefix(live: Served) -> None:
+    page = {"Accept": "text/html"}
+    for path, location in (("/gh1/", "signin"), ("/", "signin"), ("/gh1/a/b", "../signin")):
+        assert live.get(path, page).headers["location"] == location
+    assert live.get("/gh1", BEARER).headers["location"].endswith("/gh1/")
+    docs = live.get("/gh1/docs", BEARER).text
+    assert f"curl '{live.url}/gh1/api/state'" in docs
+    assert 'href="openapi.json"' in docs
+    document = live.get("/gh1/openapi.json", BEARER).json()
+    assert document["servers"] == [{"url": "/gh1"}]

@@ -1,0 +1,154 @@
+"""The demo's own journal and its past."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lupin_bridge.cli.demo import (
+    DAY_S,
+    SOURCE,
+    Feed,
+    fill_past,
+    journal_of,
+    own_args,
+    patrolled,
+    rows,
+    since_morning_s,
+    with_past,
+)
+from lupin_patrol.cli import parse as patrol_options
+from lupin_patrol.plants import SECONDS_PER_DAY
+from lupin_twin.core.parameters import World
+from lupin_twin.core.state import Bloom, Pose, Reading
+from lupin_twin.journal.rows import InspectionRow, PinRow, ScanRow
+from tests.support.journal import CLOCK, NOW, SECOND, is_whole, kept, scan, select
+
+ENV = {"XDG_STATE_HOME": "/state"}
+SHORT = ["--speed=50"]
+
+
+def test_a_demo_keeps_a_journal_of_its_own_by_seed() -> None:
+    for patrol_args, name in (([], "demo-seed-0"), (["--seed=3"], "demo-seed-3")):
+        path = f"/state/lupin-twin/{name}.sqlite"
+        args = ["--ros-args", "-p", f'journal:="{path}"', "--"]
+        assert own_args(ENV, patrol_args) == args
+        assert journal_of(ENV, patrol_args, ["--ros-args", "-p", "idw_power:=3.0"]) == Path(path)
+
+
+@pytest.mark.parametrize("patrol_args", [[], ["--speed=1"], ["--speed=50"], ["--speed=0.5"]])
+def test_a_demo_s_twin_knows_how_long_its_patrol_s_day_takes(patrol_args: list[str]) -> None:
+    patrol = patrol_options(patrol_args)
+    day_s = SECONDS_PER_DAY / patrol.day_speed / patrol.speed
+    assert patrolled(ENV, patrol_args, []).world == World("simulated", day_s)
+
+
+@pytest.mark.parametrize("speed", ["0", "nan", "inf", "-1"])
+def test_what_is_no_speed_is_left_for_the_patrol_to_refuse(speed: str) -> None:
+    assert patrolled(ENV, [f"--speed={speed}"], []).world.day_length_s == 1440.0
+
+
+@pytest.mark.parametrize(
+    "ros_args",
+    [
+        ["-p", "journal:=off"],
+        ["-p", "journal:=/somewhere/else.sqlite"],
+        ["--params-file", "twin.yaml"],
+        ["-p", "use_sim_time:=true"],
+    ],
+)
+def test_another_journal_or_none_or_another_clock_gets_no_past(ros_args: list[str]) -> None:
+    assert journal_of(ENV, [], ["--ros-args", *ros_args]) is None
+
+
+def test_an_empty_journal_is_filled_once(tmp_path: Path) -> None:
+    path = tmp_path / "demo.sqlite"
+    assert fill_past(path, SHORT)
+    assert is_whole(path)
+    (count,) = select(path, "SELECT count(*) FROM scan")
+    assert count > (2500,)
+    assert not fill_past(path, SHORT)
+    assert select(path, "SELECT count(*) FROM scan") == [count]
+
+
+def test_started_again_it_goes_on_with_the_day(tmp_path: Path) -> None:
+    path = tmp_path / "demo.sqlite"
+    feed = Feed("patrol", ["lupin_patrol", "--end-with-parent", *SHORT], [], World(), path)
+    assert with_past(feed, path, SHORT) == feed, "the first time it is nine"
+    [(until_ns,)] = select(path, "SELECT value FROM meta WHERE key = 'simulated_until_ns'")
+    # Fifty times as fast, a day takes 28.8 s.
+    for later_s, since_s in ((0.0, 0.0), (14.4, 720.0), (28.8, 0.0), (2_894.4, 720.0)):
+        now_ns = int(str(until_ns)) + round(later_s * 1e9)
+        assert since_morning_s(path, SHORT, now_ns) == pytest.approx(since_s, abs=1e-6)
+    again = with_past(feed, path, SHORT)
+    module, since, *words = again.command
+    assert [module, *words] == feed.command
+    assert again == replace(feed, command=again.command)
+    assert 0.0 <= patrol_options([since]).since_morning < DAY_S
+
+
+@pytest.mark.parametrize("journal", ["another's", "empty", "none", "no journal"])
+def test_of_a_journal_without_such_a_past_there_is_no_day_to_go_on_with(
+    tmp_path: Path, journal: str
+) -> None:
+    path = tmp_path / "demo.sqlite"
+    if journal == "another's":
+        kept(path, [scan()], CLOCK)
+    elif journal != "none":
+        path.write_text("" if journal == "empty" else "nonsense" * 1_000)
+    assert since_morning_s(path, SHORT, NOW) is None
+
+
+def test_somebody_s_journal_is_left(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path = tmp_path / "demo.sqlite"
+    kept(path, [scan()], CLOCK)
+    assert not fill_past(path, SHORT)
+    assert select(path, "SELECT count(*) FROM scan") == [(1,)]
+    assert caplog.records == []
+
+
+def test_what_hinders_it_is_told_and_is_no_end(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert not fill_past(tmp_path / "demo.sqlite", ["--speed=0"])
+    (tmp_path / "no").write_text("a file where a folder should be")
+    assert not fill_past(tmp_path / "no" / "demo.sqlite", SHORT)
+    told = [record.message for record in caplog.records]
+    assert len(told) == 2
+    assert "argument --speed" in told[0]
+    assert "File exists" in told[1]
+
+
+def test_events_become_the_rows_that_a_twin_would_have_written() -> None:
+    pose = [1.0, 2.0, 0.3, 0.0, 0.0, 0.0, 1.0]
+    common: dict[str, Any] = {"tag_id": "7", "pass": 12}
+    ok = common | {"at_s": -2.0, "pose": pose, "status": 0, "detail": "", "readings": [["a", 1.5]]}
+    failed = common | {"at_s": -1.0, "pose": None, "status": 2, "detail": "no", "readings": []}
+    look = common | {
+        "at_s": -1.5,
+        "pose": pose,
+        "species": "lupin",
+        "confidence": 0.5,
+        "anomaly": True,
+        "flower_count": 1,
+        "bug_count": 3,
+        "blooms": [[1.0, 2.0, 0.5, 0.2, "lupin", 0.9, True]],
+        "footprint": [[0.0, 0.0, 0.0]],
+    }
+    made = list(rows([json.dumps(event) for event in (ok, look, failed)], NOW))
+    at_ns = NOW - 2 * SECOND
+    assert made[0] == PinRow("7", at_ns, at_ns, Pose(*pose))
+    assert made[1] == ScanRow(
+        "7", at_ns, at_ns, (Reading("a", 1.5),), source=SOURCE, mission="past-0012"
+    )
+    seen = made[2]
+    assert isinstance(seen, InspectionRow)
+    assert (seen.stamp_ns, seen.flower.bug_count) == (NOW - 1_500_000_000, 3)
+    assert seen.flower.blooms == (Bloom(1.0, 2.0, 0.5, 0.2, "lupin", 0.9, anomaly=True),)
+    last = made[3]
+    assert isinstance(last, ScanRow)
+    assert (last.status, last.detail, last.readings) == (2, "no", ())

@@ -1,0 +1,49 @@
+"""Copies of journals: the newest serves at once, and those of twins long gone are deleted."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import time
+from pathlib import Path
+
+from lupin_bridge.feed.followed_log import RETAINED_S, FollowedLog
+from lupin_twin.core.past import NotRemembered
+from lupin_twin.journal.follow import Lot, write
+from lupin_twin.runtime.workers import Workers
+
+
+def copies(folder: Path, *ages_s: float) -> list[Path]:
+    """One file for each age, of a journal of its own."""
+    paths = [folder / f"{number:032}.sqlite" for number in range(len(ages_s))]
+    for path, age_s in zip(paths, ages_s, strict=True):
+        write(path, Lot(path.stem, (), 0, is_all=True), 1)
+        os.utime(path, (time.time() - age_s,) * 2)
+    return paths
+
+
+def left_after_start(folder: Path) -> tuple[str | None, list[Path]]:
+    """The file that is read at once, and those that are left."""
+
+    async def test() -> str | None:
+        async def query(_after: int) -> Lot:
+            raise NotRemembered("nobody is there", is_lasting=False)
+
+        log = FollowedLog(query, Workers("test"))
+        await log.start(folder)
+        condition = log.condition
+        await log.stop()
+        return None if condition is None else condition.path
+
+    return asyncio.run(test()), sorted(folder.glob("*.sqlite"))
+
+
+def test_a_copy_that_was_not_written_for_long_is_deleted_at_the_start(tmp_path: Path) -> None:
+    newest, recent, _ = paths = copies(tmp_path, 60.0, RETAINED_S - 60.0, RETAINED_S + 60.0)
+    assert left_after_start(tmp_path) == (str(newest), paths[:2])
+    assert recent.exists()
+
+
+def test_the_newest_stays_however_old_it_is(tmp_path: Path) -> None:
+    newest, _ = copies(tmp_path, RETAINED_S + 60.0, RETAINED_S + 120.0)
+    assert left_after_start(tmp_path) == (str(newest), [newest])

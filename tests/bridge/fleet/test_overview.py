@@ -1,0 +1,151 @@
+"""The page over all sites: who lives, how each one is, and what is said where nobody knows."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.archive import Archive, forward_once, forwarder
+from tests.support.fleet import fleet, frames, scans_lately, wall, write
+from tests.support.journal import scan
+from tests.support.postgres import server
+from tests.support.waiting import wait_for
+
+
+@pytest.fixture
+def journal(tmp_path: Path) -> Path:
+    return tmp_path / "journal.sqlite"
+
+
+def test_a_site_that_is_forwarded_is_live_and_judged(archive: Archive, journal: Path) -> None:
+    write(journal, scans_lately())
+    with forwarder(archive, journal), fleet(archive) as page:
+        found = page.site(is_live=True, verdict="healthy", active_alarms=0)
+    assert found.keys() == {
+        "site", "name", "verdict", "last_verdict", "active_alarms", "last_received", "lag_s",
+        "is_live",
+    }  # fmt: skip
+    assert abs(found["last_received"]["sec"] - time.time()) < 120
+    assert 0 <= found["lag_s"] < 10
+
+
+def test_a_scan_is_on_the_page_without_being_asked_for(archive: Archive, journal: Path) -> None:
+    write(journal, scans_lately())
+    with forwarder(archive, journal), fleet(archive) as page:
+        before = page.site(is_live=True, verdict="healthy")
+        with frames(page) as received:
+            first = next(received)
+            assert first["is_whole"]
+            assert [site["site"] for site in first["sites"]] == ["gh1"]
+            now_ns = wall().stamp_ns
+            write(journal, [scan("0", now_ns, temperature=45.0)])
+            write(journal, [scan("0", now_ns + 1, temperature=45.0)])
+            for frame in received:
+                assert not frame["is_whole"]
+                news = [site for site in frame["sites"] if site["verdict"] == "critical"]
+                if news and news[0]["active_alarms"]:
+                    break
+        assert news[0]["last_received"] != before["last_received"]
+
+
+def test_who_is_not_forwarded_is_silent_and_what_was_known_is_the_last(
+    archive: Archive, journal: Path
+) -> None:
+    write(journal, scans_lately(temperature=45.0))
+    with fleet(archive) as page:
+        with forwarder(archive, journal):
+            before = page.site(is_live=True, verdict="critical")
+        after = page.site(is_live=False)
+        assert after["verdict"] == "unknown"
+        assert after["last_verdict"] == "critical"
+        assert after["active_alarms"] == before["active_alarms"]
+        assert after["lag_s"] >= 10
+        status = page.http.get("/sites/gh1/readyz")
+        assert status.status_code == 503
+        assert status.json()["state_age_seconds"] >= 10
+        # The state is that of when it was heard last.
+        stamp = page.http.get("/sites/gh1/api/state").json()["header"]["stamp"]["sec"]
+        assert stamp <= time.time() - 10
+
+        def silence() -> dict[str, Any] | None:
+            alarms = page.http.get("/sites/gh1/api/alarms").json()["alarms"]
+            return next((it for it in alarms if it["reason"]["kind"] == "silent"), None)
+
+        found = wait_for(silence, "the alarm of a twin that is silent")
+        assert found is not None
+        assert found["raised_at"]["sec"] <= time.time() - 10
+
+
+def test_an_archive_that_is_down_is_told_and_comes_back(journal: Path) -> None:
+    with server() as own:
+        archive = Archive(own)
+        archive.add_user("page", "lupin_page")
+        write(journal, scans_lately())
+        forward_once(archive, journal)
+        with fleet(archive) as page:
+            page.site(last_verdict="healthy")
+            assert page.http.get("/readyz").status_code == 200
+            state = page.http.get("/sites/gh1/api/state")
+            assert state.status_code == 200
+            own.stop()
+            wait_for(
+                lambda: page.http.get("/readyz").status_code == 503, "a page that says it is down"
+            )
+            assert "cannot be reached" in page.http.get("/readyz").json()["message"]
+            # What was last known, as last known.
+            assert page.sites()["gh1"]["last_verdict"] == "healthy"
+            assert not page.sites()["gh1"]["is_live"]
+            again = page.http.get("/sites/gh1/api/state")
+            assert len(again.json()["tags"]) == len(state.json()["tags"])
+            said = wait_for(
+                lambda: page.http.get("/sites/gh1/readyz").json()["input_problems"],
+                "the site's page to say so",
+            )
+            assert "The archive" in said[0]
+            wait_for(lambda: page.http.get("/sites/gh1/readyz").status_code == 503, "no live site")
+            own.start()
+            wait_for(lambda: page.http.get("/readyz").status_code == 200, "it to be back")
+
+
+def test_a_site_whose_rows_cannot_be_read_is_unknown_and_costs_no_other_its_status(
+    archive: Archive, journal: Path, tmp_path: Path
+) -> None:
+    archive.add_user("gh2")
+    other = tmp_path / "other.sqlite"
+    for site, path in ((archive, journal), (archive.of_site("gh2"), other)):
+        write(path, scans_lately())
+        forward_once(site, path)
+    archive.do("UPDATE scan SET readings = '{\"no\": \"list\"}' WHERE site = 'gh1'")
+    with fleet(archive) as page:
+        page.site("gh2", last_verdict="healthy", active_alarms=0)
+        assert page.site("gh1", last_verdict=None, active_alarms=None)["verdict"] == "unknown"
+        said = "site gh1 cannot be judged: its status is unknown"
+        wait_for(lambda: said in page.process.output, said)
+
+
+def test_replicas_give_the_same_etag(archive: Archive, journal: Path) -> None:
+    write(journal, scans_lately())
+    forward_once(archive, journal)
+    # Until it counts as silent it is about to change.
+    with fleet(archive) as one, fleet(archive) as other:
+        for page in (one, other):
+            page.site(is_live=False, last_verdict="healthy", active_alarms=0)
+        tags = [page.http.get("/api/sites").headers["etag"] for page in (one, other)]
+        assert tags[0] == tags[1]
+        found = other.http.get("/api/sites", headers={"If-None-Match": tags[0]})
+        assert found.status_code == 304
+        write(journal, [scan("0", wall().stamp_ns)])
+        forward_once(archive, journal)
+        wait_for(lambda: one.http.get("/api/sites").headers["etag"] != tags[0], "another tag")
+
+
+def test_an_archive_without_sites_is_an_empty_overview(archive: Archive) -> None:
+    with fleet(archive) as page:
+        wait_for(lambda: page.http.get("/readyz").status_code == 200, "an archive that is read")
+        assert page.sites() == {}
+        metrics = page.http.get("/metrics").text
+        assert "lupin_fleet_archive_reachable 1" in metrics
+        assert "lupin_fleet_sites 0" in metrics

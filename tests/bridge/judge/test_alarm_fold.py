@@ -1,0 +1,409 @@
+from __future__ import annotations
+
+import math
+import random
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from unittest.mock import patch
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lupin_bridge.alarms.ledger import page_of
+from lupin_bridge.judge import alarm_fold, tag_log
+from lupin_bridge.judge.alarm import Alarm
+from lupin_bridge.judge.alarm_fold import Follower
+from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.judge.verdict import Kind
+from lupin_twin.core.writes import PastWrite, RunSpan
+from tests.support.alarms_reference import Plain, S, alarms
+from tests.support.ordinary_day import DAY_NS, ordinary_days
+
+SENSORS = own_sensors()
+FOREVER = 2**63 - 1
+MINUTE = 60 * S
+START = 1_000 * S
+SCAN, LOOK = 0, 1
+
+
+def day_of(light: bool | None, at_ns: int) -> bool:
+    return light if light is not None else at_ns % (20 * MINUTE) < 12 * MINUTE
+
+
+VALUES = {
+    "temperature": [6.0, 15.2, 17.9, 18.0, 18.3, 18.5, 22.0, 25.8, 36.0, math.nan],
+    "humidity": [20.0, 60.0, 99.0, math.inf],
+    "light": [0.0, 49.9, 50.0, 900.0, math.nan],
+    "door": [1.0, math.nan],
+}
+SPANS = [
+    (RunSpan(1, 0, FOREVER),),
+    (RunSpan(1, 0, START + 30 * MINUTE), RunSpan(2, START + 30 * MINUTE, FOREVER)),
+    (
+        RunSpan(1, 0, START + 20 * MINUTE),
+        RunSpan(2, START + 20 * MINUTE, START + 50 * MINUTE),
+        RunSpan(1, START + 50 * MINUTE, FOREVER),
+    ),
+]
+
+
+def some_write(chance: random.Random, number: int) -> PastWrite:
+    one = PastWrite(
+        number=number,
+        run=chance.choice([1, 1, 1, 2]),
+        tag_id=chance.choice("abc"),
+        stamp_ns=START + chance.randint(0, 40) * chance.choice([1, 4, 12]) * MINUTE,
+        kind=chance.choice([SCAN, SCAN, SCAN, LOOK]),
+        status=chance.choice([0, 0, 0, 2]),
+    )
+    if one.kind == SCAN:
+        names = tuple(chance.sample(sorted(VALUES), chance.randint(0, 4)))
+        values = tuple(chance.choice(VALUES[name]) for name in names)
+        return replace(one, sensors=names, values=values)
+    if one.status:
+        return one
+    species, bugs = chance.choice(["", "Orchid", "tulip"]), chance.randint(0, 3)
+    return replace(
+        one, has_seen=True, species=species, anomaly=chance.random() < 0.5, bug_count=bugs
+    )
+
+
+def plain(alarm: Alarm) -> Plain:
+    reason = alarm.reason
+    assert reason.since_ns is not None
+    return Plain(
+        alarm.tag_id,
+        reason.kind,
+        reason.sensor,
+        reason.verdict,
+        reason.value,
+        reason.limit,
+        reason.since_ns,
+        alarm.raised_at_ns,
+        alarm.cleared_at_ns,
+        alarm.worst,
+    )
+
+
+def follow(
+    lots: Iterable[Sequence[PastWrite]], spans: Sequence[RunSpan], now_ns: int
+) -> tuple[Alarm, ...]:
+    """What a bridge does that is asked now and then."""
+    follower = Follower(SENSORS, day_of, spans)
+    for lot in lots:
+        follower.take(lot)
+        follower.found(now_ns)
+    assert follower.missed == 0
+    return page_of(follower.found(now_ns).alarms).alarms
+
+
+@settings(max_examples=150)
+@given(st.integers(0, 2**32))
+def test_alarms_are_those_of_the_plainest_way_in_any_order_and_however_often_heard(
+    seed: int,
+) -> None:
+    chance = random.Random(seed)
+    heard = [some_write(chance, number) for number in range(chance.randint(0, 60))]
+    spans = chance.choice(SPANS)
+    last_ns = max((write.stamp_ns for write in heard), default=START)
+    now_ns = last_ns + chance.randint(0, 300) * MINUTE
+    expected = alarms(heard, spans, now_ns, SENSORS, day_of)
+    arrived = [*heard, *chance.choices(heard, k=5)] if heard else []
+    chance.shuffle(arrived)
+    lots = []
+    while arrived:
+        count = chance.randint(1, 9)
+        lots.append(arrived[:count])
+        del arrived[:count]
+    with patch.object(tag_log, "MARK", chance.choice([1, 3, 64])):
+        found = follow(lots, spans, now_ns)
+    assert {plain(alarm) for alarm in found} == expected
+    assert len({alarm.id for alarm in found}) == len(found)
+    at_once = follow([heard], spans, now_ns)
+    assert at_once == found
+    in_order = sorted(heard, key=lambda write: write.stamp_ns)
+    one_by_one = follow([[write] for write in in_order], spans, now_ns)
+    assert one_by_one == found
+
+
+@settings(max_examples=150)
+@given(st.integers(0, 2**32))
+def test_what_is_old_is_forgotten_and_changes_nothing_of_what_is_told(seed: int) -> None:
+    chance = random.Random(seed)
+    heard = [some_write(chance, number) for number in range(chance.randint(1, 60))]
+    heard.sort(key=lambda write: write.stamp_ns)
+    spans, now_ns = chance.choice(SPANS), heard[-1].stamp_ns + chance.randint(0, 300) * MINUTE
+    expected = alarms(heard, spans, now_ns, SENSORS, day_of)
+    # What there is no room for is kept as what it led to.
+    follower = Follower(SENSORS, day_of, spans, kept=chance.choice([3, 24, 300]))
+    since_ns = 0
+    while heard:
+        # Late, but not as late as that.
+        count = min(len(heard), chance.randint(1, 9))
+        lot, heard = heard[:count], heard[count:]
+        chance.shuffle(lot)
+        follower.take(lot)
+        with patch.object(alarm_fold, "FORGET_EVERY_NS", 0):
+            follower.found(now_ns, since_ns)
+        since_ns = max(since_ns, lot[0].stamp_ns - chance.randint(0, 60) * MINUTE)
+        since_ns = min(since_ns, heard[0].stamp_ns) if heard else since_ns
+    page = page_of(follower.found(now_ns, since_ns).alarms, since_ns)
+    if follower.missed:
+        return
+    expected = {one for one in expected if one.cleared_ns is None or one.cleared_ns >= since_ns}
+    assert {plain(alarm) for alarm in page.alarms} == expected
+
+
+def test_what_is_older_than_what_is_kept_is_not_taken_in_and_counted() -> None:
+    follower, heard = Follower(SENSORS, day_of, SPANS[0], kept=4), scans([22] * 9)
+    follower.take(heard[:5])
+    follower.take(heard[5:])
+    late = [replace(one, number=90 + one.number, stamp_ns=one.stamp_ns + S) for one in heard]
+    follower.take(late[5:8])
+    assert follower.missed == 0
+    follower.take(late[3:4])
+    assert follower.missed == 1
+    since_ns = START + 2 * alarm_fold.FORGET_EVERY_NS
+    follower.found(since_ns, since_ns)
+    follower.take([replace(heard[0], number=99, stamp_ns=since_ns - 1)])
+    assert follower.missed == 2
+    follower.take([replace(heard[0], number=100, stamp_ns=since_ns)])
+    assert follower.missed == 2
+
+
+def test_nothing_grows_with_the_days() -> None:
+    """A round a day, and a lamp that goes on and off: gaps, pauses and turns without end."""
+    follower = Follower(SENSORS, day_of, SPANS[0])
+    for day in range(60):
+        for at in (0, 1):
+            light, number = (900.0, 0.0)[at], 2 * day + at
+            stamp_ns = START + day * DAY_NS + at * MINUTE
+            follower.take([PastWrite(number, 1, "a", stamp_ns, SCAN, 0, ("light",), (light,))])
+        follower.found(stamp_ns, max(0, stamp_ns - 7 * DAY_NS))
+    (run,) = follower._runs.values()
+    trail = run.tags["a"].trail
+    assert (len(trail.gaps), len(trail.turns)) == (7, 15)
+    assert len([*run.stretches.pauses()]) == 7
+    assert len(run.limits) == 7
+    assert [run.days.is_day(stamp_ns - at) for at in (0, MINUTE)] == [False, True]
+
+
+def scans(values: Sequence[float], sensor: str = "temperature", tag: str = "a") -> list[PastWrite]:
+    """By day, one a minute."""
+    return [
+        PastWrite(number, 1, tag, START + number * MINUTE, SCAN, 0, ("light", sensor), (900, value))
+        for number, value in enumerate(values)
+    ]
+
+
+def told(heard: Sequence[PastWrite], later_ns: int = 0) -> list[Alarm]:
+    return list(follow([heard], SPANS[0], heard[-1].stamp_ns + later_ns))
+
+
+def test_two_scans_raise_and_two_clear() -> None:
+    assert told(scans([22, 17, 22, 17, 22])) == []
+    (alarm,) = told(scans([22, 17, 16, 22, 16.5, 22, 22, 17]))
+    at = [(at_ns - START) // MINUTE for at_ns in (alarm.raised_at_ns, alarm.cleared_at_ns or 0)]
+    assert at == [2, 6]
+    reason = alarm.reason
+    assert (reason.value, reason.limit, reason.verdict) == (16, 18, "stressed")
+    assert reason.since_ns == START + MINUTE
+    assert alarm.worst == 16
+
+
+def test_one_that_gets_worse_is_the_same_and_its_verdict_and_worst_are_worse() -> None:
+    (stressed,) = told(scans([17, 17]))
+    (critical,) = told(scans([17, 17, 6, 12]))
+    assert critical.id == stressed.id
+    assert (stressed.reason.verdict, critical.reason.verdict) == ("stressed", "critical")
+    assert (critical.worst, critical.reason.limit) == (6, 18)
+    assert (critical.raised_as, critical.is_worse, stressed.is_worse) == ("stressed", True, False)
+    (bad,) = told(scans([6, 6, 6]))
+    assert (bad.raised_as, bad.is_worse) == ("critical", False)
+
+
+def test_whatever_a_verdict_can_be_of_becomes_an_alarm_but_what_the_estimate_says() -> None:
+    """A silent twin is the feed's to tell."""
+    good = (22.0, 60.0)
+
+    def at(minute: int, tag: str, *values: float, status: int = 0) -> PastWrite:
+        names = ("temperature", "door")[: len(values)]
+        return PastWrite(0, 1, tag, START + minute * MINUTE, SCAN, status, names, values)
+
+    heard = [at(minute, "well", *good) for minute in range(60)]
+    heard += [at(minute, "cold", 6.0) for minute in range(60)]
+    heard += [at(minute, "dead", 22.0, math.nan) for minute in range(60)]
+    heard += [at(minute, "silent", *(good if minute < 9 else good[:1])) for minute in range(60)]
+    heard += [at(minute, "left out", *good) for minute in range(9)]
+    heard += [at(minute, "lost", *(good if minute < 50 else ()), status=2) for minute in range(60)]
+    heard += [replace(at(7, "pest"), kind=LOOK, has_seen=True, anomaly=True, bug_count=2)]
+    heard = [replace(write, number=number) for number, write in enumerate(heard)]
+    found = {(one.tag_id, str(one.reason.kind), one.reason.sensor) for one in told(heard, DAY_NS)}
+    assert found == {
+        ("cold", "range", "temperature"),
+        ("dead", "reading_failed", "door"),
+        ("silent", "old", "door"),
+        ("left out", "old", ""),
+        ("lost", "scan_failed", ""),
+        ("pest", "pest", ""),
+        ("", "stopped", ""),
+    }
+    assert {kind for _, kind, _ in found} == set(Kind) - {Kind.CHANGED, Kind.SILENT}
+
+
+def test_raised_anew_it_is_another() -> None:
+    newer, older = told(scans([17, 17, 22, 22, 17, 17]))
+    assert newer.id != older.id
+    assert newer.is_active
+    assert not older.is_active
+
+
+@given(st.lists(st.floats(17.61, 18.39), min_size=2, max_size=40))
+def test_what_wobbles_about_a_limit_is_one_episode(values: list[float]) -> None:
+    assert len(told(scans([17.0, 17.0, *values]))) == 1
+
+
+def test_too_low_and_too_high_are_two_alarms() -> None:
+    assert [alarm.worst for alarm in told(scans([17, 17, 27, 28]))] == [28, 17]
+
+
+def test_a_silent_patrol_is_one_alarm_of_the_house_and_none_of_its_tags() -> None:
+    heard = [one for tag in "abcdefgh" for one in scans([22] * 5, tag=tag)]
+    heard = [replace(one, number=number) for number, one in enumerate(heard)]
+    last_ns = max(one.stamp_ns for one in heard)
+    assert follow([heard], SPANS[0], last_ns + 10 * MINUTE) == ()
+    (alarm,) = follow([heard], SPANS[0], last_ns + 10 * MINUTE + 1)
+    assert (alarm.reason.kind, alarm.tag_id, alarm.raised_at_ns - last_ns - 1) == (
+        "stopped",
+        "",
+        10 * MINUTE,
+    )
+    again = replace(heard[0], number=99, stamp_ns=last_ns + 30 * MINUTE)
+    (over,) = follow([heard, [again]], SPANS[0], again.stamp_ns)
+    assert (over.id, over.cleared_at_ns) == (alarm.id, again.stamp_ns)
+
+
+@pytest.mark.parametrize(("holds_minutes", "is_overdue"), [(9, True), (10, False), (11, False)])
+def test_in_a_pause_time_stands_from_its_first_moment_on(
+    holds_minutes: int, is_overdue: bool
+) -> None:
+    """A tag whose limit runs out exactly as a pause begins is not overdue if it ends the pause."""
+    mine = scans([22])
+    other = [replace(one, number=50 + one.number) for one in scans([22] * 11, tag="b")]
+    first = START + 40 * MINUTE
+    again = replace(mine[0], number=99, stamp_ns=first)
+    heard = [*mine, *other, again]
+    follower = Follower(SENSORS, day_of, SPANS[0], recent_s=holds_minutes * 60.0)
+    follower.take(heard)
+    found = [one for one in follower.found(first).alarms if one.tag_id == "a"]
+    assert [one.reason.kind for one in found] == ["old"] * is_overdue
+    # Another tag ends the pause: from then on time passes.
+    follower = Follower(SENSORS, day_of, SPANS[0], recent_s=600.0)
+    follower.take([*mine, *other, *(replace(again, number=99 + n, tag_id="b", stamp_ns=first + n)
+                                    for n in (0, 1))])  # fmt: skip
+    (late,) = (one for one in follower.found(first + 1).alarms if one.tag_id == "a")
+    assert late.raised_at_ns == first + 1
+
+
+def test_a_tag_that_is_passed_by_is_overdue_until_it_is_scanned() -> None:
+    other = scans([22] * 20, tag="b")
+    mine = [replace(one, number=100 + one.number) for one in scans([22, 22])]
+    (alarm,) = told([*mine, *other])
+    assert (alarm.tag_id, alarm.reason.kind) == ("a", "old")
+    assert alarm.raised_at_ns == START + 11 * MINUTE + 1
+    late = replace(mine[0], number=103, stamp_ns=START + 5 * MINUTE)
+    later = replace(mine[0], number=104, stamp_ns=START + 14 * MINUTE)
+    assert told([*mine, *other, late, later]) == []
+
+
+def test_it_says_when_it_will_be_another_by_itself() -> None:
+    follower = Follower(SENSORS, day_of, SPANS[0])
+    heard = scans([22, 22])
+    follower.take(heard)
+    last_ns = heard[-1].stamp_ns
+    due_ns = follower.found(last_ns).due_ns
+    assert follower.found(due_ns - 1).alarms == ()
+    assert [one.reason.kind for one in follower.found(due_ns).alarms] == ["stopped"]
+    assert follower.found(due_ns).due_ns == FOREVER
+
+
+def test_what_stays_as_it_is_is_the_very_same() -> None:
+    follower = Follower(SENSORS, day_of, SPANS[0])
+    heard = scans([17, 17, 16, 22, 22])
+    follower.take(heard[:2])
+    now_ns = heard[-1].stamp_ns
+    first = follower.found(now_ns).alarms
+    assert [one.worst for one in first] == [17]
+    assert follower.found(now_ns).alarms is first
+    follower.take(heard[2:])
+    assert [one.worst for one in follower.found(now_ns).alarms] == [16]
+    # It was warm between the two.
+    late = [replace(heard[0], number=90 + n, stamp_ns=START + n, values=(900, 22)) for n in (1, 2)]
+    follower.take(late)
+    assert first[0].id not in {one.id for one in follower.found(now_ns).alarms}
+
+
+def test_ordinary_days_raise_less_than_an_alarm_in_ten_minutes_and_none_is_false() -> None:
+    heard = ordinary_days()
+    last_ns = heard[-1].stamp_ns
+    raised = follow([heard], SPANS[0], last_ns)
+    counts = Counter((one.reason.kind.value, one.reason.sensor) for one in raised)
+    # The climate's own nights and places, and noise where it is as wide as the range's margin.
+    assert counts == {
+        ("pest", ""): 50,
+        ("range", "temperature"): 22,
+        ("range", "humidity"): 18,
+        ("range", "soil_moisture"): 5,
+        ("range", "co2"): 1,
+        ("scan_failed", ""): 1,
+    }
+    first_round_ns = heard[0].stamp_ns + 3600 * S
+    steady = [one for one in raised if one.raised_at_ns > first_round_ns]
+    assert len(steady) / ((last_ns - first_round_ns) / (10 * MINUTE)) < 0.25
+    for day in range(3):
+        of_day = [one for one in raised if day * DAY_NS <= one.raised_at_ns < (day + 1) * DAY_NS]
+        assert len(of_day) < 24 * 6 / 3
+    # Pests are those that are: one from the first look that saw them to the first that did not.
+    seen: dict[str, bool] = {}
+    broke_out = 0
+    for look in (write for write in heard if write.has_seen):
+        broke_out += look.anomaly and not seen.get(look.tag_id, False)
+        seen[look.tag_id] = look.anomaly
+    assert counts["pest", ""] == broke_out
+    # Tries that failed twice in one round are not told, those that failed in two rounds are.
+    (lost,) = (one for one in raised if one.reason.kind == "scan_failed")
+    assert lost.raised_at_ns - (lost.reason.since_ns or 0) > 48 * MINUTE
+
+
+def test_a_second_try_in_one_round_says_no_more_than_the_first() -> None:
+    def fails(number: int, minute: float) -> PastWrite:
+        return PastWrite(number, 1, "a", START + int(minute * MINUTE), SCAN, 2)
+
+    rounds = [
+        replace(one, stamp_ns=START + 30 * index * MINUTE)
+        for index, one in enumerate(scans([22, 22, 22]))
+    ]
+    twice = [fails(10, 90), fails(11, 119.9)]
+    assert told([*rounds, *twice]) == []
+    (lost,) = told([*rounds, *twice, fails(12, 120)])
+    assert (lost.reason.kind, lost.reason.since_ns) == ("scan_failed", START + 90 * MINUTE)
+    assert lost.raised_at_ns == START + 120 * MINUTE
+    # Of what has been scanned once, and never.
+    first = replace(rounds[0], stamp_ns=START + 60 * MINUTE)
+    assert told([first, *twice]) == []
+    assert told([first, *twice, fails(12, 120)]) == [lost]
+    assert told([*twice])[0].raised_at_ns == twice[1].stamp_ns
+
+
+def test_a_tag_scanned_once_is_overdue_after_a_day() -> None:
+    others = [
+        replace(one, stamp_ns=START + 9 * index * MINUTE)
+        for index, one in enumerate(scans([22] * 162, tag="b"))
+    ]
+    once = [replace(one, number=1_000) for one in scans([22])]
+    (alarm,) = told([*once, *others])
+    assert (alarm.tag_id, alarm.reason.limit) == ("a", 86_400.0)
+    assert alarm.raised_at_ns == START + DAY_NS + 1
+    assert told([*once, *others[:-1]]) == []

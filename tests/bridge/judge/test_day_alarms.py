@@ -1,0 +1,159 @@
+"""Alarms of quantities of a day: from dawn to dawn by the clock, one value a day and a tag."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterable
+from dataclasses import replace
+from itertools import count
+
+import pytest
+
+from lupin_bridge.judge.alarm import Alarm, reasons_of_days
+from lupin_bridge.judge.alarm_fold import Follower
+from lupin_bridge.judge.derived import DAILY, DAY_NS
+from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.judge.verdict import Verdict
+from lupin_twin.core.writes import PastWrite, RunSpan
+from tests.support.ordinary_day import ordinary_days
+
+HOUR = 3600 * 10**9
+SPANS = (RunSpan(1, 0, 2**63 - 1),)
+DAWN, DUSK = 6, 18
+MEAN, MINIMUM = "temperature_24h_mean", "temperature_night_minimum"
+
+
+def is_day(at_ns: int) -> bool:
+    return DAWN <= at_ns / HOUR % 24 < DUSK
+
+
+def day_of(light: bool | None, at_ns: int) -> bool:
+    return is_day(at_ns) if light is None else light
+
+
+def scans(
+    of: dict[str, list[float]], every_h: float = 1.0, first_h: float = DAWN
+) -> list[PastWrite]:
+    """A sensor's value on each day, from dawn to dawn, read again and again."""
+    numbers = count(1)
+    return [
+        PastWrite(next(numbers), 1, "a", at_ns, 0, 0, (name,), (value,))
+        for name, values in of.items()
+        for day, value in enumerate(values)
+        for step in range(round(24 / every_h))
+        if (at_ns := round((DAWN + 24 * day + step * every_h) * HOUR)) >= first_h * HOUR
+    ]
+
+
+def found(heard: Iterable[PastWrite]) -> list[Alarm]:
+    follower = Follower(own_sensors(), day_of, SPANS)
+    follower.take(heard)
+    alarms = [one for one in follower.found(40 * DAY_NS).alarms if one.reason.sensor in DAILY]
+    return sorted(alarms, key=lambda one: (one.raised_at_ns, one.id))
+
+
+def dawn(day: int) -> int:
+    return day * DAY_NS + DAWN * HOUR
+
+
+def test_a_days_mean_raises_at_the_next_dawn_and_one_good_day_clears() -> None:
+    [cold] = found(scans({"temperature": [20.0, 14.0, 13.0, 20.0, 20.0]}))
+    assert (cold.tag_id, cold.reason.sensor, cold.reason.verdict) == ("a", MEAN, Verdict.STRESSED)
+    # The last hour of that day was on the way to the next one's temperature.
+    assert cold.reason.value == pytest.approx(14.0, abs=0.1)
+    assert cold.worst == pytest.approx(13.0, abs=0.2)
+    assert cold.reason.limit == 17.0
+    assert (cold.raised_at_ns, cold.reason.since_ns) == (dawn(2), dawn(2))
+    assert cold.cleared_at_ns == dawn(4)
+
+
+def test_the_value_is_that_of_the_history_at_that_moment() -> None:
+    chance = random.Random(4)
+    heard = [
+        replace(one, values=(chance.uniform(5.0, 14.0),))
+        for one in scans({"temperature": [0.0] * 3}, every_h=0.2)
+    ]
+    readings = [(one.stamp_ns, one.values[0]) for one in heard]
+    alarms = found(heard)
+    assert {one.reason.sensor for one in alarms} == {MEAN, MINIMUM}
+    for alarm in alarms:
+        at_dawn = DAILY[alarm.reason.sensor].at(dawn(1), readings, is_day)
+        assert alarm.raised_at_ns == dawn(1)
+        assert alarm.reason.value == pytest.approx(at_dawn)
+
+
+def test_near_the_limit_of_its_range_it_is_one_episode() -> None:
+    wobbling = found(scans({"temperature": [16.9, 17.2, 16.9, 17.4, 20.0, 20.0]}))
+    assert [(one.raised_at_ns, one.cleared_at_ns) for one in wobbling] == [(dawn(1), dawn(5))]
+
+
+def test_of_too_little_of_a_day_nothing_is_said() -> None:
+    assert found(scans({"temperature": [14.0, 14.0]}, first_h=DAWN + 5)) == []
+    assert found(scans({"temperature": [14.0] * 4}, every_h=4.0)) == []
+    assert found(scans({"temperature": [14.0]})) == []  # its dawn is still to come
+    gone = [one for one in scans({"temperature": [14.0] * 4}) if one.stamp_ns < dawn(1) + HOUR]
+    [alarm] = found(gone)
+    assert alarm.is_active
+
+
+def test_what_comes_late_puts_the_day_right() -> None:
+    heard = scans({"temperature": [14.0, 14.0, 14.0]})
+    late = [one for one in heard if dawn(0) + 4 * HOUR < one.stamp_ns < dawn(0) + 15 * HOUR]
+    early = [one for one in heard if one not in late]
+    assert [one.raised_at_ns for one in found(early)] == [dawn(2)]
+    follower = Follower(own_sensors(), day_of, SPANS)
+    follower.take(early)
+    follower.found(40 * DAY_NS)
+    follower.take(late)
+    after = follower.found(40 * DAY_NS).alarms
+    assert [one for one in after if one.reason.sensor in DAILY] == found(heard)
+    assert [one.raised_at_ns for one in found(heard)] == [dawn(1)]
+
+
+def test_a_range_of_light_is_a_crops() -> None:
+    heard = scans({"light": [4_000.0, 4_000.0]})
+    assert found(heard) == []
+    look = PastWrite(10_000, 1, "a", HOUR, 1, 0, has_seen=True, species="Lettuce")
+    [dim] = found([look, *heard])
+    assert dim.reason.sensor == "daily_light_integral"
+    assert dim.reason.value == pytest.approx(24 * 3600 * 4_000.0 / 54.0 / 1e6)
+    assert dim.reason.limit == 12.0
+
+
+def test_a_sensor_that_reads_the_quantity_goes_first() -> None:
+    own = [
+        replace(one, sensors=("temperature", MEAN), values=(14.0, 20.0))
+        for one in scans({"temperature": [14.0] * 3})
+    ]
+    assert found(own) == []
+
+
+def test_without_a_clock_a_day_is_24_hours() -> None:
+    follower = Follower(own_sensors(), lambda _, __: True, SPANS)
+    follower.take(scans({"temperature": [14.0] * 3}, first_h=DAWN + 5))
+    [cold] = [one for one in follower.found(40 * DAY_NS).alarms if one.reason.sensor in DAILY]
+    assert (cold.reason.sensor, cold.raised_at_ns) == (MEAN, dawn(1) + 5 * HOUR)
+
+
+def test_an_alarm_is_a_reason_from_when_it_was_raised_until_it_was_cleared() -> None:
+    alarms = found(scans({"temperature": [14.0, 20.0, 20.0]}))
+    raised, cleared = dawn(1), dawn(2)
+    told = [bool(reasons_of_days(alarms, at)) for at in (raised - 1, raised, cleared - 1, cleared)]
+    assert told == [False, True, True, False]
+    assert not reasons_of_days(alarms)
+    assert reasons_of_days(found(scans({"temperature": [14.0, 14.0]})))["a"][0].sensor == MEAN
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_demos_ordinary_days_raise_none_where_nothing_else_is_wrong(seed: int) -> None:
+    heard = ordinary_days(seed)
+    follower = Follower(own_sensors(), day_of, SPANS)
+    follower.take(heard)
+    alarms = follower.found(heard[-1].stamp_ns).alarms
+    of_days = {
+        (one.tag_id, DAILY[one.reason.sensor].sensor)
+        for one in alarms
+        if one.reason.sensor in DAILY
+    }
+    assert of_days
+    assert of_days <= {(one.tag_id, one.reason.sensor) for one in alarms}

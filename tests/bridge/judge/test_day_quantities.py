@@ -1,0 +1,72 @@
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from lupin_bridge.judge.derived import BASE_C, DAILY, DAY_NS, LX_PER_UMOL, MAX_GAP_NS
+
+HOUR = 3600 * 10**9
+AT = 100 * DAY_NS
+
+
+def is_day(at_ns: int) -> bool:
+    """From 6 to 18."""
+    return 6 <= at_ns % DAY_NS / HOUR < 18
+
+
+def value(name: str, of: Callable[[float], float], hours: float = 24.0, step: float = 0.5) -> float:
+    """The quantity at midnight of a sensor whose course over the hours of the day is `of`."""
+    count = round(hours / step)
+    readings = [
+        (AT - round(step * HOUR * back), of(24.0 - step * back)) for back in range(count, -1, -1)
+    ]
+    return DAILY[name].at(AT, readings, is_day)
+
+
+def test_a_daily_light_integral_is_the_sum_of_the_photons() -> None:
+    # 10 h of 54,000 lx are 10 h of 1000 umol/m2/s.
+    lit = value("daily_light_integral", lambda hour: 54_000.0 * (7.0 <= hour <= 17.0), step=0.01)
+    assert lit == pytest.approx(36.0, rel=2e-3)
+    # Half a sine of 12 h: its mean is 2 / pi of the highest.
+    sun = value("daily_light_integral", lambda hour: max(0.0, math.sin((hour - 6) * math.pi / 12)))
+    assert sun == pytest.approx(12 * 3600 * 2 / math.pi / LX_PER_UMOL / 1e6, rel=5e-3)
+
+
+def test_temperature_over_a_day() -> None:
+    def course(hour: float) -> float:
+        return 24.0 if 6.0 <= hour < 18.0 else 16.0
+
+    assert value("temperature_24h_mean", course, step=0.01) == pytest.approx(20.0, abs=0.02)
+    assert value("day_night_difference", course, step=0.01) == pytest.approx(8.0, abs=0.02)
+    assert value("temperature_night_minimum", lambda hour: 5.0 if hour == 12.0 else hour) == 0.0
+    assert value("growing_degree_days", course) == (24.0 + 16.0) / 2 - BASE_C
+    assert value("growing_degree_days", lambda _: 4.0) == 0.0
+
+
+def test_a_dose_of_co2_is_of_the_hours_of_day() -> None:
+    dose = value("co2_dose", lambda hour: 800.0 if 6.0 <= hour <= 18.0 else 5000.0, step=0.01)
+    assert dose == pytest.approx(12 * 800.0, rel=5e-3)
+
+
+@pytest.mark.parametrize("name", DAILY)
+def test_of_too_little_of_a_day_there_is_no_value(name: str) -> None:
+    assert math.isfinite(value(name, lambda _: 20.0, hours=19.5))
+    assert math.isnan(value(name, lambda _: 20.0, hours=19.0))
+    # Between readings that are too far apart nothing is known.
+    far = 2.0 * MAX_GAP_NS / HOUR
+    assert math.isnan(value(name, lambda _: 20.0, step=far))
+    assert math.isnan(DAILY[name].at(AT, [], is_day))
+
+
+def test_what_was_read_before_that_day_or_after_counts_for_nothing() -> None:
+    daily = DAILY["temperature_24h_mean"]
+    readings = [(AT + hour * HOUR, 20.0 if -24 <= hour <= 0 else 99.0) for hour in range(-30, 4)]
+    assert daily.at(AT, readings, is_day) == 20.0
+
+
+def test_without_a_night_there_is_no_difference_and_no_minimum() -> None:
+    readings = [(AT + hour * HOUR, 20.0) for hour in range(-24, 1)]
+    for name in ("day_night_difference", "temperature_night_minimum"):
+        assert math.isnan(DAILY[name].at(AT, readings, lambda _: True))

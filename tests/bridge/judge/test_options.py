@@ -1,0 +1,86 @@
+from __future__ import annotations
+
+import re
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lupin_bridge.judge.options import MAX_FILE_BYTES, Criteria, own_sensors, unix_s
+from lupin_bridge.settings import SettingError, Settings
+
+
+def criteria(**settings: Any) -> Criteria:
+    return Criteria.of(Settings(**settings))
+
+
+def test_without_a_choice_it_is_our_own_file_and_the_patrols_rhythm() -> None:
+    chosen = criteria()
+    assert chosen.sensors == own_sensors()
+    assert chosen.recent_s is None
+    assert criteria(reading_validity_s=900.0).recent_s == 900.0
+
+
+def test_an_operators_file_replaces_ours(tmp_path: Path) -> None:
+    file = tmp_path / "mine.json"
+    file.write_text(own_sensors().text.replace("Soil moisture", "Bodenfeuchte"), "utf-8")
+    assert criteria(sensors=str(file)).sensors.named("soil_moisture").label == "Bodenfeuchte"
+
+
+def test_what_is_wrong_with_the_file_is_told_with_its_line(tmp_path: Path) -> None:
+    file = tmp_path / "mine.json"
+    file.write_text(own_sensors().text.replace('"ideal": [18, 26]', '"ideal": [26, 18]'), "utf-8")
+    says = f"--sensors {file}: sensors.temperature: ideal is [26.0, 18.0], and low must be"
+    with pytest.raises(SettingError, match=re.escape(says)):
+        criteria(sensors=str(file))
+
+
+def test_a_file_that_is_not_there_or_no_text_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SettingError, match=r"nowhere\.json cannot be read: No such file"):
+        criteria(sensors=str(tmp_path / "nowhere.json"))
+    with pytest.raises(SettingError, match="cannot be read: Is a directory"):
+        criteria(sensors=str(tmp_path))
+    (tmp_path / "latin").write_bytes(b'{"\xb0C": 1}')
+    with pytest.raises(SettingError, match="latin is no UTF-8: invalid start byte at byte 2"):
+        criteria(sensors=str(tmp_path / "latin"))
+
+
+def test_a_file_is_not_read_past_its_limit(tmp_path: Path) -> None:
+    file = tmp_path / "long.json"
+    text = own_sensors().text
+    file.write_text(text + " " * (MAX_FILE_BYTES - len(text.encode())), "utf-8")
+    criteria(sensors=str(file))
+    with file.open("a") as more:
+        more.write(" ")
+    with pytest.raises(SettingError, match="is longer than 1000000 bytes, the limit"):
+        criteria(sensors=str(file))
+    with pytest.raises(SettingError, match="is longer than 1000000 bytes"):
+        criteria(sensors="/dev/zero")
+
+
+def test_the_hours_of_the_day_are_those_of_the_house() -> None:
+    clock = criteria(time_zone="Europe/Amsterdam", day_hours="07:30-19:00").clock
+    summer = datetime(2026, 7, 1, 5, 29, tzinfo=UTC).timestamp()
+    assert not clock.is_day(summer)
+    assert clock.is_day(summer + 60)
+    winter = datetime(2026, 1, 1, 6, 29, tzinfo=UTC).timestamp()
+    assert not clock.is_day(winter)
+    assert clock.is_day(winter + 60)
+
+
+@pytest.mark.parametrize("zone", ["Mars/Olympus", "../../etc/passwd", "Europe"])
+def test_a_zone_that_nobody_knows_is_refused(zone: str) -> None:
+    with pytest.raises(SettingError, match=f"--time-zone is '{re.escape(zone)}', which this mach"):
+        criteria(time_zone=zone)
+
+
+@pytest.mark.parametrize("hours", ["", "6-20", "06:00-24:00", "06:60-20:00", "06:00–20:00", "day"])
+def test_hours_that_are_none_are_refused(hours: str) -> None:
+    with pytest.raises(SettingError, match=f"--day-hours is '{hours}', not such as 06:00-20:00"):
+        criteria(day_hours=hours)
+
+
+def test_simulated_time_has_no_hours_of_a_wall() -> None:
+    assert unix_s(3_600 * 10**9) is None
+    assert unix_s(1_790_000_000 * 10**9) == 1_790_000_000

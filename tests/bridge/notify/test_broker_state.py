@@ -1,0 +1,224 @@
+"""What a broker has to be told: what is new, once, and the newest of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lupin_bridge.alarms.board import Board
+from lupin_bridge.judge.verdict import Health, Verdict
+from lupin_bridge.notify.messages import GreenhouseState, Topics
+from lupin_bridge.notify.mirror import Mirror
+from tests.support.seen import HOLDS_NS, NOW_NS, SENSORS, S, alarm, seen, tag
+
+TOPICS = Topics("lt", "homeassistant")
+
+
+def mirror(discovery: str = "homeassistant") -> Mirror:
+    return Mirror(Topics("lt", discovery), SENSORS)
+
+
+def told(mirror: Mirror, now: GreenhouseState) -> dict[str, Any]:
+    """What is said of the house as it is now: topic to payload, None: gone."""
+    mirror.see(now)
+    messages = list(mirror.messages())
+    assert mirror.waiting == 0
+    found = {it.topic: json.loads(it.payload) if it.payload else None for it in messages}
+    assert len(found) == len(messages), "a topic twice in one turn"
+    return found
+
+
+def announcements(found: Mapping[str, Any]) -> set[str]:
+    return {topic for topic in found if topic.startswith("homeassistant/")}
+
+
+def test_all_is_told_once_and_then_only_what_is_new() -> None:
+    one = mirror()
+    a, b = tag("a", temperature=21.0, humidity=60.0), tag("b", temperature=22.0)
+    first = told(one, seen(a, b))
+    assert first["lt/tags/a/readings/temperature"]["value"] == 21.0
+    assert first["lt/tags/b/health"]["verdict"] == "healthy"
+    assert first["lt/house/health"]["verdict"] == "healthy"
+    # Made of temperature and humidity, judged, and told like a sensor.
+    assert first["lt/tags/a/readings/vpd"]["unit"] == "kPa"
+    # Of a: five readings, verdict, alarm; of b: one, and these two; of the house: three.
+    assert len(announcements(first)) == 7 + 3 + 3
+    assert told(one, seen(a, b)) == {}
+    later = tag("b", NOW_NS + 60 * S, temperature=6.0)
+    news = told(one, seen(a, later, now_ns=NOW_NS + 60 * S))
+    assert set(news) == {"lt/tags/b/readings/temperature", "lt/tags/b/health", "lt/house/health"}
+    assert news["lt/tags/b/health"]["verdict"] == "critical"
+
+
+def test_a_reading_that_does_not_hold_any_more_is_told_to_be_unknown() -> None:
+    one = mirror()
+    state = tag("a", temperature=21.0)
+    told(one, seen(state))
+    assert told(one, seen(state, now_ns=NOW_NS + HOLDS_NS)) == {}
+    news = told(one, seen(state, now_ns=NOW_NS + HOLDS_NS + 1))
+    assert news["lt/tags/a/readings/temperature"]["value"] is None
+    assert news["lt/tags/a/readings/temperature"]["stamp"]["sec"] == NOW_NS // S
+    assert news["lt/tags/a/health"]["verdict"] == "unknown"
+
+
+def test_a_verdict_that_changes_by_itself_is_told_and_no_other() -> None:
+    one = mirror()
+    day = seen(tag("a", temperature=16.0), tag("b", temperature=20.0))
+    told(one, day)
+    tags = {**day.judged.tags, "a": Health(Verdict.HEALTHY)}
+    news = told(one, replace(day, judged=replace(day.judged, tags=tags)))
+    assert set(news) == {"lt/tags/a/health"}
+    assert news["lt/tags/a/health"]["verdict"] == "healthy"
+
+
+def test_of_a_silent_twin_readings_grow_old_all_the_same() -> None:
+    one = mirror()
+    now = seen(tag("a", temperature=21.0))
+    told(one, now)
+    silent = replace(now, is_live=False, message="silent", now_ns=NOW_NS + HOLDS_NS + 1)
+    news = told(one, silent)
+    assert news["lt/house/twin"]["state"] == "OFF"
+    assert news["lt/tags/a/readings/temperature"]["value"] is None
+
+
+def test_while_the_clock_does_not_run_nothing_is_known() -> None:
+    one = mirror()
+    state = tag("a", temperature=21.0)
+    told(one, seen(state))
+    assert told(one, seen(state, now_ns=None))["lt/tags/a/readings/temperature"]["value"] is None
+    assert told(one, seen(state))["lt/tags/a/readings/temperature"]["value"] == 21.0
+
+
+def test_everything_says_where_it_comes_from_and_anew_when_that_is_another_place() -> None:
+    one = mirror()
+    state = tag("a", temperature=6.0)
+    then = seen(state, alarms=(alarm("a"),))
+    first = told(one, then)
+    said = {topic for topic in first if topic.startswith("lt/")}
+    assert {first[topic]["origin"] for topic in said} == {"robot"}
+    news = told(one, replace(then, origin="recorded"))
+    assert {topic: it["origin"] for topic, it in news.items()} == dict.fromkeys(said, "recorded")
+
+
+def test_alarms_are_told_of_the_tag_and_of_the_house() -> None:
+    one = mirror()
+    state = tag("a", temperature=21.0)
+    starting = replace(seen(state), board=Board())
+    first = told(one, starting)
+    assert first["lt/tags/a/alarms"]["state"] is None
+    assert first["lt/house/alarms"]["state"] is None
+    known = told(one, replace(starting, board=seen(state).board))
+    assert {topic: payload["state"] for topic, payload in known.items()} == {
+        "lt/tags/a/alarms": "OFF",
+        "lt/house/alarms": "OFF",
+    }
+    news = told(one, seen(state, alarms=(alarm("a"), alarm("", Verdict.UNKNOWN))))
+    assert news["lt/tags/a/alarms"]["state"] == "ON"
+    assert news["lt/tags/a/alarms"]["alarms"][0]["worst"] == 6.6
+    assert news["lt/house/alarms"]["count"] == 2
+    news = told(one, seen(state, alarms=(alarm("a", cleared_ns=NOW_NS),)))
+    assert (news["lt/tags/a/alarms"]["state"], news["lt/house/alarms"]["state"]) == ("OFF", "OFF")
+
+
+def test_after_a_reconnect_or_a_birth_everything_is_told_again() -> None:
+    one = mirror()
+    now = seen(tag("a", temperature=21.0))
+    first = told(one, now)
+    one.forget()
+    assert told(one, now) == first
+
+
+def test_an_announcement_is_made_anew_where_it_says_something_else() -> None:
+    one = mirror()
+    state = tag("a", temperature=21.0)
+    told(one, seen(state))
+    slower = tag("a", NOW_NS + 1, temperature=21.0)
+    assert announcements(told(one, seen(slower, now_ns=NOW_NS + 1))) == set()
+    holds = {"a": HOLDS_NS + 1}
+    news = told(one, seen(tag("a", NOW_NS + 2, temperature=21.0), holds_ns=holds))
+    (config,) = announcements(news)
+    assert news[config]["expire_after"] == 900
+    more = told(one, seen(tag("a", NOW_NS + 2, temperature=21.0, co2=500.0), holds_ns=holds))
+    assert announcements(more) == {
+        "homeassistant/sensor/lt/tag_a_-_reading_co2/config",
+    }
+
+
+def test_a_tag_that_is_gone_is_taken_back() -> None:
+    one = mirror()
+    first = told(one, seen(tag("a", temperature=21.0), tag("b", temperature=21.0)))
+    news = told(one, seen(tag("a", temperature=21.0)))
+    gone = {topic for topic, payload in news.items() if payload is None}
+    assert gone == {topic for topic in announcements(first) if "/tag_b_-_" in topic}
+    one.forget()
+    assert not [topic for topic in told(one, seen()) if "/tag_b_-_" in topic]
+
+
+def test_a_tag_that_goes_while_the_broker_is_away_is_taken_back_too() -> None:
+    one = mirror()
+    told(one, seen(tag("a", temperature=21.0)))
+    one.forget()
+    news = told(one, seen())
+    assert [topic for topic, payload in news.items() if payload is None] == sorted(
+        topic for topic in news if "/tag_a_-_" in topic
+    )
+
+
+def test_without_a_discovery_prefix_nothing_is_announced() -> None:
+    assert announcements(told(mirror(""), seen(tag("a", temperature=21.0)))) == set()
+
+
+def test_what_waits_is_bounded_by_the_house_and_what_gives_way_is_counted() -> None:
+    one = mirror()
+    for number in range(100):
+        one.see(seen(tag("a", NOW_NS + number, temperature=20.0 + number), now_ns=NOW_NS + 200))
+    assert (one.waiting, one.dropped) == (2, 99)
+    found = [it for it in one.messages() if it.topic == "lt/tags/a/readings/temperature"]
+    assert [json.loads(it.payload)["value"] for it in found] == [119.0]
+
+
+def test_what_changes_during_a_turn_is_told_with_its_newest() -> None:
+    one = mirror()
+    one.see(seen(tag("a", temperature=1.0), tag("b", temperature=1.0)))
+    messages = one.messages()
+    first = next(messages)
+    assert "house" in first.topic
+    one.see(seen(tag("a", temperature=1.0), tag("b", NOW_NS, temperature=2.0)))
+    values = [
+        json.loads(it.payload)["value"]
+        for it in messages
+        if it.topic == "lt/tags/b/readings/temperature"
+    ]
+    assert values == [2.0]
+
+
+VALUES = st.sampled_from([None, 5.0, 20.0, 40.0])
+HOUSES = st.lists(st.tuples(VALUES, VALUES, st.booleans()), min_size=1, max_size=6)
+
+
+@given(HOUSES, st.sets(st.integers(0, 5)))
+def test_however_it_comes_the_broker_knows_the_newest(
+    houses: list[tuple[float | None, float | None, bool]], cuts: set[int]
+) -> None:
+    """Whatever was heard before, and however often the connection was lost."""
+    one, knows = mirror(), dict[str, Any]()
+    for number, (first, second, has_alarm) in enumerate(houses):
+        at_ns = NOW_NS + number * S
+        tags = [
+            tag(name, at_ns, temperature=value)
+            for name, value in (("a", first), ("b", second))
+            if value is not None
+        ]
+        now = seen(*tags, alarms=(alarm("a"),) if has_alarm else (), now_ns=at_ns)
+        if number in cuts:
+            one.forget()
+        knows |= told(one, now)
+    fresh = told(mirror(), now)
+    assert {topic: payload for topic, payload in knows.items() if topic in fresh} == fresh
+    rest = {topic for topic in knows if topic not in fresh and knows[topic] is not None}
+    assert not {topic for topic in rest if topic.startswith("homeassistant/")}

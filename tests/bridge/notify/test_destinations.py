@@ -1,0 +1,185 @@
+"""Where things are sent: what cannot be is refused at the start, and no secret is in a message."""
+
+from __future__ import annotations
+
+import logging
+import ssl
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lupin_bridge.notify.destinations import MAX_PREFIX, MAX_URL, MIN_SECRET_LENGTH, Targets
+from lupin_bridge.settings import Secrets, SettingError, Settings
+from tests.support.tls import certificate
+
+SECRET = "s" * MIN_SECRET_LENGTH
+SIGNED = Secrets(webhook_secret=SECRET)
+
+
+def refusal(secrets: Secrets = SIGNED, **settings: Any) -> str:
+    with pytest.raises(SettingError) as refused:
+        Targets.of(Settings(**settings), secrets)
+    return str(refused.value)
+
+
+def test_nobody_is_told_unless_an_operator_wants_it() -> None:
+    assert Targets.of(Settings(), Secrets()) == Targets(None, None)
+
+
+@pytest.mark.parametrize(
+    ("url", "host", "port", "has_tls", "called"),
+    [
+        ("mqtt://broker.lan", "broker.lan", 1883, False, "mqtt://broker.lan:1883"),
+        ("mqtt://10.0.0.1:1/", "10.0.0.1", 1, False, "mqtt://10.0.0.1:1"),
+        ("mqtts://[::1]", "::1", 8883, True, "mqtts://[::1]:8883"),
+    ],
+)
+def test_a_broker_is_named_by_its_address(
+    url: str, host: str, port: int, has_tls: bool, called: str
+) -> None:
+    target = Targets.of(Settings(mqtt_url=url), Secrets()).mqtt
+    assert target is not None
+    assert (target.host, target.port, target.called) == (host, port, called)
+    assert (target.tls is not None) is has_tls
+    assert (target.topics.prefix, target.topics.discovery) == ("lupin-twin", "homeassistant")
+
+
+@pytest.mark.parametrize(
+    ("url", "port", "path", "called"),
+    [
+        ("http://hook.lan", 80, "/", "http://hook.lan:80"),
+        ("https://hook.lan/a?b=c", 443, "/a?b=c", "https://hook.lan:443"),
+        ("http://hook.lan:8080/secret-path", 8080, "/secret-path", "http://hook.lan:8080"),
+    ],
+)
+def test_a_receiver_is_named_without_its_path(url: str, port: int, path: str, called: str) -> None:
+    target = Targets.of(Settings(webhook_url=url), SIGNED).webhook
+    assert target is not None
+    assert (target.port, target.path, target.called) == (port, path, called)
+    assert SECRET not in repr(target)
+    assert "secret-path" not in repr(target)
+
+
+@pytest.mark.parametrize(
+    ("url", "named"),
+    [
+        ("tcp://broker", "--mqtt-url has to begin with mqtt:// or mqtts://"),
+        ("broker.lan", "--mqtt-url has to begin with mqtt:// or mqtts://"),
+        ("mqtt://", "--mqtt-url names no host"),
+        ("mqtt://a:0", "--mqtt-url has the port 0, must be from 1 to 65535"),
+        ("mqtt://a:65536", "--mqtt-url is no address: Port out of range 0-65535"),
+        ("mqtt://a/b", "--mqtt-url has a path: topics go below --mqtt-prefix"),
+        ("mqtt://me:hunter2@a", "--mqtt-url has a user or a password in it"),
+        ("mqtt://a b", "--mqtt-url is longer than 2000 characters, or has one that"),
+        ("mqtt://ä", "--mqtt-url is longer than 2000 characters, or has one that"),
+        ("mqtt://" + "a" * (MAX_URL - 6), "--mqtt-url is longer than 2000 characters"),
+    ],
+)
+def test_what_is_no_address_of_a_broker_is_refused(url: str, named: str) -> None:
+    said = refusal(mqtt_url=url)
+    assert said.startswith(named)
+    assert "hunter2" not in said
+
+
+@pytest.mark.parametrize(
+    ("url", "named"),
+    [
+        ("ftp://a", "--webhook-url has to begin with http:// or https://"),
+        ("http://a/#b", "--webhook-url has a fragment (#)"),
+        ("http://a/\r\nX: y", "--webhook-url is longer than 2000 characters, or has one that"),
+        ("https://me:hunter2@a", "--webhook-url has a user or a password in it"),
+    ],
+)
+def test_what_is_no_address_of_a_receiver_is_refused(url: str, named: str) -> None:
+    said = refusal(webhook_url=url)
+    assert said.startswith(named)
+    assert "hunter2" not in said
+
+
+def test_an_address_may_be_as_long_as_the_limit() -> None:
+    url = "http://a/" + "b" * (MAX_URL - 9)
+    assert Targets.of(Settings(webhook_url=url), SIGNED).webhook is not None
+
+
+@pytest.mark.parametrize("prefix", ["", "/a", "a/", "a/+/b", "a#", "$SYS/a", "a\nb", "a" * 129])
+def test_a_prefix_that_no_topic_may_have_is_refused(prefix: str) -> None:
+    assert "--mqtt-prefix is " in refusal(mqtt_url="mqtt://a", mqtt_prefix=prefix)
+    if prefix:
+        said = refusal(mqtt_url="mqtt://a", mqtt_discovery_prefix=prefix)
+        assert "--mqtt-discovery-prefix is " in said
+
+
+@pytest.mark.parametrize("prefix", ["a", "farm/gh1", "ferme/été 1", "a" * MAX_PREFIX])
+def test_other_prefixes_will_do(prefix: str) -> None:
+    target = Targets.of(Settings(mqtt_url="mqtt://a", mqtt_prefix=prefix), Secrets()).mqtt
+    assert target is not None
+    assert target.topics.prefix == prefix
+
+
+def test_without_a_discovery_prefix_nothing_is_announced_and_both_must_differ() -> None:
+    settings = Settings(mqtt_url="mqtt://a", mqtt_discovery_prefix="")
+    target = Targets.of(settings, Secrets()).mqtt
+    assert target is not None
+    assert target.topics.discovery == ""
+    assert "both 'x', must differ" in refusal(
+        mqtt_url="mqtt://a", mqtt_prefix="x", mqtt_discovery_prefix="x"
+    )
+
+
+def test_a_password_needs_a_user_and_is_better_sent_over_tls(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    secrets = Secrets(mqtt_password="hunter2")
+    assert "no --mqtt-user" in refusal(secrets, mqtt_url="mqtt://a")
+    with caplog.at_level(logging.WARNING):
+        target = Targets.of(Settings(mqtt_url="mqtts://a", mqtt_user="me"), secrets).mqtt
+        assert caplog.messages == []
+        Targets.of(Settings(mqtt_url="mqtt://a", mqtt_user="me"), secrets)
+    assert "--mqtt-url is without TLS" in caplog.text
+    assert target is not None
+    assert (target.user, target.password) == ("me", "hunter2")
+    assert "hunter2" not in repr(target)
+
+
+def test_a_webhook_needs_a_secret_that_is_one() -> None:
+    assert "--webhook-secret-file" in refusal(Secrets(), webhook_url="http://a")
+    said = refusal(Secrets(webhook_secret=SECRET[1:]), webhook_url="http://a")
+    assert f"has {MIN_SECRET_LENGTH - 1} characters" in said
+
+
+@pytest.mark.parametrize(
+    ("name", "url"),
+    [
+        ("mqtt_user", "mqtt_url"),
+        ("mqtt_password_file", "mqtt_url"),
+        ("mqtt_ca", "mqtt_url"),
+        ("webhook_secret_file", "webhook_url"),
+        ("webhook_ca", "webhook_url"),
+    ],
+)
+def test_a_setting_that_is_of_no_use_is_told(name: str, url: str) -> None:
+    given: dict[str, Any] = {name: "x"}
+    said = refusal(**given)
+    assert said.startswith(f"--{name.replace('_', '-')} is given without --{url.replace('_', '-')}")
+
+
+def test_a_mistake_is_called_what_its_operator_called_it() -> None:
+    said = refusal(mqtt_url="x", given_as={"mqtt_url": "LUPIN_MQTT_URL"})
+    assert said.startswith("LUPIN_MQTT_URL has to begin with")
+
+
+def test_an_authority_of_ones_own_is_trusted_and_a_file_that_is_none_is_named(
+    tmp_path: Path,
+) -> None:
+    made = certificate(tmp_path)
+    target = Targets.of(Settings(mqtt_url="mqtts://a", mqtt_ca=str(made.cert)), Secrets()).mqtt
+    assert target is not None
+    assert target.tls is not None
+    assert target.tls.verify_mode == ssl.CERT_REQUIRED
+    assert target.tls.check_hostname
+    none = tmp_path / "none.pem"
+    none.write_text("nothing")
+    assert "none.pem holds no PEM certificate" in refusal(mqtt_url="mqtts://a", mqtt_ca=str(none))
+    assert "/no: No such file" in refusal(webhook_url="https://a", webhook_ca="/no")
+    assert "--mqtt-url is without TLS" in refusal(mqtt_url="mqtt://a", mqtt_ca=str(made.cert))

@@ -1,0 +1,164 @@
+"""One POST to a real server: what it says, and how little is taken of what comes back."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import ssl
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from lupin_bridge.notify.destinations import Targets, WebhookTarget
+from lupin_bridge.notify.webhook import MAX_HEAD_BYTES, PostAnswer, PostError, post
+from lupin_bridge.settings import Secrets, Settings
+from tests.support.mosquitto import free_port
+from tests.support.receiver import Posted, receiver, silence, status
+from tests.support.tls import Certificate, certificate
+
+
+def target(url: str, ca: str = "") -> WebhookTarget:
+    settings = Settings(webhook_url=url, webhook_ca=ca)
+    found = Targets.of(settings, Secrets(webhook_secret="s" * 16)).webhook
+    assert found is not None
+    return found
+
+
+def sent(url: str, answer_s: float = 60.0, ca: str = "") -> PostAnswer:
+    return asyncio.run(post(target(url, ca), {"webhook-id": "1"}, b'{"a":1}', 60.0, answer_s))
+
+
+def refusal(url: str, answer_s: float = 60.0, ca: str = "") -> str:
+    with pytest.raises(PostError) as refused:
+        sent(url, answer_s, ca)
+    return str(refused.value)
+
+
+def test_a_post_says_what_it_is() -> None:
+    with receiver(status(204)) as server:
+        assert sent(f"http://127.0.0.1:{server.port}/hook?a=b") == PostAnswer(204)
+    (posted,) = server.posted
+    assert (posted.path, posted.body) == ("/hook?a=b", b'{"a":1}')
+    assert posted.headers["content-type"] == "application/json"
+    assert posted.headers["host"] == f"127.0.0.1:{server.port}"
+    assert posted.headers["webhook-id"] == "1"
+
+
+@pytest.mark.parametrize("code", [200, 302, 404, 500])
+def test_any_status_is_an_answer_and_a_redirect_is_not_followed(code: int) -> None:
+    with receiver(status(200)) as elsewhere:
+        place = f"Location: http://127.0.0.1:{elsewhere.port}/"
+        with receiver(status(code, place, "Retry-After: 7")) as server:
+            assert sent(f"http://127.0.0.1:{server.port}/") == PostAnswer(code, 7)
+    assert elsewhere.posted == []
+
+
+def test_nobody_there_is_told_in_the_systems_words() -> None:
+    assert refusal(f"http://127.0.0.1:{free_port()}/") == "Connection refused"
+
+
+def test_no_answer_in_time_is_none() -> None:
+    with receiver(silence) as server:
+        assert refusal(f"http://127.0.0.1:{server.port}/", 0.05) == "no answer within 0.05 s"
+
+
+def test_an_answer_that_trickles_has_the_same_time() -> None:
+    def trickle(_: Posted) -> Iterator[bytes | None]:
+        yield b"HTTP/1.1 200 OK\r\nX: "
+        yield None
+
+    with receiver(trickle) as server:
+        assert refusal(f"http://127.0.0.1:{server.port}/", 0.05) == "no answer within 0.05 s"
+
+
+def test_a_body_is_not_read_however_much_comes() -> None:
+    given: list[int] = []
+
+    def flood(_: Posted) -> Iterator[bytes | None]:
+        yield b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n"
+        while True:
+            given.append(65_536)
+            yield b"10000\r\n" + b"x" * 65_536 + b"\r\n"
+
+    with receiver(flood) as server:
+        assert sent(f"http://127.0.0.1:{server.port}/") == PostAnswer(200)
+    assert sum(given) < 20_000_000  # what the sockets hold
+
+
+def test_a_head_is_read_up_to_a_limit() -> None:
+    def long(_: Posted) -> Iterator[bytes | None]:
+        yield b"HTTP/1.1 200 OK\r\nX: " + b"x" * 2 * MAX_HEAD_BYTES
+        yield None
+
+    with receiver(long) as server:
+        assert refusal(f"http://127.0.0.1:{server.port}/").startswith("no answer of HTTP: ")
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        (b"SSH-2.0-OpenSSH\r\n\r\n", "no answer of HTTP: "),
+        (b"", "the connection was closed before an answer"),
+        (b"HTTP/1.1 200", "the connection was closed before an answer"),
+    ],
+)
+def test_what_is_no_answer_is_told(said: bytes, why: str) -> None:
+    with receiver(lambda _: iter([said])) as server:
+        assert refusal(f"http://127.0.0.1:{server.port}/").startswith(why)
+
+
+def test_what_is_said_before_the_answer_is_none() -> None:
+    first = b"HTTP/1.1 103 Early Hints\r\n\r\nHTTP/1.1 202 OK\r\n\r\n"
+    with receiver(lambda _: iter([first])) as server:
+        assert sent(f"http://127.0.0.1:{server.port}/") == PostAnswer(202)
+
+
+def test_a_wish_to_be_left_alone_that_is_no_number_is_none() -> None:
+    with receiver(status(503, "Retry-After: Wed, 21 Oct 2026 07:28:00 GMT")) as server:
+        assert sent(f"http://127.0.0.1:{server.port}/") == PostAnswer(503)
+
+
+def test_one_of_thousands_of_digits_is_a_long_one() -> None:
+    with receiver(status(200, "Retry-After: " + "9" * 5_000)) as server:
+        assert sent(f"http://127.0.0.1:{server.port}/") == PostAnswer(200, 999_999_999)
+
+
+def test_a_host_that_is_no_name_is_told() -> None:
+    assert refusal("http://a..b/") == "its host is no name that can be looked up"
+
+
+def served(made: Certificate) -> ssl.SSLContext:
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(made.cert, made.key)
+    return context
+
+
+def test_https_is_trusted_by_its_authority_alone(tmp_path: Path) -> None:
+    made = certificate(tmp_path)
+    with receiver(status(200), tls=served(made)) as server:
+        url = f"https://127.0.0.1:{server.port}/"
+        assert "certificate verify failed" in refusal(url)
+        ca = tmp_path / "ca.pem"
+        made.authority.cert_pem.write_to_path(str(ca))
+        assert sent(url, ca=str(ca)) == PostAnswer(200)
+    assert len(server.posted) == 1
+
+
+def test_a_connection_that_is_reset_is_told() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        url = f"http://127.0.0.1:{listener.getsockname()[1]}/"
+
+        async def reset() -> None:
+            loop = asyncio.get_running_loop()
+            listener.setblocking(False)
+            sending = asyncio.create_task(post(target(url), {}, b"{}", 60.0, 60.0))
+            client, _ = await loop.sock_accept(listener)
+            # Closed with a time of 0, it is reset (socket(7)).
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            client.close()
+            with pytest.raises(PostError):
+                await sending
+
+        asyncio.run(reset())

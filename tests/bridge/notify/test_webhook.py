@@ -1,0 +1,262 @@
+"""The webhook and a real receiver: refusing, hanging, slow, failing, and then taking all of it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from lupin_bridge.notify import webhook as webhook_module
+from lupin_bridge.notify.destinations import Targets
+from lupin_bridge.notify.webhook import AT_ONCE, MAX_REFUSALS, ORIGIN_S, Delivery, Webhook
+from lupin_bridge.settings import Secrets, Settings
+from lupin_twin.core.diagnostics import Origin
+from tests.support.docs import block_named
+from tests.support.mosquitto import free_port
+from tests.support.receiver import Answer, Posted, Receiver, receiver, silence, status
+from tests.support.seen import NOW_NS, Alarms, S, alarm
+from tests.support.waiting import PATIENCE_S, until
+
+SECRET = "a secret of 20 chars"
+A, B = alarm("a"), alarm("b", raised_ns=NOW_NS + S)
+
+
+@asynccontextmanager
+async def telling(
+    port: int,
+    board: Alarms,
+    origin: Callable[[], Origin] = lambda: "simulated",
+    origin_s: float = ORIGIN_S,
+) -> AsyncIterator[Webhook]:
+    """A webhook that is in a hurry."""
+    settings = Settings(webhook_url=f"http://127.0.0.1:{port}/hook")
+    target = Targets.of(settings, Secrets(webhook_secret=SECRET)).webhook
+    assert target is not None
+    hook = Webhook(target, first_wait_s=0.001, origin_s=origin_s)
+    hook.start(board, lambda: NOW_NS, origin)
+    try:
+        yield hook
+    finally:
+        await hook.stop()
+
+
+def verified(posted: Posted, secret: str, now_s: float) -> bool:
+    """As the docs show it."""
+    shown: dict[str, Any] = {}
+    exec(block_named("webhook").text, shown)
+    shown["time"] = SimpleNamespace(time=lambda: now_s)
+    return bool(shown["is_genuine"](posted.headers, posted.body, secret))
+
+
+def test_a_long_past_is_taken_part_by_part_and_a_change_behind_it_waits_for_its_turn() -> None:
+    many = [alarm(str(number), raised_ns=NOW_NS - number) for number in range(2 * AT_ONCE + 1)]
+
+    async def run(server: Receiver) -> None:
+        board = Alarms()
+        board.show(many)
+        async with telling(server.port, board) as hook:
+            board.show([*many, B])
+            assert hook.condition.waiting == 0, "nothing of it on the way"
+            await until(lambda: hook.condition.waiting == len(many) + 1, "all of it")
+            await until(lambda: server.posted, "the oldest of it")
+
+    with receiver(silence) as server:
+        asyncio.run(run(server))
+    assert server.posted[0].json["alarm"]["tag_id"] == many[-1].tag_id
+
+
+def test_changes_are_posted_in_order_and_signed() -> None:
+    async def run(server: Receiver) -> None:
+        board = Alarms()
+        board.show([A])
+        async with telling(server.port, board) as hook:
+            await until(lambda: len(server.posted) == 1, "what is active at the start")
+            board.show([replace(A, cleared_at_ns=NOW_NS + 2 * S), B])
+            await until(lambda: hook.condition.sent == 3, "the changes")
+            assert hook.condition.waiting == 0
+            assert hook.condition.detail == ""
+
+    with receiver(status(200)) as server:
+        asyncio.run(run(server))
+    changes = [(it.json["change"], it.json["alarm"]["tag_id"]) for it in server.posted]
+    assert changes == [("raised", "a"), ("raised", "b"), ("cleared", "a")]
+    assert {it.json["origin"] for it in server.posted} == {"simulated"}
+    assert [it.json["id"] for it in server.posted] == server.ids
+    (first, *_) = server.posted
+    sent_at = int(first.headers["webhook-timestamp"])
+    assert verified(first, SECRET, sent_at)
+    assert not verified(first, SECRET, sent_at + 300)
+    assert not verified(first, "another secret of 28 chars", sent_at)
+    assert not verified(replace(first, body=first.body + b" "), SECRET, sent_at)
+
+
+def slowly(_: Posted) -> Iterator[bytes | None]:
+    yield from (bytes([byte]) for byte in b"HTTP/1.1 200 OK\r\n\r\n")
+
+
+def cut(_: Posted) -> Iterator[bytes | None]:
+    return iter(())
+
+
+@pytest.mark.parametrize("bad", [status(500), status(302), status(429, "Retry-After: 0"), cut])
+def test_what_is_not_taken_comes_again_with_the_same_id_and_the_rest_behind_it(
+    bad: Answer,
+) -> None:
+    async def run(server: Receiver) -> None:
+        board = Alarms()
+        board.show([A, B])
+        origins: list[Origin] = ["robot"]
+        async with telling(server.port, board, lambda: origins[-1]) as hook:
+            assert hook.condition.waiting == 2
+            origins.append("recorded")
+            await until(lambda: hook.condition.sent == 2, "both")
+            assert hook.condition.failed == 2
+            assert hook.condition.is_connected
+
+    with receiver(bad, bad, slowly, status(200)) as server:
+        asyncio.run(run(server))
+    assert server.ids == [f"{A.id}.raised"] * 3 + [f"{B.id}.raised"]
+    assert {it.json["origin"] for it in server.posted} == {"robot"}, "what it was as it was heard"
+
+
+def test_nothing_is_posted_before_it_is_known_where_it_comes_from() -> None:
+    asked: list[int] = []
+    origins: list[Origin] = ["unknown"]
+
+    def origin() -> Origin:
+        asked.append(1)
+        return origins[-1]
+
+    async def run(server: Receiver) -> None:
+        board = Alarms()
+        board.show([A, B])
+        async with telling(server.port, board, origin, origin_s=PATIENCE_S) as hook:
+            await until(lambda: len(asked) > 4, "it to be looked for, again and again")
+            assert (hook.condition.waiting, server.posted) == (2, [])
+            origins.append("robot")
+            await until(lambda: hook.condition.sent == 2, "both")
+
+    with receiver(status(200)) as server:
+        asyncio.run(run(server))
+    assert [it.json["origin"] for it in server.posted] == ["robot", "robot"]
+
+
+def test_of_a_twin_that_never_says_where_it_comes_from_alarms_are_posted_all_the_same() -> None:
+    async def run(server: Receiver) -> None:
+        board = Alarms()
+        board.show([A, B])
+        async with telling(server.port, board, lambda: "unknown", origin_s=0.5) as hook:
+            await until(lambda: hook.condition.sent == 2, "both")
+
+    with receiver(status(200)) as server:
+        asyncio.run(run(server))
+    assert [it.json["origin"] for it in server.posted] == ["unknown", "unknown"]
+
+
+def test_one_that_refuses_and_comes_later_gets_all_of_it() -> None:
+    port = free_port()
+
+    async def run() -> None:
+        board = Alarms()
+        async with telling(port, board) as hook:
+            board.show([A])
+            await until(lambda: hook.condition.failed > 3, "some tries")
+            assert hook.condition.waiting == 1
+            assert not hook.condition.is_connected
+            assert hook.condition.detail == f"Connection refused (http://127.0.0.1:{port})"
+            assert "hook" not in hook.condition.detail
+            with receiver(status(200), port=port) as server:
+                await until(lambda: hook.condition.sent == 1, "the alarm")
+            assert server.ids == [f"{A.id}.raised"]
+
+    asyncio.run(run())
+
+
+def test_one_that_hangs_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(webhook_module, "ANSWER_S", 0.2)
+
+    async def run(server: Receiver) -> None:
+        board = Alarms()
+        board.show([A])
+        async with telling(server.port, board) as hook:
+            await until(lambda: hook.condition.sent == 1, "the alarm")
+
+    with receiver(silence, status(200)) as server:
+        asyncio.run(run(server))
+    # On a busy machine the answer may be late once more.
+    assert len(server.ids) >= 2
+    assert set(server.ids) == {f"{A.id}.raised"}
+
+
+def test_a_message_that_the_receiver_will_not_have_does_not_hold_up_the_others() -> None:
+    async def run(server: Receiver) -> None:
+        board = Alarms()
+        board.show([A, B])
+        async with telling(server.port, board) as hook:
+            await until(lambda: hook.condition.sent == 1, "the second")
+            assert (hook.condition.dropped, hook.condition.waiting) == (1, 0)
+
+    with receiver(*[status(422)] * MAX_REFUSALS, status(200)) as server:
+        asyncio.run(run(server))
+    assert server.ids == [f"{A.id}.raised"] * MAX_REFUSALS + [f"{B.id}.raised"]
+    assert server.posted[-1].json["lost"] == 1
+
+
+def test_words_of_any_length_are_said_once_and_cut(caplog: pytest.LogCaptureFixture) -> None:
+    async def run(server: Receiver) -> None:
+        board = Alarms()
+        board.show([A])
+        async with telling(server.port, board) as hook:
+            await until(lambda: hook.condition.failed > 2, "some tries")
+
+    with receiver(lambda _: iter([b"x" * 3_000 + b"\r\n\r\n"])) as server:
+        asyncio.run(run(server))
+    (said,) = [r.getMessage() for r in caplog.records if "takes no alarms" in r.getMessage()]
+    assert len(said) < 300
+
+
+def test_what_cannot_even_be_sent_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> bytes:
+        raise TypeError("no such thing")
+
+    async def run() -> None:
+        board = Alarms()
+        board.show([A])
+        async with telling(free_port(), board) as hook:
+            await until(lambda: hook.condition.failed == 1, "the try")
+            assert not hook.condition.is_connected
+            assert hook.condition.detail.startswith("TypeError (http://")
+
+    monkeypatch.setattr(Delivery, "body", broken)
+    asyncio.run(run())
+
+
+def test_it_ends_at_once_while_somebody_hangs() -> None:
+    async def run(server: Receiver) -> None:
+        board = Alarms()
+        board.show([A])
+        async with telling(server.port, board) as hook:
+            await until(lambda: len(server.posted) == 1, "the post")
+            async with asyncio.timeout(5.0):  # the answer may take 10 s
+                await hook.stop()
+
+    with receiver(silence) as server:
+        asyncio.run(run(server))
+
+
+def test_after_a_restart_the_same_is_told_with_the_same_ids() -> None:
+    async def run(server: Receiver) -> None:
+        board = Alarms()
+        board.show([A])
+        for number in (1, 2):
+            async with telling(server.port, board) as hook:
+                await until(lambda: hook.condition.sent == 1, f"start {number}")
+
+    with receiver(status(200)) as server:
+        asyncio.run(run(server))
+    assert server.ids == [f"{A.id}.raised"] * 2

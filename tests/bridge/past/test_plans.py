@@ -1,0 +1,115 @@
+"""What is asked of the past: it crosses, it says what it costs, who has the answer gets none."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import pickle
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from lupin_bridge.field.formats import PNG
+from lupin_bridge.judge.options import Criteria
+from lupin_bridge.past.plans import (
+    Answered,
+    ConditionalQuery,
+    Health,
+    History,
+    NoSuchTag,
+    OneTag,
+    Query,
+    Timeline,
+    WholeState,
+)
+from lupin_bridge.past.query import PeriodQuery
+from lupin_bridge.serving.admission import Answer
+from lupin_bridge.settings import Settings
+from lupin_twin.core.journal_condition import UNKNOWN
+from lupin_twin.core.past import Event, SeriesPast, SeriesRequest
+from lupin_twin.core.writes import RecentRequest
+from lupin_twin.field.idw import never
+from lupin_twin.runtime.workers import SMALL_S
+from tests.bridge.past.test_as_of import HOUSE, NS, asked
+
+CRITERIA = Criteria.of(Settings(time_zone="Europe/Amsterdam"))
+QUESTIONS: tuple[Query, ...] = (
+    WholeState(5 * NS),
+    OneTag(5 * NS, "b"),
+    Health(5 * NS, CRITERIA),
+    replace(asked(sensor_type="co2_dose"), at_ns=5 * NS, field_format=PNG),
+    replace(asked(), at_ns=5 * NS, field_format=PNG),
+    replace(asked(), at_ns=5 * NS),
+    History(SeriesRequest("a", "co2"), 9 * NS, CRITERIA, UNKNOWN),
+    Timeline(PeriodQuery(0, 9 * NS, 5), UNKNOWN),
+)
+
+
+def answer(question: Query, has: str = "") -> Answered:
+    """What is made of the house, and of series without an entry."""
+    looking = ConditionalQuery(question, has).look()
+    found: Any = None
+    try:
+        while True:
+            need = looking.send(found)
+            if isinstance(need, SeriesRequest):
+                found = SeriesPast(0, 9 * NS)
+            else:
+                found = () if isinstance(need, RecentRequest) else HOUSE
+    except StopIteration as end:
+        answered: Answered = end.value.do(never)
+        return answered
+
+
+@pytest.mark.parametrize("question", QUESTIONS, ids=lambda q: type(q).__name__)
+def test_it_crosses_and_its_answer_is_the_same_there(question: Query) -> None:
+    there: Query = pickle.loads(pickle.dumps(question, 5))
+    assert there == question
+    assert hash(there) == hash(question)
+    told = answer(there)
+    assert told == answer(question)
+    assert pickle.loads(pickle.dumps(told, 5)) == told
+    # Who has it is told so: the ETag is the same, and nothing is written.
+    assert answer(there, f'"other", W/{told.etag}') == Answered(told.etag, None)
+
+
+def test_a_timeline_asks_for_its_parts_one_by_one() -> None:
+    looking = Timeline(PeriodQuery(0, 9 * NS, 5), UNKNOWN).look()
+    needs = [next(looking)]
+    with contextlib.suppress(StopIteration):
+        while True:
+            needs.append(looking.send(SeriesPast(0, 9 * NS)))
+    assert {need.sensor_type for need in needs if isinstance(need, SeriesRequest)} == set(Event)
+
+
+def test_a_large_body_goes_beside_the_rest() -> None:
+    for length, beside in ((65_536, 0), (65_537, 1)):
+        answered = Answered("x", Answer(b"7" * length, "text/plain", {"a": "b"}))
+        buffers: list[pickle.PickleBuffer] = []
+        text = pickle.dumps(answered, 5, buffer_callback=buffers.append)
+        assert (len(buffers), len(text) > length) == (beside, not beside)
+        found = pickle.loads(text, buffers=[buffer.raw() for buffer in buffers])
+        assert found.answer is not None
+        assert bytes(found.answer.body) == b"7" * length
+
+
+def test_a_tag_that_was_not_known_is_told_with_how_many_were() -> None:
+    with pytest.raises(NoSuchTag) as caught:
+        answer(OneTag(5 * NS, "c"))
+    there = pickle.loads(pickle.dumps(caught.value))
+    assert (there.tag_id, there.known) == ("c", 2)
+
+
+def test_a_large_house_and_a_large_field_cost_more_than_small_ones() -> None:
+    for question in QUESTIONS:
+        assert question.cost_s(10_000) >= question.cost_s(30)
+    assert QUESTIONS[0].cost_s(30) < SMALL_S < QUESTIONS[0].cost_s(10_000)
+    fine = replace(asked(resolution=0.001), at_ns=0, field_format=PNG)
+    assert fine.cost_s(30) > SMALL_S, "one that will be refused is no small one"
+    # All that is looked up counts, and not the first of it alone.
+    history = History(SeriesRequest("a", "co2"), None, CRITERIA, UNKNOWN)
+    assert history.cost_s(30) < SMALL_S
+    assert Timeline(PeriodQuery(0, 0, 1, "a"), UNKNOWN).cost_s(30) > SMALL_S
+    for question in QUESTIONS[:5]:
+        assert json.dumps(question.cost_s(0))

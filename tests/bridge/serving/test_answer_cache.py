@@ -1,0 +1,114 @@
+"""Answers that are written already: what is kept, what goes, and what readers hold."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lupin_bridge.serving.admission import ENTRY_BYTES, MAX_NEWEST, Answer, AnswerCache
+
+
+def answer(size: int) -> Answer:
+    return Answer(b"x" * size, "text/plain")
+
+
+def kept_for(*bodies: int) -> AnswerCache:
+    """Room for exactly these bodies."""
+    return AnswerCache(max_bytes=sum(bodies) + len(bodies) * ENTRY_BYTES)
+
+
+def has(kept: AnswerCache, key: object) -> bool:
+    lent = kept.lend(key)
+    if lent is not None:
+        lent[1]()
+    return lent is not None
+
+
+def test_what_was_put_is_lent() -> None:
+    kept, given_answer = kept_for(10), answer(10)
+    assert kept.lend("a") is None
+    kept.put("a", given_answer)
+    lent = kept.lend("a")
+    assert lent is not None
+    assert lent[0] is given_answer, "and its body is the very same: nothing is copied"
+
+
+@pytest.mark.parametrize(("size", "is_kept"), [(10, True), (11, False)])
+def test_one_past_the_whole_bound_is_not_kept(size: int, is_kept: bool) -> None:
+    kept = kept_for(10)
+    kept.put("a", answer(size))
+    assert has(kept, "a") is is_kept
+
+
+def test_the_least_recently_used_goes_first() -> None:
+    kept = kept_for(10, 10, 10)
+    for key in "abc":
+        kept.put(key, answer(10))
+    assert has(kept, "a")
+    kept.put("d", answer(10))
+    assert [has(kept, key) for key in "abcd"] == [True, False, True, True]
+
+
+def test_what_is_being_sent_stays_and_counts_until_it_is_given_back() -> None:
+    kept = kept_for(10, 10)
+    kept.put("a", answer(10))
+    lent = [kept.lend("a"), kept.lend("a")]
+    kept.put("b", answer(10))
+    kept.put("c", answer(10))
+    assert [has(kept, key) for key in "abc"] == [True, False, True]
+    kept.put("d", answer(20 + ENTRY_BYTES))
+    assert not has(kept, "d"), "there is no room while anybody reads"
+    for one in lent:
+        assert one is not None
+        one[1]()
+    kept.put("d", answer(20 + ENTRY_BYTES))
+    assert [has(kept, key) for key in "abcd"] == [False, False, False, True]
+
+
+def test_what_replaces_another_takes_its_place() -> None:
+    kept = kept_for(10, 10, 10)
+    kept.put("field", answer(10))
+    for number in range(100):
+        kept.put(("state", number), answer(10), instead_of=("state", number - 1))
+    assert has(kept, "field"), "the many states in between did not drive it out"
+    assert len(kept) == 2
+
+
+Step = tuple[str, int, int]
+STEPS = st.lists(
+    st.tuples(st.sampled_from(["put", "lend", "give back"]), st.integers(0, 5), st.integers(0, 40))
+)
+
+
+@given(STEPS)
+def test_the_bound_holds_whatever_happens(steps: list[Step]) -> None:
+    kept = AnswerCache(max_bytes=60 + 3 * ENTRY_BYTES)
+    lent: list[Any] = []
+    for what, key, size in steps:
+        if what == "put":
+            kept.put(key, answer(size))
+        elif what == "lend" and (one := kept.lend(key)) is not None:
+            lent.append(one)
+        elif what == "give back" and lent:
+            lent.pop()[1]()
+        assert 0 <= kept.bytes <= 60 + 3 * ENTRY_BYTES
+        for one, _ in lent:
+            assert any(entry.answer is one for entry in kept._entries.values())
+    for _, give_back in lent:
+        give_back()
+    assert kept.bytes == sum(entry.bytes for entry in kept._entries.values())
+    assert all(entry.readers == 0 for entry in kept._entries.values())
+
+
+def test_the_newest_etags_are_told() -> None:
+    kept = AnswerCache()
+    for number in range(MAX_NEWEST + 1):
+        kept.put(f'"{number}"', Answer(b"", "text/plain"))
+    assert kept.newest_tags() == [f'"{number}"' for number in range(MAX_NEWEST, 0, -1)]
+    kept.put(("no", "tag"), Answer(b"", "text/plain"))
+    lent = kept.lend('"1"')
+    assert lent is not None
+    assert kept.newest_tags()[:2] == ['"1"', f'"{MAX_NEWEST}"']

@@ -1,0 +1,129 @@
+"""A defect in judging costs a tag, or a state, its status; the frames go on."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from typing import Any
+
+import pytest
+from websockets.asyncio.client import connect
+
+from lupin_bridge.feed.source import TwinUpdate
+from lupin_bridge.judge.verdict import Health, judge_house, judge_tag
+from lupin_bridge.stream.hub import Client
+from lupin_twin.core.state import Reading, Snapshot, TagState
+from tests.bridge.test_bridge import Ear, Stage
+from tests.support.inprocess import run, running
+from tests.support.messages import scan
+from tests.support.ros import Peer
+from tests.support.waiting import PATIENCE_S, until
+from tests.support.web import ws_url
+
+
+def judged_state(number: int) -> TwinUpdate:
+    """The state after so many scans of two tags."""
+    stamp_ns = number * 10**9
+    readings = (Reading("temperature", 24.0, stamp_ns),)
+    tags = tuple(
+        TagState(tag_id, readings=readings, last_observed_ns=stamp_ns) for tag_id in ("bad", "good")
+    )
+    return TwinUpdate(Snapshot(stamp_ns, "map", tags), f"r{number}")
+
+
+def test_a_tag_that_cannot_be_judged_is_unknown_and_the_frames_go_on(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    is_broken = True
+
+    def judge(tag: TagState, *args: Any, **more: Any) -> Health:
+        if tag.tag_id == "bad" and is_broken:
+            raise ZeroDivisionError("a defect")
+        return judge_tag(tag, *args, **more)
+
+    monkeypatch.setattr("lupin_bridge.judge.judging.judge_tag", judge)
+
+    async def test() -> None:
+        nonlocal is_broken
+        async with Stage(frames_per_s=1000.0) as stage:
+            for number in range(1, 6):
+                stage.script.tell(judged_state(number))
+                await until(lambda: len(stage.ear.states) == number, "the frame")  # noqa: B023
+                health = stage.ear.states[-1]["health"]["tags"]
+                assert health["bad"] == {"verdict": "unknown"}
+                assert health["good"]["verdict"] == "healthy"
+            assert caplog.text.count("bad could not be judged") == 1
+            assert caplog.text.count("ZeroDivisionError: a defect") == 1
+            assert b"lupin_judge_errors_total 5.0" in stage.bridge.metrics.text()
+            is_broken = False
+            stage.script.tell(judged_state(6))
+            await until(lambda: len(stage.ear.states) == 6, "the frame")
+            assert stage.ear.states[-1]["health"]["tags"]["bad"]["verdict"] == "healthy"
+
+    asyncio.run(test())
+
+
+def test_a_state_that_cannot_be_judged_goes_out_and_all_is_unknown(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    is_broken = False
+
+    def judge(*args: Any, **more: Any) -> Health:
+        if is_broken:
+            raise ZeroDivisionError("a defect")
+        return judge_house(*args, **more)
+
+    monkeypatch.setattr("lupin_bridge.judge.judging.judge_house", judge)
+
+    def verdicts(frame: dict[str, Any]) -> list[str]:
+        health = frame["health"]
+        return [health["house"]["verdict"], *(tag["verdict"] for tag in health["tags"].values())]
+
+    async def test() -> None:
+        nonlocal is_broken
+        delta = Ear()
+        async with Stage(frames_per_s=1000.0) as stage:
+            stage.bridge.join(Client(delta, delta=True))
+            for number, is_broken in enumerate((False, True, True, False), start=1):
+                stage.script.tell(judged_state(number))
+                await until(lambda: len(stage.ear.states) == number, "the frame")  # noqa: B023
+                wanted = "unknown" if is_broken else "healthy"
+                assert verdicts(stage.ear.states[-1]) == [wanted] * 3
+            assert [verdicts(frame) for frame in delta.heard if frame["type"] == "delta"] == [
+                ["unknown"] * 3,
+                ["unknown"],
+                ["healthy"] * 3,
+            ]
+            assert caplog.text.count("ZeroDivisionError: a defect") == 1
+            assert b"lupin_judge_errors_total 2.0" in stage.bridge.metrics.text()
+
+    asyncio.run(test())
+
+
+def test_of_a_real_twin_the_others_are_judged_and_the_state_is_answered(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def judge(tag: TagState, *args: Any, **more: Any) -> Health:
+        if tag.tag_id == "bad":
+            raise ZeroDivisionError("a defect")
+        return judge_tag(tag, *args, **more)
+
+    monkeypatch.setattr("lupin_bridge.judge.judging.judge_tag", judge)
+
+    async def test() -> None:
+        async with running() as served, connect(ws_url(served.url), proxy=None) as listener:
+            with Peer(domain) as peer:
+                for tag_id in ("bad", "good"):
+                    peer.observe(scan(tag_id, {"temperature": 24.0}))
+                seen: dict[str, Any] = {}
+                while len(seen) < 2:
+                    frame = json.loads(await asyncio.wait_for(listener.recv(), PATIENCE_S))
+                    seen = frame.get("health", {}).get("tags", {})
+            assert {tag_id: tag["verdict"] for tag_id, tag in seen.items()} == {
+                "bad": "unknown",
+                "good": "healthy",
+            }
+            answer = await served.http.get("/api/health")
+            assert answer.json()["tags"]["bad"]["verdict"] == "unknown"
+
+    run(domain, test())

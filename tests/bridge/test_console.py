@@ -1,0 +1,97 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from lupin_bridge.console import say, tell
+from tests.support.waiting import PATIENCE_S
+
+# It says, tells and says again, and a file that it opens gets neither of the two.
+SCRIPT = """
+import os, sys
+from lupin_bridge.console import say, tell
+from lupin_twin.runtime.process import open_standard_files
+open_standard_files()
+file = os.open(sys.argv[1], os.O_WRONLY | os.O_CREAT)
+say("one")
+tell("first", "second")
+say("two")
+os.system("echo three; echo four >&2")
+os.write(file, b"its own")
+sys.exit(7)
+"""
+
+
+def run(path: Path, streams: str) -> subprocess.CompletedProcess[str]:
+    """The script with its streams led there by a shell."""
+    command = f'exec "$@" {streams}'
+    return subprocess.run(
+        ["sh", "-c", command, "sh", sys.executable, "-c", SCRIPT, str(path)],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
+    )
+
+
+NO_ROOM = "lupin-twin: cannot write to the standard output: No space left on device\n"
+
+
+@pytest.mark.parametrize(
+    ("streams", "out", "err"),
+    [
+        ("", "first\nsecond\nthree\n", "lupin-twin: one\nlupin-twin: two\nfour\n"),
+        ("2>&-", "first\nsecond\nthree\n", ""),
+        ("2>/dev/full", "first\nsecond\nthree\n", ""),
+        (">&-", "", "lupin-twin: one\nlupin-twin: two\nfour\n"),
+        ("<&- >&- 2>&-", "", ""),
+        (">/dev/full 2>/dev/full", "", ""),
+    ],
+)
+def test_what_cannot_be_said_ends_nothing_and_is_in_no_file(
+    tmp_path: Path, streams: str, out: str, err: str
+) -> None:
+    ended = run(tmp_path / "file", streams)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (7, out, err)
+    assert (tmp_path / "file").read_bytes() == b"its own"
+
+
+def test_output_that_has_no_room_is_told_once(tmp_path: Path) -> None:
+    ended = run(tmp_path / "file", ">/dev/full")
+    assert ended.returncode == 7
+    assert ended.stderr.count(NO_ROOM) == 1
+    assert "Error" not in ended.stderr
+
+
+def test_who_reads_no_more_is_told_nothing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer, "w") as pipe:
+        monkeypatch.setattr(sys, "stdout", pipe)
+        tell("first")
+        assert capsys.readouterr().err == ""
+        monkeypatch.setattr(sys, "stderr", pipe)
+        for _ in range(2):
+            say("nobody hears it")
+        # Nothing waits that would be tried again, and fail, as it is closed.
+    monkeypatch.setattr(sys, "stderr", None)
+    say("nobody hears it")
+
+
+def test_a_stream_that_somebody_has_closed_ends_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with (tmp_path / "log").open("w") as log:
+        monkeypatch.setattr(sys, "stderr", log)
+    say("nobody hears it")
+
+
+def test_a_line_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    say("one\n  and two")
+    assert capsys.readouterr().err == "lupin-twin: one and two\n"

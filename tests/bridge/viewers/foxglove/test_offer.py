@@ -1,0 +1,245 @@
+"""The channels that there are, of a script of ROS: what is offered, and who is told of news."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lupin_bridge.feed.relay import RosTime
+from lupin_bridge.feed.source import TwinUnavailableError
+from lupin_bridge.feed.topics import TwinNames, topics_of
+from lupin_bridge.viewers import foxglove_session as module
+from lupin_bridge.viewers.foxglove_session import MAX_LAYERS, Offer
+from tests.support.waiting import until
+
+LAYOUT = Path(__file__).parents[4] / "backend" / "foxglove" / "lupin-twin.json"
+NAMES = TwinNames(
+    *("/n/twin/state", "/n/twin/get_field", "/o", "/d", "/map", "/diag"),
+    *("/n/twin/field/", "/n/twin/tags", "/n/twin/planters"),
+)
+OWN = ["/n/twin/state", "/o", "/d", "/map", "/diag"]
+POINTS, MARKERS = "sensor_msgs/msg/PointCloud2", "visualization_msgs/msg/MarkerArray"
+
+
+class Source:
+    """A source, and the relay of it, that say what the test makes them say."""
+
+    def __init__(self, published: Mapping[str, str] = {}) -> None:  # never changed
+        self.relay = self
+        self.now_published = dict(published)
+        self.now = RosTime(5, is_simulated=False)
+        self.looks = 0
+        self.answers = asyncio.Event()
+        self.answers.set()
+        self.fault: Exception | None = None
+        self.has_ended = False
+
+    def names(self) -> TwinNames:
+        return NAMES
+
+    async def published(self, is_wanted: Callable[[str, str], bool]) -> Mapping[str, str]:
+        self.looks += 1
+        await self.answers.wait()
+        if self.fault is not None:
+            raise self.fault
+        if self.has_ended:
+            raise TwinUnavailableError("the ROS thread has ended")
+        return {name: kind for name, kind in self.now_published.items() if is_wanted(name, kind)}
+
+    async def time(self) -> RosTime:
+        return self.now
+
+
+@pytest.fixture(autouse=True)
+def schemas(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every type has a text, of however much is installed, but for one."""
+
+    def text(type_name: str) -> str:
+        if type_name == MARKERS:
+            raise LookupError(f"the message type {type_name} is not installed")
+        return f"# {type_name}"
+
+    monkeypatch.setattr(module, "schema_text", text)
+
+
+def offer_of(source: Source) -> Offer:
+    any_source: Any = source
+    return Offer(any_source)
+
+
+def topics(offer: Offer) -> list[str]:
+    assert offer.channels.keys() == offer.wires.keys() == offer.topics.keys()
+    assert all(offer.topics[key].name == each.topic for key, each in offer.channels.items())
+    return [channel.topic for channel in offer.channels.values()]
+
+
+def test_a_twins_topics_are_offered_and_the_layers_that_are_published() -> None:
+    source = Source(
+        {
+            "/n/twin/field/co2": POINTS,
+            "/n/twin/field/odd": "std_msgs/msg/String",
+            "/n/twin/scan": POINTS,
+            "/twin/field/other_house": POINTS,
+            "/n/twin/state": "lupin_msgs/msg/TwinState",
+            "/cmd_vel": "geometry_msgs/msg/Twist",
+        }
+    )
+
+    async def test() -> None:
+        offer = offer_of(source)
+        await asyncio.gather(offer.look(), offer.look())
+        assert (topics(offer), source.looks) == ([*OWN, "/n/twin/field/co2"], 1)
+        assert offer.channels[1].schema == "# lupin_msgs/msg/TwinState"
+
+    asyncio.run(test())
+
+
+def test_a_client_that_goes_does_not_end_the_look_of_another() -> None:
+    async def test() -> None:
+        source = Source()
+        offer = offer_of(source)
+        source.answers.clear()
+        gone, waiting = (asyncio.create_task(offer.look()) for _ in range(2))
+        await until(lambda: source.looks == 1, "the look of both")
+        gone.cancel()
+        await asyncio.wait([gone])
+        source.answers.set()
+        await waiting
+        assert (topics(offer), source.looks) == (OWN, 1)
+
+    asyncio.run(test())
+
+
+def test_looking_goes_on_after_an_error(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(module, "LOOK_S", 0.0)
+
+    async def test() -> None:
+        source = Source()
+        source.fault = RuntimeError("a fault")
+        offer = offer_of(source)
+        with offer.followed(lambda _: None):
+            await until(lambda: "met an error and goes on" in caplog.text, "the error")
+            source.fault = None
+            await until(lambda: offer.topics, "the topics")
+
+    asyncio.run(test())
+
+
+def test_what_has_no_definition_is_left_out_and_warned_of_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async def test() -> None:
+        offer = offer_of(Source({"/n/twin/tags": MARKERS, "/n/twin/planters": MARKERS}))
+        for _ in range(3):
+            await offer.look()
+        assert topics(offer) == OWN
+        assert caplog.text.count("is not offered to viewers") == 1
+
+    asyncio.run(test())
+
+
+def test_layers_are_bounded_and_without_ros_there_are_none() -> None:
+    async def test() -> None:
+        source = Source({f"/n/twin/field/s{n:03}": POINTS for n in range(MAX_LAYERS + 1)})
+        offer = offer_of(source)
+        await offer.look()
+        assert len(topics(offer)) == len(OWN) + MAX_LAYERS
+        source.has_ended = True
+        await offer.look()
+        assert topics(offer) == OWN
+
+    asyncio.run(test())
+
+
+def test_followers_are_told_of_news_alone_and_an_id_never_comes_back(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "LOOK_S", 0.0)
+    monkeypatch.setattr(module, "TICK_S", 0.0)
+
+    async def test() -> None:
+        source = Source({"/n/twin/field/a": POINTS})
+        offer = offer_of(source)
+        await offer.look()
+        news: list[int | None] = []
+        with offer.followed(news.append):
+            looks = source.looks
+            await until(lambda: source.looks > looks + 2, "some looks")
+            assert news == []
+            del source.now_published["/n/twin/field/a"]
+            await until(lambda: news == [None], "the layer's end")
+            assert topics(offer) == OWN
+            source.now_published["/n/twin/field/a"] = POINTS
+            await until(lambda: news == [None, None], "the layer again")
+            assert max(offer.channels) == len(OWN) + 2
+            source.now = RosTime(0, is_simulated=True)
+            await until(lambda: offer.has_time, "simulated time")
+            source.now = RosTime(7, is_simulated=True)
+            await until(lambda: news[2:] == [7], "its first moment")
+            looks = source.looks
+            await until(lambda: source.looks > looks + 2, "some looks")
+            assert news[2:] == [7], "time that stands is told once"
+            late: list[int | None] = []
+            with offer.followed(late.append):
+                assert late == [7], "and once to whoever comes meanwhile"
+
+        def following() -> list[str]:
+            names = (task.get_name() for task in asyncio.all_tasks())
+            return [name for name in names if name.startswith("foxglove")]
+
+        await until(lambda: not following(), "an end of looking: nobody follows")
+        next_one: list[int | None] = []
+        with offer.followed(next_one.append):
+            await until(lambda: next_one == [7], "the time that still stands")
+
+    asyncio.run(test())
+
+
+def test_a_follower_that_fails_costs_the_others_nothing(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(module, "LOOK_S", 0.0)
+    monkeypatch.setattr(module, "TICK_S", 0.0)
+
+    def fail(_: int | None) -> None:
+        raise ZeroDivisionError
+
+    async def test() -> None:
+        source = Source()
+        offer = offer_of(source)
+        await offer.look()
+        news: list[int | None] = []
+        with offer.followed(fail), offer.followed(news.append):
+            source.now_published["/n/twin/field/a"] = POINTS
+            await until(lambda: news == [None], "the layer")
+            source.now = RosTime(7, is_simulated=True)
+            await until(lambda: news == [None, 7], "its first moment")
+            source.now = RosTime(8, is_simulated=True)
+            await until(lambda: news == [None, 7, 8], "and the next")
+        assert caplog.text.count("a viewer met an error") == 3
+
+    asyncio.run(test())
+
+
+def test_the_layout_shows_what_is_offered_and_each_of_its_panels_has_a_place() -> None:
+    layout = json.loads(LAYOUT.read_text(encoding="utf-8"))
+    named: set[str] = set()
+    for panel in layout["configById"].values():
+        named |= {panel.get("topicPath"), panel.get("topicToRender"), *panel.get("topics", ())}
+    names = TwinNames("/twin/state", "/twin/get_field")
+    known = {topic.name for topic in topics_of(names)} | {names.tags_layer, names.planters_layer}
+    layers = {name for name in named - {None} if name.startswith(names.field_layers)}
+    assert named - {None} - layers <= known
+    assert len(layers) == 1
+
+    def placed(node: Any) -> set[str]:
+        return {node} if isinstance(node, str) else placed(node["first"]) | placed(node["second"])
+
+    assert placed(layout["layout"]) == set(layout["configById"])

@@ -1,0 +1,161 @@
+"""One client of Foxglove's protocol: what it may have, and what it gets where it is slow."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from lupin_bridge.serving.ws_protocol import MAX_BURST, MAX_MESSAGES_PER_S, TooManyMessages
+from lupin_bridge.viewers.foxglove_protocol import MAX_SUBSCRIPTIONS, Channel
+from lupin_bridge.viewers.foxglove_session import (
+    MAX_MESSAGE_BYTES,
+    Counts,
+    Message,
+    Reaction,
+    Session,
+)
+
+CHANNELS = {n: Channel(n, f"/topic{n}", "a/msg/B", "int32 x\n") for n in range(1, 201)}
+WIRES = {n: channel.json() for n, channel in CHANNELS.items()}
+
+
+class Stage:
+    """A session that was told of the channels."""
+
+    def __init__(self) -> None:
+        self.counts = Counts()
+        self.session = Session(self.counts)
+        self.session.offer(CHANNELS, WIRES)
+        self.now_s = 0.0
+
+    def say(self, **members: Any) -> Reaction:
+        self.now_s += 1.0
+        return self.session.receive(json.dumps(members), self.now_s)
+
+    def subscribe(self, *pairs: tuple[int, int]) -> Reaction:
+        entries = [{"id": key, "channelId": channel} for key, channel in pairs]
+        return self.say(op="subscribe", subscriptions=entries)
+
+    def unsubscribe(self, *keys: int) -> Reaction:
+        return self.say(op="unsubscribe", subscriptionIds=keys)
+
+    def written(self) -> list[tuple[int, bytes]]:
+        """All that waits: subscriptions and payloads."""
+        found = []
+        while (parts := self.session.next()) is not None:
+            found.append((parts[0][1], parts[1]))
+        return found
+
+
+@pytest.fixture
+def stage() -> Stage:
+    return Stage()
+
+
+def errors(reaction: Reaction) -> list[str]:
+    told = [json.loads(reply) for reply in reaction.replies]
+    assert all((status["op"], status["level"]) == ("status", 2) for status in told)
+    return [status["message"] for status in told]
+
+
+def test_each_channel_is_subscribed_once_and_each_id_used_once(stage: Stage) -> None:
+    reaction = stage.subscribe((1, 10), (2, 20))
+    assert reaction == Reaction(begun=((1, CHANNELS[10]), (2, CHANNELS[20])))
+    reaction = stage.subscribe((1, 30), (3, 10), (4, 999), (5, 40))
+    assert errors(reaction) == [
+        "subscription 1 is in use; channel 10 is subscribed to already; there is no channel 999"
+    ]
+    assert reaction.begun == ((5, CHANNELS[40]),)
+    reaction = stage.unsubscribe(1, 1, 77)
+    assert (reaction.ended, errors(reaction)) == ((1,), ["there is no subscription 77"])
+    assert stage.subscribe((1, 10)).begun == ((1, CHANNELS[10]),), "free again, both"
+
+
+def test_so_many_subscriptions_and_no_more(stage: Stage) -> None:
+    most = [(n, n) for n in range(1, MAX_SUBSCRIPTIONS + 1)]
+    assert len(stage.subscribe(*most).begun) == MAX_SUBSCRIPTIONS
+    reaction = stage.subscribe((199, 199))
+    assert (reaction.begun, errors(reaction)) == ((), ["128 subscriptions are open, the limit"])
+    stage.unsubscribe(1)
+    assert stage.subscribe((199, 199)).begun
+
+
+def test_a_refusal_is_told_and_changes_nothing(stage: Stage) -> None:
+    expected = "refused: lupin-twin only reads, expected subscribe or unsubscribe"
+    assert errors(stage.say(op="advertise")) == [f"advertise is {expected}"]
+    assert errors(stage.session.receive(b"\x01", 99.0)) == [f"a binary message is {expected}"]
+
+
+def test_who_talks_too_fast_has_to_go(stage: Stage) -> None:
+    for _ in range(MAX_BURST):
+        stage.session.receive("{}", 10.0)
+    with pytest.raises(TooManyMessages, match="more than 100 messages a second after 500 at once"):
+        stage.session.receive("{}", 10.0)
+    stage.session.receive("{}", 10.0 + 1.0 / MAX_MESSAGES_PER_S)
+
+
+def test_the_newest_of_each_subscription_waits_and_each_has_its_turn(stage: Stage) -> None:
+    stage.subscribe((1, 10), (2, 20))
+    for key, payload in ((1, b"a"), (2, b"b"), (1, b"c"), (9, b"nobody")):
+        assert stage.session.put(key, Message(payload, 5)) is None
+    assert stage.written() == [(2, b"b"), (1, b"c")]
+    assert stage.counts == Counts(sent=2, skipped=1)
+    stage.session.put(1, Message(b"d", 5))
+    stage.unsubscribe(1)
+    assert stage.written() == [], "who has unsubscribed hears nothing more"
+
+
+def test_time_goes_before_messages_and_only_the_newest(stage: Stage) -> None:
+    stage.subscribe((1, 10))
+    stage.session.put(1, Message(b"a", 5))
+    stage.session.put_time(7)
+    stage.session.put_time(8)
+    assert stage.session.next() == (b"\x02\x08" + bytes(7), b"")
+    assert stage.written() == [(1, b"a")]
+
+
+def test_a_message_past_the_limit_is_left_out_and_said_once(stage: Stage) -> None:
+    stage.subscribe((1, 10))
+    most = bytes(MAX_MESSAGE_BYTES)
+    assert stage.session.put(1, Message(most, 5)) is None
+    assert len(stage.written()[0][1]) == MAX_MESSAGE_BYTES
+    too_large = Message(most + b"x", 5)
+    note = stage.session.put(1, too_large)
+    assert note is not None
+    assert json.loads(note)["level"] == 1
+    assert json.loads(note)["message"].startswith("messages on '/topic10' are left out while")
+    assert stage.session.put(1, too_large) is None
+    assert stage.written() == []
+
+
+def test_channels_that_come_and_go_are_told_and_their_subscriptions_end(stage: Stage) -> None:
+    stage.subscribe((1, 10), (2, 20))
+    stage.session.put(1, Message(b"a", 5))
+    now = {n: channel for n, channel in CHANNELS.items() if n != 10}
+    now[300] = Channel(300, "/new", "a/msg/B", "")
+    reaction = stage.session.offer(now, {**WIRES, 300: now[300].json()})
+    gone, new = map(json.loads, reaction.replies)
+    assert gone == {"op": "unadvertise", "channelIds": [10]}
+    assert [channel["topic"] for channel in new["channels"]] == ["/new"]
+    assert (reaction.ended, stage.written()) == ((1,), [])
+    assert not stage.session.has(1, CHANNELS[10])
+    assert stage.session.has(2, CHANNELS[20])
+    stage.subscribe((1, 300))
+    assert stage.session.has(1, now[300])
+    assert not stage.session.has(1, CHANNELS[10]), "the id is another channel's now"
+    assert stage.session.offer(now, WIRES) == Reaction()
+
+
+def test_a_client_is_told_of_the_channels_although_there_are_none() -> None:
+    [reply] = Session(Counts()).offer({}, {}).replies
+    assert json.loads(reply) == {"op": "advertise", "channels": []}
+
+
+def test_a_subscription_that_cannot_be_served_is_given_up(stage: Stage) -> None:
+    stage.subscribe((1, 10))
+    stage.session.give_up(1)
+    stage.session.give_up(1)
+    assert not stage.session.has(1, CHANNELS[10])
+    assert stage.subscribe((1, 10)).begun

@@ -1,0 +1,383 @@
+"""One rosbridge client's state: subscriptions, levels, pace; and what each message leads to."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from websockets.client import ClientProtocol
+from websockets.protocol import State
+from websockets.uri import parse_uri
+
+from lupin_bridge.feed.topics import TwinNames
+from lupin_bridge.serving.ws_protocol import MAX_BURST, MAX_MESSAGES_PER_S, TooManyMessages
+from lupin_bridge.stream.frames import FrameWriter, StateFrame
+from lupin_bridge.stream.hub import Client, Hub
+from lupin_bridge.stream.status import Liveness
+from lupin_bridge.viewers.rosbridge_session import MAX_SUBSCRIPTIONS, Reaction, Session
+from lupin_twin.core.state import Snapshot, TagState
+
+TOPIC = "/twin/state"
+NAMES = TwinNames(TOPIC, "/twin/get_field")
+SERVED = "/twin/state, /floranova/observations, /perception/discovered_tags, /map, /diagnostics"
+
+
+@pytest.fixture
+def session() -> Session:
+    return Session(NAMES)
+
+
+def send(session: Session, now_s: float = 0.0, **members: Any) -> Reaction:
+    return session.receive(json.dumps(members), now_s)
+
+
+def replies(reaction: Reaction) -> list[Any]:
+    return [json.loads(reply) for reply in reaction.replies]
+
+
+def subscribe(session: Session, message_id: object = None, **options: Any) -> Reaction:
+    return send(session, **{"op": "subscribe", "topic": TOPIC, "id": message_id, **options})
+
+
+def unsubscribe(session: Session, message_id: object = None, topic: str = TOPIC) -> Reaction:
+    return send(session, op="unsubscribe", topic=topic, id=message_id)
+
+
+def texts_of(wire: bytes) -> list[Any]:
+    """The JSON of every text frame on the wire."""
+    client = ClientProtocol(parse_uri("ws://twin"), state=State.OPEN)
+    client.receive_data(wire)
+    return [json.loads(bytes(event.data)) for event in client.events_received()]  # type: ignore[union-attr]
+
+
+def frame(*tag_ids: str) -> StateFrame:
+    return FrameWriter().state(Snapshot(0, "map", tuple(TagState(t) for t in tag_ids)), "r")
+
+
+# --- subscriptions ----------------------------------------------------------------------------
+
+
+def test_who_subscribes_is_due_the_state_and_gets_no_other_reply(session: Session) -> None:
+    assert not session.is_subscribed
+    assert subscribe(session) == Reaction(state_is_due=True, subscribed=TOPIC)
+    assert session.is_subscribed
+
+
+def test_each_subscription_is_due_the_state(session: Session) -> None:
+    assert subscribe(session, "a").state_is_due
+    assert subscribe(session, "b").state_is_due
+    assert subscribe(session, "a").state_is_due, "roslib repeats itself after a reconnection"
+
+
+def test_the_least_throttle_counts(session: Session) -> None:
+    subscribe(session, "slow", throttle_rate=5000)
+    assert session.min_interval_s == 5.0
+    subscribe(session, "quick", throttle_rate=200)
+    assert session.min_interval_s == 0.2
+    subscribe(session, "quick", throttle_rate=300)
+    assert session.min_interval_s == 0.3, "the same id again replaces the first"
+    subscribe(session, "unthrottled")
+    assert session.min_interval_s == 0.0
+    unsubscribe(session, "unthrottled")
+    unsubscribe(session, "quick")
+    assert session.min_interval_s == 5.0
+
+
+def test_a_subscription_ends_by_its_id(session: Session) -> None:
+    subscribe(session, "a")
+    subscribe(session, 7)
+    subscribe(session)
+    assert unsubscribe(session, "a") == Reaction()
+    assert unsubscribe(session, 7) == Reaction()
+    assert session.is_subscribed
+    assert unsubscribe(session) == Reaction()
+    assert not session.is_subscribed
+
+
+def test_without_an_id_all_end(session: Session) -> None:
+    for message_id in ("a", "b", None):
+        subscribe(session, message_id)
+    unsubscribe(session)
+    assert not session.is_subscribed
+
+
+def test_the_id_1_is_not_the_id_true_nor_the_text_1(session: Session) -> None:
+    subscribe(session, 1)
+    unsubscribe(session, "1")
+    assert session.is_subscribed
+
+
+@pytest.mark.parametrize(("message_id", "topic"), [("b", TOPIC), ("a", "/cmd_vel")])
+def test_to_end_what_was_never_begun_is_worth_a_warning(
+    session: Session, message_id: str, topic: str
+) -> None:
+    subscribe(session, "a")
+    (status,) = replies(unsubscribe(session, message_id, topic))
+    assert (status["level"], status["id"]) == ("warning", message_id)
+    assert status["msg"] == f"there is no such subscription to topic {topic!r}"
+    assert session.is_subscribed
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"topic": "/cmd_vel"}, f"topic '/cmd_vel' is not served, expected one of {SERVED}"),
+        ({"topic": "/map/"}, f"topic '/map/' is not served, expected one of {SERVED}"),
+        (
+            {"type": "std_msgs/String"},
+            "type is 'std_msgs/String', expected lupin_msgs/msg/TwinState",
+        ),
+        ({"throttle_rate": -1}, "throttle_rate is -1, must not be less than 0"),
+        ({"compression": 7}, "compression is 7, expected a string"),
+    ],
+)
+def test_a_refused_subscription_changes_nothing(
+    session: Session, options: dict[str, Any], text: str
+) -> None:
+    reaction = subscribe(session, "a", **options)
+    assert replies(reaction) == [{"op": "status", "level": "error", "msg": text, "id": "a"}]
+    assert not reaction.state_is_due
+    assert not session.is_subscribed
+
+
+@pytest.mark.parametrize("type_", ["lupin_msgs/msg/TwinState", "lupin_msgs/TwinState", "", None])
+def test_the_type_may_be_given_in_both_forms(session: Session, type_: object) -> None:
+    assert subscribe(session, type=type_) == Reaction(state_is_due=True, subscribed=TOPIC)
+
+
+def test_a_subscription_with_warnings_stands(session: Session) -> None:
+    reaction = subscribe(session, "a", queue_length=10, compression="png", fragment_size=9)
+    assert [reply["level"] for reply in replies(reaction)] == ["warning"] * 2
+    assert {reply["id"] for reply in replies(reaction)} == {"a"}
+    assert reaction.state_is_due
+    assert session.is_subscribed
+
+
+def test_subscriptions_are_bounded(session: Session) -> None:
+    for number in range(MAX_SUBSCRIPTIONS):
+        assert not subscribe(session, number).replies
+    (status,) = replies(subscribe(session, "one more"))
+    assert status["msg"] == f"{MAX_SUBSCRIPTIONS} subscriptions are open, the limit"
+    assert not subscribe(session, 0, throttle_rate=1).replies, "replacing one is no new one"
+    unsubscribe(session, 0)
+    assert not subscribe(session, "one more").replies
+
+
+def test_other_topics_are_fed_as_their_last_subscription_wants_it(session: Session) -> None:
+    assert subscribe(session, topic="map", throttle_rate=500) == Reaction(subscribed="map")
+    assert not session.is_subscribed
+    feed = session.feeds["map"]
+    assert (feed.topic.name, feed.topic.type_name) == ("/map", "nav_msgs/msg/OccupancyGrid")
+    assert (feed.name, feed.min_interval_s) == ("map", 0.5)
+    subscribe(session, "b", topic="map", throttle_rate=100)
+    assert session.feeds == {"map": replace(feed, min_interval_s=0.1)}
+    unsubscribe(session, "b", topic="map")
+    assert session.feeds == {"map": feed}
+    unsubscribe(session, topic="map")
+    assert session.feeds == {}
+
+
+# --- the state on the wire --------------------------------------------------------------------
+
+
+def test_a_state_is_a_published_message(session: Session) -> None:
+    subscribe(session)
+    (message,) = texts_of(session.wire(frame("7")))
+    assert (message["op"], message["topic"]) == ("publish", TOPIC)
+    assert [tag["tag_id"] for tag in message["msg"]["tags"]] == ["7"]
+    assert message["msg"]["header"] == {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": "map"}
+
+
+def test_a_state_is_written_once_for_all_clients() -> None:
+    state, sessions = frame("7"), [Session(NAMES) for _ in range(3)]
+    for session in sessions:
+        subscribe(session, "a")
+        subscribe(session, "b")
+    wires = [session.wire(state) for session in sessions]
+    assert wires[0] is wires[1] is wires[2]
+
+
+def test_a_topic_is_called_what_the_client_calls_it(session: Session) -> None:
+    subscribe(session, topic="twin/state")
+    subscribe(session, "a", topic="twin/state")
+    assert [text["topic"] for text in texts_of(session.wire(frame()))] == ["twin/state"]
+    subscribe(session, topic="/twin/state")
+    spellings = [text["topic"] for text in texts_of(session.wire(frame()))]
+    assert spellings == ["twin/state", "/twin/state"]
+    unsubscribe(session, topic="twin/state")
+    assert [text["topic"] for text in texts_of(session.wire(frame()))] == ["/twin/state"]
+
+
+class Socket:
+    """A connection that takes everything, or nothing."""
+
+    def __init__(self, can_take: bool = True) -> None:
+        self.can_take = can_take
+        self.got: list[bytes] = []
+        self.dismissed = False
+
+    def write(self, wire: bytes) -> None:
+        self.got.append(wire)
+
+    def dismiss(self, code: int, reason: str) -> None:
+        self.dismissed = True
+
+
+def test_who_has_not_subscribed_is_closed_when_its_socket_stays_full(session: Session) -> None:
+    hub, full, free = Hub(2, 30.0, Liveness().status), Socket(can_take=False), Socket()
+    for socket in (full, free):
+        hub.join(Client(socket, wants_status=False, wants_state=False), 0.0)
+    assert hub.dismiss_stuck(29.9) == 0
+    assert hub.dismiss_stuck(30.0) == 1
+    assert (full.dismissed, free.dismissed) == (True, False)
+
+
+def test_a_throttled_client_gets_no_two_states_closer_than_it_asked(session: Session) -> None:
+    hub, writer, socket = Hub(1, 30.0, Liveness().status), FrameWriter(), Socket()
+    client = Client(socket, strict_interval=True, wants_status=False)
+    client.wire = lambda _client, f: session.wire(f)
+    subscribe(session, throttle_rate=250)
+    client.min_interval_s = session.min_interval_s
+    hub.join(client, 0.0)
+    sent_ms = []
+    for now_ms in [*range(0, 1000, 100), *range(3000, 3300, 100)]:  # silence in between
+        hub.publish(writer.state(Snapshot(0, "map", ()), "r"), now_ms / 1000)
+        if socket.got:
+            sent_ms.append(now_ms)
+            socket.got.clear()
+    assert sent_ms == [0, 300, 600, 900, 3000]
+
+
+# --- calls, levels and everything else --------------------------------------------------------
+
+
+def test_a_call_of_get_field_is_left_to_be_computed(session: Session) -> None:
+    args = {"sensor_type": "co2", "resolution": 1}
+    reaction = send(session, op="call_service", service="/twin/get_field", args=args, id="a")
+    assert reaction.field_call is not None
+    assert reaction.field_call.request.sensor_type == "co2"
+    assert reaction.field_call.call.id == "a"
+    assert reaction.replies == ()
+
+
+def test_a_call_with_a_warning_is_made_all_the_same(session: Session) -> None:
+    reaction = send(session, op="call_service", service="/twin/get_field", compression="png")
+    assert reaction.field_call is not None
+    assert [reply["level"] for reply in replies(reaction)] == ["warning"]
+
+
+def test_rosapi_is_answered_at_once(session: Session) -> None:
+    reaction = send(session, op="call_service", service="/rosapi/topics", id="a")
+    [response] = replies(reaction)
+    values = response.pop("values")
+    assert response == {
+        "op": "service_response",
+        "id": "a",
+        "service": "/rosapi/topics",
+        "result": True,
+    }
+    assert (values["topics"][0], values["types"][0]) == (TOPIC, "lupin_msgs/msg/TwinState")
+
+
+@pytest.mark.parametrize(
+    "members", [{"service": "/reboot"}, {"service": "/twin/get_field", "args": {"x": 1}}]
+)
+def test_a_refused_call_has_a_response(session: Session, members: dict[str, Any]) -> None:
+    (response,) = replies(send(session, op="call_service", id="a", **members))
+    assert (response["op"], response["id"]) == ("service_response", "a")
+    assert response["result"] is False
+    assert isinstance(response["values"], str)
+
+
+@pytest.mark.parametrize("op", ["advertise", "publish", "unadvertise", "advertise_service", "auth"])
+def test_what_is_refused_says_so_and_changes_nothing(session: Session, op: str) -> None:
+    subscribe(session, "a", throttle_rate=100)
+    (status,) = replies(send(session, op=op, topic=TOPIC, type="std_msgs/String", id="p"))
+    assert (status["op"], status["level"], status["id"]) == ("status", "error", "p")
+    assert status["msg"].startswith(f"{op} is refused")
+    assert session.min_interval_s == 0.1
+
+
+@pytest.mark.parametrize(
+    ("level", "told"),
+    [
+        ("none", []),
+        ("error", ["error"]),
+        ("warning", ["error", "warning"]),
+        ("info", ["error", "warning"]),
+    ],
+)
+def test_the_level_says_how_much_a_client_is_told(
+    session: Session, level: str, told: list[str]
+) -> None:
+    assert send(session, op="set_level", level=level) == Reaction()
+    statuses = replies(send(session, op="publish", topic=TOPIC))
+    statuses += replies(subscribe(session, queue_length=9))
+    assert [status["level"] for status in statuses] == told
+
+
+def test_who_is_told_nothing_still_gets_the_response_to_a_call(session: Session) -> None:
+    send(session, op="set_level", level="none")
+    (response,) = replies(send(session, op="call_service", service="/reboot"))
+    assert response["result"] is False
+
+
+# --- pace -------------------------------------------------------------------------------------
+
+
+def test_a_client_may_send_a_burst_and_then_keep_a_pace(session: Session) -> None:
+    for _ in range(MAX_BURST):
+        unsubscribe(session)
+    with pytest.raises(TooManyMessages, match="more than 100 messages a second"):
+        unsubscribe(session)
+    for step in range(1, 2 * MAX_MESSAGES_PER_S):
+        send(session, step / MAX_MESSAGES_PER_S, op="unsubscribe", topic=TOPIC)
+
+
+def test_messages_that_are_refused_count_too(session: Session) -> None:
+    for _ in range(MAX_BURST):
+        session.receive(b"\xff", 0.0)
+    with pytest.raises(TooManyMessages):
+        session.receive("{", 0.0)
+
+
+# --- anything at all --------------------------------------------------------------------------
+
+STEPS = st.lists(
+    st.tuples(
+        st.sampled_from(["subscribe", "unsubscribe"]),
+        st.sampled_from([None, "a", "b", 1, "1"]),
+        st.sampled_from([0, 50, 1000]),
+    ),
+    max_size=30,
+)
+
+
+@given(STEPS)
+def test_subscriptions_are_as_a_plain_account_of_them(steps: list[tuple[str, Any, int]]) -> None:
+    session, account = Session(NAMES), dict[object, int]()
+    for op, message_id, rate in steps:
+        if op == "subscribe":
+            subscribe(session, message_id, throttle_rate=rate)
+            account[message_id] = rate
+        else:
+            unsubscribe(session, message_id)
+            account = (
+                {} if message_id is None else {k: v for k, v in account.items() if k != message_id}
+            )
+        assert session.is_subscribed == bool(account)
+        assert session.min_interval_s == min(account.values(), default=0) / 1000
+
+
+@given(st.lists(st.text() | st.binary(), max_size=20))
+def test_rubbish_leaves_the_session_as_it_was(messages: list[str | bytes]) -> None:
+    session = Session(NAMES)
+    subscribe(session, "a", throttle_rate=100)
+    for message in messages:
+        reaction = session.receive(message, 0.0)
+        assert [reply["op"] for reply in replies(reaction)] == ["status"]
+    assert session.min_interval_s == 0.1

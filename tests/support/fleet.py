@@ -1,0 +1,89 @@
+"""A real `lupin-twin fleet` over a real archive, and greenhouses that forward to it."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+from lupin_twin.journal.rows import Row
+from lupin_twin.journal.runs import Clock
+from tests.support.archive import Archive
+from tests.support.journal import SECOND, kept, pin, scan
+from tests.support.processes import Process, lupin_twin, url_of
+from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.ws_client import open_websocket
+
+
+def wall() -> Clock:
+    """The wall's clock now, as a robot has it."""
+    now_ns = time.time_ns()
+    return Clock(now_ns, now_ns, is_simulated=False)
+
+
+def scans_lately(temperature: float = 22.0, tags: int = 5, scans: int = 6) -> list[Row]:
+    """Tags with their places, each scanned once a minute until now."""
+    now_ns = time.time_ns()
+    pins: list[Row] = [pin(str(tag), now_ns - 600 * SECOND, float(tag)) for tag in range(tags)]
+    return pins + [
+        scan(str(tag), now_ns - (scans - number) * 60 * SECOND + tag, temperature=temperature)
+        for number in range(scans)
+        for tag in range(tags)
+    ]
+
+
+def write(journal: Path, rows: list[Row]) -> None:
+    """As a twin does that is started for it."""
+    kept(journal, rows, wall())
+
+
+class Page:
+    """The fleet's page at an address."""
+
+    def __init__(self, process: Process) -> None:
+        self.process = process
+        self.url = url_of(process)
+        self.http = httpx.Client(base_url=self.url, timeout=PATIENCE_S, trust_env=False)
+
+    def sites(self) -> dict[str, dict[str, Any]]:
+        """The overview, by site."""
+        answer = self.http.get("/api/sites")
+        assert answer.status_code == 200, answer.text
+        return {site["site"]: site for site in answer.json()["sites"]}
+
+    def site(self, name: str = "gh1", **said: Any) -> dict[str, Any]:
+        """A site's entry once it says this."""
+
+        def look() -> dict[str, Any] | None:
+            found = self.sites().get(name, {})
+            return found if found and all(found[key] == it for key, it in said.items()) else None
+
+        found = wait_for(look, f"{name} with {said}: {self.sites()}")
+        assert found is not None
+        return found
+
+
+@contextmanager
+def fleet(archive: Archive, *args: str, user: str = "page") -> Iterator[Page]:
+    """One that serves; it ends with the block."""
+    with lupin_twin(0, "fleet", "--archive-url", archive.url(user), *args) as process:
+        page = Page(process)
+        with page.http:
+            yield page
+
+
+@contextmanager
+def frames(page: Page) -> Iterator[Iterator[dict[str, Any]]]:
+    """What a browser of the overview gets."""
+    with open_websocket(page.url.replace("http", "ws", 1) + "/ws/sites") as connection:
+
+        def each() -> Iterator[dict[str, Any]]:
+            while True:
+                yield json.loads(connection.recv(timeout=PATIENCE_S))
+
+        yield each()

@@ -1,0 +1,219 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from lupin_twin.core.diagnostics import (
+    ERROR,
+    MAX_PROBLEMS,
+    MAX_SHOWN,
+    OK,
+    STALE,
+    WARN,
+    Estimates,
+    Finding,
+    Health,
+    Layers,
+    Origin,
+    SelfReport,
+    findings,
+    self_report,
+)
+from lupin_twin.core.drops import Counts, Recent
+from lupin_twin.core.journal_condition import UNKNOWN, Condition, JournalState
+from lupin_twin.core.state import ClockState
+
+WELL = Health(
+    clock="running",
+    counts=Counts(),
+    inputs={"/floranova/observations": 1},
+    observed_ago_s=2.0,
+    late={},
+    twins=1,
+    state_topic="/twin/state",
+    fields_computing=0,
+    fields_computed=3,
+    slowest_field_s=0.25,
+)
+FRAME = Recent("frame", "its frame is 'odom'", 12)
+
+
+def found(name: str, **changes: Any) -> Finding:
+    [finding] = [each for each in findings(replace(WELL, **changes)) if each.name == name]
+    return finding
+
+
+def test_layers_say_what_is_published_and_what_cannot_be() -> None:
+    published = {"/twin/field/co2": 3, "/twin/tags": 0}
+    said = found("layers", layers=Layers(published, 1))
+    assert (said.level, said.message) == (OK, "1 of 2 topics have subscribers")
+    assert said.values == {"/twin/field/co2": "3", "/twin/tags": "0"}
+    said = found("layers", layers=Layers(published, 1, {"/twin/field/co2": "too far"}))
+    assert (said.level, said.message) == (WARN, "/twin/field/co2: too far")
+
+
+def test_a_twin_that_is_well_is_ok_in_all() -> None:
+    levels = {finding.name: finding.level for finding in findings(WELL)}
+    assert levels == dict.fromkeys(
+        (
+            "clock",
+            "origin",
+            "inputs",
+            "drops",
+            "queues",
+            "stamps",
+            "fields",
+            "estimates",
+            "layers",
+            "journal",
+            "twins",
+        ),
+        OK,
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "level", "words"),
+    [
+        ("clock", {"clock": "paused"}, WARN, "paused"),
+        ("clock", {"clock": "stopped"}, ERROR, "stopped"),
+        ("clock", {"clock": "none"}, ERROR, "no ROS time"),
+        ("inputs", {"observed_ago_s": None}, STALE, "no observation"),
+        ("inputs", {"inputs": {"/map": 0}}, WARN, "nobody publishes /map"),
+        ("inputs", {"observed_ago_s": None, "input_problems": ("use UDP",)}, WARN, "use UDP"),
+        ("drops", {"counts": Counts({"frame": 40}, 0, (FRAME,))}, WARN, "12 lately"),
+        ("drops", {"counts": Counts({"frame": 40})}, OK, "nothing lately"),
+        ("drops", {"counts": Counts(callback_errors=1)}, WARN, "nothing lately"),
+        (
+            "queues",
+            {"counts": Counts({"lost": 5}, 0, (Recent("lost", "", 5),))},
+            WARN,
+            "5 messages",
+        ),
+        ("queues", {"counts": Counts({"lost": 5})}, OK, "nothing lost"),
+        ("stamps", {"late": {"robot": 9}}, WARN, "behind their own earlier ones from robot"),
+        (
+            "journal",
+            {"journal": Condition(JournalState.FAILING, "no room")},
+            ERROR,
+            "no room",
+        ),
+        ("twins", {"twins": 2}, ERROR, "2 twins"),
+    ],
+)
+def test_what_is_not_well_has_its_level(
+    name: str, changes: dict[str, Any], level: int, words: str
+) -> None:
+    finding = found(name, **changes)
+    assert finding.level == level
+    assert words in finding.message
+
+
+def test_the_numbers_are_there() -> None:
+    counts = Counts({"frame": 40, "lost": 5}, 0, (FRAME,))
+    values = {
+        "frame": "40",
+        "lately: frame": "12",
+        "last: frame": "its frame is 'odom'",
+        "callback errors": "0",
+    }
+    assert found("drops", counts=counts).values == values
+    assert found("queues", counts=counts).values == {"lost": "5"}
+    assert found("fields").values == {"computed": "3", "slowest, s": "0.250"}
+    assert found("inputs").values["last observation, s ago"] == "2.0"
+
+
+def test_a_journal_that_cannot_be_written_is_an_error_and_one_that_is_off_is_none() -> None:
+    failing = Condition(JournalState.FAILING, "the disk is full", "/j.sqlite", lost=3)
+    [told] = [f for f in findings(replace(WELL, journal=failing)) if f.name == "journal"]
+    assert (told.level, told.message) == (ERROR, "the disk is full")
+    assert told.values["lost"] == "3"
+    off = Condition(JournalState.OFF, "kept in a temporary file")
+    [told] = [f for f in findings(replace(WELL, journal=off)) if f.name == "journal"]
+    assert (told.level, told.message) == (OK, "kept in a temporary file")
+
+
+@pytest.mark.parametrize("clock", ["running", "paused", "stopped", "none"])
+def test_what_is_said_is_read_again(clock: ClockState) -> None:
+    recent = (FRAME, Recent("lost", "lost messages", 2), Recent("late_stamp", "late", 1))
+    counts = Counts({"frame": 40, "lost": 5, "late_stamp": 1}, 3, recent)
+    assert self_report(findings(replace(WELL, clock=clock, counts=counts))) == SelfReport(
+        clock, counts, UNKNOWN, "robot"
+    )
+
+
+@pytest.mark.parametrize("origin", ["unknown", "robot", "simulated", "recorded", "sim_time"])
+def test_where_observations_come_from_is_read_again(origin: Origin) -> None:
+    assert self_report(findings(replace(WELL, origin=origin))).origin == origin
+    assert self_report([found("origin", origin=origin)]).origin == origin
+    assert self_report([Finding("origin", OK, "", {"origin": "elsewhere"})]).origin == "unknown"
+
+
+def test_what_is_said_of_the_journal_is_read_again() -> None:
+    told = Condition(
+        JournalState.FAILING,
+        "the disk is full",
+        "/j.sqlite",
+        written=7,
+        waiting=2,
+        lost=3,
+        refused=1,
+        set_aside="/j.sqlite.damaged",
+        simulated_ns=(1_763_440_800_000_000_001, 1_763_700_000_000_000_000),
+        complete_ns=1_763_700_000_000_000_002,
+        kept_ns=((0, 5), (7, 2**63 - 1)),
+        journal_id="0123456789abcdef",
+    )
+    none: dict[str, Any] = {"simulated_ns": None, "complete_ns": None, "kept_ns": ()}
+    for journal in (told, replace(told, **none)):
+        assert self_report(findings(replace(WELL, journal=journal))).journal == journal
+    for values in ({}, {"state": "constructor"}):
+        assert self_report([Finding("journal", OK, "", values)]).journal == UNKNOWN
+    for stretch in ("1", "1 x", "x 1", " ", "1 " + 20 * "9"):
+        values = {"state": "recording", "simulated": stretch}
+        assert self_report([Finding("journal", OK, "", values)]).journal.simulated_ns is None
+        values = {"state": "recording", "complete to": stretch, "kept": stretch}
+        read = self_report([Finding("journal", OK, "", values)]).journal
+        assert (read.complete_ns, read.kept_ns) == (1 if stretch == "1" else None, ())
+
+
+def test_what_is_said_of_inputs_is_read_again_up_to_a_limit() -> None:
+    for count in (0, MAX_PROBLEMS):
+        problems = tuple(f"{number}: use UDP" for number in range(count))
+        assert self_report(findings(replace(WELL, input_problems=problems))).input_problems == (
+            problems
+        )
+    values = {f"problem {number}": "x" * (MAX_SHOWN + 1) for number in range(1, MAX_PROBLEMS + 2)}
+    read = self_report([Finding("inputs", WARN, "", values)]).input_problems
+    assert [len(each) for each in read] == [MAX_SHOWN] * MAX_PROBLEMS
+
+
+def test_who_says_nothing_is_not_said_to_have_dropped_nothing() -> None:
+    assert self_report(()) == SelfReport(None, None)
+    assert self_report([Finding("clock", OK, "", {"state": "well"})]) == SelfReport(None, None)
+
+
+@pytest.mark.parametrize("text", ["", "-1", "1.5", "many", "²", "9" * 16])
+def test_a_number_that_is_none_counts_nothing(text: str) -> None:
+    values = {"frame": text, "lately: frame": text, "callback errors": text, "spoons": "7"}
+    assert self_report([Finding("drops", OK, "", values)]).counts == Counts()
+
+
+def test_a_long_word_is_told_up_to_a_limit() -> None:
+    for length in (MAX_SHOWN, MAX_SHOWN + 1):
+        word = "x" * length
+        said = found("drops", counts=Counts({"frame": 1}, 0, (Recent("frame", word, 1),)))
+        shown = said.values["last: frame"]
+        assert (len(shown), shown == word) == (MAX_SHOWN, length == MAX_SHOWN)
+        [source] = found("stamps", late={word: 1}).values
+        assert source == shown
+
+
+def test_estimates_that_are_wrong_are_named() -> None:
+    assert found("estimates").message == "nothing is wrong"
+    wrong = found("estimates", estimates=Estimates({"co2": "singular"}, ("light",), 3))
+    assert wrong.level == WARN
+    assert wrong.message.startswith("co2: singular; light: too sure of itself")
+    assert wrong.values == {"fits failed": "3"}

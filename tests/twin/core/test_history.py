@@ -1,0 +1,306 @@
+"""What was observed before: in its order, once each, within its bounds, for both who keep it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lupin_twin.core import history as history_module
+from lupin_twin.core import ingest
+from lupin_twin.core.history import History, PastAttempt, PastScan, TagHistory
+from lupin_twin.core.state import Attempt, Inspection, Reading, Scan, TagState, TwinStore
+from tests.support.store import SCAN_FAILED, S, failed_look, look, scan
+
+
+def stamps_s(past: tuple[PastScan, ...] | tuple[PastAttempt, ...]) -> list[float]:
+    return [each.stamp_ns / S for each in past]
+
+
+def values(history: History, sensor: str, tag_id: str = "1") -> list[tuple[float, float]]:
+    return [
+        (past.stamp_ns / S, reading.value)
+        for past in history.of(tag_id).scans
+        for reading in past.readings
+        if reading.name == sensor
+    ]
+
+
+def test_scans_that_brought_readings_are_kept_and_every_try() -> None:
+    history = History()
+    assert history.of("1") == TagHistory()
+    history.add(scan("1", at_s=1.0, co2=400.0))
+    history.add(look("1", at_s=2.0))
+    history.add(failed_look("1", at_s=3.0))
+    history.add(Scan("1", 4 * S, status=1, status_detail="blocked"))
+    past = history.of("1")
+    assert past.is_known
+    assert past.scans == (PastScan(S, (Reading("co2", 400.0),)),)
+    assert past.attempts == (
+        PastAttempt(Attempt(S), 0),
+        PastAttempt(Attempt(2 * S), 1),
+        PastAttempt(Attempt(3 * S, SCAN_FAILED), 1),
+        PastAttempt(Attempt(4 * S, 1, "blocked"), 0),
+    )
+
+
+def test_it_is_in_the_order_of_time_and_keeps_the_newest() -> None:
+    history = History(buffer_len=3)
+    for at_s in (2.0, 4.0, 3.0):
+        history.add(scan("1", at_s=at_s, co2=at_s))
+    assert stamps_s(history.of("1").scans) == [2.0, 3.0, 4.0]
+    history.add(scan("1", at_s=1.0, co2=1.0))
+    assert stamps_s(history.of("1").scans) == stamps_s(history.of("1").attempts) == [2.0, 3.0, 4.0]
+    history.add(scan("1", at_s=5.0, co2=1.0))
+    assert stamps_s(history.of("1").scans) == [3.0, 4.0, 5.0]
+
+
+def test_failed_tries_push_no_scan_out() -> None:
+    history = History(buffer_len=2)
+    history.add(scan("1", at_s=1.0, co2=1.0))
+    for at_s in (2.0, 3.0, 4.0):
+        history.add(scan("1", at_s=at_s, succeeded=False))
+    assert stamps_s(history.of("1").scans) == [1.0]
+    assert stamps_s(history.of("1").attempts) == [3.0, 4.0]
+
+
+def test_the_same_observation_heard_three_times_is_one() -> None:
+    history = History()
+    for _ in range(3):
+        for write in (scan("1", at_s=5.0, co2=1.0), look("1", at_s=5.0), failed_look("1", 6.0)):
+            history.add(write)
+    assert stamps_s(history.of("1").scans) == [5.0]
+    assert [(tried.stamp_ns / S, tried.kind) for tried in history.of("1").attempts] == [
+        (5.0, 0),
+        (5.0, 1),
+        (6.0, 1),
+    ]
+
+
+def test_what_was_heard_is_known_by_kind_stamp_and_source() -> None:
+    history = History()
+    history.add(scan("1", at_s=5.0, source="a", co2=1.0))
+    assert history.news(scan("1", at_s=5.0, source="a", co2=9.0)) is None
+    for other in (
+        scan("2", at_s=5.0, source="a"),
+        scan("1", at_s=6.0, source="a"),
+        scan("1", at_s=5.0, source="b"),
+        replace(look("1", at_s=5.0), source="a"),
+    ):
+        assert history.news(other) == other
+
+
+def test_two_sources_at_one_moment_are_two_in_the_order_of_their_arrival() -> None:
+    history = History()
+    for number in range(4):
+        history.add(scan("1", at_s=5.0, source=f"robot {number}", co2=float(number)))
+    assert values(history, "co2") == [(5.0, 0.0), (5.0, 1.0), (5.0, 2.0), (5.0, 3.0)]
+
+
+def test_readings_of_one_stamp_that_come_in_parts_are_one_scan() -> None:
+    history = History()
+    history.add(scan("1", at_s=5.0, co2=1.0))
+    history.add(scan("1", at_s=5.0, light=2.0))
+    history.add(scan("1", at_s=5.0, co2=3.0))
+    assert history.of("1").scans == (PastScan(5 * S, (Reading("co2", 3.0), Reading("light", 2.0))),)
+
+
+def test_what_has_no_stamp_of_its_own_is_known_by_the_moment_it_came() -> None:
+    history = History()
+    for at_s in (1.0, 2.0):
+        history.add(replace(scan("1", at_s=at_s, co2=1.0), own_stamp_ns=0))
+    assert stamps_s(history.of("1").scans) == [1.0, 2.0]
+
+
+def test_a_sensor_that_a_scan_names_many_times_is_kept_once() -> None:
+    history = History()
+    history.add(Scan("1", S, tuple(Reading("co2", float(i)) for i in range(1_000))))
+    assert values(history, "co2") == [(1.0, 999.0)]
+
+
+def test_the_histories_of_all_tags_are_bounded_and_a_tag_makes_room_of_its_own(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(history_module, "MAX_HISTORY_ITEMS", 6)
+    history = History()
+    for at_s in (1.0, 2.0):
+        history.add(scan("1", at_s=at_s, co2=at_s))  # a try and a reading each
+    history.add(scan("2", at_s=3.0, co2=3.0))
+    assert [stamps_s(history.of(t).scans) for t in ("1", "2")] == [[1.0, 2.0], [3.0]]
+    history.add(scan("1", at_s=4.0, co2=4.0))
+    assert stamps_s(history.of("1").scans)[-1] == 4.0
+    assert len(history.of("1").scans) + len(history.of("1").attempts) == 4
+    history.add(scan("3", at_s=5.0, co2=5.0))
+    assert history.of("3") == TagHistory()
+    assert stamps_s(history.of("2").scans) == [3.0]
+
+
+def test_after_a_clock_that_went_back_nothing_is_later_and_news_is_news() -> None:
+    history = History()
+    for at_s in (40.0, 3600.0):
+        history.add(scan("1", at_s=at_s, co2=at_s))
+    history.hold_to(50 * S)
+    assert stamps_s(history.of("1").scans) == stamps_s(history.of("1").attempts) == [40.0, 50.0]
+    history.add(scan("1", at_s=3600.0, co2=1.0))
+    assert values(history, "co2") == [(40.0, 40.0), (50.0, 3600.0), (3600.0, 1.0)]
+
+
+# --- against a model ----------------------------------------------------------------------------
+
+WRITES = st.lists(
+    st.builds(
+        lambda at_s, sensor, value, source: scan(
+            "1", at_s, source=source, **({sensor: value} if sensor else {})
+        ),
+        st.integers(1, 12),
+        st.sampled_from(["", "co2", "light"]),
+        st.integers(0, 3).map(float),
+        st.sampled_from(["a", "b"]),
+    )
+    | st.builds(lambda at_s: look("1", at_s), st.integers(1, 12)),
+    max_size=20,
+)
+
+
+@given(WRITES, st.integers(1, 6))
+def test_against_the_plainest_history(writes: list[Scan | Inspection], buffer_len: int) -> None:
+    """All of it, sorted by stamp, each once, and of that the newest."""
+    history = History(buffer_len)
+    scans: dict[tuple[int, str], dict[str, float]] = {}
+    tries: dict[tuple[int, int, str], None] = {}
+    for write in writes:
+        history.add(write)
+        tries.setdefault((write.stamp_ns, isinstance(write, Inspection), write.source))
+        if isinstance(write, Scan) and write.readings:
+            readings = {r.name: r.value for r in write.readings}
+            scans.setdefault((write.stamp_ns, write.source), {}).update(readings)
+    past = history.of("1")
+    newest = sorted(tries, key=lambda key: key[0])[-buffer_len:]
+    if len(tries) <= buffer_len:  # of what was pushed out, heard again, nothing can be known
+        assert [(each.stamp_ns, each.kind) for each in past.attempts] == [key[:2] for key in newest]
+    if len(scans) <= buffer_len:
+        expected = sorted(scans.items(), key=lambda item: item[0][0])
+        assert [
+            (each.stamp_ns, {r.name: r.value for r in each.readings}) for each in past.scans
+        ] == [(stamp_ns, readings) for (stamp_ns, _), readings in expected]
+    assert len(past.attempts) <= buffer_len
+    assert len(past.scans) <= buffer_len
+
+
+# --- of a twin elsewhere ------------------------------------------------------------------------
+
+
+class Twin:
+    """A store with its history, and a history that follows its states."""
+
+    def __init__(self) -> None:
+        self.store, self.own, self.followed = TwinStore(), History(), History()
+
+    def write(self, write: Scan | Inspection) -> None:
+        assert ingest.apply(write, self.store, self.own) is None
+        self.tell()
+
+    def tell(self, *, clock_went_back: bool = False) -> None:
+        for tag in self.store.snapshot(0, "map").tags:
+            self.followed.follow(tag, clock_went_back=clock_went_back)
+
+    def hold_to(self, now_ns: int) -> None:
+        if self.store.hold_to(now_ns):
+            self.own.hold_to(now_ns)
+            self.tell(clock_went_back=True)
+
+
+def test_who_follows_a_twin_sees_what_was_really_scanned_when() -> None:
+    twin = Twin()
+    twin.write(scan("1", at_s=10.0, co2=400.0, light=1.0))
+    twin.write(look("1", at_s=3610.0))
+    twin.write(scan("1", at_s=7210.0, light=2.0))
+    twin.write(scan("1", at_s=7300.0, succeeded=False))
+    followed = twin.followed.of("1")
+    assert followed.scans == twin.own.of("1").scans
+    assert stamps_s(followed.scans) == [10.0, 7210.0]
+    assert [past.what for past in followed.attempts] == [
+        past.what for past in twin.own.of("1").attempts
+    ]
+    assert [past.kind for past in followed.attempts] == [0, 1, 0, None]
+
+
+def test_who_comes_late_knows_what_the_state_still_shows() -> None:
+    twin, late = Twin(), History()
+    twin.write(scan("1", at_s=10.0, co2=400.0, light=1.0))
+    twin.write(scan("1", at_s=7210.0, light=2.0))
+    twin.write(look("1", at_s=7300.0))
+    twin.write(scan("1", at_s=7400.0, succeeded=False))
+    [tag] = twin.store.snapshot(0, "map").tags
+    for _ in range(2):
+        late.follow(tag)
+    assert values(late, "co2") == [(10.0, 400.0)]
+    assert values(late, "light") == [(7210.0, 2.0)]
+    assert [(past.stamp_ns / S, past.kind) for past in late.of("1").attempts] == [
+        (7300.0, 1),
+        (7400.0, None),
+    ]
+
+
+def test_who_follows_a_twin_follows_its_clock_back() -> None:
+    twin = Twin()
+    for at_s in (40.0, 3600.0):
+        twin.write(scan("1", at_s=at_s, co2=at_s))
+    twin.hold_to(50 * S)
+    twin.write(scan("1", at_s=60.0, co2=1.0))
+    assert twin.followed.of("1").scans == twin.own.of("1").scans
+    assert stamps_s(twin.followed.of("1").scans) == [40.0, 50.0, 60.0]
+
+
+def test_a_twin_that_was_started_anew_and_knows_less_moves_nothing() -> None:
+    history, successor = History(), Twin()
+    for at_s in (1000.0, 2800.0):
+        twin = Twin()
+        twin.write(scan("1", at_s=at_s, co2=at_s))
+        history.follow(twin.store.snapshot(0, "map").tags[0])
+    successor.write(scan("1", at_s=1000.0, co2=1000.0))
+    history.follow(successor.store.snapshot(0, "map").tags[0])
+    assert values(history, "co2") == [(1000.0, 1000.0), (2800.0, 2800.0)]
+    assert stamps_s(history.of("1").attempts) == [1000.0, 2800.0]
+
+
+def test_without_times_there_is_nothing_to_follow() -> None:
+    history = History()
+    history.follow(TagState("1", readings=(Reading("co2", 1.0),), last_observed_ns=S))
+    assert history.of("1") == TagHistory()
+
+
+def test_tags_that_a_twin_does_not_know_any_more_are_forgotten(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(history_module, "MAX_HISTORY_ITEMS", 4)
+    history = History()
+    for tag_id in ("1", "2"):
+        history.add(scan(tag_id, co2=1.0))
+    history.forget_all_but({"2"})
+    assert history.of("1") == TagHistory()
+    history.add(scan("3", co2=1.0))
+    assert [len(history.of(tag_id).scans) for tag_id in ("2", "3")] == [1, 1]
+
+
+IN_ORDER = st.lists(
+    st.tuples(st.integers(1, 5), st.sets(st.sampled_from(["co2", "light"])), st.booleans()),
+    max_size=12,
+)
+
+
+@given(IN_ORDER)
+def test_both_histories_are_the_same_where_every_state_is_seen(
+    steps: list[tuple[int, set[str], bool]],
+) -> None:
+    twin, at_s = Twin(), 0
+    for number, (wait_s, sensors, is_look) in enumerate(steps):
+        at_s += wait_s
+        readings = tuple(Reading(name, float(number)) for name in sorted(sensors))
+        twin.write(look("1", at_s) if is_look else Scan("1", at_s * S, readings))
+    assert twin.followed.of("1").scans == twin.own.of("1").scans
+    assert [past.what for past in twin.followed.of("1").attempts] == [
+        past.what for past in twin.own.of("1").attempts
+    ]

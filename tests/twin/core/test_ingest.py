@@ -1,0 +1,216 @@
+"""The rules of ingestion, one by one: plain values in, a write or a drop out."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from lupin_twin.core import ingest
+from lupin_twin.core.drops import MAX_TEXT_LENGTH, Drop, Reason
+from lupin_twin.core.history import History, TagHistory
+from lupin_twin.core.ingest import Pin, Received, ReceivedInspection, ReceivedReading, ReceivedTags
+from lupin_twin.core.state import Flower, Inspection, Pose, Reading, Scan, TwinStore
+from lupin_twin.ros.convert import pose_message, pose_of
+from tests.support.store import S, at
+
+NOW_NS = 100 * S
+SKIPPED = 3
+READINGS = (Reading("co2", 1.0),)
+
+
+def heard_reading(tag_id: str = "1", pose: Pose | None = None, **changes: object) -> Received:
+    part = ReceivedReading(tag_id, 3 * S, READINGS, pose or at(1.0, 2.0))
+    return replace(Received(0, "robot", 0, "", "map", 4 * S, part), **changes)  # type: ignore[arg-type]
+
+
+def heard_look(tag_id: str = "1", frame_id: str = "", **changes: object) -> Received:
+    part = ReceivedInspection(tag_id, frame_id, Flower("rose", 0.9), at(1.0, 2.0))
+    return replace(Received(1, "robot", 0, "", "map", 4 * S, part), **changes)  # type: ignore[arg-type]
+
+
+def reason_of(heard: Received) -> Reason | None:
+    write = ingest.observation(heard, "map", NOW_NS)
+    return write.reason if isinstance(write, Drop) else None
+
+
+# --- observations -------------------------------------------------------------------------------
+
+
+def test_a_tag_reading_is_a_scan_with_its_pose_and_stamp() -> None:
+    assert ingest.observation(heard_reading(), "map", NOW_NS) == Scan(
+        "1", 4 * S, READINGS, at(1.0, 2.0), source="robot", own_stamp_ns=4 * S
+    )
+
+
+@pytest.mark.parametrize(("own_s", "at_s"), [(0, 3), (101, 100)])
+def test_a_scan_without_a_stamp_was_made_when_its_sensors_were_read(own_s: int, at_s: int) -> None:
+    write = ingest.observation(heard_reading(stamp_ns=own_s * S), "map", NOW_NS)
+    assert isinstance(write, Scan)
+    assert (write.stamp_ns, write.own_stamp_ns) == (at_s * S, (own_s or 3) * S)
+
+
+def test_a_scan_that_is_not_ok_keeps_its_readings_and_why_and_loses_its_pose() -> None:
+    heard = heard_reading(status=SKIPPED, status_detail="no time")
+    assert ingest.observation(heard, "map", NOW_NS) == Scan(
+        "1", 4 * S, READINGS, None, SKIPPED, "no time", "robot", 4 * S
+    )
+
+
+def test_a_look_is_what_the_camera_made_of_it() -> None:
+    assert ingest.observation(heard_look(), "map", NOW_NS) == Inspection(
+        "1", 4 * S, Flower("rose", 0.9), at(1.0, 2.0), source="robot", own_stamp_ns=4 * S
+    )
+
+
+def test_a_look_that_is_not_ok_is_a_failed_try_and_its_payload_nothing() -> None:
+    heard = heard_look(status=SKIPPED, status_detail="dark")
+    assert ingest.observation(heard, "map", NOW_NS) == Inspection(
+        "1", 4 * S, None, None, SKIPPED, "dark", "robot", 4 * S
+    )
+
+
+@pytest.mark.parametrize(("length", "kept"), [(256, 256), (257, 256), (10_000, 256)])
+def test_a_long_word_of_a_producer_is_cut_and_nothing_is_dropped_for_it(
+    length: int, kept: int
+) -> None:
+    heard = heard_reading(source="s" * length, status_detail="d" * length)
+    write = ingest.observation(heard, "map", NOW_NS)
+    assert isinstance(write, Scan)
+    assert (len(write.source), len(write.status_detail)) == (kept, kept)
+    assert write.source.endswith("…") == (length > kept)
+
+
+@pytest.mark.parametrize(("kind", "name"), [(2, "KIND_ANOMALY"), (77, "an unknown kind")])
+def test_other_kinds_are_dropped_by_their_name(kind: int, name: str) -> None:
+    drop = ingest.observation(Received(kind, "robot", 0, "", "map", S, None), "map", NOW_NS)
+    assert isinstance(drop, Drop)
+    assert drop.reason is Reason.KIND
+    assert drop.on("/t") == f"dropped an observation on /t: kind {kind} ({name}) is not a tag's"
+
+
+def test_a_frame_is_the_expected_one_or_empty_and_a_looks_own_comes_first() -> None:
+    assert reason_of(heard_reading(frame_id="")) is None
+    assert reason_of(heard_reading(frame_id="odom")) is Reason.FRAME
+    assert reason_of(heard_look(frame_id="odom")) is Reason.FRAME
+    assert reason_of(heard_look("1", "map", status=0)) is None
+    assert reason_of(replace(heard_look("1", "map"), frame_id="odom")) is None
+    assert reason_of(replace(heard_look(), frame_id="odom")) is Reason.FRAME
+
+
+def test_the_frame_is_looked_at_before_the_tag_id() -> None:
+    assert reason_of(heard_reading("", frame_id="odom")) is Reason.FRAME
+    assert reason_of(heard_reading("")) is Reason.TAG_ID
+    assert reason_of(heard_look("")) is Reason.TAG_ID
+
+
+@pytest.mark.parametrize(
+    ("stamp_s", "now_s", "expected_s"),
+    [
+        (60.0, 100.0, 60.0),  # latched earlier: as old as it says
+        (100.0, 100.0, 100.0),
+        (130.0, 100.0, 100.0),  # from the future: no younger than now
+        (0.0, 100.0, 100.0),  # no stamp: now
+        (60.0, 0.0, 60.0),  # simulated time has not started
+        (0.0, 0.0, 1e-9),  # of neither: not 0, which stands for never
+    ],
+)
+def test_when_an_observation_was_made(stamp_s: float, now_s: float, expected_s: float) -> None:
+    assert ingest.observed_at(round(stamp_s * S), round(now_s * S)) == round(expected_s * S)
+
+
+# --- poses --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("w", [1.0, -0.5, 1e-17])
+def test_a_scans_pose_counts_with_any_w_but_zero(w: float) -> None:
+    pose = replace(at(1.0, 2.0), qw=w)
+    assert ingest.scanned_pose(pose) == pose
+
+
+def test_a_scans_pose_with_w_zero_or_a_broken_number_is_none() -> None:
+    assert ingest.scanned_pose(replace(at(0.0), qw=0.0)) is None
+    assert ingest.scanned_pose(replace(at(0.0), qw=-0.0)) is None
+    for broken in (math.nan, math.inf):
+        assert ingest.scanned_pose(at(broken)) is None
+        assert ingest.scanned_pose(replace(at(0.0), qw=broken)) is None
+        assert ingest.discovered_pose(at(0.0, broken)) is None
+        assert ingest.discovered_pose(replace(at(0.0), qw=broken)) is None
+
+
+def test_a_discoverys_w_zero_is_taken_as_one() -> None:
+    for w, expected in ((0.0, 1.0), (-0.0, 1.0), (0.5, 0.5)):
+        pose = ingest.discovered_pose(replace(at(0.0), qw=w))
+        assert pose is not None
+        assert pose.qw == expected
+
+
+@pytest.mark.parametrize("length", [1.0, 2.5])
+def test_a_discoverys_half_turn_stays_one_and_is_told_from_no_pose(length: float) -> None:
+    pose = ingest.discovered_pose(replace(at(1.0), qx=0.6 * length, qz=-0.8 * length, qw=0.0))
+    assert pose is not None
+    assert (pose.qx, pose.qy, pose.qz) == pytest.approx((0.6, 0.0, -0.8), abs=1e-15)
+    assert 0.0 < pose.qw < 1e-8
+    assert ingest.scanned_pose(pose_of(pose_message(pose))) == pose
+
+
+# --- discovered tags ----------------------------------------------------------------------------
+
+
+def test_a_discovery_pins_what_has_no_pose_yet_and_makes_no_other_pose() -> None:
+    asked = []
+
+    def pose(index: int) -> Pose:
+        asked.append(index)
+        return at(math.nan if index == 3 else index)
+
+    heard = ReceivedTags("map", ["a", "b", "", "broken"], pose)
+    made = list(ingest.discoveries(heard, "map", is_pinned=lambda tag_id: tag_id == "a"))
+    assert made[0] == Pin("b", at(1.0))
+    assert [drop.reason for drop in made[1:] if isinstance(drop, Drop)] == [
+        Reason.TAG_ID,
+        Reason.POSE,
+    ]
+    assert asked == [1, 3]
+
+
+def test_a_discovery_in_another_frame_is_dropped_once_whatever_it_holds() -> None:
+    heard = ReceivedTags("odom", ["a", ""], lambda _: at(0.0))
+    [drop] = ingest.discoveries(heard, "map", is_pinned=lambda _: False)
+    assert isinstance(drop, Drop)
+    assert drop.on("/t") == "dropped a message on /t: its frame is 'odom', expected 'map'"
+
+
+# --- writing ------------------------------------------------------------------------------------
+
+
+def test_what_is_written_is_in_store_and_history_and_what_is_refused_is_in_neither() -> None:
+    store, history = TwinStore(), History()
+    assert ingest.apply(Scan("1", S, READINGS), store, history) is None
+    assert ingest.apply(Inspection("1", 2 * S, Flower("rose")), store, history) is None
+    assert ingest.apply(Pin("1", at(1.0)), store, history) is None
+    [tag] = store.snapshot(S, "map").tags
+    assert ([r.value for r in tag.readings], tag.flower.species) == ([1.0], "rose")
+    assert tag.pose == at(1.0)
+    assert [tried.stamp_ns for tried in history.of("1").attempts] == [S, 2 * S]
+    too_long = "x" * (MAX_TEXT_LENGTH + 1)
+    for write in (Pin(too_long, at(1.0)), Scan(too_long, S), Inspection(too_long, S, None)):
+        drop = ingest.apply(write, store, history)
+        assert drop is not None
+        assert drop.reason is Reason.REJECTED
+        assert f"the limit is {MAX_TEXT_LENGTH}" in drop.why
+    assert history.of(too_long) == TagHistory()
+
+
+def test_a_message_from_the_future_stays_as_old_as_when_it_was_heard_first() -> None:
+    """Heard again, latched, it must not make what it said look fresh."""
+    store, history = TwinStore(), History()
+    for now_s in (100, 160, 220):
+        heard = heard_reading(stamp_ns=10_000 * S)
+        write = ingest.observation(heard, "map", now_s * S)
+        assert isinstance(write, Scan)
+        ingest.apply(write, store, history)
+    [tag] = store.snapshot(220 * S, "map").tags
+    assert tag.last_observed_ns == 100 * S
+    assert [scan.stamp_ns for scan in history.of("1").scans] == [100 * S]

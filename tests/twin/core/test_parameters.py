@@ -1,0 +1,163 @@
+"""Parameters: the contract's names and defaults, and a clear word for each bad value."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from lupin_twin.core.parameters import MAX_NAMES, ParameterError, TwinParameters, changed, describe
+
+DEFAULTS = {
+    "observations_topic": "floranova/observations",
+    "discovered_tags_topic": "perception/discovered_tags",
+    "map_topic": "map",
+    "state_topic": "twin/state",
+    "field_service_name": "twin/get_field",
+    "state_publish_rate_hz": 1.0,
+    "frame_id": "map",
+    "max_pose_m": 1000.0,
+    "buffer_len": 32,
+    "idw_power": 2.0,
+    "idw_falloff_radius_m": 1.5,
+    "idw_max_distance_m": 1.5,
+    "max_grid_cells": 1_000_000,
+    "layers": (),
+    "journal": "",
+    "journal_days": 90.0,
+    "journal_max_mb": 4000.0,
+}
+
+
+def parameters(name: str, value: Any) -> TwinParameters:
+    return TwinParameters(**{name: value})
+
+
+def test_names_and_defaults() -> None:
+    assert asdict(TwinParameters()) == DEFAULTS
+
+
+def test_the_shipped_file_holds_every_parameter_at_its_default() -> None:
+    file = Path("ros_node/lupin_twin/config/twin.yaml")
+    # For every node: a twin of another name or namespace, and `web`, read it too.
+    # Of an empty list, ROS does not know what it is one of.
+    assert yaml.safe_load(file.read_text()) == {
+        "/**": {"ros__parameters": {**DEFAULTS, "layers": [""], "use_sim_time": False}}
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("state_publish_rate_hz", 0.0),
+        ("state_publish_rate_hz", 1e6),
+        ("idw_power", 0.0),
+        ("idw_power", math.nan),
+        ("idw_power", math.inf),
+        ("idw_power", "two"),
+        ("idw_falloff_radius_m", -1.5),
+        ("idw_max_distance_m", math.inf),
+        ("buffer_len", 0),
+        ("buffer_len", 1.5),
+        ("buffer_len", True),
+        ("max_grid_cells", 0),
+        ("frame_id", ""),
+        ("frame_id", 7),
+        ("map_topic", ""),
+        ("observations_topic", None),
+        ("layers", ["co2", 7]),
+        ("layers", 7),
+    ],
+)
+def test_a_bad_value_is_refused_by_name_with_the_value(name: str, value: Any) -> None:
+    with pytest.raises(ParameterError) as caught:
+        parameters(name, value)
+    message = str(caught.value)
+    assert message.startswith(f"parameter {name} is ")
+    assert "expected" in message
+    assert value == "" or str(value) in message
+
+
+@pytest.mark.parametrize("name", [f.name for f in fields(TwinParameters) if f.metadata["low"]])
+def test_the_ends_of_a_range_are_in_it_and_what_lies_beyond_is_not(name: str) -> None:
+    spec = next(f for f in fields(TwinParameters) if f.name == name)
+    low, high = spec.metadata["low"], spec.metadata["high"]
+    for end in (low, high):
+        assert getattr(parameters(name, end), name) == end
+    beyond: Any
+    for beyond in (low / 2 if isinstance(low, float) else low - 1, high * 2):
+        with pytest.raises(ParameterError, match=name):
+            parameters(name, beyond)
+
+
+@pytest.mark.parametrize(
+    ("given", "names"),
+    [([], ()), (None, ()), ([""], ()), ("co2", ("co2",)), (["co2", "", "light"], ("co2", "light"))],
+)
+def test_of_a_list_empty_names_do_not_count(given: Any, names: tuple[str, ...]) -> None:
+    assert parameters("layers", given).layers == names
+
+
+def test_a_list_has_so_many_names_and_no_more() -> None:
+    names = [f"sensor{number}" for number in range(MAX_NAMES)]
+    assert parameters("layers", names).layers == tuple(names)
+    with pytest.raises(ParameterError, match="parameter layers is 17 names, expected 16 at most"):
+        parameters("layers", [*names, "more"])
+
+
+def test_a_whole_number_is_a_number() -> None:
+    power = parameters("idw_power", 3).idw_power
+    assert (power, type(power)) == (3.0, float)
+
+
+def test_every_parameter_is_described() -> None:
+    for spec in fields(TwinParameters):
+        told = describe(spec.name)
+        assert told.description
+        assert bool(told.range) == (type(spec.default) in (int, float))
+
+
+CHANGEABLE = {
+    "state_publish_rate_hz": 5,
+    "idw_power": 3.0,
+    "idw_falloff_radius_m": 2.0,
+    "idw_max_distance_m": 2.0,
+    "max_pose_m": 2000.0,
+}
+
+
+def test_what_may_change_while_the_twin_runs_changes_and_the_rest_stays() -> None:
+    before = TwinParameters(buffer_len=5)
+    after = changed(before, CHANGEABLE)
+    assert asdict(after) == asdict(before) | CHANGEABLE
+    assert type(after.state_publish_rate_hz) is float
+
+
+@pytest.mark.parametrize("name", sorted(set(DEFAULTS) - set(CHANGEABLE)))
+def test_what_is_fixed_cannot_and_says_why(name: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        changed(TwinParameters(), {"idw_power": 3.0, name: "other"})
+    text = str(caught.value)
+    assert text.startswith(f"parameter {name} is ")
+    assert f"cannot become 'other' while the twin runs: {describe(name).fixed}" in text
+    assert len(describe(name).fixed) > 20
+
+
+@pytest.mark.parametrize("wrong", [{"idw_power": "x" * 10**6}, {"layers": {"x": "y" * 10**6}}])
+def test_a_complaint_repeats_no_more_than_the_beginning_of_what_is_long(wrong: Any) -> None:
+    with pytest.raises(ParameterError) as caught:
+        TwinParameters(**wrong)
+    assert len(str(caught.value)) < 200
+    with pytest.raises(ParameterError) as caught:
+        changed(TwinParameters(), {"frame_id": "x" * 10**6})
+    assert len(str(caught.value)) < 400
+
+
+def test_a_plain_off_which_yaml_reads_as_false_is_the_journals_off() -> None:
+    assert TwinParameters(journal=False).journal == "off"  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match="parameter journal is True"):
+        TwinParameters(journal=True)  # type: ignore[arg-type]

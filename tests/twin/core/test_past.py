@@ -1,0 +1,154 @@
+from __future__ import annotations
+
+import pickle
+import re
+from typing import Any
+
+import pytest
+
+from lupin_twin.core.drops import MAX_TEXT_LENGTH
+from lupin_twin.core.past import (
+    HOUR_NS,
+    MAX_POINTS,
+    SLOT_NS,
+    Event,
+    Grid,
+    NotRemembered,
+    PastRefused,
+    SeriesPast,
+    SeriesRequest,
+    check_moment,
+    error_of,
+    grid,
+    message_of,
+)
+
+ASKED: dict[str, Any] = {"tag_id": "tag_7", "sensor_type": "temperature"}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ({"tag_id": ""}, "tag_id is empty"),
+        ({"sensor_type": ""}, "sensor_type is empty"),
+        ({"sensor_type": "~hopes"}, "sensor_type '~hopes' is none of ~scans"),
+        ({"sensor_type": "~runs"}, "tag_id is 'tag_7', and ~runs are those of '*'"),
+        (
+            {"tag_id": "*"},
+            "tag_id is '*', which has events alone, and sensor_type is 'temperature': expected one",
+        ),
+        (
+            {"tag_id": "7" * (MAX_TEXT_LENGTH + 1)},
+            "tag_id '777777777777777777777777'… has 257 char",
+        ),
+        ({"sensor_type": "t" * (MAX_TEXT_LENGTH + 1)}, "has 257 characters, the limit is 256"),
+        ({"start_ns": -1}, "start or end is -1 ns"),
+        ({"end_ns": -1}, "start or end is -1 ns"),
+        ({"start_ns": 5, "end_ns": 4}, "end 4 ns is before start 5 ns"),
+        ({"max_points": 0}, "max_points is 0, the limits are 1 and 5000"),
+        ({"max_points": MAX_POINTS + 1}, "max_points is 5001"),
+    ],
+)
+def test_a_question_that_cannot_be_answered_is_refused(wrong: dict[str, Any], says: str) -> None:
+    with pytest.raises(PastRefused, match=re.escape(says)):
+        SeriesRequest(**(ASKED | wrong))
+
+
+@pytest.mark.parametrize(
+    "right",
+    [
+        {},
+        {"start_ns": 5, "end_ns": 5},
+        {"start_ns": 5, "end_ns": 0},
+        {"max_points": 1},
+        {"max_points": MAX_POINTS},
+        {"tag_id": "7" * MAX_TEXT_LENGTH, "sensor_type": "t" * MAX_TEXT_LENGTH},
+    ],
+)
+def test_the_limits_themselves_are_allowed(right: dict[str, Any]) -> None:
+    assert SeriesRequest(**(ASKED | right)).event is None
+
+
+def test_events_are_asked_for_like_sensors() -> None:
+    for event in Event:
+        assert SeriesRequest("*", event.value).event is event
+
+
+def test_buckets_have_a_length() -> None:
+    assert SeriesPast(0, 10, bucket_ns=5).is_bucketed
+    assert not SeriesPast(0, 10).is_bucketed
+
+
+@pytest.mark.parametrize(
+    ("at_ns", "says"),
+    [
+        (5_000_000_002, "at is 5.000000002 s, later than now, 5.000000001 s"),
+        (-1, "at is -0.000000001 s, before 0"),
+    ],
+)
+def test_a_moment_has_to_have_passed(at_ns: int, says: str) -> None:
+    with pytest.raises(PastRefused, match=re.escape(says)):
+        check_moment(at_ns, 5_000_000_001)
+
+
+@pytest.mark.parametrize("at_ns", [0, 5])
+def test_now_has_passed(at_ns: int) -> None:
+    check_moment(at_ns, 5)
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (PastRefused("at is 3 s"), "at is 3 s"),
+        (NotRemembered("no journal", is_lasting=True), "not remembered: no journal"),
+        (NotRemembered("the file is busy", is_lasting=False), "the file is busy: ask again later"),
+        (NotRemembered("32 wait: ask again later", is_lasting=False), "32 wait: ask again later"),
+    ],
+)
+def test_why_there_is_no_answer_is_told_in_words_and_read_again(
+    error: PastRefused | NotRemembered, message: str
+) -> None:
+    assert message_of(error) == message
+    read = error_of(message)
+    assert type(read) is type(error)
+    assert message_of(read) == message
+    if isinstance(error, NotRemembered) and isinstance(read, NotRemembered):
+        assert read.is_lasting is error.is_lasting
+
+
+def test_a_failure_of_the_twin_is_nobodys_mistake_and_may_pass() -> None:
+    read = error_of(message_of(KeyError("stamp")))
+    assert isinstance(read, NotRemembered)
+    assert not read.is_lasting
+    assert str(read) == "the twin failed to answer: 'stamp': ask again later"
+
+
+@pytest.mark.parametrize(
+    ("asked", "expected"),
+    [
+        ((7, 107, 10), Grid(7, 107, 10)),
+        ((7, 108, 10), Grid(7, 108, 11)),
+        ((7, 7, 10), Grid(7, 7, 1)),
+        # Just below five minutes, and five minutes.
+        ((7, 7 + 10 * SLOT_NS - 10, 10), Grid(7, 7 + 10 * SLOT_NS - 10, SLOT_NS - 1)),
+        ((7, 7 + 10 * SLOT_NS, 10), Grid(0, 11 * SLOT_NS, 2 * SLOT_NS)),
+        ((0, 10 * SLOT_NS, 10), Grid(0, 10 * SLOT_NS, SLOT_NS)),
+        # Fifty-five minutes, and an hour.
+        ((0, 110 * SLOT_NS, 10), Grid(0, 110 * SLOT_NS, 11 * SLOT_NS)),
+        ((1, 110 * SLOT_NS + 1, 10), Grid(0, 10 * HOUR_NS, HOUR_NS)),
+        ((HOUR_NS + 1, 21 * HOUR_NS, 10), Grid(HOUR_NS, 21 * HOUR_NS, 2 * HOUR_NS)),
+        # Coarser than they need be.
+        ((7, 107, 10, SLOT_NS), Grid(0, SLOT_NS, SLOT_NS)),
+        ((7, 107, 10, HOUR_NS), Grid(0, HOUR_NS, HOUR_NS)),
+    ],
+)
+def test_buckets_cover_a_period_and_long_ones_begin_on_the_full_hour(
+    asked: tuple[int, int, int], expected: Grid
+) -> None:
+    assert grid(*asked) == expected
+
+
+def test_what_is_not_remembered_can_be_told_by_another_process() -> None:
+    for is_lasting in (True, False):
+        told = pickle.loads(pickle.dumps(NotRemembered("gone", is_lasting=is_lasting)))
+        assert (str(told), told.is_lasting) == ("gone", is_lasting)

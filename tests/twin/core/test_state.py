@@ -1,0 +1,307 @@
+"""The store, rule by rule; no ROS here."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+
+import pytest
+
+from lupin_twin.core import drops, state
+from lupin_twin.core.drops import Rejected
+from lupin_twin.core.state import (
+    Attempt,
+    Bloom,
+    Flower,
+    Inspection,
+    Reading,
+    Scan,
+    TwinStore,
+    age_seconds,
+)
+from tests.support.store import S, at, failed_look, look, scan
+
+
+def write(store: TwinStore, observation: Scan | Inspection) -> None:
+    if isinstance(observation, Scan):
+        store.record(observation)
+    else:
+        store.record_inspection(observation)
+
+
+def tag(store: TwinStore, tag_id: str) -> state.TagState:
+    return next(t for t in store.snapshot(0, "map").tags if t.tag_id == tag_id)
+
+
+def test_readings_are_latest_per_name_and_keep_their_order() -> None:
+    store = TwinStore()
+    store.record(scan("1", co2=1.0, light=2.0))
+    store.record(scan("1", light=3.0, humidity=4.0))
+    assert [(r.name, r.value) for r in tag(store, "1").readings] == [
+        ("co2", 1.0),
+        ("light", 3.0),
+        ("humidity", 4.0),
+    ]
+
+
+def test_first_pose_wins_whoever_brings_it() -> None:
+    for first, second, third in (
+        ("scan", "pin", "look"),
+        ("pin", "scan", "look"),
+        ("look", "scan", "pin"),
+    ):
+        store = TwinStore()
+        writes = {
+            "scan": lambda x, s=store: s.record(scan("1", pose=at(x))),
+            "look": lambda x, s=store: s.record_inspection(look("1", pose=at(x))),
+            "pin": lambda x, s=store: s.pin("1", at(x)),
+        }
+        for x, name in enumerate((first, second, third)):
+            writes[name](float(x))
+        assert tag(store, "1").pose == at(0.0), (first, second, third)
+
+
+def test_a_tag_without_a_pose_takes_the_first_that_comes() -> None:
+    store = TwinStore()
+    store.record(scan("1", co2=1.0))
+    assert tag(store, "1").pose is None
+    assert store.pin("1", at(5.0))
+    assert not store.pin("1", at(6.0))
+    assert tag(store, "1").pose == at(5.0)
+    assert store.is_pinned("1")
+    assert not store.is_pinned("2")
+
+
+def test_a_pin_touches_neither_readings_nor_species_nor_time() -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=3.0, co2=1.0))
+    store.record_inspection(look("1", at_s=4.0, species="rose"))
+    before = tag(store, "1")
+    store.pin("1", at(5.0))
+    assert tag(store, "1") == dataclasses.replace(before, pose=at(5.0))
+
+
+def test_flower_results_replace_and_leave_readings_alone() -> None:
+    store = TwinStore()
+    bloom = Bloom(0.0, 0.0, 0.0, 0.1, "rose", 0.9, anomaly=True)
+    store.record(scan("1", co2=1.0))
+    store.record_inspection(look("1", species="rose", anomaly=True, bug_count=2, blooms=(bloom,)))
+    store.record_inspection(look("1", species="lupin"))
+    assert tag(store, "1").flower == Flower(species="lupin")
+    assert [r.value for r in tag(store, "1").readings] == [1.0]
+
+
+def test_a_write_counts_when_it_changes_what_is_shown_and_a_refused_one_never() -> None:
+    store = TwinStore()
+    store.record(scan("1", co2=1.0))
+    store.record_inspection(look("1", species="rose"))
+    store.pin("2", at(1.0))
+    store.record(scan("tried", succeeded=False))
+    assert store.observation_count == 4
+    store.pin("2", at(2.0))
+    for refused in (scan("x" * 300), Scan("3", S, (Reading("n" * 300, 1.0),))):
+        with pytest.raises(Rejected):
+            store.record(refused)
+    assert store.observation_count == 4
+    assert {t.tag_id for t in store.snapshot(0, "map").tags} == {"1", "2", "tried"}
+
+
+def test_a_write_that_changes_nothing_that_is_shown_does_not_count() -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=20.0, co2=1.0, light=math.nan))
+    store.record_inspection(look("1", at_s=20.0, species="rose", confidence=math.nan))
+    before = tag(store, "1")
+    store.record(scan("1", at_s=20.0, co2=1.0, light=math.nan))
+    store.record_inspection(look("1", at_s=20.0, species="rose", confidence=math.nan))
+    assert tag(store, "1") is before, "who looks for changes compares identities"
+    store.record(scan("1", at_s=10.0, co2=9.0))
+    store.record_inspection(look("1", at_s=10.0, species="lupin"))
+    store.record(scan("1", at_s=30.0, succeeded=False))
+    assert store.observation_count == 2
+    store.record(scan("1", at_s=10.0, pose=at(1.0), co2=9.0))
+    assert store.observation_count == 3, "it pins the tag"
+
+
+def test_the_last_try_is_kept_apart_from_what_was_observed() -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=10.0, co2=1.0))
+    assert tag(store, "1").last_try == Attempt(10 * S)
+    store.record(Scan("1", 30 * S, status=1, status_detail="blocked"))
+    store.record_inspection(failed_look("1", at_s=20.0))
+    kept = tag(store, "1")
+    assert kept.last_try == Attempt(30 * S, 1, "blocked")
+    assert (kept.last_observed_ns, kept.looked_at_ns) == (10 * S, None)
+    store.record_inspection(look("1", at_s=40.0))
+    assert tag(store, "1").last_try == Attempt(40 * S)
+    store.pin("2", at(1.0))
+    assert tag(store, "2").last_try is None
+
+
+def test_every_reading_has_its_own_time_and_a_look_makes_none_younger() -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=10.0, co2=1.0, light=2.0))
+    store.record_inspection(look("1", at_s=3610.0))
+    store.record(scan("1", at_s=7210.0, light=3.0))
+    kept = tag(store, "1")
+    assert kept.readings == (Reading("co2", 1.0, 10 * S), Reading("light", 3.0, 7210 * S))
+    assert (kept.looked_at_ns, kept.last_observed_ns) == (3610 * S, 7210 * S)
+
+
+def test_age_is_since_the_last_observation_and_never_negative() -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=100.0, co2=1.0))
+    assert tag(store, "1").stale_seconds(130 * S) == 30.0
+    assert tag(store, "1").stale_seconds(50 * S) == 0.0
+
+
+def test_an_age_is_of_a_moment_and_never_negative() -> None:
+    assert age_seconds(3 * S, 5 * S) == 2.0
+    assert age_seconds(5 * S, 3 * S) == 0.0
+
+
+def test_a_tag_never_observed_is_infinitely_old() -> None:
+    store = TwinStore()
+    store.pin("1", at(1.0))
+    assert tag(store, "1").last_observed_ns is None
+    assert math.isinf(tag(store, "1").stale_seconds(5 * S))
+
+
+def test_a_failed_scan_is_listed_and_makes_nothing_look_younger() -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=10.0, succeeded=False))
+    assert tag(store, "1").last_observed_ns == 10 * S
+    store.record(scan("1", at_s=20.0, co2=1.0))
+    store.record(scan("1", at_s=30.0, succeeded=False))
+    assert tag(store, "1").last_observed_ns == 20 * S
+    store.record(scan("1", at_s=40.0, succeeded=False, light=1.0))
+    assert tag(store, "1").last_observed_ns == 40 * S
+
+
+def test_samples_need_a_pose_and_a_finite_reading_and_keep_the_first_mention_order() -> None:
+    store = TwinStore()
+    store.record(scan("late", co2=5.0))
+    store.record(scan("nan", pose=at(1.0), co2=math.nan))
+    store.record(scan("inf", pose=at(2.0), co2=math.inf))
+    store.record(scan("past float32", pose=at(2.5), co2=-3.5e38))
+    store.record(scan("other", pose=at(3.0), light=1.0))
+    store.record(scan("good", pose=at(4.0, 7.0), co2=6.0))
+    assert store.samples_for_sensor("co2") == ((4.0, 7.0, 6.0),)
+    store.pin("late", at(9.0))
+    assert store.samples_for_sensor("co2") == ((9.0, 0.0, 5.0), (4.0, 7.0, 6.0))
+    readings = {t.tag_id: t.readings[0].value for t in store.snapshot(0, "map").tags}
+    assert math.isnan(readings["nan"])
+    assert math.isinf(readings["inf"])
+
+
+BLOOM = Bloom(0.0, 0.0, 0.0, 0.1, "rose", 0.9, anomaly=False)
+# What makes a write of a size, and the size that it may have.
+BOUNDED: dict[str, tuple[Callable[[int], Scan | Inspection], int]] = {
+    "readings": (
+        lambda n: Scan("1", S, tuple(Reading(f"s{i}", 0.0) for i in range(n))),
+        drops.MAX_SENSORS_PER_TAG,
+    ),
+    "blooms": (lambda n: look("1", blooms=(BLOOM,) * n), drops.MAX_BLOOMS_PER_TAG),
+    "footprint": (
+        lambda n: look("1", footprint=((0.0, 0.0, 0.0),) * n),
+        drops.MAX_FOOTPRINT_POINTS,
+    ),
+    "the tag_id of a scan": (lambda n: Scan("t" * n, S), drops.MAX_TEXT_LENGTH),
+    "a sensor's name": (
+        lambda n: Scan("1", S, (Reading("s" * n, 0.0),)),
+        drops.MAX_TEXT_LENGTH,
+    ),
+    "the tag_id of a look": (lambda n: look("t" * n), drops.MAX_TEXT_LENGTH),
+    "species": (lambda n: look("1", species="r" * n), drops.MAX_TEXT_LENGTH),
+    "a bloom's species": (
+        lambda n: look("1", blooms=(dataclasses.replace(BLOOM, species="r" * n),)),
+        drops.MAX_TEXT_LENGTH,
+    ),
+}
+
+
+@pytest.mark.parametrize("what", BOUNDED)
+def test_a_bound_belongs_to_what_is_allowed_and_one_more_is_refused_by_both_numbers(
+    what: str,
+) -> None:
+    make, limit = BOUNDED[what]
+    store = TwinStore()
+    write(store, make(limit))
+    before = store.snapshot(0, "map").tags
+    assert len(before) == 1
+    with pytest.raises(Rejected, match=rf"{limit + 1}\b.*limit is {limit}$"):
+        write(store, make(limit + 1))
+    assert store.snapshot(0, "map").tags == before
+
+
+def test_a_pinned_tags_id_is_bounded_like_a_scanned_ones() -> None:
+    store = TwinStore()
+    store.pin("t" * drops.MAX_TEXT_LENGTH, at(1.0))
+    with pytest.raises(Rejected, match="limit is"):
+        store.pin("t" * (drops.MAX_TEXT_LENGTH + 1), at(1.0))
+
+
+def test_one_tag_too_many_is_refused_and_the_known_ones_go_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(state, "MAX_TAGS", 2)
+    store = TwinStore()
+    store.record(scan("1", co2=1.0))
+    store.pin("2", at(1.0))
+    with pytest.raises(Rejected, match="tags: 3, the limit is 2"):
+        store.record(scan("3", co2=1.0))
+    with pytest.raises(Rejected):
+        store.pin("4", at(1.0))
+    store.record(scan("1", co2=2.0))
+    assert tag(store, "1").readings[0].value == 2.0
+
+
+def test_what_all_tags_hold_is_bounded_and_what_is_known_goes_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(state, "MAX_ITEMS", 4)
+    store = TwinStore()
+    store.record(scan("1", co2=1.0))
+    store.record_inspection(look("2", blooms=(BLOOM, BLOOM), footprint=((0.0, 0.0, 0.0),)))
+    for one_too_many in (scan("1", light=1.0), scan("3", co2=1.0), look("1", blooms=(BLOOM,))):
+        with pytest.raises(Rejected, match="of all tags: 5, the limit is 4"):
+            write(store, one_too_many)
+    assert [t.tag_id for t in store.snapshot(0, "map").tags] == ["1", "2"]
+    store.record(scan("1", co2=2.0))
+    assert tag(store, "1").readings[0].value == 2.0
+    store.pin("3", at(1.0))
+    # A look with one flower less makes room for one reading more.
+    store.record_inspection(look("2", blooms=(BLOOM,), footprint=((0.0, 0.0, 0.0),)))
+    store.record(scan("3", co2=3.0))
+    assert tag(store, "3").readings[0].value == 3.0
+
+
+def test_a_sensor_that_a_scan_names_many_times_is_kept_once() -> None:
+    store = TwinStore()
+    store.record(Scan("1", S, tuple(Reading("co2", float(i)) for i in range(1_000))))
+    assert tag(store, "1").readings == (Reading("co2", 999.0, S),)
+
+
+def test_a_snapshot_stays_as_it_was() -> None:
+    store = TwinStore()
+    store.record(scan("1", co2=1.0))
+    before = store.snapshot(7, "map")
+    store.record(scan("1", co2=2.0))
+    assert (before.stamp_ns, before.frame_id) == (7, "map")
+    assert before.tags[0].readings[0].value == 1.0
+
+
+@pytest.mark.parametrize("field", ["x", "y", "z", "qx", "qy", "qz", "qw"])
+@pytest.mark.parametrize("broken", [math.nan, math.inf, -math.inf])
+def test_one_number_that_is_not_finite_makes_a_pose_not_finite(field: str, broken: float) -> None:
+    assert at(1.0).is_finite
+    assert not dataclasses.replace(at(1.0), **{field: broken}).is_finite
+
+
+def test_the_size_is_that_of_what_is_kept() -> None:
+    store = TwinStore()
+    assert store.size == (0, 0)
+    store.record(scan("1", co2=1.0, light=2.0))
+    store.record(scan("1", co2=3.0))
+    store.pin("2", at(1.0))
+    assert store.size == (2, 2)

@@ -1,0 +1,254 @@
+"""What counts as the latest, in whatever order it comes, and when the clock goes back."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lupin_twin.core import state
+from lupin_twin.core.drops import Rejected
+from lupin_twin.core.state import Attempt, Flower, Inspection, Reading, Scan, TagState, TwinStore
+from tests.support.store import SCAN_FAILED, S, at, look, scan
+
+
+def tag(store: TwinStore, tag_id: str) -> TagState:
+    return next(t for t in store.snapshot(0, "map").tags if t.tag_id == tag_id)
+
+
+def test_an_older_scan_replaces_nothing_newer_and_adds_what_was_not_known() -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=20.0, co2=2.0))
+    store.record(scan("1", at_s=10.0, pose=at(5.0), co2=1.0, light=1.0))
+    kept = tag(store, "1")
+    assert [(r.name, r.value) for r in kept.readings] == [("co2", 2.0), ("light", 1.0)]
+    assert (kept.pose, kept.last_observed_ns) == (at(5.0), 20 * S)
+    # Of each sensor its own time counts: light is known from 10 s only.
+    store.record(scan("1", at_s=15.0, co2=3.0, light=3.0))
+    assert [r.value for r in tag(store, "1").readings] == [2.0, 3.0]
+
+
+def test_an_older_look_replaces_no_newer_one_but_may_pin() -> None:
+    store = TwinStore()
+    store.record_inspection(look("1", at_s=20.0, species="rose", anomaly=True))
+    store.record_inspection(look("1", at_s=10.0, pose=at(5.0), species="lupin"))
+    kept = tag(store, "1")
+    assert kept.flower == Flower(species="rose", anomaly=True)
+    assert (kept.pose, kept.last_observed_ns) == (at(5.0), 20 * S)
+    # A newer scan is no look: the flowers' own time counts.
+    store.record(scan("1", at_s=40.0, co2=1.0))
+    store.record_inspection(look("1", at_s=30.0, species="lupin"))
+    assert tag(store, "1").flower == Flower(species="lupin")
+    assert tag(store, "1").last_observed_ns == 40 * S
+
+
+def test_of_equal_stamps_the_later_arrival_counts() -> None:
+    store = TwinStore()
+    for value, species in ((1.0, "rose"), (2.0, "lupin")):
+        store.record(scan("1", at_s=5.0, co2=value))
+        store.record_inspection(look("1", at_s=5.0, species=species))
+    assert tag(store, "1").readings[0].value == 2.0
+    assert tag(store, "1").flower.species == "lupin"
+
+
+def test_the_time_of_a_failed_scan_gives_way_to_any_observation() -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=20.0, succeeded=False))
+    store.record(scan("1", at_s=10.0, co2=1.0))
+    assert tag(store, "1").last_observed_ns == 10 * S
+
+
+def test_after_a_clock_that_went_back_all_ages_from_there_and_news_is_news() -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=40.0, co2=1.0))
+    store.record(scan("1", at_s=3600.0, co2=2.0))
+    store.record_inspection(look("1", at_s=3600.0, species="rose"))
+    store.record(scan("before", at_s=40.0, co2=1.0))
+    store.record(scan("tried", at_s=3600.0, succeeded=False))
+    store.pin("never", at(1.0))
+    count = store.observation_count
+    assert not store.hold_to(3600 * S)
+    assert not store.hold_to(0), "a simulated clock that has not started is no clock that went back"
+    assert store.hold_to(50 * S)
+    assert not store.hold_to(50 * S)
+    ages = {t.tag_id: t.stale_seconds(60 * S) for t in store.snapshot(60 * S, "map").tags}
+    assert ages == {"1": 10.0, "before": 20.0, "tried": 10.0, "never": math.inf}
+    tags = {t.tag_id: t for t in store.snapshot(60 * S, "map").tags}
+    assert tags["1"].readings == (Reading("co2", 2.0, 50 * S),)
+    assert (tags["1"].looked_at_ns, tags["1"].last_try) == (50 * S, Attempt(50 * S))
+    assert tags["tried"].last_try == Attempt(50 * S, SCAN_FAILED)
+    assert tags["before"].readings == (Reading("co2", 1.0, 40 * S),)
+    assert store.observation_count == count
+    store.record(scan("1", at_s=55.0, co2=3.0))
+    store.record_inspection(look("1", at_s=55.0, species="lupin"))
+    kept = tag(store, "1")
+    assert (kept.readings[0].value, kept.flower.species) == (3.0, "lupin")
+    assert kept.last_observed_ns == 55 * S
+
+
+def test_a_try_that_is_newer_than_all_that_was_observed_follows_the_clock_too() -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=10.0, co2=1.0))
+    store.record(scan("1", at_s=90.0, succeeded=False))
+    assert store.hold_to(50 * S)
+    assert tag(store, "1").last_try == Attempt(50 * S, SCAN_FAILED)
+    assert tag(store, "1").last_observed_ns == 10 * S
+
+
+def test_a_refused_write_leaves_no_stamp_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=1.0, co2=1.0))
+    with monkeypatch.context() as full:
+        full.setattr(state, "MAX_ITEMS", 1)
+        with pytest.raises(Rejected):
+            store.record(scan("1", at_s=9.0, co2=9.0, light=9.0))
+    store.record(scan("1", at_s=2.0, co2=2.0))
+    assert tag(store, "1").readings == (Reading("co2", 2.0, 2 * S),)
+    assert not store.hold_to(5 * S)
+
+
+# --- against a model ----------------------------------------------------------------------------
+
+
+def plainest(writes: list[Write]) -> dict[str, TagState]:
+    """The state of each tag, from the list of all that was ever written: no rule but the order.
+
+    What has a time goes by it (of equal times, by arrival); poses and names go by arrival alone.
+    """
+    tags: dict[str, TagState] = {}
+    for tag_id in dict.fromkeys(write.tag_id for write in writes):
+        own = [write for write in writes if write.tag_id == tag_id]
+        names = dict.fromkeys(r.name for w in own if isinstance(w, Scan) for r in w.readings)
+        tried = sorted(own, key=lambda write: write.stamp_ns)
+        seen = [write for write in tried if brings(write)]
+        values = {
+            reading.name: Reading(reading.name, reading.value, write.stamp_ns)
+            for write in tried
+            if isinstance(write, Scan)
+            for reading in write.readings
+        }
+        looks = [w for w in tried if isinstance(w, Inspection) and w.flower is not None]
+        last_observed = seen[-1] if seen else tried[0]
+        tags[tag_id] = TagState(
+            tag_id,
+            next((write.pose for write in own if write.pose is not None), None),
+            tuple(values[name] for name in names),
+            last_observed.stamp_ns,
+            looks[-1].flower or Flower() if looks else Flower(),
+            looks[-1].stamp_ns if looks else None,
+            Attempt(tried[-1].stamp_ns, tried[-1].status, tried[-1].status_detail),
+        )
+    return tags
+
+
+def brings(write: Write) -> bool:
+    return (
+        write.succeeded or bool(write.readings) if isinstance(write, Scan) else bool(write.flower)
+    )
+
+
+def held(write: Write, now_ns: int) -> Write:
+    return replace(write, stamp_ns=min(write.stamp_ns, now_ns))
+
+
+Write = Scan | Inspection
+TAG_IDS = st.sampled_from(["a", "b"])
+STAMPS = st.integers(1, 30).map(lambda at_s: at_s * S)
+POSES = st.one_of(st.none(), st.integers(-5, 5).map(float).map(at))
+STATUS = st.sampled_from([0, 2])
+SENSORS = st.sets(st.sampled_from(["co2", "light"])).map(sorted)
+SCANS = st.builds(
+    lambda tag_id, stamp_ns, names, pose, status: Scan(
+        tag_id, stamp_ns, tuple(Reading(name, 0.0) for name in names), pose, status
+    ),
+    TAG_IDS, STAMPS, SENSORS, POSES, STATUS,
+)  # fmt: skip
+LOOKS = st.builds(
+    lambda tag_id, stamp_ns, pose, status: Inspection(
+        tag_id, stamp_ns, None if status else Flower(), pose, status
+    ),
+    TAG_IDS, STAMPS, POSES, STATUS,
+)  # fmt: skip
+STEPS = st.lists(SCANS | LOOKS | st.integers(1, 30), max_size=25)
+
+
+def numbered(write: Write, number: int) -> Write:
+    """The write with a value of its own, so that it can be told from all others."""
+    if isinstance(write, Scan):
+        readings = tuple(replace(reading, value=float(number)) for reading in write.readings)
+        return replace(write, readings=readings, status_detail=str(number))
+    flower = None if write.flower is None else Flower(flower_count=number)
+    return replace(write, flower=flower, status_detail=str(number))
+
+
+@given(STEPS)
+def test_against_the_plainest_store(steps: list[Write | int]) -> None:
+    """Any sequence of writes in any order of time, and of clocks that go back (the numbers)."""
+    store = TwinStore()
+    written: list[Write] = []
+    for number, step in enumerate(steps):
+        if isinstance(step, int):
+            store.hold_to(step * S)
+            # By time first: of what is equal from now on, the last in the list is the latest.
+            written = [held(write, step * S) for write in in_time(written)]
+            continue
+        write = numbered(step, number)
+        written.append(write)
+        before = {t.tag_id: t for t in store.snapshot(0, "map").tags}
+        count = store.observation_count
+        store.record(write) if isinstance(write, Scan) else store.record_inspection(write)
+        after = tag(store, write.tag_id)
+        shown = [as_shown(each) for each in (before.get(write.tag_id), after)]
+        assert store.observation_count == count + (shown[0] != shown[1])
+    kept = {t.tag_id: t for t in store.snapshot(0, "map").tags}
+    for tag_id, expected in plainest(written).items():
+        assert by_name(kept[tag_id]) == by_name(expected)
+
+
+def in_time(writes: list[Write]) -> list[Write]:
+    return sorted(writes, key=lambda write: write.stamp_ns)
+
+
+def by_name(state_of_tag: TagState) -> TagState:
+    """Without the order of the readings and the pose, which a clock that goes back leaves alone."""
+    readings = sorted(state_of_tag.readings, key=lambda reading: reading.name)
+    return replace(state_of_tag, readings=tuple(readings), pose=None)
+
+
+def as_shown(state_of_tag: TagState | None) -> object:
+    """What the state's message says of a tag."""
+    if state_of_tag is None:
+        return None
+    readings = tuple(replace(reading, observed_at_ns=None) for reading in state_of_tag.readings)
+    return replace(state_of_tag, readings=readings, looked_at_ns=None, last_try=None)
+
+
+@given(
+    st.lists(SCANS | LOOKS, max_size=12).flatmap(
+        lambda w: st.tuples(st.just(w), st.permutations(w))
+    )
+)
+def test_what_has_stamps_of_its_own_is_the_same_in_any_order(
+    orders: tuple[list[Write], list[Write]],
+) -> None:
+    """Poses apart, which the first to come keeps."""
+    unique = {(write.tag_id, write.stamp_ns): write for write in orders[0]}
+    states = []
+    for order in orders:
+        store = TwinStore()
+        for write in order:
+            if unique[write.tag_id, write.stamp_ns] is write:
+                store.record(write) if isinstance(write, Scan) else store.record_inspection(write)
+        states.append({t.tag_id: by_name(t) for t in store.snapshot(0, "map").tags})
+    assert states[0] == states[1]
+
+
+@pytest.mark.parametrize("name", ["a", "b"])
+def test_the_first_pose_stays(name: str) -> None:
+    store = TwinStore()
+    for x in range(3):
+        store.record(scan(name, at_s=9.0 - x, pose=at(float(x))))
+    assert tag(store, name).pose == at(0.0)

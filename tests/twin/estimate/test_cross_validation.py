@@ -1,0 +1,135 @@
+"""Readings held against all others: as the textbook leaves them out; which sensor has changed."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+from lupin_twin.estimate import MAX_EXACT, Model, Readings, fit
+from lupin_twin.estimate.cross_validation import gap_of
+from lupin_twin.estimate.kernel import Hyper, Scale
+from lupin_twin.estimate.posterior import INFLATION
+from lupin_twin.field.grid import FloatArray
+from tests.support import textbook_gp
+from tests.support.estimates import DAY_S, a_day, hypers, some_readings, spots_of
+
+
+def by_the_textbook(readings: Readings, block: list[int], h: Hyper) -> tuple[float, float]:
+    """Mean and sd of the last of a block of readings, given all others; the unit is a sensor's."""
+    y = (readings.value - 20.0) / 2.0
+    mean, covariance = textbook_gp.left_out(spots_of(readings), y, block, h)
+    noise = h.tau**2 + 0.02**2
+    true = float(covariance[-1, -1]) - noise
+    return 20.0 + 2.0 * float(mean[-1]), 2.0 * sqrt(INFLATION**2 * true + noise)
+
+
+@given(some_readings(), hypers)
+def test_what_is_expected_is_what_the_textbook_says_without_the_last_four(
+    readings: Readings, h: Hyper
+) -> None:
+    model = Model(Scale(20.0, 2.0), 2.0, DAY_S, h)
+    found = model.posterior(readings, 2 * DAY_S).changes()
+    order = np.lexsort((np.arange(len(readings)), readings.time_s))
+    for tag, change in enumerate(found):
+        own = [int(row) for row in order if readings.tag[row] == tag]
+        assert (change is None) == (not own)
+        if change is None or change.has_changed:
+            continue
+        mean, sd = by_the_textbook(readings, own[-4:], h)
+        assert change.expected == pytest.approx(mean, rel=1e-5, abs=1e-5)
+        assert change.expected_sd == pytest.approx(sd, rel=1e-5)
+
+
+def test_a_tag_is_left_out_with_all_that_are_nearer_than_tags_are_to_gaps() -> None:
+    day = a_day(tags=9, passes=5)
+    xy = day.xy.copy()
+    xy[8] = xy[7] + 0.05  # beside another, which must not help it
+    beside = Readings(day.time_s, day.tag, day.value, xy)
+    h = Hyper(1.0, 5.0, 1.0, 1.0, 0.5, 8.0, 0.4, 2.5, 0.15, 0.3)
+    posterior = Model(Scale(20.0, 2.0), 2.0, DAY_S, h).posterior(beside, DAY_S)
+    [(measured, mean, sd)] = posterior.left_out(np.array([7]))
+    gap = gap_of(xy)
+    near = [tag for tag in range(9) if np.hypot(*(xy[tag] - xy[7])) < gap]
+    assert 8 in near
+    order = np.argsort(beside.time_s)
+    rows = [int(row) for row in order if beside.tag[row] in near and beside.tag[row] != 7]
+    rows += [int(row) for row in order if beside.tag[row] == 7]
+    assert measured == beside.value[rows[-1]]
+    assert (mean, sd) == pytest.approx(by_the_textbook(beside, rows, h), rel=1e-6)
+
+
+def test_the_gap_is_how_far_most_of_the_floor_is_from_a_tag() -> None:
+    corners = np.array([(x, y) for x in (0.0, 4.0) for y in (0.0, 4.0)])
+    assert gap_of(corners) == pytest.approx(1.6, abs=0.2)
+    pairs = np.vstack((corners, corners + 0.1))
+    assert gap_of(pairs) == pytest.approx(1.6, abs=0.2)
+
+
+def test_of_a_tag_with_too_few_others_nothing_is_said() -> None:
+    few = a_day(tags=4)
+    assert fit(few).posterior(few, DAY_S).left_out(np.arange(4)) == []
+    clump = Readings(few.time_s, few.tag, few.value, few.xy * 1e-6)
+    assert fit(clump).posterior(clump, DAY_S).left_out(np.arange(4)) == []
+    enough = a_day(tags=12)
+    assert len(fit(enough).posterior(enough, DAY_S).left_out(np.array([0, 5]))) == 2
+
+
+def with_offset(day: Readings, tag: int, scans: int, offset: float) -> tuple[Readings, FloatArray]:
+    """The last scans of a tag are off; and when they were."""
+    own = np.flatnonzero(day.tag == tag)
+    late = own[np.argsort(day.time_s[own])[-scans:]]
+    value = day.value.copy()
+    value[late] += offset
+    return Readings(day.time_s, day.tag, value, day.xy), np.sort(day.time_s[late])
+
+
+@pytest.mark.parametrize("scans", [2, 4, 9])
+def test_a_sensor_that_reads_three_degrees_more_has_changed_since_then(scans: int) -> None:
+    day = a_day(passes=24)
+    model = fit(day)
+    assert not any(one.has_changed for one in model.posterior(day, DAY_S).changes() if one)
+    off, since = with_offset(day, 3, scans, 3.0)
+    found = model.posterior(off, DAY_S).changes()
+    assert [tag for tag, one in enumerate(found) if one and one.has_changed] == [3]
+    change = found[3]
+    assert change is not None
+    assert change.since_s == since[0]
+    assert change.offset == pytest.approx(3.0, abs=0.5)
+    assert off.value[off.time_s == since[-1]][0] - change.expected == pytest.approx(3.0, abs=0.5)
+
+
+def test_one_odd_reading_is_no_change_nor_is_a_place_that_was_always_different() -> None:
+    day = a_day(passes=24)
+    model = fit(day)
+    for scans in (1, 24):
+        off, _ = with_offset(day, 3, scans, 3.0)
+        found = model.posterior(off, DAY_S).changes()
+        assert not any(one.has_changed for one in found if one)
+
+
+def test_not_more_than_half_of_the_tags_have_changed() -> None:
+    off = a_day(passes=24)
+    model = fit(off)
+    for tag in range(6):
+        off, _ = with_offset(off, tag, 6, 5.0 + tag)
+    found = model.posterior(off, DAY_S).changes()
+    assert sum(one.has_changed for one in found if one) <= 4
+
+
+def test_of_many_tags_each_is_judged_by_those_near_it() -> None:
+    day = a_day(tags=200, passes=6)
+    assert len(day) > MAX_EXACT
+    model = fit(day)
+    off, since = with_offset(day, 50, 3, 4.0)
+    found = model.posterior(off, DAY_S).changes()
+    assert [tag for tag, one in enumerate(found) if one and one.has_changed] == [50]
+    change = found[50]
+    assert change is not None
+    assert change.since_s == since[0]
+    held = model.posterior(day, DAY_S).left_out(np.arange(200))
+    inside = [abs(measured - mean) <= 1.645 * sd for measured, mean, sd in held]
+    assert len(inside) == 200
+    assert np.mean(inside) > 0.8

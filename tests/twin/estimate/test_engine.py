@@ -1,0 +1,149 @@
+"""Which readings count, and what an estimate is made of."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND
+from lupin_twin.estimate import MAX_EXACT, MAX_PER_TAG, PER_TAG
+from lupin_twin.estimate.engine import (
+    MAX_TAGS,
+    NEWEST,
+    EstimateJob,
+    EstimateRequest,
+    RecentReadings,
+    TagPast,
+    cost_s,
+    moment_of,
+    readings_of,
+)
+from lupin_twin.field.engine import FieldRefused, FieldRequest
+from lupin_twin.field.idw import Abandoned
+from tests.support.estimates import DAY_S
+
+S = NANOSECONDS_PER_SECOND
+
+
+def box(sensor: str = "temperature", resolution: float = 0.5) -> FieldRequest:
+    return FieldRequest(sensor, resolution, 0.0, 0.0, 4.0, 8.0)
+
+
+def tag_past(index: int, *hours: float) -> TagPast:
+    readings = tuple((int(hour * 3600 * S), 20.0 + hour) for hour in hours)
+    return TagPast(f"tag-{index}", float(index), 0.0, readings)
+
+
+def test_readings_are_told_by_seconds_before_the_moment() -> None:
+    readings = readings_of(
+        [tag_past(0, 1.0, 2.0), tag_past(1), tag_past(2, 2.5)], int(3600e9 * 3), DAY_S
+    )
+    assert readings.time_s.tolist() == [-7200.0, -3600.0, -1800.0]
+    assert readings.tag.tolist() == [0, 0, 2], "numbers are those of the tags asked about"
+
+
+def test_what_is_later_or_older_than_a_day_does_not_count() -> None:
+    tags = [tag_past(0, 1.0, 26.0)]
+    at_ns = int(25.0 * 3600 * S)
+    assert readings_of(tags, at_ns, DAY_S).value.tolist() == [21.0]
+    with pytest.raises(FieldRefused, match=r"no tag has a reading of the 86400 s before"):
+        readings_of(tags, at_ns + S, DAY_S)
+    assert len(readings_of(tags, at_ns + S, 2 * DAY_S)) == 1
+
+
+def test_many_tags_share_what_can_be_solved_at_once() -> None:
+    hours = [index / 2.0 for index in range(40)]
+    at_ns = int(24 * 3600 * S)
+    few = readings_of([tag_past(index, *hours) for index in range(3)], at_ns, DAY_S)
+    assert 3 * MAX_PER_TAG * 0.75 <= len(few) <= 3 * MAX_PER_TAG
+    most = readings_of([tag_past(index, *hours) for index in range(64)], at_ns, DAY_S)
+    assert 0.75 * MAX_EXACT <= len(most) <= MAX_EXACT
+    assert most.time_s.min() <= -22.0 * 3600.0, "fewer, but of the day"
+    many = readings_of([tag_past(index, *hours) for index in range(MAX_EXACT)], at_ns, DAY_S)
+    assert MAX_EXACT * 4 <= len(many) <= MAX_EXACT * PER_TAG
+    assert len(readings_of([tag_past(index, 1.0) for index in range(MAX_TAGS)], at_ns, DAY_S))
+    with pytest.raises(FieldRefused, match=r"10001 tags have this sensor, .* of 10000 at most"):
+        readings_of([tag_past(index, 1.0) for index in range(MAX_TAGS + 1)], at_ns, DAY_S)
+
+
+def test_a_day_is_remembered_by_the_newest_of_each_hour_and_the_last_readings() -> None:
+    recent = RecentReadings(DAY_S)
+    for minute in range(30 * 60):
+        recent.add("a", "co2", minute * 60 * S, float(minute))
+    recent.add("a", "co2", 10 * 3600 * S, -1.0)  # received late, and older than another of its hour
+    for value in (math.nan, 1e39):
+        recent.add("a", "co2", 30 * 3600 * S, value)
+    found = recent.of("a", "co2")
+    last = [float(minute) for minute in range(30 * 60 - NEWEST, 30 * 60)]
+    hours = [60.0 * hour + 59.0 for hour in range(6, 29)]
+    assert [value for _, value in found] == [*hours, last[0] - 1.0, *last]
+    assert list(found) == sorted(found)
+    recent.add("a", "co2", *found[-2])
+    assert recent.of("a", "co2") == found, "received again, it is nothing new"
+    recent.hold_to(10 * 3600 * S)
+    assert [value for _, value in recent.of("a", "co2")] == [
+        60.0 * hour + 59.0 for hour in range(6, 10)
+    ]
+    assert recent.of("a", "light") == ()
+
+
+def test_an_estimate_without_a_model_is_fitted_for_itself() -> None:
+    request = EstimateRequest(box())
+    tags = [tag_past(index, 1.0 + index / 3.0, 2.0) for index in range(3)]
+    estimate = EstimateJob(request, None, DAY_S).compute(tags, int(3 * 3600 * S))
+    assert (estimate.sample_count, estimate.reading_count) == (3, 6)
+    assert (estimate.grid.width, estimate.grid.height) == (8, 16)
+    assert np.isfinite(estimate.grid.mean).all()
+    assert (estimate.grid.sd > 0.0).all()
+
+
+def test_an_estimate_of_now_is_one_of_the_last_minute_or_of_the_newest_reading() -> None:
+    hour_ns = 3600 * S
+    tags = [tag_past(0, 0.5, 1.0), tag_past(1, 2.0)]
+    assert moment_of(tags, hour_ns + 59 * S, DAY_S) == hour_ns
+    assert moment_of(tags, hour_ns + 60 * S, DAY_S) == hour_ns + 60 * S
+    late = [TagPast("late", 0.0, 0.0, ((hour_ns + 7 * S, 20.0), (2 * hour_ns, 20.0)))]
+    assert moment_of(late, hour_ns + 59 * S, DAY_S) == hour_ns + 7 * S
+    assert moment_of([], 25 * S, 1440.0) == 25 * S, "a minute of that day is a second"
+
+
+def test_what_nobody_waits_for_ends_between_two_steps() -> None:
+    asked: list[None] = []
+
+    def should_stop() -> bool:
+        asked.append(None)
+        return len(asked) == 3
+
+    tags = [tag_past(index, 1.0, 2.0) for index in range(3)]
+    with pytest.raises(Abandoned):
+        EstimateJob(EstimateRequest(box()), None, DAY_S).compute(tags, 3 * 3600 * S, should_stop)
+
+
+def test_what_a_sensor_has_read_since_it_changed_does_not_count() -> None:
+    tags = [tag_past(index, 1.0 + index / 3.0, 2.0) for index in range(3)]
+
+    def made_of(since_h: float) -> tuple[int, int]:
+        changed = {"tag-1": int(since_h * 3600 * S), "gone": 0}
+        asked = EstimateRequest(box(), int(3.0 * 3600 * S))
+        made = EstimateJob(asked, None, DAY_S, changed).compute(tags, 0)
+        return made.sample_count, made.reading_count
+
+    assert made_of(2.5) == (3, 6)
+    assert made_of(2.0) == (3, 5)
+    assert made_of(1.0) == (2, 4)
+
+
+@pytest.mark.parametrize("at_ns", [-1, 11 * S])
+def test_a_moment_that_has_not_come_is_refused(at_ns: int) -> None:
+    EstimateRequest(box(), 10 * S).check(10 * S, 1_000)
+    with pytest.raises(FieldRefused, match=r"at is .* s, the limits are 0 and now, 10.0 s"):
+        EstimateRequest(box(), at_ns).check(10 * S, 1_000)
+
+
+def test_a_box_is_refused_as_a_field_is() -> None:
+    with pytest.raises(FieldRefused, match="127"):
+        EstimateRequest(box()).check(S, 127)
+    EstimateRequest(box()).check(S, 128)
+    assert cost_s(EstimateRequest(box()), 3, 128) < cost_s(EstimateRequest(box()), 30, 128)

@@ -1,0 +1,52 @@
+"""Whether an estimate keeps its word, counted by the hour."""
+
+from __future__ import annotations
+
+from lupin_twin.estimate.grading import LEAST_SCANS, Grades, Record, Tally
+
+HOUR_NS = 3_600 * 1_000_000_000
+
+
+def test_a_share_is_of_those_that_were_predicted() -> None:
+    assert Tally(4, 3).share == 0.75
+    assert Tally().share is None
+
+
+def test_counts_are_of_the_last_day_and_week() -> None:
+    grades = Grades(86_400.0)
+    assert grades.record(0) == Record(None, Tally(), Tally())
+    grades.add(Tally(), 5)
+    assert grades.record(5).since_ns is None, "nothing was held to its word"
+    grades.add(Tally(10, 9), 5)
+    grades.add(Tally(2, 1), 3 * HOUR_NS)
+    assert grades.record(3 * HOUR_NS) == Record(5, Tally(12, 10), Tally(12, 10))
+    assert grades.record(24 * HOUR_NS) == Record(5, Tally(2, 1), Tally(12, 10))
+    assert grades.record(7 * 24 * HOUR_NS) == Record(5, Tally(), Tally(2, 1))
+    grades.add(Tally(1, 1), 8 * 24 * HOUR_NS)
+    assert grades.record(8 * 24 * HOUR_NS) == Record(5, Tally(1, 1), Tally(1, 1))
+
+
+def test_a_day_is_as_long_as_the_greenhouse_s() -> None:
+    grades = Grades(1_440.0)
+    grades.add(Tally(2, 2), 0)
+    assert grades.record(1_379 * 1_000_000_000).day.scans == 2
+    assert grades.record(1_440 * 1_000_000_000).day.scans == 0
+
+
+def test_a_clock_that_goes_back_leaves_nothing_that_is_to_come() -> None:
+    grades = Grades(86_400.0)
+    grades.add(Tally(5, 5), 10 * HOUR_NS)
+    grades.add(Tally(1, 0), 2 * HOUR_NS)
+    assert grades.record(2 * HOUR_NS) == Record(2 * HOUR_NS, Tally(1, 0), Tally(1, 0))
+    assert grades.record(10 * HOUR_NS).day == Tally(1, 0)
+
+
+def test_a_model_is_trusted_by_its_day_and_week_and_by_few_scans_neither_way() -> None:
+    good, bad, few = Tally(100, 80), Tally(100, 79), Tally(LEAST_SCANS - 1, 0)
+    assert Record(1, good, good).is_trusted is True
+    assert Record(1, bad, good).is_trusted is False
+    assert Record(1, good, bad).is_trusted is False
+    assert Record(1, few, good).is_trusted is True
+    assert Record(1, few, few).is_trusted is None
+    assert Record(None, Tally(), Tally()).is_trusted is None
+    assert Record(1, Tally(LEAST_SCANS, LEAST_SCANS), good).is_trusted is True

@@ -1,0 +1,420 @@
+"""GetField without ROS: what is refused, what is remembered, what an explored map clips."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lupin_twin.core.drops import MAX_TEXT_LENGTH
+from lupin_twin.core.state import Pose, Reading, Scan, TwinStore
+from lupin_twin.field import idw
+from lupin_twin.field.engine import (
+    FieldCache,
+    FieldEngine,
+    FieldJob,
+    FieldRefused,
+    FieldRequest,
+    FieldRules,
+    check_request,
+    cost_s,
+    default_box,
+    default_request,
+)
+from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.field.grid import FieldGrid
+from lupin_twin.field.idw import Abandoned
+
+MAX_CELLS = 1_000_000
+
+
+def request_of(**changes: Any) -> FieldRequest:
+    """A request for 4 x 2 cells of 1 m from the origin, unless changed."""
+    given = {
+        "sensor_type": "temperature",
+        "resolution": 1.0,
+        "bbox_min_x": 0.0,
+        "bbox_min_y": 0.0,
+        "bbox_max_x": 4.0,
+        "bbox_max_y": 2.0,
+    }
+    return FieldRequest(**{**given, **changes})
+
+
+def rules_of(**changes: Any) -> FieldRules:
+    given = {
+        "idw_power": 2.0,
+        "falloff_radius_m": 1.5,
+        "max_distance_m": 1.5,
+        "max_grid_cells": MAX_CELLS,
+    }
+    return FieldRules(**{**given, **changes})
+
+
+def engine_of(**changes: Any) -> FieldEngine:
+    return FieldEngine(rules_of(**changes), FieldCache(max_bytes=64_000_000))
+
+
+def scan(tag_id: str, x: float, y: float, value: float) -> Scan:
+    return Scan(
+        tag_id=tag_id,
+        stamp_ns=1,
+        readings=(Reading("temperature", value),),
+        pose=Pose(x, y, 0.5, 0.0, 0.0, 0.0, 1.0),
+    )
+
+
+def map_of(rows: Any, revision: int = 1) -> OccupancyMap:
+    cells = np.array(rows, dtype=np.int8)
+    return OccupancyMap(
+        frame_id="map",
+        stamp_ns=0,
+        width=cells.shape[1],
+        height=cells.shape[0],
+        resolution=1.0,
+        origin_x=0.0,
+        origin_y=0.0,
+        origin_yaw=0.0,
+        cells=cells.ravel(),
+        revision=revision,
+    )
+
+
+@pytest.fixture
+def store() -> TwinStore:
+    """Two tags, at the centres of the request's cells (0, 0) and (3, 1)."""
+    store = TwinStore()
+    store.record(scan("a", 0.5, 0.5, 10.0))
+    store.record(scan("b", 3.5, 1.5, 20.0))
+    return store
+
+
+def answer(engine: FieldEngine, request: FieldRequest, *args: Any) -> FieldGrid:
+    """What a client gets: the remembered field, or the job's, which is remembered."""
+    found = engine.lookup(request, *args)
+    if isinstance(found, FieldGrid):
+        return found
+    grid = found.compute()
+    engine.keep(found, grid)
+    return grid
+
+
+# --- the request -----------------------------------------------------------------------------
+
+
+@settings(max_examples=200)
+@given(st.floats())
+def test_request_holds_what_the_wire_can(number: float) -> None:
+    request = request_of(resolution=number, bbox_min_x=number, bbox_max_y=-number)
+    with np.errstate(all="ignore"):
+        expected = np.float32(number)
+    np.testing.assert_equal(request.resolution, float(expected))
+    np.testing.assert_equal(request.bbox_min_x, float(expected))
+    np.testing.assert_equal(request.bbox_max_y, -float(expected))
+    assert type(request.resolution) is float
+
+
+def test_request_over_ros_and_over_http_is_the_same() -> None:
+    over_ros = request_of(resolution=float(np.float32(0.1)), bbox_max_x=float(np.float32(1.1)))
+    assert over_ros == request_of(resolution=0.1, bbox_max_x=1.1)
+    assert check_request(over_ros, MAX_CELLS) == (11, 20)
+
+
+def test_request_is_frozen() -> None:
+    with pytest.raises(AttributeError):
+        request_of().resolution = 2.0  # type: ignore[misc]
+
+
+def test_dimensions_of_a_good_request() -> None:
+    assert check_request(request_of(), MAX_CELLS) == (4, 2)
+    assert check_request(request_of(), 8) == (4, 2)
+
+
+def test_box_without_extent_is_one_cell() -> None:
+    assert check_request(request_of(bbox_max_x=0.0, bbox_max_y=0.0), MAX_CELLS) == (1, 1)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"sensor_type": ""}, "sensor_type is empty, must name a sensor"),
+        (
+            {"sensor_type": "t" * (MAX_TEXT_LENGTH + 1)},
+            f"has {MAX_TEXT_LENGTH + 1} characters, the limit is {MAX_TEXT_LENGTH}",
+        ),
+        ({"resolution": 0.0}, r"resolution is 0\.0 m, must be greater than 0"),
+        ({"resolution": -1.0}, r"resolution is -1\.0 m, must be greater than 0"),
+        ({"resolution": math.nan}, "resolution is nan, must be finite"),
+        ({"resolution": math.inf}, "resolution is inf, must be finite"),
+        ({"bbox_min_x": math.nan}, "bbox_min_x is nan, must be finite"),
+        ({"bbox_min_y": -math.inf}, "bbox_min_y is -inf, must be finite"),
+        ({"bbox_max_x": 1e300}, r"bbox_max_x is 1e\+300 m, must fit into float32"),
+        ({"resolution": 1e-50, "bbox_max_y": 1e39}, "resolution is 1e-50 m, must fit into float32"),
+        ({"bbox_max_y": math.nan}, "bbox_max_y is nan, must be finite"),
+        ({"bbox_min_x": 5.0}, r"bbox_max_x is 4\.0 m, must not be less than bbox_min_x \(5\.0 m\)"),
+        ({"bbox_max_y": -1.0}, r"bbox_max_y is -1\.0 m, must not be less than bbox_min_y \(0\.0"),
+        ({"resolution": 0.002}, r"0\.002 m makes 2000 x 1000 cells, the limit is 1000000 in all"),
+    ],
+)
+def test_bad_request_is_refused(changes: dict[str, Any], message: str, store: TwinStore) -> None:
+    with pytest.raises(FieldRefused, match=message):
+        check_request(request_of(**changes), MAX_CELLS)
+    engine = engine_of()
+    with pytest.raises(FieldRefused, match=message):
+        engine.lookup(request_of(**changes), store, None)
+    assert (engine.cache.hits, engine.cache.misses) == (0, 0)
+
+
+def test_one_cell_too_many_is_refused() -> None:
+    assert check_request(request_of(resolution=0.5), 32) == (8, 4)
+    with pytest.raises(FieldRefused, match="makes 8 x 4 cells, the limit is 31 in all"):
+        check_request(request_of(resolution=0.5), 31)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"resolution": 1e-9, "bbox_max_x": 1000.0, "bbox_max_y": 1000.0},
+        # 2³² x 2³² and 65,536 x 65,536 cells: 0 in 64 and in 32 bits.
+        {"resolution": 2.0**-20, "bbox_max_x": 2.0**12, "bbox_max_y": 2.0**12},
+        {"resolution": 1.0, "bbox_max_x": 65_536.0, "bbox_max_y": 65_536.0},
+        # The quotient overflows float32, the extent too.
+        {"resolution": 1e-45, "bbox_min_x": -3.4e38, "bbox_max_x": 3.4e38},
+        {"resolution": 1e-45, "bbox_max_x": 3.4e38, "bbox_max_y": 3.4e38},
+    ],
+)
+def test_grid_bomb_is_refused_without_an_allocation(
+    changes: dict[str, Any], store: TwinStore
+) -> None:
+    engine = engine_of()
+    request = request_of(**changes)
+    tracemalloc.start()
+    try:
+        with pytest.raises(FieldRefused, match="the limit is 1000000 in all"):
+            engine.lookup(request, store, None)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 20_000
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"idw_power": -1.0}, r"idw_power is -1\.0, must be finite and not less than 0"),
+        ({"falloff_radius_m": math.nan}, "falloff_radius_m is nan, must be finite"),
+        ({"max_distance_m": math.inf}, "max_distance_m is inf, must be finite"),
+        ({"max_grid_cells": 0}, "max_grid_cells is 0, must not be less than 1"),
+    ],
+)
+def test_rules_out_of_range_are_refused(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        rules_of(**changes)
+
+
+# --- the engine ------------------------------------------------------------------------------
+
+
+def test_first_request_is_a_job_and_the_second_a_hit(store: TwinStore) -> None:
+    engine = engine_of()
+    job = engine.lookup(request_of(), store, None)
+    assert isinstance(job, FieldJob)
+    grid = job.compute()
+    engine.keep(job, grid)
+    assert engine.lookup(request_of(), store, None) is grid
+    assert (engine.cache.hits, engine.cache.misses) == (1, 1)
+
+
+def test_field_is_of_the_stores_samples_by_the_rules(store: TwinStore) -> None:
+    grid = answer(engine_of(), request_of(), store, None)
+    assert (grid.width, grid.height, grid.sample_count) == (4, 2, 2)
+    rows = grid.values.reshape(2, 4)
+    assert (rows[0, 0], rows[1, 3]) == (10.0, 20.0)
+    assert not np.isnan(rows[0, 1])
+    narrow = answer(engine_of(max_distance_m=0.5), request_of(), store, None)
+    assert np.isnan(narrow.values.reshape(2, 4)[0, 1])
+    store.record(scan("c", 1.5, 0.5, 30.0))
+    by_power = [
+        answer(engine_of(idw_power=power), request_of(), store, None).values.reshape(2, 4)[1, 0]
+        for power in (1.0, 2.0)
+    ]
+    assert by_power[0] != by_power[1]
+    # With no tag within the falloff, the nearest is taken: "a", 1 m away.
+    nearest = answer(engine_of(falloff_radius_m=0.5), request_of(), store, None)
+    assert nearest.values.reshape(2, 4)[1, 0] == 10.0
+
+
+def test_sensor_that_nobody_reported_is_no_error(store: TwinStore) -> None:
+    grid = answer(engine_of(), request_of(sensor_type="sound"), store, None)
+    assert np.isnan(grid.values).all()
+    assert (grid.sample_count, grid.value_min, grid.value_max) == (0, 0.0, 0.0)
+
+
+def test_every_write_that_can_change_a_field_makes_it_anew(store: TwinStore) -> None:
+    engine = engine_of()
+    unpinned = Scan("d", stamp_ns=1, readings=(Reading("temperature", 40.0),))
+    store.record(unpinned)
+    before = answer(engine, request_of(), store, None)
+    store.record(scan("a", 0.5, 0.5, 11.0))
+    assert answer(engine, request_of(), store, None).values[0] == 11.0
+    assert before.values[0] == 10.0
+    store.pin("d", Pose(2.5, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0))
+    assert answer(engine, request_of(), store, None).values[2] == 40.0
+
+
+def test_job_holds_the_moment_it_was_made_in(store: TwinStore) -> None:
+    engine = engine_of()
+    job = engine.lookup(request_of(), store, None)
+    assert isinstance(job, FieldJob)
+    store.record(scan("a", 0.5, 0.5, 11.0))
+    grid = job.compute()
+    assert grid.values[0] == 10.0
+    engine.keep(job, grid)
+    assert answer(engine, request_of(), store, None).values[0] == 11.0
+
+
+def test_field_that_comes_late_is_no_answer_to_a_newer_request(store: TwinStore) -> None:
+    engine = engine_of()
+    late = engine.lookup(request_of(), store, None)
+    assert isinstance(late, FieldJob)
+    store.record(scan("a", 0.5, 0.5, 11.0))
+    newer = answer(engine, request_of(), store, None)
+    engine.keep(late, late.compute())
+    assert engine.lookup(request_of(), store, None) is newer
+
+
+def test_any_thread_may_compute(store: TwinStore) -> None:
+    engine = engine_of()
+    jobs = [
+        engine.lookup(request_of(resolution=0.01 * step), store, map_of([[0] * 4] * 2))
+        for step in range(1, 9)
+    ]
+    with ThreadPoolExecutor(4) as pool:
+        grids = list(pool.map(FieldJob.compute, jobs))
+    for job, grid in zip(jobs, grids, strict=True):
+        assert isinstance(job, FieldJob)
+        np.testing.assert_array_equal(grid.values, job.compute().values)
+
+
+def test_a_job_that_nobody_waits_for_ends_between_two_parts(store: TwinStore) -> None:
+    """Asked so often that no two questions are more than some milliseconds apart."""
+    for number in range(100):
+        store.record(scan(f"far {number}", number * 1.0, 0.0, 1.0))
+    rules = {"falloff_radius_m": 200.0, "max_distance_m": 200.0}
+    job = engine_of(**rules).lookup(request_of(resolution=0.01), store, None)
+    assert isinstance(job, FieldJob)
+    asked = itertools.count(1)
+    job.compute(lambda: next(asked) == 0)
+    assert next(asked) > 400 * 200 * 100 / idw._MAX_PAIRS
+    answers = iter([False, False, True])
+    with pytest.raises(Abandoned):
+        job.compute(lambda: next(answers))
+    assert next(answers, None) is None, "asked three times, and not again"
+
+
+@pytest.mark.parametrize(
+    ("samples", "changes", "rules", "expected_s"),
+    [
+        (0, {"resolution": 0.01}, {}, 400 * 200 * 20e-9),
+        # Each sample reaches a window of 3 m.
+        (10, {"resolution": 0.01}, {}, 400 * 200 * 20e-9 + 10 * 300 * 200 * 5e-9),
+        (10, {"resolution": 0.01}, {"idw_power": 3.0}, 400 * 200 * 20e-9 + 600_000 * 15e-9),
+        # And no more than the box.
+        (10, {}, {"max_distance_m": 50.0}, 8 * 20e-9 + 10 * 8 * 5e-9),
+    ],
+)
+def test_cost_follows_cells_and_the_windows_of_the_samples(
+    samples: int, changes: dict[str, Any], rules: dict[str, Any], expected_s: float
+) -> None:
+    cost = cost_s(request_of(**changes), samples, rules_of(**rules))
+    assert cost == pytest.approx(expected_s, rel=0.01)
+
+
+def test_a_jobs_cost_is_that_of_its_samples(store: TwinStore) -> None:
+    job = engine_of().lookup(request_of(), store, None)
+    assert isinstance(job, FieldJob)
+    assert len(job.samples) == 2
+    assert job.cost_s == cost_s(request_of(), 2, rules_of())
+
+
+def test_sliding_box_keeps_the_cache_within_its_bounds(store: TwinStore) -> None:
+    engine = FieldEngine(rules_of(), FieldCache(max_bytes=10_000))
+    for step in range(200):
+        box = {"bbox_min_x": step * 0.1, "bbox_max_x": step * 0.1 + 10.0}
+        answer(engine, request_of(resolution=0.5, **box), store, None)
+        assert len(engine.cache) <= 64
+        assert engine.cache.bytes <= 10_000
+    assert engine.cache.misses == 200
+
+
+# --- explored --------------------------------------------------------------------------------
+
+
+def test_a_map_clips_to_what_it_knows(store: TwinStore) -> None:
+    occupancy = map_of([[0, -1, 0, 0], [0, 0, 0, -1]])
+    unclipped = answer(engine_of(), request_of(), store, None)
+    clipped = answer(engine_of(), request_of(), store, occupancy)
+    known = np.array([1, 0, 1, 1, 1, 1, 1, 0], dtype=np.bool_)
+    np.testing.assert_array_equal(
+        clipped.values, np.where(known, unclipped.values, np.float32(np.nan))
+    )
+    assert not np.isnan(unclipped.values[1])
+
+
+def test_before_a_map_came_nothing_is_clipped_and_its_first_one_makes_fields_anew(
+    store: TwinStore,
+) -> None:
+    engine = engine_of()
+    grid = answer(engine, request_of(), store, None)
+    assert not np.isnan(grid.values).any()
+    clipped = answer(engine, request_of(), store, map_of([[-1] * 4] * 2, revision=0))
+    assert np.isnan(clipped.values).all()
+    assert (clipped.sample_count, clipped.value_min, clipped.value_max) == (2, 0.0, 0.0)
+
+
+def test_a_new_map_makes_fields_anew(store: TwinStore) -> None:
+    first, second = map_of([[0] * 4] * 2, revision=1), map_of([[-1] * 4] * 2, revision=2)
+    clipping = engine_of()
+    assert not np.isnan(answer(clipping, request_of(), store, first).values).all()
+    assert np.isnan(answer(clipping, request_of(), store, second).values).all()
+    assert clipping.cache.hits == 0
+
+
+def test_mask_has_the_fields_own_grid(store: TwinStore) -> None:
+    """1.1 m at 0.1 m, in float32: both count 11 columns, or the mask would not fit."""
+    engine = engine_of()
+    request = request_of(resolution=0.1, bbox_max_x=1.1, bbox_max_y=2.3)
+    grid = answer(engine, request, store, map_of([[0] * 4] * 4))
+    assert (grid.width, grid.height) == (11, 23)
+    assert not np.isnan(grid.values[0])
+
+
+# --- the default box -------------------------------------------------------------------------
+
+
+def test_default_box_is_that_of_the_tags_and_their_reach() -> None:
+    positions = ((x, y) for x, y in [(1.0, 5.0), (-2.0, 3.0), (0.0, 8.5)])
+    assert default_box(positions, 1.5) == (-3.5, 1.5, 2.5, 10.0)
+
+
+def test_default_box_without_a_tag_is_the_reach_around_the_origin() -> None:
+    assert default_box([], 2.5) == (-2.5, -2.5, 2.5, 2.5)
+
+
+def test_default_box_goes_no_farther_for_a_tag_that_is_far_off() -> None:
+    positions = [(0.0, 0.0), (1.0, 2.0), (3.0, 1.0), (5000.0, 1.0)]
+    assert default_box(positions, 1.0) == (-1.0, -1.0, 4.0, 3.0)
+
+
+def test_cells_of_a_default_request_are_doubled_until_there_are_few_enough() -> None:
+    box = (0.0, 0.0, 400.0, 300.0)
+    assert default_request("co2", box, 12_000_000).resolution == np.float32(0.1)
+    assert default_request("co2", box, 11_999_999).resolution == np.float32(0.2)
+    assert default_request("co2", (-1e6, -1e6, 1e6, 1e6), 1).resolution >= 2e6

@@ -1,0 +1,90 @@
+"""Where another tag could stand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from lupin_twin.field.explored import (
+    LEAST_APART_M,
+    MARGIN_M,
+    MAX_PLACES,
+    OccupancyMap,
+    floor,
+    free_of,
+)
+
+TAGS = np.array([(1.0, 1.0), (3.0, 2.0)])
+
+
+def a_map(rows: list[list[int]], yaw: float = 0.0, resolution: float = 1.0) -> OccupancyMap:
+    return OccupancyMap(
+        frame_id="map",
+        stamp_ns=0,
+        width=len(rows[0]),
+        height=len(rows),
+        resolution=resolution,
+        origin_x=10.0,
+        origin_y=20.0,
+        origin_yaw=yaw,
+        cells=np.array([cell for row in rows for cell in row], dtype=np.int8),
+        revision=1,
+    )
+
+
+def test_without_a_map_it_is_about_the_tags() -> None:
+    places = floor(TAGS, None)
+    low, high = TAGS.min(axis=0) - MARGIN_M, TAGS.max(axis=0) + MARGIN_M
+    assert ((places > low) & (places < high)).all()
+    assert len(places) == 8 * 6
+    assert len(floor(TAGS[:1], None)) > 1
+    empty = OccupancyMap(
+        frame_id="map",
+        stamp_ns=0,
+        width=0,
+        height=0,
+        resolution=1.0,
+        origin_x=0.0,
+        origin_y=0.0,
+        origin_yaw=0.0,
+        cells=np.array([], dtype=np.int8),
+        revision=1,
+    )
+    np.testing.assert_array_equal(floor(TAGS, empty), places)
+
+
+@pytest.mark.parametrize("far", [5000.0, 1.1e6, 1e300, 1.7e308])
+def test_about_a_tag_that_is_far_off_there_is_no_floor(far: float) -> None:
+    lost = np.array([(-far, far)])
+    np.testing.assert_array_equal(floor(np.vstack((TAGS, TAGS, lost)), None), floor(TAGS, None))
+    if far > 1e6:
+        assert len(floor(lost, None)) == 0
+
+
+def test_on_a_map_it_is_what_is_free_and_known() -> None:
+    places = floor(TAGS, a_map([[0, 100, -1], [49, 50, 10]]))
+    assert sorted(map(tuple, places.tolist())) == [(10.5, 20.5), (10.5, 21.5), (12.5, 21.5)]
+
+
+def test_a_map_may_be_turned() -> None:
+    [place] = floor(TAGS, a_map([[100, 0]], yaw=math.pi / 2)).tolist()
+    assert np.allclose(place, (9.5, 21.5))
+
+
+def test_of_a_large_house_so_many_places_lie_anywhere() -> None:
+    places = floor(TAGS, a_map([[0] * 1_000] * 500, resolution=0.05))
+    assert len(places) == MAX_PLACES
+    assert np.ptp(places, axis=0).min() > 20.0
+    np.testing.assert_array_equal(places, floor(TAGS, a_map([[0] * 1_000] * 500, resolution=0.05)))
+
+
+def test_of_a_house_of_many_tags_they_are_fewer() -> None:
+    of_many = floor(np.zeros((65, 2)), a_map([[0] * 100] * 100))
+    assert len(of_many) == 100 < len(floor(np.zeros((64, 2)), a_map([[0] * 100] * 100)))
+
+
+def test_no_tag_stands_on_another() -> None:
+    places = np.array([(1.0, 1.0 + LEAST_APART_M), (1.0, 0.99 + LEAST_APART_M), (2.0, 0.0)])
+    assert free_of(TAGS, places).tolist() == [[1.0, 1.5], [2.0, 0.0]]

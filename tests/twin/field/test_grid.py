@@ -1,0 +1,121 @@
+"""The grid's cells: how many, where their centres lie, and how float noise adds none."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from lupin_twin.field.grid import cell_centres, grid_dimensions
+
+
+def test_a_cells_centre_is_half_a_cell_from_the_corner() -> None:
+    assert cell_centres(-1.0, 3, 0.5).tolist() == [-0.75, -0.25, 0.25]
+
+
+def float32(number: float) -> float:
+    return float(np.float32(number))
+
+
+@pytest.mark.parametrize("through", [float, float32, np.float32])
+@pytest.mark.parametrize(
+    ("extent", "resolution", "cells"),
+    [
+        (1.1, 0.1, 11),
+        (2.3, 1.0, 3),
+        (0.3, 0.1, 3),
+        (0.7, 0.1, 7),
+        (1000.0, 0.1, 10_000),
+        (1.15, 0.1, 12),
+        (0.05, 0.1, 1),
+        (0.0, 0.1, 1),
+        (1.1001, 0.1, 12),
+        (0.003, 0.001, 3),
+        (70.0, 10.0, 7),
+        (0.027, 0.009, 3),
+        (70.1, 10.0, 8),
+    ],
+)
+def test_dimensions_are_the_extent_in_cells_rounded_up(
+    through: Any, extent: float, resolution: float, cells: int
+) -> None:
+    dimensions = grid_dimensions(
+        through(0.0), through(-extent), through(extent), through(0.0), through(resolution)
+    )
+    assert dimensions == (cells, cells)
+    assert [type(number) for number in dimensions] == [int, int]
+
+
+@settings(max_examples=500)
+@given(
+    st.integers(-100_000, 100_000),
+    st.integers(1, 3000),
+    st.sampled_from(["0.05", "0.1", "0.2", "0.3", "0.7", "1", "2.3"]),
+    st.sampled_from([float, float32]),
+)
+@example(10_001, 11, "0.1", float32)
+def test_float_noise_never_adds_a_cell(
+    tenths: int, cells: int, resolution: str, through: Any
+) -> None:
+    """A whole number of cells, in decimal, stays one: up to 10 km from the origin, rounded too."""
+    low = Fraction(tenths, 10)
+    high = low + cells * Fraction(resolution)
+    bounds = [through(float(low)), through(float(high))]
+    assert grid_dimensions(bounds[0], 0.0, bounds[1], 1.0, through(float(resolution)))[0] == cells
+
+
+@settings(max_examples=300)
+@given(
+    st.integers(-1000, 1000),
+    st.integers(0, 300),
+    st.floats(0.05, 0.95),
+    st.sampled_from([float, float32]),
+)
+def test_part_of_a_cell_is_a_cell(tenths: int, cells: int, part: float, through: Any) -> None:
+    low = tenths / 10
+    high = low + (cells + part) * 0.1
+    width, _ = grid_dimensions(through(low), 0.0, through(high), 1.0, through(0.1))
+    assert width == cells + 1
+
+
+def test_number_that_never_was_float32_keeps_its_last_digits() -> None:
+    assert grid_dimensions(0.0, 0.0, 2.0000001, 2.0, 1.0) == (3, 2)
+    assert grid_dimensions(1e6 + 0.1, 0.0, 1e6 + 2.1001, 2.0, 1.0) == (3, 2)
+
+
+@pytest.mark.parametrize(
+    ("extent", "resolution"),
+    [(1000.0, 1e-9), (3.4e38, 1e-45), (1e308, 5e-324), (1.7e308, 1e-3)],
+)
+def test_bombs_have_exact_dimensions(extent: float, resolution: float) -> None:
+    dimensions = grid_dimensions(0.0, -extent, extent, extent, resolution)
+    assert [type(number) for number in dimensions] == [int, int]
+    cells = Fraction(extent) / Fraction(resolution)
+    assert [float(number / cells) for number in dimensions] == pytest.approx([1.0, 2.0], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("box", "resolution", "message"),
+    [
+        ((0.0, 0.0, 1.0, 1.0), 0.0, r"resolution is 0\.0 m, must be greater than 0"),
+        ((0.0, 0.0, 1.0, 1.0), -0.1, r"resolution is -0\.1 m, must be greater than 0"),
+        ((0.0, 0.0, 1.0, 1.0), math.nan, "resolution is nan, must be finite"),
+        ((0.0, 0.0, 1.0, 1.0), math.inf, "resolution is inf, must be finite"),
+        ((math.nan, 0.0, 1.0, 1.0), 0.1, "bbox_min_x is nan, must be finite"),
+        ((0.0, -math.inf, 1.0, 1.0), 0.1, "bbox_min_y is -inf, must be finite"),
+        ((0.0, 0.0, math.inf, 1.0), 0.1, "bbox_max_x is inf, must be finite"),
+        ((0.0, 0.0, 1.0, math.nan), 0.1, "bbox_max_y is nan, must be finite"),
+        ((2.0, 0.0, 1.0, 1.0), 0.1, r"bbox_max_x is 1\.0 m, must not be less than bbox_min_x \(2"),
+        ((0.0, 2.0, 1.0, 1.0), 0.1, r"bbox_max_y is 1\.0 m, must not be less than bbox_min_y \(2"),
+    ],
+)
+def test_boxes_that_make_no_grid_are_refused(
+    box: tuple[float, float, float, float], resolution: float, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        grid_dimensions(*box, resolution)

@@ -1,0 +1,285 @@
+"""The field rule by rule, its grid, and what is refused; see also `test_idw_definition`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lupin_twin.field.grid import FieldGrid, cell_centres
+from lupin_twin.field.idw import COINCIDENT_EPS_M, FieldSample, compute_idw_field
+
+Sample = tuple[float, float, float]
+
+# One cell whose centre is exactly the origin.
+UNIT_CELL: dict[str, Any] = {
+    "bbox_min_x": -0.5,
+    "bbox_min_y": -0.5,
+    "bbox_max_x": 0.5,
+    "bbox_max_y": 0.5,
+    "resolution": 1.0,
+}
+
+
+def field_at_origin(samples: Sequence[Sample], **rules: Any) -> float:
+    """The one value of a field of one cell, centred on the origin."""
+    defaults = {"falloff_radius_m": 1.5, "max_distance_m": 1.5, "power": 2.0}
+    grid = compute_idw_field(samples, **UNIT_CELL, **{**defaults, **rules})
+    assert grid.values.shape == (1,)
+    return float(grid.values[0])
+
+
+def field_over(width: int, height: int, samples: Sequence[Sample], **changes: Any) -> FieldGrid:
+    """A field over `width` x `height` cells from the origin, 1 m each unless changed."""
+    resolution = changes.pop("resolution", 1.0)
+    defaults = {"falloff_radius_m": 1.5, "max_distance_m": 1.5, "power": 2.0}
+    return compute_idw_field(
+        samples,
+        bbox_min_x=0.0,
+        bbox_min_y=0.0,
+        bbox_max_x=width * resolution,
+        bbox_max_y=height * resolution,
+        resolution=resolution,
+        **{**defaults, **changes},
+    )
+
+
+# --- rule by rule ----------------------------------------------------------------------------
+
+
+def test_unexplored_cells_are_nan_whatever_lies_there() -> None:
+    mask = np.array([[True, False], [False, True]])
+    grid = field_over(2, 2, [(0.5, 0.5, 1.0), (1.5, 0.5, 2.0)], explored_mask=mask)
+    np.testing.assert_array_equal(np.isnan(grid.values), [False, True, True, False])
+    assert grid.values[0] == 1.0
+
+
+@pytest.mark.parametrize("power", [2.0, 3.0])
+@pytest.mark.parametrize("falloff", [0.5, 1.5, 3.0])
+def test_gate_lets_through_at_its_distance_and_not_beyond(falloff: float, power: float) -> None:
+    rules = {"falloff_radius_m": falloff, "max_distance_m": 1.5, "power": power}
+    assert field_at_origin([(0.9, 1.2, 7.0)], **rules) == 7.0
+    assert field_at_origin([(1.5, 0.0, 7.0)], **rules) == 7.0
+    assert math.isnan(field_at_origin([(math.nextafter(1.5, 2.0), 0.0, 7.0)], **rules))
+
+
+@pytest.mark.parametrize("power", [2.0, 3.0])
+def test_gate_is_the_nearest_samples_and_comes_before_the_falloff(power: float) -> None:
+    samples = [(1.6, 0.0, 7.0), (0.0, 1.7, 9.0)]
+    assert math.isnan(
+        field_at_origin(samples, falloff_radius_m=5.0, max_distance_m=1.5, power=power)
+    )
+    near_too = [*samples, (1.4, 0.0, 8.0)]
+    value = field_at_origin(near_too, falloff_radius_m=5.0, max_distance_m=1.5, power=power)
+    assert 7.0 < value < 9.0
+    assert value != 8.0
+
+
+@pytest.mark.parametrize("power", [2.0, 3.0])
+def test_gate_comes_before_coincidence(power: float) -> None:
+    samples = [(0.0008, 0.0, 7.0)]
+    rules = {"falloff_radius_m": 0.0005, "max_distance_m": 0.0005, "power": power}
+    assert math.isnan(field_at_origin(samples, **rules))
+    assert field_at_origin(samples, **{**rules, "max_distance_m": 0.0008}) == 7.0
+
+
+@pytest.mark.parametrize("power", [2.0, 3.0])
+@pytest.mark.parametrize("falloff", [0.0, 1.0, 1.5, 3.0])
+def test_coincident_sample_is_taken_exactly(power: float, falloff: float) -> None:
+    closer = math.nextafter(COINCIDENT_EPS_M, 0.0)
+    samples = [(0.002, 0.0, 1e6), (closer, 0.0, 7.0)]
+    assert field_at_origin(samples, falloff_radius_m=falloff, power=power) == 7.0
+
+
+def test_sample_a_little_closer_than_that_is_exact_beside_a_very_large_one() -> None:
+    # Its weight is hardly above that at the distance itself; averaged it would be 3.8.
+    assert field_at_origin([(0.97 * COINCIDENT_EPS_M, 0.0, 0.0), (0.5, 0.0, 1e6)]) == 0.0
+
+
+@pytest.mark.parametrize(("power", "weights"), [(2.0, (1e6, 4.0)), (3.0, (1e9, 8.0))])
+def test_sample_at_the_coincidence_distance_is_averaged(
+    power: float, weights: tuple[float, float]
+) -> None:
+    samples = [(COINCIDENT_EPS_M, 0.0, 0.0), (0.5, 0.0, 1e6)]
+    expected = 1e6 * weights[1] / sum(weights)
+    assert field_at_origin(samples, power=power) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("power", [2.0, 3.0])
+def test_nearest_of_several_coincident_samples_is_taken(power: float) -> None:
+    samples = [(0.0005, 0.0, 1.0), (0.0002, 0.0, 2.0), (0.0, 0.0004, 3.0)]
+    assert field_at_origin(samples, power=power) == 2.0
+
+
+@pytest.mark.parametrize("power", [2.0, 3.0])
+@pytest.mark.parametrize("distance", [0.0, 0.0005])
+def test_first_of_equally_coincident_samples_wins(power: float, distance: float) -> None:
+    samples = [(distance, 0.0, 5.0), (0.0, distance, 6.0), (-distance, 0.0, 4.0)]
+    assert field_at_origin(samples, power=power) == 5.0
+    assert field_at_origin(samples[1:], power=power) == 6.0
+
+
+def test_weights_are_the_inverse_power_of_the_distance() -> None:
+    samples = [(1.0, 0.0, 10.0), (0.0, 0.5, 20.0)]
+    assert field_at_origin(samples, power=2.0) == pytest.approx((10 + 20 * 4) / 5, rel=1e-7)
+    assert field_at_origin(samples, power=1.0) == pytest.approx((10 + 20 * 2) / 3, rel=1e-7)
+    assert field_at_origin(samples, power=3.0) == pytest.approx((10 + 20 * 8) / 9, rel=1e-7)
+    assert field_at_origin(samples, power=0.0) == pytest.approx(15.0)
+
+
+@pytest.mark.parametrize("power", [2.0, 3.0])
+def test_falloff_takes_in_samples_at_its_radius_and_not_beyond(power: float) -> None:
+    beyond = math.nextafter(1.0, 2.0)
+    rules = {"falloff_radius_m": 1.0, "max_distance_m": 2.0, "power": power}
+    assert field_at_origin([(1.0, 0.0, 10.0), (0.0, -1.0, 20.0)], **rules) == 15.0
+    assert field_at_origin([(1.0, 0.0, 10.0), (0.0, -beyond, 20.0)], **rules) == 10.0
+    assert field_at_origin([(beyond, 0.0, 10.0), (0.0, -1.0, 20.0)], **rules) == 20.0
+
+
+@pytest.mark.parametrize("power", [2.0, 3.0])
+def test_nearest_sample_fills_the_gap_between_falloff_and_gate(power: float) -> None:
+    rules = {"falloff_radius_m": 0.5, "max_distance_m": 2.0, "power": power}
+    assert field_at_origin([(1.2, 0.0, 10.0), (0.0, 1.1, 20.0)], **rules) == 20.0
+    # Equally near: the first.
+    assert field_at_origin([(0.0, 1.5, 3.0), (0.9, 1.2, 1.0), (1.5, 0.0, 2.0)], **rules) == 3.0
+    assert field_at_origin([(0.9, 1.2, 1.0), (1.5, 0.0, 2.0)], **rules) == 1.0
+
+
+def test_equal_distances_tie_although_their_squares_are_a_rounding_apart() -> None:
+    """The tie is one of distances. These two are the same float64, and their squares are not."""
+    first, second = (0.3, 1.1), (1.0, 0.55)
+    scale = math.dist(first, (0, 0)) / math.dist(second, (0, 0))
+    candidates = (
+        (second[0] * scale * (1 + step * 2**-52), second[1] * scale) for step in range(-8, 9)
+    )
+    square = first[0] ** 2 + first[1] ** 2
+    tied = [
+        (x, y)
+        for x, y in candidates
+        if x * x + y * y < square and math.sqrt(x * x + y * y) == math.sqrt(square)
+    ]
+    assert tied
+    for x, y in tied:
+        samples = [(*first, 10.0), (x, y, 20.0)]
+        assert field_at_origin(samples, falloff_radius_m=0.5, max_distance_m=2.0) == 10.0
+
+
+@pytest.mark.parametrize("power", [2.0, 3.0])
+def test_distance_at_a_radius_is_within_although_its_square_is_not(power: float) -> None:
+    """0.8 and 1.5 are the legs of a triangle whose long side, 1.7, is met exactly by rounding."""
+    assert 0.8 * 0.8 + 1.5 * 1.5 > 1.7 * 1.7
+    assert math.sqrt(0.8 * 0.8 + 1.5 * 1.5) == 1.7
+    gate = {"falloff_radius_m": 0.0, "max_distance_m": 1.7, "power": power}
+    assert field_at_origin([(0.8, 1.5, 7.0)], **gate) == 7.0
+    falloff = {"falloff_radius_m": 1.7, "max_distance_m": 3.0, "power": power}
+    assert field_at_origin([(0.8, 1.5, 10.0), (1.5, 0.8, 20.0)], **falloff) == 15.0
+
+
+def test_sample_outside_the_box_reaches_into_it() -> None:
+    grid = field_over(2, 1, [(-0.5, 0.5, 7.0)], max_distance_m=1.0, falloff_radius_m=1.0)
+    np.testing.assert_array_equal(grid.values, np.array([7.0, np.nan], dtype=np.float32))
+
+
+# --- the grid --------------------------------------------------------------------------------
+
+
+def test_rows_run_up_from_the_lower_edge_and_cells_are_centred() -> None:
+    grid = compute_idw_field(
+        [(10.75, 20.25, 1.0), (10.25, 20.75, 2.0), (11.25, 20.75, 3.0)],
+        bbox_min_x=10.0,
+        bbox_min_y=20.0,
+        bbox_max_x=11.5,
+        bbox_max_y=21.0,
+        resolution=0.5,
+        falloff_radius_m=0.1,
+        max_distance_m=0.1,
+        power=2.0,
+    )
+    assert (grid.width, grid.height, grid.resolution) == (3, 2, 0.5)
+    assert (grid.origin_x, grid.origin_y) == (10.0, 20.0)
+    nan = math.nan
+    np.testing.assert_array_equal(
+        grid.values, np.array([nan, 1.0, nan, 2.0, nan, 3.0], dtype=np.float32)
+    )
+    np.testing.assert_array_equal(cell_centres(10.0, 3, 0.5), [10.25, 10.75, 11.25])
+
+
+def test_grid_is_flat_float32_and_cannot_be_written_to() -> None:
+    grid = field_over(3, 2, [FieldSample(x=1.0, y=1.0, value=5.0)])
+    assert grid.values.shape == (6,)
+    assert grid.values.dtype == np.float32
+    for array in (grid.values, grid.values.base):
+        assert array is not None
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0.0
+    with pytest.raises(AttributeError):
+        grid.width = 7  # type: ignore[misc]
+
+
+def test_range_is_that_of_the_finite_cells() -> None:
+    grid = field_over(
+        5, 1, [(0.5, 0.5, -3.5), (4.5, 0.5, 8.25)], max_distance_m=1.0, falloff_radius_m=1.0
+    )
+    assert (grid.value_min, grid.value_max) == (-3.5, 8.25)
+    assert type(grid.value_min) is float
+    assert np.isnan(grid.values[2])
+
+
+def test_range_is_zero_where_nothing_is_known() -> None:
+    for samples in ([], [(50.0, 50.0, 9.0)]):
+        grid = field_over(3, 3, samples)
+        assert np.isnan(grid.values).all()
+        assert (grid.value_min, grid.value_max) == (0.0, 0.0)
+        assert grid.sample_count == len(samples)
+
+
+def test_range_leaves_out_what_float32_cannot_hold() -> None:
+    samples = [(0.5, 0.5, 1e39), (3.5, 0.5, 8.0), (6.5, 0.5, -1e39)]
+    grid = field_over(7, 1, samples, max_distance_m=0.5, falloff_radius_m=0.5)
+    assert (grid.values[0], grid.values[6]) == (math.inf, -math.inf)
+    assert (grid.value_min, grid.value_max) == (8.0, 8.0)
+    only = field_over(1, 1, samples[:1])
+    assert (only.value_min, only.value_max) == (0.0, 0.0)
+
+
+def test_sample_count_is_of_the_samples_given() -> None:
+    assert field_over(2, 2, [(0.0, 0.0, 1.0), (1.0, 1.0, 2.0), (99.0, 0.0, 3.0)]).sample_count == 3
+
+
+# --- refusals --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"falloff_radius_m": -0.1}, r"falloff_radius_m is -0\.1, must not be less than 0"),
+        ({"falloff_radius_m": math.nan}, "falloff_radius_m is nan, must be finite"),
+        ({"max_distance_m": math.inf}, "max_distance_m is inf, must be finite"),
+        ({"max_distance_m": -1.0}, r"max_distance_m is -1\.0, must not be less than 0"),
+        ({"power": -2.0}, r"power is -2\.0, must not be less than 0"),
+        ({"power": math.nan}, "power is nan, must be finite"),
+        ({"explored_mask": np.ones((3, 2), dtype=np.bool_)}, r"shape \(3, 2\), must be bool"),
+        ({"explored_mask": np.ones((2, 3))}, "float64 of shape"),
+        ({"resolution": 0.0}, r"resolution is 0\.0 m, must be greater than 0"),
+    ],
+)
+def test_rules_out_of_range_are_refused(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        field_over(3, 2, [(0.0, 0.0, 1.0)], **changes)
+
+
+@pytest.mark.parametrize(
+    ("samples", "message"),
+    [
+        ([(0.0, 0.0, 1.0), (0.0, math.nan, 1.0)], r"samples\[1\]\.y is nan, must be finite"),
+        ([(math.inf, 0.0, 1.0)], r"samples\[0\]\.x is inf"),
+        ([(0.0, 0.0, -math.inf)], r"samples\[0\]\.value is -inf"),
+        ([(0.0, 0.0)], "samples hold 2 numbers, must be 3 each of 1"),
+    ],
+)
+def test_samples_that_are_no_samples_are_refused(samples: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        field_over(3, 2, samples)

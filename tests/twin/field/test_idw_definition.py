@@ -1,0 +1,255 @@
+"""The field against its definition, the oracle's double loop; and what may not change it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lupin_twin.field import idw
+from lupin_twin.field.grid import FieldGrid
+from lupin_twin.field.idw import compute_idw_field
+from tests.oracle_idw import field_by_loop
+from tests.twin.field.test_idw import Sample
+
+
+def assert_same_values(
+    actual: npt.NDArray[np.float32], expected: Sequence[float], samples: Sequence[Sample]
+) -> None:
+    """The same NaN cells to the bit, and the same values to float32 rounding."""
+    wanted = np.array(expected, dtype=np.float64)
+    np.testing.assert_array_equal(np.isnan(actual), np.isnan(wanted))
+    known = ~np.isnan(wanted)
+    # Values of both signs cancel: what is left is as exact as the largest of them.
+    largest = max((abs(value) for _, _, value in samples), default=0.0)
+    rounding = np.spacing(np.abs(wanted[known]).astype(np.float32)) + 1e-11 * largest
+    assert (np.abs(actual[known] - wanted[known]) <= rounding).all()
+
+
+# --- against the oracle ----------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Case:
+    """A field to be made twice."""
+
+    samples: tuple[Sample, ...]
+    width: int
+    height: int
+    min_x: float
+    min_y: float
+    resolution: float
+    falloff: float
+    max_distance: float
+    power: float
+    explored: npt.NDArray[np.bool_] | None = None
+
+    def by_twin(self) -> FieldGrid:
+        return compute_idw_field(
+            self.samples,
+            bbox_min_x=self.min_x,
+            bbox_min_y=self.min_y,
+            bbox_max_x=self.min_x + self.width * self.resolution,
+            bbox_max_y=self.min_y + self.height * self.resolution,
+            resolution=self.resolution,
+            falloff_radius_m=self.falloff,
+            max_distance_m=self.max_distance,
+            power=self.power,
+            explored_mask=self.explored,
+        )
+
+    def by_loop(self) -> list[float]:
+        return field_by_loop(
+            self.samples,
+            width=self.width,
+            height=self.height,
+            bbox_min_x=self.min_x,
+            bbox_min_y=self.min_y,
+            resolution=self.resolution,
+            falloff_radius_m=self.falloff,
+            max_distance_m=self.max_distance,
+            power=self.power,
+            explored=None if self.explored is None else self.explored.tolist(),
+        )
+
+
+def positions(cells: int) -> st.SearchStrategy[float]:
+    """Along one axis, in cells: often on a centre or a corner, where distances tie, often not."""
+    exact = st.integers(-6, 2 * cells + 6).map(lambda halves: halves / 2)
+    anywhere = st.floats(-3.0, cells + 3.0)
+    return st.one_of(exact, anywhere, exact.map(lambda position: position + 1e-4))
+
+
+# In cells; 2.5 and 5 are the long sides of right triangles with legs on the grid.
+RADII = st.one_of(st.sampled_from([0.0, 0.5, 1.0, 1.5, 2.5, 5.0, 100.0]), st.floats(0.0, 6.0))
+VALUES = st.one_of(st.integers(-5, 40).map(float), st.floats(-1e6, 1e6))
+
+
+@st.composite
+def cases(draw: st.DrawFn) -> Case:
+    width, height = draw(st.integers(1, 9)), draw(st.integers(1, 9))
+    resolution = draw(st.sampled_from([0.001, 0.05, 0.1, 0.25, 1.0, 10.0]))
+    min_x = draw(st.sampled_from([0.0, -3.7, 1000.25, -1e6]))
+    min_y = draw(st.sampled_from([0.0, 12.3, -1000.25, 1e6]))
+    spots = draw(st.lists(st.tuples(positions(width), positions(height), VALUES), max_size=12))
+    again = draw(st.booleans())
+    if spots and again:  # a second tag at the same spot
+        x, y, _ = draw(st.sampled_from(spots))
+        spots.append((x, y, draw(VALUES)))
+    falloff = draw(RADII)
+    explored = None
+    if draw(st.integers(0, 3)) == 0:
+        cells = st.lists(st.booleans(), min_size=width * height, max_size=width * height)
+        explored = np.array(draw(cells), dtype=np.bool_).reshape(height, width)
+    return Case(
+        samples=tuple((min_x + x * resolution, min_y + y * resolution, v) for x, y, v in spots),
+        width=width,
+        height=height,
+        min_x=min_x,
+        min_y=min_y,
+        resolution=resolution,
+        falloff=falloff * resolution,
+        max_distance=draw(st.one_of(st.just(falloff), RADII)) * resolution,
+        power=draw(st.sampled_from([2.0, 2.0, 2.0, 0.0, 0.5, 1.0, 3.0, 4.5, 60.0])),
+        explored=explored,
+    )
+
+
+@contextmanager
+def small_parts() -> Iterator[None]:
+    """Make the engine split even a tiny grid, down to single cells."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(idw, "_MAX_PAIRS", 12)
+        patch.setattr(idw, "_MIN_PAIRS", 12)
+        patch.setattr(idw, "_MIN_POINTS", 1)
+        yield
+
+
+@settings(max_examples=500)
+@given(cases())
+def test_field_is_the_definitions(case: Case) -> None:
+    grid = case.by_twin()
+    assert (grid.width, grid.height) == (case.width, case.height)
+    assert_same_values(grid.values, case.by_loop(), case.samples)
+
+
+@settings(max_examples=300)
+@given(cases())
+def test_field_is_the_definitions_however_it_is_split(case: Case) -> None:
+    with small_parts():
+        grid = case.by_twin()
+    assert_same_values(grid.values, case.by_loop(), case.samples)
+
+
+@pytest.mark.parametrize("resolution", [0.001, 10.0])
+@pytest.mark.parametrize(("falloff", "max_distance"), [(1.5, 1.5), (0.7, 1.5), (2.5, 1.5)])
+def test_field_of_many_parts_is_the_definitions(
+    resolution: float, falloff: float, max_distance: float
+) -> None:
+    """Large enough to be split by the engine's own measure, with a hundred tags in one cell."""
+    rng = np.random.default_rng(7)
+    spots = np.vstack([rng.uniform(-2, 70, (60, 2)), rng.uniform(10.0, 11.0, (100, 2))])
+    case = Case(
+        samples=tuple((x * resolution, y * resolution, 20 + x / 7) for x, y in spots.tolist()),
+        width=64,
+        height=48,
+        min_x=0.0,
+        min_y=0.0,
+        resolution=resolution,
+        falloff=falloff * 4 * resolution,
+        max_distance=max_distance * 4 * resolution,
+        power=2.0,
+    )
+    assert_same_values(case.by_twin().values, case.by_loop(), case.samples)
+
+
+@pytest.mark.parametrize(("width", "height"), [(6, 6), (40, 1), (1, 40)])
+def test_field_of_more_samples_than_fit_at_once_is_the_definitions(width: int, height: int) -> None:
+    rng = np.random.default_rng(11)
+    spots = rng.uniform(0.0, 1.0, (9000, 2)) * (width, height)
+    case = Case(
+        samples=tuple((x, y, 20 + x) for x, y in spots.tolist()),
+        width=width,
+        height=height,
+        min_x=0.0,
+        min_y=0.0,
+        resolution=1.0,
+        falloff=30.0,
+        max_distance=50.0,
+        power=2.0,
+    )
+    assert_same_values(case.by_twin().values, case.by_loop(), case.samples)
+
+
+# --- what may not change it ------------------------------------------------------------------
+
+
+@st.composite
+def exact_cases(draw: st.DrawFn) -> Case:
+    """All lengths are multiples of 1/8 m below 2⁸ m: sums and differences of them are exact."""
+    width, height = draw(st.integers(1, 8)), draw(st.integers(1, 8))
+    eighths = st.integers(-16, 80).map(lambda number: number / 8)
+    return Case(
+        samples=tuple(draw(st.lists(st.tuples(eighths, eighths, VALUES), max_size=10))),
+        width=width,
+        height=height,
+        min_x=draw(st.integers(-8, 8)) / 8,
+        min_y=draw(st.integers(-8, 8)) / 8,
+        resolution=draw(st.sampled_from([0.25, 0.5, 1.0])),
+        falloff=draw(st.integers(0, 40)) / 8,
+        max_distance=draw(st.integers(0, 40)) / 8,
+        power=draw(st.sampled_from([2.0, 1.0, 3.0])),
+    )
+
+
+@settings(max_examples=300)
+@given(exact_cases(), st.sampled_from([-(2.0**20), 2.0**8, 2.0**24]))
+def test_moving_everything_moves_the_field(case: Case, by: float) -> None:
+    moved = Case(
+        **{
+            **vars(case),
+            "samples": tuple((x + by, y - by, value) for x, y, value in case.samples),
+            "min_x": case.min_x + by,
+            "min_y": case.min_y - by,
+        }
+    ).by_twin()
+    assert (moved.origin_x, moved.origin_y) == (case.min_x + by, case.min_y - by)
+    assert_same_values(moved.values, case.by_twin().values.tolist(), case.samples)
+
+
+@settings(max_examples=300)
+@given(exact_cases())
+def test_mirroring_everything_mirrors_the_field(case: Case) -> None:
+    mirrored = Case(
+        **{
+            **vars(case),
+            "samples": tuple((-x, y, value) for x, y, value in case.samples),
+            "min_x": -(case.min_x + case.width * case.resolution),
+        }
+    ).by_twin()
+    rows = case.by_twin().values.reshape(case.height, case.width)
+    assert_same_values(mirrored.values, rows[:, ::-1].ravel().tolist(), case.samples)
+
+
+@settings(max_examples=200)
+@given(exact_cases(), st.sampled_from([-2.0, 0.25, 1024.0]))
+def test_scaling_the_values_scales_the_field(case: Case, factor: float) -> None:
+    samples = tuple((x, y, value * factor) for x, y, value in case.samples)
+    scaled = Case(**{**vars(case), "samples": samples}).by_twin()
+    expected = [value * factor for value in case.by_twin().values.tolist()]
+    assert_same_values(scaled.values, expected, samples)
+
+
+@settings(max_examples=200)
+@given(exact_cases(), VALUES, st.integers(0, 10))
+def test_a_sample_out_of_reach_changes_nothing(case: Case, value: float, index: int) -> None:
+    # 80 m away from all of it; the reach is 5 m at most.
+    samples = (*case.samples[:index], (100.0, -80.0, value), *case.samples[index:])
+    grid = Case(**{**vars(case), "samples": samples}).by_twin()
+    assert_same_values(grid.values, case.by_twin().values.tolist(), samples)

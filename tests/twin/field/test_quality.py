@@ -1,0 +1,190 @@
+"""How far off a field is, by leaving each tag out once, and how much of it is known."""
+
+from __future__ import annotations
+
+import math
+import tracemalloc
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lupin_twin.core.state import Pose, Reading, TagState
+from lupin_twin.field import idw
+from lupin_twin.field import quality as field_quality
+from lupin_twin.field.idw import Abandoned, compute_idw_field
+from lupin_twin.field.quality import FieldQuality, leave_one_out, painted_share
+from tests.oracle_idw import value_at
+
+RULES: dict[str, Any] = {"falloff_radius_m": 1.5, "max_distance_m": 1.5, "power": 2.0}
+
+Spot = tuple[float, float, float]
+
+
+def tag(tag_id: str, x: float, y: float, value: float) -> TagState:
+    return TagState(
+        tag_id=tag_id,
+        pose=Pose(x, y, 0.5, 0.0, 0.0, 0.0, 1.0),
+        readings=(Reading("humidity", 55.0), Reading("temperature", value)),
+    )
+
+
+def tags_at(spots: Iterable[Spot]) -> list[TagState]:
+    return [tag(f"tag-{index}", *spot) for index, spot in enumerate(spots)]
+
+
+def quality_of(spots: Sequence[Spot], **changes: Any) -> FieldQuality:
+    return leave_one_out(tags_at(spots), "temperature", **{**RULES, **changes})
+
+
+def test_each_tag_is_predicted_from_the_others() -> None:
+    # Between the others, nearer to one of them, the middle tag is predicted as (4·10 + 16) / 5.
+    quality = quality_of([(0.0, 0.0, 10.0), (0.5, 0.0, 12.0), (1.5, 0.0, 16.0)])
+    errors = [
+        (12 * 2.25 + 16 * 0.25) / 2.5 - 10,
+        (10 * 4 + 16) / 5 - 12,
+        (12 * 2.25 + 10) / 3.25 - 16,
+    ]
+    assert (quality.judged, quality.unjudged) == (3, 0)
+    assert quality.rmse == pytest.approx(math.sqrt(sum(error**2 for error in errors) / 3))
+    assert quality.worst is not None
+    assert quality.worst.tag_id == "tag-2"
+    assert quality.worst.measured == 16.0
+    assert quality.worst.predicted == pytest.approx(errors[2] + 16.0)
+    assert quality.worst.error == pytest.approx(errors[2])
+    assert quality.worst.error < 0
+
+
+def test_tag_without_a_neighbour_in_reach_is_not_judged() -> None:
+    quality = quality_of([(0.0, 0.0, 10.0), (1.5, 0.0, 11.0), (3.1, 0.0, 99.0)])
+    assert (quality.judged, quality.unjudged) == (2, 1)
+    assert quality.rmse == pytest.approx(1.0)
+
+
+def test_nothing_can_be_said_about_lonely_tags() -> None:
+    for spots in ([], [(0.0, 0.0, 10.0)], [(0.0, 0.0, 10.0), (9.0, 0.0, 10.0)]):
+        assert quality_of(spots) == FieldQuality("temperature", 0, len(spots), None, None)
+
+
+def test_tag_at_the_same_spot_is_the_prediction() -> None:
+    quality = quality_of([(0.0, 0.0, 10.0), (0.0, 0.0, 13.0), (1.0, 0.0, 50.0)])
+    assert quality.worst is not None
+    assert quality.worst.tag_id == "tag-2"
+    # 10 and 13 predict each other, exactly; both of them, 1 m away, predict the third.
+    assert quality.worst.error == pytest.approx(11.5 - 50.0)
+    assert quality.rmse == pytest.approx(math.sqrt((3**2 + 3**2 + 38.5**2) / 3))
+
+
+def test_of_equally_bad_tags_the_first_is_named() -> None:
+    quality = quality_of([(0.0, 0.0, 10.0), (1.0, 0.0, 13.0)])
+    assert quality.worst is not None
+    assert (quality.worst.tag_id, quality.worst.error) == ("tag-0", 3.0)
+
+
+def test_only_pinned_tags_with_a_finite_reading_of_the_sensor_take_part() -> None:
+    tags = [
+        *tags_at([(0.0, 0.0, 10.0), (1.0, 0.0, 12.0), (0.5, 0.0, math.nan)]),
+        TagState("unpinned", readings=(Reading("temperature", 90.0),)),
+        TagState("silent", pose=Pose(0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)),
+    ]
+    quality = leave_one_out(tags, "temperature", **RULES)
+    assert (quality.judged, quality.unjudged, quality.rmse) == (2, 0, 2.0)
+    assert leave_one_out(tags, "light", **RULES) == FieldQuality("light", 0, 0, None, None)
+
+
+def test_field_rules_are_the_ones_given() -> None:
+    spots = [(0.0, 0.0, 10.0), (1.0, 0.0, 12.0), (0.0, 2.0, 16.0)]
+    assert quality_of(spots, max_distance_m=2.0, falloff_radius_m=2.0).judged == 3
+    narrow = quality_of(spots, max_distance_m=2.0, falloff_radius_m=0.5)
+    assert narrow.rmse == pytest.approx(math.sqrt((2**2 + 2**2 + 6**2) / 3))
+    flat = quality_of(spots, max_distance_m=3.0, falloff_radius_m=3.0, power=0.0)
+    assert flat.worst is not None
+    assert flat.worst.predicted == 11.0
+
+
+@settings(max_examples=150)
+@given(
+    spots=st.lists(
+        st.tuples(
+            st.integers(0, 16).map(lambda number: number / 4),
+            st.floats(0.0, 4.0),
+            st.floats(-50.0, 50.0),
+        ),
+        max_size=25,
+    ),
+    falloff=st.sampled_from([0.5, 1.5, 3.0]),
+    max_distance=st.sampled_from([0.5, 1.5, 3.0]),
+    power=st.sampled_from([2.0, 3.0]),
+)
+def test_error_is_the_definitions(
+    spots: list[Spot], falloff: float, max_distance: float, power: float
+) -> None:
+    rules = {"falloff_radius_m": falloff, "max_distance_m": max_distance, "power": power}
+    with pytest.MonkeyPatch.context() as patch:  # in many parts
+        patch.setattr(field_quality, "_MAX_PAIRS", 16)
+        patch.setattr(idw, "_MIN_POINTS", 1)
+        quality = quality_of(spots, **rules)
+    errors = [
+        value_at((x, y), [*spots[:index], *spots[index + 1 :]], **rules) - value
+        for index, (x, y, value) in enumerate(spots)
+    ]
+    known = [error for error in errors if not math.isnan(error)]
+    assert (quality.judged, quality.unjudged) == (len(known), len(spots) - len(known))
+    if known:
+        expected = math.sqrt(sum(error**2 for error in known) / len(known))
+        assert quality.rmse == pytest.approx(expected, rel=1e-9, abs=1e-9)
+        assert quality.worst is not None
+        assert abs(quality.worst.error) == pytest.approx(max(map(abs, known)), abs=1e-9)
+        index = int(quality.worst.tag_id.removeprefix("tag-"))
+        assert quality.worst.error == pytest.approx(errors[index], abs=1e-9)
+
+
+def test_broken_sensors_error_is_large_and_finite() -> None:
+    quality = quality_of([(0.0, 0.0, 3e38), (1.0, 0.0, -3e38)])
+    assert quality.rmse == pytest.approx(6e38)
+
+
+def test_memory_does_not_grow_with_the_square_of_the_tags() -> None:
+    rng = np.random.default_rng(1)
+    spots = rng.uniform(0.0, 40.0, (4000, 2)).tolist()
+    tags = tags_at((x, y, x + y) for x, y in spots)
+    tracemalloc.start()
+    try:
+        quality = leave_one_out(tags, "temperature", **RULES)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert quality.judged == 4000
+    assert peak < 4_000_000  # the square of the tags is 128 MB of distances
+
+
+def test_rules_out_of_range_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"power is -1\.0, must not be less than 0"):
+        quality_of([(0.0, 0.0, 1.0)], power=-1.0)
+
+
+def test_painted_share_is_that_of_the_known_cells() -> None:
+    samples = [(0.5, 0.5, 1.0), (1.5, 0.5, 1e39)]
+    grid = compute_idw_field(
+        samples,
+        bbox_min_x=0.0,
+        bbox_min_y=0.0,
+        bbox_max_x=4.0,
+        bbox_max_y=2.0,
+        resolution=1.0,
+        falloff_radius_m=0.5,
+        max_distance_m=0.5,
+        power=2.0,
+    )
+    assert painted_share(grid) == 0.25
+
+
+def test_a_judgement_that_nobody_waits_for_ends_between_two_parts() -> None:
+    answers = iter([False, False, True])
+    spots = [(x * 0.5, y * 0.5, 1.0) for x in range(40) for y in range(40)]
+    with pytest.raises(Abandoned):
+        quality_of(spots, should_stop=lambda: next(answers))
+    assert next(answers, None) is None, "asked three times, and not again"

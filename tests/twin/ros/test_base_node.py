@@ -1,0 +1,269 @@
+"""What every node does alike, by a node of its own in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import rclpy
+from lupin_msgs.msg import Observation
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
+from rclpy.serialization import serialize_message
+
+from lupin_twin.core.drops import LOST, Drop, Reason
+from lupin_twin.ros.base_node import (
+    BEHIND_S,
+    BELIEVED_S,
+    DRAIN_S,
+    WARNING_PERIOD_S,
+    NodeUtilities,
+    latched,
+    read_message,
+    waker,
+)
+from lupin_twin.ros.message_limits import MessageShape
+from tests.support.hostile import PACKAGES, lies
+from tests.support.messages import INFO, scan
+from tests.support.ros import Peer
+from tests.support.waiting import PATIENCE_S, wait_for
+
+SHAPE = MessageShape(Observation, PACKAGES, max_bytes=1_000)
+
+
+class Logged:
+    """Stands in for a node's logger and for the clock that throttles it."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.now_s = 100.0
+
+    def warning(self, text: str) -> None:
+        self.lines.append(text)
+
+    error = warning
+
+
+@pytest.fixture
+def logged(monkeypatch: pytest.MonkeyPatch) -> Logged:
+    made = Logged()
+    monkeypatch.setattr("lupin_twin.ros.base_node.time.monotonic", lambda: made.now_s)
+    return made
+
+
+@pytest.fixture
+def utilities(domain: int, logged: Logged) -> Iterator[NodeUtilities]:
+    context = Context()
+    rclpy.init(args=[], context=context, domain_id=domain)
+    node = rclpy.create_node("utilities", context=context)
+    node.get_logger = lambda: logged
+    yield NodeUtilities(node)
+    node.destroy_node()
+    rclpy.try_shutdown(context=context)
+
+
+def test_latched_is_reliable_transient_local_and_keeps_the_last() -> None:
+    profile = latched(7)
+    assert profile.history == HistoryPolicy.KEEP_LAST
+    assert profile.depth == 7
+    assert profile.reliability == ReliabilityPolicy.RELIABLE
+    assert profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+
+
+def test_a_message_is_read_up_to_its_limit_and_dropped_past_it() -> None:
+    data = serialize_message(scan("1", {"co2": 1.0}))
+    read: Any = read_message(data, MessageShape(Observation, PACKAGES, max_bytes=len(data)))
+    assert read.tag_reading.tag_id == "1"
+    drop = read_message(data, MessageShape(Observation, PACKAGES, max_bytes=len(data) - 1))
+    assert drop == Drop(Reason.SIZE, f"{len(data)} bytes, the limit is {len(data) - 1}")
+
+
+def test_what_cannot_be_read_is_a_drop() -> None:
+    drop = read_message(serialize_message(scan("1", {"co2": 1.0}))[:50], SHAPE)
+    assert isinstance(drop, Drop)
+    assert drop.reason is Reason.UNREADABLE
+
+
+def test_a_length_that_lies_is_told_of_by_its_field() -> None:
+    drops = (read_message(lie, SHAPE) for lie in lies(serialize_message(scan("1"))))
+    whys = [drop.why for drop in drops if isinstance(drop, Drop)]
+    for field in ("header.frame_id claims", "tag_reading.readings: ", "flower.flowers: "):
+        assert any(why.startswith(field) and why.endswith(" bytes are left") for why in whys), field
+
+
+def test_a_subscription_hands_on_messages_and_tells_of_the_others(
+    utilities: NodeUtilities, logged: Logged
+) -> None:
+    taken: list[Any] = []
+    topic = utilities.subscribe(
+        "observations_topic",
+        "some/observations",
+        SHAPE,
+        depth=3,
+        group=None,
+        callback=taken.append,
+    )
+    assert topic == "/some/observations"
+    [subscription] = [s for s in utilities.node.subscriptions if s.topic_name == topic]
+    subscription.callback(serialize_message(scan("1")), INFO)
+    subscription.callback(bytes(1_001), INFO | {"received_timestamp": 1_500_000_000})
+    assert utilities.published_ago_s == 1.5
+    assert [msg.tag_reading.tag_id for msg in taken] == ["1"]
+    assert logged.lines == [
+        "dropped a message on /some/observations: 1001 bytes, the limit is 1000"
+    ]
+
+
+def test_who_wakes_a_node_that_is_gone_wakes_nobody(utilities: NodeUtilities) -> None:
+    node = utilities.node
+    condition = node.create_guard_condition(lambda: None)
+    wake = waker(condition)
+    wake()
+    condition.destroy()
+    wake()
+
+
+def test_warnings_are_throttled_by_their_key_and_counted(
+    utilities: NodeUtilities, logged: Logged
+) -> None:
+    for _ in range(3):
+        utilities.drop(Drop(Reason.FRAME, "no"), "/t")
+    utilities.drop(Drop(Reason.KIND, "no", case="2"), "/t")
+    utilities.drop(Drop(Reason.KIND, "no", case="9"), "/t")
+    logged.now_s += WARNING_PERIOD_S
+    utilities.drop(Drop(Reason.FRAME, "no"), "/t")
+    said = "dropped a message on /t: no"
+    assert logged.lines == [said, said, said, f"{said} (2 more since the last warning)"]
+
+
+def test_an_error_of_a_callback_is_counted_and_told_with_its_trace(
+    utilities: NodeUtilities, logged: Logged
+) -> None:
+    def fail() -> None:
+        raise ValueError("broken")
+
+    guarded = utilities.guarded("the test", fail)
+    guarded()
+    guarded()
+    assert utilities.callback_errors == 2
+    [line] = logged.lines
+    assert line.startswith("error number 1, in the test:\n")
+    assert "ValueError: broken" in line
+
+
+def test_of_a_shared_topic_only_what_is_wanted_is_read_and_nothing_else_counted(
+    utilities: NodeUtilities,
+) -> None:
+    taken: list[str] = []
+    utilities.subscribe(
+        "a_topic",
+        "shared",
+        SHAPE,
+        depth=5,
+        group=None,
+        callback=lambda msg: taken.append(msg.tag_reading.tag_id),
+        is_wanted=lambda data: b"ours" in data,
+    )
+    (subscription,) = [s for s in utilities.node.subscriptions if s.topic_name == "/shared"]
+    assert subscription.qos_profile.durability == DurabilityPolicy.VOLATILE
+    for number, tag_id in ((1, "ours"), (9, "theirs"), (20, "ours")):
+        info = {**INFO, "publication_sequence_number": number}
+        subscription.callback(serialize_message(scan(tag_id)), info)
+    subscription.callback(bytes(SHAPE.max_bytes + 1), INFO)
+    assert taken == ["ours", "ours"]
+    assert utilities.counts().dropped == {}
+    subscription.callback(b"ours" + bytes(SHAPE.max_bytes), INFO)
+    assert utilities.counts().dropped == {"size": 1}
+
+
+def test_messages_that_wait_are_taken_one_right_behind_the_other(
+    utilities: NodeUtilities, domain: int
+) -> None:
+    """In one round of the executor, whatever else is due in it; and before what takes its time."""
+    heard: list[float] = []
+    large = MessageShape(Observation, PACKAGES, max_bytes=10_000)
+    group = utilities.node.default_callback_group
+    utilities.subscribe(
+        "topic",
+        "many",
+        large,
+        depth=50,
+        group=group,
+        callback=lambda message: heard.append(message.tag_reading.readings[0].value),
+    )
+    executor = SingleThreadedExecutor(context=utilities.node.context)
+    executor.add_node(utilities.node)
+    with Peer(domain) as peer:
+        publisher = peer.publisher("/many", Observation)
+        peer.until(lambda: utilities.node.count_publishers("/many"), "the publisher")
+
+        def publish(values: range) -> None:
+            for value in values:
+                publisher.publish(scan("1", {"co2": float(value)}))
+            # The reader's queue has them then.
+            assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE_S))
+
+        publish(range(1))
+        wait_for(lambda: heard, "the first", meanwhile=lambda: executor.spin_once(0.05))
+        publish(range(1, 40))
+        executor.spin_once(PATIENCE_S)
+        assert heard == list(map(float, range(40)))
+        publish(range(40, 90))
+        utilities.drain()
+        assert heard == list(map(float, range(90)))
+        assert utilities.counts().dropped.get(LOST, 0) == 0
+    executor.shutdown()
+
+
+def test_those_that_wait_keep_nobody_waiting_for_long(
+    utilities: NodeUtilities, logged: Logged, domain: int
+) -> None:
+    heard: list[Any] = []
+
+    def hear(message: Any) -> None:
+        heard.append(message)
+        logged.now_s += DRAIN_S / 2 + 0.001
+
+    group = utilities.node.default_callback_group
+    utilities.subscribe("topic", "many", SHAPE, depth=5, group=group, callback=hear)
+    (subscription,) = [s for s in utilities.node.subscriptions if s.topic_name == "/many"]
+    with Peer(domain) as peer:
+        publisher = peer.publisher("/many", Observation)
+        peer.until(publisher.get_subscription_count, "the subscription")
+
+        def publish() -> None:
+            for _ in range(5):
+                publisher.publish(scan("1"))
+            assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE_S))
+
+        publish()
+        one = serialize_message(scan("1"))
+        for count in (3, 6):  # one that the executor brings, and two behind it
+            subscription.callback(one, INFO)
+            assert len(heard) == count
+        publish()
+        # Before what keeps the thread for longer, all that there is room for.
+        utilities.drain()
+        assert len(heard) == 11
+
+
+def test_a_message_that_waited_long_tells_that_the_thread_is_behind_for_a_while(
+    utilities: NodeUtilities, logged: Logged, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    group = utilities.node.default_callback_group
+    utilities.subscribe("topic", "many", SHAPE, depth=5, group=group, callback=lambda _: None)
+    (subscription,) = [s for s in utilities.node.subscriptions if s.topic_name == "/many"]
+    monkeypatch.setattr("lupin_twin.ros.base_node.time.time_ns", lambda: 10**18)
+    one = serialize_message(scan("1"))
+    for waited_s, is_behind in ((0.0, False), (BEHIND_S, False), (BEHIND_S + 0.001, True)):
+        received_ns = 10**18 - int(waited_s * 1e9)
+        subscription.callback(one, {**INFO, "received_timestamp": received_ns})
+        assert utilities.is_behind == is_behind
+    logged.now_s += BELIEVED_S - 0.001
+    subscription.callback(one, {**INFO, "received_timestamp": 10**18})
+    assert utilities.is_behind
+    logged.now_s += 0.002
+    assert not utilities.is_behind

@@ -1,0 +1,246 @@
+"""Messages to values and back; with ROS messages, without a running ROS."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from decimal import Decimal
+from typing import Any
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import Quaternion
+from hypothesis import given
+from hypothesis import strategies as st
+from lupin_msgs.msg import Observation as ObservationMsg
+from lupin_msgs.msg import TwinTimes
+from rclpy.serialization import deserialize_message, serialize_message
+from std_msgs.msg import Header
+
+from lupin_twin.core import history, ingest
+from lupin_twin.core.ingest import ReceivedInspection, ReceivedReading
+from lupin_twin.core.state import (
+    NANOSECONDS_PER_SECOND,
+    STATUS_OK,
+    Attempt,
+    Bloom,
+    Flower,
+    Pose,
+    Reading,
+    Snapshot,
+    TagState,
+)
+from lupin_twin.ros import convert
+from tests.support import messages
+
+S = NANOSECONDS_PER_SECOND
+PINNED = TagState(
+    tag_id="7",
+    pose=Pose(1.0, 2.0, 3.0, 0.0, 0.0, 0.6, 0.8),
+    readings=(Reading("co2", 512.0, 3 * S), Reading("light", 900.0, 5 * S + 7)),
+    last_observed_ns=5 * S + 7,
+    flower=Flower(
+        species="rose",
+        confidence=0.9,
+        anomaly=True,
+        flower_count=3,
+        bug_count=1,
+        blooms=(Bloom(1.1, 2.2, 0.5, 0.25, "rose", 0.75, anomaly=True),),
+        footprint=((0.0, 0.0, 0.0), (1.5, 0.0, 0.0), (1.5, 0.25, 0.0)),
+    ),
+    looked_at_ns=4 * S,
+    last_try=Attempt(6 * S, 2, "not decoded"),
+)
+UNPINNED = TagState(tag_id="8")
+
+
+def test_a_state_survives_the_wire_and_back() -> None:
+    snapshot = Snapshot(stamp_ns=9 * S, frame_id="map", tags=(PINNED, UNPINNED))
+    state = over_the_wire(convert.StateMessages().build(snapshot))
+    times = deserialize_message(convert.TimesMessages().build(snapshot), TwinTimes)
+    assert convert.snapshot_of(state, None, times) == snapshot
+
+
+def test_without_times_nothing_is_known_but_the_last_observation() -> None:
+    snapshot = Snapshot(stamp_ns=9 * S, frame_id="map", tags=(PINNED, UNPINNED))
+    heard = convert.snapshot_of(over_the_wire(convert.StateMessages().build(snapshot)))
+    assert not heard.has_times
+    [pinned, unpinned] = heard.tags
+    assert pinned.readings == tuple(replace(r, observed_at_ns=None) for r in PINNED.readings)
+    assert (pinned.last_observed_ns, pinned.looked_at_ns, pinned.last_try) == (
+        PINNED.last_observed_ns,
+        None,
+        None,
+    )
+    assert unpinned == UNPINNED
+
+
+def test_a_state_and_its_times_of_the_same_tags_keep_the_very_same_values() -> None:
+    snapshot = Snapshot(stamp_ns=9 * S, frame_id="map", tags=(PINNED, UNPINNED))
+    state = over_the_wire(convert.StateMessages().build(snapshot))
+    times = deserialize_message(convert.TimesMessages().build(snapshot), TwinTimes)
+    first = convert.snapshot_of(state, None, times)
+    second = convert.snapshot_of(state, first, times)
+    assert all(one is other for one, other in zip(first.tags, second.tags, strict=True))
+    times.tags[0].looked_at.sec += 1
+    third = convert.snapshot_of(state, second, times)
+    assert third.tags[0] is not second.tags[0]
+    assert third.tags[1] is second.tags[1]
+
+
+TEXT = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=9)
+STAMPS = st.integers(1, 2_000_000_000 * S)
+TAGS_WITH_TIMES = st.builds(
+    TagState,
+    tag_id=TEXT,
+    readings=st.lists(
+        st.builds(Reading, TEXT, st.just(1.0), STAMPS), max_size=4, unique_by=lambda r: r.name
+    ).map(tuple),
+    looked_at_ns=st.none() | STAMPS,
+    last_try=st.none() | st.builds(Attempt, STAMPS, st.integers(0, 255), TEXT),
+)
+
+
+@given(st.lists(TAGS_WITH_TIMES, max_size=4, unique_by=lambda tag: tag.tag_id), TEXT)
+def test_times_put_together_from_parts_are_those_that_ros_would_write(
+    tags: list[TagState], frame_id: str
+) -> None:
+    builder = convert.TimesMessages()
+    builder.build(Snapshot(S, frame_id, tuple(tags[:2])))
+    msg = deserialize_message(builder.build(Snapshot(9 * S + 7, frame_id, tuple(tags))), TwinTimes)
+    assert msg == TwinTimes(
+        header=Header(stamp=convert.time_msg(9 * S + 7), frame_id=frame_id),
+        tags=[convert.times_message(tag) for tag in tags],
+    )
+    assert [each.tag_id for each in msg.tags] == [tag.tag_id for tag in tags]
+
+
+def over_the_wire(msg: Any) -> Any:
+    return deserialize_message(serialize_message(msg), type(msg))
+
+
+def test_no_pose_is_published_as_w_zero_and_no_observation_as_infinitely_old() -> None:
+    tag = convert.StateMessages().build(Snapshot(9 * S, "map", (UNPINNED,))).tags[0]
+    assert tag.pose.orientation.w == 0.0
+    assert (tag.last_observed.sec, tag.last_observed.nanosec) == (0, 0)
+    assert math.isinf(tag.stale_seconds)
+
+
+def test_only_a_changed_tag_is_built_anew_and_every_age_is_current() -> None:
+    build = convert.StateMessages().build
+    first = build(Snapshot(9 * S, "map", (PINNED, UNPINNED)))
+    kept = list(first.tags)
+    changed = TagState(tag_id="8", readings=(Reading("co2", 1.0),), last_observed_ns=10 * S)
+    second = build(Snapshot(12 * S + 7, "map", (PINNED, changed)))
+    assert second.tags[0] is kept[0]
+    assert second.tags[1] is not kept[1]
+    assert second.tags[0].stale_seconds == 7.0
+    assert [r.value for r in second.tags[1].readings] == [1.0]
+
+
+def test_counts_saturate_at_the_messages_range() -> None:
+    tag = TagState(tag_id="1", flower=Flower(flower_count=70_000, bug_count=-3))
+    msg = convert.tag_message(tag)
+    assert (msg.flower_count, msg.bug_count) == (65_535, 0)
+
+
+@pytest.mark.parametrize("w", [1.0, 0.0, math.nan])
+def test_a_pose_is_heard_as_it_was_sent(w: float) -> None:
+    heard = convert.pose_of(messages.pose(1.0, 2.0, w=w))
+    assert (heard.x, heard.y) == (1.0, 2.0)
+    assert repr(heard.qw) == repr(w)
+
+
+def test_a_tag_reading_is_heard_field_by_field() -> None:
+    msg = messages.scan(
+        "1", {"co2": 1.0}, at=(1.0, 2.0), status=ObservationMsg.STATUS_SKIPPED, stamp_s=4.0
+    )
+    msg.tag_reading.stamp.sec = 3
+    heard = convert.received(msg)
+    assert (heard.kind, heard.status, heard.frame_id) == (0, 3, "map")
+    assert heard.stamp_ns == 4 * S
+    pose = Pose(1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    assert heard.part == ReceivedReading("1", 3 * S, (Reading("co2", 1.0),), pose)
+
+
+def test_a_look_is_heard_field_by_field() -> None:
+    msg = messages.look(
+        "1", "rose", at=(1.0, 2.0), anomaly=True, flower_count=4, bug_count=2,
+        blooms=[(0.5, 0.5)], footprint=[(0.0, 0.0), (1.0, 0.0)], stamp_s=3.0,
+        frame_id="odom", pose_frame_id="map",
+    )  # fmt: skip
+    heard = convert.received(msg)
+    assert (heard.kind, heard.status, heard.frame_id, heard.stamp_ns) == (1, 0, "odom", 3 * S)
+    flower = Flower(
+        species="rose",
+        confidence=0.9,
+        anomaly=True,
+        flower_count=4,
+        bug_count=2,
+        blooms=(Bloom(0.5, 0.5, 0.0, 0.4, "rose", 0.8, anomaly=False),),
+        footprint=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+    )
+    assert heard.part == ReceivedInspection(
+        "1", "map", flower, Pose(1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    )
+
+
+@pytest.mark.parametrize("kind", [2, 77])
+def test_an_observation_of_another_kind_has_no_part(kind: int) -> None:
+    msg = messages.scan("1", {"co2": 1.0})
+    msg.kind = kind
+    assert convert.received(msg).part is None
+
+
+def test_the_kinds_and_the_status_are_the_messages() -> None:
+    assert history.KIND_TAG_READING == ObservationMsg.KIND_TAG_READING
+    assert history.KIND_FLOWER == ObservationMsg.KIND_FLOWER
+    assert ingest.KIND_ANOMALY == ObservationMsg.KIND_ANOMALY
+    assert STATUS_OK == ObservationMsg.STATUS_OK
+
+
+def test_discovered_tags_are_heard_and_a_pose_is_made_when_it_is_asked_for() -> None:
+    heard = convert.received_tags(
+        messages.discovered({"1": messages.pose(1.0), "2": messages.pose(2.0)})
+    )
+    assert (heard.frame_id, list(heard.tag_ids)) == ("map", ["1", "2"])
+    assert heard.pose(1) == Pose(2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+@given(st.floats(width=32))
+def test_the_shortest_decimal_is_the_same_float32(value: float) -> None:
+    short = convert.shortest(float(np.float32(value)))
+    assert np.array_equal(np.float32(short), np.float32(value), equal_nan=True)
+    if math.isfinite(value):
+        assert significant_digits(short) <= min(9, significant_digits(float(np.float32(value))))
+
+
+def significant_digits(value: float) -> int:
+    return len(Decimal(repr(value)).normalize().as_tuple().digits)
+
+
+def test_times_at_the_ends_of_the_messages_range() -> None:
+    assert convert.time_msg(-5).sec == 0
+    assert convert.time_msg(10**20).sec == 2_147_483_647
+    assert convert.nanoseconds(convert.time_msg(3 * S + 4)) == 3 * S + 4
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.5, math.pi / 2, -2.0])
+def test_a_maps_yaw_comes_from_its_quaternion_normalised_or_not(yaw: float) -> None:
+    for length in (1.0, 2.0):
+        origin = messages.pose(1.0, 2.0)
+        origin.orientation = Quaternion(z=length * math.sin(yaw / 2), w=length * math.cos(yaw / 2))
+        occupancy = convert.map_of(messages.occupancy_grid([[0, 100]], 0.05, origin), 3)
+        assert occupancy.origin_yaw == pytest.approx(yaw)
+        assert (occupancy.origin_x, occupancy.origin_y, occupancy.revision) == (1.0, 2.0, 3)
+        assert occupancy.resolution == 0.05
+        assert occupancy.cells.tolist() == [[0, 100]]
+
+
+def test_a_malformed_map_is_refused() -> None:
+    for breakage in ({"width": 3}, {"resolution": 0.0}, {"resolution": math.nan}):
+        msg = messages.occupancy_grid([[0, 0]])
+        for name, value in breakage.items():
+            setattr(msg.info, name, value)
+        with pytest.raises(ValueError, match="map"):
+            convert.map_of(msg, 1)

@@ -1,0 +1,99 @@
+"""Estimates as messages, and back."""
+
+from __future__ import annotations
+
+import math
+from array import array
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND as S
+from lupin_twin.estimate import Place
+from lupin_twin.estimate.engine import Estimate, EstimateRequest
+from lupin_twin.estimate.grading import Record, Tally
+from lupin_twin.field.engine import FieldRefused, FieldRequest
+from lupin_twin.ros import convert_field
+from lupin_twin.ros.convert_past import NotAnAnswerError
+from lupin_twin.runtime.estimate_rounds import DEFAULT_PLACES, Report, ReportRequest, TagCheck
+from tests.support.estimates import an_estimate
+
+
+def test_a_question_comes_back_as_it_was() -> None:
+    asked = EstimateRequest(FieldRequest("co2", 0.5, -1.0, 0.0, 2.0, 1.5), 1_500_000_000)
+    assert convert_field.estimate_request_of(convert_field.estimate_request_message(asked)) == asked
+
+
+def test_an_estimate_comes_back_as_it_was() -> None:
+    estimate = an_estimate(width=3, height=2)
+    back = convert_field.estimate_of(convert_field.response_of(estimate))
+    assert isinstance(back, Estimate)
+    assert (back.sample_count, back.reading_count) == (
+        estimate.sample_count,
+        estimate.reading_count,
+    )
+    for name in ("mean", "sd", "known"):
+        np.testing.assert_array_equal(getattr(back.grid, name), getattr(estimate.grid, name))
+    for name in ("width", "height", "origin_x", "origin_y", "resolution", "sd_known"):
+        assert getattr(back.grid, name) == getattr(estimate.grid, name), name
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"width": 2}, "6 values of mean, of 2 x 2"),
+        ({"sd": array("f", [1.0] * 5)}, "5 values of sd"),
+        ({"sd": array("f", [1.0] * 5 + [math.nan])}, "a value of sd is no number"),
+        ({"width": 0, "mean": array("f"), "sd": array("f")}, "0 values of mean"),
+    ],
+)
+def test_what_cannot_be_is_not_believed(changes: dict[str, Any], complaint: str) -> None:
+    response = convert_field.response_of(an_estimate(width=3, height=2))
+    for name, value in changes.items():
+        setattr(response, name, value)
+    with pytest.raises(NotAnAnswerError, match=complaint):
+        convert_field.estimate_of(response)
+
+
+REPORT = Report(
+    5 * S,
+    4 * S,
+    "why",
+    Record(3 * S, Tally(10, 9), Tally(70, 60)),
+    (
+        TagCheck("a", 20.0, 2 * S, 21.0, 0.5, -2.0, -1.0, None),
+        TagCheck("b", 30.0, S, 21.0, 0.5, 9.0, 9.0, S),
+    ),
+    (Place(1.0, 2.0, 0.75),),
+)
+
+
+@pytest.mark.parametrize(
+    "report", [REPORT, Report(S, None, "", Record(None, Tally(), Tally()))], ids=["full", "bare"]
+)
+def test_a_report_comes_back_as_it_was(report: Report) -> None:
+    assert convert_field.report_of(convert_field.report_response(report)) == report
+
+
+def test_a_question_for_a_report_comes_back_as_it_was() -> None:
+    asked = ReportRequest("co2", 7)
+    message = convert_field.report_request_message(asked)
+    assert convert_field.report_request_of(message) == asked
+    message.max_places = 0
+    assert convert_field.report_request_of(message) == ReportRequest("co2", DEFAULT_PLACES)
+    message.max_places = 21
+    with pytest.raises(FieldRefused, match="max_places is 21, the limits are 1 and 20"):
+        convert_field.report_request_of(message)
+
+
+def test_a_report_with_lists_of_several_lengths_is_not_believed() -> None:
+    response = convert_field.report_response(REPORT)
+    response.z = array("d", [1.0])
+    with pytest.raises(NotAnAnswerError, match=r"lists of tags are \[1, 2\] long"):
+        convert_field.report_of(response)
+    response = convert_field.report_response(REPORT)
+    for name in ("place_x", "place_y", "error_ratio"):
+        setattr(response, name, array("d", [1.0] * 21))
+    with pytest.raises(NotAnAnswerError, match="20 at most"):
+        convert_field.report_of(response)

@@ -1,0 +1,323 @@
+"""GetEstimate over DDS: of a twin that has heard a day, of a moment before, and what is refused."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from threading import Event
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Time
+from lupin_msgs.srv import GetEstimate, GetEstimateReport
+
+from lupin_twin.core.diagnostics import Estimates
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pose, Reading, Scan, TwinStore
+from lupin_twin.estimate import FitFailed
+from lupin_twin.estimate.engine import TagPast, readings_of
+from lupin_twin.estimate.grading import Tally
+from lupin_twin.ros.estimate_service import EstimateService
+from lupin_twin.runtime.estimate_rounds import FIRST_FIT, Done, Loaded, ReportRequest
+from lupin_twin.runtime.workers import MAX_QUERIES
+from tests.support import messages
+from tests.support.domains import own_domain
+from tests.support.journal import select
+from tests.support.processes import OFTEN, twin_node
+from tests.support.ros import Peer
+from tests.support.waiting import wait_for
+
+SERVICE = "/twin/get_estimate"
+REPORT_SERVICE = "/twin/get_estimate_report"
+BOX: dict[str, Any] = {
+    "sensor_type": "temperature",
+    "resolution": 0.5,
+    "bbox_min_x": 0.0,
+    "bbox_min_y": 0.0,
+    "bbox_max_x": 2.0,
+    "bbox_max_y": 3.0,
+}
+PLACES = {"a": (0.25, 0.25), "b": (1.75, 2.75)}
+# By the steady clock, later than any rest.
+FAR_S = 1e12
+
+
+@cache
+def now_s() -> int:
+    """When the first test here asks: all files are read long before the last one is run."""
+    return int(time.time())
+
+
+@cache
+def times() -> dict[str, list[int]]:
+    """Seven each, an hour apart; the last half an hour ago."""
+    seconds = [now_s() - 1800 - 3600 * n for n in range(7)]
+    return {"a": seconds, "b": [second - 600 for second in seconds]}
+
+
+@pytest.fixture(scope="module")
+def peer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Peer]:
+    journal = tmp_path_factory.mktemp("journal") / "j.sqlite"
+    arguments = (*OFTEN, "-p", f"journal:={journal}")
+    with own_domain() as domain, twin_node(domain, *arguments), Peer(domain) as peer:
+        peer.wait_for_twin()
+        for tag_id, stamps in times().items():
+            for stamp_s in sorted(stamps):
+                readings = {"temperature": 20.0 + 3.0 * PLACES[tag_id][0]}
+                peer.observe(messages.scan(tag_id, readings, stamp_s=stamp_s, at=PLACES[tag_id]))
+        peer.observe(messages.scan("last", {"co2": 1.0}))
+        peer.tag("last")
+        rows = "SELECT count(*) FROM scan"
+        wait_for(lambda: select(journal, rows) == [(15,)], "all of it in the journal")
+        yield peer
+
+
+def ask(peer: Peer, **changes: Any) -> Any:
+    return peer.ask(GetEstimate, SERVICE, **{**BOX, **changes})
+
+
+def test_the_estimate_is_near_the_readings_at_the_tags_and_less_sure_between(peer: Peer) -> None:
+    answer = ask(peer)
+    assert answer.ok, answer.error_message
+    assert (answer.width, answer.height, answer.resolution_used) == (4, 6, 0.5)
+    assert (answer.sample_count, answer.reading_count) == (2, 14)
+    mean, sd = (np.array(one).reshape(6, 4) for one in (answer.mean, answer.sd))
+    assert mean[0, 0] == pytest.approx(20.75, abs=0.5)
+    assert mean[5, 3] == pytest.approx(25.25, abs=0.5)
+    assert sd[0, 0] < sd[3, 1]
+    assert (sd > 0.0).all()
+    assert answer.sd_known > 0.0
+
+
+def test_what_is_expected_of_each_tag_and_where_another_helps_is_reported(peer: Peer) -> None:
+    def report(accept: Any) -> Any:
+        def look() -> Any:
+            answer = peer.ask(GetEstimateReport, REPORT_SERVICE, sensor_type="temperature")
+            assert answer.ok, answer.error_message
+            return answer if accept(answer) else None
+
+        return wait_for(look, "the report")
+
+    newest = [max(times()["a"]), max(times()["b"])]
+    # It is made beside what is heard, and may be of the scans before.
+    loaded = report(lambda answer: [one.sec for one in answer.observed_at] == newest)
+    assert list(loaded.tag_ids) == ["a", "b"]
+    assert loaded.fitted_at.sec >= now_s()
+    assert loaded.fit_problem == ""
+    assert list(loaded.measured) == [20.75, 25.25]
+    assert list(loaded.left_out) == [False, False]
+    assert 1 <= len(loaded.place_x) <= 5
+    assert all(0.0 < ratio <= 1.0 for ratio in loaded.error_ratio)
+    assert (loaded.week_scans, loaded.graded_since) == (0, Time())
+
+    stamp_s = int(time.time())
+    peer.observe(messages.scan("a", {"temperature": 20.8}, stamp_s=stamp_s, at=PLACES["a"]))
+    later = report(lambda answer: answer.observed_at[0].sec == stamp_s)
+    assert later.measured[0] == 20.8
+    assert abs(later.expected[0] - 20.8) < 4.0 * later.expected_sd[0]
+    assert later.week_scans == 0, "two tags are too few to be held against each other"
+    refused = peer.ask(GetEstimateReport, REPORT_SERVICE, sensor_type="co2", max_places=21)
+    assert refused == GetEstimateReport.Response(
+        error_message="max_places is 21, the limits are 1 and 20"
+    )
+    unknown = peer.ask(GetEstimateReport, REPORT_SERVICE, sensor_type="ph")
+    assert (unknown.ok, unknown.fitted_at, list(unknown.tag_ids)) == (True, Time(), [])
+
+
+def test_as_of_a_moment_only_what_was_observed_until_then_counts(peer: Peer) -> None:
+    at_s = times()["a"][3]
+    answer = ask(peer, at=Time(sec=at_s))
+    assert answer.ok, answer.error_message
+    tags = [
+        TagPast(
+            tag_id,
+            *PLACES[tag_id],
+            tuple((stamp_s * NANOSECONDS_PER_SECOND, 0.0) for stamp_s in stamps),
+        )
+        for tag_id, stamps in times().items()
+    ]
+    expected = readings_of(tags, at_s * NANOSECONDS_PER_SECOND, 86_400.0)
+    assert answer.reading_count == len(expected) == 8
+    assert answer.sample_count == 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"sensor_type": ""}, "sensor_type is empty"),
+        ({"resolution": 0.0}, "resolution is 0.0"),
+        ({"resolution": 0.0001}, "cells"),
+        ({"sensor_type": "ph"}, "no tag has a reading of the 86400 s before that moment"),
+        ({"at": Time(sec=2**31 - 1)}, "at is 2147483647.0 s, the limits are 0 and now"),
+    ],
+)
+def test_what_cannot_be_estimated_is_refused_by_name(
+    peer: Peer, changes: dict[str, Any], complaint: str
+) -> None:
+    answer = ask(peer, **changes)
+    assert complaint in answer.error_message
+    assert answer == GetEstimate.Response(error_message=answer.error_message)
+
+
+def test_a_flood_of_the_dearest_holds_up_no_observation_and_no_field(peer: Peer) -> None:
+    dearest = {**BOX, "resolution": 0.003}
+    clients = [
+        peer.node.create_client(kind, name)
+        for kind, name in ((GetEstimate, SERVICE), (GetEstimateReport, REPORT_SERVICE))
+    ]
+    for client in clients:
+        peer.until(client.service_is_ready, "the service")
+    asked: list[Any] = []
+
+    def ask_both() -> None:
+        place = {**dearest, "bbox_max_x": 2.0 + len(asked) / 1000.0}
+        asked.append(clients[0].call_async(GetEstimate.Request(**place)))
+        asked.append(clients[1].call_async(GetEstimateReport.Request(sensor_type="temperature")))
+
+    for _ in range(MAX_QUERIES + 8):
+        ask_both()
+        peer.spin_briefly()
+    peer.observe(messages.scan("in the flood", {"co2": 400.0}, at=(1.0, 1.0)))
+    peer.tag("in the flood")
+    assert peer.get_field(**{**BOX, "sensor_type": "co2"}).sample_count == 1
+
+    def answers(ok: bool) -> list[Any]:
+        return [one.result() for one in asked if one.done() and one.result().ok is ok]
+
+    def are_there() -> bool:
+        # A service holds ten requests: of such a flood, DDS loses some, and all but twenty to a
+        # twin that stood still meanwhile, which are too few to be refused.
+        if not answers(False):
+            ask_both()
+        return bool(answers(True) and answers(False))
+
+    peer.until(are_there, "an answer and a refusal")
+    assert all(one.error_message.endswith("ask again later") for one in answers(False))
+    for client in clients:
+        peer.node.destroy_client(client)
+
+
+def test_after_a_restart_models_are_made_of_what_the_journal_holds(tmp_path: Path) -> None:
+    journal = tmp_path / "j.sqlite"
+    arguments = (*OFTEN, "-p", f"journal:={journal}")
+    with own_domain() as domain, twin_node(domain, *arguments), Peer(domain) as peer:
+        peer.wait_for_twin()
+        for stamp_s in sorted(times()["a"] + times()["b"]):
+            tag_id = "a" if stamp_s in times()["a"] else "b"
+            peer.observe(messages.scan(tag_id, {"co2": 400.0}, stamp_s=stamp_s, at=PLACES[tag_id]))
+        rows = "SELECT count(*) FROM scan"
+        wait_for(lambda: select(journal, rows) == [(14,)], "all of it in the journal")
+    # Where the one that has ended is not found any more.
+    with own_domain() as domain, twin_node(domain, *arguments), Peer(domain) as peer:
+        peer.wait_for_twin()
+
+        def report() -> Any:
+            found = peer.ask(GetEstimateReport, REPORT_SERVICE, sensor_type="co2")
+            return found if found.tag_ids else None
+
+        found = wait_for(report, "a model")
+    assert sorted(found.tag_ids) == ["a", "b"]
+    assert found.fitted_at.sec > 0
+    assert (found.week_scans, found.graded_since) == (0, Time())
+
+
+def test_what_is_wrong_with_models_is_said_in_the_log_and_for_diagnostics() -> None:
+    """A fit that fails keeps the last; a share denies the model."""
+    reported: list[str] = []
+    utilities: Any = SimpleNamespace(is_behind=False, warn=lambda _, text: reported.append(text))
+    nothing: Any = None
+    service = EstimateService(
+        utilities,
+        nothing,
+        nothing,
+        occupancy=nothing,
+        day_length_s=1_440.0,
+        max_grid_cells=100,
+        now_ns=now_s,
+        wake=lambda: None,
+    )
+    loaded = Loaded(0, nothing, nothing, ())
+
+    def end(outcome: Done | Exception) -> None:
+        for _ in range(FIRST_FIT):
+            service.watch.add(Scan("a", 1, (Reading("co2", 400.0),)))
+        due = service.watch.due(FAR_S)
+        assert due is not None
+        service.watch.begin(due, FAR_S)
+        service._is_working = True  # nothing else is begun
+        service._ended(due, outcome)
+
+    end(Done(Tally(90, 10), loaded))
+    end(FitFailed("singular"))
+    assert service.state() == Estimates({"co2": "singular"}, ("co2",), 1)
+    assert [one.partition(":")[0] for one in reported] == [
+        "the estimate of co2 is too sure of itself",
+        "no new model of co2",
+    ]
+    assert "of 90 scans, 10 came to lie where 9 of 10 were predicted" in reported[0]
+    end(Done(Tally(1, 0), loaded))
+    assert len(reported) == 2, "once, for as long as it lasts"
+    end(Done(Tally(10_000, 9_000), loaded))
+    assert service.state() == Estimates({}, (), 1)
+    end(Done(Tally(100_000, 0), loaded))
+    assert len(reported) == 3, "and again where it was trusted in between"
+    report = service.report(ReportRequest("co2"))()
+    assert report.record.is_trusted is False
+    assert report.places == (), "who asks for no places has none worked out"
+    service.close()
+
+
+def test_scans_in_any_number_cost_no_more_than_a_tenth_of_a_core() -> None:
+    """Five sensors at thirty tags, forty scans a second: rounds and fits rest after their work."""
+    store, start_ns = TwinStore(), time.time_ns()
+    utilities: Any = SimpleNamespace(is_behind=False, warn=lambda *_: None, report=lambda *_: None)
+    nothing: Any = None
+    has_news = Event()
+    service = EstimateService(
+        utilities,
+        store,
+        nothing,
+        occupancy=lambda: None,
+        day_length_s=86_400.0,
+        max_grid_cells=100,
+        now_ns=time.time_ns,
+        wake=has_news.set,
+    )
+    sensors = ("temperature", "humidity", "co2", "light", "ph")
+
+    def scan(number: int, stamp_ns: int) -> None:
+        tag, place = number % 30, Pose(number % 6, number % 30 // 6, 0.0, 0.0, 0.0, 0.0, 1.0)
+        values = (20.0 + (number * 7919 + index * 31) % 97 / 97 for index in range(5))
+        readings = tuple(
+            Reading(name, value, stamp_ns) for name, value in zip(sensors, values, strict=True)
+        )
+        one = Scan(str(tag), stamp_ns, readings, place)
+        store.record(one)
+        service.add(one)
+
+    def cpu_of_others_s() -> float:
+        return time.process_time() - time.thread_time()
+
+    def scans_until(is_over: Callable[[], bool]) -> None:
+        number = 0
+        while not is_over():
+            number += 1
+            scan(number, time.time_ns())
+            service.go_on()
+            if has_news.wait(0.025):
+                has_news.clear()
+                service.deliver()
+
+    try:
+        for number in range(900):
+            scan(number, start_ns - (900 - number) * NANOSECONDS_PER_SECOND)
+        scans_until(lambda: all(service.watch.fit(name).model for name in sensors))
+        begun_s, cpu_s = time.monotonic(), cpu_of_others_s()
+        scans_until(lambda: time.monotonic() - begun_s > 16.0)
+        share = (cpu_of_others_s() - cpu_s) / (time.monotonic() - begun_s)
+        assert 0.0 < share < 0.15, "one round more than its rest may fall into the time"
+    finally:
+        service.close()

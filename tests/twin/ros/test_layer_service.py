@@ -1,0 +1,442 @@
+"""Layers and markers over real DDS, of a twin below a namespace, in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray
+from lupin_msgs.msg import Observation
+from lupin_msgs.srv import GetEstimate, GetField
+from sensor_msgs.msg import PointCloud2
+from visualization_msgs.msg import Marker, MarkerArray
+
+from lupin_twin.core.parameters import TwinParameters
+from lupin_twin.field.engine import DEFAULT_RESOLUTION_M
+from lupin_twin.field.idw import Abandoned
+from lupin_twin.ros import layer_service as module
+from lupin_twin.ros.layers import MarkerArrays
+from tests.support.domains import own_domain
+from tests.support.messages import look, scan
+from tests.support.processes import Process, twin_node
+from tests.support.ros import Peer, latched
+from tests.support.waiting import wait_for
+
+LAYERS = "layers:=[temperature, soil moisture, co2, humidity, light, soil_moisture]"
+SENSORS = Path("backend/lupin_bridge/sensors.json")
+RVIZ = Path("ros_node/lupin_twin/rviz/twin.rviz")
+# What each display of RViz reads.
+READS = {
+    "rviz_default_plugins/Map": "nav_msgs/msg/OccupancyGrid",
+    "rviz_default_plugins/PointCloud2": "sensor_msgs/msg/PointCloud2",
+    "rviz_default_plugins/MarkerArray": "visualization_msgs/msg/MarkerArray",
+}
+CO2, SOIL = "/gh1/twin/field/co2", "/gh1/twin/field/soil_x20_moisture"
+TEMPERATURE = "/gh1/twin/field/temperature"
+TAGS, PLANTERS = "/gh1/twin/tags", "/gh1/twin/planters"
+KINDS = dict.fromkeys((CO2, SOIL, TEMPERATURE), PointCloud2) | dict.fromkeys(
+    (TAGS, PLANTERS), MarkerArray
+)
+BOX = ((0.0, 0.0), (1.0, 0.0), (1.0, 0.5))
+
+
+class Viewer(Peer):
+    """A peer that looks at what is drawn, and keeps all that comes."""
+
+    def __init__(self, domain: int, name: str) -> None:
+        super().__init__(domain, name)
+        self.came: dict[str, list[Any]] = {topic: [] for topic in KINDS}
+        self.subscriptions: dict[str, Any] = {}
+        self.said: dict[str, str] = {}
+
+    def watch(self, topic: str) -> None:
+        self.subscriptions[topic] = self.node.create_subscription(
+            KINDS[topic], topic, self.came[topic].append, latched(1)
+        )
+
+    def unwatch(self, topic: str) -> None:
+        self.node.destroy_subscription(self.subscriptions.pop(topic))
+
+    def newest(self, topic: str, accept: Any = lambda _: True) -> Any:
+        came = self.came[topic]
+        return self.until(
+            lambda: came[-1] if came and accept(came[-1]) else None, f"a message on {topic}"
+        )
+
+    def hear_diagnostics(self) -> None:
+        def hear(msg: Any) -> None:
+            for status in msg.status:
+                if status.name == "/gh1/lupin_twin: layers":
+                    self.said = {each.key: each.value for each in status.values}
+                    self.said["message"] = status.message
+
+        self.node.create_subscription(DiagnosticArray, "/diagnostics", hear, 10)
+
+    def says(self, topic: str, count: int) -> None:
+        """Wait until the twin says so; that it says more is found here too."""
+        self.until(lambda: self.said.get(topic) == str(count), f"{count} on {topic}")
+
+
+class Stage:
+    """A service with one topic: what is made of it, and when, is the test's."""
+
+    topic_name = "/t"
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now_s = 0.0
+        self.key: object = 0
+        self.plans = 0
+        self.is_behind = False
+        self.is_free = threading.Event()
+        self.is_free.set()
+        self.fails: Exception | None = None
+        self.sent: list[bytes] = []
+        self.kept: list[Any] = []
+        self.keep, self.publish = lambda *field: self.kept.append(field), self.sent.append
+        anything: Any = self
+        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now_s))
+        make: Any = module.LayerService
+        self.service = make(*[anything] * 7, 1_440.0, lambda: None)
+        self.listeners, self.forgotten = 1, 0
+        self.topic = module._Topic(self, lambda: self.key, self.plan, self.forget)
+        self.service._topics.append(self.topic)
+
+    def get_subscription_count(self) -> int:
+        return self.listeners
+
+    def forget(self) -> None:
+        self.forgotten += 1
+
+    def drain(self) -> None: ...
+
+    def warn(self, *_: Any) -> None: ...
+
+    def plan(self) -> Any:
+        self.plans += 1
+        if isinstance(self.fails, ValueError):
+            raise self.fails
+        return None, self.make
+
+    def make(self, *_: Any) -> Any:
+        self.is_free.wait()
+        if self.fails is not None:
+            raise self.fails
+        job_and_grid: Any = ("job", "grid")
+        return module._Made(b"made", *job_and_grid)
+
+    def look(self, now_s: float) -> int:
+        """Look at this moment; returns how often something was begun so far."""
+        self.now_s = now_s
+        self.service.check()
+        return self.plans
+
+    def is_delivered(self) -> bool:
+        self.service.deliver()
+        return not self.topic.is_under_way
+
+
+@pytest.fixture
+def stage(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stage]:
+    made = Stage(monkeypatch)
+    yield made
+    made.is_free.set()
+    made.service.close()
+
+
+def test_what_has_changed_is_made_at_its_rate_and_not_twice_at_once(stage: Stage) -> None:
+    stage.is_free.clear()
+    assert stage.look(10.0) == 1
+    stage.key = 1
+    assert stage.look(20.0) == 1, "it is under way"
+    stage.is_free.set()
+    wait_for(stage.is_delivered, "the first")
+    assert (stage.sent, stage.kept) == ([b"made"], [("job", "grid")])
+    assert stage.look(10.999) == 1
+    stage.is_behind = True
+    assert stage.look(11.0) == 1, "the node is behind"
+    stage.is_behind = False
+    assert stage.look(11.0) == 2
+    wait_for(stage.is_delivered, "the second")
+    assert stage.look(30.0) == 2, "nothing has changed"
+
+
+def test_what_was_given_up_is_made_again_and_a_problem_ends(stage: Stage) -> None:
+    stage.fails = Abandoned()
+    stage.look(10.0)
+    wait_for(stage.is_delivered, "its end")
+    stage.fails = ValueError("too far apart")
+    assert stage.look(20.0) == 2, "though nothing has changed"
+    assert stage.service.state().problems == {"/t": "too far apart"}
+    stage.key, stage.fails = 1, None
+    stage.look(30.0)
+    wait_for(stage.is_delivered, "a good one")
+    assert stage.service.state().problems == {}
+    assert stage.sent == [b"made"]
+
+
+def test_while_nobody_looks_nothing_is_made_or_kept_and_at_the_end_no_thread_is_left(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    forgotten: list[str] = []
+    with monkeypatch.context() as patch:
+        patch.setattr(MarkerArrays, "forget", lambda _: forgotten.append("marks"))
+        stage.service.offer(SimpleNamespace(create_publisher=lambda *_: stage), (), "map")
+        stage.listeners = 0
+        assert (stage.look(10.0), stage.forgotten) == (0, 1)
+    assert len(forgotten) == 2, "tags and planters"
+    del stage.service._topics[1:]
+    stage.listeners = 1
+    assert (stage.look(20.0), stage.forgotten) == (1, 1)
+    wait_for(stage.is_delivered, "what is looked at")
+
+    def threads() -> list[str]:
+        return [it.name for it in threading.enumerate() if it.name.startswith("layers")]
+
+    assert threads()
+    stage.service.close()
+    wait_for(lambda: not threads(), "the end of its thread")
+
+
+def test_marks_that_are_as_before_are_not_sent_again() -> None:
+    marks: list[Any] = [[1], [1], [2]]
+    anything: Any = SimpleNamespace(build=lambda marks: b"%d" % marks[0])
+    marked = module._Marked(lambda _: marks.pop(0), anything)
+    snapshot: Any = None
+    assert [marked.make(snapshot).data for _ in range(3)] == [b"1", None, b"2"]
+
+
+def test_a_layer_is_another_when_the_map_is_or_a_minute_of_its_day_has_passed(stage: Stage) -> None:
+    now_ns, revision, model = 0, 1, object()
+    parts: dict[str, Any] = {
+        "fields": SimpleNamespace(rules=0),
+        "occupancy": lambda: SimpleNamespace(revision=revision),
+        "estimates": SimpleNamespace(
+            watch=SimpleNamespace(fit=lambda _: SimpleNamespace(model=model, at_ns=1))
+        ),
+        "store": SimpleNamespace(observation_count=1),
+        "now_ns": lambda: now_ns,
+        "day_length_s": 1_440.0,
+    }
+    for name, part in parts.items():
+        setattr(stage.service, name, part)
+
+    def key() -> object:
+        return stage.service._key_of_layer("co2")
+
+    first = key()
+    now_ns = 10**9 - 1
+    assert key() == first
+    now_ns = 10**9
+    assert key() != first, "a minute of a day of 24 minutes"
+    now_ns, revision = 0, 2
+    assert key() != first, "another map"
+    model = None
+    unknown = key()
+    revision = 3
+    assert key() != unknown, "also without an estimate"
+
+
+@pytest.fixture(scope="module")
+def house() -> Iterator[tuple[int, Process, Viewer]]:
+    args = ("--ros-args", "-r", "__ns:=/gh1", "-p", LAYERS)
+    with (
+        own_domain() as domain,
+        twin_node(domain, *args) as process,
+        Viewer(domain, "robot") as robot,
+    ):
+        yield domain, process, robot
+
+
+def observe(robot: Peer, *messages: Any) -> None:
+    for message in messages:
+        robot.publish("/gh1/floranova/observations", message)
+
+
+def cells(msg: Any) -> npt.NDArray[np.float32]:
+    """(n, 5): x, y, z, value, error."""
+    assert [field.name for field in msg.fields] == ["x", "y", "z", "value", "error"]
+    return np.frombuffer(bytes(msg.data), dtype=np.float32).reshape(msg.width, 5)
+
+
+def box_of(low: tuple[float, float], high: tuple[float, float]) -> dict[str, Any]:
+    """The default box and cells: the tags', 1.5 m wider, in cells of 0.1 m."""
+    return {
+        "resolution": 0.1,
+        "bbox_min_x": low[0] - 1.5,
+        "bbox_min_y": low[1] - 1.5,
+        "bbox_max_x": high[0] + 1.5,
+        "bbox_max_y": high[1] + 1.5,
+    }
+
+
+def test_a_layer_is_the_field_and_is_made_only_for_who_looks(
+    house: tuple[int, Process, Viewer],
+) -> None:
+    domain, _, robot = house
+    robot.hear_diagnostics()
+    for x in (0, 4):
+        observe(robot, scan(f"t{x}", {"co2": 400.0 + x, "soil moisture": 30.0}, (x, 0)))
+    box = box_of((0.0, 0.0), (4.0, 0.0))
+    ask: dict[str, Any] = {"sensor_type": "co2", **box}
+    field = robot.until(
+        lambda: (f := robot.ask(GetField, "/gh1/twin/get_field", **ask)).sample_count == 2 and f,
+        "both tags",
+    )
+    # Something is known, nobody looks: nothing was made.
+    robot.says(CO2, 0)
+    robot.says(TAGS, 0)
+    assert robot.said["message"] == "0 of 8 topics have subscribers"
+
+    with Viewer(domain, "viewer") as viewer:
+        viewer.watch(CO2)
+        msg = viewer.newest(CO2)
+        values = np.array(field.values).reshape(field.height, field.width)
+        rows, columns = np.nonzero(~np.isnan(values))
+        assert 0 < rows.size < values.size
+        found = cells(msg)
+        np.testing.assert_array_equal(found[:, 3], values[rows, columns].astype(np.float32))
+        np.testing.assert_allclose(found[:, 0], -1.5 + (columns + 0.5) * 0.1, atol=1e-6)
+        np.testing.assert_allclose(found[:, 1], -1.5 + (rows + 0.5) * 0.1, atol=1e-6)
+        # Two readings make no model yet: nothing is known of the error.
+        assert (found[:, 2] == 0.0).all()
+        assert (found[:, 4] == -1.0).all()
+        assert (msg.header.frame_id, msg.is_dense) == ("map", True)
+        assert msg.header.stamp.sec > 0
+
+        with Viewer(domain, "late") as late:
+            late.watch(CO2)
+            assert late.newest(CO2).header.stamp == msg.header.stamp  # out of the latch
+        robot.says(CO2, 1)
+        robot.says(SOIL, 0)
+
+        observe(robot, scan("t0", {"co2": 900.0}))
+        changed = viewer.newest(CO2, lambda m: cells(m)[:, 3].max() == 900.0)
+        assert cells(changed).shape == found.shape
+        # A sensor whose name is none in ROS.
+        viewer.watch(SOIL)
+        assert (cells(viewer.newest(SOIL))[:, 3] == 30.0).all()
+        viewer.unwatch(CO2)
+        robot.until(
+            lambda: robot.said["message"] == "1 of 8 topics have subscribers", "one who looks"
+        )
+        observe(robot, scan("t0", {"co2": 700.0}))
+        viewer.newest(SOIL)  # the same tags at another revision
+        viewer.came[CO2].clear()
+        viewer.watch(CO2)
+        viewer.newest(CO2, lambda m: cells(m)[:, 3].max() == 700.0)
+    robot.says(CO2, 3)
+
+
+def test_the_error_is_that_of_the_value_by_the_estimate(
+    house: tuple[int, Process, Viewer],
+) -> None:
+    domain, _, robot = house
+    now_s = robot.node.get_clock().now().nanoseconds / 1e9
+    places = [(x, 8.0) for x in range(5)]
+    observe(
+        robot,
+        *(
+            scan(f"e{x}", {"temperature": 20.0 + x + ago_s / 60}, (x, y), stamp_s=now_s - ago_s)
+            for x, y in places
+            for ago_s in (1200.0, 600.0, 1.0)
+        ),
+    )
+    ask: dict[str, Any] = {"sensor_type": "temperature", **box_of((0.0, 0.0), (4.0, 8.0))}
+    with Viewer(domain, "viewer") as viewer:
+        viewer.watch(TEMPERATURE)
+
+        def is_as_foretold() -> bool:
+            clouds = viewer.came[TEMPERATURE]
+            if not clouds or not len(found := cells(clouds[-1])) or found[0, 4] < 0.0:
+                return False
+            estimate = viewer.ask(GetEstimate, "/gh1/twin/get_estimate", **ask)
+            field = viewer.ask(GetField, "/gh1/twin/get_field", **ask)
+            values = np.array(field.values)
+            known = ~np.isnan(values)
+            off = values[known] - np.array(estimate.mean)[known]
+            expected = np.hypot(np.array(estimate.sd)[known], off)
+            return expected.shape == found[:, 4].shape and np.allclose(
+                found[:, 4], expected, rtol=1e-4
+            )
+
+        viewer.until(is_as_foretold, "errors as those of the estimate")
+
+
+def test_tags_and_planters_are_marked_as_they_are(house: tuple[int, Process, Viewer]) -> None:
+    domain, _, robot = house
+    observe(
+        robot,
+        scan("m1", {"light": 1.0}, (1.0, 3.0)),
+        scan("m2", {"light": 1.0}, (2.0, 3.0)),
+        look("m1", footprint=BOX),
+        look("m2", footprint=BOX),
+        scan("m2", status=Observation.STATUS_SCAN_FAILED),
+    )
+    with Viewer(domain, "viewer") as viewer:
+        viewer.watch(TAGS)
+        viewer.watch(PLANTERS)
+        msg = viewer.newest(TAGS, lambda m: any(x.text == "m2 (failed)" for x in m.markers))
+        assert msg.markers[0].action == Marker.DELETEALL
+        names = {marker.text: marker for marker in msg.markers if marker.text}
+        balls = {m.id: m for m in msg.markers if m.type == Marker.SPHERE and m.ns == "tags"}
+        fresh, failed = balls[names["m1"].id], balls[names["m2 (failed)"].id]
+        assert (fresh.pose.position.x, fresh.pose.position.y) == (1.0, 3.0)
+        assert fresh.color.g > fresh.color.r
+        assert failed.color.r > failed.color.g
+        outlines = viewer.newest(PLANTERS, lambda m: len(m.markers) > 1).markers[1:]
+        assert [(o.ns, o.id, len(o.points)) for o in outlines] == [("planters", fresh.id, 4)]
+        # What it is stays what it is called by.
+        observe(robot, scan("m2", {"light": 2.0}))
+        msg = viewer.newest(TAGS, lambda m: any(x.text == "m2" for x in m.markers))
+        assert next(x.id for x in msg.markers if x.text == "m2") == failed.id
+
+
+def test_rviz_shows_what_the_twin_publishes(house: tuple[int, Process, Viewer]) -> None:
+    _, _, robot = house
+    manager = yaml.safe_load(RVIZ.read_text(encoding="utf-8"))["Visualization Manager"]
+    shown = {each["Name"]: each for each in manager["Displays"] if "Topic" in each}
+    # Relative, so that a namespace moves them; latched, or the last one would not come.
+    reads = {f"/gh1/{each['Topic']['Value']}": [READS[each["Class"]]] for each in shown.values()}
+    robot.until(
+        lambda: reads.items() <= dict(robot.node.get_topic_names_and_types()).items(),
+        f"topics {reads}",
+    )
+    for each in shown.values():
+        topic = each["Topic"]
+        assert (topic["Durability Policy"], topic["Reliability Policy"], topic["Depth"]) == (
+            "Transient Local",
+            "Reliable",
+            1,
+        )
+    known = json.loads(SENSORS.read_text(encoding="utf-8"))["sensors"]
+    layers = {name: each for name, each in shown.items() if "PointCloud2" in each["Class"]}
+    assert list(layers) == [name for name, told in known.items() if "derived" not in told]
+    # A layer that is shown costs the twin something.
+    assert [name for name, each in layers.items() if each["Enabled"]] == ["temperature"]
+    assert {each["Channel Name"] for each in layers.values()} == {"value"}
+    assert {each["Size (m)"] for each in layers.values()} == {DEFAULT_RESOLUTION_M}
+    namespaces = {space for each in shown.values() for space in each.get("Namespaces", ())}
+    assert namespaces == {"tags", "names", "planters"}
+    assert manager["Global Options"]["Fixed Frame"] == TwinParameters().frame_id
+
+
+def test_a_tag_that_is_far_off_makes_no_layer_wider_and_has_its_marker(
+    house: tuple[int, Process, Viewer],
+) -> None:
+    domain, _, robot = house
+    at = {"a": (0.0, 0.0), "b": (1.0, 0.0), "c": (1.0, 0.5), "far": (900.0, 0.0)}
+    observe(robot, *(scan(tag_id, {"co2": 1.0}, place) for tag_id, place in at.items()))
+    with Viewer(domain, "viewer") as viewer:
+        viewer.watch(CO2)
+        viewer.watch(TAGS)
+        viewer.newest(TAGS, lambda m: any(x.text == "far" for x in m.markers))
+        layer = cells(viewer.newest(CO2, lambda m: m.width > 0))
+        assert layer[:, 0].max() < 100.0

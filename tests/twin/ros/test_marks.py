@@ -1,0 +1,79 @@
+"""What is marked of tags and planters: where, once each, and how old it looks."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from lupin_twin.core.state import Attempt, Flower, Pose, Snapshot, TagState
+from lupin_twin.ros.layers import (
+    FRESH_S,
+    OLD_S,
+    PlanterMark,
+    TagMark,
+    appearance_of,
+    planter_marks,
+    tag_marks,
+)
+
+NOW_NS = 10_000_000_000_000
+BOX = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.5, 0.0))
+
+
+def tag(name: str, x: float | None = 0.0, age_s: float = 0.0, **more: object) -> TagState:
+    pose = None if x is None else Pose(x, 2.0, 0.5, 0.0, 0.0, 0.0, 1.0)
+    observed_ns = NOW_NS - round(age_s * 1e9)
+    return TagState(name, pose=pose, last_observed_ns=observed_ns, **more)  # type: ignore[arg-type]
+
+
+def house(*tags: TagState) -> Snapshot:
+    return Snapshot(NOW_NS, "map", tags)
+
+
+@pytest.mark.parametrize(
+    ("age_s", "look"),
+    [
+        (0.0, "fresh"),
+        (FRESH_S - 1e-3, "fresh"),
+        (FRESH_S, "fading"),
+        (OLD_S - 1e-3, "fading"),
+        (OLD_S, "old"),
+    ],
+)
+def test_a_tag_looks_as_old_as_it_is(age_s: float, look: str) -> None:
+    assert appearance_of(tag("a", age_s=age_s), NOW_NS) == look
+
+
+def test_a_tag_that_was_never_observed_or_nobody_knows_when_is_old() -> None:
+    assert appearance_of(TagState("a"), NOW_NS) == "old"
+    assert appearance_of(tag("a"), None) == "old"
+
+
+def test_a_tag_whose_last_try_failed_says_so_whatever_its_age() -> None:
+    assert appearance_of(tag("a", last_try=Attempt(NOW_NS, 2)), NOW_NS) == "failed"
+    assert appearance_of(tag("a", last_try=Attempt(NOW_NS, 0)), NOW_NS) == "fresh"
+
+
+def test_tags_keep_their_numbers_also_beside_one_without_a_place() -> None:
+    lost = tag("lost", None)
+    here = TagMark(1, "here", 1.0, 2.0, 0.5, "fresh")
+    assert tag_marks(house(lost, tag("here", 1.0))) == [here]
+    found = tag_marks(house(tag("lost", 3.0), tag("here", 1.0)))
+    assert found == [TagMark(0, "lost", 3.0, 2.0, 0.5, "fresh"), here]
+
+
+def test_planters_are_told_once_by_the_number_of_their_first_tag() -> None:
+    seen = Flower(footprint=BOX)
+    others = Flower(footprint=((5.0, 0.0, 0.0), *BOX[1:]))
+    marks = planter_marks(
+        house(tag("bare"), tag("a", flower=seen), tag("b", flower=others), tag("c", flower=seen))
+    )
+    assert marks == [PlanterMark(1, BOX), PlanterMark(2, others.footprint)]
+
+
+@pytest.mark.parametrize("corners", [BOX[:2], ((math.nan, 0.0, 0.0), *BOX[1:])])
+def test_what_makes_no_outline_is_no_planter(
+    corners: tuple[tuple[float, float, float], ...],
+) -> None:
+    assert planter_marks(house(tag("a", flower=Flower(footprint=corners)))) == []

@@ -1,0 +1,140 @@
+"""What a node drops, and how loudly; over real DDS, each with a twin of its own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import pytest
+from lupin_msgs.msg import Observation
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
+
+from tests.support import messages
+from tests.support.messages import discovered, look, occupancy_grid, scan
+from tests.support.processes import OFTEN, twin_node
+from tests.support.ros import Peer
+from tests.twin.ros.test_node import Twin, running_twin
+
+
+@pytest.fixture
+def twin() -> Iterator[Twin]:
+    """A twin of the test's own."""
+    yield from running_twin(*OFTEN)
+
+
+def test_a_wrong_frame_is_dropped_on_each_path_and_names_both_frames(twin: Twin) -> None:
+    twin.peer.observe(
+        scan("scan", {"co2": 1.0}, at=(1, 1), frame_id="odom"),
+        look("flower-own", frame_id="map", pose_frame_id="camera"),
+        look("flower-header", frame_id="base_link"),
+    )
+    twin.peer.discover(discovered({"discovery": messages.pose(1, 1)}, frame_id="laser"))
+    twin.peer.publish_map(occupancy_grid([[0]], frame_id="other_map"))
+    twin.warning("/floranova/observations", "'odom'", "'map'")
+    twin.warning("/perception/discovered_tags", "'laser'", "'map'")
+    twin.warning("/map", "'other_map'", "'map'")
+    twin.settled()
+    assert set(twin.tags()) == {"marker"}
+
+
+def test_an_anomaly_and_an_unknown_kind_are_dropped_with_a_throttled_warning(twin: Twin) -> None:
+    anomaly, unknown = scan("x", {"co2": 1.0}), scan("y", {"co2": 1.0})
+    anomaly.kind, unknown.kind = Observation.KIND_ANOMALY, 9
+    # Kind comes before frame: a wrong frame in an anomaly is not what the warning is about.
+    anomaly.header.frame_id = "odom"
+    twin.peer.observe(*[anomaly] * 10, *[unknown] * 10)
+    twin.warning("KIND_ANOMALY")
+    twin.warning("kind 9")
+    twin.settled()
+    assert set(twin.tags()) == {"marker"}
+    assert twin.process.output.count("KIND_ANOMALY") == 1
+    assert twin.process.output.count("kind 9") == 1
+    assert "odom" not in twin.process.output
+
+
+def test_an_empty_tag_id_is_dropped_on_each_path(twin: Twin) -> None:
+    twin.peer.observe(scan("", {"co2": 1.0}), look(""))
+    twin.peer.discover(discovered({"": messages.pose(1, 1), "good": messages.pose(2, 2)}))
+    twin.peer.tag("good")
+    twin.settled()
+    assert set(twin.tags()) == {"good", "marker"}
+    twin.warning("tag_id is empty")
+
+
+def test_a_message_cut_short_or_too_large_is_dropped_and_the_node_lives(twin: Twin) -> None:
+    data = bytes(serialize_message(scan("broken", {"co2": 1.0})))
+    publisher = twin.peer.publisher("/floranova/observations", Observation)
+    publisher.publish(data[:40])
+    twin.warning("unreadable")
+    publisher.publish(scan("large", {f"sensor{i}": 1.0 for i in range(50_000)}))
+    twin.warning("bytes", "limit is 1000000")
+    twin.settled()
+    assert set(twin.tags()) == {"marker"}
+
+
+def test_a_tag_past_its_bounds_is_refused_with_the_value_and_the_limit(twin: Twin) -> None:
+    twin.peer.observe(scan("many", {f"sensor{i}": 1.0 for i in range(65)}))
+    twin.warning("65", "limit is 64")
+    twin.peer.observe(scan("t" * 300, {"co2": 1.0}))
+    twin.settled()
+    assert set(twin.tags()) == {"marker"}
+
+
+def test_a_malformed_map_is_refused_and_the_last_good_one_stays(domain: int) -> None:
+    with twin_node(domain, *OFTEN) as process, Peer(domain) as peer:
+        peer.wait_for_twin()
+        twin = Twin(process, peer)
+        peer.observe(scan("1", {"co2": 500.0}, at=(0.5, 0.5)))
+        peer.publish_map(occupancy_grid([[0, -1]]))
+        peer.until(lambda: known_cells(peer) == [True, False], "the clipped field")
+        broken = occupancy_grid([[0, 0]])
+        broken.info.width = 7
+        peer.publish_map(broken)
+        twin.warning("map data holds 2 cells", "the last one stays")
+        assert known_cells(peer) == [True, False]
+        peer.publish_map(occupancy_grid([[-1, 0]]))
+        peer.until(lambda: known_cells(peer) == [False, True], "the field of the next map")
+
+
+def known_cells(peer: Peer) -> list[bool]:
+    response = peer.get_field(sensor_type="co2", resolution=1.0, bbox_max_x=2.0, bbox_max_y=1.0)
+    return [not math.isnan(value) for value in response.values]
+
+
+def test_a_pose_too_far_off_is_dropped_on_each_path_and_the_readings_stay(twin: Twin) -> None:
+    peer = twin.peer
+    peer.observe(
+        scan("lost", {"temperature": 21.0}, at=(3.0, -5000.0)),
+        look("flower", "lupin", at=(1e30, 0.0)),
+    )
+    peer.discover(
+        discovered({"high": messages.pose(1, 1, 1001), "limit": messages.pose(-1000, 1000)})
+    )
+    peer.tag("limit")
+    twin.warning("/floranova/observations", "'lost'", "its y is -5000 m", "1000 m (max_pose_m)")
+    twin.warning("/perception/discovered_tags", "'high'", "its z is 1001 m")
+    twin.settled()
+    tags = twin.tags()
+    assert {name: tag.pose.orientation.w for name, tag in tags.items()} == {
+        "lost": 0.0,
+        "flower": 0.0,
+        "limit": 1.0,
+        "marker": 0.0,
+    }
+    assert [reading.value for reading in tags["lost"].readings] == [21.0]
+    assert tags["flower"].species == "lupin"
+    # The first pose that is possible is the tag's.
+    peer.observe(scan("lost", {"temperature": 22.0}, at=(3.0, 5.0)))
+    peer.tag("lost", lambda tag: tag.pose.position.y == 5.0)
+
+
+def test_the_limit_of_a_pose_may_be_changed_while_the_twin_runs(twin: Twin) -> None:
+    twin.peer.observe(scan("far", {"co2": 1.0}, at=(1500.0, 0.0)))
+    twin.warning("'far'", "its x is 1500 m")
+    limit = Parameter("max_pose_m", value=2000.0).to_parameter_msg()
+    answer = twin.peer.ask(SetParameters, "/lupin_twin/set_parameters", parameters=[limit])
+    assert answer.results[0].successful, answer.results[0].reason
+    twin.peer.observe(scan("far", {"co2": 2.0}, at=(1500.0, 0.0)))
+    twin.peer.tag("far", lambda tag: tag.pose.position.x == 1500.0)

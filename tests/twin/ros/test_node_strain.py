@@ -1,0 +1,266 @@
+"""The node over real DDS while somebody strains it: the state keeps its beat, nothing is lost."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from typing import Any
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from lupin_msgs.msg import DiscoveredTag, DiscoveredTags
+from lupin_msgs.srv import GetEstimate, GetField, GetHistory
+from rclpy.serialization import serialize_message
+
+from lupin_twin.ros.base_node import SERVICE_QOS
+from lupin_twin.runtime.workers import MAX_QUERIES
+from tests.support.domains import own_domain
+from tests.support.messages import discovered, occupancy_grid, scan
+from tests.support.proc_stat import peak_mb, reset_peak, resident_mb, waited_s
+from tests.support.processes import Process, twin_node
+from tests.support.ros import Peer
+from tests.support.waiting import wait_for
+
+BEAT_S = 0.1
+BEAT = ("--ros-args", "-p", f"state_publish_rate_hz:={1 / BEAT_S}")
+
+
+class Strained:
+    """A twin at ten states a second, and a peer that measures the pauses between them."""
+
+    def __init__(self, process: Process, peer: Peer) -> None:
+        self.process, self.peer = process, peer
+
+    def longest_pause_s(self, done: Callable[[], object], what: str) -> float:
+        """The longest time without a state until `done` gives something true."""
+        last_s, longest_s, seen = time.monotonic(), 0.0, len(self.peer.states)
+
+        def look() -> object:
+            nonlocal last_s, longest_s, seen
+            if len(self.peer.states) > seen:
+                now_s = time.monotonic()
+                longest_s, last_s, seen = (
+                    max(longest_s, now_s - last_s),
+                    now_s,
+                    len(self.peer.states),
+                )
+            return done()
+
+        self.peer.until(look, what)
+        return max(longest_s, time.monotonic() - last_s)
+
+
+@pytest.fixture
+def strained() -> Iterator[Strained]:
+    with (
+        own_domain() as domain,
+        twin_node(domain, *BEAT, afresh=True) as process,
+        Peer(domain) as peer,
+    ):
+        peer.wait_for_twin()
+        peer.listen()
+        peer.until(lambda: peer.states, "a state")
+        yield Strained(process, peer)
+
+
+def test_a_length_that_lies_delays_no_state_and_takes_no_memory(strained: Strained) -> None:
+    peer, pid = strained.peer, strained.process.pid
+    topic = "/perception/discovered_tags"
+    whole = serialize_message(DiscoveredTags(tags=[DiscoveredTag()]))
+    at = whole.index(b"\x01\x00\x00\x00", 20)  # behind the header: how many tags
+    lie = whole[:at] + (3_000_000).to_bytes(4, "little") + whole[at + 4 :] + bytes(3_000_000)
+    before_mb = resident_mb(pid)
+    reset_peak(pid)
+    waited_before_s = sum(map(waited_s, (pid, os.getpid())))
+    peer.publisher(topic, DiscoveredTags).publish(lie)
+    pause_s = strained.longest_pause_s(
+        lambda: "tags: 3000000, the limit is 20000" in strained.process.output,
+        "the lie to be told of",
+    )
+    # What the machine withholds from the two is no delay of the twin's.
+    pause_s -= sum(map(waited_s, (pid, os.getpid()))) - waited_before_s
+    peer.observe(scan("after", {"co2": 1.0}))
+    peer.tag("after")
+    assert peak_mb(pid) - before_mb < 40.0
+    assert pause_s < 1.0, "a tick of the default rate"
+
+
+HEAVY = {
+    "resolution": 0.01,
+    "bbox_min_x": 0.0,
+    "bbox_min_y": 0.0,
+    "bbox_max_x": 10.0,
+    "bbox_max_y": 10.0,
+}
+
+
+@pytest.fixture
+def wide() -> Iterator[Strained]:
+    """A twin whose every tag reaches every cell: 10^6 cells with 150 tags take seconds."""
+    reach = ("-p", "idw_falloff_radius_m:=20.0", "-p", "idw_max_distance_m:=20.0")
+    rate = ("-p", f"state_publish_rate_hz:={1 / BEAT_S}")
+    with (
+        own_domain() as domain,
+        twin_node(domain, "--ros-args", *rate, *reach, "-p", "idw_power:=2.5") as process,
+        Peer(domain) as peer,
+    ):
+        peer.wait_for_twin()
+        peer.listen()
+        for number in range(150):
+            peer.observe(scan(f"tag {number}", {"co2": 400.0}, (number % 15, number // 15)))
+            if number % 40 == 39:
+                peer.tag(f"tag {number}")
+        peer.tag("tag 149")
+        yield Strained(process, peer)
+
+
+def ask(strained: Strained, **request: float) -> Any:
+    """Begin a call of the service; the future of its response."""
+    client = strained.peer.node.create_client(GetField, "/twin/get_field")
+    strained.peer.until(client.service_is_ready, "the service")
+    return client.call_async(GetField.Request(sensor_type="co2", **{**HEAVY, **request}))
+
+
+def shifted(number: int) -> dict[str, float]:
+    """Another field of the same size."""
+    return {"bbox_min_x": -0.25 * number, "bbox_max_x": 10.0 - 0.25 * number}
+
+
+def test_a_heavy_field_holds_up_no_observation_and_no_state(wide: Strained) -> None:
+    peer = wide.peer
+    heavy = [ask(wide), ask(wide)]
+    start_s = time.monotonic()
+    sent = 0
+
+    def send_and_look() -> bool:
+        # Two hundred within a second or so, and for as long as it computes.
+        nonlocal sent
+        if sent < 200:
+            peer.observe(scan("counted", {f"s{sent % 50}": float(sent)}))
+            sent += 1
+        return sent == 200 and all(future.done() for future in heavy)
+
+    pause_s = wide.longest_pause_s(send_and_look, "the heavy fields")
+    took_s = time.monotonic() - start_s
+    peer.tag("counted", lambda tag: readings(tag) == {f"s{n}": 150.0 + n for n in range(50)})
+    assert "lost" not in wide.process.output
+    # Of a machine with other work to do, a share; of a thread that computes, all of it.
+    assert pause_s < max(1.0, took_s / 2)
+    first, second = (future.result() for future in heavy)
+    assert first.ok
+    assert first.width * first.height == 1_000_000
+    assert first.values == second.values
+
+
+def readings(tag: Any) -> dict[str, float]:
+    return {reading.name: reading.value for reading in tag.readings}
+
+
+def test_a_cheap_field_does_not_wait_behind_heavy_ones(wide: Strained) -> None:
+    heavy = [ask(wide, **shifted(number)) for number in range(6)]
+    cheap = ask(wide, resolution=1.0)
+    wide.peer.until(cheap.done, "the cheap field")
+    assert not all(future.done() for future in heavy)
+    assert cheap.result().ok
+
+
+def test_more_fields_than_can_wait_are_refused_with_the_reason(wide: Strained) -> None:
+    client = wide.peer.node.create_client(GetField, "/twin/get_field")
+    wide.peer.until(client.service_is_ready, "the service")
+    asked = []
+    for number in range(MAX_QUERIES + 20):
+        request = {**HEAVY, **shifted(number)}
+        asked.append(client.call_async(GetField.Request(sensor_type="co2", **request)))
+        if number % 5 == 4:  # a service holds fifty requests: one behind them tells they were taken
+            wide.peer.until(client.call_async(GetField.Request()).done, "five to be taken")
+
+    def refusal() -> Any:
+        answers = [future.result() for future in asked if future.done()]
+        return next((answer for answer in answers if not answer.ok), None)
+
+    refused = wide.peer.until(refusal, "a refusal")
+    assert "requests wait, which is the limit" in refused.error_message
+
+
+def test_all_are_answered_that_ask_while_the_twin_stands_still(strained: Strained) -> None:
+    node = strained.peer.node
+    clients = [
+        node.create_client(kind, name, qos_profile=SERVICE_QOS)
+        for kind, name in (
+            (GetField, "/twin/get_field"),
+            (GetHistory, "/twin/get_history"),
+            (GetEstimate, "/twin/get_estimate"),
+        )
+    ]
+    for client in clients:
+        strained.peer.until(client.service_is_ready, client.service_name)
+    strained.process.freeze()
+    # An empty request is refused, and that is an answer.
+    asked = [client.call_async(client.srv_type.Request()) for client in clients * SERVICE_QOS.depth]
+    strained.process.thaw()
+    strained.peer.until(lambda: all(future.done() for future in asked), "all answers")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_within_two_seconds_whatever_is_computed(
+    wide: Strained, number: signal.Signals
+) -> None:
+    for x in range(4):
+        ask(wide, **shifted(x))
+    cheap = ask(wide, resolution=1.0)
+    wide.peer.until(cheap.done, "the cheap field: the heavy ones are being computed")
+    pid = wide.process.pid
+    start_s, before_s = time.monotonic(), waited_s(pid)
+    waited = [before_s]
+    wide.process.send(number)
+
+    def has_ended() -> bool:
+        with suppress(FileNotFoundError):  # gone between two looks
+            waited.append(waited_s(pid))
+        return wide.process.exit_code is not None
+
+    wait_for(has_ended, "its end")
+    # What the machine withholds from it is no delay of its own.
+    assert time.monotonic() - start_s - (max(waited) - before_s) < 2.0
+    assert wide.process.exit_code == 0
+
+
+def test_messages_that_came_too_fast_are_counted_and_told_of(strained: Strained) -> None:
+    strained.peer.observe(scan("fast"))
+    strained.peer.tag("fast")
+    strained.process.freeze()
+    # Twenty times what the latch holds.
+    for number in range(1000):
+        strained.peer.observe(scan("fast", {"co2": float(number)}))
+    strained.process.thaw()
+    strained.peer.tag("fast", lambda tag: readings(tag) == {"co2": 999.0})
+    line = strained.process.wait_for_output("on /floranova/observations: they came too fast")
+    # In one go or in several, of which the first is told at once.
+    lost = re.search(r"lost (\d+) messages", line)
+    assert lost
+    assert 1 <= int(lost[1]) < 1000
+
+
+def test_the_twin_says_on_diagnostics_how_it_is(strained: Strained) -> None:
+    peer = strained.peer
+    heard: list[Any] = []
+    peer.node.create_subscription(DiagnosticArray, "/diagnostics", heard.append, 10)
+
+    def levels() -> dict[str, bytes]:
+        return {status.name: status.level for status in heard[-1].status} if heard else {}
+
+    inputs, drops = "/lupin_twin: inputs", "/lupin_twin: drops"
+    peer.until(lambda: levels().get(inputs) == DiagnosticStatus.STALE, "no observation yet")
+    assert levels()["/lupin_twin: clock"] == DiagnosticStatus.OK
+    peer.observe(scan("1", frame_id="odom"))
+    peer.until(lambda: levels()[drops] == DiagnosticStatus.WARN, "the drop")
+    [told] = [status for status in heard[-1].status if status.name == drops]
+    assert {pair.key: pair.value for pair in told.values}["frame"] == "1"
+    for topic, message in (("/perception/discovered_tags", discovered({})), ("/map", None)):
+        peer.publish(topic, message or occupancy_grid([[0]]))
+    peer.observe(scan("1", {"co2": 1.0}))
+    peer.until(lambda: levels()[inputs] == DiagnosticStatus.OK, "all inputs")

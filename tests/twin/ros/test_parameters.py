@@ -1,0 +1,139 @@
+"""Parameters as ROS hands them over; real nodes, in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+import rclpy
+from builtin_interfaces.msg import Time
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from lupin_twin.core.parameters import ParameterError, TwinParameters
+from lupin_twin.ros.parameters import (
+    AdjustableNode,
+    declare,
+    naming,
+    naming_own_parameters,
+    unknown_overrides,
+)
+
+
+@contextmanager
+def node_with(domain: int, *overrides: str, made: Any = Node) -> Iterator[Any]:
+    context = Context()
+    arguments = [word for override in overrides for word in ("-p", override)]
+    rclpy.init(args=["--ros-args", *arguments], context=context, domain_id=domain)
+    try:
+        node = made("any", context=context)
+        yield node
+        node.destroy_node()
+    finally:
+        rclpy.try_shutdown(context=context)
+
+
+def test_all_are_declared_and_what_is_set_is_read(domain: int) -> None:
+    with node_with(domain, "idw_power:=3", "state_topic:=/s") as node:
+        assert declare(node) == TwinParameters(idw_power=3.0, state_topic="/s")
+
+
+def test_some_are_declared_and_the_others_are_neither_read_nor_unknown(domain: int) -> None:
+    with node_with(domain, "idw_power:=3.0", "buffer_len:=5") as node:
+        assert declare(node, ["buffer_len"]) == TwinParameters(buffer_len=5)
+        assert not node.has_parameter("idw_power")
+        assert unknown_overrides(node) == []
+
+
+def test_descriptors_tell_meaning_range_and_why_it_is_read_only(domain: int) -> None:
+    with node_with(domain) as node:
+        declare(node)
+        power, length, journal = node.describe_parameters(["idw_power", "buffer_len", "journal"])
+    assert "weights" in power.description
+    [limits] = power.floating_point_range
+    assert (limits.from_value, limits.to_value) == (0.01, 100.0)
+    assert (power.read_only, power.additional_constraints) == (False, "")
+    [whole] = length.integer_range
+    assert (whole.from_value, whole.to_value, length.read_only) == (1, 10_000, True)
+    assert journal.additional_constraints.startswith("read only: room was made by it")
+
+
+def test_a_change_is_told_once_with_all_parameters(domain: int) -> None:
+    told: list[TwinParameters] = []
+    with node_with(domain, made=AdjustableNode) as node:
+        node.parameters = declare(node)
+        node.adjust_by(told.append)
+        wanted = [Parameter("idw_power", value=3), Parameter("idw_max_distance_m", value=2.5)]
+        assert node.set_parameters_atomically(wanted).successful
+        assert node.set_parameters_atomically(wanted).successful, "and nothing is new"
+        assert node.get_parameter("idw_power").value == 3
+        # ROS's own, and those of whoever else.
+        [result] = node.set_parameters([Parameter("use_sim_time", value=False)])
+        assert result.successful
+    assert told == [TwinParameters(idw_power=3.0, idw_max_distance_m=2.5)]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        ("idw_power", 100.5, "parameter idw_power is 100.5, expected 0.01 to 100.0"),
+        ("idw_power", "two", "parameter idw_power is 'two' (str), expected float"),
+        ("idw_power", None, "parameter idw_power is None (NoneType), expected float"),
+        (
+            "buffer_len",
+            5,
+            "parameter buffer_len is 32 and cannot become 5 while the twin runs: room",
+        ),
+    ],
+)
+def test_a_refused_change_changes_nothing_and_names_parameter_value_and_limit(
+    domain: int, name: str, value: Any, reason: str
+) -> None:
+    with node_with(domain, made=AdjustableNode) as node:
+        node.parameters = declare(node)
+        node.adjust_by(lambda _: pytest.fail("it was told"))
+        good = Parameter("idw_max_distance_m", value=9.0)
+        result = node.set_parameters_atomically([good, Parameter(name, value=value)])
+        assert not result.successful
+        assert result.reason.startswith(reason)
+        assert node.parameters == TwinParameters()
+        for one in ("idw_max_distance_m", name):
+            assert node.get_parameter(one).value == getattr(TwinParameters(), one)
+
+
+def test_an_override_of_no_parameter_is_known_by_name(domain: int) -> None:
+    with node_with(domain, "idw_pwoer:=3.0", "use_sim_time:=false") as node:
+        declare(node)
+        assert unknown_overrides(node) == ["idw_pwoer"]
+
+
+def test_what_another_node_of_the_twins_reads_has_to_be_right_too(domain: int) -> None:
+    with (
+        node_with(domain, "idw_power:=abc") as node,
+        pytest.raises(ParameterError, match="parameter idw_power is 'abc'"),
+    ):
+        declare(node, ["buffer_len"])
+
+
+def test_complaints_name_the_parameter(domain: int) -> None:
+    with (
+        node_with(domain) as node,
+        pytest.raises(ParameterError, match="parameter map_topic is 'a b': Invalid topic name"),
+        naming("map_topic", "a b"),
+    ):
+        node.create_subscription(Time, "a b", lambda _: None, 1)
+    with (
+        pytest.raises(ParameterError, match=r"parameter use_sim_time is no bool: .*'5'"),
+        naming_own_parameters(),
+        node_with(domain, "use_sim_time:=5"),
+    ):
+        pass
+    with (
+        pytest.raises(ParameterError, match="parameter start_type_description_service is no bool"),
+        naming_own_parameters(),
+        node_with(domain, "start_type_description_service:=5"),
+    ):
+        pass

@@ -1,0 +1,229 @@
+"""Answers that DDS cannot deliver yet: over a stand-in, and of a real twin to a real client."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from lupin_msgs.srv import GetField
+from rcl_interfaces.srv import GetParameters
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+from lupin_twin.ros import responses as module
+from lupin_twin.ros.responses import (
+    MAX_ATTEMPT_S,
+    MAX_UNSENT,
+    PATIENCE_S,
+    RETRY_S,
+    UNSENT,
+    Later,
+    Responses,
+)
+from tests.support.domains import own_domain
+from tests.support.processes import twin_node
+from tests.support.ros import Peer
+
+
+class Stage:
+    """A service whose answers reach those whom DDS has found, in place of rclpy's; and a clock."""
+
+    service_name = "/ask"
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+        self.found: set[Any] = set()
+        self.takes_s = 0.125
+        self.tried: list[Any] = []
+        self.sent: list[tuple[Any, Any]] = []
+        self.warned: list[str] = []
+        self.drained = 0
+        self.responses = Responses(lambda _, text: self.warned.append(text), self.drain)
+        self.responses.watch(self)
+
+    def drain(self) -> None:
+        self.drained += 1
+
+    def send_response(self, response: Any, header: Any) -> None:
+        self.tried.append(header)
+        self.now_s += 0.0 if header in self.found else self.takes_s
+        if header in self.found:
+            self.sent.append((response, header))
+        else:
+            warnings.warn(f"{UNSENT}: client will not receive", RuntimeWarning, stacklevel=1)
+
+    def go_on(self) -> list[Any]:
+        """Who was tried."""
+        del self.tried[:]
+        self.now_s += RETRY_S
+        self.responses.go_on()
+        return self.tried
+
+
+@pytest.fixture
+def stage(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stage]:
+    with warnings.catch_warnings():  # as they are without pytest's own rule: none is an error
+        warnings.resetwarnings()
+        made = Stage()
+        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: made.now_s))
+        yield made
+
+
+def test_what_could_be_sent_is_sent_once(stage: Stage) -> None:
+    stage.found = {"a"}
+    stage.send_response("response", "a")
+    assert stage.sent == [("response", "a")]
+    assert len(stage.responses) == 0
+    assert stage.go_on() == []
+
+
+def test_an_answer_is_sent_as_soon_as_its_reader_is_found_and_once(stage: Stage) -> None:
+    stage.send_response("response", "a")
+    assert stage.drained == 1, "what came meanwhile"
+    assert stage.go_on() == ["a"]
+    assert stage.drained == 2
+    stage.found = {"a"}
+    assert stage.go_on() == ["a"]
+    assert stage.sent == [("response", "a")]
+    assert stage.go_on() == []
+    assert stage.warned == []
+
+
+def test_a_round_ends_with_the_first_failure_and_each_has_its_turn(stage: Stage) -> None:
+    for who in ("a", "b", "c", "d"):
+        stage.send_response("response", who)
+    stage.found = {"b", "d"}
+    assert stage.go_on() == ["d", "c"]
+    assert stage.go_on() == ["b", "a"]
+    assert stage.go_on() == ["c"]
+    assert stage.go_on() == ["a"]
+    assert [who for _, who in stage.sent] == ["d", "b"]
+
+
+def test_one_that_can_be_sent_does_not_wait_behind_many_that_never_will_be(stage: Stage) -> None:
+    for who in range(MAX_UNSENT - 1):
+        stage.send_response("response", who)
+    for _ in range(3):
+        stage.go_on()
+    stage.send_response("response", "late")
+    stage.found = {"late"}
+    assert stage.go_on()[0] == "late"
+    assert stage.sent == [("response", "late")]
+    assert stage.warned == []
+
+
+def test_attempts_take_a_fifth_of_the_time(stage: Stage) -> None:
+    stage.takes_s = MAX_ATTEMPT_S
+    stage.send_response("response", "a")
+    assert stage.go_on() == ["a"]
+    at_s = stage.now_s
+    while not stage.go_on():
+        pass
+    assert stage.now_s - stage.takes_s - at_s == 4 * stage.takes_s
+
+
+def test_what_is_too_large_is_not_retained(stage: Stage) -> None:
+    stage.takes_s = MAX_ATTEMPT_S + 0.125
+    stage.send_response("response", "a")
+    assert len(stage.responses) == 0
+    assert "gave up a response of /ask: it is too large to be retained" in stage.warned[0]
+
+
+def test_it_is_given_up_aloud_where_nobody_reads(stage: Stage) -> None:
+    stage.send_response("response", "a")
+    stage.now_s += PATIENCE_S - 2 * RETRY_S
+    assert stage.go_on() == ["a"]
+    assert stage.go_on() == []
+    assert len(stage.responses) == 0
+    [said] = stage.warned
+    assert said == (
+        "gave up a response of /ask: for 30 s DDS has found no reader for it; is the QoS of a "
+        "client another than the default of services?"
+    )
+
+
+def test_only_so_many_are_kept(stage: Stage) -> None:
+    for who in range(MAX_UNSENT + 1):
+        stage.send_response("response", who)
+    assert len(stage.responses) == MAX_UNSENT
+    [said] = stage.warned
+    assert said.startswith("gave up a response of /ask: too much else waits to be sent again; ")
+    stage.found = set(range(MAX_UNSENT + 1))
+    assert stage.go_on() == [*range(MAX_UNSENT, 0, -1)], "the oldest was given up"
+
+
+@pytest.mark.parametrize("error", [RuntimeWarning("other"), SystemError("other"), ValueError()])
+def test_another_error_is_that_of_who_sends(stage: Stage, error: Exception) -> None:
+    def fail(*_: Any) -> None:
+        raise error
+
+    service: Any = SimpleNamespace(send_response=fail, service_name="/ask")
+    stage.responses.watch(service)
+    with pytest.raises(type(error)):
+        service.send_response("response", "a")
+    assert len(stage.responses) == 0
+
+
+class Service:
+    """What rclpy's executor does with one: it sends what the callback gave."""
+
+    service_name = "/ask"
+
+    def __init__(self) -> None:
+        self.sent: list[tuple[Any, Any]] = []
+
+    def send_response(self, response: Any, header: Any) -> None:
+        self.sent.append((response, header))
+
+
+def test_a_response_that_is_there_is_sent_at_once() -> None:
+    service = Service()
+    Responses(lambda *_: None, lambda: None).watch(service)
+    service.send_response("response", "header")
+    assert service.sent == [("response", "header")]
+
+
+def test_a_response_that_comes_later_goes_to_who_asked() -> None:
+    service = Service()
+    Responses(lambda *_: None, lambda: None).watch(service)
+    first, second = Later(), Later()
+    service.send_response(first, "first")
+    service.send_response(second, "second")
+    assert service.sent == []
+    second.answer(2)
+    first.answer(1)
+    assert service.sent == [(2, "second"), (1, "first")]
+
+
+def test_a_response_may_be_there_before_rclpy_tells_whom_to() -> None:
+    service = Service()
+    Responses(lambda *_: None, lambda: None).watch(service)
+    later = Later()
+    later.answer(1)
+    service.send_response(later, "header")
+    assert service.sent == [(1, "header")]
+
+
+def test_a_client_that_dds_never_finds_is_told_of_and_holds_nobody_up() -> None:
+    # Its reader wants what the service's writer does not offer: they never match, and rclpy meets
+    # what it meets with a reader that is found too late.
+    never = QoSProfile(depth=50, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    ask, parameters = "/twin/get_field", "/lupin_twin/get_parameters"
+    with own_domain() as domain, twin_node(domain) as twin, Peer(domain, "robot") as robot:
+        futures = []
+        for kind, name in ((GetField, ask), (GetParameters, parameters)):
+            client = robot.node.create_client(kind, name, qos_profile=never)
+            said = f"gave up a response of {name}: too much else waits to be sent again"
+
+            def is_said(client: Any = client, kind: Any = kind, said: str = said) -> bool:
+                # A service holds ten requests: more would be lost where they came at once.
+                futures.append(client.call_async(kind.Request()))
+                return said in twin.output
+
+            robot.until(is_said, said)
+        assert robot.get_field(sensor_type="co2").sample_count == 0
+        assert not any(future.done() for future in futures)
+        assert "Error" not in twin.output
+        assert "RuntimeWarning" not in twin.output

@@ -1,0 +1,143 @@
+"""Spinning survives a callback that raises, and ends when ROS does; in this process."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+
+from lupin_twin.ros import base_node as spinning_module
+from lupin_twin.ros.base_node import end_spinning, spin_until_shutdown
+from tests.support.waiting import wait_for
+
+
+class Spinning:
+    """A node whose timer runs `work`, spun in a thread."""
+
+    def __init__(self, domain: int) -> None:
+        self.context = Context()
+        rclpy.init(args=[], context=self.context, domain_id=domain)
+        self.node = rclpy.create_node("spinning", context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self.errors: list[tuple[str, Exception]] = []
+        self.thread = threading.Thread(target=spin_until_shutdown, args=(self.executor, self.note))
+
+    def note(self, what: str, error: Exception) -> None:
+        self.errors.append((what, error))
+
+    def has_ended(self) -> bool:
+        return not self.thread.is_alive()
+
+
+@pytest.fixture
+def spinning(domain: int) -> Iterator[Spinning]:
+    it = Spinning(domain)
+    yield it
+    if not it.has_ended():
+        end_spinning(it.executor)
+    it.thread.join(5)
+    it.node.destroy_node()
+    rclpy.try_shutdown(context=it.context)
+
+
+def test_a_callback_that_raises_is_reported_and_the_next_one_runs(spinning: Spinning) -> None:
+    calls: list[int] = []
+
+    def work() -> None:
+        calls.append(1)
+        raise ValueError(f"call {len(calls)}")
+
+    spinning.node.create_timer(0.01, work)
+    spinning.thread.start()
+    wait_for(lambda: len(spinning.errors) >= 3, "three errors")
+    assert [str(error) for _, error in spinning.errors[:3]] == ["call 1", "call 2", "call 3"]
+
+
+def test_between_an_error_and_the_next_try_it_rests(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An executor that fails at once, again and again, must not take a whole core."""
+    happened: list[str] = []
+
+    class Broken:
+        def spin(self) -> None:
+            happened.append("spin")
+            if len(happened) < 5:
+                raise RuntimeError("broken")
+
+    monkeypatch.setattr(spinning_module, "sleep", lambda seconds: happened.append("rest"))
+    spin_until_shutdown(Broken(), lambda *_: None)
+    assert happened == ["spin", "rest", "spin", "rest", "spin"]
+
+
+def test_it_ends_when_it_is_asked_to(spinning: Spinning) -> None:
+    spinning.thread.start()
+    end_spinning(spinning.executor)
+    wait_for(spinning.has_ended, "the end of the spinning")
+    assert spinning.errors == []
+
+
+def test_the_end_breaks_no_spin_that_is_about_to_wait(
+    spinning: Spinning, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """rclpy's own shutdown, called from here at that moment, breaks the spin."""
+    about_to_wait, asked = threading.Event(), threading.Event()
+    get_nodes = spinning.executor.get_nodes
+
+    def pause() -> Any:
+        if threading.current_thread() is spinning.thread and not asked.is_set():
+            about_to_wait.set()
+            asked.wait(20)
+        return get_nodes()
+
+    monkeypatch.setattr(spinning.executor, "get_nodes", pause)
+    spinning.thread.start()
+    assert about_to_wait.wait(20)
+    end_spinning(spinning.executor)
+    asked.set()
+    wait_for(spinning.has_ended, "the end of the spinning")
+    assert spinning.errors == []
+
+
+def test_a_callback_ends_before_the_spinning_does(spinning: Spinning) -> None:
+    runs, asked, ended = threading.Event(), threading.Event(), threading.Event()
+
+    def work() -> None:
+        runs.set()
+        asked.wait(20)
+        ended.set()
+
+    spinning.node.create_timer(0.01, work)
+    spinning.thread.start()
+    assert runs.wait(20)
+    end_spinning(spinning.executor)
+    asked.set()
+    wait_for(spinning.has_ended, "the end of the spinning")
+    assert ended.is_set()
+    assert spinning.errors == []
+
+
+def test_it_ends_with_the_context(spinning: Spinning) -> None:
+    spinning.thread.start()
+    spinning.node.create_timer(0.01, lambda: rclpy.try_shutdown(context=spinning.context))
+    wait_for(spinning.has_ended, "the end of the spinning")
+    assert spinning.errors == []
+
+
+def test_what_is_no_exception_ends_it(spinning: Spinning, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SystemExit and its like are meant to end a thread; that it has ended is for others to see."""
+    seen: list[Any] = []
+    monkeypatch.setattr(threading, "excepthook", seen.append)
+
+    def leave() -> None:
+        raise KeyboardInterrupt
+
+    spinning.node.create_timer(0.01, leave)
+    spinning.thread.start()
+    wait_for(spinning.has_ended, "the end of the spinning")
+    assert spinning.errors == []
+    assert seen[0].exc_type is KeyboardInterrupt

@@ -1,0 +1,237 @@
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from concurrent.futures import Future
+from typing import Any
+
+import pytest
+
+from lupin_twin.core.past import NotRemembered, PastRefused, error_of, message_of
+from lupin_twin.runtime.workers import (
+    LARGE_AT_ONCE,
+    MAX_QUERIES,
+    PACE_S,
+    SMALL_AT_ONCE,
+    SMALL_S,
+    JobQueue,
+    Query,
+    Workers,
+)
+from tests.support.waiting import wait_for
+
+LARGE_S = 2 * SMALL_S
+
+
+class Stage:
+    """A queue, and searches that end when a test says so."""
+
+    def __init__(self) -> None:
+        self.workers = Workers("test")
+        self.woken = threading.Semaphore(0)
+        self.is_behind = False
+        self.now_s = 100.0
+        self.queue = JobQueue(
+            self.workers, self.woken.release, lambda: self.is_behind, lambda: self.now_s
+        )
+        self.begun: list[Future[int]] = []
+        self.answers: list[Any] = []
+
+    def ask(self, make: Any = str, cost_s: float = 0.0, key: Any = None) -> Future[int]:
+        search: Future[int] = Future()
+
+        def look_up() -> Future[int]:
+            self.begun.append(search)
+            return search
+
+        self.queue.ask(Query(look_up, self.answers.append, make, cost_s, key))
+        return search
+
+    def delivered(self) -> Any:
+        """The next answer; a wake-up brings one at most, and may find nothing left to bring."""
+        before = len(self.answers)
+        while len(self.answers) == before:
+            wait_for(lambda: self.woken.acquire(blocking=False), "the owner to be woken")
+            self.queue.deliver()
+        assert len(self.answers) == before + 1
+        return self.answers[-1]
+
+
+@pytest.fixture
+def made() -> Iterator[Stage]:
+    stage = Stage()
+    yield stage
+    stage.workers.close()
+
+
+def test_what_is_found_is_made_an_answer_elsewhere_and_handed_out_here(made: Stage) -> None:
+    threads: list[str] = []
+
+    def make(number: int) -> str:
+        threads.append(threading.current_thread().name)
+        return f"made of {number}"
+
+    search = made.ask(make)
+    assert made.queue.waiting == 1
+    made.queue.deliver()
+    assert made.answers == [], "nothing is there yet"
+    search.set_result(7)  # found in this very thread, and still not made in it
+    assert made.delivered() == "made of 7"
+    assert threads[0].startswith("test_")
+    assert (made.queue.waiting, made.queue.answered) == (0, 1)
+    assert made.queue.slowest_s > 0.0
+
+
+def test_one_wake_up_brings_one_answer_and_the_others_are_not_forgotten(made: Stage) -> None:
+    searches = [made.ask() for _ in range(SMALL_AT_ONCE)]
+    for number, search in enumerate(searches):
+        search.set_result(number)
+    assert {made.delivered() for _ in searches} == set("0123")
+
+
+@pytest.mark.parametrize("error", [PastRefused("at is 3 s"), OSError("no such file")])
+def test_an_error_of_the_search_is_the_answer(made: Stage, error: Exception) -> None:
+    made.ask().set_exception(error)
+    assert made.delivered() is error
+    assert made.queue.answered == 0
+    assert made.queue.waiting == 0
+
+
+def test_an_error_in_the_making_is_the_answer(made: Stage) -> None:
+    made.ask(lambda number: 1 // number).set_result(0)
+    assert isinstance(made.delivered(), ZeroDivisionError)
+
+
+def test_what_cannot_be_looked_up_is_answered_and_holds_up_nobody(made: Stage) -> None:
+    error = NotRemembered("no journal", is_lasting=True)
+
+    def look_up() -> Future[int]:
+        raise error
+
+    for _ in range(2):
+        made.queue.ask(Query(look_up, made.answers.append, str, LARGE_S))
+    assert made.delivered() is error
+    assert made.delivered() is error
+    assert made.queue.waiting == 0
+
+
+def test_an_answer_that_cannot_be_sent_holds_up_nobody(made: Stage) -> None:
+    def reply(answer: str) -> None:
+        raise RuntimeError(answer)
+
+    done: Future[int] = Future()
+    done.set_result(1)
+    made.queue.ask(Query(lambda: done, reply, str, LARGE_S))
+    after = made.ask(cost_s=LARGE_S)
+    wait_for(lambda: made.woken.acquire(blocking=False), "the owner to be woken")
+    with pytest.raises(RuntimeError):
+        made.queue.deliver()
+    after.set_result(2)
+    assert made.delivered() == "2"
+
+
+def test_a_search_that_was_given_up_is_answered_too(made: Stage) -> None:
+    search = made.ask()
+    search.cancel()
+    search.set_running_or_notify_cancel()
+    assert isinstance(made.delivered(), Exception)
+
+
+def test_closed_workers_end_no_query_in_silence(made: Stage) -> None:
+    search = made.ask()
+    made.workers.close()
+    search.set_result(1)
+    assert "closed" in str(made.delivered())
+
+
+def test_large_ones_are_taken_one_by_one_when_the_last_is_out_and_small_ones_do_not_wait(
+    made: Stage,
+) -> None:
+    large = [made.ask(cost_s=LARGE_S) for _ in range(LARGE_AT_ONCE + 2)]
+    small = [made.ask(cost_s=SMALL_S) for _ in range(SMALL_AT_ONCE + 1)]
+    assert made.begun == [*large[:LARGE_AT_ONCE], *small[:SMALL_AT_ONCE]]
+    large[0].set_result(0)
+    wait_for(lambda: made.woken.acquire(blocking=False), "the answer")
+    assert len(made.begun) == LARGE_AT_ONCE + SMALL_AT_ONCE, "before the last is handed out"
+    made.queue.deliver()
+    assert made.begun[-1] is large[LARGE_AT_ONCE]
+    small[0].set_result(1)
+    assert made.delivered() == "1"
+    assert made.begun[-1] is small[-1]
+
+
+@pytest.mark.parametrize("cost_s", [SMALL_S, LARGE_S])
+def test_who_asks_waits_while_observations_do_but_for_one_a_second(
+    made: Stage, cost_s: float
+) -> None:
+    made.is_behind = True
+    asked = [made.ask(cost_s=cost_s) for _ in range(4)]
+    assert made.begun == asked[:1]
+    asked[0].set_result(0)
+    assert made.delivered() == "0"
+    made.now_s += PACE_S - 0.01
+    made.queue.go_on()
+    assert made.begun == asked[:1], "one answer is no leave for the next"
+    made.now_s += 0.02
+    made.queue.go_on()
+    assert made.begun == asked[:2]
+    assert made.queue.waiting == 3
+    made.is_behind = False
+    asked[1].set_result(1)
+    assert made.delivered() == "1"
+    assert made.begun[:3] == asked[:3], "at once"
+
+
+@pytest.mark.parametrize("cost_s", [SMALL_S, LARGE_S])
+def test_so_many_queries_wait_and_one_more_is_told_to_come_again(
+    made: Stage, cost_s: float
+) -> None:
+    searches = [made.ask(cost_s=cost_s) for _ in range(MAX_QUERIES)]
+    with pytest.raises(NotRemembered, match=rf"{MAX_QUERIES} requests .* the limit") as refused:
+        made.ask()
+    told = error_of(message_of(refused.value))
+    assert isinstance(told, NotRemembered)
+    assert not told.is_lasting
+    searches[0].set_result(0)
+    made.delivered()
+    made.ask()
+
+
+def test_without_a_step_of_making_the_search_is_the_answer(made: Stage) -> None:
+    made.ask(None).set_result(7)
+    assert made.delivered() == 7
+
+
+def test_queries_of_one_key_share_a_search_while_it_is_under_way(made: Stage) -> None:
+    first = made.ask(key="a")
+    for _ in range(2):
+        made.ask(key="a")
+    other = made.ask(key="b")
+    assert made.begun == [first, other]
+    assert made.queue.waiting == 2
+    first.set_result(1)
+    wait_for(lambda: made.woken.acquire(blocking=False), "the answer")
+    made.queue.deliver()
+    assert made.answers == ["1", "1", "1"]
+    assert made.queue.answered == 1
+    made.ask(key="a")
+    assert len(made.begun) == 3, "a new one"
+
+
+def test_an_error_goes_to_all_who_share_it(made: Stage) -> None:
+    search = made.ask(key="a")
+    made.ask(key="a")
+    error = ValueError("too much")
+    search.set_exception(error)
+    wait_for(lambda: made.woken.acquire(blocking=False), "the answer")
+    made.queue.deliver()
+    assert made.answers == [error, error]
+
+
+def test_one_more_waits_for_what_is_under_way_when_all_places_are_taken(made: Stage) -> None:
+    searches = [made.ask(key=number) for number in range(MAX_QUERIES)]
+    made.ask(key=0)
+    searches[0].set_result(5)
+    wait_for(lambda: made.woken.acquire(blocking=False), "the answer")
+    made.queue.deliver()
+    assert made.answers == ["5", "5"]

@@ -1,0 +1,208 @@
+"""Questions to a journal: order, end, and what is said where there is no answer."""
+
+from __future__ import annotations
+
+import sqlite3
+import threading
+from collections.abc import Iterator
+from concurrent.futures import CancelledError
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.past import NotRemembered
+from lupin_twin.runtime.journal_queries import MAX_WAITING, Recall
+from lupin_twin.runtime.workers import LARGE_THREADS, SMALL_THREADS, ShouldStop
+from tests.support.journal import kept, recording, scan, wait_state
+from tests.support.waiting import PATIENCE_S, wait_for
+
+LARGE_S = 10.0
+# Counts for longer than any test waits.
+ENDLESS = (
+    "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 1000000000000)"
+    " SELECT count(*) FROM n"
+)
+
+
+def count(connection: sqlite3.Connection, _: ShouldStop) -> int:
+    (found,) = connection.execute("SELECT count(*) FROM scan").fetchone()
+    return int(found)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "j.sqlite"
+
+
+@contextmanager
+def recalling(path: Path, max_s: float = PATIENCE_S) -> Iterator[Recall]:
+    recall = Recall(lambda: Condition(JournalState.RECORDING, path=str(path)), max_s)
+    try:
+        yield recall
+    finally:
+        recall.close()
+
+
+def answer(recall: Recall) -> int:
+    return recall.query(count).result(PATIENCE_S)
+
+
+def is_answer(recall: Recall, expected: int) -> bool:
+    return answer(recall) == expected
+
+
+def why_not(recall: Recall, *, is_lasting: bool = False) -> str:
+    with pytest.raises(NotRemembered) as caught:
+        answer(recall)
+    assert caught.value.is_lasting is is_lasting
+    return str(caught.value)
+
+
+def test_a_question_is_answered_while_another_writes(path: Path) -> None:
+    with recording(path) as journal, recalling(path) as recall:
+        wait_state(journal, JournalState.RECORDING)
+        for number in range(3):
+            journal.write(scan(at_ns=number + 1))
+            wait_for(partial(is_answer, recall, number + 1), "the row")
+
+
+def test_a_question_sees_one_moment(path: Path) -> None:
+    kept(path, [scan(at_ns=1)])
+
+    def twice(connection: sqlite3.Connection, should_stop: ShouldStop) -> tuple[int, int]:
+        before = count(connection, should_stop)
+        kept(path, [scan(at_ns=2)])
+        return before, count(connection, should_stop)
+
+    with recalling(path) as recall:
+        assert recall.query(twice).result(PATIENCE_S) == (1, 1)
+        assert answer(recall) == 2
+
+
+def test_the_journal_of_another_twin_is_not_read(path: Path) -> None:
+    kept(path, [scan()])
+    told = Condition(JournalState.IN_USE, "the journal j is in use by /other", str(path))
+    recall = Recall(lambda: told)
+    assert "in use by /other: ask that twin" in why_not(recall)
+    recall.close()
+
+
+def test_a_file_that_is_not_there_yet_is_told_and_found_when_it_comes(path: Path) -> None:
+    with recalling(path) as recall:
+        assert f"{path} is not there" in why_not(recall)
+        path.touch()
+        assert f"{path} is not there" in why_not(recall)
+        kept(path, [scan()])
+        assert answer(recall) == 1
+
+
+def test_a_file_in_the_place_of_another_is_read_from_then_on(path: Path) -> None:
+    kept(path, [scan()])
+    with recalling(path) as recall:
+        assert answer(recall) == 1
+        path.rename(path.with_name("aside"))
+        assert "is not there" in why_not(recall)
+        kept(path, [scan(at_ns=1), scan(at_ns=2)])
+        assert answer(recall) == 2
+
+
+def test_a_foreign_file_is_told_with_what_to_do(path: Path) -> None:
+    sqlite3.connect(path).execute("CREATE TABLE theirs (x)").connection.close()
+    with recalling(path) as recall:
+        assert "not a journal of lupin-twin; name another file" in why_not(recall)
+
+
+@pytest.mark.parametrize("where", [0, 3 * 1024 + 100])
+def test_a_damaged_file_is_told_with_what_to_do_and_read_again_when_it_is_mended(
+    path: Path, where: int
+) -> None:
+    kept(path, [scan(at_ns=number) for number in range(1, 200)])
+    whole = path.read_bytes()
+    with recalling(path) as recall:
+        path.write_bytes(whole[:where] + b"\xff" * (len(whole) - where))
+        assert "is damaged" in why_not(recall)
+        path.write_bytes(whole)
+        assert answer(recall) == 199
+
+
+def test_a_file_that_cannot_be_read_now_is_told(path: Path) -> None:
+    path.mkdir()
+    with recalling(path) as recall:
+        assert f"{path} cannot be read now" in why_not(recall)
+
+
+def test_an_error_of_the_questions_own_is_its_askers(path: Path) -> None:
+    kept(path, [scan()])
+    with recalling(path) as recall:
+        wrong = recall.query(lambda connection, _: connection.execute("SELECT x FROM scan"))
+        with pytest.raises(sqlite3.OperationalError, match="no such column"):
+            wrong.result(PATIENCE_S)
+        assert answer(recall) == 1
+
+
+def test_a_small_question_waits_for_no_large_one(path: Path) -> None:
+    kept(path, [scan()])
+    with recalling(path) as recall:
+        endless = [
+            recall.query(lambda connection, _: connection.execute(ENDLESS).fetchone(), LARGE_S)
+            for _ in range(LARGE_THREADS + 5)
+        ]
+        assert answer(recall) == 1
+        assert not any(future.done() for future in endless)
+
+
+def test_a_question_that_nobody_waits_for_ends(path: Path) -> None:
+    kept(path, [scan()])
+    with recalling(path) as recall:
+        begun = threading.Event()
+
+        def asks(connection: sqlite3.Connection, _: ShouldStop) -> None:
+            begun.set()
+            connection.execute(ENDLESS).fetchone()
+
+        future = recall.query(asks)
+        assert begun.wait(PATIENCE_S)
+        future.cancel()
+        with pytest.raises(CancelledError):
+            future.result(PATIENCE_S)
+        assert answer(recall) == 1
+
+
+def test_a_question_that_takes_too_long_ends(path: Path) -> None:
+    kept(path, [scan()])
+    with recalling(path, 0.05) as recall:
+        future = recall.query(lambda connection, _: connection.execute(ENDLESS).fetchone())
+        with pytest.raises(NotRemembered, match=r"not answer within 0\.05 s"):
+            future.result(PATIENCE_S)
+
+
+def test_so_many_questions_wait_and_no_more(path: Path) -> None:
+    kept(path, [scan()])
+    with recalling(path) as recall:
+        gate = threading.Event()
+        threads = LARGE_THREADS + SMALL_THREADS
+        held = [recall.query(lambda *_: gate.wait(PATIENCE_S)) for _ in range(threads)]
+        wait_for(lambda: all(future.running() for future in held), "questions that run")
+        waiting = [recall.query(count) for _ in range(MAX_WAITING)]
+        assert f"{MAX_WAITING} queries about the past are waiting" in why_not(recall)
+        gate.set()
+        assert [future.result(PATIENCE_S) for future in waiting] == [1] * MAX_WAITING
+
+
+def test_the_end_ends_what_runs_and_leaves_nothing_open(path: Path) -> None:
+    kept(path, [scan()])
+    with recalling(path) as recall:
+        assert answer(recall) == 1
+        running = recall.query(lambda connection, _: connection.execute(ENDLESS).fetchone())
+        wait_for(running.running, "a question that runs")
+        recall.close()
+        with pytest.raises(CancelledError):
+            running.result(PATIENCE_S)
+        assert "is ending" in why_not(recall)
+        descriptors = [
+            link.readlink() for link in Path("/proc/self/fd").iterdir() if link.is_symlink()
+        ]
+        assert path not in descriptors

@@ -1,0 +1,285 @@
+from __future__ import annotations
+
+import sqlite3
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from lupin_twin.core import ingest
+from lupin_twin.core.history import History
+from lupin_twin.core.ingest import Pin
+from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.state import Flower, Inspection, Pose, Reading, Scan, TwinStore
+from lupin_twin.journal.fold import state_at
+from lupin_twin.journal.runs import Clock
+from lupin_twin.runtime.memory import MAX_NEW_RUNS, Memory, journal_path, open_journal, state_folder
+from lupin_twin.runtime.workers import ShouldStop
+from tests.support.journal import is_whole, kept, scan, select
+from tests.support.waiting import wait_for
+
+S = 1_000_000_000
+NOW = 1_900_000_000 * S
+HERE = Pose(1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+FLOWER = Flower("lupin", 0.9, False, 3, 1)
+
+
+def wall(at_s: float) -> Clock:
+    return Clock(NOW + int(at_s * S), NOW + int(at_s * S), is_simulated=False)
+
+
+def sim(at_s: float, wall_s: float) -> Clock:
+    return Clock(int(at_s * S), NOW + int(wall_s * S), is_simulated=True)
+
+
+@contextmanager
+def twin(path: Path | None, clock: Clock) -> Iterator[tuple[Memory, TwinStore, History]]:
+    """A life of a twin."""
+    store, history = TwinStore(), History(8)
+    memory = Memory(store, history, open_journal(path, "/twin", 1e4, 1e4), 8)
+    memory.follow(clock)
+    try:
+        yield memory, store, history
+    finally:
+        memory.close()
+
+
+def test_damage_that_somebody_meets_has_the_file_set_aside_while_the_twin_records(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "j.sqlite"
+    count = 5_000
+    kept(path, [scan(str(n % 30), NOW - (count - n) * S, t=n) for n in range(count)])
+
+    def how_many(memory: Memory) -> int:
+        def ask(connection: sqlite3.Connection, _: ShouldStop) -> int:
+            return len(connection.execute("SELECT readings FROM scan").fetchall())
+
+        return memory.recall.query(ask).result(30.0)
+
+    with twin(path, wall(5)) as (memory, _, _):
+        # What is met before is for the check at the start.
+        wait_for(lambda: memory.condition.state is JournalState.RECORDING, "the journal")
+        # Not through the memory: what that has read it keeps, and would not see the damage.
+        assert select(path, "SELECT count(readings) FROM scan") == [(count,)]
+        with path.open("r+b") as file:
+            file.seek(path.stat().st_size // 2)
+            file.write(b"\xff" * 4096)
+        with pytest.raises(NotRemembered, match="the twin quarantines it and retains what"):
+            how_many(memory)
+        memory.apply(SCAN, NOW)
+        wait_for(lambda: memory.condition.set_aside, "the damaged file to be set aside")
+        wait_for(lambda: memory.condition.written == 2, "what came meanwhile, and its place")
+        assert Path(memory.condition.set_aside).exists()
+        # A few pages are lost, and what can be read is being read.
+        wait_for(lambda: count * 0.9 < how_many(memory) <= count, "what can be read")
+        # Were it somebody's error and no damage, the disk would be filled with copies.
+        before = memory.condition.set_aside
+        memory.heal("again, the same day")
+        memory.apply(replace(SCAN, stamp_ns=NOW + 9, own_stamp_ns=NOW + 9), NOW)
+        wait_for(lambda: memory.condition.written == 3, "what came after it")
+        assert memory.condition.set_aside == before
+        assert len(list(tmp_path.glob("*.damaged-*Z"))) == 1
+    assert is_whole(path)
+
+
+def test_what_is_known_again_is_told_in_one_line(tmp_path: Path) -> None:
+    def told(path: Path, *clocks: Clock, writes: Sequence[ingest.Write] = ()) -> list[str | None]:
+        memory = Memory(TwinStore(), History(8), open_journal(path, "/twin", 1e4, 1e4), 8)
+        said = [memory.follow(clock) for clock in clocks]
+        for write in writes:
+            assert memory.apply(write, NOW) is None
+        memory.close()
+        return said
+
+    path = tmp_path / "j.sqlite"
+    nothing = f"journal {path}: nothing was known before"
+    assert told(path, wall(5), wall(6), writes=WRITES) == [nothing, None]
+    [line] = told(path, wall(9))
+    oldest = f"{datetime.fromtimestamp(PART.stamp_ns / S, UTC):%Y-%m-%dT%H:%M:%SZ}"
+    assert line == (
+        f"journal {path}: 3 tags are known again, of 3 places, 3 readings, 1 inspections;"
+        f" the oldest is of {oldest}"
+    )
+    path = tmp_path / "simulated.sqlite"
+    told(path, sim(5, 5), writes=[at(SCAN, 4 * S)])
+    waiting = Clock(0, NOW, is_simulated=True)
+    before, after = told(path, waiting, sim(6, 6))
+    assert before is None
+    assert str(after).endswith("; the oldest is of second 4.000")
+
+
+def at(write: Scan | Inspection, stamp_ns: int) -> Scan | Inspection:
+    return replace(write, stamp_ns=stamp_ns, own_stamp_ns=stamp_ns)
+
+
+SCAN = Scan("7", NOW, (Reading("t", 21.5), Reading("h", 0.1)), HERE, source="a", own_stamp_ns=NOW)
+PART = Scan("7", NOW - 5 * S, (Reading("co2", 400.0),), source="b", own_stamp_ns=NOW - 5 * S)
+FAILED = Scan("7", NOW + S, (), None, 2, "no answer", "a", NOW + S)
+LOOK = Inspection("8", NOW + S, FLOWER, source="a", own_stamp_ns=NOW + S)
+BLIND = Inspection("8", NOW + 2 * S, None, None, 1, "dark", "a", NOW + 2 * S)
+WRITES = (SCAN, PART, FAILED, LOOK, BLIND, Pin("8", HERE), Pin("9", HERE))
+
+
+def test_a_twin_that_starts_again_knows_all_that_it_knew(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    with twin(path, wall(5)) as (memory, before, past):
+        for write in WRITES:
+            assert memory.apply(write, NOW) is None
+    with twin(path, wall(9)) as (_, after, again):
+        known = {tag.tag_id: tag for tag in after.snapshot(NOW, "map").tags}
+        assert list(known) == ["7", "8", "9"]
+        for tag in before.snapshot(NOW, "map").tags:
+            restored = known[tag.tag_id]
+            assert set(restored.readings) == set(tag.readings)
+            assert replace(restored, readings=tag.readings) == tag
+            assert again.of(tag.tag_id) == past.of(tag.tag_id)
+        assert after.observation_count >= before.observation_count
+
+
+def test_a_place_is_as_old_as_the_scan_that_brought_it_and_a_discovery_is_of_now(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "j.sqlite"
+    with twin(path, wall(5)) as (memory, _, _):
+        memory.apply(SCAN, NOW)
+        memory.apply(Pin("9", HERE), NOW)
+    stamps = select(path, "SELECT stamp_ns FROM place ORDER BY seq")
+    assert stamps == [(NOW,), (NOW + 5 * S,)]
+
+
+def test_what_is_heard_again_changes_nothing_and_is_not_written(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    with twin(path, wall(5)) as (memory, _, _):
+        for write in WRITES:
+            memory.apply(write, NOW)
+    with twin(path, wall(9)) as (memory, store, history):
+        before, count, past = store.snapshot(NOW, "map"), store.observation_count, history.of("7")
+        for write in WRITES:
+            memory.apply(write, NOW + 9 * S)
+        assert store.snapshot(NOW, "map") == before
+        assert store.observation_count == count
+        assert history.of("7") == past
+        wait_for(lambda: memory.condition.repeated == 5, "all that were there")
+        assert memory.condition.written == 0
+
+
+def test_a_place_is_written_once_by_whatever_gives_it(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    other = replace(HERE, x=9.0)
+    with twin(path, wall(5)) as (memory, _, _):
+        memory.apply(SCAN, NOW)
+        memory.apply(Pin("7", other), NOW)
+        memory.apply(replace(at(SCAN, NOW + S), pose=other), NOW)
+    with twin(path, wall(9)) as (_, store, _):
+        [tag] = store.snapshot(NOW, "map").tags
+        assert tag.pose == HERE
+
+
+def test_a_simulation_that_starts_over_is_empty_and_one_that_goes_on_is_not(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "j.sqlite"
+    with twin(path, sim(500, 500)) as (memory, _, _):
+        memory.apply(at(SCAN, 499 * S), NOW + 499 * S)
+        memory.apply(at(SCAN, 600 * S), NOW + 600 * S)
+    with twin(path, sim(605, 610)) as (_, store, _):
+        assert store.knows("7")
+    with twin(path, sim(610, 86_400)) as (_, store, _):
+        assert not store.knows("7")
+
+
+def test_nothing_is_known_before_a_simulated_clock_has_started(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    with twin(path, sim(5, 5)) as (memory, _, _):
+        memory.apply(at(SCAN, 4 * S), NOW)
+        memory.apply(at(SCAN, 300 * S), NOW + 295 * S)
+    with twin(path, Clock(0, NOW, is_simulated=True)) as (memory, store, _):
+        memory.apply(at(LOOK, 301 * S), NOW + 296 * S)
+        assert not store.knows("7")
+        memory.follow(sim(305, 300))
+        assert store.knows("7")
+        assert store.knows("8")
+
+
+def test_a_clock_that_goes_back_begins_a_run_that_knows_what_the_twin_knew(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    with twin(path, sim(100, 100)) as (memory, store, _):
+        memory.apply(at(SCAN, 99 * S), NOW + 99 * S)
+        memory.follow(sim(50, 101))
+        store.hold_to(50 * S)
+        memory.apply(at(LOOK, 50 * S), NOW + 102 * S)
+        before = store.snapshot(50 * S, "map")
+    with twin(path, sim(300, 110)) as (_, store, _):
+        assert store.snapshot(50 * S, "map").tags == before.tags
+
+
+def test_a_clock_that_goes_back_all_the_time_begins_few_runs(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    with twin(path, sim(9000, 0)) as (memory, _, _):
+        for number in range(1000):
+            memory.follow(sim(1000, number / 100))
+            memory.follow(sim(9000, number / 100))
+    assert select(path, "SELECT count(*) FROM run") == [(1 + MAX_NEW_RUNS,)]
+
+
+@pytest.mark.parametrize(("last_s", "more"), [(199.9, 0), (200, 1)])
+def test_and_another_after_some_time(tmp_path: Path, last_s: float, more: int) -> None:
+    path = tmp_path / "j.sqlite"
+    with twin(path, sim(9000, 0)) as (memory, _, _):
+        for number in range(MAX_NEW_RUNS):
+            memory.follow(sim(1000 - number, 100 + number))
+        memory.follow(sim(500, last_s))
+    assert select(path, "SELECT count(*) FROM run") == [(1 + MAX_NEW_RUNS + more,)]
+
+
+def test_what_is_refused_is_not_written(tmp_path: Path) -> None:
+    with twin(tmp_path / "j.sqlite", wall(5)) as (memory, _, _):
+        assert memory.apply(replace(SCAN, tag_id="x" * 1000), NOW) is not None
+        memory.apply(LOOK, NOW)
+        wait_for(lambda: memory.condition.written == 1, "the look alone")
+
+
+def test_off_is_a_temporary_file_that_answers_and_is_gone_at_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with twin(None, wall(5)) as (memory, store, _):
+        memory.apply(SCAN, NOW)
+        assert store.knows("7")
+        wait_for(lambda: memory.condition.written == 2, "the scan and its place")
+        answer = memory.recall.query(lambda c, _: state_at(c, NOW, "map")).result(10.0)
+        assert [tag.tag_id for tag in answer.tags] == ["7"]
+        assert Path(memory.condition.path).is_relative_to(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("given", "namespace", "path"),
+    [
+        ("", "/", "/state/lupin-twin/domain-3.sqlite"),
+        ("", "/house1/west", "/state/lupin-twin/domain-3.house1.west.sqlite"),
+        ("/data/j.sqlite", "/house1", "/data/j.sqlite"),
+    ],
+)
+def test_the_file_is_the_given_one_or_named_by_domain_and_namespace(
+    given: str, namespace: str, path: str
+) -> None:
+    assert journal_path(given, {"XDG_STATE_HOME": "/state"}, 3, namespace) == Path(path)
+
+
+def test_off_is_no_file() -> None:
+    assert journal_path("off", {}, 0, "/") is None
+
+
+@pytest.mark.parametrize("given", ["", "relative/path"])
+def test_without_a_valid_folder_it_is_the_users(
+    given: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", "/home/somebody")
+    assert state_folder({"XDG_STATE_HOME": given}) == Path("/home/somebody/.local/state/lupin-twin")

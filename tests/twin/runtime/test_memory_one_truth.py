@@ -1,0 +1,386 @@
+"""What is known live, what the log says of the same moment, and what the next start knows: one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from lupin_twin.core.ingest import Pin
+from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.core.state import NO_FLOWER, Flower
+from tests.support.journal import select
+from tests.support.memory_life import HERE, NOW, THERE, S, twin
+from tests.support.waiting import wait_for
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "j.sqlite"
+
+
+def count(path: Path) -> int:
+    [(found,)] = select(path, "SELECT count(*) FROM scan WHERE is_copy = 0")
+    assert isinstance(found, int)
+    return found
+
+
+# --- 1: latest, and what is received again --------------------------------------------------------
+
+
+def test_of_one_write_that_is_received_twice_the_first_value_stays(path: Path) -> None:
+    with twin(path) as life:
+        life.hear(-5, t=20.0)
+        life.hear(-5, t=25.0)
+        assert life.says() == (20.0, 5.0)
+    with twin(path) as life:
+        life.hear(-5, t=25.0)
+        assert life.says() == (20.0, 5.0)
+        assert count(path) == 1
+
+
+def test_sensors_that_are_new_are_a_further_part_of_the_same_scan(path: Path) -> None:
+    with twin(path) as life:
+        life.hear(-5, t=20.0)
+        life.hear(-5, t=25.0, h=60.0)
+        assert life.says("t") == (20.0, 5.0)
+        assert life.says("h") == (60.0, 5.0)
+        assert len(life.history.of("7").scans) == 1
+    assert select(path, "SELECT readings, stamp_ns FROM scan ORDER BY seq") == [
+        ("[20.0]", NOW - 5 * S),
+        ("[60.0]", NOW - 5 * S),
+    ]
+
+
+def test_of_two_sources_with_one_stamp_the_later_received_counts_and_repeats_flip_nothing(
+    path: Path,
+) -> None:
+    with twin(path) as life:
+        for _ in range(3):
+            life.hear(-5, source="a", t=20.0)
+            life.hear(-5, source="b", t=25.0)
+        life.hear(-5, source="a", t=20.0)
+        assert life.says() == (25.0, 5.0)
+    with twin(path) as life:
+        assert life.says() == (25.0, 5.0)
+        life.hear(-5, source="a", t=20.0)
+        assert life.says() == (25.0, 5.0)
+    assert count(path) == 2
+
+
+def test_what_is_later_by_its_stamp_counts_whatever_comes_first(path: Path) -> None:
+    with twin(path) as life:
+        life.hear(-5, t=20.0)
+        life.hear(-9, t=25.0, h=60.0)
+        assert life.says() == (20.0, 5.0)
+        assert life.says("h") == (60.0, 9.0)
+
+
+def test_a_look_that_is_received_again_is_nothing_new(path: Path) -> None:
+    rose, lily = Flower("rose", 0.9, False, 3, 1), Flower("lily", 0.9, True, 3, 1)
+    with twin(path) as life:
+        life.hear(-5, flower=rose)
+        life.hear(-5, flower=lily)
+        assert life.live == life.past()
+        assert life.live["7"].flower == rose
+    assert select(path, "SELECT species FROM look") == [("rose",)]
+
+
+def test_a_try_that_failed_makes_nothing_younger(path: Path) -> None:
+    with twin(path) as life:
+        life.hear(-9, status=2)
+        life.hear(-8, status=1)
+        assert life.live == life.past()
+        assert life.live["7"].last_observed_ns == NOW - 9 * S
+        life.hear(-7)
+        life.hear(-6, status=2)
+        life.hear(-5, flower=NO_FLOWER, status=2)
+        assert life.live == life.past()
+        assert life.live["7"].last_observed_ns == NOW - 7 * S
+        before = life.live
+    with twin(path) as life:
+        assert life.live == life.past() == before
+
+
+# --- 2: stamps from the future --------------------------------------------------------------------
+
+
+def test_a_stamp_from_the_future_is_held_to_when_it_was_first_received(path: Path) -> None:
+    with twin(path) as life:
+        life.hear(60, t=20.0)
+        life.at(30, passed_s=30)
+        life.hear(60, t=20.0)
+        life.at(100, passed_s=70)
+        life.hear(60, t=20.0)
+        assert life.says() == (20.0, 100.0)
+    with twin(path, 130) as life:
+        life.hear(60, t=20.0)
+        assert life.says() == (20.0, 130.0)
+    assert select(path, "SELECT stamp_ns, own_stamp_ns FROM scan") == [(NOW, NOW + 60 * S)]
+
+
+def test_it_stays_known_however_much_else_was_tried_meanwhile(path: Path) -> None:
+    with twin(path) as life:
+        life.hear(60, t=20.0)
+        for second in range(1, 12):  # more than a tag's history has
+            life.at(second, passed_s=1)
+            life.hear(second, h=float(second))
+        life.at(100, passed_s=80)
+        life.hear(60, t=20.0)
+        assert life.says("t") == (20.0, 100.0)
+        assert count(path) == 12
+
+
+def test_within_one_tick_of_the_clock_what_has_no_stamp_is_one_write(path: Path) -> None:
+    with twin(path, is_simulated=True) as life:
+        life.at(50)
+        life.hear(None, t=20.0)
+        life.hear(None, t=25.0, h=60.0)
+        assert life.says("t") == (20.0, 0.0)
+        assert life.says("h") == (60.0, 0.0)
+        life.hear(None, source="b", t=25.0)
+        assert life.says("t") == (25.0, 0.0)
+
+
+# --- 3: runs and steps ----------------------------------------------------------------------------
+
+
+def runs(path: Path) -> list[tuple[object, ...]]:
+    return select(path, "SELECT run, joins FROM run ORDER BY run")
+
+
+@pytest.mark.parametrize("ahead_s", [1.0, 3600.0, 400 * 86_400.0])
+def test_a_wall_clock_that_goes_on_is_one_run_however_far_it_jumps(
+    path: Path, ahead_s: float
+) -> None:
+    with twin(path) as life:
+        life.hear(-5, t=20.0)
+        life.at(ahead_s, passed_s=1.0)
+        assert life.says() == (20.0, ahead_s + 5)
+    with twin(path, 2 * ahead_s) as life:
+        assert life.says() == (20.0, 2 * ahead_s + 5)
+    assert runs(path) == [(1, None)]
+
+
+def test_after_a_step_back_what_comes_then_counts_everywhere(path: Path) -> None:
+    with twin(path) as life:
+        life.hear(-5, t=1.0)
+        life.hear(-5, tag="8", t=3.0, pose=HERE)
+        life.at(-40)
+        assert life.says() == (1.0, 0.0)
+        life.at(-30, passed_s=10)
+        life.hear(-31, t=2.0)
+        assert life.says() == (2.0, 1.0)
+        assert life.says(tag="8") == (3.0, 10.0)
+        assert life.live["8"].pose == HERE
+        # Before it began the step holds nothing: that is answered by what was then.
+        assert life.past(-41) == {}
+        life.at(30, passed_s=60)
+        assert life.says() == (2.0, 61.0)
+        before = life.live
+    with twin(path, 31) as life:
+        assert life.live == before
+    assert runs(path) == [(1, None), (2, 1)]
+
+
+def test_a_step_back_while_the_twin_is_away_is_one_too(path: Path) -> None:
+    with twin(path) as life:
+        life.hear(-5, t=1.0)
+    with twin(path, -40) as life:
+        assert life.says() == (1.0, 0.0)
+        life.at(-30)
+        life.hear(-31, t=2.0)
+        assert life.says() == (2.0, 1.0)
+    with twin(path, 30) as life:
+        assert life.says() == (2.0, 61.0)
+    assert runs(path) == [(1, None), (2, 1)]
+
+
+def test_what_is_received_again_after_a_step_is_the_same_still(path: Path) -> None:
+    with twin(path) as life:
+        life.hear(-5, t=1.0)
+        life.at(-40)
+        life.hear(-5, t=1.0)
+        life.at(60)
+        life.hear(-5, t=1.0)
+        assert life.says() == (1.0, 100.0)
+    assert count(path) == 1
+
+
+def test_a_wall_clock_set_back_by_hours_begins_a_run_that_knows_all(path: Path) -> None:
+    with twin(path) as life:
+        life.hear(-5, t=1.0, pose=HERE)
+        life.hear(-5, tag="8", status=2)
+        life.at(-7200)
+        assert life.says() == (1.0, 0.0)
+        life.at(-7100)
+        life.hear(-7101, t=2.0)
+        assert life.says() == (2.0, 1.0)
+        before = life.live
+        life.at(-7000)
+        assert life.past(-3) == life.past(0), "until the first run ended it has the moment"
+    with twin(path, -7000) as life:
+        assert life.live == before
+        assert life.past(-7150)["7"].readings[0].value == 1.0
+    assert runs(path) == [(1, None), (2, None)]
+
+
+def test_a_jump_ahead_joins_the_run_from_before_the_clock_went_back(path: Path) -> None:
+    with twin(path, -100) as life:
+        life.at(0, passed_s=100)
+        life.hear(-5, t=1.0)
+        life.at(-7200)
+        life.hear(-7200, t=2.0)
+        life.at(10, passed_s=10)
+        life.hear(9, t=3.0)
+        assert life.says() == (3.0, 1.0)
+        assert life.past(-4)["7"].readings[0].value == 1.0
+        assert life.past(5)["7"].readings[0].value == 1.0
+        before = life.live
+    with twin(path, 20) as life:
+        assert life.live == before
+    assert runs(path) == [(1, None), (2, None), (3, 1)]
+
+
+def test_a_step_to_before_the_beginning_of_its_run_has_the_moment(path: Path) -> None:
+    with twin(path, -9000) as life:
+        life.at(0, passed_s=9000)
+        life.hear(-5, t=1.0)
+        life.at(-7200)
+        life.hear(-7200, t=2.0)
+        life.at(-7240)
+        assert life.says() == (2.0, 0.0)
+
+
+def test_a_simulation_that_goes_on_after_a_wall_clock_is_the_run_that_goes_on(path: Path) -> None:
+    with twin(path, 10, is_simulated=True) as life:
+        life.hear(10, t=1.0)
+        life.at(500, passed_s=490)
+        life.hear(500, t=1.5)
+    with twin(path, 501) as life:
+        life.hear(501, t=9.0)
+    with twin(path, 700, is_simulated=True) as life:
+        assert life.says() == (1.5, 200.0)
+    assert select(path, "SELECT run FROM run WHERE ended_stamp_ns IS NULL") == [(1,)]
+
+
+def test_a_simulation_that_is_played_again_says_all_of_it_anew(path: Path) -> None:
+    with twin(path, 10, is_simulated=True) as life:
+        life.hear(10, t=1.0)
+        life.hear(20, t=1.5)
+        life.at(3)
+        assert life.says() == (1.5, 0.0)
+        life.at(10)
+        life.hear(10, t=1.0)
+        assert life.says() == (1.0, 0.0)
+    assert runs(path) == [(1, None), (2, None)]
+
+
+# --- 4: a clock that contradicts the log ----------------------------------------------------------
+
+BOOT = -3e8  # a board without a clock of its own starts years ago
+
+
+def filled(path: Path) -> None:
+    with twin(path) as life:
+        life.hear(-5, t=1.0, pose=HERE)
+        life.hear(-9, tag="8", t=4.0)
+
+
+def test_a_clock_that_contradicts_the_log_begins_nothing_and_is_told(path: Path) -> None:
+    filled(path)
+    before = path.read_bytes()
+    with twin(path, BOOT) as life:
+        assert life.doubts()
+        wait_for(
+            lambda: life.memory.condition.state is JournalState.DOUBTING, "the doubt to be told"
+        )
+        assert "contradicts the journal" in life.memory.condition.detail
+        assert life.live["7"].readings[0].value == 1.0
+        assert life.live["7"].pose == HERE
+        life.at(BOOT + 100, passed_s=100)
+        life.hear(BOOT + 99, t=2.0)
+        assert life.live["7"].readings[0].value == 2.0
+        assert life.memory.condition.waiting == 1
+    assert runs(path) == [(1, None)]
+    assert count(path) == 2
+    assert path.read_bytes() == before
+
+
+def test_once_it_agrees_the_run_goes_on_and_what_waited_is_written_as_of_then(path: Path) -> None:
+    filled(path)
+    with twin(path, BOOT) as life:
+        life.at(BOOT + 100, passed_s=100)
+        life.hear(BOOT + 99, t=2.0)
+        life.at(BOOT + 110, passed_s=10)
+        life.at(3600, passed_s=1)
+        assert not life.doubts()
+        assert life.says() == (2.0, 12.0)
+        assert life.says(tag="8") == (4.0, 3609.0)
+        assert life.past(3580)["7"].readings[0].value == 1.0
+        before = life.live
+    with twin(path, 3600) as life:
+        assert life.live == before
+    assert runs(path) == [(1, None)]
+
+
+def test_a_clock_that_does_not_agree_within_ten_minutes_is_believed(path: Path) -> None:
+    filled(path)
+    with twin(path, BOOT) as life:
+        life.hear(BOOT, t=2.0, tag="9")
+        life.at(BOOT + 599, passed_s=599)
+        assert life.doubts()
+        life.at(BOOT + 600, passed_s=1)
+        assert not life.doubts()
+        assert life.says(tag="9") == (2.0, 600.0)
+        assert life.live["7"].pose == HERE, "tags do not move"
+        assert life.live["7"].readings == (), "how old its readings are is not known"
+        assert runs(path) == [(1, None), (2, None)]
+        # And then it is set right.
+        life.at(50, passed_s=10)
+        life.hear(50, t=3.0)
+        assert life.says(tag="9")[0] == 2.0
+        assert life.says() == (3.0, 0.0)
+    assert runs(path) == [(1, None), (2, None), (3, 1)]
+
+
+# --- 6: places ------------------------------------------------------------------------------------
+
+
+def test_a_place_counts_from_the_earliest_stamp_that_came_with_one(path: Path) -> None:
+    with twin(path) as life:
+        life.hear(-5, t=1.0, pose=HERE)
+        life.hear(-60, t=2.0, pose=THERE)
+        assert life.live == life.past()
+        assert life.past(-30)["7"].pose == HERE
+        assert life.past(-61) == {}
+    with twin(path) as life:
+        life.hear(-80, t=3.0, pose=THERE)
+        life.hear(-70, t=3.5, pose=THERE)
+        assert life.past(-75)["7"].pose == HERE
+        assert life.memory.apply(Pin("9", THERE), life.now_ns) is None
+        assert life.past()["9"].pose == THERE
+        assert "9" not in life.past(-1)
+    assert select(path, "SELECT tag, stamp_ns, x FROM place ORDER BY seq") == [
+        ("7", NOW - 5 * S, 1.0),
+        ("7", NOW - 60 * S, 1.0),
+        ("7", NOW - 80 * S, 1.0),
+        ("9", NOW, 5.0),
+    ]
+
+
+# --- 7 and 8: what many sources leave, and the end ------------------------------------------------
+
+
+def test_many_sources_and_missions_make_no_series(path: Path) -> None:
+    with twin(path) as life:
+        for number in range(50):
+            life.hear(number - 100, source=f"robot {number}", t=1.0)
+    assert select(path, "SELECT count(*) FROM series") == [(1,)]
+
+
+def test_at_the_end_all_is_in_the_one_file(path: Path) -> None:
+    with twin(path) as life:
+        life.hear(-5, t=1.0)
+    assert not path.with_name(path.name + "-wal").exists()
+    assert sorted(file.name for file in path.parent.iterdir()) == ["j.sqlite", "j.sqlite.lock"]

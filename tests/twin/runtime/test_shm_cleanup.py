@@ -1,0 +1,107 @@
+"""What a killed process left unfinished of Fast DDS's memory, and that nothing hangs on it."""
+
+from __future__ import annotations
+
+import logging
+import os
+import struct
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from lupin_twin.runtime.process import FOLDER, ports, remove_stale_shared_memory
+from tests.support.domains import own_domain
+from tests.support.processes import lupin_twin, twin_node, url_of
+
+DOMAIN = 7
+PORT = 7400 + 250 * DOMAIN + 11
+BEING_MADE = struct.pack("=I", 1) + bytes(52_396)
+MADE = struct.pack("=I", 2) + bytes(52_396)
+
+
+def leave(folder: Path, content: bytes, port: int = PORT, old_s: float = 60.0) -> Path:
+    path = folder / f"fastrtps_port{port}"
+    path.write_bytes(content)
+    then = time.time() - old_s
+    os.utime(path, (then, then))
+    return path
+
+
+@pytest.mark.parametrize("content", [b"", b"\0\0", bytes(52_400), BEING_MADE])
+def test_what_is_half_made_is_removed_and_told(
+    tmp_path: Path, content: bytes, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = leave(tmp_path, content)
+    assert remove_stale_shared_memory(DOMAIN, tmp_path) == [path.name]
+    assert not path.exists()
+    assert caplog.messages == [f"removed {path}, left unfinished by a killed process"]
+
+
+def test_the_first_port_of_a_domain_and_the_last_are_looked_at(tmp_path: Path) -> None:
+    paths = [leave(tmp_path, BEING_MADE, port) for port in (9_150, 9_399)]
+    assert remove_stale_shared_memory(DOMAIN, tmp_path) == [path.name for path in paths]
+
+
+def test_what_is_made_or_just_being_made_or_of_another_domain_or_no_file_stays(
+    tmp_path: Path,
+) -> None:
+    kept = [
+        leave(tmp_path, MADE),
+        leave(tmp_path, BEING_MADE, PORT + 1, old_s=0.0),
+        leave(tmp_path, BEING_MADE, 9_149),
+        leave(tmp_path, BEING_MADE, 9_400),
+        tmp_path / f"fastrtps_port{PORT + 2}",
+        tmp_path / f"fastrtps_port{PORT + 3}",
+        tmp_path / f"fastrtps_port{PORT + 4}",
+    ]
+    kept[4].mkdir()
+    kept[5].symlink_to(kept[2])
+    os.mkfifo(kept[6])
+    open_files = len(list(Path("/proc/self/fd").iterdir()))
+    assert remove_stale_shared_memory(DOMAIN, tmp_path) == []
+    assert len(list(Path("/proc/self/fd").iterdir())) == open_files
+    assert all(path.exists() for path in kept)
+    assert remove_stale_shared_memory(DOMAIN, tmp_path / "none") == []
+
+
+def test_what_cannot_be_removed_is_an_error_that_says_what_to_do(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = leave(tmp_path, BEING_MADE)
+
+    def refuse(_: Path) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(Path, "unlink", refuse)
+    assert remove_stale_shared_memory(DOMAIN, tmp_path) == []
+    [record] = caplog.records
+    assert record.levelno == logging.ERROR
+    assert str(path) in record.message
+    assert "FASTDDS_BUILTIN_TRANSPORTS=UDPv4" in record.message
+
+
+@pytest.fixture
+def strewn() -> Iterator[int]:
+    """A domain in which the ports that a first process takes were left unfinished."""
+    with own_domain() as domain:
+        left = [leave(FOLDER, BEING_MADE, port) for port in ports(domain)[10:16]]
+        try:
+            yield domain
+        finally:
+            for path in left:
+                path.unlink(missing_ok=True)
+
+
+def test_a_twin_starts_where_one_was_killed_as_it_started(strewn: int) -> None:
+    with twin_node(strewn) as twin:
+        twin.wait_for_output("left unfinished by a killed process")
+        twin.wait_for_output(f"in ROS domain {strewn} subscribes")
+
+
+@pytest.mark.parametrize("role", ["serve", "web"])
+def test_the_bridge_starts_there_too(strewn: int, role: str) -> None:
+    with lupin_twin(strewn, role) as bridge:
+        assert url_of(bridge)
+        assert "left unfinished by a killed process" in bridge.output

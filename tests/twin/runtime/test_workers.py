@@ -1,0 +1,225 @@
+"""Two lanes of work: the order of service, and the end of what nobody waits for."""
+
+from __future__ import annotations
+
+import gc
+import threading
+import weakref
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError, Future
+from contextlib import contextmanager
+from functools import partial
+from typing import TypeVar
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lupin_twin.field.idw import Abandoned
+from lupin_twin.runtime.workers import (
+    LARGE_THREADS,
+    PATIENCE,
+    SMALL_S,
+    SMALL_THREADS,
+    TURN_S,
+    ShouldStop,
+    Workers,
+    in_turns,
+)
+from tests.support.waiting import PATIENCE_S, wait_for
+
+LARGE_S = 10.0
+T = TypeVar("T")
+
+
+class Clock:
+    """A clock that goes when it is told to."""
+
+    now_s = 0.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+@contextmanager
+def workers(**threads: int) -> Iterator[tuple[Workers, Clock]]:
+    clock = Clock()
+    running = Workers("test", clock, **threads)
+    try:
+        yield running, clock
+    finally:
+        running.close()
+
+
+def occupy(running: Workers, cost_s: float, jobs: int) -> Callable[[], None]:
+    """Keep so many threads busy; returns what sets them free."""
+    is_free = threading.Event()
+    busy = running.running + jobs
+    for _ in range(jobs):
+        running.submit(lambda _: is_free.wait(PATIENCE_S), cost_s)
+    wait_for(lambda: running.running == busy, "threads that are busy")
+    return is_free.set
+
+
+def threads_of(name: str) -> list[str]:
+    return [thread.name for thread in threading.enumerate() if thread.name.startswith(name)]
+
+
+def result(future: Future[T]) -> T:
+    return future.result(PATIENCE_S)
+
+
+def test_a_result_and_an_error_come_to_whoever_waits() -> None:
+    with workers() as (running, _):
+        assert result(running.submit(lambda _: 7)) == 7
+        with pytest.raises(ZeroDivisionError):
+            result(running.submit(lambda _: 1 // 0))
+
+
+def test_a_small_job_does_not_wait_for_large_ones_at_work_or_in_the_queue() -> None:
+    with workers() as (running, _):
+        set_free = occupy(running, LARGE_S, LARGE_THREADS)
+        queue = [running.submit(lambda _: None, LARGE_S) for _ in range(20)]
+        assert result(running.submit(lambda _: "small", SMALL_S)) == "small"
+        assert running.waiting == len(queue)
+        set_free()
+
+
+def test_one_past_small_is_large() -> None:
+    with workers(large_threads=0) as (running, _):
+        large = running.submit(lambda _: None, SMALL_S * 1.001)
+        assert result(running.submit(lambda _: "small", SMALL_S)) == "small"
+        assert not large.done()
+
+
+def test_small_jobs_may_take_every_thread() -> None:
+    with workers() as (running, _):
+        occupy(running, SMALL_S, LARGE_THREADS + SMALL_THREADS)()
+
+
+@settings(max_examples=50)
+@given(st.lists(st.tuples(st.floats(0.0, 5.0), st.floats(0.0, 20.0)), min_size=2, max_size=15))
+def test_a_job_is_passed_by_no_more_than_its_own_cost_allows(
+    jobs: list[tuple[float, float]],
+) -> None:
+    """None starves: what comes later than PATIENCE times a job's cost is served after it."""
+    order: list[int] = []
+
+    def note(number: int, _: ShouldStop) -> None:
+        order.append(number)
+
+    arrivals: list[float] = []
+    with workers(large_threads=1, small_threads=0) as (running, clock):
+        set_free = occupy(running, 0.0, 1)
+        futures = []
+        for number, (pause_s, cost_s) in enumerate(jobs):
+            clock.now_s += pause_s
+            arrivals.append(clock.now_s)
+            futures.append(running.submit(partial(note, number), cost_s))
+        set_free()
+        for future in futures:
+            result(future)
+    for place, number in enumerate(order):
+        passed_by = [later for later in order[:place] if later > number]
+        cost_s = jobs[number][1]
+        for later in passed_by:
+            assert arrivals[later] <= arrivals[number] + PATIENCE * cost_s
+    # And the cheaper of two that came together goes first.
+    due = [arrival + PATIENCE * cost for arrival, (_, cost) in zip(arrivals, jobs, strict=True)]
+    assert order == sorted(range(len(jobs)), key=lambda number: due[number])
+
+
+def test_what_is_cancelled_in_the_queue_never_runs() -> None:
+    ran = []
+    with workers() as (running, _):
+        set_free = occupy(running, LARGE_S, LARGE_THREADS)
+        job = running.submit(lambda _: ran.append(1), LARGE_S)
+        assert job.cancel()
+        assert (running.waiting, running.abandoned) == (0, 1)
+        last = running.submit(lambda _: None, LARGE_S)
+        set_free()
+        result(last)
+    assert ran == []
+    with pytest.raises(CancelledError):
+        result(job)
+
+
+def test_what_is_cancelled_at_work_is_asked_to_stop() -> None:
+    started = threading.Event()
+
+    def work(should_stop: ShouldStop) -> None:
+        started.set()
+        wait_for(should_stop, "the word to stop")
+        raise Abandoned
+
+    with workers() as (running, _):
+        job = running.submit(work)
+        assert started.wait(PATIENCE_S)
+        job.cancel()
+        with pytest.raises(Abandoned):
+            result(job)
+        wait_for(lambda: running.running == 0, "a free thread")
+        assert running.abandoned == 1
+        job.cancel()
+        assert running.abandoned == 1, "once is enough"
+        assert result(running.submit(lambda stop: stop())) is False, "that is another job"
+
+
+def test_what_is_done_is_not_abandoned_by_a_late_cancel() -> None:
+    with workers() as (running, _):
+        job = running.submit(lambda _: 1)
+        assert result(job) == 1
+        assert not job.cancel()
+        assert running.abandoned == 0
+
+
+def test_closing_drops_what_waits_stops_what_runs_and_ends_the_threads() -> None:
+    running = Workers("to be closed")
+    assert threads_of("to be closed") == [], "none before there is work"
+    stopped = threading.Event()
+
+    def work(should_stop: ShouldStop) -> None:
+        wait_for(should_stop, "the word to stop")
+        stopped.set()
+
+    at_work = [running.submit(work, LARGE_S) for _ in range(LARGE_THREADS)]
+    wait_for(lambda: running.running == LARGE_THREADS, "jobs at work")
+    waiting = running.submit(lambda _: None, LARGE_S)
+    running.close()
+    assert stopped.wait(PATIENCE_S)
+    assert waiting.cancelled()
+    for job in at_work:
+        result(job)
+    wait_for(lambda: threads_of("to be closed") == [], "the threads' end")
+    with pytest.raises(RuntimeError, match="closed"):
+        running.submit(lambda _: None)
+
+
+def test_what_a_job_was_made_of_and_its_result_are_not_kept() -> None:
+    class Thing:
+        pass
+
+    with workers(large_threads=1, small_threads=0) as (running, _):
+        thing, made = Thing(), Thing()
+        seen, result_seen = weakref.ref(thing), weakref.ref(made)
+
+        def work(_: ShouldStop, thing: Thing = thing, made: Thing = made) -> Thing:
+            assert thing is not made
+            return made
+
+        future = running.submit(work)
+        del work, thing, made
+        assert result(future) is result_seen()
+        wait_for(lambda: gc.collect() is not None and seen() is None, "the end of the input")
+        del future
+        wait_for(lambda: gc.collect() is not None and result_seen() is None, "the result's end")
+
+
+def test_who_makes_many_things_rests_after_each_turn() -> None:
+    clock, made = Clock(), list[int]()
+    rests = list[tuple[int, float]]()
+    for item in in_turns(range(10), clock, lambda seconds: rests.append((len(made), seconds))):
+        made.append(item)
+        clock.now_s += 0.4 * TURN_S
+    assert made == list(range(10))
+    assert rests == [(3, TURN_S), (6, TURN_S), (9, TURN_S)]

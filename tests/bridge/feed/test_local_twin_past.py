@@ -134,14 +134,16 @@ def test_a_journal_that_is_off_remembers_for_as_long_as_the_twin_lives(
             await until(lambda: stage.twin.journal().state == "off", "the journal")
             folder = Path(stage.twin.journal().path).parent
 
-            def take(node: TwinNode) -> None:
+            def take(node: TwinNode) -> int:
                 at_ns = node.now_ns()
                 node.memory.apply(Scan("1", at_ns, (Reading("co2", 400.0),)), at_ns)
+                return at_ns
 
-            await stage.twin.thread.call(take)
-            now_ns = stage.twin.now_ns
+            at_ns = await stage.twin.thread.call(take)
             await until(lambda: stage.twin.journal().written, "the scan")
-            [tag] = (await stage.twin.state_at(now_ns)).tags
+            # The source's clock goes on from its last update, a moment behind the node's.
+            await until(lambda: stage.twin.now_ns >= at_ns, "the moment of the scan")
+            [tag] = (await stage.twin.state_at(at_ns)).tags
             assert tag.readings[0].value == 400.0
             assert folder.exists()
         assert not folder.exists()

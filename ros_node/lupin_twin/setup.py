@@ -12,7 +12,7 @@ setup(
     package_data={"lupin_twin": ["py.typed"]},
     # The messages come from lupin_msgs, rclpy from ROS (apt) or the ROS wheels (PyPI): naming
     # them here would make pip look for what colcon has already built.
-    install_requires=["numpy>=1.26,<3"],
+    install_requires=["numpy>=1.26,<3", "PyYAML>=6,<7"],
     extras_require={"test": ["pytest"]},  # by which colcon knows how to test it
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/lupin_twin"]),
@@ -21,5 +21,10 @@ setup(
         ("share/lupin_twin/config", ["config/twin.yaml"]),
         ("share/lupin_twin/rviz", ["rviz/twin.rviz"]),
     ],
-    entry_points={"console_scripts": ["twin_node = lupin_twin.cli:command"]},
+    entry_points={
+        "console_scripts": [
+            "twin_node = lupin_twin.cli:command",
+            "adapt = lupin_twin.adapt.cli:command",
+        ]
+    },
 )

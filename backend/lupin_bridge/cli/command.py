@@ -33,6 +33,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     limit_blas_threads()
     return_large_blocks()
     own, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
+    if own[:1] == ["adapt"]:
+        from lupin_twin.adapt.cli import main as adapt  # noqa: PLC0415  # it has options of its own
+
+        return adapt([*own[1:], "--ros-args", *ros_args[1:]] if ros_args else own[1:])
     options = parser().parse_args(own)
     if options.role == "journal":
         if ros_args:

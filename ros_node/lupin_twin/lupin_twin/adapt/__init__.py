@@ -1,0 +1,1 @@
+"""Observations made of what any robot publishes: standard messages, poses, fixed sensors."""

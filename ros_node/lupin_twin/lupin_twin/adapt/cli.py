@@ -1,0 +1,158 @@
+"""The command `adapt`: observations of any robot's own topics, until a signal ends it."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from threading import Event, Thread, main_thread
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from lupin_twin.runtime import process
+from lupin_twin.runtime.process import exit_after, remove_stale_shared_memory
+
+if TYPE_CHECKING:
+    from lupin_twin.adapt.config import Config
+
+USAGE_ERROR = 2
+WRONG = 1
+
+
+def parser() -> argparse.ArgumentParser:
+    """The options; ROS's own come behind `--ros-args`."""
+    made = argparse.ArgumentParser(
+        prog="adapt",
+        description="Makes observations of a robot's own topics, or of fixed sensors.",
+        epilog="Everything from --ros-args on goes to ROS: --ros-args -p use_sim_time:=true.",
+        allow_abbrev=False,
+    )
+    made.add_argument("--config", type=Path, metavar="FILE", help="YAML: topics, tags, sensors")
+    made.add_argument(
+        "--check",
+        action="store_true",
+        help="listen, say what comes and what is missing, and end; without --config, print a "
+        "configuration to start from",
+    )
+    made.add_argument(
+        "--seconds", type=float, default=10.0, metavar="S", help="how long to listen (default: 10)"
+    )
+    return made
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run it; returns the exit code: 2 for a wrong configuration, 1 where --check found a fault."""
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    split = arguments.index("--ros-args") if "--ros-args" in arguments else len(arguments)
+    own, ros_args = arguments[:split], arguments[split:]
+    options = parser().parse_args(own)
+    if options.config is None and not options.check:
+        return _refuse("--config FILE is missing; --check prints one to start from")
+    if not 0.1 <= options.seconds <= 3600.0:
+        return _refuse(f"--seconds is {options.seconds:g}, must be from 0.1 to 3600")
+    process.block()  # before anything slow is imported
+    from lupin_twin.adapt.config import ConfigError, read_config  # noqa: PLC0415  # see above
+
+    try:
+        config = None if options.config is None else read_config(options.config)
+        return _with_ros(
+            ros_args,
+            lambda: (
+                _check(config, options.seconds) if options.check or config is None else _run(config)
+            ),
+        )
+    except ConfigError as error:
+        return _refuse(str(error))
+
+
+def command() -> NoReturn:
+    """`main` as a process of its own."""
+    exit_after(main)
+
+
+def _with_ros(ros_args: list[str], role: Callable[[], int]) -> int:
+    import rclpy  # noqa: PLC0415  # see `main`
+    from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
+
+    try:
+        rclpy.init(args=["adapt", *ros_args], signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # the parent of all that rclpy raises for bad arguments
+        return _refuse(f"cannot start ROS: {error}")
+    remove_stale_shared_memory(rclpy.get_default_context().get_domain_id())
+    try:
+        return role()
+    finally:
+        rclpy.try_shutdown()
+
+
+def _run(config: Config) -> int:
+    from rclpy.executors import SingleThreadedExecutor  # noqa: PLC0415
+
+    from lupin_twin.adapt.node import AdaptNode  # noqa: PLC0415
+    from lupin_twin.ros.base_node import end_spinning, spin_until_shutdown  # noqa: PLC0415
+
+    node = AdaptNode(config)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    ended = Event()
+
+    def spin() -> None:
+        try:
+            spin_until_shutdown(executor, node.utilities.report)
+        finally:
+            ended.set()
+            signal.pthread_kill(main_thread().ident or 0, signal.SIGTERM)  # it waits, see below
+
+    thread = Thread(target=spin, name="ros")
+    thread.start()
+    node.get_logger().info(
+        f"adapting {len(config.sensors)} sensors for {len(config.tags)} tags; "
+        "what comes and what is dropped is on /diagnostics"
+    )
+    process.wait()
+    exit_code = 1 if ended.is_set() else 0
+    end_spinning(executor)
+    thread.join()
+    node.destroy_node()
+    return exit_code
+
+
+def _check(config: Config | None, seconds: float) -> int:
+    from rclpy.executors import SingleThreadedExecutor  # noqa: PLC0415
+
+    from lupin_twin.adapt.check import Listener, listen, report, suggestion  # noqa: PLC0415
+
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
+    _say(f"listening for {seconds:g} s ...", sys.stderr)
+    listener = Listener(config)
+    executor = SingleThreadedExecutor()
+    executor.add_node(listener)
+    listen(executor, seconds)
+    if config is None:
+        if not any(heard.messages for heard in listener.heard.values()):
+            return _refuse(
+                f"nothing was heard that is a reading or a pose; topics: "
+                f"{', '.join(sorted(listener.topics)) or 'none'}"
+            )
+        _say("# Where each tag is, [x, y] in m, is for you to fill in.", sys.stdout)
+        _say(suggestion(listener).rstrip(), sys.stdout)
+        return 0
+    lines = list(report(config, listener, seconds))
+    for _, line in lines:
+        _say(line, sys.stdout)
+    return 0 if all(is_right for is_right, _ in lines) else WRONG
+
+
+def _say(text: str, to: Any) -> None:
+    to.write(f"{text}\n")
+    to.flush()
+
+
+def _refuse(reason: str) -> int:
+    sys.stderr.write(f"adapt: {' '.join(reason.split())}\n")
+    return USAGE_ERROR
+
+
+if __name__ == "__main__":
+    command()

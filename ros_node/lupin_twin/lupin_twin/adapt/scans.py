@@ -1,0 +1,197 @@
+"""Readings become scans: which tag a reading belongs to, and the mean over a stop. Pure.
+
+All times are ROS time, ns. The robot is at a tag while that is the nearest, within the reach; it
+leaves beyond 1.1 times the reach, or the jitter of a localisation would make many scans of one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Final
+
+from lupin_twin.adapt.config import Config, Place, Sensor
+
+LEAVES: Final = 1.1
+# Who was at a tag for so long and read nothing has failed; one that passed by has not.
+STAYED_NS: Final = 2_000_000_000
+NS: Final = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class MadeScan:
+    """A scan of a tag: each sensor's mean, of the moment of the newest reading.
+
+    Without a reading it is a failed attempt, and `detail` says why; with, it says how far the
+    readings were spread.
+    """
+
+    tag_id: str
+    stamp_ns: int
+    place: Place | None
+    readings: tuple[tuple[str, float], ...]
+    detail: str
+
+
+@dataclass(slots=True)
+class _Mean:
+    """Mean and spread, one by one (Welford 1962)."""
+
+    number: int = 0
+    mean: float = 0.0
+    squares: float = 0.0
+
+    def add(self, value: float) -> None:
+        self.number += 1
+        step = value - self.mean
+        self.mean += step / self.number
+        self.squares += step * (value - self.mean)
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the readings; 0 of one."""
+        return math.sqrt(self.squares / (self.number - 1)) if self.number > 1 else 0.0
+
+
+@dataclass(slots=True)
+class _Window:
+    """What has been read at one tag since `begun_ns`."""
+
+    begun_ns: int
+    newest_ns: int = 0
+    means: dict[str, _Mean] = field(default_factory=dict)
+
+    def add(self, sensor: str, value: float, stamp_ns: int) -> None:
+        self.means.setdefault(sensor, _Mean()).add(value)
+        self.newest_ns = max(self.newest_ns, stamp_ns)
+
+
+class Scans:
+    """Where the robot is, and what was read there so far. Of fixed sensors, what each tag's say."""
+
+    def __init__(self, config: Config) -> None:
+        self._config = config
+        self._places: dict[str, Place] = dict(config.tags)
+        self._tag: str | None = None
+        self._seen_ns = 0
+        self._visit: _Window | None = None
+        self._fixed: dict[str, _Window] = {}
+        self._now_ns = 0
+
+    @property
+    def tag(self) -> str | None:
+        """The tag that the robot is at; None: at none, or not known."""
+        return self._tag
+
+    def move(self, x: float, y: float, now_ns: int) -> Iterator[MadeScan]:
+        """The robot is here, m; yields the scan that ends by it."""
+        yield from self.due(now_ns)
+        self._seen_ns = now_ns
+        yield from self._be_at(self._nearest(x, y), now_ns)
+
+    def take(self, sensor: Sensor, value: float, stamp_ns: int, now_ns: int) -> bool:
+        """A reading, in the sensor's unit; returns whether it belongs to a tag."""
+        if sensor.tag:
+            window = self._fixed.setdefault(sensor.tag, _Window(now_ns))
+        elif self._visit is not None:
+            window = self._visit
+        else:
+            return False
+        window.add(sensor.name, value, stamp_ns)
+        return True
+
+    def due(self, now_ns: int) -> Iterator[MadeScan]:
+        """Scans whose time is over; to be called once a second, and before the robot is moved."""
+        if now_ns < self._now_ns:  # the clock has gone back: another world
+            self._tag, self._visit, self._fixed = None, None, {}
+        self._now_ns = now_ns
+        window_ns = int(self._config.window_s * NS)
+        for tag_id, window in tuple(self._fixed.items()):
+            if now_ns - window.begun_ns >= window_ns:
+                del self._fixed[tag_id]
+                yield self._scan(tag_id, window)
+        robot = self._config.robot
+        if robot is not None and now_ns - self._seen_ns > robot.max_age_s * NS:
+            yield from self._be_at(None, now_ns)
+        elif self._visit is not None and now_ns - self._visit.begun_ns >= window_ns:
+            yield from self._ended(now_ns)
+            self._visit = _Window(now_ns)
+
+    def _be_at(self, tag_id: str | None, now_ns: int) -> Iterator[MadeScan]:
+        if tag_id == self._tag:
+            return
+        yield from self._ended(now_ns)
+        self._tag = tag_id
+        self._visit = None if tag_id is None else _Window(now_ns)
+
+    def _ended(self, now_ns: int) -> Iterator[MadeScan]:
+        window, tag_id = self._visit, self._tag
+        if window is None or tag_id is None:
+            return
+        if window.means:
+            yield self._scan(tag_id, window)
+        elif now_ns - window.begun_ns >= STAYED_NS:
+            stayed_s = (now_ns - window.begun_ns) / NS
+            yield MadeScan(
+                tag_id, now_ns, self._place(tag_id), (), f"no reading in {stayed_s:.0f} s here"
+            )
+
+    def _scan(self, tag_id: str, window: _Window) -> MadeScan:
+        means = sorted(window.means.items())
+        detail = ", ".join(f"{name} ±{mean.spread:.2g} of {mean.number}" for name, mean in means)
+        readings = tuple((name, mean.mean) for name, mean in means)
+        return MadeScan(tag_id, window.newest_ns, self._place(tag_id), readings, detail)
+
+    def _place(self, tag_id: str) -> Place | None:
+        return self._places.get(tag_id) or _cell_place(tag_id, self._config.cell_m)
+
+    def _nearest(self, x: float, y: float) -> str | None:
+        reach_m, here = self._config.reach_m, self._tag
+        if here is not None and _distance_m(self._places.get(here), x, y) > LEAVES * reach_m:
+            here = None
+        found = min(
+            ((_distance_m(place, x, y), tag_id) for tag_id, place in self._places.items()),
+            default=(math.inf, ""),
+        )
+        if found[0] <= reach_m:
+            # The other has to be nearer by as much as makes the robot leave.
+            stays = here is not None and (
+                _distance_m(self._places.get(here), x, y) - found[0] <= (LEAVES - 1.0) * reach_m
+            )
+            return here if stays else found[1]
+        if here is not None:
+            return here
+        return _cell_of(x, y, self._config.cell_m) if self._config.cell_m else None
+
+
+def _distance_m(place: Place | None, x: float, y: float) -> float:
+    return math.inf if place is None else math.hypot(place.x - x, place.y - y)
+
+
+def _cell_of(x: float, y: float, cell_m: float) -> str:
+    return f"cell {math.floor(x / cell_m)} {math.floor(y / cell_m)}"
+
+
+def _cell_place(tag_id: str, cell_m: float) -> Place:
+    """The centre of a cell, from its name."""
+    i, j = map(int, tag_id.split()[1:])
+    return Place((i + 0.5) * cell_m, (j + 0.5) * cell_m)
+
+
+def number_of(message: object, path: str) -> float:
+    """The number at a field's path, such as `data` or `axes[2].value`.
+
+    Raises:
+        LookupError, AttributeError, TypeError: there is none.
+
+    """
+    value: object = message
+    for part in path.split("."):
+        name, _, index = part.partition("[")
+        value = getattr(value, name)
+        if index:
+            value = value[int(index[:-1])]  # type: ignore[index]
+    if not hasattr(value, "__float__"):
+        raise TypeError(f"{path} is a {type(value).__name__}, expected a number")
+    return float(value)

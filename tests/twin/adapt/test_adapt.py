@@ -1,0 +1,244 @@
+"""`lupin-twin adapt` and a twin, each in a process of its own; standard messages alone come in."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+import yaml
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from lupin_msgs.msg import Observation
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import QoSProfile, qos_profile_sensor_data
+from sensor_msgs.msg import RelativeHumidity, Temperature
+from std_msgs.msg import Float32
+
+from lupin_twin.adapt.check import Listener, listen, report, suggestion
+from lupin_twin.adapt.config import Config, config_of, read_config
+from tests.support.domains import ros_env
+from tests.support.inprocess import ros_domain
+from tests.support.processes import Process, twin_node
+from tests.support.ros import Peer, latched
+from tests.support.waiting import wait_for
+
+CONFIG = """
+robot: {topic: /amcl_pose, type: geometry_msgs/msg/PoseWithCovarianceStamped}
+tags: {A: [0.0, 0.0], B: [3.0, 0.0]}
+reach_m: 0.8
+window_s: 0.5
+sensors:
+  temperature: {topic: /temperature, type: sensor_msgs/msg/Temperature, field: temperature, max: 60}
+  humidity: {topic: /humidity, type: sensor_msgs/msg/RelativeHumidity}
+  co2: {topic: /b/co2, type: std_msgs/msg/Float32, tag: B}
+"""
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    path = tmp_path / "adapt.yaml"
+    path.write_text(CONFIG)
+    return path
+
+
+def adapt(domain: int, *args: str) -> Process:
+    command = [sys.executable, "-m", "lupin_bridge.cli.command", "adapt", *args]
+    return Process(command, ros_env(domain))
+
+
+class Robot:
+    """What a robot that knows nothing of the twin publishes."""
+
+    def __init__(self, peer: Peer) -> None:
+        self.peer = peer
+        self.reports: list[Any] = []
+        self.observations: list[Any] = []
+        node = peer.node
+        self._pose = node.create_publisher(
+            PoseWithCovarianceStamped, "/amcl_pose", QoSProfile(depth=1)
+        )
+        sensor = qos_profile_sensor_data
+        self._temperature = node.create_publisher(Temperature, "/temperature", sensor)
+        self._humidity = node.create_publisher(RelativeHumidity, "/humidity", sensor)
+        self._co2 = node.create_publisher(Float32, "/b/co2", sensor)
+        node.create_subscription(DiagnosticArray, "/diagnostics", self.reports.append, 10)
+        node.create_subscription(
+            Observation, "/floranova/observations", self.observations.append, latched(50)
+        )
+
+    def _now(self) -> Any:
+        return self.peer.node.get_clock().now().to_msg()
+
+    def be_at(self, x: float, frame_id: str = "map") -> None:
+        message = PoseWithCovarianceStamped()
+        message.header.stamp, message.header.frame_id = self._now(), frame_id
+        message.pose.pose.position.x = x
+        self._pose.publish(message)
+
+    def read(self, temperature: float, humidity: float = 0.6, stamp: Any = None) -> None:
+        for publisher, message, field, value in (
+            (self._temperature, Temperature(), "temperature", temperature),
+            (self._humidity, RelativeHumidity(), "relative_humidity", humidity),
+        ):
+            message.header.stamp = stamp or self._now()
+            setattr(message, field, value)
+            publisher.publish(message)
+
+    def fixed(self, value: float) -> None:
+        self._co2.publish(Float32(data=value))
+
+    def said(self, text: str) -> bool:
+        """Whether the adapter has it on `/diagnostics`."""
+        return any(
+            text in status.message
+            for report in self.reports
+            for status in report.status
+            if status.hardware_id == "/lupin_adapt"
+        )
+
+
+def test_a_robot_of_standard_messages_alone_is_on_the_twins_state(
+    domain: int, config: Path
+) -> None:
+    with (
+        twin_node(domain),
+        adapt(domain, "--config", str(config)) as process,
+        Peer(domain) as peer,
+    ):
+        robot = Robot(peer)
+        peer.listen()
+        # Surveyed tags are known before the robot has been anywhere.
+        peer.tag("B", lambda tag: tag.pose.position.x == 3.0)
+
+        def at_a() -> Any:
+            robot.be_at(0.2)
+            robot.read(21.5)
+            tags = {tag.tag_id: tag for tag in peer.states[-1].tags}
+            return tags["A"].readings and tags
+
+        tags = peer.until(at_a, "readings at tag A")
+        values = {reading.name: reading.value for reading in tags["A"].readings}
+        assert values == {"temperature": 21.5, "humidity": pytest.approx(60.0)}
+        assert not tags["B"].readings
+
+        def fixed_at_b() -> Any:
+            robot.fixed(800.0)
+            tags = {tag.tag_id: tag for tag in peer.states[-1].tags}
+            return tags["B"].readings and tags
+
+        tags = peer.until(fixed_at_b, "the fixed sensor's reading")
+        assert [(each.name, each.value) for each in tags["B"].readings] == [("co2", 800.0)]
+        assert {each.source for each in robot.observations} == {"adapt"}
+        assert process.stop() == 0
+
+
+@pytest.mark.parametrize(
+    ("do", "text"),
+    [
+        (lambda robot: robot.be_at(0.0, "odom"), "its frame is 'odom', expected 'map' (frame_id)"),
+        (lambda robot: robot.be_at(float("nan")), "its position is (nan, 0) m"),
+        (lambda robot: robot.read(290.0), "temperature is 290, must be from -inf to 60"),
+        (lambda robot: robot.read(float("nan")), "temperature is nan, must be from"),
+        (
+            lambda robot: robot.read(20.0, stamp=Time(sec=7)),
+            "behind ROS time here, the limit is 10 s: is a clock wrong",
+        ),
+    ],
+    ids=["frame", "pose", "unit", "NaN", "clock"],
+)
+def test_what_is_wrong_is_dropped_counted_and_said(
+    domain: int, config: Path, do: Callable[[Robot], None], text: str
+) -> None:
+    with adapt(domain, "--config", str(config)) as process, Peer(domain) as peer:
+        robot = Robot(peer)
+
+        def said() -> bool:
+            do(robot)
+            return robot.said(text)
+
+        peer.until(said, f"{text!r} on /diagnostics")
+        assert process.output.count(text.partition(",")[0]) >= 1  # a line, not one a message
+        assert process.exit_code is None
+
+
+def heard(domain: int, config: Config | None, is_enough: Callable[[Listener], bool]) -> Listener:
+    """What a check hears of a robot, as soon as that is enough."""
+    with Peer(domain) as peer, ros_domain(domain):
+        robot = Robot(peer)
+        rclpy.init(args=[])
+        try:
+            listener = Listener(config)
+            executor = SingleThreadedExecutor()
+            executor.add_node(listener)
+
+            def publish() -> bool:
+                robot.be_at(0.0, "odom")
+                robot.read(21.5)
+                listen(executor, 0.05)
+                return is_enough(listener)
+
+            peer.until(publish, "enough to be heard")
+            return listener
+        finally:
+            rclpy.try_shutdown()
+
+
+def test_check_says_of_each_topic_whether_it_is_right(domain: int, config: Path) -> None:
+    known = read_config(config)
+    lines: list[tuple[bool, str]] = []
+
+    def is_enough(listener: Listener) -> bool:
+        lines[:] = report(known, listener, 6.0)
+        return sum(is_right for is_right, _ in lines) == 2 and "its frame" in lines[0][1]
+
+    heard(domain, known, is_enough)
+    robot, temperature, humidity, co2 = (line for _, line in lines)
+    assert robot.startswith("WRONG robot: /amcl_pose: its frame is 'odom', expected 'map'")
+    assert temperature.startswith("ok    temperature: /temperature: ")
+    assert temperature.endswith(", temperature = 21.5")
+    assert humidity.endswith(", humidity = 60")
+    assert co2 == "WRONG co2 of tag B: /b/co2: nothing came in 6 s"
+
+
+def test_check_without_a_configuration_finds_one_that_works(domain: int) -> None:
+    def is_enough(listener: Listener) -> bool:
+        return sum(each.messages > 0 for each in listener.heard.values()) == 3
+
+    found = config_of(yaml.safe_load(suggestion(heard(domain, None, is_enough))))
+    assert found.frame_id == "odom"
+    assert found.robot is not None
+    assert found.robot.topic == "/amcl_pose"
+    assert [(it.name, it.topic, it.factor) for it in found.sensors] == [
+        ("humidity", "/humidity", 100.0),
+        ("temperature", "/temperature", 1.0),
+    ]
+
+
+def test_check_ends_by_itself_and_says_what_is_wrong_by_its_code(domain: int, config: Path) -> None:
+    with adapt(domain, "--config", str(config), "--check", "--seconds", "0.1") as process:
+        assert process.wait() == 1
+        assert "WRONG robot: /amcl_pose: nobody publishes it" in process.output
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        (("/temperature,", "'/1 bad',"), "topic '/1 bad'"),
+        (("sensor_msgs/msg/Temperature", "apriltag_msgs/msg/X"), "the package apriltag_msgs is"),
+        (("sensor_msgs/msg/Temperature", "sensor_msgs/msg/Warmth"), "has no message Warmth"),
+        (("reach_m: 0.8", "reach_m: far"), "reach_m is 'far', expected a number"),
+    ],
+)
+def test_a_configuration_that_cannot_be_is_one_line(
+    domain: int, config: Path, change: tuple[str, str], complaint: str
+) -> None:
+    config.write_text(config.read_text().replace(*change))
+    with adapt(domain, "--config", str(config)) as process:
+        assert process.wait() == 2
+        wait_for(lambda: complaint in process.output, complaint)
+        assert "Traceback" not in process.output

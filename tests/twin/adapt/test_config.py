@@ -1,0 +1,129 @@
+"""What `adapt` is told: everything that can be wrong is named by its key, its value, the limit."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from lupin_twin.adapt.config import ConfigError, Place, Robot, Sensor, config_of, read_config
+
+LEAST = """
+robot: {topic: /amcl_pose, type: geometry_msgs/msg/PoseWithCovarianceStamped}
+tags: {A: [0.0, 0.0], B: [3.0, 0.0, 0.4], 12: [1, 2]}
+reach_m: 0.8
+sensors:
+  temperature: {topic: /temperature, type: sensor_msgs/msg/Temperature, field: temperature}
+  humidity: {topic: /humidity, type: sensor_msgs/msg/RelativeHumidity}
+"""
+
+
+def test_the_least_that_has_to_work(tmp_path: Path) -> None:
+    path = tmp_path / "adapt.yaml"
+    path.write_text(LEAST)
+    config = read_config(path)
+    assert config.robot == Robot("/amcl_pose", "geometry_msgs/msg/PoseWithCovarianceStamped")
+    assert config.tags == {"A": Place(0, 0), "B": Place(3, 0, 0.4), "12": Place(1, 2)}
+    assert (config.frame_id, config.reach_m) == ("map", 0.8)
+    temperature, humidity = config.sensors
+    assert temperature == Sensor(
+        "temperature", "/temperature", "sensor_msgs/msg/Temperature", "temperature"
+    )
+    # A standard message's ratio is our percent, without being told.
+    assert (humidity.field, humidity.factor) == ("relative_humidity", 100.0)
+
+
+def test_tags_may_stand_in_a_file_of_their_own(tmp_path: Path) -> None:
+    (tmp_path / "tags.yaml").write_text("A: [1.5, 2.5]")
+    (tmp_path / "adapt.yaml").write_text(LEAST.replace("{A: [0.0, 0.0],", "tags.yaml #"))
+    assert read_config(tmp_path / "adapt.yaml").tags == {"A": Place(1.5, 2.5)}
+
+
+def test_one_quantity_may_have_several_fixed_sensors() -> None:
+    content = {
+        "tags": {"A": [0, 0], "B": [1, 0]},
+        "sensors": {
+            "co2": [
+                {"topic": "/a/co2", "type": "std_msgs/msg/Float32", "tag": "A", "max": 5000},
+                {"topic": "/b/co2", "type": "std_msgs/msg/Float32", "tag": "B", "offset": -20},
+            ]
+        },
+    }
+    first, second = config_of(content).sensors
+    assert (first.name, first.tag, first.low, first.high) == ("co2", "A", -math.inf, 5000.0)
+    assert (second.name, second.tag, second.offset) == ("co2", "B", -20.0)
+
+
+def changed(path: str, value: Any) -> dict[str, Any]:
+    """The least configuration with another value; `...` takes the key away."""
+    content: dict[str, Any] = yaml.safe_load(LEAST)
+    *parents, key = path.split(".")
+    table = content
+    for parent in parents:
+        table = table[parent]
+    if value is ...:
+        del table[key]
+    else:
+        table[key] = value
+    return content
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "complaint"),
+    [
+        ("sensors", ..., "sensors: none is given"),
+        ("sensors.temperature.topic", ..., "sensors.temperature.topic is missing"),
+        ("sensors.temperature.factr", 2, "sensors.temperature.'factr' is not known, expected one"),
+        ("sensors.temperature.factor", "2", "sensors.temperature.factor is '2', expected a number"),
+        ("sensors.temperature.factor", math.nan, "sensors.temperature.factor is nan, expected a"),
+        ("sensors.temperature.factor", 10**400, "expected a number"),
+        ("sensors.temperature.type", "Temperature", "expected such as sensor_msgs/msg/Temp"),
+        ("sensors.temperature.field", "a b", "sensors.temperature.field is 'a b', expected a path"),
+        ("sensors.temperature.min", 1e300, None),
+        ("sensors.temperature.tag", "Z", "sensors.temperature.tag is 'Z', which is not one of"),
+        ("sensors.temperature", 5, "sensors.temperature is 5, expected keys and values"),
+        ("robot", ..., "sensors.temperature has no tag, so it is the robot's, but robot is not"),
+        ("robot.type", "nav_msgs/msg/Path", "robot.type is 'nav_msgs/msg/Path', expected one of"),
+        ("robot.max_age_s", 0, "robot.max_age_s is 0, must be from 0.1 to 86400"),
+        ("tags", {}, "tags: none is given, and cell_m is 0"),
+        ("tags.A", [1], "tags.A is [1], expected [x, y] or [x, y, z] in m"),
+        ("tags.A", [1, math.inf], "tags.A is [1, inf], expected [x, y]"),
+        ("tags", {True: [0, 0]}, "tags: True is no text of 1 to 256 characters"),
+        ("tags", "none.yaml", "none.yaml: No such file or directory"),
+        ("reach_m", 0, "reach_m is 0, must be from 0.01 to 100"),
+        ("window_s", True, "window_s is True, expected a number"),
+        ("frame_id", "", "frame_id: '' is no text"),
+        ("colour", 1, "'colour' is not known, expected one of robot, tags"),
+    ],
+)
+def test_what_cannot_be_is_named(path: str, value: Any, complaint: str | None) -> None:
+    content = changed(path, value)
+    if complaint is None:
+        config_of(content)
+        return
+    with pytest.raises(ConfigError) as refused:
+        config_of(content)
+    assert complaint in str(refused.value)
+    assert len(str(refused.value)) < 400
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("a: [", "is no YAML"),
+        ("[" * 5000, "is no YAML"),
+        ("a: " + "9" * 5000, "is no YAML"),
+        ("\x00", "is no YAML"),
+        ("- 1", "the file is [1], expected keys"),
+        ("x" * 4_000_001, "has more than 4000000 bytes"),
+    ],
+)
+def test_a_file_that_is_none_is_named(tmp_path: Path, text: str, complaint: str) -> None:
+    path = tmp_path / "adapt.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError) as refused:
+        read_config(path)
+    assert complaint in str(refused.value)

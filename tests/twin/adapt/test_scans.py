@@ -1,0 +1,157 @@
+"""Readings become scans: the tag they belong to, and the mean of a stop."""
+
+from __future__ import annotations
+
+import statistics
+from types import SimpleNamespace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lupin_twin.adapt.config import Config, Place, Robot, Sensor
+from lupin_twin.adapt.scans import MadeScan, Scans, number_of
+
+S = 1_000_000_000
+ROBOT = Robot("/pose", "geometry_msgs/msg/PoseStamped", max_age_s=30.0)
+TEMPERATURE = Sensor("temperature", "/t", "std_msgs/msg/Float32", "data")
+FIXED = Sensor("co2", "/c", "std_msgs/msg/Float32", "data", tag="B")
+TAGS = {"A": Place(0.0, 0.0), "B": Place(3.0, 0.0, 0.5)}
+
+
+def scans_of(**changes: object) -> Scans:
+    given: dict[str, object] = {"robot": ROBOT, "tags": TAGS, "reach_m": 0.8, "window_s": 10.0}
+    return Scans(Config((TEMPERATURE, FIXED), **(given | changes)))  # type: ignore[arg-type]
+
+
+def read(scans: Scans, at_s: float, value: float = 20.0, sensor: Sensor = TEMPERATURE) -> bool:
+    return scans.take(sensor, value, int(at_s * S), int(at_s * S))
+
+
+def move(scans: Scans, at_s: float, x: float, y: float = 0.0) -> list[MadeScan]:
+    return list(scans.move(x, y, int(at_s * S)))
+
+
+def test_a_stop_is_one_scan_of_the_mean_when_the_robot_leaves() -> None:
+    scans = scans_of()
+    assert move(scans, 1, 0.3) == []
+    assert read(scans, 2, 20.0)
+    assert read(scans, 3, 22.0)
+    (scan,) = move(scans, 4, 1.5)
+    assert scan == MadeScan(
+        "A", 3 * S, TAGS["A"], (("temperature", 21.0),), "temperature ±1.4 of 2"
+    )
+    assert scans.tag is None
+
+
+def test_what_is_read_between_tags_belongs_to_none() -> None:
+    scans = scans_of()
+    assert not read(scans, 0)
+    move(scans, 1, 1.5)
+    assert not read(scans, 2)
+    assert move(scans, 3, 0.0) == []
+
+
+def test_a_long_stop_is_a_scan_each_window() -> None:
+    scans = scans_of()
+    move(scans, 0, 0.0)
+    read(scans, 1)
+    assert list(scans.due(9 * S)) == []
+    assert [scan.stamp_ns for scan in scans.due(10 * S)] == [S]
+    read(scans, 11, 30.0)
+    (scan,) = move(scans, 12, 9.0)
+    assert scan.readings == (("temperature", 30.0),)
+
+
+def test_who_stops_and_reads_nothing_has_failed_and_who_passes_by_has_not() -> None:
+    scans = scans_of()
+    move(scans, 0, 0.0)
+    assert move(scans, 1, 1.5) == []
+    move(scans, 2, 0.0)
+    (scan,) = move(scans, 5, 1.5)
+    assert (scan.tag_id, scan.readings, scan.detail) == ("A", (), "no reading in 3 s here")
+
+
+def test_jitter_at_the_edge_of_reach_makes_one_scan() -> None:
+    scans = scans_of()
+    move(scans, 0, 0.79)
+    read(scans, 0)
+    for at in range(1, 9):
+        assert move(scans, at, 0.79 + 0.05 * (at % 2)) == []
+    assert len(move(scans, 9, 0.9)) == 1
+
+
+def test_of_two_tags_in_reach_the_nearer_counts_once_it_is_clearly_nearer() -> None:
+    scans = scans_of(tags={"A": Place(0, 0), "B": Place(1, 0)})
+    move(scans, 0, 0.4)
+    assert scans.tag == "A"
+    move(scans, 1, 0.52)
+    assert scans.tag == "A"
+    move(scans, 2, 0.6)
+    assert scans.tag == "B"
+
+
+def test_a_pose_holds_no_longer_than_its_age() -> None:
+    scans = scans_of()
+    move(scans, 0, 0.0)
+    read(scans, 1)
+    (scan,) = scans.due(10 * S)
+    assert scan.tag_id == "A"
+    list(scans.due(31 * S))
+    assert scans.tag is None
+    assert not read(scans, 31)
+
+
+def test_a_clock_that_goes_back_begins_anew() -> None:
+    scans = scans_of()
+    move(scans, 100, 0.0)
+    read(scans, 101)
+    assert list(scans.due(5 * S)) == []
+    assert scans.tag is None
+
+
+def test_a_fixed_sensor_needs_no_robot() -> None:
+    scans = scans_of(robot=None)
+    for at in range(10):
+        assert read(scans, at, 400.0 + at, FIXED)
+    (scan,) = scans.due(10 * S)
+    assert (scan.tag_id, scan.place, scan.stamp_ns) == ("B", TAGS["B"], 9 * S)
+    assert scan.readings == (("co2", 404.5),)
+    assert list(scans.due(30 * S)) == []
+
+
+def test_where_no_tag_is_in_reach_a_cell_may_be_one() -> None:
+    scans = scans_of(cell_m=2.0)
+    move(scans, 0, 7.0, -0.5)
+    read(scans, 1)
+    (scan,) = move(scans, 2, 0.0)
+    assert (scan.tag_id, scan.place) == ("cell 3 -1", Place(7.0, -1.0))
+    assert scans.tag == "A"
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=50))
+def test_mean_and_spread_are_the_definitions(values: list[float]) -> None:
+    scans = scans_of()
+    move(scans, 0, 0.0)
+    for value in values:
+        read(scans, 1, value)
+    (scan,) = move(scans, 2, 9.0)
+    assert scan.readings[0][1] == pytest.approx(statistics.fmean(values), abs=1e-6)
+    spread = float(scan.detail.split("±")[1].split()[0])
+    assert spread == pytest.approx(statistics.stdev(values), rel=0.06, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("path", "number"), [("data", 1.5), ("axes[1].value", 7.0), ("list[0]", 4.0), ("is_on", 1.0)]
+)
+def test_a_number_is_found_by_its_path(path: str, number: float) -> None:
+    axes = [SimpleNamespace(value=6), SimpleNamespace(value=7)]
+    message = SimpleNamespace(data=1.5, axes=axes, list=[4], is_on=True, text="8")
+    assert number_of(message, path) == number
+
+
+@pytest.mark.parametrize("path", ["none", "axes[0]", "list[3]", "text", "data.x"])
+def test_what_is_no_number_is_an_error(path: str) -> None:
+    message = SimpleNamespace(data=1.5, axes=[SimpleNamespace()], list=[4], text="8")
+    with pytest.raises((AttributeError, LookupError, TypeError)):
+        number_of(message, path)

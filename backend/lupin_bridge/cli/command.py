@@ -21,6 +21,7 @@ from lupin_bridge.cli.configuration import (
     take_secrets,
 )
 from lupin_bridge.settings import SettingError, Settings, limits_of, option, table
+from lupin_twin.adapt import cli as adapt
 from lupin_twin.runtime.process import exit_after, limit_blas_threads, return_large_blocks
 
 log = logging.getLogger(__name__)
@@ -33,11 +34,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     limit_blas_threads()
     return_large_blocks()
     own, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
-    if own[:1] == ["adapt"]:
-        from lupin_twin.adapt.cli import main as adapt  # noqa: PLC0415  # it has options of its own
-
-        return adapt([*own[1:], "--ros-args", *ros_args[1:]] if ros_args else own[1:])
     options = parser().parse_args(own)
+    if options.role == "adapt":
+        return adapt.run(options, ros_args)
     if options.role == "journal":
         if ros_args:
             _fail("journal takes no arguments of ROS: name its file with --journal or --namespace")
@@ -221,6 +220,9 @@ def parser() -> argparse.ArgumentParser:
             )
     journal.add_parser(roles)
     archive.add_parsers(roles)
+    adapt.add_options(
+        roles.add_parser("adapt", help=adapt.HELP, description=adapt.HELP, allow_abbrev=False)
+    )
     return made
 
 

@@ -9,7 +9,9 @@ from typing import Any
 import pytest
 import yaml
 
-from lupin_twin.adapt.config import ConfigError, Place, Robot, Sensor, config_of, read_config
+from lupin_twin.adapt.config import Place, Robot, Sensor, config_of, read_config
+from lupin_twin.adapt.table import ConfigError
+from tests.support.docs import block_named
 
 LEAST = """
 robot: {topic: /amcl_pose, type: geometry_msgs/msg/PoseWithCovarianceStamped}
@@ -57,6 +59,15 @@ def test_one_quantity_may_have_several_fixed_sensors() -> None:
     assert (second.name, second.tag, second.offset) == ("co2", "B", -20.0)
 
 
+@pytest.mark.parametrize("name", ["adapt", "adapt-mqtt"])
+def test_what_the_docs_show_is_taken(name: str) -> None:
+    config = config_of(yaml.safe_load(block_named(name).text))
+    assert len(config.tags) == 2
+    assert len(config.sensors) == (2 if name == "adapt" else 0)
+    # Zigbee2MQTT's availability is a topic of its own.
+    assert config.broker is None or len(config.broker.patterns) == 4
+
+
 def changed(path: str, value: Any) -> dict[str, Any]:
     """The least configuration with another value; `...` takes the key away."""
     content: dict[str, Any] = yaml.safe_load(LEAST)
@@ -74,7 +85,7 @@ def changed(path: str, value: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("path", "value", "complaint"),
     [
-        ("sensors", ..., "sensors: none is given"),
+        ("sensors", ..., "sensors: none is given, and no mqtt"),
         ("sensors.temperature.topic", ..., "sensors.temperature.topic is missing"),
         ("sensors.temperature.factr", 2, "sensors.temperature.'factr' is not known, expected one"),
         ("sensors.temperature.factor", "2", "sensors.temperature.factor is '2', expected a number"),

@@ -9,23 +9,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_twin.adapt.config import Config, Place, Robot, Sensor
+from lupin_twin.adapt.config import Config, Place, Robot
 from lupin_twin.adapt.scans import MadeScan, Scans, number_of
 
 S = 1_000_000_000
 ROBOT = Robot("/pose", "geometry_msgs/msg/PoseStamped", max_age_s=30.0)
-TEMPERATURE = Sensor("temperature", "/t", "std_msgs/msg/Float32", "data")
-FIXED = Sensor("co2", "/c", "std_msgs/msg/Float32", "data", tag="B")
 TAGS = {"A": Place(0.0, 0.0), "B": Place(3.0, 0.0, 0.5)}
 
 
 def scans_of(**changes: object) -> Scans:
     given: dict[str, object] = {"robot": ROBOT, "tags": TAGS, "reach_m": 0.8, "window_s": 10.0}
-    return Scans(Config((TEMPERATURE, FIXED), **(given | changes)))  # type: ignore[arg-type]
+    return Scans(Config((), **(given | changes)))  # type: ignore[arg-type]
 
 
-def read(scans: Scans, at_s: float, value: float = 20.0, sensor: Sensor = TEMPERATURE) -> bool:
-    return scans.take(sensor, value, int(at_s * S), int(at_s * S))
+def read(scans: Scans, at_s: float, value: float = 20.0) -> bool:
+    return scans.take("temperature", "", value, int(at_s * S), int(at_s * S))
 
 
 def move(scans: Scans, at_s: float, x: float, y: float = 0.0) -> list[MadeScan]:
@@ -113,7 +111,7 @@ def test_a_clock_that_goes_back_begins_anew() -> None:
 def test_a_fixed_sensor_needs_no_robot() -> None:
     scans = scans_of(robot=None)
     for at in range(10):
-        assert read(scans, at, 400.0 + at, FIXED)
+        assert scans.take("co2", "B", 400.0 + at, at * S, at * S)
     (scan,) = scans.due(10 * S)
     assert (scan.tag_id, scan.place, scan.stamp_ns) == ("B", TAGS["B"], 9 * S)
     assert scan.readings == (("co2", 404.5),)

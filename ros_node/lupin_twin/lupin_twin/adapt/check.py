@@ -11,9 +11,10 @@ from typing import Any, Final
 import yaml
 from rclpy.node import Node
 
-from lupin_twin.adapt.config import POSES, STANDARD, Config, ConfigError, Sensor
+from lupin_twin.adapt.config import POSES, STANDARD, Config, Sensor
 from lupin_twin.adapt.node import ANY_PUBLISHER, MAX_SKEW_S, message_type
 from lupin_twin.adapt.scans import number_of
+from lupin_twin.adapt.table import ConfigError
 
 LOOK_S: Final = 0.2
 

@@ -20,39 +20,44 @@ USAGE_ERROR = 2
 WRONG = 1
 
 
-def parser() -> argparse.ArgumentParser:
-    """The options; ROS's own come behind `--ros-args`."""
-    made = argparse.ArgumentParser(
-        prog="adapt",
-        description="Makes observations of a robot's own topics, or of fixed sensors.",
-        epilog="Everything from --ros-args on goes to ROS: --ros-args -p use_sim_time:=true.",
-        allow_abbrev=False,
-    )
-    made.add_argument("--config", type=Path, metavar="FILE", help="YAML: topics, tags, sensors")
-    made.add_argument(
+HELP = "make observations of a robot's own topics, or of sensors at an MQTT broker"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The command's own options; ROS's come behind `--ros-args`."""
+    parser.add_argument("--config", type=Path, metavar="FILE", help="YAML: topics, tags, sensors")
+    parser.add_argument(
         "--check",
         action="store_true",
         help="listen, say what comes and what is missing, and end; without --config, print a "
         "configuration to start from",
     )
-    made.add_argument(
+    parser.add_argument(
         "--seconds", type=float, default=10.0, metavar="S", help="how long to listen (default: 10)"
     )
-    return made
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run it; returns the exit code: 2 for a wrong configuration, 1 where --check found a fault."""
+    """The executable of the ROS package; see `run`."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     split = arguments.index("--ros-args") if "--ros-args" in arguments else len(arguments)
-    own, ros_args = arguments[:split], arguments[split:]
-    options = parser().parse_args(own)
+    made = argparse.ArgumentParser(prog="adapt", description=HELP, allow_abbrev=False)
+    add_options(made)
+    return run(made.parse_args(arguments[:split]), arguments[split:])
+
+
+def run(options: argparse.Namespace, ros_args: Sequence[str]) -> int:
+    """Run it until a signal ends it.
+
+    Returns the exit code: 2 for a wrong configuration, 1 where --check found a fault.
+    """
     if options.config is None and not options.check:
         return _refuse("--config FILE is missing; --check prints one to start from")
     if not 0.1 <= options.seconds <= 3600.0:
         return _refuse(f"--seconds is {options.seconds:g}, must be from 0.1 to 3600")
     process.block()  # before anything slow is imported
-    from lupin_twin.adapt.config import ConfigError, read_config  # noqa: PLC0415  # see above
+    from lupin_twin.adapt.config import read_config  # noqa: PLC0415  # see above
+    from lupin_twin.adapt.table import ConfigError  # noqa: PLC0415  # see above
 
     try:
         config = None if options.config is None else read_config(options.config)
@@ -71,7 +76,7 @@ def command() -> NoReturn:
     exit_after(main)
 
 
-def _with_ros(ros_args: list[str], role: Callable[[], int]) -> int:
+def _with_ros(ros_args: Sequence[str], role: Callable[[], int]) -> int:
     import rclpy  # noqa: PLC0415  # see `main`
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
 

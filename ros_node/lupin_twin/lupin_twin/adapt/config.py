@@ -8,21 +8,19 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import yaml
 
-from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS, MAX_TEXT_LENGTH
+from lupin_twin.adapt.mqtt_topics import Broker, broker_of
+from lupin_twin.adapt.table import ConfigError, Table, check_text, is_number, shown
+from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
 
 MAX_FILE_BYTES: Final = 4_000_000
 _TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Za-z][A-Za-z0-9]*")
 _FIELD: Final = re.compile(r"[a-z]\w*(\[\d+\])?(\.[a-z]\w*(\[\d+\])?)*")
-
-
-class ConfigError(ValueError):
-    """A configuration that cannot be; the message names the key, the value and the limit."""
 
 
 class Quantity(NamedTuple):
@@ -102,11 +100,12 @@ class Config:
 
     sensors: tuple[Sensor, ...]
     robot: Robot | None = None
-    tags: Mapping[str, Place] = ()  # type: ignore[assignment]  # always given, see `config_of`
+    tags: Mapping[str, Place] = field(default_factory=dict)
     frame_id: str = "map"
     reach_m: float = 0.8
     window_s: float = 10.0
     cell_m: float = 0.0
+    broker: Broker | None = None
 
 
 def read_config(path: Path) -> Config:
@@ -121,10 +120,10 @@ def read_config(path: Path) -> Config:
 
 def config_of(content: Any, folder: Path = Path()) -> Config:
     """The same of what the file holds; see `read_config`."""
-    table = _Table("", content)
-    robot = _robot(_Table("robot", table.take("robot"))) if table.has("robot") else None
+    table = Table("", content)
+    robot = _robot(Table("robot", table.take("robot"))) if table.has("robot") else None
     tags = dict(_tags(table.take("tags", {}), folder))
-    sensors = tuple(_sensors(_Table("sensors", table.take("sensors", {}))))
+    sensors = tuple(_sensors(Table("sensors", table.take("sensors", {}))))
     config = Config(
         sensors,
         robot,
@@ -133,10 +132,11 @@ def config_of(content: Any, folder: Path = Path()) -> Config:
         reach_m=table.number("reach_m", 0.8, 0.01, 100.0),
         window_s=table.number("window_s", 10.0, 0.1, 3600.0),
         cell_m=table.number("cell_m", 0.0, 0.0, 100.0),
+        broker=broker_of(Table("mqtt", table.take("mqtt")), folder) if table.has("mqtt") else None,
     )
     table.end()
-    if not sensors:
-        raise ConfigError("sensors: none is given, expected one at least")
+    if not sensors and config.broker is None:
+        raise ConfigError("sensors: none is given, and no mqtt: expected one of them at least")
     for sensor in sensors:
         if sensor.tag and sensor.tag not in tags:
             raise ConfigError(
@@ -152,7 +152,7 @@ def config_of(content: Any, folder: Path = Path()) -> Config:
     return config
 
 
-def _robot(table: _Table) -> Robot:
+def _robot(table: Table) -> Robot:
     robot = Robot(
         topic=table.text("topic"),
         type_name=table.one_of("type", POSES),
@@ -165,47 +165,46 @@ def _robot(table: _Table) -> Robot:
 def _tags(content: Any, folder: Path) -> Iterator[tuple[str, Place]]:
     if isinstance(content, str):
         content = _yaml(folder / content)
-    table = _Table("tags", content)
+    table = Table("tags", content)
     if len(table.content) > MAX_TAGS:
         raise ConfigError(f"tags: {len(table.content)}, the limit is {MAX_TAGS}")
     for key in tuple(table.content):
         # 12 without quotes is a number in YAML, and the name of a tag nevertheless.
         name = str(key) if isinstance(key, int) and not isinstance(key, bool) else key
-        _check_text("tags", name)
+        check_text("tags", name)
         at = table.take(key)
         if (
             not isinstance(at, list)
             or len(at) not in (2, 3)
-            or not all(_is_number(each) for each in at)
+            or not all(is_number(each) for each in at)
         ):
-            raise ConfigError(f"tags.{name} is {_shown(at)}, expected [x, y] or [x, y, z] in m")
+            raise ConfigError(f"tags.{name} is {shown(at)}, expected [x, y] or [x, y, z] in m")
         yield name, Place(*map(float, at))
 
 
-def _sensors(table: _Table) -> Iterator[Sensor]:
+def _sensors(table: Table) -> Iterator[Sensor]:
     if len(table.content) > MAX_SENSORS_PER_TAG:
         raise ConfigError(f"sensors: {len(table.content)}, the limit is {MAX_SENSORS_PER_TAG}")
     for name in tuple(table.content):
-        _check_text("sensors", name)
+        check_text("sensors", name)
         given = table.take(name)
         several = isinstance(given, list)
         for number, each in enumerate(given if several else [given]):
             called = f"sensors.{name}[{number}]" if several else f"sensors.{name}"
-            yield _sensor(name, _Table(called, each))
+            yield _sensor(name, Table(called, each))
 
 
-def _sensor(name: str, table: _Table) -> Sensor:
+def _sensor(name: str, table: Table) -> Sensor:
     type_name = table.text("type")
     if not _TYPE.fullmatch(type_name):
         raise ConfigError(
-            f"{table.name}.type is {_shown(type_name)}, expected such as "
-            "sensor_msgs/msg/Temperature"
+            f"{table.name}.type is {shown(type_name)}, expected such as sensor_msgs/msg/Temperature"
         )
     known = STANDARD.get(type_name)
     field = table.text("field", None if known is None else known.field)
     if not _FIELD.fullmatch(field):
         raise ConfigError(
-            f"{table.name}.field is {_shown(field)}, expected a path such as data or axes[2].value"
+            f"{table.name}.field is {shown(field)}, expected a path such as data or axes[2].value"
         )
     # The factor is that of the standard field: another number of the message is in its own unit.
     factor = known.factor if known is not None and field == known.field else 1.0
@@ -224,85 +223,6 @@ def _sensor(name: str, table: _Table) -> Sensor:
     if sensor.low > sensor.high:
         raise ConfigError(f"{table.name}.min is {sensor.low:g}, above max, {sensor.high:g}")
     return sensor
-
-
-class _Table:
-    """A mapping of the file, taken key by key; what is left at the end is a mistake."""
-
-    def __init__(self, name: str, content: Any) -> None:
-        if not isinstance(content, dict):
-            raise ConfigError(
-                f"{name or 'the file'} is {_shown(content)}, expected keys and values"
-            )
-        self.name = name
-        self.content: dict[Any, Any] = dict(content)
-        self._known: list[str] = []
-
-    def has(self, key: str) -> bool:
-        return key in self.content
-
-    def take(self, key: Any, *default: Any) -> Any:
-        self._known.append(key)
-        if key not in self.content and not default:
-            raise ConfigError(f"{self._called(key)} is missing")
-        return self.content.pop(key, *default)
-
-    def text(self, key: str, default: str | None = None) -> str:
-        value = self.take(key) if default is None else self.take(key, default)
-        return _check_text(self._called(key), value)
-
-    def one_of(self, key: str, names: Mapping[str, Any]) -> str:
-        value = self.take(key)
-        if value not in names:
-            raise ConfigError(
-                f"{self._called(key)} is {_shown(value)}, expected one of {', '.join(names)}"
-            )
-        return str(value)
-
-    def number(
-        self, key: str, default: float, low: float = -math.inf, high: float = math.inf
-    ) -> float:
-        value = self.take(key, default)
-        if value is not default and not _is_number(value):
-            raise ConfigError(f"{self._called(key)} is {_shown(value)}, expected a number")
-        if not low <= value <= high:
-            raise ConfigError(
-                f"{self._called(key)} is {_shown(value)}, must be from {low:g} to {high:g}"
-            )
-        return float(value)
-
-    def end(self) -> None:
-        for key in self.content:
-            raise ConfigError(
-                f"{self._called(_shown(key))} is not known, expected one of "
-                f"{', '.join(self._known)}"
-            )
-
-    def _called(self, key: object) -> str:
-        return f"{self.name}.{key}" if self.name else str(key)
-
-
-def _check_text(what: str, value: Any) -> str:
-    if not isinstance(value, str) or not 0 < len(value) <= MAX_TEXT_LENGTH:
-        raise ConfigError(
-            f"{what}: {_shown(value)} is no text of 1 to {MAX_TEXT_LENGTH} characters; "
-            "YAML takes yes, on and numbers for something else, unless they are in quotes"
-        )
-    return value
-
-
-def _is_number(value: Any) -> bool:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:  # an integer of hundreds of digits
-        return False
-
-
-def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else f"{text[:79]}…"
 
 
 def _yaml(path: Path) -> Any:

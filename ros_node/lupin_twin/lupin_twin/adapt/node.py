@@ -9,6 +9,7 @@ import importlib
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
@@ -21,16 +22,20 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header
 
-from lupin_twin.adapt.config import POSES, Config, ConfigError, Place, Sensor
+from lupin_twin.adapt.config import POSES, Config, Place, Sensor
+from lupin_twin.adapt.mqtt import Message, MqttClient
+from lupin_twin.adapt.mqtt_topics import Pattern, PayloadError, measured
 from lupin_twin.adapt.scans import MadeScan, Scans, number_of
+from lupin_twin.adapt.table import ConfigError
 from lupin_twin.core import interfaces
 from lupin_twin.core.diagnostics import OK, WARN, Finding
-from lupin_twin.core.drops import Drop, Reason
+from lupin_twin.core.drops import RECENT_S, Drop, Reason
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.ros import convert
-from lupin_twin.ros.base_node import NodeUtilities, latched, qos_of
+from lupin_twin.ros.base_node import NodeUtilities, latched, qos_of, waker
 
 SOURCE: Final = "adapt"
+MQTT: Final = "MQTT"
 # Matches every publisher, also those that drop messages rather than wait.
 ANY_PUBLISHER: Final = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 MAX_MESSAGE_BYTES: Final = 1_000_000
@@ -61,6 +66,15 @@ def message_type(name: str) -> Any:
         raise ConfigError(f"type {name}: the package {package} has no message {message}") from None
 
 
+@dataclass(frozen=True, slots=True)
+class _Dropped:
+    """How often something was wrong, and the last time in words; `last_s` by the steady clock."""
+
+    count: int
+    text: str
+    last_s: float
+
+
 class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
     """Readings in, observations out. Belongs to the thread that spins it.
 
@@ -78,6 +92,8 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.received: Counter[str] = Counter()
         self.used: Counter[str] = Counter()
         self._heard_s: dict[str, float] = {}
+        # By case: what was wrong with one sensor must not hide what is wrong with another.
+        self._dropped: dict[str, _Dropped] = {}
         self._made = 0
         self._moved_s = 0.0
         self._started_s = time.monotonic()
@@ -90,8 +106,13 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._diagnostics = self.create_publisher(
             DiagnosticArray, interfaces.DIAGNOSTICS.name, qos_of(interfaces.DIAGNOSTICS)
         )
+        self._mqtt: MqttClient | None = None
         self._subscribe()
         self._publish_tags()
+        if config.broker is not None:
+            arrived = self.create_guard_condition(self.utilities.guarded("MQTT", self._on_mqtt))
+            self._mqtt = MqttClient(config.broker, waker(arrived))
+            self._mqtt.start()
         self.utilities.every(None, 1.0, "the second", self._each_second)
 
     def _subscribe(self) -> None:
@@ -131,7 +152,11 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             raise ConfigError(f"topic {topic!r}: {str(error).partition(chr(10))[0]}") from None
 
     def _drop(self, reason: Reason, topic: str, why: str, case: str = "") -> None:
-        self.utilities.drop(Drop(reason, why, case=case), topic)
+        drop = Drop(reason, why, case=case)
+        self.utilities.drop(drop, topic)
+        key = case or reason.value
+        count = self._dropped[key].count if key in self._dropped else 0
+        self._dropped[key] = _Dropped(count + 1, drop.on(topic), time.monotonic())
 
     def _now_ns(self) -> int:
         return int(self.get_clock().now().nanoseconds)
@@ -181,7 +206,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
                     f"{sensor.name} is {value:g}, must be from {sensor.low:g} to {sensor.high:g}",
                     case=f"range {sensor.name}",
                 )
-            elif self._scans.take(sensor, value, stamp_ns, self._now_ns()):
+            elif self._scans.take(sensor.name, sensor.tag, value, stamp_ns, self._now_ns()):
                 self.used[topic] += 1
 
     def _stamp_ns(self, topic: str, message: Any) -> int | None:
@@ -203,9 +228,70 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             return None
         return min(stamp_ns, now_ns)
 
+    def destroy_node(self) -> None:
+        """End the connection to the broker, too."""
+        if self._mqtt is not None:
+            self._mqtt.stop()
+        super().destroy_node()
+
+    def _on_mqtt(self) -> None:
+        assert self._mqtt is not None
+        assert self._config.broker is not None
+        for message in self._mqtt.take():
+            self.received[MQTT] += 1
+            for pattern in self._config.broker.patterns:
+                found = pattern.match(message.topic)
+                if found is not None:
+                    self._on_measured(pattern, *found, message)
+
+    def _on_measured(self, pattern: Pattern, tag: str, sensor: str, message: Message) -> None:
+        topic, now_ns = f"MQTT {message.topic[:80]}", self._now_ns()
+        try:
+            said = measured(pattern, tag, sensor, message.payload)
+        except PayloadError as error:
+            self._drop(Reason.REJECTED, topic, str(error), case="payload")
+            return
+        if said.is_away:
+            self._publish([self._scans.failed(tag, "its sensor is offline", now_ns)])
+            return
+        if said.stamp_s is None and message.is_retained and said.readings:
+            self._drop(
+                Reason.REJECTED,
+                topic,
+                "it is retained and says no time (time): nobody knows how old it is",
+                case="retained",
+            )
+            return
+        stamp_ns = now_ns
+        if said.stamp_s is not None:
+            ahead_s = said.stamp_s - time.time()
+            if ahead_s > MAX_SKEW_S:
+                why = f"its time is {ahead_s:.0f} s ahead, the limit is {MAX_SKEW_S:g} s"
+                self._drop(Reason.REJECTED, topic, f"{why}: is a clock wrong?", case="clock")
+                return
+            stamp_ns += int(min(ahead_s, 0.0) * NANOSECONDS_PER_SECOND)
+        for name, value in said.readings:
+            if self._scans.take(name, said.tag, value, stamp_ns, now_ns):
+                self.used[MQTT] += 1
+
     def _each_second(self) -> None:
         self._publish(self._scans.due(self._now_ns()))
         findings = [self._finding(topic) for topic in sorted(self._heard_s)]
+        if self._mqtt is not None:
+            if self._mqtt.problem:
+                self.utilities.warn(("mqtt", self._mqtt.problem), f"MQTT: {self._mqtt.problem}")
+            findings.append(
+                Finding(
+                    MQTT,
+                    WARN if self._mqtt.problem else OK,
+                    self._mqtt.problem or "connected",
+                    {
+                        "received": str(self.received[MQTT]),
+                        "used": str(self.used[MQTT]),
+                        "lost": str(self._mqtt.lost),
+                    },
+                )
+            )
         self._diagnostics.publish(
             convert.diagnostics(
                 [*findings, self._summary()], self.get_fully_qualified_name(), self._now_ns()
@@ -223,16 +309,16 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         )
 
     def _summary(self) -> Finding:
-        counts = self.utilities.counts()
-        dropped = [f"{drop.count} in 5 min: {drop.message}" for drop in counts.recent]
+        now_s, errors = time.monotonic(), self.utilities.callback_errors
+        recent = [it.text for it in self._dropped.values() if now_s - it.last_s < RECENT_S]
         return Finding(
             "observations",
-            WARN if dropped or counts.callback_errors else OK,
-            "; ".join(dropped) or f"at {self._scans.tag or 'no tag'}",
+            WARN if recent or errors else OK,
+            "; ".join(recent) or f"at {self._scans.tag or 'no tag'}",
             {
                 "made": str(self._made),
-                "errors": str(counts.callback_errors),
-                **{f"dropped {why}": str(count) for why, count in counts.dropped.items()},
+                "errors": str(errors),
+                **{f"dropped: {case}": str(it.count) for case, it in self._dropped.items()},
             },
         )
 

@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Final
 
-from lupin_twin.adapt.config import Config, Place, Sensor
+from lupin_twin.adapt.config import Config, Place
+from lupin_twin.core.drops import MAX_TAGS
 
 LEAVES: Final = 1.1
 # Who was at a tag for so long and read nothing has failed; one that passed by has not.
@@ -74,6 +75,8 @@ class Scans:
         self._config = config
         self._places: dict[str, Place] = dict(config.tags)
         self._tag: str | None = None
+        # Where that is, if it is a cell.
+        self._cell: Place | None = None
         self._seen_ns = 0
         self._visit: _Window | None = None
         self._fixed: dict[str, _Window] = {}
@@ -88,17 +91,33 @@ class Scans:
         """The robot is here, m; yields the scan that ends by it."""
         yield from self.due(now_ns)
         self._seen_ns = now_ns
-        yield from self._be_at(self._nearest(x, y), now_ns)
+        tag_id = self._nearest(x, y)
+        cell_m = self._config.cell_m
+        if tag_id is None and cell_m:
+            i, j = math.floor(x / cell_m), math.floor(y / cell_m)
+            cell = Place((i + 0.5) * cell_m, (j + 0.5) * cell_m)
+            yield from self._be_at(f"cell {i} {j}", now_ns, cell)
+        else:
+            yield from self._be_at(tag_id, now_ns)
 
-    def take(self, sensor: Sensor, value: float, stamp_ns: int, now_ns: int) -> bool:
-        """A reading, in the sensor's unit; returns whether it belongs to a tag."""
-        if sensor.tag:
-            window = self._fixed.setdefault(sensor.tag, _Window(now_ns))
+    def failed(self, tag_id: str, detail: str, now_ns: int) -> MadeScan:
+        """A failed attempt at a tag."""
+        return MadeScan(tag_id, now_ns, self._place(tag_id), (), detail)
+
+    def take(self, sensor: str, tag: str, value: float, stamp_ns: int, now_ns: int) -> bool:
+        """A reading, in the sensor's unit; returns whether it belongs to a tag.
+
+        `tag` is where the sensor is fixed; empty: it is the robot's.
+        """
+        if tag:
+            if tag not in self._fixed and len(self._fixed) >= MAX_TAGS:
+                return False
+            window = self._fixed.setdefault(tag, _Window(now_ns))
         elif self._visit is not None:
             window = self._visit
         else:
             return False
-        window.add(sensor.name, value, stamp_ns)
+        window.add(sensor, value, stamp_ns)
         return True
 
     def due(self, now_ns: int) -> Iterator[MadeScan]:
@@ -118,11 +137,13 @@ class Scans:
             yield from self._ended(now_ns)
             self._visit = _Window(now_ns)
 
-    def _be_at(self, tag_id: str | None, now_ns: int) -> Iterator[MadeScan]:
+    def _be_at(
+        self, tag_id: str | None, now_ns: int, cell: Place | None = None
+    ) -> Iterator[MadeScan]:
         if tag_id == self._tag:
             return
         yield from self._ended(now_ns)
-        self._tag = tag_id
+        self._tag, self._cell = tag_id, cell
         self._visit = None if tag_id is None else _Window(now_ns)
 
     def _ended(self, now_ns: int) -> Iterator[MadeScan]:
@@ -133,9 +154,7 @@ class Scans:
             yield self._scan(tag_id, window)
         elif now_ns - window.begun_ns >= STAYED_NS:
             stayed_s = (now_ns - window.begun_ns) / NS
-            yield MadeScan(
-                tag_id, now_ns, self._place(tag_id), (), f"no reading in {stayed_s:.0f} s here"
-            )
+            yield self.failed(tag_id, f"no reading in {stayed_s:.0f} s here", now_ns)
 
     def _scan(self, tag_id: str, window: _Window) -> MadeScan:
         means = sorted(window.means.items())
@@ -144,7 +163,7 @@ class Scans:
         return MadeScan(tag_id, window.newest_ns, self._place(tag_id), readings, detail)
 
     def _place(self, tag_id: str) -> Place | None:
-        return self._places.get(tag_id) or _cell_place(tag_id, self._config.cell_m)
+        return self._places.get(tag_id, self._cell if tag_id == self._tag else None)
 
     def _nearest(self, x: float, y: float) -> str | None:
         reach_m, here = self._config.reach_m, self._tag
@@ -160,23 +179,11 @@ class Scans:
                 _distance_m(self._places.get(here), x, y) - found[0] <= (LEAVES - 1.0) * reach_m
             )
             return here if stays else found[1]
-        if here is not None:
-            return here
-        return _cell_of(x, y, self._config.cell_m) if self._config.cell_m else None
+        return here
 
 
 def _distance_m(place: Place | None, x: float, y: float) -> float:
     return math.inf if place is None else math.hypot(place.x - x, place.y - y)
-
-
-def _cell_of(x: float, y: float, cell_m: float) -> str:
-    return f"cell {math.floor(x / cell_m)} {math.floor(y / cell_m)}"
-
-
-def _cell_place(tag_id: str, cell_m: float) -> Place:
-    """The centre of a cell, from its name."""
-    i, j = map(int, tag_id.split()[1:])
-    return Place((i + 0.5) * cell_m, (j + 0.5) * cell_m)
 
 
 def number_of(message: object, path: str) -> float:

@@ -1,0 +1,304 @@
+"""MQTT in: which topics, what stands where in a payload, and what it says of which tag. Pure."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final
+from urllib.parse import urlsplit
+
+from lupin_twin.adapt.table import ConfigError, Table, shown
+
+PORTS: Final = {"mqtt": 1883, "mqtts": 8883}
+MAX_TOPICS: Final = 100
+MAX_PAYLOAD_BYTES: Final = 65_536
+# A number above this is milliseconds since the epoch, not seconds: as seconds, the year 5138.
+_MILLISECONDS: Final = 1e11
+_PLACEHOLDER: Final = re.compile(r"\{(tag|sensor)\}|(\+)")
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """Where a payload has a sensor, keys with full stops between, and how that becomes our unit."""
+
+    path: str = ""
+    factor: float = 1.0
+    offset: float = 0.0
+    low: float = -math.inf
+    high: float = math.inf
+
+
+# What Zigbee2MQTT calls it: https://www.zigbee2mqtt.io/guide/usage/exposes.html
+_ZIGBEE: Final = {
+    "temperature": Value("temperature"),
+    "humidity": Value("humidity", low=0.0, high=100.0),
+    "soil_moisture": Value("soil_moisture", low=0.0, high=100.0),
+    "light": Value("illuminance", low=0.0),
+    "co2": Value("co2", low=0.0),
+}
+# What Home Assistant's statestream has behind the last underscore of an entity:
+# https://www.home-assistant.io/integrations/mqtt_statestream/
+_HOME_ASSISTANT: Final = {
+    "temperature": "temperature",
+    "humidity": "humidity",
+    "illuminance": "light",
+    "carbon_dioxide": "co2",
+    "co2": "co2",
+    "soil_moisture": "soil_moisture",
+    "moisture": "soil_moisture",
+}
+PRESETS: Final = ("zigbee2mqtt", "homeassistant")
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """One line of the configuration: a topic, and what its payloads mean.
+
+    `values` by sensor; without any, the payload is one number, of the sensor in the topic. `names`
+    are what the topic may call a sensor, by what it is here. `time` is where a payload says when it
+    was measured. With `is_availability`, the payload says whether the tag's sensor is there.
+    """
+
+    topic: str
+    tag: str = ""
+    sensor: str = ""
+    values: Mapping[str, Value] = field(default_factory=dict)
+    plain: Value = Value()
+    names: Mapping[str, str] = field(default_factory=dict)
+    time: str = ""
+    is_availability: bool = False
+
+    @property
+    def filter(self) -> str:
+        """What to subscribe to: a level with a placeholder is any."""
+        return "/".join("+" if _PLACEHOLDER.search(part) else part for part in self._levels)
+
+    @property
+    def _levels(self) -> list[str]:
+        return self.topic.split("/")
+
+    def match(self, topic: str) -> tuple[str, str] | None:
+        """Tag and sensor of a topic, each empty where it says none; None: it is another's."""
+        found = re.fullmatch(_regex(self.topic, tuple(self.names)), topic)
+        if found is None:
+            return None
+        named = found.groupdict()
+        sensor = named.get("sensor", self.sensor)
+        return named.get("tag", self.tag), self.names.get(sensor, sensor)
+
+
+@dataclass(frozen=True, slots=True)
+class Broker:
+    """Where the broker is, who we are to it, and what is listened to there."""
+
+    host: str
+    port: int
+    patterns: tuple[Pattern, ...]
+    user: str = ""
+    password: str = ""
+    is_tls: bool = False
+    ca: str = ""
+
+
+class PayloadError(ValueError):
+    """A payload that says nothing; the message says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What one message says: readings of a tag, or that its sensor is not there.
+
+    `stamp_s` is seconds since the epoch, None: the payload does not say.
+    """
+
+    tag: str
+    readings: tuple[tuple[str, float], ...] = ()
+    stamp_s: float | None = None
+    is_away: bool = False
+
+
+def measured(pattern: Pattern, tag: str, sensor: str, payload: bytes) -> Measured:
+    """What a payload says.
+
+    Raises:
+        PayloadError: it has no number where one was expected, or one out of range.
+
+    """
+    if len(payload) > MAX_PAYLOAD_BYTES:
+        raise PayloadError(f"{len(payload)} bytes, the limit is {MAX_PAYLOAD_BYTES}")
+    if pattern.is_availability:
+        return Measured(tag, is_away=b"offline" in payload)
+    if not pattern.values:
+        return Measured(tag, ((sensor, _number(payload, pattern.plain, "the payload")),))
+    try:
+        content = json.loads(payload)
+    except (ValueError, RecursionError):
+        raise PayloadError(f"it is no JSON: {shown(payload[:40])}") from None
+    readings = []
+    for name, value in pattern.values.items():
+        found = _at(content, value.path)
+        if found is not None:  # a device says what it has
+            readings.append((name, _number(found, value, value.path)))
+    if not readings:
+        paths = ", ".join(value.path for value in pattern.values.values())
+        raise PayloadError(f"it has none of {paths}")
+    stamp = _at(content, pattern.time) if pattern.time else None
+    return Measured(tag, tuple(readings), None if stamp is None else _seconds(stamp))
+
+
+def broker_of(table: Table, folder: Path) -> Broker:
+    """The broker of the configuration.
+
+    Raises:
+        ConfigError: a key that cannot be.
+
+    """
+    text = table.text("url")
+    url = urlsplit(text)
+    try:
+        port = url.port
+    except ValueError:
+        port = 0
+    if url.scheme not in PORTS or not url.hostname or port == 0 or url.path.strip("/"):
+        raise ConfigError(f"mqtt.url is {shown(text)}, expected such as mqtt://broker.lan:1883")
+    if "@" in url.netloc:
+        raise ConfigError("mqtt.url has a user in it: use mqtt.user and mqtt.password_file")
+    listed = table.take("topics")
+    if not isinstance(listed, list) or not 0 < len(listed) <= MAX_TOPICS:
+        raise ConfigError(f"mqtt.topics is {shown(listed)}, expected a list of 1 to {MAX_TOPICS}")
+    patterns: list[Pattern] = []
+    for number, each in enumerate(listed):
+        patterns.extend(_patterns(Table(f"mqtt.topics[{number}]", each)))
+    broker = Broker(
+        url.hostname,
+        port or PORTS[url.scheme],
+        tuple(patterns),
+        user=str(table.take("user", "")),
+        password=_password(table, folder),
+        is_tls=url.scheme == "mqtts",
+        ca=str(table.take("ca", "")),
+    )
+    table.end()
+    return broker
+
+
+def _password(table: Table, folder: Path) -> str:
+    file = table.take("password_file", "")
+    if not file:
+        return ""
+    try:
+        return (folder / str(file)).read_text(encoding="utf-8").strip()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is no text"
+        raise ConfigError(f"mqtt.password_file {file}: {reason}") from None
+
+
+def _patterns(table: Table) -> Iterator[Pattern]:
+    topic = table.text("topic")
+    if "#" in topic or topic.startswith("/") or "$" in topic:
+        raise ConfigError(
+            f"{table.name}.topic is {shown(topic)}, expected levels with {{tag}}, {{sensor}} or +"
+        )
+    preset = table.one_of("preset", PRESETS) if table.has("preset") else ""
+    tag = str(table.take("tag", ""))
+    if bool(tag) == ("{tag}" in topic):
+        raise ConfigError(f"{table.name}: expected {{tag}} in its topic, or tag; one of them")
+    sensor = table.text("sensor") if table.has("sensor") else ""
+    values = _values(Table(f"{table.name}.values", table.take("values", {})))
+    if preset == "zigbee2mqtt":
+        values = {**_ZIGBEE, **values}
+        yield Pattern(f"{topic}/availability", tag, is_availability=True)
+    names = _HOME_ASSISTANT if preset == "homeassistant" else {}
+    if not values and bool(sensor) == ("{sensor}" in topic):
+        raise ConfigError(
+            f"{table.name}: a payload that is a number needs {{sensor}} in its topic, or sensor; "
+            "JSON needs values, or a preset"
+        )
+    if table.has("availability"):
+        there = table.text("availability")
+        yield Pattern(there, tag, is_availability=True)
+    default = "last_seen" if preset == "zigbee2mqtt" else ""
+    time = table.text("time") if table.has("time") else default
+    yield Pattern(topic, tag, sensor, values, _value(table), names, time)
+    table.end()
+
+
+def _values(table: Table) -> dict[str, Value]:
+    values = {}
+    for name in tuple(table.content):
+        given = table.take(name)
+        if isinstance(given, str):
+            values[str(name)] = Value(given)
+            continue
+        each = Table(f"{table.name}.{name}", given)
+        path = each.text("path")
+        values[str(name)] = _value(each, path)
+        each.end()
+    return values
+
+
+def _value(table: Table, path: str = "") -> Value:
+    return Value(
+        path,
+        factor=table.number("factor", 1.0),
+        offset=table.number("offset", 0.0),
+        low=table.number("min", -math.inf),
+        high=table.number("max", math.inf),
+    )
+
+
+def _regex(topic: str, sensors: tuple[str, ...]) -> str:
+    """A topic's pattern; a sensor is one of those names, where there are any."""
+    # The longest first: `soil_moisture` ends with `moisture`.
+    known = "|".join(map(re.escape, sorted(sensors, key=len, reverse=True)))
+    parts, at = [], 0
+    for found in _PLACEHOLDER.finditer(topic):
+        parts.append(re.escape(topic[at : found.start()]))
+        name = found[1]
+        any_level = known if known and name == "sensor" else "[^/]+?"
+        parts.append(f"(?P<{name}>{any_level})" if name else "[^/]+")
+        at = found.end()
+    return "".join(parts) + re.escape(topic[at:])
+
+
+def _at(content: Any, path: str) -> Any:
+    for key in path.split("."):
+        if isinstance(content, list) and key.isdecimal() and int(key) < len(content):
+            content = content[int(key)]
+        elif isinstance(content, dict):
+            content = content.get(key)
+        else:
+            return None
+    return content
+
+
+def _number(found: Any, value: Value, what: str) -> float:
+    """A number, also where it is written as text."""
+    try:
+        # true is a number to Python, and none to who reads a temperature.
+        number = float("" if isinstance(found, bool) else found) * value.factor + value.offset
+    except (TypeError, ValueError, OverflowError):
+        raise PayloadError(f"{what} is {shown(found)[:80]}, expected a number") from None
+    if not value.low <= number <= value.high or math.isinf(number):
+        raise PayloadError(f"{what} is {number:g}, must be from {value.low:g} to {value.high:g}")
+    return number
+
+
+def _seconds(stamp: Any) -> float:
+    """A moment in seconds since the epoch, of such a number, one of milliseconds, or ISO 8601."""
+    try:
+        if isinstance(stamp, str):
+            moment = datetime.fromisoformat(stamp)
+            return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+        if isinstance(stamp, int | float) and not isinstance(stamp, bool):
+            seconds = stamp / 1000 if stamp > _MILLISECONDS else float(stamp)
+            if 0 < seconds < _MILLISECONDS:
+                return seconds
+    except (ValueError, OverflowError):
+        pass
+    raise PayloadError(f"its time is {shown(stamp)}, expected ISO 8601 or seconds since the epoch")

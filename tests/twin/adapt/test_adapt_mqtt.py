@@ -1,0 +1,131 @@
+"""Fixed sensors at a real broker, on the state of a twin that has never heard of MQTT."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from paho.mqtt.client import Client
+from paho.mqtt.enums import CallbackAPIVersion
+
+from tests.support.mosquitto import Broker
+from tests.support.processes import Process, twin_node
+from tests.support.ros import Peer
+from tests.twin.adapt.test_adapt import Robot, adapt
+
+CONFIG = """
+tags: {{bench: [1.0, 2.0]}}
+window_s: 0.2
+mqtt:
+  url: {url}
+  topics:
+    - {{topic: "zigbee2mqtt/{{tag}}", preset: zigbee2mqtt}}
+    - {{topic: "plain/{{tag}}/{{sensor}}", max: 2000}}
+"""
+
+
+@contextmanager
+def adapted(domain: int, broker: Broker) -> Iterator[Process]:
+    path = broker.folder / "adapt.yaml"
+    path.write_text(CONFIG.format(url=broker.url))
+    with adapt(domain, "--config", str(path)) as process:
+        yield process
+
+
+@contextmanager
+def device(broker: Broker) -> Iterator[Client]:
+    client = Client(CallbackAPIVersion.VERSION2)
+    client.connect("127.0.0.1", broker.port)
+    client.loop_start()
+    try:
+        yield client
+    finally:
+        client.disconnect()
+        client.loop_stop()
+
+
+def readings(peer: Peer, tag_id: str) -> dict[str, float]:
+    """What the newest state has of a tag."""
+    tags = {tag.tag_id: tag for tag in peer.states[-1].tags} if peer.states else {}
+    tag: Any = tags.get(tag_id)
+    return {} if tag is None else {each.name: each.value for each in tag.readings}
+
+
+def test_what_zigbee_sensors_say_is_on_the_state_and_so_is_that_one_is_gone(
+    domain: int, tmp_path: Path
+) -> None:
+    broker = Broker(tmp_path)
+    payload = json.dumps({"temperature": 21.5, "humidity": 60, "battery": 90})
+    with (
+        broker.running(),
+        twin_node(domain),
+        adapted(domain, broker) as process,
+        Peer(domain) as peer,
+        device(broker) as client,
+    ):
+        robot = Robot(peer)
+        peer.listen()
+
+        def is_known() -> bool:
+            client.publish("zigbee2mqtt/bench", payload)
+            client.publish("plain/other/co2", "800")
+            return bool(readings(peer, "bench")) and bool(readings(peer, "other"))
+
+        peer.until(is_known, "both sensors on the state")
+        assert readings(peer, "bench") == {"temperature": 21.5, "humidity": 60.0}
+        assert readings(peer, "other") == {"co2": 800.0}
+        placed = {tag.tag_id: tag.pose.orientation.w for tag in peer.states[-1].tags}
+        assert placed == {"bench": 1.0, "other": 0.0}  # nobody has said where the other one is
+
+        client.publish("zigbee2mqtt/bench/availability", '{"state": "offline"}')
+
+        def has_failed() -> bool:
+            return any(it.status_detail == "its sensor is offline" for it in robot.observations)
+
+        peer.until(has_failed, "the failed attempt")
+        assert process.exit_code is None
+
+
+def test_what_is_retained_counts_by_its_own_time_or_not_at_all(domain: int, tmp_path: Path) -> None:
+    broker = Broker(tmp_path)
+    then_s = time.time() - 3600.0
+    with broker.running(), device(broker) as client:
+        for topic, payload in (
+            ("zigbee2mqtt/bench", {"temperature": 21.5, "last_seen": then_s * 1000}),
+            ("zigbee2mqtt/undated", {"temperature": 21.5}),
+            ("plain/hot/temperature", 3000),
+        ):
+            client.publish(topic, json.dumps(payload), qos=1, retain=True).wait_for_publish(60.0)
+        with twin_node(domain), adapted(domain, broker), Peer(domain) as peer:
+            robot = Robot(peer)
+            peer.listen()
+            tag = peer.tag("bench", lambda tag: tag.readings)
+            assert abs(tag.last_observed.sec - then_s) < 2.0
+            peer.until(lambda: robot.said("it is retained and says no time"), "the complaint")
+            peer.until(lambda: robot.said("must be from -inf to 2000"), "the other")
+            assert readings(peer, "undated") == readings(peer, "hot") == {}
+
+
+def test_a_broker_that_comes_late_or_goes_is_told_and_found_again(
+    domain: int, tmp_path: Path
+) -> None:
+    broker = Broker(tmp_path)
+    with adapted(domain, broker) as process, Peer(domain) as peer:
+        robot = Robot(peer)
+        peer.until(lambda: robot.said("nobody answers at 127.0.0.1"), "the broker to be missed")
+        with broker.running():
+            peer.until(lambda: robot.said("connected"), "the broker")
+        robot.reports.clear()
+        peer.until(lambda: robot.said("127.0.0.1"), "its end to be told")
+        with broker.running(), device(broker) as client:
+
+            def is_heard() -> bool:
+                client.publish("plain/a/co2", "5")
+                return bool(robot.observations)
+
+            peer.until(is_heard, "what it says after that")
+        assert process.exit_code is None

@@ -1,0 +1,164 @@
+"""MQTT in: topics and payloads of fixed sensors, and everything that can be wrong with them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lupin_twin.adapt.mqtt_topics import Broker, Measured, PayloadError, broker_of, measured
+from lupin_twin.adapt.table import ConfigError, Table
+
+
+def broker(*topics: dict[str, Any], **more: Any) -> Broker:
+    content = {"url": "mqtt://broker.lan", "topics": list(topics), **more}
+    return broker_of(Table("mqtt", content), Path())
+
+
+def said(configured: Broker, topic: str, payload: object) -> list[Measured]:
+    raw = payload if isinstance(payload, bytes) else json.dumps(payload).encode()
+    return [
+        measured(pattern, *found, raw)
+        for pattern in configured.patterns
+        if (found := pattern.match(topic)) is not None
+    ]
+
+
+def test_a_plain_number_is_a_reading_of_the_tag_and_sensor_in_its_topic() -> None:
+    configured = broker({"topic": "gh/{tag}/{sensor}", "factor": 0.1})
+    assert configured.patterns[0].filter == "gh/+/+"
+    assert said(configured, "gh/A 1/co2", b" 8000 ") == [Measured("A 1", (("co2", 800.0),))]
+    assert said(configured, "gh/A/co2/more", b"1") == []
+
+
+def test_json_is_read_by_paths_and_says_when_it_was() -> None:
+    configured = broker(
+        {
+            "topic": "house/+/climate",
+            "tag": "A",
+            "values": {
+                "temperature": {"path": "air.t", "factor": 5 / 9, "offset": -160 / 9},
+                "co2": "list.1",
+            },
+            "time": "at",
+        }
+    )
+    payload = {"air": {"t": 212}, "list": [1, 2], "at": "1970-01-01T00:01:00Z"}
+    (found,) = said(configured, "house/x/climate", payload)
+    assert dict(found.readings) == pytest.approx({"temperature": 100.0, "co2": 2.0})
+    assert found.stamp_s == 60.0
+    for at, seconds in (
+        (90, 90.0),
+        (1_700_000_000_000, 1.7e9),
+        ("1970-01-01T02:00:00+01:00", 3600),
+    ):
+        assert said(configured, "house/x/climate", {"list": [0, 1], "at": at})[0].stamp_s == seconds
+
+
+def test_zigbee2mqtts_payloads_need_no_paths() -> None:
+    configured = broker({"topic": "zigbee2mqtt/{tag}", "preset": "zigbee2mqtt"})
+    payload = {
+        "battery": 100,
+        "temperature": 21.4,
+        "humidity": 55.5,
+        "soil_moisture": 33,
+        "illuminance": 1200,
+        "linkquality": 120,
+        "last_seen": 1_700_000_000_000,
+        "update": {"state": "idle"},
+    }
+    (found,) = said(configured, "zigbee2mqtt/bench 3", payload)
+    assert found.tag == "bench 3"
+    assert dict(found.readings) == {
+        "temperature": 21.4,
+        "humidity": 55.5,
+        "soil_moisture": 33.0,
+        "light": 1200.0,
+    }
+    assert found.stamp_s == 1.7e9
+    away = said(configured, "zigbee2mqtt/bench 3/availability", {"state": "offline"})
+    assert away == [Measured("bench 3", is_away=True)]
+    back = said(configured, "zigbee2mqtt/bench 3/availability", b"online")
+    assert back == [Measured("bench 3")]
+
+
+def test_home_assistants_entities_are_tag_and_sensor() -> None:
+    configured = broker({"topic": "ha/sensor/{tag}_{sensor}/state", "preset": "homeassistant"})
+    for entity, tag, sensor in (
+        ("north_bay_temperature", "north_bay", "temperature"),
+        ("a_soil_moisture", "a", "soil_moisture"),
+        ("a_carbon_dioxide", "a", "co2"),
+        ("a_illuminance", "a", "light"),
+    ):
+        assert said(configured, f"ha/sensor/{entity}/state", b"5") == [
+            Measured(tag, ((sensor, 5.0),))
+        ]
+    assert said(configured, "ha/sensor/north_bay_battery/state", b"5") == []
+
+
+@pytest.mark.parametrize(
+    ("payload", "complaint"),
+    [
+        (b"unavailable", "the payload is b'unavailable', expected a number"),
+        (b"nan", "the payload is nan, must be from 0 to 50"),
+        (b"51", "the payload is 51, must be from 0 to 50"),
+        (b"9" * 400, "must be from 0 to 50"),
+        (b"\xff\xfe", "expected a number"),
+        (b"1" * 70_000, "70000 bytes, the limit is 65536"),
+    ],
+)
+def test_a_number_that_is_none_is_named(payload: bytes, complaint: str) -> None:
+    configured = broker({"topic": "{tag}/t", "sensor": "temperature", "min": 0, "max": 50})
+    with pytest.raises(PayloadError) as refused:
+        said(configured, "A/t", payload)
+    assert complaint in str(refused.value)
+    assert len(str(refused.value)) < 250
+
+
+@pytest.mark.parametrize(
+    ("payload", "complaint"),
+    [
+        (b"{", "it is no JSON: b'{'"),
+        (b"[" * 50_000, "it is no JSON"),
+        (b"[1]", "it has none of t"),
+        (b'{"t": true}', "t is True, expected a number"),
+        (b'{"t": {}}', "t is {}, expected a number"),
+        (b'{"t": 1, "at": "yesterday"}', "its time is 'yesterday', expected ISO 8601"),
+        (b'{"t": 1, "at": -5}', "its time is -5"),
+        (b'{"t": 1, "at": 1e999}', "its time is inf"),
+    ],
+)
+def test_json_that_says_nothing_is_named(payload: bytes, complaint: str) -> None:
+    configured = broker({"topic": "{tag}/j", "values": {"temperature": "t"}, "time": "at"})
+    with pytest.raises(PayloadError) as refused:
+        said(configured, "A/j", payload)
+    assert complaint in str(refused.value)
+    assert len(str(refused.value)) < 250
+
+
+@pytest.mark.parametrize(
+    ("topic", "more", "complaint"),
+    [
+        ({"topic": "a/#", "tag": "A", "sensor": "t"}, {}, "mqtt.topics[0].topic is 'a/#'"),
+        ({"topic": "a"}, {}, "expected {tag} in its topic, or tag; one of them"),
+        ({"topic": "{tag}", "tag": "A"}, {}, "expected {tag} in its topic, or tag"),
+        ({"topic": "{tag}"}, {}, "a payload that is a number needs {sensor} in its topic"),
+        ({"topic": "{tag}", "preset": "zwave"}, {}, "preset is 'zwave', expected one of zigbee"),
+        ({"topic": "{tag}", "sensor": "t", "unit": "C"}, {}, "'unit' is not known, expected one"),
+        ({"topic": "{tag}", "values": {"t": 5}}, {}, "mqtt.topics[0].values.t is 5"),
+        ({"topic": "{tag}", "sensor": "t"}, {"url": "http://x"}, "mqtt.url is 'http://x'"),
+        ({"topic": "{tag}", "sensor": "t"}, {"url": "mqtt://x:99999"}, "mqtt.url is"),
+        ({"topic": "{tag}", "sensor": "t"}, {"url": "mqtt://u:p@x"}, "has a user in it"),
+        ({"topic": "{tag}", "sensor": "t"}, {"password_file": "/none"}, "No such file"),
+        ({"topic": "{tag}", "sensor": "t"}, {"topics": []}, "mqtt.topics is [], expected a list"),
+    ],
+)
+def test_what_cannot_be_configured_is_named(
+    topic: dict[str, Any], more: dict[str, Any], complaint: str
+) -> None:
+    with pytest.raises(ConfigError) as refused:
+        broker(topic, **more)
+    assert complaint in str(refused.value)
+    assert "u:p" not in str(refused.value)

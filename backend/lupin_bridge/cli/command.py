@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from lupin_bridge import __version__, logs
-from lupin_bridge.cli import archive, journal
+from lupin_bridge.cli import archive, import_csv, journal
 from lupin_bridge.cli.configuration import (
     CONFIG_VARIABLE,
     settings_from,
@@ -28,6 +28,13 @@ log = logging.getLogger(__name__)
 
 USAGE_ERROR = 2
 
+_WITHOUT_ROS = {
+    "journal": journal.run,
+    "import": import_csv.run,
+    "archive": archive.run,
+    "forward": archive.run,
+}
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a role; returns the process's exit code."""
@@ -37,14 +44,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = parser().parse_args(own)
     if options.role == "adapt":
         return adapt.run(options, ros_args)
-    if options.role == "journal":
+    if options.role in _WITHOUT_ROS:
         if ros_args:
-            _fail("journal takes no arguments of ROS: name its file with --journal or --namespace")
-        return journal.run(options, os.environ)
-    if options.role in {"archive", "forward"}:
-        if ros_args:
-            _fail(f"{options.role} takes no arguments of ROS")
-        return archive.run(options, os.environ)
+            _fail(f"{options.role} takes no arguments of ROS: --journal or --namespace name a file")
+        return _WITHOUT_ROS[options.role](options, os.environ)
     play_args = _play_args(options)
     try:
         settings = _settings_from(options)
@@ -220,6 +223,7 @@ def parser() -> argparse.ArgumentParser:
             )
     journal.add_parser(roles)
     archive.add_parsers(roles)
+    import_csv.add_parser(roles)
     adapt.add_options(
         roles.add_parser("adapt", help=adapt.HELP, description=adapt.HELP, allow_abbrev=False)
     )

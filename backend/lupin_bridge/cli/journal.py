@@ -65,7 +65,7 @@ class JournalError(Exception):
 
 
 # Errors whose text is the message.
-_SHOWN: Final = (
+SHOWN: Final = (
     JournalError,
     CannotWrite,
     PastRefused,
@@ -144,21 +144,23 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
         return FAILED
     except KeyboardInterrupt:
         return INTERRUPTED
-    except _SHOWN as error:
-        return _fail(str(error))
+    except SHOWN as error:
+        return fail(str(error))
     except (*FILE_ERRORS, OSError) as error:
         if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_INTERRUPT:
             return INTERRUPTED
         wrong = "is damaged" if says_damaged(error) else "cannot be read or written"
-        return _fail(f"the journal {path} {wrong}: {error}")
+        return fail(f"the journal {path} {wrong}: {error}")
     return code
 
 
 # --- which file ----------------------------------------------------------------------------------
 
 
-def path_of(options: argparse.Namespace, environ: Mapping[str, str]) -> Path:
-    """The journal that the options name.
+def path_of(
+    options: argparse.Namespace, environ: Mapping[str, str], *, may_be_new: bool = False
+) -> Path:
+    """The journal that the options name; with `may_be_new`, one that is to be made too.
 
     Raises:
         JournalError: there is none.
@@ -184,6 +186,8 @@ def path_of(options: argparse.Namespace, environ: Mapping[str, str]) -> Path:
                 return file
         except OSError as error:
             raise JournalError(f"cannot look for the journal {file}: {error.strerror}") from error
+    if may_be_new:
+        return path
     others = sorted(file.name for file in path.parent.glob("*.sqlite"))
     there = f"; in its folder there are {', '.join(others[:9])}" if others else ""
     raise JournalError(f"there is no journal {path}{there}")
@@ -442,6 +446,7 @@ def _iso(stamp_ns: int) -> str:
     return moment.isoformat(timespec="seconds").replace("+00:00", "Z")
 
 
-def _fail(message: str) -> int:
+def fail(message: str) -> int:
+    """One line of what is wrong; returns the exit code."""
     say(message)
     return FAILED

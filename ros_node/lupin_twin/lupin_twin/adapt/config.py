@@ -12,8 +12,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-import yaml
-
 from lupin_twin.adapt.mqtt_topics import Broker, broker_of
 from lupin_twin.adapt.table import ConfigError, Table, check_text, is_number, shown
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
@@ -115,7 +113,7 @@ def read_config(path: Path) -> Config:
         ConfigError: it cannot be read, or says what cannot be.
 
     """
-    return config_of(_yaml(path), path.parent)
+    return config_of(read_yaml(path), path.parent)
 
 
 def config_of(content: Any, folder: Path = Path()) -> Config:
@@ -164,7 +162,7 @@ def _robot(table: Table) -> Robot:
 
 def _tags(content: Any, folder: Path) -> Iterator[tuple[str, Place]]:
     if isinstance(content, str):
-        content = _yaml(folder / content)
+        content = read_yaml(folder / content)
     table = Table("tags", content)
     if len(table.content) > MAX_TAGS:
         raise ConfigError(f"tags: {len(table.content)}, the limit is {MAX_TAGS}")
@@ -225,7 +223,15 @@ def _sensor(name: str, table: Table) -> Sensor:
     return sensor
 
 
-def _yaml(path: Path) -> Any:
+def read_yaml(path: Path) -> Any:
+    """What a YAML file holds.
+
+    Raises:
+        ConfigError: it cannot be read, is too large, or is no YAML.
+
+    """
+    import yaml  # noqa: PLC0415  # commands that read none start without
+
     try:
         with path.open("rb") as file:
             content = file.read(MAX_FILE_BYTES + 1)

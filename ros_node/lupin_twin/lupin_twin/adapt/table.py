@@ -25,6 +25,7 @@ class Table:
 
     def has(self, key: str) -> bool:
         """Whether the key is given, and was not taken yet."""
+        self._known.append(key)
         return key in self.content
 
     def take(self, key: Any, *default: Any) -> Any:
@@ -63,10 +64,9 @@ class Table:
 
     def end(self) -> None:
         """All has been taken: what is left is a mistake."""
+        known = ", ".join(dict.fromkeys(self._known))
         for key in self.content:
-            raise ConfigError(
-                f"{self._called(shown(key))} is not known, expected one of {', '.join(self._known)}"
-            )
+            raise ConfigError(f"{self._called(shown(key))} is not known, expected one of {known}")
 
     def _called(self, key: object) -> str:
         return f"{self.name}.{key}" if self.name else str(key)

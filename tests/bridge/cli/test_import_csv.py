@@ -1,0 +1,230 @@
+"""`lupin-twin import`: what a CSV file has, what of it is refused, and what a journal then has."""
+
+from __future__ import annotations
+
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from lupin_bridge.cli.command import main
+from lupin_twin.journal.beside import Lock
+from tests.support.docs import block_named
+from tests.support.domains import ros_env
+from tests.support.journal import NOW, SECOND, kept, scan, select
+from tests.support.processes import Process, lupin_twin, url_of
+from tests.support.waiting import wait_for
+
+WIDE = {
+    "time": "at",
+    "tag": "bench",
+    "sensors": {"temperature": "t", "humidity": {"column": "rh", "factor": 100, "max": 100}},
+}
+LONG = {
+    "time": "_time",
+    "tag": "room",
+    "sensor": "_field",
+    "value": "_value",
+    "names": {"temperature": "temp", "co2": "co2"},
+}
+ROWS = """at,bench,t,rh,note
+2024-05-01T12:00:00+02:00,A,21.5,0.55,
+2024-05-01T10:05:00Z,A,22.5,,wet
+1714558200,B,20.0,0.6,
+"""
+INFLUX = """#datatype,string,long,dateTime:RFC3339,double,string,string
+#group,false,false,false,false,true,true
+,result,table,_time,_value,_field,room
+
+,,0,2024-05-01T10:00:00Z,21.5,temp,A
+,,0,2024-05-01T10:00:10Z,22.5,temp,A
+
+,result,table,_time,_value,_field,room
+,,1,2024-05-01T10:00:00Z,800,co2,A
+,,1,2024-05-01T10:00:00Z,3.1,battery,A
+""".replace("\n,", "\n")
+
+
+class Import:
+    """A file to be imported, and the command that does it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.file = folder / "r.csv"
+        self.map = folder / "columns.yaml"
+        self.journal = folder / "j.sqlite"
+
+    def given(self, columns: Any, rows: str | bytes) -> Import:
+        self.map.write_text(yaml.safe_dump(columns, sort_keys=False))
+        self.file.write_bytes(rows.encode() if isinstance(rows, str) else rows)
+        return self
+
+    def run(self, *more: str) -> int:
+        own = ["import", str(self.file), "--map", str(self.map), "--journal", str(self.journal)]
+        return main([*own, *more])
+
+    def rows(self) -> list[tuple[object, ...]]:
+        """Tag, stamp, arrival, sensors, readings and source of each scan, by stamp."""
+        return select(
+            self.journal,
+            "SELECT tag, stamp_ns, arrival_ns, sensors, readings, source FROM scan JOIN series"
+            " USING (site, series) ORDER BY stamp_ns, tag, sensors",
+        )
+
+
+@pytest.fixture
+def importing(tmp_path: Path) -> Import:
+    return Import(tmp_path)
+
+
+def test_without_write_it_says_what_it_would_do_and_does_nothing(
+    importing: Import, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert importing.given(WIDE, ROWS).run() == 0
+    out, err = capsys.readouterr()
+    assert out.splitlines() == [
+        "3 rows, 3 scans of 2 tags",
+        "from 2024-05-01T10:00:00+00:00 to 2024-05-01T10:10:00+00:00",
+        "humidity: 2 readings from 55 to 60",
+        "temperature: 3 readings from 20 to 22.5",
+    ]
+    assert "nothing was written; add --write" in err
+    assert not importing.journal.exists()
+
+
+def test_what_is_written_is_in_the_journal_once(
+    importing: Import, capsys: pytest.CaptureFixture[str]
+) -> None:
+    importing.given(WIDE | {"places": {"A": [1.5, 2]}}, ROWS)
+    assert importing.run("--write") == 0
+    then_ns = int(datetime(2024, 5, 1, 10, tzinfo=UTC).timestamp()) * SECOND
+    rows = importing.rows()
+    assert rows[0] == (
+        "A", then_ns, then_ns, '["temperature","humidity"]', "[21.5,55.00000000000001]", "import"
+    )  # fmt: skip
+    assert [(row[0], row[4]) for row in rows[1:]] == [("A", "[22.5]"), ("B", "[20.0,60.0]")]
+    assert "3 scans are new" in capsys.readouterr().out
+    assert importing.run("--write") == 0
+    assert "0 scans are new" in capsys.readouterr().out
+    assert importing.rows() == rows
+    assert select(importing.journal, "SELECT tag, x, y FROM place") == [("A", 1.5, 2.0)]
+
+
+def test_a_databases_export_names_the_sensor_in_a_column(
+    importing: Import, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert importing.given(LONG, INFLUX).run("--write") == 0
+    assert [row[3:5] for row in importing.rows()] == [
+        ('["co2"]', "[800.0]"),
+        ('["temperature"]', "[21.5]"),
+        ('["temperature"]', "[22.5]"),
+    ]
+    assert "refused: 1: _field 'battery' is not one of names (line 10)" in capsys.readouterr().out
+
+
+def test_what_came_before_a_twin_is_in_its_past(importing: Import) -> None:
+    kept(importing.journal, [scan("A", NOW, temperature=25.0)])
+    assert importing.given(WIDE, ROWS).run("--write") == 0
+    assert [row[5] for row in importing.rows()] == ["import"] * 3 + ["robot"]
+
+
+@pytest.mark.parametrize(
+    ("row", "reason"),
+    [
+        ("yesterday,A,1,", "the time is no ISO 8601, and no seconds since 1970"),
+        ("2024-05-01T10:00:00,A,1,", "the time has no offset, and time_zone is not given"),
+        ("1900-05-01T10:00:00Z,A,1,", "the time is before 1970"),
+        ("-5,A,1,", "the time is no moment since 1970"),
+        ("1714558200,,1,", "no tag, or one of more than 256 characters"),
+        ("1714558200,A,,", "no reading"),
+        ("1714558200,A,warm,", "temperature is no number"),
+        ("1714558200,A,nan,", "temperature is not from -inf to inf"),
+        ("1714558200,A,1,1.01", "humidity is not from -inf to 100"),
+        ("1714558200,A", "too few columns"),
+    ],
+)
+def test_a_row_that_cannot_be_is_counted_and_named_and_the_others_come(
+    importing: Import, capsys: pytest.CaptureFixture[str], row: str, reason: str
+) -> None:
+    assert importing.given(WIDE, f"at,bench,t,rh\n{row}\n1714558200,B,20,0.5\n").run("--write") == 0
+    assert f"refused: 1: {reason} (line 2)" in capsys.readouterr().out
+    assert len(importing.rows()) == 1
+
+
+def test_a_time_without_offset_is_in_the_zone_that_is_given(importing: Import) -> None:
+    columns = WIDE | {"time_zone": "Europe/Amsterdam"}
+    importing.given(columns, "at,bench,t,rh\n2024-05-01T12:00,A,1,\n").run("--write")
+    assert importing.rows()[0][1] == 1_714_557_600 * SECOND
+
+
+@pytest.mark.parametrize(
+    ("columns", "rows", "complaint"),
+    [
+        (WIDE | {"time": "when"}, ROWS, "there is no column 'when', but at, bench, t, rh, note"),
+        (WIDE | {"zone": "x"}, ROWS, "'zone' is not known, expected one of time_zone, time, tag"),
+        (WIDE | {"time_zone": "Mars"}, ROWS, "time_zone is 'Mars', expected such as Europe/"),
+        (WIDE | {"tag_id": "A"}, ROWS, "expected tag, a column, or tag_id, every row's tag"),
+        (WIDE | {"sensor": "a", "value": "b"}, ROWS, "expected sensors, or sensor and value"),
+        (WIDE | {"sensors": {"t": 5}}, ROWS, "sensors.t is 5, expected keys and values"),
+        (WIDE | {"places": {"A": [1]}}, ROWS, "places.A is [1], expected [x, y] in m"),
+        (WIDE, b"\xff\xfe\x00", "is no CSV in UTF-8"),
+        (WIDE, 'at,bench,t,rh\n"' + "x" * 200_000, "is no CSV in UTF-8: field larger than"),
+        (WIDE, "", "there is no column 'at', but none"),
+    ],
+)
+def test_what_cannot_be_imported_at_all_is_one_line(
+    importing: Import,
+    capsys: pytest.CaptureFixture[str],
+    columns: Any,
+    rows: str | bytes,
+    complaint: str,
+) -> None:
+    assert importing.given(columns, rows).run("--write") == 1
+    err = capsys.readouterr().err
+    assert complaint in err
+    assert "Traceback" not in err
+    assert importing.rows() == []
+
+
+def test_a_journal_that_a_twin_writes_is_in_use(
+    importing: Import, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with Lock(importing.journal, "/lupin_twin"):
+        assert importing.given(WIDE, ROWS).run("--write") == 1
+    assert "is in use by /lupin_twin" in capsys.readouterr().err
+
+
+def test_a_journal_of_a_simulation_is_left_alone(
+    importing: Import, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from lupin_twin.journal.runs import Clock
+
+    kept(importing.journal, [scan("A", 5 * SECOND)], Clock(5 * SECOND, NOW, is_simulated=True))
+    assert importing.given(WIDE, ROWS).run("--write") == 1
+    assert "is of a simulation: import into another" in capsys.readouterr().err
+
+
+def test_the_page_has_what_was_imported(domain: int, importing: Import) -> None:
+    columns = yaml.safe_load(block_named("import").text)
+    importing.given(columns, block_named("import-rows").text)
+    own = [
+        *("import", str(importing.file), "--map", str(importing.map), "--write"),
+        *("--journal", str(importing.journal)),
+    ]
+    command = [sys.executable, "-m", "lupin_bridge.cli.command", *own]
+    with Process(command, ros_env(domain)) as process:
+        assert process.wait() == 0, process.output
+    import httpx
+
+    parameters = ("-p", f"journal:={importing.journal}", "-p", "journal_days:=3650")
+    with lupin_twin(domain, "serve", "--ros-args", *parameters) as server:
+        address = f"{url_of(server)}/api/history?tag_id=bench-1&sensor_type=temperature&from=0"
+
+        def past() -> Any:
+            answer = httpx.get(address, trust_env=False)
+            return answer.status_code == 200 and answer.json()
+
+        found = wait_for(past, "the imported past")
+        assert [point["value"] for point in found["readings"]] == [21.5, 22.0]

@@ -368,7 +368,7 @@ def _write(path: Path, columns: Columns, found: Iterator[ScanRow]) -> int:
         Lock(path, "lupin-twin import"),
         closing(JournalFile(path, _NO_LIMITS, is_sound=None)) as file,
     ):
-        known = _runs(path)
+        known, placed = _known(path)
         while batch := list(islice(found, _BATCH)):
             if not known:
                 begin = Clock(batch[0].stamp_ns, batch[0].stamp_ns, is_simulated=False)
@@ -381,21 +381,26 @@ def _write(path: Path, columns: Columns, found: Iterator[ScanRow]) -> int:
             new += written
             if refused:
                 raise JournalError(f"{refused} rows could not be written into {path}")
-        pins = [
-            (known[-1], PinRow(tag_id, 1, known[-1].begun.arrival_ns, pose))
-            for tag_id, pose in columns.places.items()
-            if known
-        ]
-        file.append(pins)
+        for run in known[-1:]:
+            # A tag's place holds from before its first reading on, and the first one stays.
+            file.append(
+                [
+                    (run, PinRow(tag_id, 1, run.begun.arrival_ns, pose))
+                    for tag_id, pose in columns.places.items()
+                    if tag_id not in placed
+                ]
+            )
     return new
 
 
-def _runs(path: Path) -> list[Run]:
+def _known(path: Path) -> tuple[list[Run], set[str]]:
+    """The journal's runs, and the tags whose places it has."""
     with closing(open_named(path)) as connection:
         found = runs(connection.execute)
+        placed = {tag_id for (tag_id,) in connection.execute("SELECT DISTINCT tag FROM place")}
     if any(run.begun.is_simulated for run in found):
         raise JournalError(f"the journal {path} is of a simulation: import into another")
-    return found
+    return found, placed
 
 
 def _iso(stamp_ns: int) -> str:

@@ -46,7 +46,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         return adapt.run(options, ros_args)
     if options.role in _WITHOUT_ROS:
         if ros_args:
-            _fail(f"{options.role} takes no arguments of ROS: --journal or --namespace name a file")
+            which = ": name its file with --journal or --namespace"
+            of_a_file = which if options.role in {"journal", "import"} else ""
+            _fail(f"{options.role} takes no arguments of ROS{of_a_file}")
         return _WITHOUT_ROS[options.role](options, os.environ)
     play_args = _play_args(options)
     try:

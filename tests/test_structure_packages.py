@@ -25,8 +25,14 @@ from tests.support.structure import ROOT, ROS
 
 ROS_NODE = ROOT / "ros_node"
 PACKAGES = ("lupin_twin", "lupin_patrol")
-# How rosdep calls what Python calls otherwise; None: rosdep does not know it.
-ROSDEP_KEYS = {"numpy": "python3-numpy", "pytest": "python3-pytest", "greenhouse_sim": None}
+# How rosdep calls what Python calls otherwise; None: it does not know it, or not its version.
+ROSDEP_KEYS = {
+    "numpy": "python3-numpy",
+    "pytest": "python3-pytest",
+    "yaml": "python3-yaml",
+    "greenhouse_sim": None,
+    "paho": None,
+}
 
 
 # What builds and tests the messages.

@@ -51,10 +51,8 @@ ACTIONS: Final[Mapping[str, str]] = {
 }
 _MAX_SHOWN: Final = 20
 _RUNS_SHOWN: Final = 10
-# ROS has ports for no more.
-_MAX_DOMAIN: Final = 232
-# Past every stamp.
-_END_NS: Final = (MAX_SECONDS + 1) * 10**9
+_MAX_DOMAIN: Final = 232  # ROS has ports for no more
+_END_NS: Final = (MAX_SECONDS + 1) * 10**9  # past every stamp
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 # Where a systemd service keeps it: backend/deploy/lupin-twin.service.
 SERVICE_FOLDER: Final = Path("/var/lib/lupin-twin")
@@ -139,8 +137,7 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
             code = _forget(path, options)
         else:
             code = {"info": _info, "check": _check, "vacuum": _vacuum}[options.action](path)
-    except BrokenPipeError:
-        # The reader has closed the pipe.
+    except BrokenPipeError:  # the reader has closed it
         return FAILED
     except KeyboardInterrupt:
         return INTERRUPTED

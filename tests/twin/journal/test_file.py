@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +10,8 @@ import pytest
 from lupin_twin.core.state import Reading
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
+from lupin_twin.journal.salvage import quarantine
+from lupin_twin.journal.schema import open_writer, set_meta
 from tests.support.journal import (
     CLOCK,
     LIMITS,
@@ -130,18 +133,14 @@ def test_a_damaged_file_is_quarantined_and_read_as_far_as_it_goes(
     assert is_whole(path)
 
 
-def test_salvage_that_takes_long_goes_on_in_steps_and_after_a_restart(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    kept(path, [scan(at_ns=NOW + n) for n in range(3000)])
-    monkeypatch.setattr("lupin_twin.journal.file._SALVAGE_S", 0.0)
-    file = JournalFile(path, LIMITS, is_sound=False)
-    assert file.look_after(may_purge=True)
-    file.close()
-    with opened(path) as file:
-        while file.look_after(may_purge=True):
-            pass
-    assert select(path, "SELECT count(*) FROM scan") == [(3000,)]
+def test_what_was_killed_while_it_saved_begins_again(path: Path) -> None:
+    kept(path, [scan(at_ns=NOW + n) for n in range(300)])
+    aside = quarantine(path, "20261121T141500Z")
+    with closing(open_writer(path)) as connection:
+        set_meta(connection, "salvage", aside.name)
+    with opened(path):
+        pass
+    assert select(path, "SELECT count(*) FROM scan") == [(300,)]
     assert select(path, "SELECT * FROM meta WHERE key = 'salvage'") == []
 
 

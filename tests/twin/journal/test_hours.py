@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lupin_twin.journal.hours import WrittenInspection, WrittenScan, delete_before
-from lupin_twin.journal.hours import count as count_rows
-from lupin_twin.journal.rows import numbers_of
+from lupin_twin.journal.appending import Appender
+from lupin_twin.journal.hours import count_rows, delete_before
 from lupin_twin.journal.schema import SiteLog
 from tests.support.log_life import BEGUN, HOUR, MINUTE, lived, look, scan, steps
 from tests.twin.journal.conftest import Copied, Living
@@ -44,28 +43,10 @@ def test_what_is_counted_in_another_order_on_the_other_engine_is_the_same(
         archive = SiteLog(*copied(life.connection))
         for table in _DERIVED:
             archive.execute(f"DELETE FROM {table} WHERE site = :site")
-        found: list[WrittenScan | WrittenInspection] = [
-            WrittenScan(run, series, kind, stamp_ns, status, numbers_of([readings])[0])
-            for run, series, kind, stamp_ns, status, readings in log.execute(
-                "SELECT run, scan.series, kind, stamp_ns, status, readings FROM scan"
-                " JOIN series ON series.series = scan.series WHERE is_copy = 0"
-            )
-        ]
-        found += [
-            WrittenInspection(run, tag, seq, stamp_ns, bool(anomaly), bug_count)
-            for run, tag, seq, stamp_ns, anomaly, bug_count in log.execute(
-                "SELECT run, tag, seq, stamp_ns, anomaly, bug_count FROM look WHERE is_copy = 0"
-            )
-        ]
-        random.shuffle(found)
-        size = random.randint(1, 9)
-        for first in range(0, len(found), size):
-            lot = found[first : first + size]
-            count_rows(
-                archive,
-                [row for row in lot if isinstance(row, WrittenScan)],
-                [row for row in lot if isinstance(row, WrittenInspection)],
-            )
+        numbers = list(range(1, 1 + Appender(life.connection).last_seq))
+        random.shuffle(numbers)
+        for number in numbers:
+            count_rows(archive, number - 1, number)
         *there, there_sums = derived(archive)
         *here, here_sums = derived(log)
         assert there == here

@@ -9,7 +9,7 @@ import pytest
 
 from lupin_twin.journal.checking import find_all_damage
 from lupin_twin.journal.rows import Row
-from lupin_twin.journal.salvage import Salvage, quarantine
+from lupin_twin.journal.salvage import quarantine, salvage
 from lupin_twin.journal.schema import open_reader, open_writer
 from tests.support.journal import NOW, SECOND, is_whole, kept, known, look, pin, scan, select
 
@@ -38,8 +38,7 @@ def damaged(whole: Path, tmp_path: Path) -> Path:
 def salvaged(damaged: Path) -> Path:
     new = damaged.with_name("new.sqlite")
     with closing(open_writer(new)) as connection:
-        for _ in Salvage(damaged, connection).steps():
-            pass
+        salvage(damaged, connection)
     assert is_whole(new)
     with closing(open_reader(new)) as connection:
         assert list(find_all_damage(connection, lambda what, share: None)) == []
@@ -145,15 +144,21 @@ def test_whatever_stands_on_the_pages_it_ends(whole: Path, damaged: Path, seed: 
     salvaged(damaged)
 
 
-def test_salvage_that_is_cut_short_goes_on_where_it_was(whole: Path, damaged: Path) -> None:
-    new = damaged.with_name("new.sqlite")
-    with closing(open_writer(new)) as connection:
-        steps = Salvage(damaged, connection).steps()
-        for _ in range(3):
-            next(steps)
-        steps.close()
-    assert scans(salvaged(damaged)) == scans(whole)
+def test_what_was_begun_before_is_begun_again(whole: Path, damaged: Path) -> None:
+    salvaged(damaged)
+    new = salvaged(damaged)
+    assert scans(new) == scans(whole)
     assert set(select(new, "SELECT * FROM hour")) == set(select(whole, "SELECT * FROM hour"))
+
+
+@pytest.mark.parametrize("size", [100, 1024])
+def test_without_header_or_first_page_all_is_read(whole: Path, damaged: Path, size: int) -> None:
+    content = damaged.read_bytes()
+    damaged.write_bytes(bytes(size) + content[size:])
+    assert scans(salvaged(damaged)) == scans(whole)
+    assert {file.name for file in damaged.parent.iterdir() if "damaged" in file.name} == {
+        "damaged.sqlite"
+    }
 
 
 def test_a_damaged_file_is_quarantined_with_its_log_and_never_overwritten(tmp_path: Path) -> None:

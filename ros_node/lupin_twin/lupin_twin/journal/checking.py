@@ -24,6 +24,7 @@ from lupin_twin.journal.rows import numbers_of, sensor_names
 from lupin_twin.journal.runs import Run, runs
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
+    LOCAL_SITE,
     DamagedFile,
     Empty,
     Foreign,
@@ -41,21 +42,27 @@ _COMPARED: Final = 20_000
 # A sum is kept to fifteen digits, each time that a batch is added.
 _TOLERANCE: Final = 1e-11
 
-# What is wrong with rows from :after to :until, as (seq, tag).
+WRITTEN: Final = ("scan", "look")
+# What is wrong with rows behind :after up to :until, as (seq, tag).
 _WRONG: Final = {
     "scan": (
         "SELECT seq, tag FROM scan AS r LEFT JOIN series AS s"
         " ON s.site = r.site AND s.series = r.series"
         " WHERE r.seq > :after AND r.seq <= :until AND r.site = :site AND (tag IS NULL"
         " OR CASE WHEN json_valid(sensors) AND json_valid(readings)"
-        " THEN json_array_length(sensors) != json_array_length(readings) ELSE 1 END"
-        " OR typeof(stamp_ns) != 'integer' OR typeof(status) != 'integer')"
+        " THEN json_array_length(sensors) != json_array_length(readings)"
+        " OR EXISTS (SELECT 1 FROM json_each(readings) WHERE type IN ('text', 'array', 'object'))"
+        " ELSE 1 END OR typeof(stamp_ns) != 'integer' OR typeof(status) != 'integer'"
+        " OR stamp_ns NOT BETWEEN 0 AND 4611686018427387904)"
     ),
     "look": (
         "SELECT seq, tag FROM look AS r LEFT JOIN run ON run.site = r.site AND run.run = r.run"
-        " WHERE r.seq > :after AND r.seq <= :until AND r.site = :site"
-        " AND (run.run IS NULL OR NOT json_valid(blooms) OR NOT json_valid(box)"
-        " OR typeof(stamp_ns) != 'integer' OR typeof(bug_count) != 'integer')"
+        " WHERE r.seq > :after AND r.seq <= :until AND r.site = :site AND (run.run IS NULL"
+        " OR CASE WHEN json_valid(blooms) AND json_valid(box)"
+        " THEN EXISTS (SELECT 1 FROM json_each(blooms) WHERE json_array_length(value) != 7)"
+        " OR EXISTS (SELECT 1 FROM json_each(box) WHERE json_array_length(value) != 3)"
+        " ELSE 1 END OR typeof(stamp_ns) != 'integer' OR typeof(bug_count) != 'integer'"
+        " OR stamp_ns NOT BETWEEN 0 AND 4611686018427387904)"
     ),
     "place": (
         "SELECT seq, tag FROM place AS r LEFT JOIN run ON run.site = r.site AND run.run = r.run"
@@ -139,6 +146,14 @@ def _rows(connection: sqlite3.Connection, table: str, report: Progress) -> Itera
             after = last if following is None else following - 1
             report(table, (after - first + 1) / (last - first + 1))
     report(table, 1.0)
+
+
+def delete_wrong(connection: sqlite3.Connection, table: str, after: int, until: int) -> None:
+    """Delete what is not what was written, of rows with these numbers of a twin's own log."""
+    connection.execute(
+        f"DELETE FROM {table} WHERE site = :site AND seq IN (SELECT seq FROM ({_WRONG[table]}))",
+        {"site": LOCAL_SITE, "after": after, "until": until},
+    )
 
 
 def _hours(connection: sqlite3.Connection, report: Progress) -> Iterator[str]:

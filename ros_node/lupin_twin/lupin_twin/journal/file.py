@@ -38,7 +38,7 @@ from lupin_twin.journal.runs import (
     runs,
     simulation_goes_on,
 )
-from lupin_twin.journal.salvage import Salvage, quarantine
+from lupin_twin.journal.salvage import quarantine, salvage
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
     LOCAL_SITE,
@@ -53,8 +53,6 @@ from lupin_twin.journal.schema import (
 _CHECKED_BYTES: Final = 64_000_000
 # The log is put into the file when it is this long: the longer, the fewer pages are written twice.
 _LOG_BYTES: Final = 8_000_000
-# So much of a damaged file is read before the twin goes on with what is there.
-_SALVAGE_S: Final = 1.5
 _PURGE_EVERY_S: Final = 60.0
 _PURGE_HOURS_EVERY_S: Final = 86_400.0
 _LOOK_EVERY_S: Final = 1.0
@@ -97,7 +95,6 @@ class JournalFile:
         self._path = path
         self._limits = limits
         self.quarantined = ""
-        self._salvaging: Iterator[None] | None = None
         if is_sound is False or (is_sound is None and self._is_damaged()):
             self._quarantine()
         self._open()
@@ -148,25 +145,17 @@ class JournalFile:
         self._inode = self._path.stat().st_ino
 
     def _salvage(self) -> None:
-        """Go on with what was quarantined, now or before the last end."""
-        if self.quarantined:
-            set_meta(self._connection, _SALVAGE, Path(self.quarantined).name)
-        name = get_meta(self._connection, _SALVAGE)
+        """Copy what can be read of what was quarantined, now or before the last end."""
+        name = Path(self.quarantined).name or get_meta(self._connection, _SALVAGE)
         if not name:
             return
-        self._salvaging = Salvage(self._path.with_name(name), self._connection).steps()
-        enough_s = time.monotonic() + _SALVAGE_S
-        while self._salvage_step() and time.monotonic() < enough_s:
-            pass
-
-    def _salvage_step(self) -> bool:
-        if self._salvaging is not None and next(self._salvaging, self) is self:
-            self._salvaging = self._kept = None
+        set_meta(self._connection, _SALVAGE, name)
+        salvage(self._path.with_name(name), self._connection)
+        with transaction(self._connection):
             # What could not be read nobody knows.
             for run in self._runs():
                 note_lost(self._connection, run.root, self._last(run).stamp_ns)
             self._connection.execute("DELETE FROM meta WHERE key = ?", (_SALVAGE,))
-        return self._salvaging is not None
 
     # --- runs ---------------------------------------------------------------------------------
 
@@ -337,9 +326,9 @@ class JournalFile:
             note_lost(self._connection, run.root, at_ns)
 
     def kept(self) -> Stretches:
-        """Of which stretches of ROS time all is here; none are while a damaged file is read."""
+        """Of which stretches of ROS time all is here."""
         if self._kept is None:
-            self._kept = () if self._salvaging is not None else kept(self._connection)
+            self._kept = kept(self._connection)
         return self._kept
 
     def size(self) -> int:
@@ -364,8 +353,6 @@ class JournalFile:
                 raise FileNotFoundError(f"{self._path} was removed or replaced")
         if self._log_bytes() > _LOG_BYTES:
             self._connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
-        if self._salvaging is not None:
-            return self._salvage_step()
         return may_purge and self._purge(now_s)
 
     def _purge(self, now_s: float) -> bool:

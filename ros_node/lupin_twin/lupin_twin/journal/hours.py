@@ -10,11 +10,11 @@ added.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from lupin_twin.core.past import HOUR_NS, Event, Grid, SeriesPast
-from lupin_twin.journal.rows import KIND_READING, STATUS_OK
+from lupin_twin.journal.rows import KIND_READING, STATUS_OK, numbers_of
 from lupin_twin.journal.runs import Span
 from lupin_twin.journal.schema import DamagedFile, SiteLog
 
@@ -26,6 +26,7 @@ DELETED: Final = "purged_ns:"
 TALLIED: Final = (Event.SCANS, Event.FAILURES, Event.LOOKS)
 # A sum of larger readings could be beyond any number, which PostgreSQL refuses.
 _LARGEST: Final = 1e290
+_NOTHING: Final[Mapping[int, int]] = {}
 
 
 class WrittenScan(NamedTuple):
@@ -46,7 +47,7 @@ class WrittenInspection(NamedTuple):
     tag: str
     seq: int
     stamp_ns: int
-    anomaly: bool
+    anomaly: int
     bug_count: int
 
 
@@ -55,10 +56,41 @@ def is_counted(value: float) -> bool:
     return -_LARGEST < value < _LARGEST
 
 
-def count(
-    log: SiteLog, scans: Iterable[WrittenScan], inspections: Sequence[WrittenInspection]
+def count_rows(
+    log: SiteLog, after: int, until: int, counted_ns: Mapping[int, int] = _NOTHING
 ) -> None:
-    """Count rows that are in the tables now, each once, whatever its stamp."""
+    """Count what has a number behind one, up to another, as `count` does.
+
+    Raises:
+        DamagedFile: a scan has no series, or its readings are none.
+
+    """
+    within = {"after": after, "until": until}
+    scans = log.execute(_SCANS, within).fetchall()
+    values = numbers_of([row[-1] for row in scans])
+    written = [
+        WrittenScan._make([*row[:-1], of_row]) for row, of_row in zip(scans, values, strict=True)
+    ]
+    if any(scan.kind is None for scan in written):
+        raise DamagedFile("a scan has no series")
+    count(
+        log, written, [WrittenInspection(*row) for row in log.execute(_LOOKS, within)], counted_ns
+    )
+
+
+def count(
+    log: SiteLog,
+    scans: Iterable[WrittenScan],
+    inspections: Sequence[WrittenInspection],
+    counted_ns: Mapping[int, int] = _NOTHING,
+) -> None:
+    """Count rows that are in the tables now, each once, whatever its stamp.
+
+    `counted_ns`: of some runs, up to when everything is counted already.
+    """
+    if counted_ns:
+        scans = [scan for scan in scans if scan.stamp_ns > counted_ns.get(scan.run, -1)]
+        inspections = [row for row in inspections if row.stamp_ns > counted_ns.get(row.run, -1)]
     hours: dict[tuple[int, int], list[Sequence[float]]] = {}
     tallies: dict[tuple[int, str, int], list[int]] = {}
     stamps: dict[int, list[int]] = {}
@@ -183,6 +215,16 @@ def whole_hours(span: Span, horizon_ns: int) -> tuple[tuple[int, int], list[Span
     edges = (start_ns, first * HOUR_NS), (last * HOUR_NS, end_ns)
     return (first, last), [Span(span.run, *edge) for edge in edges if edge[0] < edge[1]]
 
+
+_SCANS: Final = (
+    "SELECT run, scan.series, kind, stamp_ns, status, readings FROM scan LEFT JOIN series"
+    " ON series.site = scan.site AND series.series = scan.series"
+    " WHERE scan.site = :site AND seq > :after AND seq <= :until AND is_copy = 0"
+)
+_LOOKS: Final = (
+    "SELECT run, tag, seq, stamp_ns, anomaly, bug_count FROM look"
+    " WHERE site = :site AND seq > :after AND seq <= :until AND is_copy = 0"
+)
 
 # --- by the hour ----------------------------------------------------------------------------------
 
@@ -359,11 +401,12 @@ def _note_pests(log: SiteLog, inspection: WrittenInspection) -> None:
         # A tag without inspection has no pest; that of a deleted one is known by what it changed.
         change = log.execute(_LAST_CHANGE, within).fetchone()
         had = change is not None and change[0] == Event.PESTS_SEEN
-    _note_pest(log, within, inspection.bug_count, (had, inspection.anomaly))
+    has = bool(inspection.anomaly)
+    _note_pest(log, within, inspection.bug_count, (had, has))
     after = log.execute(_AFTER, within).fetchone()
     if after is not None:
         within |= {"at": after[0], "seq": after[1]}
-        _note_pest(log, within, after[3], (inspection.anomaly, bool(after[2])))
+        _note_pest(log, within, after[3], (has, bool(after[2])))
 
 
 def _note_pest(log: SiteLog, at: dict[str, Any], bugs: int, pests: tuple[bool, bool]) -> None:

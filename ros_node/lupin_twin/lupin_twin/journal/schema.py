@@ -183,18 +183,28 @@ def open_writer(path: Path) -> sqlite3.Connection:
     return connection
 
 
+# All of it comes in one transaction: for the mode of the vacuum alone SQLite writes a page too.
+_NEW: Final = (
+    f"PRAGMA page_size = {PAGE_SIZE}; BEGIN; PRAGMA auto_vacuum = INCREMENTAL; {SQLITE_TABLES}"  # noqa: S608
+    f" INSERT INTO site VALUES ('{LOCAL_SITE}', '');"
+    f" INSERT INTO meta VALUES ('{LOCAL_SITE}', 'journal_id', lower(hex(randomblob(16))));"
+    f" PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {VERSION}; COMMIT;"
+)
+
+
 def _create(connection: sqlite3.Connection, path: Path) -> None:
     connection.execute("PRAGMA synchronous = FULL")
-    connection.execute(f"PRAGMA page_size = {PAGE_SIZE}")
-    # All of it comes in one transaction: for the mode of the vacuum alone SQLite writes a page too.
-    connection.executescript(
-        f"BEGIN; PRAGMA auto_vacuum = INCREMENTAL; {SQLITE_TABLES}"  # noqa: S608  # constants
-        f" INSERT INTO site VALUES ('{LOCAL_SITE}', '');"
-        f" INSERT INTO meta VALUES ('{LOCAL_SITE}', 'journal_id', lower(hex(randomblob(16))));"
-        f" PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {VERSION}; COMMIT;"
-    )
+    connection.executescript(_NEW)
     connection.execute("PRAGMA journal_mode = WAL")
     sync_folder(path.parent)
+
+
+def empty_file() -> tuple[bytes, frozenset[int]]:
+    """The bytes of a new journal, and the numbers of its pages with a table's or index's rows."""
+    with closing(sqlite3.connect(":memory:", isolation_level=None)) as new:
+        new.executescript(_NEW)
+        roots = new.execute("SELECT rootpage FROM sqlite_schema")
+        return new.serialize(), frozenset(number for (number,) in roots)
 
 
 @contextmanager

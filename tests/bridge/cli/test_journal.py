@@ -240,7 +240,7 @@ def test_check_says_what_is_damaged_and_ends_with_1(
 ) -> None:
     whole = Said(capsys, "check", "--journal", path)
     assert (whole.code, whole.out) == (0, f"{path} is whole\n")
-    assert whole.err == "structure\nscan\nlook\nplace\nhour\n"
+    assert whole.err == "structure\nscan\nlook\nplace\n"
     with closing(open_writer(path)) as connection:
         connection.execute("UPDATE scan SET readings = '[' WHERE seq % 200 = 0")
     said = Said(capsys, "check", "--journal", path)

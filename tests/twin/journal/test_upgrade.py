@@ -10,7 +10,6 @@ import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 
@@ -22,12 +21,6 @@ from tests.support.journal_answers import answer, answers, old, same
 from tests.support.upgrade_child import CLOCK, LIMITS
 from tests.support.waiting import wait_for
 from tests.twin.journal.conftest import fail_on_a_full_disk
-
-
-class Usage(NamedTuple):
-    total: int
-    used: int
-    free: int
 
 
 @contextmanager
@@ -124,23 +117,6 @@ def test_killed_at_any_moment_it_is_done_at_the_next_start(tmp_path: Path) -> No
         assert names_in(folder) == {"j.sqlite", "j.sqlite.v3", "j.sqlite.lock"}
         assert path.with_name("j.sqlite.v3").read_bytes() == content
         check_states(path, "late")
-
-
-def test_on_a_full_disk_the_old_file_is_left_and_it_is_said(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = old("day", tmp_path)
-    content = path.read_bytes()
-    with monkeypatch.context() as full:
-        full.setattr(shutil, "disk_usage", lambda _: Usage(10**9, 10**9, 10_000))
-        with started(path) as journal:
-            wait_for(lambda: journal.condition.state is JournalState.FAILING, "failing")
-            assert "has 0.0 MB free, and its upgrade takes up to 0.1 MB" in journal.condition.detail
-            assert path.read_bytes() == content
-            full.undo()
-            # As soon as there is room.
-            assert wait_for(lambda: journal.take_restored(1.0), "what was known") is not None
-    check_states(path, "day")
 
 
 def test_a_disk_that_fills_meanwhile_leaves_the_old_file_as_it_was(tmp_path: Path) -> None:

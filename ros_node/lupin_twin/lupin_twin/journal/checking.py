@@ -1,34 +1,29 @@
 # ruff: noqa: S608  # SQL is put together of constants
-"""Is a journal what was written, and what is in it? Reads alone, also while a twin records.
+"""Is a journal whole, and what is in it? Reads alone, also while a twin records.
 
-SQLite keeps no checksums: a digit that has flipped in a reading shows in its hour alone, which was
-counted as the scan was written.
+SQLite checks its own structure, and that its indexes agree with their tables; here it is checked
+that rows mean something. SQLite keeps no checksums: a digit that has flipped is not found.
 """
 
 from __future__ import annotations
 
-import json
-import math
 import sqlite3
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from lupin_twin.core.past import HOUR_NS
-from lupin_twin.journal.hours import deleted_ns, is_counted
 from lupin_twin.journal.retention import KEPT_BYTES, KEPT_NS, records
-from lupin_twin.journal.rows import numbers_of, sensor_names
+from lupin_twin.journal.rows import sensor_names
 from lupin_twin.journal.runs import Run, runs
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
     LOCAL_SITE,
-    DamagedFile,
     Empty,
     Foreign,
-    SiteLog,
     get_meta,
     open_reader,
     says_damaged,
@@ -37,11 +32,6 @@ from lupin_twin.journal.schema import (
 # A lot is one short read of the file: a check that takes minutes must not keep the log growing.
 _ROWS: Final = 5_000
 _MAX_STRUCTURE: Final = 100
-# So many hours, spread over all of them, are held against their scans: some seconds' worth.
-_COMPARED: Final = 20_000
-# A sum is kept to fifteen digits, each time that a batch is added.
-_TOLERANCE: Final = 1e-11
-
 WRITTEN: Final = ("scan", "look")
 # What is wrong with rows behind :after up to :until, as (seq, tag).
 _WRONG: Final = {
@@ -103,7 +93,6 @@ def find_all_damage(connection: sqlite3.Connection, report: Progress) -> Generat
     parts: dict[str, Callable[[], Iterator[str]]] = {
         "structure": partial(_structure, connection),
         **{table: partial(_rows, connection, table, report) for table in _WRONG},
-        "hour": partial(_hours, connection, report),
     }
     for what, read in parts.items():
         try:
@@ -154,51 +143,6 @@ def delete_wrong(connection: sqlite3.Connection, table: str, after: int, until: 
         f"DELETE FROM {table} WHERE site = :site AND seq IN (SELECT seq FROM ({_WRONG[table]}))",
         {"site": LOCAL_SITE, "after": after, "until": until},
     )
-
-
-def _hours(connection: sqlite3.Connection, report: Progress) -> Iterator[str]:
-    report("hour", 0.0)
-    (count,) = connection.execute("SELECT count(*) FROM hour").fetchone()
-    stride, seen = -(-count // _COMPARED), 0
-    every = connection.execute("SELECT site, series, run, tag FROM series").fetchall()
-    for done, (site, series, run, tag) in enumerate(every, 1):
-        for row in connection.execute(_HOURS_OF, (site, series)).fetchall():
-            seen += 1
-            # Of earlier hours some scans may have been deleted by age.
-            is_whole = row[0] > deleted_ns(SiteLog(connection, site), run) // HOUR_NS
-            if seen % stride == 0 and is_whole and not _fits(connection, site, series, row):
-                yield f"hour {row[0]} of tag {tag!r} does not fit its scans"
-        report("hour", done / len(every))
-
-
-_HOURS_OF: Final = (
-    "SELECT hour, n, total, low, high FROM hour WHERE site = ? AND series = ? ORDER BY hour"
-)
-
-
-def _fits(connection: sqlite3.Connection, site: str, series: int, row: tuple[Any, ...]) -> bool:
-    hour, *noted = row
-    texts = connection.execute(
-        "SELECT readings FROM scan WHERE site = ? AND series = ? AND stamp_ns >= ? AND stamp_ns < ?"
-        " AND is_copy = 0",
-        (site, series, hour * HOUR_NS, (hour + 1) * HOUR_NS),
-    ).fetchall()
-    try:
-        n, total, low, high = map(json.loads, noted)
-        by_sensor = zip(*numbers_of([text for (text,) in texts]), strict=True)
-        for sensor, values in enumerate(by_sensor):
-            counted = [value for value in values if is_counted(value)]
-            if (n[sensor], low[sensor], high[sensor]) != (
-                len(counted),
-                min(counted, default=None),
-                max(counted, default=None),
-            ) or not math.isclose(
-                total[sensor], sum(counted), rel_tol=_TOLERANCE, abs_tol=_TOLERANCE
-            ):
-                return False
-        return bool(texts) or not any(n)
-    except (DamagedFile, ValueError, TypeError, IndexError, RecursionError):
-        return False
 
 
 _COUNTED: Final = ("scan", "look", "place", "hour")

@@ -11,7 +11,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Final
 
-from lupin_twin.journal.appending import Appender, Stretch, held, simulated
+from lupin_twin.journal.appending import Appender, Stretch, copy_known, simulated
 from lupin_twin.journal.beside import Syncing, forwarded_seq
 from lupin_twin.journal.checking import find_damage
 from lupin_twin.journal.fold import Restored, copies, fold
@@ -27,7 +27,7 @@ from lupin_twin.journal.retention import (
     purge_step,
     shrink_step,
 )
-from lupin_twin.journal.rows import PinRow, Row, newest_rows
+from lupin_twin.journal.rows import Row, newest_rows
 from lupin_twin.journal.runs import (
     CORRECTION_NS,
     FOREVER_NS,
@@ -219,24 +219,14 @@ class JournalFile:
             run = Run(number, now, self._appender.last_seq + 1, joins)
             put_run(self._connection, run)
             if before is not None:
-                self._copy(before, run, carries)
+                rows = copies(self._connection, before, carries)
+                copy_known(self._appender, before, run, rows)
                 if ended_ns is not None and before.root != run.root:
                     execute(
                         "UPDATE run SET ended_stamp_ns = ? WHERE run = ?", (ended_ns, before.root)
                     )
             self._go_on_with(run.root)
         return run
-
-    def _copy(self, before: Run, run: Run, carries: Carries) -> None:
-        rows: list[Row] = []
-        for row in copies(self._connection, before, carries):
-            is_here = before.root == run.root and row.stamp_ns <= run.begun.stamp_ns
-            if not (is_here and isinstance(row, PinRow)):
-                now = replace(row, arrival_ns=run.begun.arrival_ns)
-                # What a simulation says again is new; a wall clock comes to no moment twice.
-                rows.append(held(now, run.begun.stamp_ns, keeps_key=not run.begun.is_simulated))
-        self._appender.append(run.root, rows, are_copies=True)
-        self._appender.flush()
 
     def rejoin(self, now: Clock, before: Run) -> Run:
         """The wall's clock jumped ahead: the run that it had gone back from goes on, if any.

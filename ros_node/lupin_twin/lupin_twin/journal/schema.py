@@ -220,19 +220,6 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
         raise
 
 
-@contextmanager
-def one_view(connection: sqlite3.Connection) -> Iterator[None]:
-    """All that is read within is of one moment; keep it short, for the log grows meanwhile."""
-    if connection.in_transaction:
-        yield
-        return
-    connection.execute("BEGIN")
-    try:
-        yield
-    finally:
-        connection.rollback()  # does nothing where an interrupted statement has ended it
-
-
 def sync_folder(folder: Path) -> None:
     """Make the names in a folder last."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
@@ -331,28 +318,15 @@ def _own_tables() -> frozenset[bytes]:
         return frozenset(sql for (sql,) in new.execute(_SCHEMA))
 
 
-# --- facts about the log as a whole, by name ------------------------------------------------------
-
-
-def get_meta(connection: sqlite3.Connection, key: str, site: str = LOCAL_SITE) -> str | None:
-    """A noted fact, None where it is not noted."""
-    found = connection.execute(
-        "SELECT value FROM meta WHERE site = :site AND key = :key", {"site": site, "key": key}
-    ).fetchone()
-    return None if found is None else str(found[0])
-
-
-def set_meta(connection: sqlite3.Connection, key: str, value: object) -> None:
-    """Note a fact of this twin's own log."""
-    connection.execute(
-        "INSERT INTO meta VALUES (?, ?, ?) ON CONFLICT (site, key) DO UPDATE SET"
-        " value = excluded.value",
-        (LOCAL_SITE, key, str(value)),
-    )
+# --- one site's rows ------------------------------------------------------------------------------
 
 
 _NOTHING: Final[Mapping[str, Any]] = {}
 _META: Final = "SELECT value FROM meta WHERE site = :site AND key = :key"
+_SET_META: Final = (
+    "INSERT INTO meta VALUES (:site, :key, :value)"
+    " ON CONFLICT (site, key) DO UPDATE SET value = excluded.value"
+)
 _NAME: Final = re.compile(r":([a-z_]+)")
 
 
@@ -380,16 +354,22 @@ class SiteLog:
     @contextmanager
     def one_view(self) -> Iterator[None]:
         """All that is read within is of one moment; keep it short, for the log grows meanwhile."""
-        if isinstance(self.connection, sqlite3.Connection):
-            with one_view(self.connection):
+        connection = self.connection
+        if isinstance(connection, sqlite3.Connection):
+            if connection.in_transaction:
                 yield
-            return
-        if self.connection.info.transaction_status:  # it is in one, as `one_view` has it
+                return
+            connection.execute("BEGIN")
+            try:
+                yield
+            finally:
+                connection.rollback()  # does nothing where an interrupted statement has ended it
+        elif connection.info.transaction_status:
             yield
-            return
-        with self.connection.transaction():
-            self.connection.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ")
-            yield
+        else:
+            with connection.transaction():
+                connection.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ")
+                yield
 
     def _of_engine(self, sql: str) -> str:
         return sql if isinstance(self.connection, sqlite3.Connection) else _for_psycopg(sql)
@@ -398,3 +378,13 @@ class SiteLog:
 @cache
 def _for_psycopg(sql: str) -> str:
     return _NAME.sub(r"%(\1)s", sql).replace("?", "%s")
+
+
+def get_meta(connection: sqlite3.Connection, key: str) -> str | None:
+    """A noted fact about this twin's own log, None where it is not noted."""
+    return SiteLog(connection).meta(key)
+
+
+def set_meta(connection: sqlite3.Connection, key: str, value: object) -> None:
+    """Note a fact about this twin's own log."""
+    SiteLog(connection).execute(_SET_META, {"key": key, "value": str(value)})

@@ -3,11 +3,8 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 from sqlite3 import Connection
-from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from lupin_twin.core.past import EVERY_TAG, HOUR_NS, Event, SeriesPast, SeriesRequest
 from lupin_twin.journal.hours import SILENCE_NS
@@ -18,16 +15,11 @@ from tests.support.log_life import (
     LATEST,
     MINUTE,
     SECOND,
-    check,
     failure,
     lived,
     look,
-    one_run,
-    periods,
     scan,
-    steps,
 )
-from tests.twin.journal.conftest import Engines, Living
 
 END = BEGUN + (LATEST + 200) * MINUTE
 COUNTED = (
@@ -57,47 +49,6 @@ def told(answer: SeriesPast) -> list[tuple[int, float]]:
     return list(zip(answer.stamps_ns, answer.means, strict=True))
 
 
-@given(steps, st.tuples(periods, st.integers(1, 30)), st.sampled_from([EVERY_TAG, "7"]))
-@settings(deadline=None, max_examples=60)
-def test_they_are_those_of_a_plain_list_on_either_engine(
-    living: Living,
-    engines: Engines,
-    lives: list[tuple[str, Any]],
-    asked: tuple[tuple[int, int], int],
-    tag_id: str,
-) -> None:
-    period, points = asked
-    with living(lives) as life:
-        for connection, site in engines(life.connection):
-            for event in COUNTED:
-                request = SeriesRequest(tag_id, event, *period, points)
-                answer = series(connection, request, END, site)
-                check(answer, request, life.events(tag_id, event), now_ns=END)
-            request = SeriesRequest(tag_id, Event.SILENCES, *period)
-            start_ns = period[0] or min(life.attempts(tag_id), default=END)
-            expected = life.silences(tag_id, start_ns, period[1] or END + 1, END)
-            assert told(series(connection, request, END, site)) == expected
-
-
-@given(one_run, st.tuples(periods, st.integers(1, 30)), st.integers(0, LATEST))
-@settings(deadline=None, max_examples=40)
-def test_those_of_the_site_outlive_rows_that_were_deleted(
-    living: Living,
-    engines: Engines,
-    lives: list[tuple[str, Any]],
-    asked: tuple[tuple[int, int], int],
-    minute: int,
-) -> None:
-    period, points = asked
-    with living(lives) as life:
-        life.delete(BEGUN + minute * MINUTE)
-        for connection, site in engines(life.connection):
-            for event in COUNTED:
-                request = SeriesRequest(EVERY_TAG, event, *period, points)
-                answer = series(connection, request, END, site)
-                check(answer, request, life.events(EVERY_TAG, event), now_ns=END)
-
-
 def test_values_are_those_of_the_contract(tmp_path: Path) -> None:
     with lived(tmp_path / "j.sqlite") as life:
         life.write(
@@ -120,17 +71,6 @@ def test_values_are_those_of_the_contract(tmp_path: Path) -> None:
         assert told(ask(log, Event.SCANS, "8")) == []
 
 
-def test_a_look_that_comes_late_changes_what_changed(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        log = life.connection
-        life.write([look(at_ns=BEGUN), look(at_ns=BEGUN + 2, anomaly=True), look(at_ns=BEGUN + 4)])
-        assert told(ask(log, Event.PESTS_SEEN)) == [(BEGUN + 2, 1.0)]
-        life.write([look(at_ns=BEGUN + 1, anomaly=True)])
-        assert told(ask(log, Event.PESTS_SEEN)) == [(BEGUN + 1, 1.0)]
-        life.write([look(at_ns=BEGUN + 3)])
-        assert told(ask(log, Event.PESTS_CLEARED)) == [(BEGUN + 3, 0.0)]
-
-
 def test_of_looks_that_were_deleted_it_is_known_whether_there_was_a_pest(tmp_path: Path) -> None:
     with lived(tmp_path / "j.sqlite") as life:
         life.write([look(at_ns=BEGUN, anomaly=True)])
@@ -138,15 +78,6 @@ def test_of_looks_that_were_deleted_it_is_known_whether_there_was_a_pest(tmp_pat
         life.write([look(at_ns=BEGUN + 2 * HOUR, anomaly=True), look(at_ns=BEGUN + 3 * HOUR)])
         assert told(ask(life.connection, Event.PESTS_SEEN)) == [(BEGUN, 1.0)]
         assert told(ask(life.connection, Event.PESTS_CLEARED)) == [(BEGUN + 3 * HOUR, 0.0)]
-
-
-def test_events_of_minutes_are_counted(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write(scan(str(n % 3), BEGUN + n * SECOND) for n in range(100))
-        answer = ask(life.connection, Event.SCANS, start=BEGUN, end=BEGUN + 100 * SECOND, points=10)
-        assert answer.counts == (10,) * 10
-        assert answer.bucket_ns == 10 * SECOND
-        assert len(ask(life.connection, Event.SCANS, points=100).stamps_ns) == 100
 
 
 def test_too_many_events_are_counted_by_the_hour(

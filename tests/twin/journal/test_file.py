@@ -8,13 +8,11 @@ from pathlib import Path
 import pytest
 
 from lupin_twin.core.state import Reading
-from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.salvage import quarantine
 from lupin_twin.journal.schema import open_writer, set_meta
 from tests.support.journal import (
     CLOCK,
-    LIMITS,
     NOW,
     is_whole,
     kept,
@@ -76,19 +74,6 @@ def test_upkeep_purges_shrinks_and_checkpoints(path: Path, monkeypatch: pytest.M
     assert is_whole(path)
 
 
-def test_the_log_is_put_into_the_file_when_it_is_long(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("lupin_twin.journal.file._LOG_BYTES", 10_000)
-    with opened(path) as file:
-        run = file.start(CLOCK, 1, is_believed=False).run
-        for lot in range(50):
-            file.append([(run, scan(at_ns=NOW + 100 * lot + n)) for n in range(100)])
-            file.look_after(may_purge=True)
-        assert file._log_bytes() < 100_000
-        assert file.size() > path.stat().st_size
-
-
 def test_a_log_that_was_put_into_the_file_is_short_again(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -142,15 +127,3 @@ def test_what_was_killed_while_it_saved_begins_again(path: Path) -> None:
         pass
     assert select(path, "SELECT count(*) FROM scan") == [(300,)]
     assert select(path, "SELECT * FROM meta WHERE key = 'salvage'") == []
-
-
-def test_a_file_that_was_found_sound_is_not_read_through_again(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    kept(path, [scan()])
-
-    def never(path: Path) -> str:
-        raise AssertionError("checked")
-
-    monkeypatch.setattr("lupin_twin.journal.file.find_damage", never)
-    JournalFile(path, LIMITS, is_sound=True).close()

@@ -98,6 +98,7 @@ def upgrade(path: Path, report: Callable[[float], None]) -> str:
 
 def _is_read(connection: sqlite3.Connection) -> bool:
     """Put all of the log into the file, unless somebody still reads what was before."""
+    connection.execute("PRAGMA busy_timeout = 1000")
     ((is_busy, *_),) = connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
     return bool(is_busy)
 

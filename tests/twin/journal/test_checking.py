@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 from lupin_twin.journal.checking import find_all_damage
+from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.schema import (
+    DamagedFile,
     open_reader,
     open_writer,
 )
@@ -86,3 +88,12 @@ def test_all_of_them_are_found_and_how_far_it_is_is_told(path: Path) -> None:
     assert {what: share for what, share in told if what != "structure"} == dict.fromkeys(
         order[1:], 1.0
     )
+
+
+@pytest.mark.parametrize("text", ["[1,", "[1],[2]", "7", '["x",1]', "", "[[1]]"])
+def test_a_question_that_meets_what_is_no_list_of_numbers_says_that_it_is_damage(
+    path: Path, text: str
+) -> None:
+    changed(path, f"UPDATE scan SET readings = '{text}'")
+    with closing(open_reader(path)) as connection, pytest.raises(DamagedFile):
+        state_at(connection, NOW + 300 * SECOND, "map")

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-from collections import Counter
 from pathlib import Path
 from sqlite3 import Connection
 
@@ -145,21 +144,6 @@ def test_a_silence_is_longer_than_ten_minutes_and_than_three_usual_intervals(
         life.write([scan("9", at_ns=BEGUN + second * SECOND) for second in seconds])
         silences = told(ask(log, Event.SILENCES, "9", now=BEGUN + seconds[-1] * SECOND))
         assert silences == [(BEGUN + 7 * HOUR, 3 * 3600 + 1.0)]
-
-
-def test_too_many_silences_are_counted(tmp_path: Path) -> None:
-    stamps = [BEGUN + (n // 2) * HOUR + n for n in range(40)]
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write(scan(at_ns=stamp_ns) for stamp_ns in stamps)
-        singly = told(ask(life.connection, Event.SILENCES, points=19, now=stamps[-1]))
-        assert len(singly) == 19
-        answer = ask(life.connection, Event.SILENCES, points=18, now=stamps[-1])
-    assert sum(answer.counts) == 19
-    start_ns, bucket_ns = answer.start_ns, answer.bucket_ns
-    assert bucket_ns is not None
-    begins = Counter(start_ns + (at - start_ns) // bucket_ns * bucket_ns for at, _ in singly)
-    assert dict(zip(answer.stamps_ns, answer.counts, strict=True)) == begins
-    assert answer.means[0] == pytest.approx(3600.0)
 
 
 def test_of_years_that_were_deleted_silences_are_still_told(tmp_path: Path) -> None:

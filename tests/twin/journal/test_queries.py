@@ -90,12 +90,3 @@ def test_too_many_scans_are_told_by_the_hour(
         assert len(series(life.connection, request, END).stamps_ns) > 200
         monkeypatch.setattr("lupin_twin.journal.queries.MAX_SCANS", 299)
         assert series(life.connection, request, END).counts == (60,) * 5
-
-
-def test_few_scans_that_were_deleted_are_told_by_the_hour(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write(scan(at_ns=BEGUN + n * 30 * MINUTE, temperature=1.0) for n in range(8))
-        life.delete(BEGUN + 3 * HOUR_NS)
-        answer = series(life.connection, temperature(BEGUN), BEGUN + 4 * HOUR_NS - 1)
-    assert answer.bucket_ns == HOUR_NS
-    assert answer.counts == (2, 2, 2, 2)

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import sqlite3
 from contextlib import closing
 from pathlib import Path
 
@@ -53,17 +52,6 @@ def test_a_file_that_is_no_journal_is_left_and_nothing_made_beside_it(
     theirs = tmp_path / "theirs"
     theirs.write_bytes(content)
     with pytest.raises(refusal):
-        small(theirs)
-    assert theirs.read_bytes() == content
-    assert list(tmp_path.iterdir()) == [theirs]
-
-
-def test_a_database_that_is_no_journal_is_left_and_nothing_made_beside_it(tmp_path: Path) -> None:
-    theirs = tmp_path / "theirs.sqlite"
-    with closing(sqlite3.connect(theirs)) as connection:
-        connection.execute("CREATE TABLE mine (a)")
-    content = theirs.read_bytes()
-    with pytest.raises(Foreign):
         small(theirs)
     assert theirs.read_bytes() == content
     assert list(tmp_path.iterdir()) == [theirs]

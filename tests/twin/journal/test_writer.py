@@ -60,14 +60,6 @@ def test_what_is_handed_over_is_written_and_known_after_a_restart(path: Path) ->
         wait_for(lambda: journal.condition.repeated == 1, "a row that is there already")
 
 
-def test_what_is_waiting_when_the_twin_ends_is_written(path: Path) -> None:
-    with recording(path) as journal:
-        for n in range(2000):
-            journal.write(scan(at_ns=NOW + n))
-    assert not path.with_name("j.sqlite-wal").exists()
-    assert count(path) == 2000
-
-
 def test_before_the_clock_begins_nothing_is_written_and_nothing_lost(path: Path) -> None:
     journal = Journal(path, "/twin", LIMITS)
     wait_state(journal, JournalState.RECORDING)

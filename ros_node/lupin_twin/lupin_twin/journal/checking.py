@@ -15,7 +15,6 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.retention import KEPT_BYTES, KEPT_NS, records
 from lupin_twin.journal.rows import sensor_names
 from lupin_twin.journal.runs import Run, runs
@@ -162,7 +161,7 @@ class Overview:
     """What a journal holds.
 
     `rows` counts by table, and `tag` by name; `failures` the scans that failed; copies are rows
-    too. `hours_ns` is the stretch of the hours of wall time. `kept_ns` and `kept_bytes` are the
+    too.  `kept_ns` and `kept_bytes` are the
     limits that its last twin was given, 0 where none has said; `quarantined` names damaged journals
     beside it, with their sizes; `forgotten` are the records of `forgetting`.
     """
@@ -174,7 +173,6 @@ class Overview:
     failures: int
     sensors: tuple[str, ...]
     runs: tuple[RunExtent, ...]
-    hours_ns: tuple[int, int] | None
     kept_ns: int
     kept_bytes: int
     quarantined: tuple[tuple[str, int], ...]
@@ -211,7 +209,6 @@ def overview(connection: sqlite3.Connection, path: Path) -> Overview:
         failures=int(failures),
         sensors=_sensors(connection),
         runs=_extents(connection),
-        hours_ns=_hours_extent(connection),
         kept_ns=int(get_meta(connection, KEPT_NS) or 0),
         kept_bytes=int(get_meta(connection, KEPT_BYTES) or 0),
         quarantined=quarantined_beside(path),
@@ -254,15 +251,6 @@ def _extents(connection: sqlite3.Connection) -> tuple[RunExtent, ...]:
         for run in runs(connection.execute)
         if run.joins is None
     )
-
-
-def _hours_extent(connection: sqlite3.Connection) -> tuple[int, int] | None:
-    first, last = connection.execute(
-        "SELECT min((SELECT min(hour) FROM hour WHERE site = s.site AND series = s.series)),"
-        " max((SELECT max(hour) FROM hour WHERE site = s.site AND series = s.series))"
-        " FROM series AS s JOIN run ON run.site = s.site AND run.run = s.run WHERE NOT is_simulated"
-    ).fetchone()
-    return None if first is None else (first * HOUR_NS, (last + 1) * HOUR_NS)
 
 
 def _size(path: Path) -> int:

@@ -89,9 +89,9 @@ def test_too_many_events_are_counted_by_the_hour(
             end = BEGUN + 2 * HOUR
             return ask(life.connection, Event.SCANS, start=BEGUN, end=end, points=100)
 
-        monkeypatch.setattr("lupin_twin.journal.events.MAX_ROWS", 120)
+        monkeypatch.setattr("lupin_twin.journal.buckets.MAX_ROWS", 120)
         assert scans().bucket_ns == 72 * SECOND
-        monkeypatch.setattr("lupin_twin.journal.events.MAX_ROWS", 119)
+        monkeypatch.setattr("lupin_twin.journal.buckets.MAX_ROWS", 119)
         answer = scans()
         assert (answer.bucket_ns, answer.counts) == (HOUR_NS, (60, 60))
 

@@ -3,8 +3,6 @@ from __future__ import annotations
 from pathlib import Path
 from sqlite3 import Connection
 
-import pytest
-
 from lupin_twin.core.past import EVERY_TAG, HOUR_NS, Event, SeriesPast, SeriesRequest
 from lupin_twin.journal.hours import SILENCE_NS
 from lupin_twin.journal.queries import series
@@ -14,7 +12,6 @@ from tests.support.log_life import (
     LATEST,
     MINUTE,
     SECOND,
-    failure,
     lived,
     look,
     scan,
@@ -48,28 +45,6 @@ def told(answer: SeriesPast) -> list[tuple[int, float]]:
     return list(zip(answer.stamps_ns, answer.means, strict=True))
 
 
-def test_values_are_those_of_the_contract(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write(
-            [
-                scan(at_ns=BEGUN, temperature=1.0, co2=2.0),
-                failure(at_ns=BEGUN + 1, status=2),
-                failure(at_ns=BEGUN + 2, status=1, kind=1),
-                look(at_ns=BEGUN + 3),
-                look(at_ns=BEGUN + 4, anomaly=True),
-                look(at_ns=BEGUN + 5, anomaly=True),
-                look(at_ns=BEGUN + 6),
-            ]
-        )
-        log = life.connection
-        assert told(ask(log, Event.SCANS)) == [(BEGUN, 2.0)]
-        assert told(ask(log, Event.FAILURES, "7")) == [(BEGUN + 1, 2.0), (BEGUN + 2, 1.0)]
-        assert [value for _, value in told(ask(log, Event.LOOKS))] == [0.0, 1.0, 1.0, 0.0]
-        assert told(ask(log, Event.PESTS_SEEN)) == [(BEGUN + 4, 1.0)]
-        assert told(ask(log, Event.PESTS_CLEARED, "7")) == [(BEGUN + 6, 0.0)]
-        assert told(ask(log, Event.SCANS, "8")) == []
-
-
 def test_of_looks_that_were_deleted_it_is_known_whether_there_was_a_pest(tmp_path: Path) -> None:
     with lived(tmp_path / "j.sqlite") as life:
         life.write([look(at_ns=BEGUN, anomaly=True)])
@@ -77,23 +52,6 @@ def test_of_looks_that_were_deleted_it_is_known_whether_there_was_a_pest(tmp_pat
         life.write([look(at_ns=BEGUN + 2 * HOUR, anomaly=True), look(at_ns=BEGUN + 3 * HOUR)])
         assert told(ask(life.connection, Event.PESTS_SEEN)) == [(BEGUN, 1.0)]
         assert told(ask(life.connection, Event.PESTS_CLEARED)) == [(BEGUN + 3 * HOUR, 0.0)]
-
-
-def test_too_many_events_are_counted_by_the_hour(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write(scan(at_ns=BEGUN + n * MINUTE) for n in range(120))
-
-        def scans() -> SeriesPast:
-            end = BEGUN + 2 * HOUR
-            return ask(life.connection, Event.SCANS, start=BEGUN, end=end, points=100)
-
-        monkeypatch.setattr("lupin_twin.journal.buckets.MAX_ROWS", 120)
-        assert scans().bucket_ns == 72 * SECOND
-        monkeypatch.setattr("lupin_twin.journal.buckets.MAX_ROWS", 119)
-        answer = scans()
-        assert (answer.bucket_ns, answer.counts) == (HOUR_NS, (60, 60))
 
 
 def test_long_buckets_of_the_site_come_from_tallies_alone(tmp_path: Path) -> None:

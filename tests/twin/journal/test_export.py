@@ -1,15 +1,12 @@
 from __future__ import annotations
 
-import math
 import sqlite3
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from lupin_twin.core.past import NotRemembered, PastRow
-from lupin_twin.core.state import Reading
 from lupin_twin.journal.queries import LOT, Export, rows
 from lupin_twin.journal.schema import open_reader
 from tests.support.log_life import (
@@ -17,10 +14,7 @@ from tests.support.log_life import (
     LATEST,
     MINUTE,
     SECOND,
-    failure,
     lived,
-    look,
-    pin,
     scan,
 )
 
@@ -31,20 +25,6 @@ def every(
     connection: sqlite3.Connection, tag_id: str | None = None, sensor: str | None = None
 ) -> list[PastRow]:
     return [row for lot in rows(connection, 0, END, tag_id, sensor) for row in lot]
-
-
-def test_a_row_says_all_there_is(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        failed = replace(failure("8", BEGUN + 1), source="other")
-        life.write([scan(co2=400.0, temperature=21.0), pin(), failed, look("9", BEGUN + 2)])
-        first, second, third = every(life.connection)
-        assert first == PastRow(BEGUN, "7", 1.5, 2.5, "co2", 400.0, 0, "robot")
-        assert second == PastRow(BEGUN, "7", 1.5, 2.5, "temperature", 21.0, 0, "robot")
-        nothing = PastRow(BEGUN + 1, "8", math.nan, math.nan, "", math.nan, 2, "other")
-        assert repr(third) == repr(nothing)
-        # Of one sensor its readings alone: what failed was an attempt at all of them.
-        assert every(life.connection, None, "co2") == [first]
-        assert every(life.connection, "nobody") == []
 
 
 def test_lots_come_as_they_are_taken_and_nothing_is_held_open_between(tmp_path: Path) -> None:
@@ -60,19 +40,6 @@ def test_lots_come_as_they_are_taken_and_nothing_is_held_open_between(tmp_path: 
         checkpoint = life.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
         assert checkpoint == (0, 0, 0)
         assert sum(map(len, lots)) == 3 * LOT - taken
-
-
-def test_scans_of_many_readings_come_in_shorter_stretches(tmp_path: Path) -> None:
-    """What is in memory at once is bounded by readings, not by scans."""
-    wide = replace(scan(), readings=tuple(Reading(f"s{number}", 1.0) for number in range(64)))
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write(replace(wide, stamp_ns=BEGUN + n * SECOND // 100) for n in range(5_000))
-        export = Export(0, END, None, None)
-        found = []
-        while (step := export.step(life.connection)) is not None:
-            found.append(len(step))
-    assert sum(found) == 5_000 * 64
-    assert max(found) <= 40_000
 
 
 def test_what_is_deleted_meanwhile_breaks_it_off_and_only_if_it_was_to_come(

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import os
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -88,34 +87,6 @@ def test_a_log_that_was_put_into_the_file_is_short_again(
         file.look_after(may_purge=True)
         file.append([(run, scan(at_ns=NOW + number + 100))])
         assert file._log_bytes() < 100_000
-
-
-def _truncate(path: Path) -> None:
-    os.truncate(path, path.stat().st_size * 9 // 10)
-
-
-def _overwrite_header(path: Path) -> None:
-    with path.open("rb+") as file:
-        file.write(b"nothing of the kind")
-
-
-@pytest.mark.parametrize(("damage", "at_least"), [(_truncate, 20), (_overwrite_header, 0)])
-def test_a_damaged_file_is_quarantined_and_read_as_far_as_it_goes(
-    path: Path, damage: object, at_least: int
-) -> None:
-    rows = [scan(str(tag), NOW + n, temperature=n / 7) for n in range(20) for tag in range(100)]
-    kept(path, rows)
-    assert callable(damage)
-    damage(path)
-    damaged = path.read_bytes()
-    with opened(path) as file:
-        found = set(file.start(CLOCK, 1, is_believed=False).rows)
-        aside = Path(file.quarantined)
-    assert found <= set(rows)
-    assert len(found) >= at_least
-    assert aside.name.startswith("j.sqlite.damaged-20")
-    assert aside.read_bytes() == damaged
-    assert is_whole(path)
 
 
 def test_what_was_killed_while_it_saved_begins_again(path: Path) -> None:

@@ -7,7 +7,6 @@ import pytest
 
 from lupin_twin.core.journal_condition import JournalState
 from lupin_twin.journal.appending import Stretch, prefill, simulated
-from lupin_twin.journal.beside import InUse, Lock
 from lupin_twin.journal.rows import Row
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
@@ -83,12 +82,6 @@ def test_into_what_anybody_has_recorded_nothing_is_written(tmp_path: Path, row: 
     kept(path, [row], CLOCK)
     assert not filled(path)
     assert mark(path) is None
-
-
-def test_nor_into_one_that_a_twin_has(tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-    with Lock(path, "/lupin_twin"), pytest.raises(InUse, match="/lupin_twin"):
-        filled(path)
 
 
 def test_a_journal_at_work_says_what_of_it_is_simulated(tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import pytest
@@ -53,15 +52,6 @@ def test_the_period_ends_before_its_end_and_now_is_told(tmp_path: Path) -> None:
         assert until_now.stamps_ns == (BEGUN + 1, BEGUN + 2)
         later = series(life.connection, temperature(BEGUN + 3), BEGUN + 2)
         assert later == SeriesPast(BEGUN + 3, BEGUN + 3)
-
-
-def test_a_reading_that_is_no_number_is_told_and_not_counted(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        values = [math.nan, 1.0, math.inf, 1e300]
-        life.write(scan(at_ns=BEGUN + n, temperature=v) for n, v in enumerate(values))
-        assert repr(series(life.connection, temperature(), END).means) == "(nan, 1.0, nan, 1e+300)"
-        assert series(life.connection, temperature(BEGUN, BEGUN + 4, 2), END).counts == (1,)
-        assert series(life.connection, temperature(0, END, 1), END).counts == (1,)
 
 
 def test_long_buckets_come_from_hours_alone(tmp_path: Path) -> None:

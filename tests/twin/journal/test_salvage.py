@@ -144,13 +144,6 @@ def test_whatever_stands_on_the_pages_it_ends(whole: Path, damaged: Path, seed: 
     salvaged(damaged)
 
 
-def test_what_was_begun_before_is_begun_again(whole: Path, damaged: Path) -> None:
-    salvaged(damaged)
-    new = salvaged(damaged)
-    assert scans(new) == scans(whole)
-    assert set(select(new, "SELECT * FROM hour")) == set(select(whole, "SELECT * FROM hour"))
-
-
 @pytest.mark.parametrize("size", [100, 1024])
 def test_without_header_or_first_page_all_is_read(whole: Path, damaged: Path, size: int) -> None:
     content = damaged.read_bytes()

@@ -21,7 +21,6 @@ from lupin_twin.journal.schema import (
     open_writer,
     says_damaged,
 )
-from tests.support.journal import kept, scan
 
 
 @pytest.fixture
@@ -147,15 +146,3 @@ def test_a_flipped_letter_in_a_table_s_definition_is_damage(path: Path) -> None:
             with pytest.raises(FILE_ERRORS) as caught:
                 open_writer(path)
             assert says_damaged(caught.value)
-
-
-def test_rows_can_be_read_with_any_sqlite(tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-    kept(path, [scan("7")])
-    connection = sqlite3.connect(path)
-    (row,) = connection.execute(
-        "SELECT run, tag, stamp_ns - arrival_ns, status, source, mission, sensors, readings"
-        " FROM scan JOIN series USING (site, series)"
-    )
-    connection.close()
-    assert row == (1, "7", -1000, 0, "robot", "m1", '["temperature"]', "[21.5]")

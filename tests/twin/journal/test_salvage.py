@@ -84,12 +84,12 @@ def test_what_was_given_up_does_not_come_back_but_its_hours(tmp_path: Path) -> N
     kept(path, [scan("7", NOW + n * 60 * SECOND, a=float(n)) for n in range(500)])
     hours = set(select(path, "SELECT * FROM hour"))
     with closing(open_writer(path)) as connection:
-        connection.execute("DELETE FROM scan WHERE seq <= 200")
-        until = NOW + 199 * 60 * SECOND
+        connection.execute("DELETE FROM scan WHERE seq <= 190")
+        until = NOW + 189 * 60 * SECOND  # amid an hour
         connection.execute(f"INSERT INTO meta VALUES ('local', 'purged_ns:1', '{until}')")
-        connection.execute("INSERT INTO meta VALUES ('local', 'purged_seq', '200')")
+        connection.execute("INSERT INTO meta VALUES ('local', 'purged_seq', '190')")
     new = salvaged(path)
-    assert select(new, "SELECT min(seq), count(*) FROM scan") == [(201, 300)]
+    assert select(new, "SELECT min(seq), count(*) FROM scan") == [(191, 310)]
     assert set(select(new, "SELECT * FROM hour")) == hours
 
 
@@ -116,6 +116,15 @@ def test_a_flipped_byte_costs_its_own_page_at_most(whole: Path, damaged: Path, s
     lost = scans(whole) - scans(new)
     assert len(lost) < 130
     assert len(scans(new) - scans(whole)) <= 1
+
+
+@pytest.mark.parametrize("text", [b"local", b"[7.0]"])
+def test_a_row_that_is_no_row_any_more_is_left_out(whole: Path, damaged: Path, text: bytes) -> None:
+    content = bytearray(damaged.read_bytes())
+    at = content.index(b"robotm1[7.0]")
+    content[content.rindex(text, 0, at + 12)] ^= 0x20
+    damaged.write_bytes(content)
+    assert len(scans(whole) - scans(salvaged(damaged))) == 1
 
 
 def test_new_numbers_are_past_all_that_may_be_lost(damaged: Path) -> None:

@@ -176,10 +176,7 @@ def salvage(aside: Path, connection: sqlite3.Connection) -> None:
 
 def _opened(path: Path) -> sqlite3.Connection:
     name = f"file:{quote(os.fsencode(path))}?mode=ro"
-    connection = sqlite3.connect(name, uri=True, isolation_level=None)
-    # Without this, SQLite reads nothing of a truncated file.
-    connection.execute("PRAGMA writable_schema = ON")
-    return connection
+    return sqlite3.connect(name, uri=True, isolation_level=None)
 
 
 def _has_tables(old: sqlite3.Connection) -> bool:

@@ -24,7 +24,7 @@ LIMITS = Limits(days=36_500, max_bytes=4_000_000_000)
 
 def main(path: Path, kill_at: int) -> None:
     """Start as a twin does, and be told what was known."""
-    rebuild._ROWS = 20  # type: ignore[misc]
+    rebuild._ROWS = 50  # type: ignore[misc]
     seen = 0
 
     def step() -> None:

@@ -242,7 +242,7 @@ def _lines(found: Overview, holder: str | None) -> list[tuple[str, str]]:
         ("tags", f"{rows['tag']:,}"),
         ("sensors", ", ".join(found.sensors) or "none"),
         ("reach", _reach(extents)),
-        ("hours", f"{rows['hour']:,} of a tag's sensors{_hours(found.hours_ns)}"),
+        ("hours", f"{rows['hour']:,} of a tag's sensors"),
         ("retention", _retention(found)),
         (
             "runs",
@@ -261,10 +261,6 @@ def _reach(extents: list[RunExtent]) -> str:
     first = min(extent.first_ns or 0 for extent in of_wall)
     last = max(extent.last_ns or 0 for extent in of_wall)
     return f"{_iso(first)} to {_iso(last)}"
-
-
-def _hours(stretch_ns: tuple[int, int] | None) -> str:
-    return "" if stretch_ns is None else f", {_iso(stretch_ns[0])} to {_iso(stretch_ns[1])}"
 
 
 def _retention(found: Overview) -> str:

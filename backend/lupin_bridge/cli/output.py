@@ -91,8 +91,8 @@ Write = Callable[[bytes], object]
 # What the shell has opened already: for its name the system would open the file behind it anew.
 _DESCRIPTOR: Final = re.compile(r"/dev/(stdout|stderr)|(?:/dev|/proc/self)/fd/([0-9]{1,6})")
 _NUMBERS: Final = {"stdout": 1, "stderr": 2}
-# What SQLite, the lock and vacuum keep beside a journal, be it there now or not.
-_BESIDE: Final = ("", "-wal", "-shm", "-journal", ".lock", ".vacuum")
+# What SQLite and the lock keep beside a journal, be it there now or not.
+_BESIDE: Final = ("", "-wal", "-shm", "-journal", ".lock")
 
 
 class CannotWrite(Exception):

@@ -16,7 +16,7 @@ from tests.support.bags import no_file_above
 from tests.support.journal import NOW, SECOND, is_whole, kept, pin, recording, scan
 from tests.support.waiting import PATIENCE_S, wait_for
 
-OWN = ("", "-wal", "-shm", "-journal", ".lock", ".vacuum")
+OWN = ("", "-wal", "-shm", "-journal", ".lock")
 
 
 @pytest.fixture

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.core.state import Reading
 from lupin_twin.journal.rows import ScanRow
 from tests.support.journal import NOW, SECOND, kept, look, scan, select
 
@@ -74,11 +73,4 @@ def test_what_is_no_text_or_no_number_costs_nothing_else(path: Path) -> None:
     assert kept(path, [odd]) == (1, 0)
     assert select(path, "SELECT tag, readings FROM scan JOIN series USING (series)") == [
         ("?", "[null,null,1.5]")
-    ]
-
-
-def test_a_sensor_that_comes_twice_in_a_scan_has_its_last_value(path: Path) -> None:
-    kept(path, [replace(scan(), readings=(Reading("t", 1.0), Reading("t", 2.0)))])
-    assert select(path, "SELECT sensors, readings FROM scan JOIN series USING (series)") == [
-        ('["t"]', "[2.0]")
     ]

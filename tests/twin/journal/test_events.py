@@ -1,13 +1,7 @@
 from __future__ import annotations
 
-from collections import Counter
 from pathlib import Path
 from sqlite3 import Connection
-from typing import Any
-
-import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from lupin_twin.core.past import EVERY_TAG, HOUR_NS, Event, SeriesPast, SeriesRequest
 from lupin_twin.journal.hours import SILENCE_NS
@@ -18,16 +12,10 @@ from tests.support.log_life import (
     LATEST,
     MINUTE,
     SECOND,
-    check,
-    failure,
     lived,
     look,
-    one_run,
-    periods,
     scan,
-    steps,
 )
-from tests.twin.journal.conftest import Engines, Living
 
 END = BEGUN + (LATEST + 200) * MINUTE
 COUNTED = (
@@ -57,80 +45,6 @@ def told(answer: SeriesPast) -> list[tuple[int, float]]:
     return list(zip(answer.stamps_ns, answer.means, strict=True))
 
 
-@given(steps, st.tuples(periods, st.integers(1, 30)), st.sampled_from([EVERY_TAG, "7"]))
-@settings(deadline=None, max_examples=60)
-def test_they_are_those_of_a_plain_list_on_either_engine(
-    living: Living,
-    engines: Engines,
-    lives: list[tuple[str, Any]],
-    asked: tuple[tuple[int, int], int],
-    tag_id: str,
-) -> None:
-    period, points = asked
-    with living(lives) as life:
-        for connection, site in engines(life.connection):
-            for event in COUNTED:
-                request = SeriesRequest(tag_id, event, *period, points)
-                answer = series(connection, request, END, site)
-                check(answer, request, life.events(tag_id, event), now_ns=END)
-            request = SeriesRequest(tag_id, Event.SILENCES, *period)
-            start_ns = period[0] or min(life.attempts(tag_id), default=END)
-            expected = life.silences(tag_id, start_ns, period[1] or END + 1, END)
-            assert told(series(connection, request, END, site)) == expected
-
-
-@given(one_run, st.tuples(periods, st.integers(1, 30)), st.integers(0, LATEST))
-@settings(deadline=None, max_examples=40)
-def test_those_of_the_site_outlive_rows_that_were_deleted(
-    living: Living,
-    engines: Engines,
-    lives: list[tuple[str, Any]],
-    asked: tuple[tuple[int, int], int],
-    minute: int,
-) -> None:
-    period, points = asked
-    with living(lives) as life:
-        life.delete(BEGUN + minute * MINUTE)
-        for connection, site in engines(life.connection):
-            for event in COUNTED:
-                request = SeriesRequest(EVERY_TAG, event, *period, points)
-                answer = series(connection, request, END, site)
-                check(answer, request, life.events(EVERY_TAG, event), now_ns=END)
-
-
-def test_values_are_those_of_the_contract(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write(
-            [
-                scan(at_ns=BEGUN, temperature=1.0, co2=2.0),
-                failure(at_ns=BEGUN + 1, status=2),
-                failure(at_ns=BEGUN + 2, status=1, kind=1),
-                look(at_ns=BEGUN + 3),
-                look(at_ns=BEGUN + 4, anomaly=True),
-                look(at_ns=BEGUN + 5, anomaly=True),
-                look(at_ns=BEGUN + 6),
-            ]
-        )
-        log = life.connection
-        assert told(ask(log, Event.SCANS)) == [(BEGUN, 2.0)]
-        assert told(ask(log, Event.FAILURES, "7")) == [(BEGUN + 1, 2.0), (BEGUN + 2, 1.0)]
-        assert [value for _, value in told(ask(log, Event.LOOKS))] == [0.0, 1.0, 1.0, 0.0]
-        assert told(ask(log, Event.PESTS_SEEN)) == [(BEGUN + 4, 1.0)]
-        assert told(ask(log, Event.PESTS_CLEARED, "7")) == [(BEGUN + 6, 0.0)]
-        assert told(ask(log, Event.SCANS, "8")) == []
-
-
-def test_a_look_that_comes_late_changes_what_changed(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        log = life.connection
-        life.write([look(at_ns=BEGUN), look(at_ns=BEGUN + 2, anomaly=True), look(at_ns=BEGUN + 4)])
-        assert told(ask(log, Event.PESTS_SEEN)) == [(BEGUN + 2, 1.0)]
-        life.write([look(at_ns=BEGUN + 1, anomaly=True)])
-        assert told(ask(log, Event.PESTS_SEEN)) == [(BEGUN + 1, 1.0)]
-        life.write([look(at_ns=BEGUN + 3)])
-        assert told(ask(log, Event.PESTS_CLEARED)) == [(BEGUN + 3, 0.0)]
-
-
 def test_of_looks_that_were_deleted_it_is_known_whether_there_was_a_pest(tmp_path: Path) -> None:
     with lived(tmp_path / "j.sqlite") as life:
         life.write([look(at_ns=BEGUN, anomaly=True)])
@@ -138,32 +52,6 @@ def test_of_looks_that_were_deleted_it_is_known_whether_there_was_a_pest(tmp_pat
         life.write([look(at_ns=BEGUN + 2 * HOUR, anomaly=True), look(at_ns=BEGUN + 3 * HOUR)])
         assert told(ask(life.connection, Event.PESTS_SEEN)) == [(BEGUN, 1.0)]
         assert told(ask(life.connection, Event.PESTS_CLEARED)) == [(BEGUN + 3 * HOUR, 0.0)]
-
-
-def test_events_of_minutes_are_counted(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write(scan(str(n % 3), BEGUN + n * SECOND) for n in range(100))
-        answer = ask(life.connection, Event.SCANS, start=BEGUN, end=BEGUN + 100 * SECOND, points=10)
-        assert answer.counts == (10,) * 10
-        assert answer.bucket_ns == 10 * SECOND
-        assert len(ask(life.connection, Event.SCANS, points=100).stamps_ns) == 100
-
-
-def test_too_many_events_are_counted_by_the_hour(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write(scan(at_ns=BEGUN + n * MINUTE) for n in range(120))
-
-        def scans() -> SeriesPast:
-            end = BEGUN + 2 * HOUR
-            return ask(life.connection, Event.SCANS, start=BEGUN, end=end, points=100)
-
-        monkeypatch.setattr("lupin_twin.journal.events.MAX_ROWS", 120)
-        assert scans().bucket_ns == 72 * SECOND
-        monkeypatch.setattr("lupin_twin.journal.events.MAX_ROWS", 119)
-        answer = scans()
-        assert (answer.bucket_ns, answer.counts) == (HOUR_NS, (60, 60))
 
 
 def test_long_buckets_of_the_site_come_from_tallies_alone(tmp_path: Path) -> None:
@@ -214,21 +102,6 @@ def test_a_silence_is_longer_than_ten_minutes_and_than_three_usual_intervals(
         life.write([scan("9", at_ns=BEGUN + second * SECOND) for second in seconds])
         silences = told(ask(log, Event.SILENCES, "9", now=BEGUN + seconds[-1] * SECOND))
         assert silences == [(BEGUN + 7 * HOUR, 3 * 3600 + 1.0)]
-
-
-def test_too_many_silences_are_counted(tmp_path: Path) -> None:
-    stamps = [BEGUN + (n // 2) * HOUR + n for n in range(40)]
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write(scan(at_ns=stamp_ns) for stamp_ns in stamps)
-        singly = told(ask(life.connection, Event.SILENCES, points=19, now=stamps[-1]))
-        assert len(singly) == 19
-        answer = ask(life.connection, Event.SILENCES, points=18, now=stamps[-1])
-    assert sum(answer.counts) == 19
-    start_ns, bucket_ns = answer.start_ns, answer.bucket_ns
-    assert bucket_ns is not None
-    begins = Counter(start_ns + (at - start_ns) // bucket_ns * bucket_ns for at, _ in singly)
-    assert dict(zip(answer.stamps_ns, answer.counts, strict=True)) == begins
-    assert answer.means[0] == pytest.approx(3600.0)
 
 
 def test_of_years_that_were_deleted_silences_are_still_told(tmp_path: Path) -> None:

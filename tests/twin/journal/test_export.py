@@ -1,18 +1,12 @@
 from __future__ import annotations
 
-import math
 import sqlite3
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from lupin_twin.core.past import NotRemembered, PastRow
-from lupin_twin.core.state import Reading
 from lupin_twin.journal.queries import LOT, Export, rows
 from lupin_twin.journal.schema import open_reader
 from tests.support.log_life import (
@@ -20,14 +14,9 @@ from tests.support.log_life import (
     LATEST,
     MINUTE,
     SECOND,
-    failure,
     lived,
-    look,
-    pin,
     scan,
-    steps,
 )
-from tests.twin.journal.conftest import Engines, Living
 
 END = BEGUN + (LATEST + 200) * MINUTE
 
@@ -36,55 +25,6 @@ def every(
     connection: sqlite3.Connection, tag_id: str | None = None, sensor: str | None = None
 ) -> list[PastRow]:
     return [row for lot in rows(connection, 0, END, tag_id, sensor) for row in lot]
-
-
-@given(steps, st.tuples(*[st.integers(0, LATEST)] * 2).map(sorted), st.sampled_from([None, "7"]))
-@settings(deadline=None, max_examples=40)
-def test_it_is_that_of_a_plain_list_on_either_engine(
-    living: Living,
-    engines: Engines,
-    told: list[tuple[str, Any]],
-    minutes: list[int],
-    tag_id: str | None,
-) -> None:
-    start_ns, end_ns = (BEGUN + minute * MINUTE for minute in minutes)
-    with (
-        living(told) as life,
-        pytest.MonkeyPatch.context() as patch,
-    ):
-        patch.setattr("lupin_twin.journal.queries._STRETCH", 64)
-        patch.setattr("lupin_twin.journal.queries.LOT", 3)
-        # What is no number is null in the log.
-        expected = [
-            row if math.isfinite(row.value) else replace(row, value=math.nan)
-            for row in life.export(start_ns, end_ns, tag_id)
-        ]
-        for connection, site in engines(life.connection):
-            lots = list(rows(connection, start_ns, end_ns, tag_id, site=site))
-            assert repr([row for lot in lots for row in lot]) == repr(expected)
-            assert all(0 < len(lot) <= 3 for lot in lots)
-
-
-def test_a_row_says_all_there_is(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        failed = replace(failure("8", BEGUN + 1), source="other")
-        life.write([scan(co2=400.0, temperature=21.0), pin(), failed, look("9", BEGUN + 2)])
-        first, second, third = every(life.connection)
-        assert first == PastRow(BEGUN, "7", 1.5, 2.5, "co2", 400.0, 0, "robot")
-        assert second == PastRow(BEGUN, "7", 1.5, 2.5, "temperature", 21.0, 0, "robot")
-        nothing = PastRow(BEGUN + 1, "8", math.nan, math.nan, "", math.nan, 2, "other")
-        assert repr(third) == repr(nothing)
-        # Of one sensor its readings alone: what failed was an attempt at all of them.
-        assert every(life.connection, None, "co2") == [first]
-        assert every(life.connection, "nobody") == []
-
-
-def test_a_place_is_known_in_a_run_that_follows(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write([pin()])
-        life.begin(BEGUN - SECOND)
-        life.write([scan(at_ns=BEGUN - SECOND), pin(at_ns=BEGUN - SECOND, x=9.0)])
-        assert [row.x for row in every(life.connection)] == [1.5]
 
 
 def test_lots_come_as_they_are_taken_and_nothing_is_held_open_between(tmp_path: Path) -> None:
@@ -100,38 +40,6 @@ def test_lots_come_as_they_are_taken_and_nothing_is_held_open_between(tmp_path: 
         checkpoint = life.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
         assert checkpoint == (0, 0, 0)
         assert sum(map(len, lots)) == 3 * LOT - taken
-
-
-def test_scans_of_many_readings_come_in_shorter_stretches(tmp_path: Path) -> None:
-    """What is in memory at once is bounded by readings, not by scans."""
-    wide = replace(scan(), readings=tuple(Reading(f"s{number}", 1.0) for number in range(64)))
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write(replace(wide, stamp_ns=BEGUN + n * SECOND // 100) for n in range(5_000))
-        export = Export(0, END, None, None)
-        found = []
-        while (step := export.step(life.connection)) is not None:
-            found.append(len(step))
-    assert sum(found) == 5_000 * 64
-    assert max(found) <= 40_000
-
-
-def test_a_long_silence_is_one_step(tmp_path: Path) -> None:
-    year = 365 * 86_400 * SECOND
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write([scan(at_ns=BEGUN - year), scan(at_ns=BEGUN)])
-        queries: list[str] = []
-        life.connection.set_trace_callback(queries.append)
-        assert [row.stamp_ns for row in every(life.connection)] == [BEGUN - year, BEGUN]
-        assert len(queries) < 60
-
-
-def test_what_comes_while_it_is_taken_is_read_too(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write(scan(at_ns=BEGUN + n * SECOND) for n in range(2 * LOT))
-        lots = rows(life.connection, 0, END)
-        next(lots)
-        life.write([scan("new", at_ns=BEGUN + 9_000 * SECOND)])
-        assert [row.tag_id for lot in lots for row in lot][-1] == "new"
 
 
 def test_what_is_deleted_meanwhile_breaks_it_off_and_only_if_it_was_to_come(

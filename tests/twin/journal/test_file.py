@@ -1,17 +1,17 @@
 from __future__ import annotations
 
-import os
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from lupin_twin.core.state import Reading
-from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
+from lupin_twin.journal.salvage import quarantine
+from lupin_twin.journal.schema import open_writer, set_meta
 from tests.support.journal import (
     CLOCK,
-    LIMITS,
     NOW,
     is_whole,
     kept,
@@ -73,19 +73,6 @@ def test_upkeep_purges_shrinks_and_checkpoints(path: Path, monkeypatch: pytest.M
     assert is_whole(path)
 
 
-def test_the_log_is_put_into_the_file_when_it_is_long(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("lupin_twin.journal.file._LOG_BYTES", 10_000)
-    with opened(path) as file:
-        run = file.start(CLOCK, 1, is_believed=False).run
-        for lot in range(50):
-            file.append([(run, scan(at_ns=NOW + 100 * lot + n)) for n in range(100)])
-            file.look_after(may_purge=True)
-        assert file._log_bytes() < 100_000
-        assert file.size() > path.stat().st_size
-
-
 def test_a_log_that_was_put_into_the_file_is_short_again(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -102,56 +89,12 @@ def test_a_log_that_was_put_into_the_file_is_short_again(
         assert file._log_bytes() < 100_000
 
 
-def _truncate(path: Path) -> None:
-    os.truncate(path, path.stat().st_size * 9 // 10)
-
-
-def _overwrite_header(path: Path) -> None:
-    with path.open("rb+") as file:
-        file.write(b"nothing of the kind")
-
-
-@pytest.mark.parametrize(("damage", "at_least"), [(_truncate, 20), (_overwrite_header, 0)])
-def test_a_damaged_file_is_quarantined_and_read_as_far_as_it_goes(
-    path: Path, damage: object, at_least: int
-) -> None:
-    rows = [scan(str(tag), NOW + n, temperature=n / 7) for n in range(20) for tag in range(100)]
-    kept(path, rows)
-    assert callable(damage)
-    damage(path)
-    damaged = path.read_bytes()
-    with opened(path) as file:
-        found = set(file.start(CLOCK, 1, is_believed=False).rows)
-        aside = Path(file.quarantined)
-    assert found <= set(rows)
-    assert len(found) >= at_least
-    assert aside.name.startswith("j.sqlite.damaged-20")
-    assert aside.read_bytes() == damaged
-    assert is_whole(path)
-
-
-def test_salvage_that_takes_long_goes_on_in_steps_and_after_a_restart(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    kept(path, [scan(at_ns=NOW + n) for n in range(3000)])
-    monkeypatch.setattr("lupin_twin.journal.file._SALVAGE_S", 0.0)
-    file = JournalFile(path, LIMITS, is_sound=False)
-    assert file.look_after(may_purge=True)
-    file.close()
-    with opened(path) as file:
-        while file.look_after(may_purge=True):
-            pass
-    assert select(path, "SELECT count(*) FROM scan") == [(3000,)]
+def test_what_was_killed_while_it_saved_begins_again(path: Path) -> None:
+    kept(path, [scan(at_ns=NOW + n) for n in range(300)])
+    aside = quarantine(path, "20261121T141500Z")
+    with closing(open_writer(path)) as connection:
+        set_meta(connection, "salvage", aside.name)
+    with opened(path):
+        pass
+    assert select(path, "SELECT count(*) FROM scan") == [(300,)]
     assert select(path, "SELECT * FROM meta WHERE key = 'salvage'") == []
-
-
-def test_a_file_that_was_found_sound_is_not_read_through_again(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    kept(path, [scan()])
-
-    def never(path: Path) -> str:
-        raise AssertionError("checked")
-
-    monkeypatch.setattr("lupin_twin.journal.file.find_damage", never)
-    JournalFile(path, LIMITS, is_sound=True).close()

@@ -1,76 +1,15 @@
-"""What follows from rows does not depend on the order in which they came, nor on the engine."""
-
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
-import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
-from lupin_twin.journal.hours import WrittenInspection, WrittenScan, delete_before
-from lupin_twin.journal.hours import count as count_rows
-from lupin_twin.journal.rows import numbers_of
+from lupin_twin.journal.hours import delete_before
 from lupin_twin.journal.schema import SiteLog
-from tests.support.log_life import BEGUN, HOUR, MINUTE, lived, look, scan, steps
-from tests.twin.journal.conftest import Copied, Living
-
-_DERIVED = ("hour", "tally", "event")
+from tests.support.log_life import BEGUN, HOUR, MINUTE, lived, look, scan
 
 
-def derived(log: SiteLog) -> list[list[tuple[Any, ...]]]:
-    """The three tables, without sums, and the sums."""
-    found = [
-        sorted(log.execute(f"SELECT {columns} WHERE site = :site").fetchall())
-        for columns in (
-            "series, hour, CAST(n AS TEXT), CAST(low AS TEXT), CAST(high AS TEXT) FROM hour",
-            "run, event, hour, n, total, low, high, first_ns, last_ns FROM tally",
-            "run, event, stamp_ns, seq, tag, value FROM event",
-        )
-    ]
-    totals = "SELECT series, hour, CAST(total AS TEXT) FROM hour WHERE site = :site"
-    return [*found, [tuple(json.loads(row[2])) for row in sorted(log.execute(totals).fetchall())]]
-
-
-@given(steps, st.randoms(use_true_random=False))
-@settings(deadline=None, max_examples=30)
-def test_what_is_counted_in_another_order_on_the_other_engine_is_the_same(
-    living: Living, copied: Copied, told: list[tuple[str, Any]], random: Any
-) -> None:
-    with living(told) as life:
-        log = SiteLog(life.connection)
-        archive = SiteLog(*copied(life.connection))
-        for table in _DERIVED:
-            archive.execute(f"DELETE FROM {table} WHERE site = :site")
-        found: list[WrittenScan | WrittenInspection] = [
-            WrittenScan(run, series, kind, stamp_ns, status, numbers_of([readings])[0])
-            for run, series, kind, stamp_ns, status, readings in log.execute(
-                "SELECT run, scan.series, kind, stamp_ns, status, readings FROM scan"
-                " JOIN series ON series.series = scan.series WHERE is_copy = 0"
-            )
-        ]
-        found += [
-            WrittenInspection(run, tag, seq, stamp_ns, bool(anomaly), bug_count)
-            for run, tag, seq, stamp_ns, anomaly, bug_count in log.execute(
-                "SELECT run, tag, seq, stamp_ns, anomaly, bug_count FROM look WHERE is_copy = 0"
-            )
-        ]
-        random.shuffle(found)
-        size = random.randint(1, 9)
-        for first in range(0, len(found), size):
-            lot = found[first : first + size]
-            count_rows(
-                archive,
-                [row for row in lot if isinstance(row, WrittenScan)],
-                [row for row in lot if isinstance(row, WrittenInspection)],
-            )
-        *there, there_sums = derived(archive)
-        *here, here_sums = derived(log)
-        assert there == here
-        for one, other in zip(there_sums, here_sums, strict=True):
-            assert one == pytest.approx(other, rel=1e-12, abs=1e-6)
+def counts(log: SiteLog) -> list[int]:
+    tables = ("hour", "tally", "event")
+    return [log.execute(f"SELECT count(*) FROM {table}").fetchone()[0] for table in tables]
 
 
 def test_what_is_older_than_a_stamp_goes_at_once(tmp_path: Path) -> None:
@@ -80,6 +19,6 @@ def test_what_is_older_than_a_stamp_goes_at_once(tmp_path: Path) -> None:
         life.write(look(at_ns=at_ns, anomaly=n % 2 == 0) for n, at_ns in enumerate(stamps))
         log = SiteLog(life.connection)
         delete_before(log, 2, BEGUN + 2 * HOUR)
-        assert [len(rows) for rows in derived(log)[:3]] == [4, 8, 15]
+        assert counts(log) == [4, 8, 15]
         delete_before(log, 1, BEGUN + 2 * HOUR)
-        assert [len(rows) for rows in derived(log)[:3]] == [2, 4, 7]
+        assert counts(log) == [2, 4, 7]

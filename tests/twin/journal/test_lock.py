@@ -17,12 +17,6 @@ def test_a_second_holder_is_refused_by_name(tmp_path: Path) -> None:
         Lock(journal, "/other/lupin_twin")
 
 
-def test_what_is_let_go_of_can_be_held(tmp_path: Path) -> None:
-    for _ in range(2):
-        with Lock(tmp_path / "j.sqlite", "a twin"):
-            pass
-
-
 def test_who_holds_it_can_be_asked_without_holding_it(tmp_path: Path) -> None:
     journal = tmp_path / "j.sqlite"
     assert holder_of(journal) is None

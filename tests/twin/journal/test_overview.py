@@ -2,21 +2,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.checking import overview
 from lupin_twin.journal.retention import DAY_NS, Limits, note_limits
 from tests.support.log_life import BEGUN, SECOND, failure, lived, look, pin, scan
-
-
-def test_an_empty_journal_has_nothing_in_it(tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-    with lived(path) as life:
-        life.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-        found = overview(life.connection, path)
-    assert found.rows == {"scan": 0, "look": 0, "place": 0, "tag": 0, "hour": 0}
-    assert (found.failures, found.sensors, found.hours_ns) == (0, (), None)
-    assert [(extent.first_ns, extent.last_ns) for extent in found.runs] == [(None, None)]
-    assert (found.file_bytes, found.log_bytes) == (path.stat().st_size, 0)
 
 
 def test_rows_sensors_and_reach_are_those_of_the_file(tmp_path: Path) -> None:
@@ -28,21 +16,14 @@ def test_rows_sensors_and_reach_are_those_of_the_file(tmp_path: Path) -> None:
         life.connection.execute("UPDATE run SET is_simulated = 0")
         life.begin(5 * SECOND)
         life.write([scan("9", 7 * SECOND)])
+        note_limits(life.connection, Limits(days=36_500.0, max_bytes=5_000_000))
         found = overview(life.connection, path)
+    assert (found.kept_ns, found.kept_bytes) == (36_500 * DAY_NS, 5_000_000)
     assert found.rows["tag"] == 3
     assert found.failures == 1
     assert found.sensors == ("a", "b", "c", "temperature")
     extents = [(extent.first_ns, extent.last_ns) for extent in found.runs]
     assert extents == [(early, late), (7 * SECOND, 7 * SECOND)]
-    assert found.hours_ns == (BEGUN - HOUR_NS, BEGUN + HOUR_NS)
-
-
-def test_limits_stand_in_the_file(tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-    with lived(path) as life:
-        note_limits(life.connection, Limits(days=36_500.0, max_bytes=5_000_000))
-        found = overview(life.connection, path)
-    assert (found.kept_ns, found.kept_bytes) == (36_500 * DAY_NS, 5_000_000)
 
 
 def test_what_was_quarantined_beside_it_is_named(tmp_path: Path) -> None:

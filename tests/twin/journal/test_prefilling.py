@@ -6,12 +6,10 @@ from pathlib import Path
 import pytest
 
 from lupin_twin.core.journal_condition import JournalState
-from lupin_twin.journal.appending import PURGED_SEQ, Stretch, is_empty, prefill, simulated
-from lupin_twin.journal.beside import InUse, Lock
+from lupin_twin.journal.appending import Stretch, prefill, simulated
 from lupin_twin.journal.rows import Row
 from lupin_twin.journal.runs import Clock
-from lupin_twin.journal.salvage import quarantine
-from lupin_twin.journal.schema import open_reader, open_writer, set_meta
+from lupin_twin.journal.schema import open_reader
 from tests.support.journal import (
     CLOCK,
     NOW,
@@ -20,7 +18,6 @@ from tests.support.journal import (
     kept,
     known,
     look,
-    opened,
     pin,
     recording,
     restored,
@@ -87,45 +84,9 @@ def test_into_what_anybody_has_recorded_nothing_is_written(tmp_path: Path, row: 
     assert mark(path) is None
 
 
-def test_nor_into_one_that_has_given_all_of_it_up(tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-    kept(path, [scan()], CLOCK)
-    with closing(open_writer(path)) as connection:
-        connection.execute("DELETE FROM scan")
-        set_meta(connection, PURGED_SEQ, 1)
-        assert not is_empty(connection)
-    assert not filled(path)
-
-
-def test_nor_into_one_that_a_twin_has(tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-    with Lock(path, "/lupin_twin"), pytest.raises(InUse, match="/lupin_twin"):
-        filled(path)
-
-
-def test_of_a_filling_that_fails_nothing_is_there(tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-    with pytest.raises(AttributeError):
-        prefill(path, "a test", [*PAST, None], NOW)  # type: ignore[list-item]
-    assert mark(path) is None
-    assert filled(path)
-
-
 def test_a_journal_at_work_says_what_of_it_is_simulated(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     filled(path)
     for at_ns, is_simulated in ((NOW + SECOND, False), (5 * SECOND, True)):
         with recording(path, Clock(at_ns, NOW + SECOND, is_simulated)) as journal:
             assert wait_state(journal, JournalState.RECORDING).simulated_ns == (START, NOW)
-
-
-def test_what_was_salvaged_is_no_less_simulated(tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-    filled(path)
-    aside = quarantine(path, "20261121T141500Z")
-    with closing(open_writer(path)) as connection:
-        set_meta(connection, "salvage", aside.name)
-    with opened(path) as file:
-        while file.look_after(may_purge=True):
-            pass
-    assert mark(path) == (START, NOW)

@@ -1,83 +1,25 @@
 from __future__ import annotations
 
-import math
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from lupin_twin.core.past import HOUR_NS, MAX_POINTS, SeriesPast, SeriesRequest
-from lupin_twin.core.state import Reading
-from lupin_twin.journal.queries import newest, series
+from lupin_twin.core.past import HOUR_NS, SeriesPast, SeriesRequest
+from lupin_twin.journal.queries import series
 from tests.support.log_life import (
     BEGUN,
     LATEST,
     MINUTE,
     SECOND,
-    check,
     lived,
-    look,
-    one_run,
-    periods,
     scan,
-    steps,
 )
-from tests.twin.journal.conftest import Engines, Living
 
 END = BEGUN + (LATEST + 200) * MINUTE
 
 
 def temperature(start_ns: int = 0, end_ns: int = 0, points: int = 500) -> SeriesRequest:
     return SeriesRequest("7", "temperature", start_ns, end_ns, points)
-
-
-@given(steps, st.tuples(periods, st.integers(1, 40)), st.sampled_from(["temperature", "co2"]))
-@settings(deadline=None, max_examples=40)
-def test_it_is_that_of_a_plain_list_on_either_engine(
-    living: Living,
-    engines: Engines,
-    told: list[tuple[str, Any]],
-    asked: tuple[tuple[int, int], int],
-    sensor: str,
-) -> None:
-    period, points = asked
-    with living(told) as life:
-        for where in engines(life.connection):
-            for tag_id in ("7", "ü 9"):
-                request = SeriesRequest(tag_id, sensor, *period, points)
-                answer = series(where[0], request, END, where[1])
-                check(answer, request, life.readings(tag_id, sensor), now_ns=END)
-                ended = replace(request, end_ns=period[1] or END, max_points=MAX_POINTS)
-                every = series(where[0], ended, END, where[1])
-                finite = [
-                    (stamp_ns, value)
-                    for stamp_ns, value in zip(every.stamps_ns, every.means, strict=True)
-                    if math.isfinite(value)
-                ]
-                assert newest(where[0], ended, points, where[1]) == finite[-points:]
-
-
-@given(one_run, st.tuples(periods, st.integers(1, 40)), st.integers(0, LATEST))
-@settings(deadline=None, max_examples=40)
-def test_hours_stay_where_rows_were_deleted(
-    living: Living,
-    engines: Engines,
-    told: list[tuple[str, Any]],
-    asked: tuple[tuple[int, int], int],
-    minute: int,
-) -> None:
-    period, points = asked
-    with living(told) as life:
-        everything = life.readings("7", "temperature")
-        life.delete(BEGUN + minute * MINUTE)
-        # A reading that is no number has left no trace in an hour, and so no beginning of all.
-        if period[0] or all(math.isfinite(value) for *_, value in everything):
-            for connection, site in engines(life.connection):
-                request = temperature(*period, points)
-                check(series(connection, request, END, site), request, everything, now_ns=END)
 
 
 def test_as_many_readings_as_points_are_told_and_one_more_are_buckets(tmp_path: Path) -> None:
@@ -112,22 +54,6 @@ def test_the_period_ends_before_its_end_and_now_is_told(tmp_path: Path) -> None:
         assert later == SeriesPast(BEGUN + 3, BEGUN + 3)
 
 
-def test_what_was_never_received_is_empty(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write([look(), scan("8")])
-        for tag_id, sensor in (("7", "temperature"), ("8", "co2"), ("99", "co2")):
-            assert series(life.connection, SeriesRequest(tag_id, sensor), END).stamps_ns == ()
-
-
-def test_a_reading_that_is_no_number_is_told_and_not_counted(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        values = [math.nan, 1.0, math.inf, 1e300]
-        life.write(scan(at_ns=BEGUN + n, temperature=v) for n, v in enumerate(values))
-        assert repr(series(life.connection, temperature(), END).means) == "(nan, 1.0, nan, 1e+300)"
-        assert series(life.connection, temperature(BEGUN, BEGUN + 4, 2), END).counts == (1,)
-        assert series(life.connection, temperature(0, END, 1), END).counts == (1,)
-
-
 def test_long_buckets_come_from_hours_alone(tmp_path: Path) -> None:
     hours = 30
     with lived(tmp_path / "j.sqlite") as life:
@@ -150,24 +76,7 @@ def test_too_many_scans_are_told_by_the_hour(
     with lived(tmp_path / "j.sqlite") as life:
         life.write(scan(at_ns=BEGUN + n * MINUTE) for n in range(300))
         request = temperature(BEGUN, BEGUN + 300 * MINUTE, 299)
-        monkeypatch.setattr("lupin_twin.journal.queries.MAX_SCANS", 300)
+        monkeypatch.setattr("lupin_twin.journal.buckets.MAX_ROWS", 300)
         assert len(series(life.connection, request, END).stamps_ns) > 200
-        monkeypatch.setattr("lupin_twin.journal.queries.MAX_SCANS", 299)
+        monkeypatch.setattr("lupin_twin.journal.buckets.MAX_ROWS", 299)
         assert series(life.connection, request, END).counts == (60,) * 5
-
-
-def test_few_scans_that_were_deleted_are_told_by_the_hour(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write(scan(at_ns=BEGUN + n * 30 * MINUTE, temperature=1.0) for n in range(8))
-        life.delete(BEGUN + 3 * HOUR_NS)
-        answer = series(life.connection, temperature(BEGUN), BEGUN + 4 * HOUR_NS - 1)
-    assert answer.bucket_ns == HOUR_NS
-    assert answer.counts == (2, 2, 2, 2)
-
-
-def test_of_a_scan_in_two_parts_both_are_told(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        both = replace(scan(), readings=(Reading("co2", 400.0), Reading("temperature", 9.0)))
-        life.write([scan(temperature=20.0), both])
-        assert series(life.connection, temperature(), END).means == (20.0,)
-        assert series(life.connection, SeriesRequest("7", "co2"), END).means == (400.0,)

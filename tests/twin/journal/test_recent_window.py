@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.fold import recent_readings
-from tests.support.log_life import BEGUN, MINUTE, lived, pin, scan
+from tests.support.log_life import BEGUN, lived, pin, scan
 
 S = 1_000_000_000
 
@@ -42,19 +41,3 @@ def test_of_very_many_readings_the_last_are_told_past_those_that_are_no_number(
             life.connection, "temperature", BEGUN + 80 * S, 3600 * S, 4
         )
     assert found == tuple((BEGUN + n * S, float(n)) for n in (76, 77, 79, 80))
-
-
-def test_where_rows_were_deleted_the_means_of_hours(tmp_path: Path) -> None:
-    hours = 5
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write([pin("7", BEGUN)])
-        life.write(
-            scan(at_ns=BEGUN + n * 20 * MINUTE, temperature=float(n)) for n in range(3 * hours)
-        )
-        at_ns = BEGUN + hours * HOUR_NS
-        asked = (life.connection, "temperature", at_ns, hours * HOUR_NS, 99)
-        ((*_, before),) = recent_readings(*asked)
-        assert [value for _, value in before] == [float(n) for n in range(3 * hours)]
-        life.delete(BEGUN + 2 * HOUR_NS)
-        ((*_, found),) = recent_readings(*asked)
-    assert found == tuple((BEGUN + n * HOUR_NS + HOUR_NS // 2, 3.0 * n + 1.0) for n in range(hours))

@@ -14,11 +14,10 @@ from lupin_twin.journal.retention import (
     horizon_ns,
     note_lost,
     purge_step,
-    shrink_step,
     used_bytes,
 )
 from lupin_twin.journal.runs import FOREVER_NS, Carries, Clock
-from lupin_twin.journal.schema import SiteLog, open_reader, open_writer, transaction
+from lupin_twin.journal.schema import SiteLog, open_writer, transaction
 from tests.support.journal import CLOCK, NOW, SECOND, kept, look, opened, pin, restored, scan
 
 DAY = 24 * HOUR_NS
@@ -76,49 +75,12 @@ def test_what_is_too_large_loses_its_oldest(file: sqlite3.Connection) -> None:
     assert left == [NOW + n * 60 * SECOND for n in range(ROWS - len(left), ROWS)]
 
 
-def test_within_its_limits_nothing_goes(file: sqlite3.Connection) -> None:
-    assert purge(file, Limits(1.0, used_bytes(file)), NOW + DAY) == 0
-
-
-def test_purging_shrinks_the_file_in_small_steps(
-    path: Path, file: sqlite3.Connection, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("lupin_twin.journal.retention._FREE_PAGES", 8)
-    monkeypatch.setattr("lupin_twin.journal.retention._PAGES", 16)
-    before = path.stat().st_size
-    purge(file, Limits(0.0, ENOUGH), NOW + 99 * DAY)
-    steps = 0
-    while shrink_step(file):
-        steps += 1
-    file.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
-    assert path.stat().st_size < before / 2
-    assert steps > 3
-
-
-def test_a_reader_is_not_blocked_and_sees_what_it_began_with(
-    path: Path, file: sqlite3.Connection
-) -> None:
-    reader = open_reader(path)
-    reader.execute("BEGIN")
-    assert reader.execute("SELECT count(*) FROM scan").fetchone() == (ROWS,)
-    purge(file, Limits(0.0, ENOUGH), NOW + 99 * DAY)
-    assert reader.execute("SELECT count(*) FROM scan").fetchone() == (ROWS,)
-    reader.close()
-    assert scans(file) == []
-
-
 def test_numbers_go_on_when_everything_is_gone(path: Path, file: sqlite3.Connection) -> None:
     file.execute("DELETE FROM place")
     purge(file, Limits(0.0, ENOUGH), NOW + 99 * DAY)
     file.close()
     assert kept(path, [scan(at_ns=NOW + 200 * DAY)]) == (1, 0)
     assert restored(path).last_seq == ROWS + 3
-
-
-def test_where_scans_were_given_up_is_known(file: sqlite3.Connection) -> None:
-    assert deleted_ns(SiteLog(file), 1) == -1
-    purge(file, Limits(1.0, ENOUGH), NOW + DAY + 10 * 60 * SECOND)
-    assert deleted_ns(SiteLog(file), 1) == scans(file)[0] - 60 * SECOND
 
 
 def test_what_is_kept_begins_with_the_log_and_behind_what_was_deleted_or_lost(

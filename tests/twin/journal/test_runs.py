@@ -36,13 +36,9 @@ def test_a_wall_clock_goes_on_unless_it_is_set_back_by_more_than_a_correction(
     back_ns: int, turn: Turn | None
 ) -> None:
     assert turn_of(wall(WALL), wall(WALL - back_ns), 0) is turn
-
-
-@pytest.mark.parametrize(
-    ("jumped_ns", "turn"), [(CORRECTION_NS, None), (CORRECTION_NS + 1, Turn.AHEAD)]
-)
-def test_a_wall_clock_may_jump_ahead(jumped_ns: int, turn: Turn | None) -> None:
-    assert turn_of(wall(WALL), wall(WALL + S), jumped_ns) is turn
+    # It may jump ahead by as much as that.
+    assert turn_of(wall(WALL), wall(WALL + S), CORRECTION_NS) is None
+    assert turn_of(wall(WALL), wall(WALL + S), CORRECTION_NS + 1) is Turn.AHEAD
 
 
 def test_any_step_back_of_a_simulated_clock_is_a_new_run() -> None:
@@ -51,36 +47,20 @@ def test_any_step_back_of_a_simulated_clock_is_a_new_run() -> None:
     assert turn_of(sim(10, 0), wall(WALL), 0) is Turn.BACK
 
 
-def test_a_twin_that_restarts_beside_a_simulation_is_in_the_same_run() -> None:
-    last = sim(3600, 3600)
-    assert simulation_goes_on(sim(0, 0), last, sim(3605, 3605))
-
-
-def test_a_simulation_that_was_paused_meanwhile_is_the_same() -> None:
-    last = sim(3600, 3600)
-    assert simulation_goes_on(sim(0, 0), last, sim(3600, 4000))
-
-
-def test_todays_simulation_is_another_than_yesterdays_though_its_clock_is_further_on() -> None:
-    last = sim(3600, 3600)
-    assert not simulation_goes_on(sim(0, 0), last, sim(3700, 86_400))
-
-
-@pytest.mark.parametrize(("back_s", "is_same"), [(300, True), (300.001, False)])
-def test_a_wall_clock_that_was_set_back_does_not_make_yesterdays_simulation_todays(
-    back_s: float, is_same: bool
+@pytest.mark.parametrize(
+    ("last", "now", "goes_on"),
+    [
+        (sim(3600, 3600), sim(3605, 3605), True),  # the twin alone was started again
+        (sim(3600, 3600), sim(3600, 4000), True),  # paused meanwhile
+        (sim(3600, 3600), sim(3700, 86_400), False),  # today's, though further on
+        (sim(3600, 3600), sim(3599.9, 3601), False),  # started over
+        (sim(3600, 3600), sim(3605, 3300), True),  # the wall's clock was corrected
+        (sim(3600, 3600), sim(3605, 3299.999), False),  # the wall's clock was set back
+        (sim(400, 20), sim(500, 45), False),  # 20 times as fast, it may have begun since
+        (sim(400, 20), sim(500, 25), True),
+    ],
+)
+def test_a_simulation_goes_on_if_no_other_could_have_come_so_far(
+    last: Clock, now: Clock, *, goes_on: bool
 ) -> None:
-    last = sim(3600, 3600)
-    assert simulation_goes_on(sim(0, 0), last, sim(3605, 3600 - back_s)) is is_same
-
-
-def test_a_simulation_that_has_started_over_is_another() -> None:
-    last = sim(3600, 3600)
-    assert not simulation_goes_on(sim(0, 0), last, sim(3599.9, 3601))
-
-
-def test_a_fast_simulation_may_have_begun_since() -> None:
-    # 20 times as fast: 500 s of it pass in 25 s.
-    last = sim(400, 20)
-    assert not simulation_goes_on(sim(0, 0), last, sim(500, 45))
-    assert simulation_goes_on(sim(0, 0), last, sim(500, 25))
+    assert simulation_goes_on(sim(0, 0), last, now) is goes_on

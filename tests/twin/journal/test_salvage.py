@@ -9,7 +9,7 @@ import pytest
 
 from lupin_twin.journal.checking import find_all_damage
 from lupin_twin.journal.rows import Row
-from lupin_twin.journal.salvage import Salvage, quarantine
+from lupin_twin.journal.salvage import quarantine, salvage
 from lupin_twin.journal.schema import open_reader, open_writer
 from tests.support.journal import NOW, SECOND, is_whole, kept, known, look, pin, scan, select
 
@@ -38,8 +38,7 @@ def damaged(whole: Path, tmp_path: Path) -> Path:
 def salvaged(damaged: Path) -> Path:
     new = damaged.with_name("new.sqlite")
     with closing(open_writer(new)) as connection:
-        for _ in Salvage(damaged, connection).steps():
-            pass
+        salvage(damaged, connection)
     assert is_whole(new)
     with closing(open_reader(new)) as connection:
         assert list(find_all_damage(connection, lambda what, share: None)) == []
@@ -85,12 +84,12 @@ def test_what_was_given_up_does_not_come_back_but_its_hours(tmp_path: Path) -> N
     kept(path, [scan("7", NOW + n * 60 * SECOND, a=float(n)) for n in range(500)])
     hours = set(select(path, "SELECT * FROM hour"))
     with closing(open_writer(path)) as connection:
-        connection.execute("DELETE FROM scan WHERE seq <= 200")
-        until = NOW + 199 * 60 * SECOND
+        connection.execute("DELETE FROM scan WHERE seq <= 190")
+        until = NOW + 189 * 60 * SECOND  # amid an hour
         connection.execute(f"INSERT INTO meta VALUES ('local', 'purged_ns:1', '{until}')")
-        connection.execute("INSERT INTO meta VALUES ('local', 'purged_seq', '200')")
+        connection.execute("INSERT INTO meta VALUES ('local', 'purged_seq', '190')")
     new = salvaged(path)
-    assert select(new, "SELECT min(seq), count(*) FROM scan") == [(201, 300)]
+    assert select(new, "SELECT min(seq), count(*) FROM scan") == [(191, 310)]
     assert set(select(new, "SELECT * FROM hour")) == hours
 
 
@@ -104,7 +103,7 @@ def test_of_overwritten_pages_what_lies_beside_them_is_read(whole: Path, damaged
     assert len(found) > 1000
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_a_flipped_byte_costs_its_own_page_at_most(whole: Path, damaged: Path, seed: int) -> None:
     at = random.Random(seed).randrange(100, damaged.stat().st_size)
     with damaged.open("rb+") as file:
@@ -117,6 +116,15 @@ def test_a_flipped_byte_costs_its_own_page_at_most(whole: Path, damaged: Path, s
     lost = scans(whole) - scans(new)
     assert len(lost) < 130
     assert len(scans(new) - scans(whole)) <= 1
+
+
+@pytest.mark.parametrize("text", [b"local", b"[7.0]"])
+def test_a_row_that_is_no_row_any_more_is_left_out(whole: Path, damaged: Path, text: bytes) -> None:
+    content = bytearray(damaged.read_bytes())
+    at = content.index(b"robotm1[7.0]")
+    content[content.rindex(text, 0, at + 12)] ^= 0x20
+    damaged.write_bytes(content)
+    assert len(scans(whole) - scans(salvaged(damaged))) == 1
 
 
 def test_new_numbers_are_past_all_that_may_be_lost(damaged: Path) -> None:
@@ -135,7 +143,7 @@ def test_what_is_no_database_gives_nothing(tmp_path: Path) -> None:
     assert scans(salvaged(text)) == set()
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_whatever_stands_on_the_pages_it_ends(whole: Path, damaged: Path, seed: int) -> None:
     chance = random.Random(seed)
     content = bytearray(damaged.read_bytes())
@@ -145,15 +153,14 @@ def test_whatever_stands_on_the_pages_it_ends(whole: Path, damaged: Path, seed: 
     salvaged(damaged)
 
 
-def test_salvage_that_is_cut_short_goes_on_where_it_was(whole: Path, damaged: Path) -> None:
-    new = damaged.with_name("new.sqlite")
-    with closing(open_writer(new)) as connection:
-        steps = Salvage(damaged, connection).steps()
-        for _ in range(3):
-            next(steps)
-        steps.close()
+@pytest.mark.parametrize("size", [100, 1024])
+def test_without_header_or_first_page_all_is_read(whole: Path, damaged: Path, size: int) -> None:
+    content = damaged.read_bytes()
+    damaged.write_bytes(bytes(size) + content[size:])
     assert scans(salvaged(damaged)) == scans(whole)
-    assert set(select(new, "SELECT * FROM hour")) == set(select(whole, "SELECT * FROM hour"))
+    assert {file.name for file in damaged.parent.iterdir() if "damaged" in file.name} == {
+        "damaged.sqlite"
+    }
 
 
 def test_a_damaged_file_is_quarantined_with_its_log_and_never_overwritten(tmp_path: Path) -> None:

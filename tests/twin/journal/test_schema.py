@@ -20,9 +20,7 @@ from lupin_twin.journal.schema import (
     open_reader,
     open_writer,
     says_damaged,
-    transaction,
 )
-from tests.support.journal import kept, scan
 
 
 @pytest.fixture
@@ -38,13 +36,6 @@ def test_a_new_file_is_ours_and_can_be_shrunk(path: Path) -> None:
         assert connection.execute(f"PRAGMA {pragma}").fetchone() == (value,)
     connection.close()
     assert find_damage(path) is None
-
-
-def test_a_reader_cannot_write(path: Path) -> None:
-    connection = open_reader(path)
-    with pytest.raises(sqlite3.OperationalError, match="readonly"):
-        connection.execute("DELETE FROM scan")
-    connection.close()
 
 
 def test_an_index_that_an_earlier_release_did_not_make_is_made_and_no_damage(path: Path) -> None:
@@ -70,14 +61,6 @@ def test_a_database_of_somebody_else_is_told_and_left(tmp_path: Path) -> None:
             opens(foreign)
     assert foreign.read_bytes() == before
     assert find_damage(foreign) is None
-
-
-def test_a_database_without_anything_in_it_is_somebody_elses_too(tmp_path: Path) -> None:
-    foreign = tmp_path / "theirs.sqlite"
-    with closing(sqlite3.connect(foreign)) as connection:
-        connection.executescript("CREATE TABLE theirs (x); DROP TABLE theirs;")
-    with pytest.raises(Foreign, match="not a journal of lupin-twin"):
-        open_reader(foreign)
 
 
 @pytest.mark.parametrize("after", range(6))
@@ -106,34 +89,6 @@ def test_a_file_that_is_being_made_is_empty_or_whole_but_never_another(
     monkeypatch.setattr(sqlite3, "connect", partial(connect, factory=Reader))
     with closing(maker), suppress(Empty):
         open_reader(path).close()
-
-
-def test_whoever_looks_between_two_steps_of_making_it_finds_it_empty_or_whole(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Or a twin that is killed there would find somebody else's file the next time."""
-    path, found = tmp_path / "j.sqlite", list[str]()
-
-    class Maker(sqlite3.Connection):
-        def __init__(self, *args: Any, **options: Any) -> None:
-            super().__init__(*args, **options)
-            self.set_trace_callback(look)
-
-    def look(_: str) -> None:
-        try:
-            open_reader(path).close()
-            found.append("whole")
-        except Exception as error:  # noqa: BLE001  # which nobody would hear of from here
-            found.append(type(error).__name__)
-
-    connect = sqlite3.connect
-
-    def watched(name: object, **options: Any) -> sqlite3.Connection:
-        return connect(name, **{**({"factory": Maker} if name == path else {}), **options})  # type: ignore[call-overload,no-any-return]
-
-    monkeypatch.setattr(sqlite3, "connect", watched)
-    open_writer(path).close()
-    assert set(found) == {"Empty", "whole"}
 
 
 def test_a_file_that_is_being_made_is_called_empty_and_is_not_damaged(tmp_path: Path) -> None:
@@ -170,17 +125,6 @@ def test_a_named_file_that_is_no_database_is_somebody_elses(content: bytes, path
         open_named(path)
 
 
-def test_a_named_journal_whose_header_is_damaged_is_damaged(path: Path) -> None:
-    with closing(open_named(path)) as connection:
-        assert connection.execute("SELECT count(*) FROM scan").fetchone() == (0,)
-    whole = bytearray(path.read_bytes())
-    whole[21] ^= 0x10  # what says how pages are divided
-    path.write_bytes(whole)
-    with pytest.raises(sqlite3.DatabaseError) as caught:
-        open_named(path)
-    assert says_damaged(caught.value)
-
-
 def test_a_journal_with_a_damaged_header_is_damaged_and_not_somebody_elses(path: Path) -> None:
     whole = bytearray(path.read_bytes())
     whole[70] ^= 0x10  # the application id
@@ -202,29 +146,3 @@ def test_a_flipped_letter_in_a_table_s_definition_is_damage(path: Path) -> None:
             with pytest.raises(FILE_ERRORS) as caught:
                 open_writer(path)
             assert says_damaged(caught.value)
-
-
-def test_a_missing_file_and_a_locked_one_are_no_damage(tmp_path: Path) -> None:
-    with pytest.raises(sqlite3.OperationalError) as caught:
-        open_reader(tmp_path / "none.sqlite")
-    assert not says_damaged(caught.value)
-
-
-def test_a_transaction_is_all_or_nothing(path: Path) -> None:
-    connection = open_writer(path)
-    with pytest.raises(sqlite3.IntegrityError), transaction(connection):
-        connection.executemany("INSERT INTO site VALUES (?, '')", [("7",), ("7",)])
-    assert connection.execute("SELECT site FROM site").fetchall() == [("local",)]
-    connection.close()
-
-
-def test_rows_can_be_read_with_any_sqlite(tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-    kept(path, [scan("7")])
-    connection = sqlite3.connect(path)
-    (row,) = connection.execute(
-        "SELECT run, tag, stamp_ns - arrival_ns, status, source, mission, sensors, readings"
-        " FROM scan JOIN series USING (site, series)"
-    )
-    connection.close()
-    assert row == (1, "7", -1000, 0, "robot", "m1", '["temperature"]', "[21.5]")

@@ -5,20 +5,8 @@ from pathlib import Path
 import psycopg
 
 from lupin_twin.journal.schema import SiteLog
-from tests.support.log_life import lived, scan
+from tests.support.log_life import lived
 from tests.twin.journal.conftest import Copied
-
-
-def test_a_site_has_its_own_rows_alone(tmp_path: Path, copied: Copied) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write([scan()])
-        one, other = (SiteLog(*copied(life.connection)) for _ in range(2))
-    one.execute("DELETE FROM scan WHERE site = :site AND seq >= :least", {"least": 0})
-    counts = [
-        log.execute("SELECT count(*) FROM scan WHERE site = :site").fetchone()[0]
-        for log in (one, other)
-    ]
-    assert counts == [0, 1]
 
 
 def test_a_view_of_either_engine_is_of_one_moment(tmp_path: Path, copied: Copied) -> None:

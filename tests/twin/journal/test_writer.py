@@ -1,9 +1,7 @@
 from __future__ import annotations
 
-import gc
 import os
 import sqlite3
-import statistics
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from lupin_twin.core.journal_condition import JournalState
-from lupin_twin.journal import writer
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rows import Row
@@ -61,14 +58,6 @@ def test_what_is_handed_over_is_written_and_known_after_a_restart(path: Path) ->
         assert journal.take_restored() is None
         journal.write(scan("5"))
         wait_for(lambda: journal.condition.repeated == 1, "a row that is there already")
-
-
-def test_what_is_waiting_when_the_twin_ends_is_written(path: Path) -> None:
-    with recording(path) as journal:
-        for n in range(2000):
-            journal.write(scan(at_ns=NOW + n))
-    assert not path.with_name("j.sqlite-wal").exists()
-    assert count(path) == 2000
 
 
 def test_before_the_clock_begins_nothing_is_written_and_nothing_lost(path: Path) -> None:
@@ -155,15 +144,6 @@ def test_damage_that_is_met_while_it_records_has_the_file_quarantined_too(
     assert known(path) == {scan("1"), scan("2")}
 
 
-def test_rows_wait_for_others_from_when_they_came_and_late_ones_do_not(path: Path) -> None:
-    journal = Journal(path, "/test", LIMITS)  # follows no clock yet, and so writes nothing
-    assert journal._gather_s() == writer._GATHER_S
-    journal.write(scan())
-    assert journal._gather_s() < writer._GATHER_S
-    wait_for(lambda: journal._gather_s() <= 0.0, "the row to be late")
-    journal.close(30.0)
-
-
 def test_a_file_that_is_removed_is_made_anew(path: Path) -> None:
     with recording(path) as journal:
         journal.write(scan("1"))
@@ -189,21 +169,6 @@ def test_what_is_too_much_is_lost_oldest_first_and_told(path: Path) -> None:
         wait_for(lambda: journal.condition.written == 10, "healing")
         assert wait_state(journal, JournalState.RECORDING).is_well
     assert known(path) == {scan(str(n)) for n in range(5, 15)}
-
-
-def test_handing_over_takes_microseconds_while_the_writer_writes(path: Path) -> None:
-    rows = [scan(str(n % 500), NOW + n, a=n / 7, b=1.0, c=2.0, d=3.0, e=4.0) for n in range(10_000)]
-    with recording(path) as journal:
-        wait_state(journal, JournalState.RECORDING)
-        took = []
-        gc.disable()
-        for row in rows:
-            begun = time.perf_counter_ns()
-            journal.write(row)
-            took.append(time.perf_counter_ns() - begun)
-        gc.enable()
-    assert statistics.median(took) < 20_000
-    assert count(path) == 10_000
 
 
 def test_age_and_size_are_kept_to(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -95,6 +95,8 @@ class Appender:
             *(connection.execute(text).fetchone()[0] for text in newest),
             *(row[0] - 1 for row in connection.execute("SELECT begun_seq FROM run")),
         )
+        # Of some runs, up to when everything is counted already.
+        self.counted_ns: dict[int, int] = {}
         self._groups: dict[tuple[int, str, int], _Group] = {}
         self._waiting: dict[str, list[tuple[object, ...]]] = {table: [] for table in _ADD}
         self._waiting_weight = 0
@@ -120,7 +122,7 @@ class Appender:
                 self._connection.executemany(_ADD[table], rows)
                 rows.clear()
         if self._scans or self._inspections:
-            count(SiteLog(self._connection), self._scans, self._inspections)
+            count(SiteLog(self._connection), self._scans, self._inspections, self.counted_ns)
             self._scans, self._inspections = [], []
 
     # --- the three kinds ----------------------------------------------------------------------
@@ -317,7 +319,7 @@ def _unicode(text: str) -> str:
     return text if text.isascii() else text.encode("utf-8", "replace").decode("utf-8")
 
 
-def held(row: Row, begun_ns: int, *, keeps_key: bool) -> Row:
+def _held(row: Row, begun_ns: int, *, keeps_key: bool) -> Row:
     """A row as a copy of it at `begun_ns`: nothing is later. `keeps_key`: it is the same write."""
     if row.stamp_ns <= begun_ns:
         return row
@@ -325,6 +327,19 @@ def held(row: Row, begun_ns: int, *, keeps_key: bool) -> Row:
         return replace(row, stamp_ns=begun_ns)
     own_ns = (row.own_stamp_ns or row.stamp_ns) if keeps_key else KNOWN_BY_NOTHING
     return replace(row, stamp_ns=begun_ns, own_stamp_ns=own_ns)
+
+
+def copy_known(appender: Appender, before: Run, run: Run, rows: Iterable[Row]) -> None:
+    """Copy what was known in a run (see `copies`) into one, or a step, that begins now."""
+    begun, found = run.begun, []
+    for row in rows:
+        is_here = before.root == run.root and row.stamp_ns <= begun.stamp_ns
+        if not (is_here and isinstance(row, PinRow)):
+            # What a simulation says again is new; a wall clock comes to no moment twice.
+            row = replace(row, arrival_ns=begun.arrival_ns)  # noqa: PLW2901
+            found.append(_held(row, begun.stamp_ns, keeps_key=not begun.is_simulated))
+    appender.append(run.root, found, are_copies=True)
+    appender.flush()
 
 
 _FROM: Final = "simulated_from_ns"

@@ -1,33 +1,28 @@
 # ruff: noqa: S608  # SQL is put together of constants
-"""Is a journal what was written, and what is in it? Reads alone, also while a twin records.
+"""Is a journal whole, and what is in it? Reads alone, also while a twin records.
 
-SQLite keeps no checksums: a digit that has flipped in a reading shows in its hour alone, which was
-counted as the scan was written.
+SQLite checks its own structure, and that its indexes agree with their tables; here it is checked
+that rows mean something. SQLite keeps no checksums: a digit that has flipped is not found.
 """
 
 from __future__ import annotations
 
-import json
-import math
 import sqlite3
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-from lupin_twin.core.past import HOUR_NS
-from lupin_twin.journal.hours import deleted_ns, is_counted
 from lupin_twin.journal.retention import KEPT_BYTES, KEPT_NS, records
-from lupin_twin.journal.rows import numbers_of, sensor_names
+from lupin_twin.journal.rows import sensor_names
 from lupin_twin.journal.runs import Run, runs
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
-    DamagedFile,
+    LOCAL_SITE,
     Empty,
     Foreign,
-    SiteLog,
     get_meta,
     open_reader,
     says_damaged,
@@ -36,26 +31,27 @@ from lupin_twin.journal.schema import (
 # A lot is one short read of the file: a check that takes minutes must not keep the log growing.
 _ROWS: Final = 5_000
 _MAX_STRUCTURE: Final = 100
-# So many hours, spread over all of them, are held against their scans: some seconds' worth.
-_COMPARED: Final = 20_000
-# A sum is kept to fifteen digits, each time that a batch is added.
-_TOLERANCE: Final = 1e-11
-
-# What is wrong with rows from :after to :until, as (seq, tag).
+WRITTEN: Final = ("scan", "look")
+# What is wrong with rows behind :after up to :until, as (seq, tag).
 _WRONG: Final = {
     "scan": (
         "SELECT seq, tag FROM scan AS r LEFT JOIN series AS s"
         " ON s.site = r.site AND s.series = r.series"
         " WHERE r.seq > :after AND r.seq <= :until AND r.site = :site AND (tag IS NULL"
         " OR CASE WHEN json_valid(sensors) AND json_valid(readings)"
-        " THEN json_array_length(sensors) != json_array_length(readings) ELSE 1 END"
-        " OR typeof(stamp_ns) != 'integer' OR typeof(status) != 'integer')"
+        " THEN json_array_length(sensors) != json_array_length(readings)"
+        " OR EXISTS (SELECT 1 FROM json_each(readings) WHERE type IN ('text', 'array', 'object'))"
+        " ELSE 1 END OR typeof(stamp_ns) != 'integer' OR typeof(status) != 'integer'"
+        " OR stamp_ns NOT BETWEEN 0 AND 4611686018427387904)"
     ),
     "look": (
         "SELECT seq, tag FROM look AS r LEFT JOIN run ON run.site = r.site AND run.run = r.run"
-        " WHERE r.seq > :after AND r.seq <= :until AND r.site = :site"
-        " AND (run.run IS NULL OR NOT json_valid(blooms) OR NOT json_valid(box)"
-        " OR typeof(stamp_ns) != 'integer' OR typeof(bug_count) != 'integer')"
+        " WHERE r.seq > :after AND r.seq <= :until AND r.site = :site AND (run.run IS NULL"
+        " OR CASE WHEN json_valid(blooms) AND json_valid(box)"
+        " THEN EXISTS (SELECT 1 FROM json_each(blooms) WHERE json_array_length(value) != 7)"
+        " OR EXISTS (SELECT 1 FROM json_each(box) WHERE json_array_length(value) != 3)"
+        " ELSE 1 END OR typeof(stamp_ns) != 'integer' OR typeof(bug_count) != 'integer'"
+        " OR stamp_ns NOT BETWEEN 0 AND 4611686018427387904)"
     ),
     "place": (
         "SELECT seq, tag FROM place AS r LEFT JOIN run ON run.site = r.site AND run.run = r.run"
@@ -96,7 +92,6 @@ def find_all_damage(connection: sqlite3.Connection, report: Progress) -> Generat
     parts: dict[str, Callable[[], Iterator[str]]] = {
         "structure": partial(_structure, connection),
         **{table: partial(_rows, connection, table, report) for table in _WRONG},
-        "hour": partial(_hours, connection, report),
     }
     for what, read in parts.items():
         try:
@@ -141,49 +136,12 @@ def _rows(connection: sqlite3.Connection, table: str, report: Progress) -> Itera
     report(table, 1.0)
 
 
-def _hours(connection: sqlite3.Connection, report: Progress) -> Iterator[str]:
-    report("hour", 0.0)
-    (count,) = connection.execute("SELECT count(*) FROM hour").fetchone()
-    stride, seen = -(-count // _COMPARED), 0
-    every = connection.execute("SELECT site, series, run, tag FROM series").fetchall()
-    for done, (site, series, run, tag) in enumerate(every, 1):
-        for row in connection.execute(_HOURS_OF, (site, series)).fetchall():
-            seen += 1
-            # Of earlier hours some scans may have been deleted by age.
-            is_whole = row[0] > deleted_ns(SiteLog(connection, site), run) // HOUR_NS
-            if seen % stride == 0 and is_whole and not _fits(connection, site, series, row):
-                yield f"hour {row[0]} of tag {tag!r} does not fit its scans"
-        report("hour", done / len(every))
-
-
-_HOURS_OF: Final = (
-    "SELECT hour, n, total, low, high FROM hour WHERE site = ? AND series = ? ORDER BY hour"
-)
-
-
-def _fits(connection: sqlite3.Connection, site: str, series: int, row: tuple[Any, ...]) -> bool:
-    hour, *noted = row
-    texts = connection.execute(
-        "SELECT readings FROM scan WHERE site = ? AND series = ? AND stamp_ns >= ? AND stamp_ns < ?"
-        " AND is_copy = 0",
-        (site, series, hour * HOUR_NS, (hour + 1) * HOUR_NS),
-    ).fetchall()
-    try:
-        n, total, low, high = map(json.loads, noted)
-        by_sensor = zip(*numbers_of([text for (text,) in texts]), strict=True)
-        for sensor, values in enumerate(by_sensor):
-            counted = [value for value in values if is_counted(value)]
-            if (n[sensor], low[sensor], high[sensor]) != (
-                len(counted),
-                min(counted, default=None),
-                max(counted, default=None),
-            ) or not math.isclose(
-                total[sensor], sum(counted), rel_tol=_TOLERANCE, abs_tol=_TOLERANCE
-            ):
-                return False
-        return bool(texts) or not any(n)
-    except (DamagedFile, ValueError, TypeError, IndexError, RecursionError):
-        return False
+def delete_wrong(connection: sqlite3.Connection, table: str, after: int, until: int) -> None:
+    """Delete what is not what was written, of rows with these numbers of a twin's own log."""
+    connection.execute(
+        f"DELETE FROM {table} WHERE site = :site AND seq IN (SELECT seq FROM ({_WRONG[table]}))",
+        {"site": LOCAL_SITE, "after": after, "until": until},
+    )
 
 
 _COUNTED: Final = ("scan", "look", "place", "hour")
@@ -203,7 +161,7 @@ class Overview:
     """What a journal holds.
 
     `rows` counts by table, and `tag` by name; `failures` the scans that failed; copies are rows
-    too. `hours_ns` is the stretch of the hours of wall time. `kept_ns` and `kept_bytes` are the
+    too.  `kept_ns` and `kept_bytes` are the
     limits that its last twin was given, 0 where none has said; `quarantined` names damaged journals
     beside it, with their sizes; `forgotten` are the records of `forgetting`.
     """
@@ -215,7 +173,6 @@ class Overview:
     failures: int
     sensors: tuple[str, ...]
     runs: tuple[RunExtent, ...]
-    hours_ns: tuple[int, int] | None
     kept_ns: int
     kept_bytes: int
     quarantined: tuple[tuple[str, int], ...]
@@ -252,7 +209,6 @@ def overview(connection: sqlite3.Connection, path: Path) -> Overview:
         failures=int(failures),
         sensors=_sensors(connection),
         runs=_extents(connection),
-        hours_ns=_hours_extent(connection),
         kept_ns=int(get_meta(connection, KEPT_NS) or 0),
         kept_bytes=int(get_meta(connection, KEPT_BYTES) or 0),
         quarantined=quarantined_beside(path),
@@ -295,15 +251,6 @@ def _extents(connection: sqlite3.Connection) -> tuple[RunExtent, ...]:
         for run in runs(connection.execute)
         if run.joins is None
     )
-
-
-def _hours_extent(connection: sqlite3.Connection) -> tuple[int, int] | None:
-    first, last = connection.execute(
-        "SELECT min((SELECT min(hour) FROM hour WHERE site = s.site AND series = s.series)),"
-        " max((SELECT max(hour) FROM hour WHERE site = s.site AND series = s.series))"
-        " FROM series AS s JOIN run ON run.site = s.site AND run.run = s.run WHERE NOT is_simulated"
-    ).fetchone()
-    return None if first is None else (first * HOUR_NS, (last + 1) * HOUR_NS)
 
 
 def _size(path: Path) -> int:

@@ -9,6 +9,7 @@ and inspections come by the hour where they are many, or deleted; what is rare i
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
 from itertools import pairwise
 from statistics import median
 from typing import Any, Final
@@ -22,24 +23,14 @@ from lupin_twin.core.past import (
     SeriesRequest,
     grid,
 )
-from lupin_twin.journal.hours import (
-    SILENCE_NS,
-    TALLIED,
-    Buckets,
-    deleted_ns,
-    extent,
-    individually,
-    silence_over,
-    whole_hours,
-)
+from lupin_twin.journal.buckets import Buckets, Entry, answer, individually, whole_hours
+from lupin_twin.journal.hours import SILENCE_NS, TALLIED, deleted_ns, extent, silence_over
 from lupin_twin.journal.rows import sensor_names
 from lupin_twin.journal.runs import FOREVER_NS, Run, Span, cut, runs, spans
 from lupin_twin.journal.schema import SiteLog
 
 # A silence is longer than so many median intervals between the attempts of the period.
 INTERVALS: Final = 3
-# Rows of the site that are counted within less than an hour: a tenth of a second.
-MAX_ROWS: Final = 50_000
 
 # The first and the last attempt of a stretch in which no gap matters.
 Extent = tuple[int, int]
@@ -110,29 +101,8 @@ def events(log: SiteLog, request: SeriesRequest, now_ns: int) -> SeriesPast:
                 buckets.add_value(at_ns, length_s)
             return buckets.past()
     assert request.event is not None
-    return _happened(source, request.event, axis, period, request.max_points)
-
-
-def _happened(
-    source: _Source, event: Event, axis: Sequence[Span], period: Extent, max_points: int
-) -> SeriesPast:
-    within = cut(axis, *period)
-    if not any(source.is_deleted(event, span) for span in within):
-        entries: list[tuple[int, int, int]] = []
-        for span in within:
-            entries += source.entries(event, span, max_points + 1 - len(entries))
-            if len(entries) > max_points:
-                break
-        else:
-            entries.sort()
-            return individually([(at_ns, float(value)) for at_ns, _, value in entries], *period)
-    steps = grid(*period, max_points)
-    if steps.bucket_ns < HOUR_NS and source.is_hourly(event, within):
-        steps = grid(*period, max_points, HOUR_NS)
-    buckets = Buckets(steps)
-    for span in cut(axis, steps.start_ns, steps.end_ns):
-        source.count(buckets, event, span)
-    return buckets.past()
+    parts_of = partial(source.parts, request.event, axis)
+    return answer(parts_of, start_ns, end_ns, request.max_points)
 
 
 def _runs(found: Sequence[Span], start_ns: int, end_ns: int) -> SeriesPast:
@@ -202,6 +172,57 @@ def _last(source: _Source, axis: Sequence[Span]) -> int | None:
     return next((last for _, last in found), None)
 
 
+# --- what is counted -----------------------------------------------------------------------------
+
+
+class _Part:
+    """The events of a kind within a span; of the site scans, failures and inspections by hours."""
+
+    def __init__(self, source: _Source, event: Event, span: Span) -> None:
+        self._source = source
+        self._event = event
+        self._span = span
+        self._is_tallied = source.tag is None and event in TALLIED
+
+    def is_deleted(self) -> bool:
+        return self._is_tallied and self._span.start_ns <= self._source.deleted_ns(self._span)
+
+    def hourly(self) -> int:
+        hours = _hours(self._span)
+        return self._source.tallied(self._span, hours, [self._event]) if self._is_tallied else 0
+
+    def entries(self, limit: int) -> list[Entry]:
+        value, rows = _ROWS[self._event]
+        found = self._source.ask(
+            f"SELECT stamp_ns, seq, {value} {rows} LIMIT {limit}", self._span, self._event
+        )
+        return [(stamp_ns, seq, float(_number(of))) for stamp_ns, seq, of in found]
+
+    def fill(self, buckets: Buckets) -> None:
+        steps, rest, ask = buckets.grid, [self._span], self._source.ask
+        if self._is_tallied and buckets.are_hours():
+            hours, rest = whole_hours(self._span, self._source.deleted_ns(self._span))
+            for index, *numbers in ask(
+                f"SELECT (hour - {steps.start_ns // HOUR_NS}) / {steps.bucket_ns // HOUR_NS},"
+                f" sum(n), sum(total), min(low), max(high) {_FROM_TALLY} AND event = :event"
+                " GROUP BY 1",
+                self._span,
+                self._event,
+                hours,
+            ):
+                buckets.add(index, *map(int, numbers))
+        value, rows = _ROWS[self._event]
+        for part in rest:
+            for index, of, n in ask(
+                f"SELECT (stamp_ns - {steps.start_ns}) / {steps.bucket_ns}, {value}, count(*)"
+                f" {rows} GROUP BY 1, 2",
+                part,
+                self._event,
+            ):
+                number = _number(of)
+                buckets.add(index, n, n * number, number, number)
+
+
 # --- where it stands ------------------------------------------------------------------------------
 
 
@@ -214,71 +235,32 @@ class _Source:
 
     def __init__(self, log: SiteLog, tag: str | None) -> None:
         self._log = log
-        self._tag = tag
+        self.tag = tag
 
-    def _is_tallied(self, event: Event) -> bool:
-        return self._tag is None and event in TALLIED
+    def deleted_ns(self, span: Span) -> int:
+        """The last stamp of its run of which something was deleted."""
+        return deleted_ns(self._log, span.run.id)
 
-    def is_deleted(self, event: Event, span: Span) -> bool:
-        """Whether only their counts are left."""
-        return self._is_tallied(event) and span.start_ns <= deleted_ns(self._log, span.run.id)
-
-    def is_hourly(self, event: Event, within: Iterable[Span]) -> bool:
-        """Whether less than an hour cannot be resolved, or is too much to count."""
-        count = 0
-        for span in within if self._is_tallied(event) else ():
-            count += self._tallied(span, _hours(span), [event])
-            if self.is_deleted(event, span) or count > MAX_ROWS:
-                return True
-        return False
-
-    def entries(self, event: Event, span: Span, limit: int) -> list[tuple[int, int, int]]:
-        """(stamp, seq, value) of some of the events, at most `limit`."""
-        value, rows = _ROWS[event]
-        found = self._ask(f"SELECT stamp_ns, seq, {value} {rows} LIMIT {limit}", span, event)
-        return [(stamp_ns, seq, _number(of)) for stamp_ns, seq, of in found]
-
-    def count(self, buckets: Buckets, event: Event, span: Span) -> None:
-        """Add the events of a span: hours where it has them whole, and rows."""
-        steps, rest = buckets.grid, [span]
-        if self._is_tallied(event) and buckets.are_hours():
-            hours, rest = whole_hours(span, deleted_ns(self._log, span.run.id))
-            for index, *numbers in self._ask(
-                f"SELECT (hour - {steps.start_ns // HOUR_NS}) / {steps.bucket_ns // HOUR_NS},"
-                f" sum(n), sum(total), min(low), max(high) {_FROM_TALLY} AND event = :event"
-                " GROUP BY 1",
-                span,
-                event,
-                hours,
-            ):
-                buckets.add(index, *map(int, numbers))
-        value, rows = _ROWS[event]
-        for part in rest:
-            for index, of, n in self._ask(
-                f"SELECT (stamp_ns - {steps.start_ns}) / {steps.bucket_ns}, {value}, count(*)"
-                f" {rows} GROUP BY 1, 2",
-                part,
-                event,
-            ):
-                number = _number(of)
-                buckets.add(index, n, n * number, number, number)
+    def parts(self, event: Event, axis: Sequence[Span], start_ns: int, end_ns: int) -> list[_Part]:
+        """The events of a period, by spans."""
+        return [_Part(self, event, span) for span in cut(axis, start_ns, end_ns)]
 
     def attempts(self, span: Span) -> int:
         """How many there were, at least."""
         whole = -(-span.start_ns // HOUR_NS), span.end_ns // HOUR_NS
-        return self._tallied(span, whole, TALLIED) if self._tag is None else 0
+        return self.tallied(span, whole, TALLIED) if self.tag is None else 0
 
     def stamps(self, span: Span) -> Iterator[int]:
         """Of each attempt; what was deleted of the site is spread over its hour."""
         kept_ns = 0
-        if self._tag is None:
+        if self.tag is None:
             kept_ns = (deleted_ns(self._log, span.run.id) // HOUR_NS + 1) * HOUR_NS
         for part in cut([span], kept_ns, FOREVER_NS):
-            for (stamp_ns,) in self._ask(_STAMPS, part):
+            for (stamp_ns,) in self.ask(_STAMPS, part):
                 yield stamp_ns
         for part in cut([span], 0, kept_ns):
             sql = f"SELECT n, first_ns, last_ns {_FROM_TALLY}"
-            for n, first_ns, last_ns in self._ask(sql, part, hours=_hours(part)):
+            for n, first_ns, last_ns in self.ask(sql, part, hours=_hours(part)):
                 for number in range(n):
                     stamp_ns = first_ns + (last_ns - first_ns) * number // max(1, n - 1)
                     if part.start_ns <= stamp_ns < part.end_ns:
@@ -289,7 +271,7 @@ class _Source:
 
         Such as follow each other within `longest_ns` may be in one.
         """
-        if self._tag is not None:
+        if self.tag is not None:
             found = [stamp_ns for part in cut([span], *period) for stamp_ns in self.stamps(part)]
             for part in cut([span], 0, period[0]):
                 found += (self.ends(part) or ())[1:]
@@ -307,8 +289,8 @@ class _Source:
 
     def ends(self, span: Span) -> Extent | None:
         """The first and the last attempt; None if there was none."""
-        if self._tag is not None:
-            found = [row for row in self._ask(_ENDS, span) if row[0] is not None]
+        if self.tag is not None:
+            found = [row for row in self.ask(_ENDS, span) if row[0] is not None]
             return (min(found)[0], max(last for _, last in found)) if found else None
         every = extent(self._log, span.run.id)
         if every is None or every[1] < span.start_ns or every[0] >= span.end_ns:
@@ -329,17 +311,18 @@ class _Source:
         if over is not None:
             return over[which]
         start_ns = at_ns if which else at_ns - SILENCE_NS
-        rows = self._ask(_ENDS, Span(run, start_ns, start_ns + SILENCE_NS + 1))
+        rows = self.ask(_ENDS, Span(run, start_ns, start_ns + SILENCE_NS + 1))
         found: list[int] = [row[1 - which] for row in rows if row[0] is not None]
         if not found:  # it is deleted
             return at_ns
         return min(found) if which else max(found)
 
-    def _tallied(self, span: Span, hours: Extent, which: Sequence[Event]) -> int:
+    def tallied(self, span: Span, hours: Extent, which: Sequence[Event]) -> int:
+        """How many there were in hours of a span."""
         sql = f"SELECT coalesce(sum(n), 0) {_FROM_TALLY} AND event = :event"
-        return sum(int(self._ask(sql, span, event, hours)[0][0]) for event in which)
+        return sum(int(self.ask(sql, span, event, hours)[0][0]) for event in which)
 
-    def _ask(
+    def ask(
         self, sql: str, span: Span, event: Event | None = None, hours: Extent = (0, 0)
     ) -> list[tuple[Any, ...]]:
         query: dict[str, Any] = {
@@ -348,8 +331,8 @@ class _Source:
             "first": hours[0],
             "last": hours[1],
         }
-        query |= {"run": span.run.id, "tag": self._tag, "event": event}
-        sql = sql.replace("{tag}", "" if self._tag is None else " AND tag = :tag")
+        query |= {"run": span.run.id, "tag": self.tag, "event": event}
+        sql = sql.replace("{tag}", "" if self.tag is None else " AND tag = :tag")
         return list(self._log.execute(sql, query).fetchall())
 
 

@@ -11,7 +11,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Final
 
-from lupin_twin.journal.appending import Appender, Stretch, held, simulated
+from lupin_twin.journal.appending import Appender, Stretch, copy_known, simulated
 from lupin_twin.journal.beside import Syncing, forwarded_seq
 from lupin_twin.journal.checking import find_damage
 from lupin_twin.journal.fold import Restored, copies, fold
@@ -27,7 +27,7 @@ from lupin_twin.journal.retention import (
     purge_step,
     shrink_step,
 )
-from lupin_twin.journal.rows import PinRow, Row, newest_rows
+from lupin_twin.journal.rows import Row, newest_rows
 from lupin_twin.journal.runs import (
     CORRECTION_NS,
     FOREVER_NS,
@@ -38,7 +38,7 @@ from lupin_twin.journal.runs import (
     runs,
     simulation_goes_on,
 )
-from lupin_twin.journal.salvage import Salvage, quarantine
+from lupin_twin.journal.salvage import quarantine, salvage
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
     LOCAL_SITE,
@@ -53,8 +53,6 @@ from lupin_twin.journal.schema import (
 _CHECKED_BYTES: Final = 64_000_000
 # The log is put into the file when it is this long: the longer, the fewer pages are written twice.
 _LOG_BYTES: Final = 8_000_000
-# So much of a damaged file is read before the twin goes on with what is there.
-_SALVAGE_S: Final = 1.5
 _PURGE_EVERY_S: Final = 60.0
 _PURGE_HOURS_EVERY_S: Final = 86_400.0
 _LOOK_EVERY_S: Final = 1.0
@@ -97,7 +95,6 @@ class JournalFile:
         self._path = path
         self._limits = limits
         self.quarantined = ""
-        self._salvaging: Iterator[None] | None = None
         if is_sound is False or (is_sound is None and self._is_damaged()):
             self._quarantine()
         self._open()
@@ -148,25 +145,17 @@ class JournalFile:
         self._inode = self._path.stat().st_ino
 
     def _salvage(self) -> None:
-        """Go on with what was quarantined, now or before the last end."""
-        if self.quarantined:
-            set_meta(self._connection, _SALVAGE, Path(self.quarantined).name)
-        name = get_meta(self._connection, _SALVAGE)
+        """Copy what can be read of what was quarantined, now or before the last end."""
+        name = Path(self.quarantined).name or get_meta(self._connection, _SALVAGE)
         if not name:
             return
-        self._salvaging = Salvage(self._path.with_name(name), self._connection).steps()
-        enough_s = time.monotonic() + _SALVAGE_S
-        while self._salvage_step() and time.monotonic() < enough_s:
-            pass
-
-    def _salvage_step(self) -> bool:
-        if self._salvaging is not None and next(self._salvaging, self) is self:
-            self._salvaging = self._kept = None
+        set_meta(self._connection, _SALVAGE, name)
+        salvage(self._path.with_name(name), self._connection)
+        with transaction(self._connection):
             # What could not be read nobody knows.
             for run in self._runs():
                 note_lost(self._connection, run.root, self._last(run).stamp_ns)
             self._connection.execute("DELETE FROM meta WHERE key = ?", (_SALVAGE,))
-        return self._salvaging is not None
 
     # --- runs ---------------------------------------------------------------------------------
 
@@ -230,24 +219,14 @@ class JournalFile:
             run = Run(number, now, self._appender.last_seq + 1, joins)
             put_run(self._connection, run)
             if before is not None:
-                self._copy(before, run, carries)
+                rows = copies(self._connection, before, carries)
+                copy_known(self._appender, before, run, rows)
                 if ended_ns is not None and before.root != run.root:
                     execute(
                         "UPDATE run SET ended_stamp_ns = ? WHERE run = ?", (ended_ns, before.root)
                     )
             self._go_on_with(run.root)
         return run
-
-    def _copy(self, before: Run, run: Run, carries: Carries) -> None:
-        rows: list[Row] = []
-        for row in copies(self._connection, before, carries):
-            is_here = before.root == run.root and row.stamp_ns <= run.begun.stamp_ns
-            if not (is_here and isinstance(row, PinRow)):
-                now = replace(row, arrival_ns=run.begun.arrival_ns)
-                # What a simulation says again is new; a wall clock comes to no moment twice.
-                rows.append(held(now, run.begun.stamp_ns, keeps_key=not run.begun.is_simulated))
-        self._appender.append(run.root, rows, are_copies=True)
-        self._appender.flush()
 
     def rejoin(self, now: Clock, before: Run) -> Run:
         """The wall's clock jumped ahead: the run that it had gone back from goes on, if any.
@@ -337,9 +316,9 @@ class JournalFile:
             note_lost(self._connection, run.root, at_ns)
 
     def kept(self) -> Stretches:
-        """Of which stretches of ROS time all is here; none are while a damaged file is read."""
+        """Of which stretches of ROS time all is here."""
         if self._kept is None:
-            self._kept = () if self._salvaging is not None else kept(self._connection)
+            self._kept = kept(self._connection)
         return self._kept
 
     def size(self) -> int:
@@ -364,8 +343,6 @@ class JournalFile:
                 raise FileNotFoundError(f"{self._path} was removed or replaced")
         if self._log_bytes() > _LOG_BYTES:
             self._connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
-        if self._salvaging is not None:
-            return self._salvage_step()
         return may_purge and self._purge(now_s)
 
     def _purge(self, now_s: float) -> bool:

@@ -7,7 +7,6 @@ each series its newest row by then counts, of equal stamps the one received late
 from __future__ import annotations
 
 import gc
-import math
 import sqlite3
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -17,9 +16,9 @@ from itertools import accumulate, chain, repeat
 from typing import Any, Final, TypeVar
 
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
-from lupin_twin.core.past import MAX_POINTS, SeriesPast, SeriesRequest
+from lupin_twin.core.past import MAX_POINTS, SeriesRequest
 from lupin_twin.core.state import NO_FLOWER, Attempt, Flower, Pose, Reading, Snapshot, TagState
-from lupin_twin.journal.queries import newest, series
+from lupin_twin.journal.queries import newest
 from lupin_twin.journal.rows import (
     KIND_READING,
     STATUS_OK,
@@ -295,33 +294,16 @@ def recent_readings(
 ) -> Iterator[TagLately]:
     """The tags that had a place and a reading at `at_ns`, with their last finite readings.
 
-    `reach_ns` is how far back, `most` how many of all tags together. Where rows were deleted, the
-    means of stretches.
+    `reach_ns` is how far back, `most` how many of all tags together.
     """
     tags = [
-        tag
+        (tag.tag_id, tag.pose)
         for tag in state_at(connection, at_ns, "").tags
         if tag.pose is not None and any(reading.name == sensor_type for reading in tag.readings)
     ]
     each = max(most // max(len(tags), 1), 1)
-    for tag in tags:
-        if tag.pose is None:
-            continue
-        query = SeriesRequest(
-            tag.tag_id, sensor_type, max(1, at_ns - reach_ns), at_ns + 1, MAX_POINTS
-        )
-        found = newest(connection, query, each)
-        if found is None:
-            found = [
-                (min(stamp_ns, at_ns), value)
-                for stamp_ns, value in _values(series(connection, query, at_ns))
-            ]
-        if found:
-            yield tag.tag_id, tag.pose.x, tag.pose.y, tuple(found)
-
-
-def _values(past: SeriesPast) -> Iterator[tuple[int, float]]:
-    half_ns = (past.bucket_ns or 0) // 2
-    for stamp_ns, value in zip(past.stamps_ns, past.means, strict=True):
-        if math.isfinite(value):
-            yield stamp_ns + half_ns, value
+    start_ns = max(1, at_ns - reach_ns)
+    for tag_id, pose in tags:
+        query = SeriesRequest(tag_id, sensor_type, start_ns, at_ns + 1, MAX_POINTS)
+        if found := newest(connection, query, each):
+            yield tag_id, pose.x, pose.y, tuple(found)

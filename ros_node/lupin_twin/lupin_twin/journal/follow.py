@@ -29,7 +29,8 @@ from lupin_twin.core.writes import (
     recent_of,
 )
 from lupin_twin.journal.appending import PURGED_SEQ
-from lupin_twin.journal.hours import WrittenInspection, WrittenScan, count
+from lupin_twin.journal.checking import WRITTEN
+from lupin_twin.journal.hours import count_rows
 from lupin_twin.journal.retention import Stretches, kept
 from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, numbers_of, sensor_names
 from lupin_twin.journal.runs import runs, span_at, spans
@@ -157,7 +158,7 @@ def _newest_ns(connection: sqlite3.Connection) -> int | None:
     """The stamp of what was received last."""
     found = [
         row
-        for table in ("scan", "look")
+        for table in WRITTEN
         for row in connection.execute(
             f"SELECT seq, stamp_ns FROM {table} WHERE site = ? ORDER BY seq DESC LIMIT 1",
             (LOCAL_SITE,),
@@ -198,24 +199,16 @@ def _journal_id(log: SiteLog) -> str:
 
 
 def _put(connection: sqlite3.Connection, lot: Lot) -> None:
-    after, log = _last(connection), SiteLog(connection)
-    scans: list[WrittenScan] = []
-    inspections: list[WrittenInspection] = []
+    after = _last(connection)
     for table, *row in _rows(lot.rows):
-        if table in {"scan", "look"} and row[0] <= after:
+        if table in WRITTEN and row[0] <= after:
             continue
         way = "REPLACE" if table in {"run", "meta"} else "IGNORE"
         marks = ", ?" * len(row)
         connection.execute(f"INSERT OR {way} INTO {table} VALUES ('{LOCAL_SITE}'{marks})", row)
-        if table == "scan" and not row[9]:
-            scans.append(_scan(connection, row))
-        elif table == "look" and not row[13]:
-            inspections.append(
-                WrittenInspection(row[1], row[2], row[0], row[3], bool(row[10]), row[12])
-            )
-    count(log, scans, inspections)
+    count_rows(SiteLog(connection), after, lot.last)
     purged = int(get_meta(connection, PURGED_SEQ) or 0)
-    for table in ("scan", "look"):
+    for table in WRITTEN:
         connection.execute(f"DELETE FROM {table} WHERE site = ? AND seq <= ?", (LOCAL_SITE, purged))
 
 
@@ -227,14 +220,6 @@ def _rows(texts: Iterable[str]) -> Iterator[list[Any]]:
         ):
             raise ValueError(text[:64])
         yield row
-
-
-def _scan(connection: sqlite3.Connection, row: list[Any]) -> WrittenScan:
-    (found,) = connection.execute(
-        "SELECT run, kind FROM series WHERE site = ? AND series = ?", (LOCAL_SITE, row[1])
-    ).fetchall()
-    (values,) = numbers_of([row[10]])
-    return WrittenScan(found[0], row[1], found[1], row[2], row[5], values)
 
 
 # What an answer of so many writes takes, about, s.
@@ -303,9 +288,7 @@ def writes(connection: Any, request: WritesRequest, site: str = LOCAL_SITE) -> P
     """The next writes, copies left out."""
     log = SiteLog(connection, site)
     with log.one_view():
-        newest = max(
-            log.execute(_NEWEST.format(table)).fetchone()[0] or 0 for table in ("scan", "look")
-        )
+        newest = max(log.execute(_NEWEST.format(table)).fetchone()[0] or 0 for table in WRITTEN)
         after = request.after or _beginning(log, request, newest)
         query = {"after": after, "count": request.max_count}
         scans = log.execute(_SCANS, query).fetchall()

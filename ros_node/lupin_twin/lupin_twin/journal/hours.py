@@ -10,12 +10,11 @@ added.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
-from lupin_twin.core.past import HOUR_NS, Event, Grid, SeriesPast
-from lupin_twin.journal.rows import KIND_READING, STATUS_OK
-from lupin_twin.journal.runs import Span
+from lupin_twin.core.past import HOUR_NS, Event
+from lupin_twin.journal.rows import KIND_READING, STATUS_OK, numbers_of
 from lupin_twin.journal.schema import DamagedFile, SiteLog
 
 # Shorter stretches without an attempt are no silence, whatever is usual.
@@ -26,6 +25,7 @@ DELETED: Final = "purged_ns:"
 TALLIED: Final = (Event.SCANS, Event.FAILURES, Event.LOOKS)
 # A sum of larger readings could be beyond any number, which PostgreSQL refuses.
 _LARGEST: Final = 1e290
+_NOTHING: Final[Mapping[int, int]] = {}
 
 
 class WrittenScan(NamedTuple):
@@ -46,7 +46,7 @@ class WrittenInspection(NamedTuple):
     tag: str
     seq: int
     stamp_ns: int
-    anomaly: bool
+    anomaly: int
     bug_count: int
 
 
@@ -55,10 +55,41 @@ def is_counted(value: float) -> bool:
     return -_LARGEST < value < _LARGEST
 
 
-def count(
-    log: SiteLog, scans: Iterable[WrittenScan], inspections: Sequence[WrittenInspection]
+def count_rows(
+    log: SiteLog, after: int, until: int, counted_ns: Mapping[int, int] = _NOTHING
 ) -> None:
-    """Count rows that are in the tables now, each once, whatever its stamp."""
+    """Count what has a number behind one, up to another, as `count` does.
+
+    Raises:
+        DamagedFile: a scan has no series, or its readings are none.
+
+    """
+    within = {"after": after, "until": until}
+    scans = log.execute(_SCANS, within).fetchall()
+    values = numbers_of([row[-1] for row in scans])
+    written = [
+        WrittenScan._make([*row[:-1], of_row]) for row, of_row in zip(scans, values, strict=True)
+    ]
+    if any(scan.kind is None for scan in written):
+        raise DamagedFile("a scan has no series")
+    count(
+        log, written, [WrittenInspection(*row) for row in log.execute(_LOOKS, within)], counted_ns
+    )
+
+
+def count(
+    log: SiteLog,
+    scans: Iterable[WrittenScan],
+    inspections: Sequence[WrittenInspection],
+    counted_ns: Mapping[int, int] = _NOTHING,
+) -> None:
+    """Count rows that are in the tables now, each once, whatever its stamp.
+
+    `counted_ns`: of some runs, up to when everything is counted already.
+    """
+    if counted_ns:
+        scans = [scan for scan in scans if scan.stamp_ns > counted_ns.get(scan.run, -1)]
+        inspections = [row for row in inspections if row.stamp_ns > counted_ns.get(row.run, -1)]
     hours: dict[tuple[int, int], list[Sequence[float]]] = {}
     tallies: dict[tuple[int, str, int], list[int]] = {}
     stamps: dict[int, list[int]] = {}
@@ -107,82 +138,20 @@ def delete_before(log: SiteLog, run: int, stamp_ns: int) -> None:
         log.execute(sql, {"run": run, "at": stamp_ns, "hour": stamp_ns // HOUR_NS})
 
 
-# --- reading them ---------------------------------------------------------------------------------
-
-
-class Buckets:
-    """Counts, sums, least and largest by the bucket of a grid."""
-
-    def __init__(self, steps: Grid) -> None:
-        self.grid = steps
-        self._found: dict[int, list[float]] = {}
-
-    def are_hours(self) -> bool:
-        """Whether each has whole hours."""
-        return self.grid.bucket_ns % HOUR_NS == 0 and self.grid.start_ns % HOUR_NS == 0
-
-    def add(self, index: int, n: int, total: float, low: float, high: float) -> None:
-        """Add some to a bucket."""
-        bucket = self._found.get(index)
-        if bucket is None:
-            self._found[index] = [n, total, low, high]
-            return
-        bucket[0] += n
-        bucket[1] += total
-        bucket[2], bucket[3] = min(bucket[2], low), max(bucket[3], high)
-
-    def add_value(self, stamp_ns: int, value: float) -> None:
-        """Add one."""
-        index = (stamp_ns - self.grid.start_ns) // self.grid.bucket_ns
-        self.add(index, 1, value, value, value)
-
-    def past(self) -> SeriesPast:
-        """The answer. 12 digits are the same in whatever way, and on whichever engine, it came."""
-        steps, found = self.grid, sorted(self._found.items())
-        return SeriesPast(
-            steps.start_ns,
-            steps.end_ns,
-            steps.bucket_ns,
-            tuple(steps.start_ns + index * steps.bucket_ns for index, _ in found),
-            tuple(int(n) for _, (n, *_) in found),
-            tuple(_rounded(total / n) for _, (n, total, *_) in found),
-            tuple(_rounded(low) for _, (*_, low, _) in found),
-            tuple(_rounded(high) for _, (*_, high) in found),
-        )
-
-
-def individually(found: Sequence[tuple[int, float]], start_ns: int, end_ns: int) -> SeriesPast:
-    """An answer of single (stamp, value), not of buckets."""
-    values = tuple(value for _, value in found)
-    stamps = tuple(stamp_ns for stamp_ns, _ in found)
-    return SeriesPast(start_ns, end_ns, None, stamps, (1,) * len(found), values, values, values)
-
-
-def _rounded(number: float) -> float:
-    return float(f"{number:.12g}")
-
-
 def deleted_ns(log: SiteLog, run: int) -> int:
     """The last stamp of a run of which something was deleted; -1 if nothing was."""
     return int(log.meta(f"{DELETED}{run}") or -1)
 
 
-def whole_hours(span: Span, horizon_ns: int) -> tuple[tuple[int, int], list[Span]]:
-    """The hours that a span has whole, first to before last, and what else is in it.
-
-    Up to the horizon rows were deleted: there an hour is the span's that begins or ends in it.
-    """
-    start_ns, end_ns = span.start_ns, span.end_ns
-    first, last = -(-start_ns // HOUR_NS), end_ns // HOUR_NS
-    if start_ns <= horizon_ns:
-        first = start_ns // HOUR_NS
-    if max(start_ns, last * HOUR_NS) <= horizon_ns:
-        last = -(-end_ns // HOUR_NS)
-    if first >= last:
-        return (0, 0), [span]
-    edges = (start_ns, first * HOUR_NS), (last * HOUR_NS, end_ns)
-    return (first, last), [Span(span.run, *edge) for edge in edges if edge[0] < edge[1]]
-
+_SCANS: Final = (
+    "SELECT run, scan.series, kind, stamp_ns, status, readings FROM scan LEFT JOIN series"
+    " ON series.site = scan.site AND series.series = scan.series"
+    " WHERE scan.site = :site AND seq > :after AND seq <= :until AND is_copy = 0"
+)
+_LOOKS: Final = (
+    "SELECT run, tag, seq, stamp_ns, anomaly, bug_count FROM look"
+    " WHERE site = :site AND seq > :after AND seq <= :until AND is_copy = 0"
+)
 
 # --- by the hour ----------------------------------------------------------------------------------
 
@@ -359,11 +328,12 @@ def _note_pests(log: SiteLog, inspection: WrittenInspection) -> None:
         # A tag without inspection has no pest; that of a deleted one is known by what it changed.
         change = log.execute(_LAST_CHANGE, within).fetchone()
         had = change is not None and change[0] == Event.PESTS_SEEN
-    _note_pest(log, within, inspection.bug_count, (had, inspection.anomaly))
+    has = bool(inspection.anomaly)
+    _note_pest(log, within, inspection.bug_count, (had, has))
     after = log.execute(_AFTER, within).fetchone()
     if after is not None:
         within |= {"at": after[0], "seq": after[1]}
-        _note_pest(log, within, after[3], (inspection.anomaly, bool(after[2])))
+        _note_pest(log, within, after[3], (has, bool(after[2])))
 
 
 def _note_pest(log: SiteLog, at: dict[str, Any], bugs: int, pests: tuple[bool, bool]) -> None:

@@ -1,9 +1,5 @@
 """One sensor of one tag over a period, its readings or buckets of them; or all readings, in order.
 
-Buckets of an hour and more are made of hours; so are all where rows were deleted. Shorter ones, and
-readings, are read off the rows. What a bucket says has 12 digits, so that it is the same in
-whatever way, and on whatever engine, it was added up.
-
 An export reads a stretch of time in one short transaction, so that a reader that takes an hour over
 ten million rows keeps the log from being put into the file for no longer than that.
 """
@@ -12,19 +8,18 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any, Final
 
-from lupin_twin.core.past import HOUR_NS, NotRemembered, PastRow, SeriesPast, SeriesRequest, grid
+from lupin_twin.core.past import HOUR_NS, NotRemembered, PastRow, SeriesPast, SeriesRequest
+from lupin_twin.journal.buckets import Buckets, Entry, answer, whole_hours
 from lupin_twin.journal.events import FROM_SCAN, events
-from lupin_twin.journal.hours import Buckets, deleted_ns, individually, is_counted, whole_hours
+from lupin_twin.journal.hours import deleted_ns, is_counted
 from lupin_twin.journal.rows import KIND_READING, numbers_of, sensor_names
 from lupin_twin.journal.runs import Run, Span, runs, spans_within
 from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile, SiteLog
 
-# Scans that are read for one answer: a quarter of a second. Of more, the hours are reported.
-MAX_SCANS: Final = 50_000
 # What an answer costs, about, s; the second for events of the whole site, each tag.
 SERIES_S: Final = 0.01
 SERIES_S_PER_TAG: Final = 1e-5
@@ -38,32 +33,102 @@ _HOURS_WITHIN: Final = (
 )
 # Of a JSON list on both engines.
 _ENTRY: Final = "CAST({0} ->> CAST(:place AS INTEGER) AS {1})"
+_N: Final = _ENTRY.format("n", "BIGINT")
 _BUCKETS: Final = (
     "SELECT (hour - :origin) / :width AS bucket,"  # constants
-    f" sum({_ENTRY.format('n', 'BIGINT')}), sum({_ENTRY.format('total', 'DOUBLE PRECISION')}),"
+    f" sum({_N}), sum({_ENTRY.format('total', 'DOUBLE PRECISION')}),"
     f" min({_ENTRY.format('low', 'DOUBLE PRECISION')}),"
     f" max({_ENTRY.format('high', 'DOUBLE PRECISION')}) {_HOURS_WITHIN} GROUP BY bucket"
 )
 
 
-@dataclass(frozen=True, slots=True)
 class _Part:
-    """A series within a span: where the sensor stands in its list, and how long that is."""
+    """A sensor's readings in a series within a span; `place` is where it stands in its list."""
 
-    span: Span
-    series: int
-    place: int
-    sensors: int
-    deleted_ns: int
+    def __init__(self, log: SiteLog, span: Span, series: int, place: int, sensors: int) -> None:
+        self.span = span
+        self._log = log
+        self._series = {"series": series, "place": place}
+        self._place = place
+        self._sensors = sensors
+        self._deleted_ns = deleted_ns(log, span.run.id)
 
-    def query(self, **more: int) -> Mapping[str, int]:
-        """What queries name."""
-        within = {"start": self.span.start_ns, "end": self.span.end_ns}
-        return {"series": self.series, "place": self.place} | within | more
+    def ask(self, sql: str, span: Span | None = None, /, **more: int) -> list[tuple[Any, ...]]:
+        """Rows of the series within a part of the span, or all of it."""
+        span = span or self.span
+        hours = {"first": span.start_ns // HOUR_NS, "last": -(-span.end_ns // HOUR_NS)}
+        within = {"start": span.start_ns, "end": span.end_ns} | hours | self._series
+        return list(self._log.execute(sql, within | more).fetchall())
 
     def is_deleted(self) -> bool:
-        """Whether rows of the span may have been deleted."""
-        return self.span.start_ns <= self.deleted_ns
+        if self.span.start_ns > self._deleted_ns:
+            return False
+        last = min(self.span.end_ns - 1, self._deleted_ns) // HOUR_NS + 1
+        return bool(self.ask(f"SELECT 1 {_HOURS_WITHIN} LIMIT 1", last=last))
+
+    def hourly(self) -> int:
+        return int(self.ask(f"SELECT coalesce(sum({_N}), 0) {_HOURS_WITHIN}")[0][0])
+
+    def entries(self, limit: int) -> list[Entry]:
+        rows = self.ask(f"SELECT stamp_ns, seq, readings {_WITHIN} LIMIT :limit", limit=limit)
+        return self._read(rows)
+
+    def last(self, most: int) -> list[Entry]:
+        """The last finite readings, the newest first."""
+        found: list[Entry] = []
+        at = {"at": self.span.end_ns, "seq": 0}
+        while len(found) < most:
+            rows = self.ask(
+                f"SELECT stamp_ns, seq, readings {_WITHIN} AND (stamp_ns, seq) < (:at, :seq)"
+                " ORDER BY stamp_ns DESC, seq DESC LIMIT :limit",
+                limit=most,
+                **at,
+            )
+            found += [reading for reading in self._read(rows) if is_counted(reading[2])]
+            if len(rows) < most:
+                break
+            at = {"at": rows[-1][0], "seq": rows[-1][1]}
+        return found[:most]
+
+    def oldest(self) -> list[int]:
+        """The first stamp, or the beginning of the first hour where rows were deleted."""
+        found = [at_ns for (at_ns,) in self.ask(f"SELECT min(stamp_ns) {_WITHIN}")]
+        if self.span.start_ns <= self._deleted_ns:
+            for (hour,) in self.ask(f"SELECT min(hour) {_HOURS_WITHIN}"):
+                found.append(hour if hour is None else max(hour * HOUR_NS, self.span.start_ns))
+        return [at_ns for at_ns in found if at_ns is not None]
+
+    def fill(self, buckets: Buckets) -> None:
+        rest = [self.span]
+        if buckets.are_hours():
+            hours, rest = whole_hours(self.span, self._deleted_ns)
+            for index, n, *numbers in self.ask(
+                _BUCKETS,
+                first=hours[0],
+                last=hours[1],
+                origin=buckets.grid.start_ns // HOUR_NS,
+                width=buckets.grid.bucket_ns // HOUR_NS,
+            ):
+                if n:
+                    buckets.add(index, int(n), *numbers)
+        for span in rest:
+            for stamp_ns, _, value in self._read(
+                self.ask(f"SELECT stamp_ns, seq, readings {_WITHIN}", span)
+            ):
+                if is_counted(value):
+                    buckets.add_value(stamp_ns, value)
+
+    def _read(self, rows: Sequence[tuple[int, int, str]]) -> list[Entry]:
+        found = []
+        for (stamp_ns, seq, _), values in zip(
+            rows, numbers_of([text for *_, text in rows]), strict=True
+        ):
+            if len(values) != self._sensors:
+                raise DamagedFile(
+                    f"scan {seq} has {len(values)} readings of {self._sensors} sensors"
+                )
+            found.append((stamp_ns, seq, values[self._place]))
+        return found
 
 
 def series(
@@ -79,39 +144,24 @@ def series(
             return events(log, request, now_ns)
         # A reading of this very moment counts as one of the past.
         end_ns = max(request.end_ns or now_ns + 1, request.start_ns)
-        parts = _parts(log, request, request.start_ns, end_ns)
-        oldest = [at_ns for part in parts if (at_ns := _oldest(log, part)) is not None]
-        start_ns = request.start_ns or min(oldest, default=end_ns)
-        steps = grid(start_ns, end_ns, request.max_points)
-        # Of hours it need not be known how many scans there are, but for whether they are few.
-        limit = request.max_points if steps.bucket_ns >= HOUR_NS else MAX_SCANS
-        scans = sum(_count(log, part, limit) for part in parts)
-        are_deleted = any(part.is_deleted() and _has_hours(log, part) for part in parts)
-        if not are_deleted and scans <= request.max_points:
-            return _readings(log, parts, start_ns, end_ns)
-        if are_deleted or scans > MAX_SCANS:
-            steps = grid(start_ns, end_ns, request.max_points, HOUR_NS)
-        # The period is that of the buckets from here on.
-        parts = _parts(log, request, steps.start_ns, steps.end_ns)
-        buckets = Buckets(steps)
-        for part in parts:
-            _add(log, buckets, part)
-        return buckets.past()
+        start_ns = request.start_ns
+        if not start_ns:
+            oldest = (at_ns for part in _parts(log, request, 0, end_ns) for at_ns in part.oldest())
+            start_ns = min(oldest, default=end_ns)
+        return answer(partial(_parts, log, request), start_ns, end_ns, request.max_points)
 
 
 def newest(
     connection: Any, request: SeriesRequest, most: int, site: str = LOCAL_SITE
-) -> list[tuple[int, float]] | None:
+) -> list[tuple[int, float]]:
     """The last `most` finite readings of a sensor in a period: (ns of ROS time, value), in order.
 
-    No more of the period is read than that. None: rows of it were deleted.
+    No more of the period is read than that.
     """
     log = SiteLog(connection, site)
     with log.one_view():
         parts = _parts(log, request, request.start_ns, request.end_ns)
-        if any(part.is_deleted() and _has_hours(log, part) for part in parts):
-            return None
-        found = sorted(reading for part in parts for reading in _last(log, part, most))
+        found = sorted(reading for part in parts for reading in part.last(most))
         return [(stamp_ns, value) for stamp_ns, _, value in found[-most:]]
 
 
@@ -119,7 +169,6 @@ def _parts(log: SiteLog, request: SeriesRequest, start_ns: int, end_ns: int) -> 
     found = []
     for span in spans_within(runs(log.execute, log.site), start_ns, end_ns):
         of_run = {"run": span.run.id, "tag": request.tag_id, "kind": KIND_READING}
-        horizon_ns: int | None = None
         for number, text in log.execute(
             "SELECT series, sensors FROM series WHERE site = :site AND run = :run AND tag = :tag"
             " AND kind = :kind ORDER BY series",
@@ -127,101 +176,9 @@ def _parts(log: SiteLog, request: SeriesRequest, start_ns: int, end_ns: int) -> 
         ).fetchall():
             names = sensor_names(text)
             if request.sensor_type in names:
-                if horizon_ns is None:
-                    horizon_ns = deleted_ns(log, span.run.id)
                 place = names.index(request.sensor_type)
-                found.append(_Part(span, number, place, len(names), horizon_ns))
+                found.append(_Part(log, span, number, place, len(names)))
     return found
-
-
-def _oldest(log: SiteLog, part: _Part) -> int | None:
-    (stamp_ns,) = log.execute(f"SELECT min(stamp_ns) {_WITHIN}", part.query()).fetchone()
-    known = [] if stamp_ns is None else [int(stamp_ns)]
-    if part.is_deleted():
-        within = part.query(
-            first=part.span.start_ns // HOUR_NS, last=-(-part.span.end_ns // HOUR_NS)
-        )
-        (hour,) = log.execute(f"SELECT min(hour) {_HOURS_WITHIN}", within).fetchone()
-        if hour is not None:
-            known.append(max(hour * HOUR_NS, part.span.start_ns))
-    return min(known, default=None)
-
-
-def _count(log: SiteLog, part: _Part, limit: int) -> int:
-    (count,) = log.execute(
-        f"SELECT count(*) FROM (SELECT 1 AS one {_WITHIN} LIMIT :limit) AS found",  # noqa: S608
-        part.query(limit=limit + 1),
-    ).fetchone()
-    return int(count)
-
-
-def _has_hours(log: SiteLog, part: _Part) -> bool:
-    """Whether an hour has what was deleted within the span."""
-    last_ns = min(part.span.end_ns - 1, part.deleted_ns)
-    within = part.query(first=part.span.start_ns // HOUR_NS, last=last_ns // HOUR_NS + 1)
-    return log.execute(f"SELECT 1 {_HOURS_WITHIN} LIMIT 1", within).fetchone() is not None
-
-
-# --- rows -----------------------------------------------------------------------------------------
-
-
-def _values(log: SiteLog, part: _Part, span: Span) -> Iterator[tuple[int, int, float]]:
-    """(stamp, seq, value) of the readings in a part of the span."""
-    found = log.execute(
-        f"SELECT stamp_ns, seq, readings {_WITHIN}",
-        part.query(start=span.start_ns, end=span.end_ns),
-    )
-    return _read(part, found.fetchall())
-
-
-def _read(part: _Part, rows: Sequence[tuple[int, int, str]]) -> Iterator[tuple[int, int, float]]:
-    every = numbers_of([text for *_, text in rows])
-    for (stamp_ns, seq, _), values in zip(rows, every, strict=True):
-        if len(values) != part.sensors:
-            raise DamagedFile(f"scan {seq} has {len(values)} readings of {part.sensors} sensors")
-        yield stamp_ns, seq, values[part.place]
-
-
-def _last(log: SiteLog, part: _Part, most: int) -> list[tuple[int, int, float]]:
-    found: list[tuple[int, int, float]] = []
-    at: Mapping[str, int] = {"at": part.span.end_ns, "seq": 0}
-    while len(found) < most:
-        rows = log.execute(
-            f"SELECT stamp_ns, seq, readings {_WITHIN} AND (stamp_ns, seq) < (:at, :seq)"
-            " ORDER BY stamp_ns DESC, seq DESC LIMIT :limit",
-            part.query(limit=most, **at),
-        ).fetchall()
-        found += [reading for reading in _read(part, rows) if is_counted(reading[2])]
-        if len(rows) < most:
-            break
-        at = {"at": rows[-1][0], "seq": rows[-1][1]}
-    return found[:most]
-
-
-def _readings(log: SiteLog, parts: Sequence[_Part], start_ns: int, end_ns: int) -> SeriesPast:
-    # Of one stamp, in the order of receiving.
-    found = sorted(reading for part in parts for reading in _values(log, part, part.span))
-    return individually([(stamp_ns, value) for stamp_ns, _, value in found], start_ns, end_ns)
-
-
-def _add(log: SiteLog, buckets: Buckets, part: _Part) -> None:
-    """Add what a span has: hours where it has them whole, rows where another span begins."""
-    rest = [part.span]
-    if buckets.are_hours():
-        hours, rest = whole_hours(part.span, part.deleted_ns)
-        query = part.query(
-            first=hours[0],
-            last=hours[1],
-            origin=buckets.grid.start_ns // HOUR_NS,
-            width=buckets.grid.bucket_ns // HOUR_NS,
-        )
-        for index, n, *numbers in log.execute(_BUCKETS, query).fetchall():
-            if n:
-                buckets.add(index, int(n), *numbers)
-    for span in rest:
-        for stamp_ns, _, value in _values(log, part, span):
-            if is_counted(value):
-                buckets.add_value(stamp_ns, value)
 
 
 LOT: Final = 1_000

@@ -11,19 +11,19 @@ import json
 import os
 import shutil
 import sqlite3
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
-from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import Final
 
-from lupin_twin.core.past import Event
-from lupin_twin.journal.appending import Appender, held
+from lupin_twin.core.past import HOUR_NS
+from lupin_twin.journal.appending import Appender, copy_known
 from lupin_twin.journal.beside import Lock
 from lupin_twin.journal.checking import Progress, find_all_damage
 from lupin_twin.journal.fold import copies
 from lupin_twin.journal.hours import DELETED
-from lupin_twin.journal.retention import KEPT_BYTES, KEPT_NS, used_bytes
+from lupin_twin.journal.retention import KEPT_BYTES, KEPT_NS
 from lupin_twin.journal.runs import Carries, Run, put_run
 from lupin_twin.journal.schema import (
     APPLICATION_ID,
@@ -38,8 +38,6 @@ from lupin_twin.journal.schema import (
 from lupin_twin.journal.version3 import VERSION, Bucket, OldRun, Version3
 
 _ROWS: Final = 5_000
-# A new file is about as large as the old one; indexes and what is counted may take more.
-_ROOM: Final = 1.5
 _NUMBERS: Final = (KEPT_NS, KEPT_BYTES, "simulated_from_ns", "simulated_until_ns")
 
 
@@ -69,29 +67,25 @@ def upgrade(path: Path, report: Callable[[float], None]) -> str:
 
     """
     new = path.with_name(path.name + ".upgrade")
-    _remove(new)
-    with closing(sqlite3.connect(path, isolation_level=None, timeout=5.0)) as connection:
-        # All of it in the one file: the log beside it would be taken for one of the new file.
-        ((is_busy, *_),) = connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
-        if is_busy:
-            raise sqlite3.OperationalError(f"somebody reads {path}, which is to be upgraded")
-        connection.execute("PRAGMA query_only = 1")
-        _check_room(path, int(path.stat().st_size * _ROOM), "its upgrade takes up to")
-        try:
+    try:
+        with closing(sqlite3.connect(path, isolation_level=None, timeout=5.0)) as connection:
+            # All of it in the one file: the log beside it would be taken for one of the new file.
+            if _is_read(connection):
+                somebody = f"somebody reads {path}, which is to be upgraded"
+                raise sqlite3.OperationalError(somebody)  # noqa: TRY301
+            connection.execute("PRAGMA query_only = 1")
+            _remove(new)
             with closing(open_writer(new)) as target:
                 # Of what is begun again if it fails, nothing has to be safe before it is done.
                 target.execute("PRAGMA journal_mode = MEMORY")
                 target.execute("PRAGMA synchronous = OFF")
                 damaged = _Upgrade(Version3(connection), target, report).run()
-            _sync(new)
-        except sqlite3.OperationalError as error:
-            _remove(new)
-            if str(error).startswith("no such"):
-                raise DamagedFile(f"the tables of {path} are not those of a journal") from error
-            raise
-        except BaseException:
-            _remove(new)
-            raise
+        _sync(new)
+    except BaseException as error:
+        _remove(new)
+        if isinstance(error, sqlite3.OperationalError) and str(error).startswith("no such"):
+            raise DamagedFile(f"the tables of {path} are not those of a journal") from error
+        raise
     kept = _keep(path)
     # Empty by now, but of the old file: who still reads that has them open, and keeps them.
     for end in ("-wal", "-shm"):
@@ -102,17 +96,16 @@ def upgrade(path: Path, report: Callable[[float], None]) -> str:
     return f"{damaged:,} rows of {kept} are damaged and left out" if damaged else ""
 
 
+def _is_read(connection: sqlite3.Connection) -> bool:
+    """Put all of the log into the file, unless somebody still reads what was before."""
+    connection.execute("PRAGMA busy_timeout = 1000")
+    ((is_busy, *_),) = connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+    return bool(is_busy)
+
+
 def _remove(new: Path) -> None:
     for end in ("", "-wal", "-shm", "-journal"):
         new.with_name(new.name + end).unlink(missing_ok=True)
-
-
-def _check_room(path: Path, needed: int, what: str) -> None:
-    free = shutil.disk_usage(path.parent).free
-    if free < needed:
-        raise OSError(
-            f"the disk of {path} has {free / 1e6:.1f} MB free, and {what} {needed / 1e6:.1f} MB"
-        )
 
 
 def _keep(path: Path) -> Path:
@@ -159,20 +152,17 @@ class _Upgrade:
     def run(self) -> int:
         last_id = self._old.last_id()
         rows = iter(self._old.rows())
-        is_done = False
-        while not is_done:
+        while lot := list(islice(rows, _ROWS)):
             with transaction(self._target):
-                for _ in range(_ROWS):
-                    entry = next(rows, None)
-                    if entry is None:
-                        is_done = True
-                        break
-                    number, run, row = entry
+                for number, run, row in lot:
                     self._begin_until(run)
+                    if self._appender.counted_ns and number > self._old.meta("rolled_id"):
+                        # From here on the old file has not counted yet.
+                        self._appender.flush()
+                        self._appender.counted_ns.clear()
                     self._appender.append(run, (row,))
                 self._appender.flush()
-            if not is_done:
-                self._report(min(1.0, number / last_id))
+            self._report(min(1.0, lot[-1][0] / last_id))
         with transaction(self._target):
             self._begin_until(max(self._old.runs, default=0))
             for key in _NUMBERS:
@@ -183,8 +173,8 @@ class _Upgrade:
     def _begin_until(self, last: int) -> None:
         """Begin the runs up to one: those before it, in which nothing was received, too."""
         if last not in self._begun:
-            for number in sorted(self._old.runs):
-                if number <= last and number not in self._begun:
+            for number in sorted(self._old.runs.keys() - self._begun.keys()):
+                if number <= last:
                     self._begin(self._old.runs[number])
 
     def _begin(self, old: OldRun) -> None:
@@ -192,57 +182,37 @@ class _Upgrade:
         run = Run(old.id, old.begun, self._appender.last_seq + 1, None, old.ended_ns)
         self._begun[old.id] = run
         put_run(self._target, run)
-        self._carry_counts(run)
+        if (purged_ns := self._old.purged_ns(run.id)) >= 0:
+            self._carry_counts(run.id, purged_ns)
         before = None if old.follows is None else self._begun.get(old.follows)
-        if before is None or old.carries is Carries.NOTHING:
-            return
-        rows = [
-            held(
-                replace(row, arrival_ns=run.begun.arrival_ns),
-                run.begun.stamp_ns,
-                keeps_key=not run.begun.is_simulated,
-            )
-            for row in copies(self._target, before, old.carries)
-        ]
-        self._appender.append(run.id, rows, are_copies=True)
-        self._appender.flush()
+        if before is not None and old.carries is not Carries.NOTHING:
+            copy_known(self._appender, before, run, copies(self._target, before, old.carries))
 
-    def _carry_counts(self, run: Run) -> None:
-        """What was counted of rows that are deleted."""
-        old, horizon_ns = self._old, self._old.purged_ns(run.id)
-        if horizon_ns < 0:
-            return
-        set_meta(self._target, f"{DELETED}{run.id}", horizon_ns)
-        add = self._target.executemany
-        add(f"INSERT INTO hour VALUES ({_marks(7)})", self._hours(run))
-        tallies = [(LOCAL_SITE, run.id, *tally) for tally in old.tallies(run.id)]
-        add(f"INSERT INTO tally VALUES ({_marks(10)})", tallies)
-        events: list[tuple[object, ...]] = [
-            (Event.SILENCES, start_ns, 0, "", end_ns - start_ns)
-            for start_ns, end_ns in old.silences(run.id)
-        ]
-        events += [
-            (Event.PESTS_SEEN if is_seen else Event.PESTS_CLEARED, stamp_ns, number, tag_id, bugs)
-            for number, tag_id, stamp_ns, is_seen, bugs in old.pests(run.id)
-        ]
-        add(
-            f"INSERT INTO event VALUES ({_marks(7)})",
-            [(LOCAL_SITE, run.id, *event) for event in events],
-        )
+    def _carry_counts(self, run: int, purged_ns: int) -> None:
+        """What was counted in hours some of whose rows are deleted; the others are not counted."""
+        hour = purged_ns // HOUR_NS
+        self._appender.counted_ns[run] = (hour + 1) * HOUR_NS - 1
+        set_meta(self._target, f"{DELETED}{run}", purged_ns)
+        self._add("hour", 7, self._hours(run, hour))
+        for table, columns in (("tally", 10), ("event", 7)):
+            rows = getattr(self._old, table)(run, hour)
+            self._add(table, columns, [(LOCAL_SITE, run, *row) for row in rows])
 
-    def _hours(self, run: Run) -> list[tuple[object, ...]]:
+    def _add(self, table: str, columns: int, rows: Iterable[tuple[object, ...]]) -> None:
+        marks = ", ".join("?" * columns)
+        self._target.executemany(f"INSERT INTO {table} VALUES ({marks})", rows)
+
+    def _hours(self, run: int, until: int) -> list[tuple[object, ...]]:
         """Rows of `hour`: several series of the old file are one here, that of any source."""
         numbers: dict[tuple[str, int, tuple[str, ...]], int] = {}
         found: dict[tuple[int, int], list[Bucket]] = {}
-        for tag_id, kind, sensors, hour, buckets in self._old.hours(run.id):
+        for tag_id, kind, sensors, hour, buckets in self._old.hours(run, until):
             key = (tag_id, kind, sensors)
             if key not in numbers:
                 self._appender.last_seq += 1
                 numbers[key] = self._appender.last_seq
-                self._target.execute(
-                    f"INSERT INTO series VALUES ({_marks(6)})",
-                    (LOCAL_SITE, numbers[key], run.id, tag_id, kind, _json(sensors)),
-                )
+                row = (LOCAL_SITE, numbers[key], run, tag_id, kind, _json(sensors))
+                self._add("series", 6, [row])
             at = (numbers[key], hour)
             found[at] = list(map(_joined, found[at], buckets)) if at in found else buckets
         return [
@@ -267,92 +237,44 @@ def _json(values: Sequence[object]) -> str:
     return json.dumps(values, separators=(",", ":"))
 
 
-def _marks(count: int) -> str:
-    return ", ".join("?" * count)
-
-
 _INSTRUCTIONS: Final = 100_000
-# The copy and as much as the file system itself takes for it.
-_VACUUM_ROOM: Final = 1.02
 
 
 class NotPossible(Exception):
-    """It cannot be made smaller now; the message says why. The file is as it was."""
+    """It cannot be made smaller now; the message says why. What is in the file is as it was."""
 
 
 def vacuum(path: Path, holder: str, report: Progress) -> tuple[int, int]:
     """Make the file small; returns its bytes before and after.
 
-    All of it is read for damage first: a copy without gaps would have lost what is still to be
-    saved of a damaged one. `report(what, share)` is called as the work goes on.
+    All of it is read for damage first: without gaps, what is still to be saved of a damaged one
+    would be lost. `report(what, share)` is called meanwhile.
 
     Raises:
         InUse: a twin has it.
-        NotPossible: it is damaged, no room on its disk, or somebody reads it.
+        NotPossible: it is damaged, or somebody reads it.
         Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_named`.
 
     """
     # Not a thing is made beside a file that is no journal.
     with closing(open_named(path)):
         pass
-    copy = path.with_name(path.name + ".vacuum")
-    with Lock(path, holder):
-        _refuse_damaged(path, report)
+    with Lock(path, holder), closing(open_writer(path)) as connection:
+        hear_interrupts(connection)
         before = path.stat().st_size
-        try:
-            _copy(path, copy, report)
-            copy.chmod(path.stat().st_mode & 0o777)
-            with closing(open_writer(copy)) as connection:
-                connection.execute("SELECT count(*) FROM scan").fetchone()
-            _sync(copy)
-            copy.replace(path)
-            sync_folder(path.parent)
-        except BaseException:
-            copy.unlink(missing_ok=True)
-            raise
+        with closing(find_all_damage(connection, report)) as found:
+            first = next(found, None)
+        if first is not None:
+            raise NotPossible(
+                f"{path} is damaged and left as it is ({first});"
+                " lupin-twin journal check tells all that is"
+            )
+        connection.execute("VACUUM")
+        if _is_read(connection):
+            raise NotPossible(f"somebody reads {path}: try again when nobody does")
         return before, path.stat().st_size
 
 
 def hear_interrupts(connection: sqlite3.Connection) -> None:
     """Have Ctrl-C end what takes SQLite minutes: Python sees it only in Python."""
     connection.set_progress_handler(lambda: 0, _INSTRUCTIONS)
-
-
-def _refuse_damaged(path: Path, report: Progress) -> None:
-    with closing(open_named(path)) as connection:
-        hear_interrupts(connection)
-        with closing(find_all_damage(connection, report)) as found:
-            first = next(found, None)
-    if first is not None:
-        raise NotPossible(
-            f"{path} is damaged and left as it is ({first});"
-            " lupin-twin journal check tells all that is"
-        )
-
-
-def _copy(path: Path, copy: Path, report: Progress) -> None:
-    with closing(open_writer(path)) as connection:
-        hear_interrupts(connection)
-        # Without a log nobody who comes later finds one that is not of the new file. SQLite does
-        # this alone when nobody else has the file open.
-        try:
-            connection.execute("PRAGMA busy_timeout = 0")
-            (mode,) = connection.execute("PRAGMA journal_mode = DELETE").fetchone()
-        except sqlite3.OperationalError:
-            mode = "locked"
-        if mode != "delete":
-            raise NotPossible(f"somebody reads {path}: try again when nobody does")
-        needed = int(used_bytes(connection) * _VACUUM_ROOM)
-        try:
-            _check_room(path, needed, "a copy of what is in it takes")
-        except OSError as error:
-            raise NotPossible(str(error)) from error
-        copy.unlink(missing_ok=True)
-
-        def go_on() -> int:
-            if copy.exists():
-                report("copying", min(1.0, copy.stat().st_size / needed))
-            return 0
-
-        connection.set_progress_handler(go_on, 20 * _INSTRUCTIONS)
-        connection.execute("VACUUM INTO ?", (str(copy),))

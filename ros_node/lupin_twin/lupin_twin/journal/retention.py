@@ -238,21 +238,18 @@ def forget(path: Path, tag_id: str, *, pose_only: bool, by: str, at_ns: int) -> 
         lock = Lock(path, "lupin-twin journal forget")
     except InUse as error:
         raise InUse(f"{error}: stop the twin first") from error
-    with lock, closing(open_writer(path)) as connection:
-        # What is deleted is overwritten: what is saved of a damaged file does not bring it back.
-        connection.execute("PRAGMA secure_delete = ON")
-        with transaction(connection):
-            _check_known(connection, path, tag_id)
-            # The numbers go on, also when the newest rows are gone.
-            last_seq = Appender(connection).last_seq
-            set_meta(connection, LAST_SEQ, last_seq)
-            forgotten = _delete(connection, tag_id, pose_only=pose_only)
-            if pose_only and not forgotten.places:
-                raise NotKnown(f"the journal {path} knows no place of tag {tag_id!r}")
-            what = "pose" if pose_only else "all"
-            record = {"tag": tag_id, "what": what, "by": by, "at": at_ns, "seq": last_seq}
-            number = 1 + sum(1 for _ in records(connection))
-            set_meta(connection, f"{RECORD}{number}", json.dumps(record))
+    with lock, closing(open_writer(path)) as connection, transaction(connection):
+        _check_known(connection, path, tag_id)
+        # The numbers go on, also when the newest rows are gone.
+        last_seq = Appender(connection).last_seq
+        set_meta(connection, LAST_SEQ, last_seq)
+        forgotten = _delete(connection, tag_id, pose_only=pose_only)
+        if pose_only and not forgotten.places:
+            raise NotKnown(f"the journal {path} knows no place of tag {tag_id!r}")
+        what = "pose" if pose_only else "all"
+        record = {"tag": tag_id, "what": what, "by": by, "at": at_ns, "seq": last_seq}
+        number = 1 + sum(1 for _ in records(connection))
+        set_meta(connection, f"{RECORD}{number}", json.dumps(record))
     return forgotten
 
 

@@ -1,83 +1,78 @@
 # ruff: noqa: S608  # SQL is put together of constants
-"""A damaged file: quarantined under a name that says when, and read page by page.
+"""A damaged file: quarantined under a name that says when, and what can be read of it copied.
 
-A row is found where it stands, on whatever page, without the trees that lead to it
-(https://www.sqlite.org/fileformat2.html, 1.6 and 2): so it does not matter which pages are lost.
-The pages of its write-ahead log are read in the place of those that they were to replace.
+SQLite itself reads it, on both sides of each damaged page. What the copy loses with a page are its
+rows, and those of the pages that only it leads to.
 """
 
 from __future__ import annotations
 
+import os
+import shutil
 import sqlite3
-import struct
-from collections.abc import Generator, Iterable, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import closing, suppress
 from pathlib import Path
 from types import NoneType
-from typing import IO, Any, Final
+from typing import Any, Final
+from urllib.parse import quote
 
 from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ
-from lupin_twin.journal.hours import WrittenInspection, WrittenScan, count
-from lupin_twin.journal.rows import flower_of, numbers_of, sensor_names
+from lupin_twin.journal.checking import WRITTEN, delete_wrong
+from lupin_twin.journal.hours import DELETED, count_rows
 from lupin_twin.journal.schema import (
+    FILE_ERRORS,
     LOCAL_SITE,
     PAGE_SIZE,
-    DamagedFile,
     SiteLog,
+    empty_file,
+    says_damaged,
     set_meta,
     transaction,
 )
 
-_LEAF: Final = 0x0A
-_INNER: Final = 0x02
-_FIRST_PAGE_HEADER: Final = 100
-_INT_BYTES: Final = (0, 1, 2, 3, 4, 6, 8)
-_REAL: Final = struct.Struct(">d")
-# What of a row stands on its page, at most and at least, where the rest goes on on others.
-_LARGEST_HERE: Final = (PAGE_SIZE - 12) * 64 // 255 - 23
-_LEAST_HERE: Final = (PAGE_SIZE - 12) * 32 // 255 - 23
-# No row of ours is longer, and a damaged page may say anything.
-_MAX_PAYLOAD: Final = 10_000_000
-_LOG_HEADER: Final = 32
-_FRAME_HEADER: Final = 24
-
+# Rows that are read in one go; around damage, fewer.
+_LOT: Final = 1_000
+_LAST: Final = 2**61
 _LEAST_ROW_BYTES: Final = 20
-# By what a row of each table is known: text, integer, number, and those that may be missing.
-_KINDS: Final = {
-    "meta": "ttt",
-    "run": "tiiiiiII",
-    "series": "tiitit",
-    "scan": "tiiiIiitttit",
-    "look": "tiitiIitttFiiiitt",
-    "place": "tiitiifffffffi",
-    "hour": "tiitttt",
-    "tally": "titiiiiiii",
-    "event": "titiiti",
-    "note": "ttittttI",
-    # The index of the series: all that their table says.
-    "series_of": "tititi",
+_TYPES: Final[Mapping[str, tuple[type, ...]]] = {
+    "TEXT": (str,),
+    "BIGINT": (int,),
+    "INTEGER": (int,),
+    "DOUBLE PRECISION": (int, float),
 }
-_TYPES: Final[dict[str, tuple[type, ...]]] = {
-    "t": (str,),
-    "i": (int,),
-    "I": (int, NoneType),
-    "f": (int, float),
-    "F": (int, float, NoneType),
-}
-_WRITTEN: Final = ("scan", "look")
+_ALL: Final = "SELECT * FROM {0} WHERE site = 'local'"
+# An index of the series has all that their table has.
+_SERIES_OF: Final = (
+    "SELECT site, series, run, tag, kind, sensors FROM series INDEXED BY series_of"
+    " WHERE site = 'local'"
+)
+_TABLES: Final = (
+    "run", "series", "scan", "look", "place", "hour", "tally", "event", "note"
+)  # fmt: skip
+# By what each is ordered.
+_SMALL: Final = {"run": "run", "series": "series", "place": "seq", "note": "id"}
 _NO_RUN: Final = "run NOT IN (SELECT run FROM run)"
 _MEANINGLESS: Final = {
     "run": "joins NOT IN (SELECT run FROM run)",
     "series": f"{_NO_RUN} OR NOT json_valid(sensors)",
     "place": _NO_RUN,
 }
-# What was counted outlives the rows; of rows that are there it is counted again.
-_COUNTED: Final = ("hour", "tally", "event")
-# Later than any stamp that we write.
-_NEVER: Final = 2**62
-# A run begins at a moment of the wall's clock; nothing is counted that far.
-_LATE: Final = 10**12
+# What was counted of deleted rows is kept; of rows that are there it is counted again.
+_COUNTED: Final = {
+    "hour": ("series", f"hour <= :at / {HOUR_NS}"),
+    "tally": ("run", f"hour <= :at / {HOUR_NS}"),
+    "event": ("run", "stamp_ns <= :at"),
+}
+_NOT_DELETED: Final = (
+    (
+        "DELETE FROM hour WHERE series IN (SELECT series FROM series WHERE run = :run)"
+        f" AND hour > :at / {HOUR_NS}"
+    ),
+    f"DELETE FROM tally WHERE run = :run AND hour > :at / {HOUR_NS}",
+    "DELETE FROM event WHERE run = :run AND stamp_ns > :at",
+)
 
 Record = tuple[Any, ...]
 
@@ -99,269 +94,193 @@ def quarantine(path: Path, when: str) -> Path:
     return aside
 
 
-class _Broken(ValueError):
-    """Bytes that are no row."""
+def readable(connection: sqlite3.Connection, select: str, number: str) -> Iterator[list[Record]]:
+    """Lots of rows in the order of their number, their first column; empty ones for damage.
 
-
-class Pages:
-    """The pages of a file, those in its log included."""
-
-    def __init__(self, path: Path) -> None:
-        self._file = path.open("rb")
-        self._log: IO[bytes] | None = None
-        self._in_log: dict[int, int] = {}
-        log = path.with_name(path.name + "-wal")
-        if log.exists():
-            self._log = log.open("rb")
-            self._read_log()
-        self.count = max(path.stat().st_size // PAGE_SIZE, *self._in_log, 0)
-
-    def close(self) -> None:
-        """Let go of the file."""
-        self._file.close()
-        if self._log is not None:
-            self._log.close()
-
-    def __getitem__(self, number: int) -> bytes:
-        at = self._in_log.get(number)
-        file, at = (self._file, (number - 1) * PAGE_SIZE) if at is None else (self._log, at)
-        assert file is not None
-        file.seek(at)
-        return file.read(PAGE_SIZE)
-
-    def _read_log(self) -> None:
-        """Where each page stands in it last."""
-        assert self._log is not None
-        salt = self._log.read(_LOG_HEADER)[16:24]
-        at = _LOG_HEADER
-        while len(header := self._log.read(_FRAME_HEADER)) == _FRAME_HEADER:
-            if header[8:16] != salt:  # left behind by an earlier log
-                break
-            self._in_log[int.from_bytes(header[:4], "big")] = at + _FRAME_HEADER
-            at = self._log.seek(at + _FRAME_HEADER + PAGE_SIZE)
-
-    # --- rows ---------------------------------------------------------------------------------
-
-    def rows(self, *tables: str) -> Iterator[tuple[str, list[Record]]]:
-        """Rows of some tables, page by page from the last one on: the newest first, mostly."""
-        for number in range(self.count, 0, -1):
-            page = self[number]
-            at = _FIRST_PAGE_HEADER if number == 1 else 0
-            if len(page) < PAGE_SIZE or page[at] not in (_LEAF, _INNER):
-                continue
-            # All that stands on a page is of one table.
-            records = self._records(page, at)
-            first = next((record for record in records if _table_of(record)), ())
-            table = _table_of(first)
-            if table in tables:
-                yield table, [first, *(record for record in records if _table_of(record) == table)]
-
-    def _records(self, page: bytes, at: int) -> Iterator[Record]:
-        is_inner = page[at] == _INNER
-        cells = int.from_bytes(page[at + 3 : at + 5], "big")
-        first = at + (12 if is_inner else 8)
-        for pointer in range(first, min(first + 2 * cells, PAGE_SIZE - 1), 2):
-            cell = int.from_bytes(page[pointer : pointer + 2], "big") + (4 if is_inner else 0)
-            try:
-                yield self._record(page, cell)
-            except (_Broken, IndexError, UnicodeDecodeError, struct.error):
-                continue
-
-    def _record(self, page: bytes, at: int) -> Record:
-        length, at = _varint(page, at)
-        payload = self._payload(page, at, length)
-        header, at = _varint(payload, 0)
-        kinds = []
-        while at < header:
-            kind, at = _varint(payload, at)
-            kinds.append(kind)
-        values = []
-        for kind in kinds:
-            value, at = _value(payload, at, kind)
-            values.append(value)
-        return tuple(values)
-
-    def _payload(self, page: bytes, at: int, length: int) -> bytes:
-        """What stands on the page, and the pages that it goes on on."""
-        if length <= _LARGEST_HERE:
-            return page[at : at + length]
-        if length > _MAX_PAYLOAD:
-            raise _Broken
-        here = _LEAST_HERE + (length - _LEAST_HERE) % (PAGE_SIZE - 4)
-        here = here if here <= _LARGEST_HERE else _LEAST_HERE
-        found = bytearray(page[at : at + here])
-        following = int.from_bytes(page[at + here : at + here + 4], "big")
-        while len(found) < length:
-            more = self[following] if 0 < following <= self.count else b""
-            if len(more) < PAGE_SIZE:
-                raise _Broken
-            following = int.from_bytes(more[:4], "big")
-            found += more[4 : 4 + length - len(found)]
-        return bytes(found)
-
-
-def _table_of(record: Record) -> str:
-    """The table whose row it looks like; empty: of none, an index's entry for example."""
-    for table, kinds in _KINDS.items():
-        if (
-            len(kinds) == len(record)
-            and all(isinstance(v, _TYPES[kind]) for v, kind in zip(record, kinds, strict=True))
-            and (table != "run" or record[4] > _LATE)
-        ):
-            return table
-    return ""
-
-
-def _varint(data: bytes, at: int) -> tuple[int, int]:
-    """A number of up to nine bytes, and where it ends."""
-    value = 0
-    for index in range(8):
-        byte = data[at + index]
-        value = value << 7 | byte & 0x7F
-        if byte < 0x80:
-            return value, at + index + 1
-    return value << 8 | data[at + 8], at + 9
-
-
-def _value(data: bytes, at: int, kind: int) -> tuple[Any, int]:
-    """A value of a record by its serial type, and where it ends."""
-    if kind == 0:
-        return None, at
-    if kind in (8, 9):
-        return kind - 8, at
-    if kind < len(_INT_BYTES):
-        end = at + _INT_BYTES[kind]
-        return int.from_bytes(data[at:end], "big", signed=True), end
-    if kind == 7:
-        return _REAL.unpack(data[at : at + 8])[0], at + 8
-    end = at + (kind - 13) // 2
-    if kind < 13 or not kind % 2 or end > len(data):
-        raise _Broken
-    return data[at:end].decode(), end
-
-
-class Salvage:
-    """Copies what can be read of a damaged journal into a new one, the newest first.
-
-    Rows keep their numbers; one that is no row any more, or whose series is lost, is left.
+    `select` is a query up to the condition of the number: "SELECT id, .. FROM table WHERE".
     """
+    text = f"{select} {number} >= ? ORDER BY {number} LIMIT ?"
 
-    def __init__(self, aside: Path, connection: sqlite3.Connection) -> None:
-        self._aside = aside
-        self._connection = connection
-        self._log = SiteLog(connection)
-        # Run, kind and number of sensors of each series.
-        self._series: dict[int, tuple[int, int, int]] = {}
-        self._runs: set[int] = set()
-        self._purged_seq = 0
-        self._purged_ns: dict[int, int] = {}
-
-    def steps(self) -> Generator[None, None, None]:
-        """Each step is one transaction; after the first, runs, series and places are there.
-
-        Steps that were done before do no harm.
-        """
+    def lot(at: int, size: int) -> list[Record] | None:
         try:
-            pages = Pages(self._aside)
-        except OSError:
-            return
-        try:
-            with transaction(self._connection):
-                self._begin(pages)
-            yield
-            for table, rows in pages.rows(*_WRITTEN):
-                with transaction(self._connection):
-                    self._write(table, rows)
-                yield
-        finally:
-            pages.close()
+            rows = connection.execute(text, (at, size)).fetchall()
+        except FILE_ERRORS as error:
+            if says_damaged(error):
+                return None
+            raise
+        # A number may be damaged: none counts that is not between its neighbours. What stands at
+        # the end of a lot comes in the next one.
+        numbers = [row[0] for row in rows[-1:] if isinstance(row[0], int)]
+        if len(rows) == size > 1:
+            del rows[-1]
+        fitting = [
+            row
+            for row in rows
+            if isinstance(row[0], int) and at <= row[0] <= max(numbers, default=0)
+        ]
+        # Nothing, before the end: the order is damaged.
+        return None if not fitting and (rows or at <= end) else fitting
 
-    def _begin(self, pages: Pages) -> None:
-        found: dict[str, set[Record]] = {table: set() for table in _KINDS}
-        for table, rows in pages.rows(*(table for table in _KINDS if table not in _WRITTEN)):
-            found[table].update(row for row in rows if row[0] == LOCAL_SITE)
-        self._note(found["meta"])
-        for site, run, tag, kind, sensors, series in found["series_of"]:
-            found["series"].add((site, series, run, tag, kind, sensors))
-        for table in ("run", "series", "place", "note"):
-            self._put(table, found[table])
-        execute = self._connection.execute
-        for table, is_meaningless in _MEANINGLESS.items():
-            execute(f"DELETE FROM {table} WHERE {is_meaningless}")
-        self._runs = {run for (run,) in execute("SELECT run FROM run")}
-        for series, run, kind, sensors in execute("SELECT series, run, kind, sensors FROM series"):
-            with suppress(DamagedFile):
-                self._series[series] = (run, kind, len(sensor_names(sensors)))
-        for table in _COUNTED:
-            self._put(table, (row for row in found[table] if self._is_given_up(table, row)))
-
-    def _note(self, rows: Iterable[Record]) -> None:
-        meta = {key: value for _, key, value in rows}
-        for key, value in meta.items():
-            run = key.removeprefix("purged_ns:")
-            if key != run and run.isdecimal() and value.isdecimal():
-                self._purged_ns[int(run)] = int(value)
-        if meta.get(PURGED_SEQ, "").isdecimal():
-            self._purged_seq = int(meta[PURGED_SEQ])
-        for key, value in meta.items():
-            if key not in ("journal_id", LAST_SEQ):
-                set_meta(self._connection, key, value)
-        # The numbers go on past all that may have been lost at the end.
-        last = meta.get(LAST_SEQ, "")
-        largest = max(
-            self._purged_seq,
-            int(last) if last.isdecimal() else 0,
-            self._aside.stat().st_size // _LEAST_ROW_BYTES,
-        )
-        for (seq,) in self._connection.execute("SELECT max(seq) FROM place"):
-            largest = max(largest, seq or 0)
-        set_meta(self._connection, LAST_SEQ, largest + 1_000_000)
-
-    def _is_given_up(self, table: str, row: Record) -> bool:
-        """Whether a count is of rows that were deleted before the damage."""
-        if table == "hour":
-            run, hour = self._series.get(row[1], (-1,))[0], row[2]
+    at, size, end = 0, _LOT, -1
+    with suppress(*FILE_ERRORS):
+        for last in connection.execute(f"{select} {number} >= 0 ORDER BY {number} DESC LIMIT 1"):
+            end = last[0] if isinstance(last[0], int) else -1
+    while at < _LAST and (rows := lot(at, size)) != []:
+        if rows:
+            yield rows
+            at = max(row[0] for row in rows) + 1
+        elif size > 1:
+            size //= 2
         else:
-            run, hour = row[1], row[3] if table == "tally" else row[3] // HOUR_NS
-        return run in self._runs and hour <= self._purged_ns.get(run, -1) // HOUR_NS
+            yield []
+            at, size = _behind_damage(lot, at), _LOT
 
-    def _write(self, table: str, rows: list[Record]) -> None:
-        scans, inspections = [], []
-        for row in rows:
-            if row[0] != LOCAL_SITE or row[1] <= self._purged_seq:
-                continue
-            written = self._scan(row) if table == "scan" else self._look(row)
-            if written is None or not self._put(table, [row]):
-                continue
-            is_copy = row[10] if table == "scan" else row[14]
-            if is_copy:
-                continue
-            if isinstance(written, WrittenScan):
-                scans.append(written)
-            else:
-                inspections.append(written)
-        count(self._log, scans, inspections)
 
-    def _scan(self, row: Record) -> WrittenScan | None:
-        run, kind, sensors = self._series.get(row[2], (0, 0, -1))
+def _behind_damage(lot: Callable[[int, int], object], bad: int) -> int:
+    """The number from which on rows can be read again."""
+    step = 1
+    while bad + step < _LAST and lot(bad + step, 1) is None:
+        bad += step
+        step += step // 8 + 1
+    good = bad + step
+    while good - bad > 1:
+        middle = (good + bad) // 2
+        bad, good = (middle, good) if lot(middle, 1) is None else (bad, middle)
+    return good
+
+
+def salvage(aside: Path, connection: sqlite3.Connection) -> None:
+    """Copy what can be read of a quarantined journal into a new one; rows keep their numbers.
+
+    What was copied before, by somebody who was killed amid it, is copied again.
+
+    Raises:
+        sqlite3.Error, OSError: the new one cannot be written, or the old one not be opened.
+
+    """
+    mended = aside.with_name(aside.name + ".mended")
+    try:
+        with closing(_opened(aside)) as old:
+            is_known = _has_tables(old)
+            if is_known:
+                _copy(old, connection, aside.stat().st_size)
+        if not is_known:
+            _mend(aside, mended)
+            with closing(_opened(mended)) as old:
+                _copy(old, connection, aside.stat().st_size)
+    finally:
+        for file, ends in ((aside, ("-shm",)), (mended, ("", "-wal", "-shm"))):
+            for end in ends:
+                file.with_name(file.name + end).unlink(missing_ok=True)
+
+
+def _opened(path: Path) -> sqlite3.Connection:
+    name = f"file:{quote(os.fsencode(path))}?mode=ro"
+    return sqlite3.connect(name, uri=True, isolation_level=None)
+
+
+def _has_tables(old: sqlite3.Connection) -> bool:
+    try:
+        for table in _TABLES:
+            old.execute(f"SELECT site FROM {table} WHERE 0").fetchall()
+    except FILE_ERRORS:
+        return False
+    return True
+
+
+def _mend(aside: Path, mended: Path) -> None:
+    """A copy of a file with the header and schema of a new one: in each journal they lie there."""
+    for end in ("", "-wal"):
+        if aside.with_name(aside.name + end).exists():
+            shutil.copyfile(aside.with_name(aside.name + end), mended.with_name(mended.name + end))
+    content, roots = empty_file()
+    with mended.open("rb+") as file:
+        for number in range(len(content) // PAGE_SIZE):
+            if number + 1 not in roots:
+                file.seek(number * PAGE_SIZE)
+                file.write(content[number * PAGE_SIZE : (number + 1) * PAGE_SIZE])
+        # How many pages there are tells the file's size.
+        file.seek(28)
+        file.write(bytes(4))
+
+
+def _copy(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> None:
+    put = {table: _Table(new, table) for table in _TABLES}
+    with transaction(new):
+        for table in put:
+            new.execute(f"DELETE FROM {table}")
+        purged = _copy_facts(old, new, size)
+        for table, by in _SMALL.items():
+            put[table](_both_ends(old, _ALL.format(table), by))
+        put["series"](_both_ends(old, _SERIES_OF, "run"))
+        if purged:
+            for table, (by, which) in _COUNTED.items():
+                within = {"at": max(purged.values())}
+                put[table](_both_ends(old, f"{_ALL.format(table)} AND {which}", by, within))
+        for table, is_meaningless in _MEANINGLESS.items():
+            new.execute(f"DELETE FROM {table} WHERE {is_meaningless}")
+        for (run,) in new.execute("SELECT run FROM run").fetchall():
+            within = {"run": run, "at": purged.get(run, -1)}
+            for of_run in _NOT_DELETED:
+                new.execute(of_run, within)
+    for table in WRITTEN:
+        select, behind = f"SELECT seq, * FROM {table} WHERE site = 'local' AND", -1
+        for lot in filter(None, readable(old, select, "seq")):
+            last = max(row[0] for row in lot)
+            with transaction(new):
+                put[table](row[1:] for row in lot)
+                delete_wrong(new, table, behind, last)
+                count_rows(SiteLog(new), behind, last, purged)
+            behind = last
+            # What is in the file already need not be in its log too.
+            new.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
+
+
+def _both_ends(
+    old: sqlite3.Connection, select: str, by: str, values: Mapping[str, Any] | None = None
+) -> Iterator[Record]:
+    """Rows from the first one on until some are damaged, and so from the last one on."""
+    for order in ("ASC", "DESC"):
         try:
-            (values,) = numbers_of([row[11]])
-        except DamagedFile:
-            return None
-        if len(values) != sensors or not 0 <= row[3] < _NEVER:
-            return None
-        return WrittenScan(run, row[2], kind, row[3], row[6], values)
+            yield from old.execute(f"{select} ORDER BY {by} {order}", values or {})
+        except FILE_ERRORS as error:
+            if not says_damaged(error):
+                raise
+        else:
+            return
 
-    def _look(self, row: Record) -> WrittenInspection | None:
-        try:
-            flower_of([*row[9:14], *row[15:17]])
-        except DamagedFile:
-            return None
-        if row[2] not in self._runs or not 0 <= row[4] < _NEVER:
-            return None
-        return WrittenInspection(row[2], row[3], row[1], row[4], bool(row[11]), row[13])
 
-    def _put(self, table: str, rows: Iterable[Record]) -> int:
-        marks = ", ".join("?" * len(_KINDS[table]))
-        text = f"INSERT OR IGNORE INTO {table} VALUES ({marks})"
-        return int(self._connection.executemany(text, rows).rowcount)
+def _copy_facts(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> dict[int, int]:
+    """What is noted of the log as a whole; returns the last deleted stamp of each run."""
+    purged, largest = {}, size // _LEAST_ROW_BYTES
+    for _, key, value in _both_ends(old, _ALL.format("meta"), "key"):
+        run = str(key).removeprefix(DELETED)
+        if key in (LAST_SEQ, PURGED_SEQ) and str(value).isdecimal():
+            largest = max(largest, int(value))
+        if run != key and run.isdecimal() and str(value).isdecimal():
+            # All of that hour is counted.
+            purged[int(run)] = (int(value) // HOUR_NS + 1) * HOUR_NS - 1
+        if key not in ("journal_id", "salvage", LAST_SEQ):
+            set_meta(new, key, value)
+    # The numbers go on past all that may have been lost at the end.
+    set_meta(new, LAST_SEQ, largest + 1_000_000)
+    return purged
+
+
+class _Table:
+    """Puts rows into a table of the new file, if each column is of its type."""
+
+    def __init__(self, new: sqlite3.Connection, name: str) -> None:
+        self._new = new
+        columns = new.execute(f"PRAGMA table_info({name})").fetchall()
+        self._types = [
+            _TYPES[kind] if is_needed else (*_TYPES[kind], NoneType)
+            for _, _, kind, is_needed, *_ in columns
+        ]
+        self._insert = f"INSERT OR IGNORE INTO {name} VALUES ({', '.join('?' * len(columns))})"
+
+    def __call__(self, rows: Iterable[Record]) -> None:
+        fitting = [
+            row for row in rows if row[0] == LOCAL_SITE and all(map(isinstance, row, self._types))
+        ]
+        self._new.executemany(self._insert, fitting)

@@ -183,18 +183,28 @@ def open_writer(path: Path) -> sqlite3.Connection:
     return connection
 
 
+# All of it comes in one transaction: for the mode of the vacuum alone SQLite writes a page too.
+_NEW: Final = (
+    f"PRAGMA page_size = {PAGE_SIZE}; BEGIN; PRAGMA auto_vacuum = INCREMENTAL; {SQLITE_TABLES}"  # noqa: S608
+    f" INSERT INTO site VALUES ('{LOCAL_SITE}', '');"
+    f" INSERT INTO meta VALUES ('{LOCAL_SITE}', 'journal_id', lower(hex(randomblob(16))));"
+    f" PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {VERSION}; COMMIT;"
+)
+
+
 def _create(connection: sqlite3.Connection, path: Path) -> None:
     connection.execute("PRAGMA synchronous = FULL")
-    connection.execute(f"PRAGMA page_size = {PAGE_SIZE}")
-    # All of it comes in one transaction: for the mode of the vacuum alone SQLite writes a page too.
-    connection.executescript(
-        f"BEGIN; PRAGMA auto_vacuum = INCREMENTAL; {SQLITE_TABLES}"  # noqa: S608  # constants
-        f" INSERT INTO site VALUES ('{LOCAL_SITE}', '');"
-        f" INSERT INTO meta VALUES ('{LOCAL_SITE}', 'journal_id', lower(hex(randomblob(16))));"
-        f" PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {VERSION}; COMMIT;"
-    )
+    connection.executescript(_NEW)
     connection.execute("PRAGMA journal_mode = WAL")
     sync_folder(path.parent)
+
+
+def empty_file() -> tuple[bytes, frozenset[int]]:
+    """The bytes of a new journal, and the numbers of its pages with a table's or index's rows."""
+    with closing(sqlite3.connect(":memory:", isolation_level=None)) as new:
+        new.executescript(_NEW)
+        roots = new.execute("SELECT rootpage FROM sqlite_schema")
+        return new.serialize(), frozenset(number for (number,) in roots)
 
 
 @contextmanager
@@ -208,19 +218,6 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
         if connection.in_transaction:
             connection.execute("ROLLBACK")
         raise
-
-
-@contextmanager
-def one_view(connection: sqlite3.Connection) -> Iterator[None]:
-    """All that is read within is of one moment; keep it short, for the log grows meanwhile."""
-    if connection.in_transaction:
-        yield
-        return
-    connection.execute("BEGIN")
-    try:
-        yield
-    finally:
-        connection.rollback()  # does nothing where an interrupted statement has ended it
 
 
 def sync_folder(folder: Path) -> None:
@@ -321,28 +318,15 @@ def _own_tables() -> frozenset[bytes]:
         return frozenset(sql for (sql,) in new.execute(_SCHEMA))
 
 
-# --- facts about the log as a whole, by name ------------------------------------------------------
-
-
-def get_meta(connection: sqlite3.Connection, key: str, site: str = LOCAL_SITE) -> str | None:
-    """A noted fact, None where it is not noted."""
-    found = connection.execute(
-        "SELECT value FROM meta WHERE site = :site AND key = :key", {"site": site, "key": key}
-    ).fetchone()
-    return None if found is None else str(found[0])
-
-
-def set_meta(connection: sqlite3.Connection, key: str, value: object) -> None:
-    """Note a fact of this twin's own log."""
-    connection.execute(
-        "INSERT INTO meta VALUES (?, ?, ?) ON CONFLICT (site, key) DO UPDATE SET"
-        " value = excluded.value",
-        (LOCAL_SITE, key, str(value)),
-    )
+# --- one site's rows ------------------------------------------------------------------------------
 
 
 _NOTHING: Final[Mapping[str, Any]] = {}
 _META: Final = "SELECT value FROM meta WHERE site = :site AND key = :key"
+_SET_META: Final = (
+    "INSERT INTO meta VALUES (:site, :key, :value)"
+    " ON CONFLICT (site, key) DO UPDATE SET value = excluded.value"
+)
 _NAME: Final = re.compile(r":([a-z_]+)")
 
 
@@ -370,16 +354,22 @@ class SiteLog:
     @contextmanager
     def one_view(self) -> Iterator[None]:
         """All that is read within is of one moment; keep it short, for the log grows meanwhile."""
-        if isinstance(self.connection, sqlite3.Connection):
-            with one_view(self.connection):
+        connection = self.connection
+        if isinstance(connection, sqlite3.Connection):
+            if connection.in_transaction:
                 yield
-            return
-        if self.connection.info.transaction_status:  # it is in one, as `one_view` has it
+                return
+            connection.execute("BEGIN")
+            try:
+                yield
+            finally:
+                connection.rollback()  # does nothing where an interrupted statement has ended it
+        elif connection.info.transaction_status:
             yield
-            return
-        with self.connection.transaction():
-            self.connection.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ")
-            yield
+        else:
+            with connection.transaction():
+                connection.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ")
+                yield
 
     def _of_engine(self, sql: str) -> str:
         return sql if isinstance(self.connection, sqlite3.Connection) else _for_psycopg(sql)
@@ -388,3 +378,13 @@ class SiteLog:
 @cache
 def _for_psycopg(sql: str) -> str:
     return _NAME.sub(r"%(\1)s", sql).replace("?", "%s")
+
+
+def get_meta(connection: sqlite3.Connection, key: str) -> str | None:
+    """A noted fact about this twin's own log, None where it is not noted."""
+    return SiteLog(connection).meta(key)
+
+
+def set_meta(connection: sqlite3.Connection, key: str, value: object) -> None:
+    """Note a fact about this twin's own log."""
+    SiteLog(connection).execute(_SET_META, {"key": key, "value": str(value)})

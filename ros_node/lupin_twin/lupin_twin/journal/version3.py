@@ -9,7 +9,6 @@ of Adler-32 (RFC 1950, section 8.2). A row whose check does not fit is left out 
 from __future__ import annotations
 
 import heapq
-import math
 import sqlite3
 import struct
 import zlib
@@ -21,17 +20,15 @@ from typing import Any, Final, NamedTuple
 from lupin_twin.core.past import HOUR_NS, SLOT_NS, Event
 from lupin_twin.core.state import Bloom, Flower, Pose, Reading
 from lupin_twin.journal.hours import SILENCE_NS
-from lupin_twin.journal.rows import KIND_READING, InspectionRow, PinRow, Row, ScanRow, sensor_names
+from lupin_twin.journal.rows import InspectionRow, PinRow, Row, ScanRow, sensor_names
 from lupin_twin.journal.runs import Carries, Clock
+from lupin_twin.journal.salvage import readable
 from lupin_twin.journal.schema import DamagedFile, says_damaged
 
 VERSION: Final = 3
 
 _SCAN: Final = "id, series, stamp_ns, own_stamp_ns, lag_us, mission, detail, readings"
 _TALLIED: Final = {"scan": Event.SCANS, "failure": Event.FAILURES, "look": Event.LOOKS}
-# Rows that are read in one go; where some cannot be read, one by one.
-_LOT: Final = 2_000
-_LAST_ID: Final = 2**61
 _NOTHING: Final = -(2**63)
 _COLUMN: Final = struct.Struct("<q")
 _SHAPE: Final = struct.Struct("<HHH")  # flowers, corners of the box, species named
@@ -63,19 +60,6 @@ class OldHour(NamedTuple):
     sensors: tuple[str, ...]
     hour: int
     buckets: list[Bucket]
-
-
-class OldTally(NamedTuple):
-    """An hour of the site's attempts of one kind, with the first and the last of all."""
-
-    event: str
-    hour: int
-    n: int
-    total: int
-    low: int
-    high: int
-    first_ns: int
-    last_ns: int
 
 
 class _Series(NamedTuple):
@@ -134,108 +118,58 @@ class Version3:
         """The last stamp of a run of which something was deleted by age or size; -1: nothing."""
         return self.meta(f"purged_ns:{run}", -1)
 
-    def hours(self, run: int) -> Iterator[OldHour]:
-        """Of the hours in which scans were deleted, what is not in the scans that are left."""
-        horizon = self.purged_ns(run) // HOUR_NS
+    def hours(self, run: int, until: int) -> Iterator[OldHour]:
+        """What was counted of the readings up to an hour, for each series by itself."""
         # Tags in the order in which they were first received.
         for number, series in sorted(self._series.items(), key=lambda entry: entry[1].tag):
-            if series.run != run or horizon < 0 or not series.sensors:
+            if series.run != run or not series.sensors:
                 continue
-            left = self._left(number, series, horizon)
             for hour, packed in self._all(
                 "SELECT hour, buckets FROM rollup WHERE series = ? AND hour <= ? ORDER BY hour",
-                (number, horizon),
+                (number, until),
             ):
                 try:
                     buckets = _buckets(packed, len(series.sensors))
                 except _BadRow:
                     self.damaged += 1
-                    continue
-                for values in left.get(hour, ()):
-                    buckets = list(map(_without, buckets, values))
-                yield OldHour(series.tag_id, series.kind, series.sensors, hour, buckets)
+                else:
+                    yield OldHour(series.tag_id, series.kind, series.sensors, hour, buckets)
 
-    def _left(
-        self, number: int, series: _Series, horizon: int
-    ) -> dict[int, list[tuple[float, ...]]]:
-        """By hour, the values of the scans of a series that are there, and in its rollups."""
-        up_to = "rolling_to" if number <= self.meta("rolling_series") else "rolled_id"
-        found: dict[int, list[tuple[float, ...]]] = {}
-        for row in self._all(
-            f"SELECT {_SCAN} FROM scan WHERE series = ? AND stamp_ns < ? AND id <= ?",
-            (number, (horizon + 1) * HOUR_NS, self.meta(up_to)),
-        ):
-            with suppress(_BadRow):
-                values = _numbers(_unsealed(row[1:-1], row[-1]), len(series.sensors))
-                found.setdefault(row[2] // HOUR_NS, []).append(values)
-        return found
-
-    def tallies(self, run: int) -> Iterator[OldTally]:
-        """Attempts of the hours in which some were deleted, but for those that are left."""
-        horizon = self.purged_ns(run) // HOUR_NS
-        left: dict[tuple[str, int], list[int]] = {}
-        for number, series in self._series.items():
-            if series.run == run:
-                for table in ("scan", "look"):
-                    self._count_left(left, table, number, series, horizon)
+    def tally(self, run: int, until: int) -> Iterator[tuple[object, ...]]:
+        """Attempts up to an hour: the event, hour, count, sum, least, largest, first and last."""
         columns = ", ".join(
             f"{kind}_{part}" for kind in _TALLIED for part in ("n", "total", "low", "high")
         )
         for hour, first_ns, last_ns, *numbers in self._all(
             f"SELECT slot, first_ns, last_ns, {columns} FROM tally_hour"
             " WHERE run = ? AND slot <= ?",
-            (run, horizon),
+            (run, until),
         ):
             for index, event in enumerate(_TALLIED.values()):
-                n, total, low, high = numbers[4 * index : 4 * index + 4]
-                of_left = left.get((event, hour), [])
-                if n is not None and n > len(of_left):
-                    rest = (n - len(of_left), total - sum(of_left), low, high)
-                    yield OldTally(event, hour, *rest, first_ns, last_ns)
+                if numbers[4 * index]:
+                    yield event, hour, *numbers[4 * index : 4 * index + 4], first_ns, last_ns
 
-    def _count_left(
-        self,
-        left: dict[tuple[str, int], list[int]],
-        table: str,
-        number: int,
-        series: _Series,
-        horizon: int,
-    ) -> None:
-        value = "bug_count" if table == "look" else "0"
-        for stamp_ns, bugs in self._all(
-            f"SELECT stamp_ns, {value} FROM {table} WHERE series = ? AND stamp_ns < ? AND id <= ?",
-            (number, (horizon + 1) * HOUR_NS, self.meta("tallied_id")),
-        ):
-            if table == "look":
-                event, counted = Event.LOOKS, bugs
-            elif series.status:
-                event, counted = Event.FAILURES, series.status
-            elif series.kind == KIND_READING:
-                event, counted = Event.SCANS, len(series.sensors)
-            else:
-                continue
-            left.setdefault((event, stamp_ns // HOUR_NS), []).append(counted)
+    def event(self, run: int, until: int) -> Iterator[tuple[object, ...]]:
+        """What is rare, up to an hour: pauses of more than ten minutes, and changes of pests.
 
-    def silences(self, run: int) -> Iterator[tuple[int, int]]:
-        """(from, to) of pauses of more than ten minutes, of which scans may have been deleted."""
+        Event, stamp, number, tag, value.
+        """
         last: int | None = None
         for first_ns, last_ns in self._all(
             "SELECT first_ns, last_ns FROM tally WHERE run = ? AND slot < ? ORDER BY slot",
-            (run, (self.purged_ns(run) // HOUR_NS + 1) * HOUR_NS // SLOT_NS),
+            (run, (until + 1) * HOUR_NS // SLOT_NS),
         ):
             if last is not None and first_ns - last > SILENCE_NS:
-                yield last, first_ns
+                yield Event.SILENCES, last, 0, "", first_ns - last
             last = last_ns
-
-    def pests(self, run: int) -> Iterator[tuple[int, str, int, bool, int]]:
-        """(number, tag, stamp, whether one was seen, bugs) of changes without their inspection."""
         for number, tag, stamp_ns, anomaly, bugs in self._all(
             "SELECT id, tag, stamp_ns, anomaly, bug_count FROM change WHERE run = ?"
-            " AND id NOT IN (SELECT id FROM look)",
-            (run,),
+            " AND (stamp_ns < ? OR id NOT IN (SELECT id FROM look))",
+            (run, (until + 1) * HOUR_NS),
         ):
             if tag in self._tags:
-                yield number, self._tags[tag], stamp_ns, bool(anomaly), bugs
+                event = Event.PESTS_SEEN if anomaly else Event.PESTS_CLEARED
+                yield event, stamp_ns, number, self._tags[tag], bugs
 
     def _all(self, sql: str, values: tuple[object, ...]) -> list[tuple[Any, ...]]:
         """What was counted of deleted rows; where that is damaged, none of it is reported."""
@@ -328,48 +262,9 @@ class Version3:
 
     def _table(self, table: str, what: str) -> Iterator[tuple[Any, ...]]:
         """The rows of a table in the order of their numbers, without those out of reach."""
-        first, size = 0, _LOT
-        while True:
-            lot = self._lot(table, what, first, size)
-            if lot is None and size > 1:
-                size = 1
-                continue
-            if lot is None:
-                self.damaged += 1
-                first, size = self._past_damage(table, what, first), _LOT
-                if first >= _LAST_ID:
-                    return
-                continue
-            if not lot:
-                return
+        for lot in readable(self._connection, f"SELECT {what} FROM {table} WHERE", "id"):
+            self.damaged += not lot
             yield from lot
-            # Where pages are mixed up, rows come that were not asked for: never in circles.
-            first = max(first, int(lot[-1][0])) + 1
-
-    def _lot(self, table: str, what: str, first: int, size: int) -> list[tuple[Any, ...]] | None:
-        try:
-            return self._connection.execute(
-                f"SELECT {what} FROM {table} WHERE id >= ? ORDER BY id LIMIT ?", (first, size)
-            ).fetchall()
-        except sqlite3.Error as error:
-            if says_damaged(error):
-                return None
-            raise
-
-    def _past_damage(self, table: str, what: str, bad: int) -> int:
-        """The least number from which on rows can be read again; past all if there is none."""
-        step = 1
-        while self._lot(table, what, bad + step, 1) is None and bad + step < _LAST_ID:
-            bad += step
-            step *= 2
-        good = bad + step
-        while good - bad > 1:
-            middle = (good + bad) // 2
-            if self._lot(table, what, middle, 1) is None:
-                bad = middle
-            else:
-                good = middle
-        return good
 
 
 # --- bytes ----------------------------------------------------------------------------------------
@@ -413,12 +308,6 @@ def _buckets(packed: bytes, count: int) -> list[Bucket]:
     if layout is None or layout.size * count != len(packed):
         raise _BadRow
     return [(n, n * mean, low, high) for n, mean, low, high in layout.iter_unpack(packed)]
-
-
-def _without(bucket: Bucket, value: float) -> Bucket:
-    """A bucket before it counted a value."""
-    n, total, low, high = bucket
-    return (n - 1, total - value, low, high) if math.isfinite(value) else bucket
 
 
 def _shape(

@@ -1,0 +1,132 @@
+"""How a period is answered: each entry where they are few, buckets of them else.
+
+Buckets of an hour and more are made of hours, where these are whole; so are all where rows were
+deleted, or are too many. Shorter ones are read off the rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Final, Protocol
+
+from lupin_twin.core.past import HOUR_NS, Grid, SeriesPast, grid
+from lupin_twin.journal.runs import Span
+
+# Rows that are read for one answer: a quarter of a second. Of more, the hours are reported.
+MAX_ROWS: Final = 50_000
+
+# (stamp, seq, value).
+Entry = tuple[int, int, float]
+
+
+class Part(Protocol):
+    """What is requested, within one span."""
+
+    def is_deleted(self) -> bool:
+        """Whether only hours are left of some of it."""
+
+    def hourly(self) -> int:
+        """How many there are, by the hours."""
+
+    def entries(self, limit: int) -> list[Entry]:
+        """Some of them, at most `limit`."""
+
+    def fill(self, buckets: Buckets) -> None:
+        """Add them to buckets."""
+
+
+def answer(
+    parts_of: Callable[[int, int], Sequence[Part]], start_ns: int, end_ns: int, max_points: int
+) -> SeriesPast:
+    """What there is in a period, of which `parts_of` gives the parts."""
+    parts = parts_of(start_ns, end_ns)
+    are_deleted = any(part.is_deleted() for part in parts)
+    if not are_deleted:
+        found: list[Entry] = []
+        for part in parts:
+            found += part.entries(max_points + 1 - len(found))
+            if len(found) > max_points:
+                break
+        else:
+            # Of one stamp, in the order of receiving.
+            singly = [(stamp_ns, value) for stamp_ns, _, value in sorted(found)]
+            return individually(singly, start_ns, end_ns)
+    steps = grid(start_ns, end_ns, max_points)
+    if steps.bucket_ns < HOUR_NS and (
+        are_deleted or sum(part.hourly() for part in parts) > MAX_ROWS
+    ):
+        steps = grid(start_ns, end_ns, max_points, HOUR_NS)
+    buckets = Buckets(steps)
+    # The period is that of the buckets from here on.
+    for part in parts_of(steps.start_ns, steps.end_ns):
+        part.fill(buckets)
+    return buckets.past()
+
+
+class Buckets:
+    """Counts, sums, least and largest by the bucket of a grid."""
+
+    def __init__(self, steps: Grid) -> None:
+        self.grid = steps
+        self._found: dict[int, list[float]] = {}
+
+    def are_hours(self) -> bool:
+        """Whether each has whole hours."""
+        return self.grid.bucket_ns % HOUR_NS == 0 and self.grid.start_ns % HOUR_NS == 0
+
+    def add(self, index: int, n: int, total: float, low: float, high: float) -> None:
+        """Add some to a bucket."""
+        bucket = self._found.get(index)
+        if bucket is None:
+            self._found[index] = [n, total, low, high]
+            return
+        bucket[0] += n
+        bucket[1] += total
+        bucket[2], bucket[3] = min(bucket[2], low), max(bucket[3], high)
+
+    def add_value(self, stamp_ns: int, value: float) -> None:
+        """Add one."""
+        index = (stamp_ns - self.grid.start_ns) // self.grid.bucket_ns
+        self.add(index, 1, value, value, value)
+
+    def past(self) -> SeriesPast:
+        """The answer. 12 digits are the same in whatever way, and on whichever engine, it came."""
+        steps, found = self.grid, sorted(self._found.items())
+        return SeriesPast(
+            steps.start_ns,
+            steps.end_ns,
+            steps.bucket_ns,
+            tuple(steps.start_ns + index * steps.bucket_ns for index, _ in found),
+            tuple(int(n) for _, (n, *_) in found),
+            tuple(_rounded(total / n) for _, (n, total, *_) in found),
+            tuple(_rounded(low) for _, (*_, low, _) in found),
+            tuple(_rounded(high) for _, (*_, high) in found),
+        )
+
+
+def individually(found: Sequence[tuple[int, float]], start_ns: int, end_ns: int) -> SeriesPast:
+    """An answer of single (stamp, value), not of buckets."""
+    values = tuple(value for _, value in found)
+    stamps = tuple(stamp_ns for stamp_ns, _ in found)
+    return SeriesPast(start_ns, end_ns, None, stamps, (1,) * len(found), values, values, values)
+
+
+def _rounded(number: float) -> float:
+    return float(f"{number:.12g}")
+
+
+def whole_hours(span: Span, horizon_ns: int) -> tuple[tuple[int, int], list[Span]]:
+    """The hours that a span has whole, first to before last, and what else is in it.
+
+    Up to the horizon rows were deleted: there an hour is the span's that begins or ends in it.
+    """
+    start_ns, end_ns = span.start_ns, span.end_ns
+    first, last = -(-start_ns // HOUR_NS), end_ns // HOUR_NS
+    if start_ns <= horizon_ns:
+        first = start_ns // HOUR_NS
+    if max(start_ns, last * HOUR_NS) <= horizon_ns:
+        last = -(-end_ns // HOUR_NS)
+    if first >= last:
+        return (0, 0), [span]
+    edges = (start_ns, first * HOUR_NS), (last * HOUR_NS, end_ns)
+    return (first, last), [Span(span.run, *edge) for edge in edges if edge[0] < edge[1]]

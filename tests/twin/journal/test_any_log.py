@@ -1,0 +1,148 @@
+"""Whatever a log has lived through, it answers as the plainest list of all its rows would."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lupin_twin.core.past import EVERY_TAG, MAX_POINTS, Event, SeriesRequest
+from lupin_twin.journal.appending import Appender
+from lupin_twin.journal.hours import count_rows
+from lupin_twin.journal.queries import newest, rows, series
+from lupin_twin.journal.schema import SiteLog
+from tests.support.log_life import (
+    BEGUN,
+    LATEST,
+    MINUTE,
+    Life,
+    check,
+    one_run,
+    periods,
+    steps,
+)
+from tests.twin.journal.conftest import Engines, Living
+
+END = BEGUN + (LATEST + 200) * MINUTE
+COUNTED = (Event.SCANS, Event.FAILURES, Event.LOOKS, Event.PESTS_SEEN, Event.PESTS_CLEARED)
+Period = tuple[int, int]
+_points = st.integers(1, 40)
+
+
+@given(steps, periods, _points, st.sampled_from([EVERY_TAG, "7"]), st.randoms())
+@settings(deadline=None, max_examples=50)
+def test_its_answers_are_those_of_a_plain_list_on_either_engine(  # noqa: PLR0917
+    living: Living,
+    engines: Engines,
+    lives: list[tuple[str, Any]],
+    period: Period,
+    points: int,
+    tag_id: str,
+    random: Any,
+) -> None:
+    with living(lives) as life:
+        local, archive = engines(life.connection)
+        for connection, site in (local, archive):
+            check_events(
+                life, connection, site, SeriesRequest(tag_id, Event.SCANS, *period, points)
+            )
+            for sensor in ("temperature", "co2"):
+                check_readings(life, connection, site, SeriesRequest("7", sensor, *period, points))
+            check_export(life, connection, site, period, None if tag_id == EVERY_TAG else tag_id)
+        check_counts(life, SiteLog(*archive), random)
+
+
+@given(one_run, periods, _points, st.integers(0, LATEST))
+@settings(deadline=None, max_examples=30)
+def test_of_rows_that_were_deleted_what_was_counted_stays(  # noqa: PLR0917
+    living: Living,
+    engines: Engines,
+    lives: list[tuple[str, Any]],
+    period: Period,
+    points: int,
+    minute: int,
+) -> None:
+    with living(lives) as life:
+        readings = life.readings("7", "temperature")
+        life.delete(BEGUN + minute * MINUTE)
+        for connection, site in engines(life.connection):
+            for event in COUNTED:
+                request = SeriesRequest(EVERY_TAG, event, *period, points)
+                answer = series(connection, request, END, site)
+                check(answer, request, life.events(EVERY_TAG, event), now_ns=END)
+            # A reading that is no number has left no trace in an hour, and so no beginning of all.
+            if period[0] or all(math.isfinite(value) for *_, value in readings):
+                request = SeriesRequest("7", "temperature", *period, points)
+                check(series(connection, request, END, site), request, readings, now_ns=END)
+
+
+def check_events(life: Life, connection: Any, site: str, request: SeriesRequest) -> None:
+    tag_id, start_ns, end_ns = request.tag_id, request.start_ns, request.end_ns
+    for event in COUNTED:
+        request = replace(request, sensor_type=event)
+        answer = series(connection, request, END, site)
+        check(answer, request, life.events(tag_id, event), now_ns=END)
+    silences = SeriesRequest(tag_id, Event.SILENCES, start_ns, end_ns)
+    answer = series(connection, silences, END, site)
+    begun_ns = start_ns or min(life.attempts(tag_id), default=END)
+    expected = life.silences(tag_id, begun_ns, end_ns or END + 1, END)
+    assert list(zip(answer.stamps_ns, answer.means, strict=True)) == expected
+
+
+def check_readings(life: Life, connection: Any, site: str, request: SeriesRequest) -> None:
+    answer = series(connection, request, END, site)
+    check(answer, request, life.readings(request.tag_id, request.sensor_type), now_ns=END)
+    ended = replace(request, end_ns=request.end_ns or END, max_points=MAX_POINTS)
+    every = series(connection, ended, END, site)
+    readings = zip(every.stamps_ns, every.means, strict=True)
+    finite = [(stamp_ns, value) for stamp_ns, value in readings if math.isfinite(value)]
+    assert newest(connection, ended, request.max_points, site) == finite[-request.max_points :]
+
+
+def check_export(life: Life, connection: Any, site: str, period: Period, tag: str | None) -> None:
+    start_ns, end_ns = period[0], period[1] or END
+    expected = [
+        # What is no number is null in the log.
+        row if math.isfinite(row.value) else replace(row, value=math.nan)
+        for row in life.export(start_ns, end_ns, tag)
+    ]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("lupin_twin.journal.queries._STRETCH", 64)
+        patch.setattr("lupin_twin.journal.queries.LOT", 3)
+        lots = list(rows(connection, start_ns, end_ns, tag, site=site))
+    assert repr([row for lot in lots for row in lot]) == repr(expected)
+    assert all(0 < len(lot) <= 3 for lot in lots)
+
+
+def check_counts(life: Life, archive: SiteLog, random: Any) -> None:
+    """What is counted of rows is the same in whatever order they come."""
+    *here, here_sums = derived(SiteLog(life.connection))
+    for table in ("hour", "tally", "event"):
+        archive.execute(f"DELETE FROM {table} WHERE site = :site")
+    numbers = list(range(1, 1 + Appender(life.connection).last_seq))
+    random.shuffle(numbers)
+    for number in numbers:
+        count_rows(archive, number - 1, number)
+    *there, there_sums = derived(archive)
+    assert there == here
+    for one, other in zip(there_sums, here_sums, strict=True):
+        assert one == pytest.approx(other, rel=1e-12, abs=1e-6)
+
+
+def derived(log: SiteLog) -> list[list[tuple[Any, ...]]]:
+    """The three tables, without sums, and the sums."""
+    found = [
+        sorted(log.execute(f"SELECT {columns} WHERE site = :site").fetchall())
+        for columns in (
+            "series, hour, CAST(n AS TEXT), CAST(low AS TEXT), CAST(high AS TEXT) FROM hour",
+            "run, event, hour, n, total, low, high, first_ns, last_ns FROM tally",
+            "run, event, stamp_ns, seq, tag, value FROM event",
+        )
+    ]
+    totals = "SELECT series, hour, CAST(total AS TEXT) FROM hour WHERE site = :site"
+    return [*found, [tuple(json.loads(row[2])) for row in sorted(log.execute(totals).fetchall())]]

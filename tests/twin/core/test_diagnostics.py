@@ -83,9 +83,9 @@ def test_a_twin_that_is_well_is_ok_in_all() -> None:
         ("inputs", {"observed_ago_s": None}, STALE, "no observation"),
         ("inputs", {"inputs": {"/map": 0}}, WARN, "nobody publishes /map"),
         ("inputs", {"observed_ago_s": None, "input_problems": ("use UDP",)}, WARN, "use UDP"),
-        ("drops", {"counts": Counts({"frame": 40}, 0, (FRAME,))}, WARN, "12 lately"),
-        ("drops", {"counts": Counts({"frame": 40})}, OK, "nothing lately"),
-        ("drops", {"counts": Counts(callback_errors=1)}, WARN, "nothing lately"),
+        ("drops", {"counts": Counts({"frame": 40}, 0, (FRAME,))}, WARN, "12 recently"),
+        ("drops", {"counts": Counts({"frame": 40})}, OK, "nothing recently"),
+        ("drops", {"counts": Counts(callback_errors=1)}, WARN, "nothing recently"),
         (
             "queues",
             {"counts": Counts({"lost": 5}, 0, (Recent("lost", "", 5),))},

@@ -135,8 +135,8 @@ def findings(health: Health) -> Iterator[Finding]:
     yield Finding(
         "drops",
         WARN if recent or counts.callback_errors else OK,
-        "; ".join(f"{drop.count} lately: {_shown(drop.message)}" for drop in recent)
-        or "nothing lately",
+        "; ".join(f"{drop.count} recently: {_shown(drop.message)}" for drop in recent)
+        or "nothing recently",
         {
             **{str(why): str(count) for why, count in counts.dropped.items() if why != LOST},
             **_recent_readings(recent),
@@ -147,7 +147,7 @@ def findings(health: Health) -> Iterator[Finding]:
     yield Finding(
         "queues",
         WARN if lost else OK,
-        f"{lost[0].count} messages lost lately" if lost else "nothing lost lately",
+        f"{lost[0].count} messages lost recently" if lost else "nothing lost lately",
         {LOST: str(counts.dropped.get(LOST, 0)), **_recent_readings(lost)},
     )
     late = {_shown(source): str(count) for source, count in health.late.items()}

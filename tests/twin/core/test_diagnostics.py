@@ -125,16 +125,6 @@ def test_the_numbers_are_there() -> None:
     assert found("inputs").values["last observation, s ago"] == "2.0"
 
 
-def test_a_journal_that_cannot_be_written_is_an_error_and_one_that_is_off_is_none() -> None:
-    failing = Condition(JournalState.FAILING, "the disk is full", "/j.sqlite", lost=3)
-    [told] = [f for f in findings(replace(WELL, journal=failing)) if f.name == "journal"]
-    assert (told.level, told.message) == (ERROR, "the disk is full")
-    assert told.values["lost"] == "3"
-    off = Condition(JournalState.OFF, "kept in a temporary file")
-    [told] = [f for f in findings(replace(WELL, journal=off)) if f.name == "journal"]
-    assert (told.level, told.message) == (OK, "kept in a temporary file")
-
-
 @pytest.mark.parametrize("clock", ["running", "paused", "stopped", "none"])
 def test_what_is_said_is_read_again(clock: ClockState) -> None:
     recent = (FRAME, Recent("lost", "lost messages", 2), Recent("late_stamp", "late", 1))

@@ -16,7 +16,6 @@ from lupin_twin.estimate.engine import (
     EstimateRequest,
     RecentReadings,
     TagPast,
-    cost_s,
     moment_of,
     readings_of,
 )
@@ -140,10 +139,3 @@ def test_a_moment_that_has_not_come_is_refused(at_ns: int) -> None:
     EstimateRequest(box(), 10 * S).check(10 * S, 1_000)
     with pytest.raises(FieldRefused, match=r"at is .* s, the limits are 0 and now, 10.0 s"):
         EstimateRequest(box(), at_ns).check(10 * S, 1_000)
-
-
-def test_a_box_is_refused_as_a_field_is() -> None:
-    with pytest.raises(FieldRefused, match="127"):
-        EstimateRequest(box()).check(S, 127)
-    EstimateRequest(box()).check(S, 128)
-    assert cost_s(EstimateRequest(box()), 3, 128) < cost_s(EstimateRequest(box()), 30, 128)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import array
 import math
-import tracemalloc
 from typing import Any
 
 import numpy as np
@@ -68,32 +67,6 @@ def test_row_zero_is_the_lowest() -> None:
     np.testing.assert_array_equal(mask_of(occupancy, 2, 2), [[True, True], [False, False]])
 
 
-def test_outside_the_map_nothing_is_explored() -> None:
-    mask = mask_of(map_of([[0, 0]]), 5, 4, origin=(-1.0, -1.0))
-    expected = np.zeros((4, 5), dtype=np.bool_)
-    expected[1, 1:3] = True
-    np.testing.assert_array_equal(mask, expected)
-
-
-def test_origin_shifts_the_map() -> None:
-    occupancy = map_of([[0, -1]], origin_x=10.0, origin_y=-20.0)
-    assert not mask_of(occupancy, 2, 1).any()
-    mask = mask_of(occupancy, 2, 1, origin=(10.0, -20.0))
-    np.testing.assert_array_equal(mask, [[True, False]])
-
-
-def test_map_cell_under_the_centre_decides_for_coarser_fields() -> None:
-    # One field cell over 3 x 3 map cells, of which only the middle one is known.
-    rows = np.full((3, 6), -1)
-    rows[1, 1] = 0
-    np.testing.assert_array_equal(mask_of(map_of(rows), 2, 1, resolution=3.0), [[True, False]])
-
-
-def test_map_cell_under_the_centre_decides_for_finer_fields() -> None:
-    mask = mask_of(map_of([[0, -1]]), 8, 4, resolution=0.25)
-    np.testing.assert_array_equal(mask, [[True] * 4 + [False] * 4] * 4)
-
-
 def test_centre_on_an_edge_belongs_to_the_upper_cell_whatever_the_rounding() -> None:
     """Cells of 0.1 m over a map of 0.05 m: every centre lies on an edge of the map's cells.
 
@@ -109,25 +82,6 @@ def test_centre_on_an_edge_belongs_to_the_upper_cell_whatever_the_rounding() -> 
                 occupancy, columns // 2, 1, resolution=field_resolution, origin=(0.0, -0.05)
             )
             assert mask.all()
-
-
-def test_upper_edge_of_the_map_is_outside() -> None:
-    # The second cell's centre lies on the edge.
-    mask = mask_of(map_of([[0]]), 2, 1, origin=(-0.5, 0.0))
-    np.testing.assert_array_equal(mask, [[True, False]])
-
-
-def test_quarter_turn_lays_rows_along_the_other_axis() -> None:
-    # The map's x axis points up, its y axis to the left.
-    occupancy = map_of([[0, -1, -1], [-1, 0, 0]], origin_yaw=math.pi / 2, origin_x=2.0)
-    np.testing.assert_array_equal(
-        mask_of(occupancy, 2, 3), [[False, True], [True, False], [True, False]]
-    )
-
-
-def test_half_turn_reverses_the_map() -> None:
-    occupancy = map_of([[0, -1], [-1, -1]], origin_yaw=math.pi, origin_x=2.0, origin_y=2.0)
-    np.testing.assert_array_equal(mask_of(occupancy, 2, 2), [[False, False], [False, True]])
 
 
 @settings(max_examples=150)
@@ -174,18 +128,6 @@ def test_empty_map_explores_nothing(shape: tuple[int, int], yaw: float) -> None:
     assert not mask_of(occupancy, 3, 2).any()
 
 
-def test_turned_map_is_looked_up_in_bands() -> None:
-    occupancy = map_of(np.zeros((300, 300)), resolution=0.1, origin_yaw=0.3)
-    tracemalloc.start()
-    try:
-        mask = mask_of(occupancy, 1000, 1000, resolution=0.03)
-        _, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    assert mask.any()
-    assert peak < 4 * mask.size
-
-
 @pytest.mark.parametrize(
     "data",
     [
@@ -202,14 +144,6 @@ def test_cells_are_a_read_only_copy_by_rows(data: Any) -> None:
     assert occupancy.cells[0, 0] == 0
     with pytest.raises(ValueError, match="read-only"):
         occupancy.cells[0, 0] = 1
-
-
-def test_map_keeps_what_it_was_given() -> None:
-    occupancy = map_of([[0]], frame_id="map", stamp_ns=17, revision=9, origin_yaw=0.5)
-    assert (occupancy.frame_id, occupancy.stamp_ns, occupancy.revision) == ("map", 17, 9)
-    assert (occupancy.width, occupancy.height, occupancy.origin_yaw) == (1, 1, 0.5)
-    with pytest.raises(AttributeError):
-        occupancy.revision = 10  # type: ignore[misc]
 
 
 def test_a_map_published_again_shows_the_same() -> None:

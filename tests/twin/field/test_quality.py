@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 
 from lupin_twin.core.state import Pose, Reading, TagState
 from lupin_twin.field import idw
-from lupin_twin.field import quality as field_quality
 from lupin_twin.field.idw import Abandoned, compute_idw_field
 from lupin_twin.field.quality import FieldQuality, leave_one_out, painted_share
 from tests.oracle_idw import value_at
@@ -124,7 +123,7 @@ def test_error_is_the_definitions(
 ) -> None:
     rules = {"falloff_radius_m": falloff, "max_distance_m": max_distance, "power": power}
     with pytest.MonkeyPatch.context() as patch:  # in many parts
-        patch.setattr(field_quality, "_MAX_PAIRS", 16)
+        patch.setattr(idw, "MAX_PAIRS", 16)
         patch.setattr(idw, "_MIN_POINTS", 1)
         quality = quality_of(spots, **rules)
     errors = [

@@ -11,7 +11,7 @@ from lupin_msgs.msg import Observation
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy
 from rclpy.serialization import serialize_message
 
 from lupin_twin.core.drops import LOST, Drop, Reason
@@ -21,12 +21,11 @@ from lupin_twin.ros.base_node import (
     DRAIN_S,
     WARNING_PERIOD_S,
     NodeUtilities,
-    latched,
     read_message,
     waker,
 )
 from lupin_twin.ros.message_limits import MessageShape
-from tests.support.hostile import PACKAGES, lies
+from tests.support.hostile import PACKAGES
 from tests.support.messages import INFO, scan
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
@@ -65,33 +64,12 @@ def utilities(domain: int, logged: Logged) -> Iterator[NodeUtilities]:
     rclpy.try_shutdown(context=context)
 
 
-def test_latched_is_reliable_transient_local_and_keeps_the_last() -> None:
-    profile = latched(7)
-    assert profile.history == HistoryPolicy.KEEP_LAST
-    assert profile.depth == 7
-    assert profile.reliability == ReliabilityPolicy.RELIABLE
-    assert profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
-
-
 def test_a_message_is_read_up_to_its_limit_and_dropped_past_it() -> None:
     data = serialize_message(scan("1", {"co2": 1.0}))
     read: Any = read_message(data, MessageShape(Observation, PACKAGES, max_bytes=len(data)))
     assert read.tag_reading.tag_id == "1"
     drop = read_message(data, MessageShape(Observation, PACKAGES, max_bytes=len(data) - 1))
     assert drop == Drop(Reason.SIZE, f"{len(data)} bytes, the limit is {len(data) - 1}")
-
-
-def test_what_cannot_be_read_is_a_drop() -> None:
-    drop = read_message(serialize_message(scan("1", {"co2": 1.0}))[:50], SHAPE)
-    assert isinstance(drop, Drop)
-    assert drop.reason is Reason.UNREADABLE
-
-
-def test_a_length_that_lies_is_told_of_by_its_field() -> None:
-    drops = (read_message(lie, SHAPE) for lie in lies(serialize_message(scan("1"))))
-    whys = [drop.why for drop in drops if isinstance(drop, Drop)]
-    for field in ("header.frame_id claims", "tag_reading.readings: ", "flower.flowers: "):
-        assert any(why.startswith(field) and why.endswith(" bytes are left") for why in whys), field
 
 
 def test_a_subscription_hands_on_messages_and_tells_of_the_others(

@@ -14,7 +14,6 @@ from geometry_msgs.msg import Polygon, PoseWithCovarianceStamped
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lupin_msgs.msg import (
-    DiscoveredTag,
     DiscoveredTags,
     Observation,
     SensorReading,
@@ -28,7 +27,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import ByteMultiArray, Empty, Float64MultiArray
 from type_description_interfaces.msg import TypeDescription
 
-from lupin_twin.ros.message_limits import MalformedError, MessageShape, TooManyError
+from lupin_twin.ros.message_limits import MalformedError, MessageShape
 from tests.support.hostile import PACKAGES, lies
 
 OURS = (Observation, DiscoveredTags, TwinState, OccupancyGrid)
@@ -145,22 +144,6 @@ def test_a_sequence_holds_as_many_as_fit_into_its_bytes_and_not_one_more() -> No
         shape.check(bytes(data))
 
 
-def test_a_message_has_no_more_bytes_than_its_limit() -> None:
-    data = serialize_message(Time())
-    assert MessageShape(Time, PACKAGES, max_bytes=len(data)).check(data)
-    with pytest.raises(TooManyError, match=f"{len(data)} bytes, the limit is {len(data) - 1}"):
-        MessageShape(Time, PACKAGES, max_bytes=len(data) - 1).check(data)
-
-
-def test_a_limit_is_the_most_that_a_sequence_may_have() -> None:
-    shape = shape_of(DiscoveredTags, limits={"tags": 3})
-    tags = DiscoveredTags(tags=[DiscoveredTag()] * 3)
-    assert shape.check(serialize_message(tags))
-    tags.tags.append(DiscoveredTag())
-    with pytest.raises(TooManyError, match="tags: 4, the limit is 3"):
-        shape.check(serialize_message(tags))
-
-
 def test_a_limit_of_the_type_itself_holds() -> None:
     data = bytearray(serialize_message(ParameterDescriptor()))
     at = len(data) - 8  # of the two last sequences
@@ -221,7 +204,7 @@ from lupin_twin.ros.message_limits import MalformedError, MessageShape
 from tests.support.hostile import PACKAGES, lies
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
 
-FILLER = 3_000_000
+FILLER = 1_000_000
 is_checked = sys.argv[1] == "checked"
 messages = (
     Observation(), DiscoveredTags(tags=[DiscoveredTag()]), TwinState(tags=[TwinTagState()]),
@@ -254,6 +237,6 @@ def grown_mb(how: str) -> dict[str, float]:
 def test_no_lie_costs_more_than_a_few_times_its_bytes() -> None:
     checked = grown_mb("checked")
     assert len(checked) == 4
-    assert max(checked.values()) < 60.0, checked  # an honest sequence of 3 MB, twice
+    assert max(checked.values()) < 30.0, checked  # an honest sequence of 1 MB, twice
     unchecked = grown_mb("unchecked")
-    assert unchecked["DiscoveredTags"] > 300.0, "the lies are none"
+    assert unchecked["DiscoveredTags"] > 100.0, "the lies are none"

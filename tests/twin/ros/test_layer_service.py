@@ -205,14 +205,6 @@ def test_while_nobody_looks_nothing_is_made_or_kept_and_at_the_end_no_thread_is_
     wait_for(lambda: not threads(), "the end of its thread")
 
 
-def test_marks_that_are_as_before_are_not_sent_again() -> None:
-    marks: list[Any] = [[1], [1], [2]]
-    anything: Any = SimpleNamespace(build=lambda marks: b"%d" % marks[0])
-    marked = module._Marked(lambda _: marks.pop(0), anything)
-    snapshot: Any = None
-    assert [marked.make(snapshot).data for _ in range(3)] == [b"1", None, b"2"]
-
-
 def test_a_layer_is_another_when_the_map_is_or_a_minute_of_its_day_has_passed(stage: Stage) -> None:
     now_ns, revision, model = 0, 1, object()
     parts: dict[str, Any] = {

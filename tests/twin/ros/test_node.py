@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from lupin_msgs.msg import Observation
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from tests.support import messages
@@ -128,36 +127,6 @@ def test_a_scan_brings_readings_time_and_pose(shared: Twin) -> None:
     assert 0.0 <= tag.stale_seconds < 60.0
 
 
-def test_readings_are_latest_per_sensor(shared: Twin) -> None:
-    shared.peer.observe(
-        scan("a2", {"temperature": 20.0, "co2": 500.0}), scan("a2", {"temperature": 22.0})
-    )
-    tag = shared.peer.tag("a2", lambda t: t.readings[0].value == 22.0)
-    assert {r.name: r.value for r in tag.readings} == {"temperature": 22.0, "co2": 500.0}
-
-
-def test_a_later_pose_never_moves_a_pin(shared: Twin) -> None:
-    shared.peer.observe(
-        scan("a3", {"co2": 1.0}, at=(1, 1)),
-        scan("a3", {"co2": 2.0}, at=(9, 9)),
-        look("a3", species="rose", at=(8, 8)),
-    )
-    shared.peer.discover(discovered({"a3": messages.pose(7, 7), "a3-seen": messages.pose(1, 1)}))
-    shared.peer.tag("a3-seen")
-    tag = shared.peer.tag("a3", lambda t: t.species == "rose")
-    assert (tag.pose.position.x, tag.pose.position.y) == (1.0, 1.0)
-
-
-def test_discovery_before_scan_pins_and_the_scan_does_not_move_it(shared: Twin) -> None:
-    shared.peer.discover(discovered({"a4": messages.pose(3, 4)}))
-    tag = shared.peer.tag("a4")
-    assert (list(tag.readings), tag.species, tag.last_observed.sec) == ([], "", 0)
-    assert math.isinf(tag.stale_seconds)
-    shared.peer.observe(scan("a4", {"co2": 1.0}, at=(5, 5)))
-    tag = shared.peer.tag("a4", lambda t: len(t.readings) == 1)
-    assert (tag.pose.position.x, tag.pose.position.y) == (3.0, 4.0)
-
-
 def test_scan_before_discovery_keeps_the_scans_pose_or_takes_the_discoverys(shared: Twin) -> None:
     shared.peer.observe(scan("a5", {"co2": 1.0}, at=(1, 2)), scan("a6", {"co2": 2.0}))
     assert shared.peer.tag("a6").pose.orientation.w == 0.0
@@ -165,55 +134,6 @@ def test_scan_before_discovery_keeps_the_scans_pose_or_takes_the_discoverys(shar
     tag = shared.peer.tag("a6", lambda t: t.pose.orientation.w != 0.0)
     assert (tag.pose.position.x, tag.readings[0].value) == (4.0, 2.0)
     assert shared.peer.tag("a5").pose.position.x == 1.0
-
-
-def test_a_flower_before_both_pins_a_tag_that_nothing_pinned(shared: Twin) -> None:
-    shared.peer.observe(look("a7", at=(2, 3)))
-    shared.peer.tag("a7", lambda t: t.pose.orientation.w == 1.0)
-    shared.peer.discover(discovered({"a7": messages.pose(7, 7)}))
-    shared.peer.observe(scan("a7", {"co2": 1.0}, at=(8, 8)))
-    tag = shared.peer.tag("a7", lambda t: len(t.readings) == 1)
-    assert (tag.pose.position.x, tag.pose.position.y) == (2.0, 3.0)
-
-
-@pytest.mark.parametrize(
-    "status",
-    [
-        Observation.STATUS_UNREACHABLE,
-        Observation.STATUS_SCAN_FAILED,
-        Observation.STATUS_SKIPPED,
-        77,
-    ],
-)
-def test_a_failed_scan_is_listed_without_a_pose(shared: Twin, status: int) -> None:
-    shared.peer.observe(scan(f"b{status}", {}, at=(1, 1), status=status))
-    tag = shared.peer.tag(f"b{status}")
-    assert tag.pose.orientation.w == 0.0
-    assert tag.last_observed.sec > 0
-
-
-@pytest.mark.parametrize("broken", [math.nan, math.inf, -math.inf])
-@pytest.mark.parametrize("path", ["scan", "flower", "discovery"])
-def test_a_pose_that_is_not_finite_is_no_pose(shared: Twin, path: str, broken: float) -> None:
-    tag_id = f"c-{path}-{broken}"
-    if path == "scan":
-        shared.peer.observe(scan(tag_id, {"co2": 1.0}, at=(broken, 1.0)))
-    elif path == "flower":
-        shared.peer.observe(look(tag_id, at=(1.0, broken)))
-    else:
-        poses = {tag_id: messages.pose(1.0, 1.0, broken), f"{tag_id} whole": messages.pose()}
-        shared.peer.discover(discovered(poses))
-        shared.peer.tag(f"{tag_id} whole")
-        shared.peer.observe(scan(tag_id))
-    assert shared.peer.tag(tag_id).pose.orientation.w == 0.0
-
-
-def test_w_zero_is_no_pose_in_a_scan_and_taken_as_one_in_a_discovery(shared: Twin) -> None:
-    shared.peer.observe(scan("c1", {"co2": 1.0}))
-    assert shared.peer.tag("c1").pose.orientation.w == 0.0
-    shared.peer.discover(discovered({"c1": messages.pose(2.0, 2.0, w=0.0)}))
-    tag = shared.peer.tag("c1", lambda t: t.pose.orientation.w != 0.0)
-    assert (tag.pose.position.x, tag.pose.orientation.w) == (2.0, 1.0)
 
 
 def test_flower_results_are_latest_wins_and_a_clean_look_clears_a_pest(shared: Twin) -> None:
@@ -228,37 +148,6 @@ def test_flower_results_are_latest_wins_and_a_clean_look_clears_a_pest(shared: T
     assert (tag.species, tag.bug_count, tag.flower_count, len(tag.flowers)) == ("lupin", 0, 0, 0)
     assert len(tag.box_footprint.points) == 3
     assert tag.readings[0].value == 420.0
-
-
-def test_a_failed_look_is_listed_and_clears_nothing(shared: Twin) -> None:
-    shared.peer.observe(look("d2", "rose", anomaly=True))
-    shared.peer.tag("d2", lambda t: t.anomaly)
-    shared.peer.observe(
-        look("d2", "", status=Observation.STATUS_SCAN_FAILED),
-        look("d3", "", at=(1, 1), status=Observation.STATUS_UNREACHABLE),
-    )
-    assert shared.peer.tag("d3").pose.orientation.w == 0.0
-    assert shared.peer.tag("d2").anomaly
-
-
-def test_counts_at_the_messages_range_stay_there(shared: Twin) -> None:
-    shared.peer.observe(look("d4", flower_count=65_535, bug_count=65_535))
-    tag = shared.peer.tag("d4")
-    assert (tag.flower_count, tag.bug_count) == (65_535, 65_535)
-
-
-def test_an_empty_frame_counts_as_the_expected_one(shared: Twin) -> None:
-    shared.peer.observe(scan("e1", {"co2": 1.0}, at=(1, 1), frame_id=""))
-    assert shared.peer.tag("e1").pose.position.x == 1.0
-
-
-def test_the_flower_poses_own_frame_comes_before_the_observations(shared: Twin) -> None:
-    shared.peer.observe(
-        look("e2", frame_id="odom", pose_frame_id="map"),
-        look("e3", frame_id="", pose_frame_id=""),
-    )
-    shared.peer.tag("e2")
-    shared.peer.tag("e3")
 
 
 # --- the field ----------------------------------------------------------------------------------
@@ -282,16 +171,6 @@ def test_get_field_over_the_service(twin: Twin) -> None:
     readings = {r.name: r.value for r in twin.peer.tag("2").readings}
     assert math.isnan(readings["temperature"])
     assert math.isinf(readings["co2"])
-
-
-def test_a_pin_by_discovery_alone_enters_the_next_field(twin: Twin) -> None:
-    box = {"sensor_type": "co2", "resolution": 1.0, "bbox_max_x": 1.0, "bbox_max_y": 1.0}
-    twin.peer.observe(scan("1", {"co2": 400.0}))
-    twin.peer.tag("1")
-    assert twin.peer.get_field(**box).sample_count == 0
-    twin.peer.discover(discovered({"1": messages.pose(0.5, 0.5)}))
-    twin.peer.tag("1", lambda t: t.pose.orientation.w != 0.0)
-    assert list(twin.peer.get_field(**box).values) == [400.0]
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,12 +18,11 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
 
 from lupin_twin.field.engine import FieldJob, FieldRequest, FieldRules
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.ros.node import TwinNode
-from tests.support.messages import INFO, discovered, look, occupancy_grid, pose, scan
+from tests.support.messages import occupancy_grid, scan
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S
 
@@ -69,21 +67,6 @@ def stage(domain: int) -> Iterator[Stage]:
 
 
 # --- the contract -------------------------------------------------------------------------------
-
-
-def test_its_name_is_the_contracts(stage: Stage) -> None:
-    assert stage.node.get_fully_qualified_name() == "/lupin_twin"
-
-
-@pytest.mark.parametrize("topic", DEPTHS)
-def test_it_subscribes_to_latched_messages_and_as_many_as_the_contract_says(
-    stage: Stage, topic: str
-) -> None:
-    profile = stage.subscription(topic).qos_profile
-    assert profile.history == HistoryPolicy.KEEP_LAST
-    assert profile.depth == DEPTHS[topic]
-    assert profile.reliability == ReliabilityPolicy.RELIABLE
-    assert profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
 
 
 def test_the_parameters_are_the_rules_of_its_fields(domain: int) -> None:
@@ -195,38 +178,7 @@ def test_one_callback_group_keeps_all_callbacks_apart(stage: Stage) -> None:
     assert {id(each.callback_group) for each in ours} == {id(node._group)}
 
 
-def test_every_executor_has_one_thread_and_no_group_lets_two_callbacks_run() -> None:
-    text = "\n".join(file.read_text(encoding="utf-8") for file in SOURCES)
-    assert set(re.findall(r"\w+Executor\(", text)) == {"SingleThreadedExecutor("}
-    assert set(re.findall(r"\w+CallbackGroup\(", text)) == {"MutuallyExclusiveCallbackGroup("}
-
-
 # --- what is dropped, in which order ------------------------------------------------------------
-
-
-@pytest.mark.parametrize("message", [scan("", frame_id="odom"), look("", frame_id="odom")])
-def test_the_frame_is_looked_at_before_the_tag_id(stage: Stage, message: Any) -> None:
-    stage.node._on_observation(message)
-    [warning] = stage.warnings
-    assert "its frame is 'odom', expected 'map'" in warning
-
-
-def test_the_frame_of_a_discovery_is_looked_at_before_its_tags(stage: Stage) -> None:
-    stage.node._on_discovered_tags(discovered({"": pose(1, 1)}, frame_id="odom"))
-    [warning] = stage.warnings
-    assert "its frame is 'odom'" in warning
-
-
-@pytest.mark.parametrize("topic", LIMITS)
-def test_a_message_of_one_byte_too_many_is_dropped_unread(stage: Stage, topic: str) -> None:
-    take = stage.subscription(topic).callback
-    take(bytes(LIMITS[topic] + 1), INFO)
-    assert stage.warnings == [
-        f"dropped a message on {topic}: {LIMITS[topic] + 1} bytes, the limit is {LIMITS[topic]}"
-    ]
-    # Of all zeros, one that fits is an empty message: nothing more is said about its size.
-    take(bytes(LIMITS[topic]), INFO)
-    assert not any("bytes" in warning for warning in stage.warnings[1:])
 
 
 # --- the map ------------------------------------------------------------------------------------

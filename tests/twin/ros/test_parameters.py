@@ -104,12 +104,6 @@ def test_a_refused_change_changes_nothing_and_names_parameter_value_and_limit(
             assert node.get_parameter(one).value == getattr(TwinParameters(), one)
 
 
-def test_an_override_of_no_parameter_is_known_by_name(domain: int) -> None:
-    with node_with(domain, "idw_pwoer:=3.0", "use_sim_time:=false") as node:
-        declare(node)
-        assert unknown_overrides(node) == ["idw_pwoer"]
-
-
 def test_what_another_node_of_the_twins_reads_has_to_be_right_too(domain: int) -> None:
     with (
         node_with(domain, "idw_power:=abc") as node,

@@ -13,7 +13,6 @@ from lupin_msgs.srv import GetHistory, GetStateAt
 
 from lupin_twin.core.interfaces import GET_HISTORY, GET_STATE_AT
 from lupin_twin.core.past import (
-    MAX_POINTS,
     NotRemembered,
     PastRefused,
     SeriesPast,
@@ -21,7 +20,7 @@ from lupin_twin.core.past import (
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot, TwinStore
 from lupin_twin.ros.base_node import SERVICE_QOS
 from lupin_twin.ros.past_service import PastService
-from lupin_twin.runtime.workers import MAX_QUERIES, JobQueue, Workers
+from lupin_twin.runtime.workers import JobQueue, Workers
 from tests.support import messages
 from tests.support.domains import own_domain
 from tests.support.processes import OFTEN, twin_node
@@ -30,7 +29,6 @@ from tests.support.waiting import wait_for
 
 S = NANOSECONDS_PER_SECOND
 NOW_NS = 100 * S
-FAR = Time(sec=2**31 - 1)
 
 
 # --- with stand-ins: no ROS runs ----------------------------------------------------------------
@@ -111,12 +109,6 @@ def test_a_state_is_asked_for_by_its_moment(node: Node) -> None:
     assert node.memory.asked == 1
 
 
-@pytest.mark.parametrize("at", [Time(sec=100), Time()])
-def test_now_and_zero_can_be_asked_for(node: Node, at: Time) -> None:
-    node.memory.found.set_result(Snapshot(at.sec * S, "map", ()))
-    assert node.answer(GET_STATE_AT.name, at=at).ok
-
-
 @pytest.mark.parametrize(
     ("at", "says"),
     [
@@ -150,27 +142,6 @@ def test_a_series_is_asked_for_as_it_stands_in_the_request(node: Node) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wrong", "says"),
-    [
-        ({"tag_id": ""}, "tag_id is empty"),
-        ({"sensor_type": ""}, "sensor_type is empty"),
-        ({"sensor_type": "~moods"}, "sensor_type '~moods' is none of"),
-        ({"start": Time(sec=3), "end": Time(sec=2)}, "is before start"),
-        ({"max_points": MAX_POINTS + 1}, "max_points is 5001, the limits are 1 and 5000"),
-        ({"tag_id": "1" * 257}, "has 257 characters, the limit is 256"),
-    ],
-)
-def test_a_bad_question_is_refused_with_everything_else_empty(
-    node: Node, wrong: dict[str, Any], says: str
-) -> None:
-    response = node.answer(GET_HISTORY.name, **({"tag_id": "1", "sensor_type": "co2"} | wrong))
-    assert says in response.error_message
-    response.error_message = ""
-    assert response == GetHistory.Response()
-    assert node.memory.asked == 0
-
-
-@pytest.mark.parametrize(
     ("error", "says", "is_reported"),
     [
         (PastRefused("at is too far back"), "at is too far back", False),
@@ -186,15 +157,6 @@ def test_what_the_memory_meets_is_told_and_what_it_should_not_is_reported(
     response = node.answer(GET_STATE_AT.name, at=Time(sec=5))
     assert response == GetStateAt.Response(error_message=says)
     assert bool(node.utilities.reported) is is_reported
-
-
-def test_one_request_too_many_is_told_to_come_again(node: Node) -> None:
-    for _ in range(MAX_QUERIES):
-        node.callbacks[GET_STATE_AT.name](at=Time(sec=5))
-    response = node.answer(GET_STATE_AT.name, at=Time(sec=5))
-    assert response == GetStateAt.Response(
-        error_message=f"{MAX_QUERIES} requests wait, which is the limit: ask again later"
-    )
 
 
 # --- over DDS, without a journal ----------------------------------------------------------------
@@ -241,9 +203,3 @@ def test_a_state_of_then_is_known_without_a_journal_too(peer: Peer) -> None:
     assert response.ok, response.error_message
     [tag] = response.state.tags
     assert (tag.tag_id, tag.readings[0].value) == ("a", 410.0)
-
-
-def test_a_moment_to_come_is_refused_by_the_nodes_own_clock(peer: Peer) -> None:
-    response = peer.ask(GetStateAt, "/twin/get_state_at", at=FAR)
-    assert "at is 2147483647.000000000 s, later than now, 1" in response.error_message
-    assert not response.ok

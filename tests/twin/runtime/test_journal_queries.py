@@ -109,12 +109,6 @@ def test_a_file_in_the_place_of_another_is_read_from_then_on(path: Path) -> None
         assert answer(recall) == 2
 
 
-def test_a_foreign_file_is_told_with_what_to_do(path: Path) -> None:
-    sqlite3.connect(path).execute("CREATE TABLE theirs (x)").connection.close()
-    with recalling(path) as recall:
-        assert "not a journal of lupin-twin; name another file" in why_not(recall)
-
-
 @pytest.mark.parametrize("where", [0, 3 * 1024 + 100])
 def test_a_damaged_file_is_told_with_what_to_do_and_read_again_when_it_is_mended(
     path: Path, where: int
@@ -126,12 +120,6 @@ def test_a_damaged_file_is_told_with_what_to_do_and_read_again_when_it_is_mended
         assert "is damaged" in why_not(recall)
         path.write_bytes(whole)
         assert answer(recall) == 199
-
-
-def test_a_file_that_cannot_be_read_now_is_told(path: Path) -> None:
-    path.mkdir()
-    with recalling(path) as recall:
-        assert f"{path} cannot be read now" in why_not(recall)
 
 
 def test_an_error_of_the_questions_own_is_its_askers(path: Path) -> None:

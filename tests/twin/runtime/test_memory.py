@@ -228,16 +228,6 @@ def test_a_clock_that_goes_back_all_the_time_begins_few_runs(tmp_path: Path) -> 
     assert select(path, "SELECT count(*) FROM run") == [(1 + MAX_NEW_RUNS,)]
 
 
-@pytest.mark.parametrize(("last_s", "more"), [(199.9, 0), (200, 1)])
-def test_and_another_after_some_time(tmp_path: Path, last_s: float, more: int) -> None:
-    path = tmp_path / "j.sqlite"
-    with twin(path, sim(9000, 0)) as (memory, _, _):
-        for number in range(MAX_NEW_RUNS):
-            memory.follow(sim(1000 - number, 100 + number))
-        memory.follow(sim(500, last_s))
-    assert select(path, "SELECT count(*) FROM run") == [(1 + MAX_NEW_RUNS + more,)]
-
-
 def test_what_is_refused_is_not_written(tmp_path: Path) -> None:
     with twin(tmp_path / "j.sqlite", wall(5)) as (memory, _, _):
         assert memory.apply(replace(SCAN, tag_id="x" * 1000), NOW) is not None
@@ -271,10 +261,6 @@ def test_the_file_is_the_given_one_or_named_by_domain_and_namespace(
     given: str, namespace: str, path: str
 ) -> None:
     assert journal_path(given, {"XDG_STATE_HOME": "/state"}, 3, namespace) == Path(path)
-
-
-def test_off_is_no_file() -> None:
-    assert journal_path("off", {}, 0, "/") is None
 
 
 @pytest.mark.parametrize("given", ["", "relative/path"])

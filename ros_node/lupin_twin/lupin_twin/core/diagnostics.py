@@ -147,7 +147,7 @@ def findings(health: Health) -> Iterator[Finding]:
     yield Finding(
         "queues",
         WARN if lost else OK,
-        f"{lost[0].count} messages lost recently" if lost else "nothing lost lately",
+        f"{lost[0].count} messages lost recently" if lost else "nothing lost recently",
         {LOST: str(counts.dropped.get(LOST, 0)), **_recent_readings(lost)},
     )
     late = {_shown(source): str(count) for source, count in health.late.items()}

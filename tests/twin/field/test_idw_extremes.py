@@ -115,7 +115,7 @@ def test_cost_follows_the_painted_cells(evaluated_pairs: list[int]) -> None:
     """One tag paints 2,800 of a million cells: no more pairs than of its own part of the grid."""
     grid = field_over(1000, 1000, [(25.0, 25.0, 20.0)], resolution=0.05)
     assert np.count_nonzero(~np.isnan(grid.values)) < 3000
-    assert sum(evaluated_pairs) < 200_000
+    assert sum(evaluated_pairs) < 300_000
 
 
 def test_tags_far_outside_the_box_cost_nothing(evaluated_pairs: list[int]) -> None:

@@ -128,7 +128,7 @@ def _predictions(
             if should_stop():
                 raise Abandoned
             part, near = parts.pop()
-            gap = gap_squares(x[part], x[near]) + gap_squares(y[part], y[near])
+            gap = gap_squares(x[near], x[part]) + gap_squares(y[near], y[part])
             near = near[gap <= idw.reach_square]
             if fits(near.size, part.size):
                 predicted[part] = _predict_part(part, near, (x, y, value), idw)

@@ -41,7 +41,7 @@ def after_one_pass(day_speed: float) -> tuple[TwinStore, float]:
             time_of_day_s = event.time_of_day_s
             write(store, messages.tag_reading(event, stamp, "map"))
         elif isinstance(event, FlowersSeen):
-            write(store, messages.flower(event, stamp, "map"))
+            write(store, messages.inspection(event, stamp, "map"))
         elif isinstance(event, TagsDiscovered):
             pin_all(store, messages.discovered_tags(event, stamp, "map"))
         elif isinstance(event, PassCompleted):

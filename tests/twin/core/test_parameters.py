@@ -82,14 +82,14 @@ def test_a_bad_value_is_refused_by_name_with_the_value(name: str, value: Any) ->
     assert value == "" or str(value) in message
 
 
-@pytest.mark.parametrize("name", [f.name for f in fields(TwinParameters) if f.metadata["low"]])
+@pytest.mark.parametrize("name", [f.name for f in fields(TwinParameters) if describe(f.name).low])
 def test_the_ends_of_a_range_are_in_it_and_what_lies_beyond_is_not(name: str) -> None:
-    spec = next(f for f in fields(TwinParameters) if f.name == name)
-    low, high = spec.metadata["low"], spec.metadata["high"]
+    low, high = describe(name).low, describe(name).high
+    assert low is not None
     for end in (low, high):
         assert getattr(parameters(name, end), name) == end
     beyond: Any
-    for beyond in (low / 2 if isinstance(low, float) else low - 1, high * 2):
+    for beyond in (low - 1 if type(low) is int else low / 2, high * 2):
         with pytest.raises(ParameterError, match=name):
             parameters(name, beyond)
 

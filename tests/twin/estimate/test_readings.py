@@ -30,7 +30,7 @@ GOOD: dict[str, Any] = {
         ({"time_s": [0.0, math.inf]}, "time_s has numbers that are not finite"),
         ({"value": [0.0, math.nan]}, "value has numbers that are not finite"),
         ({"xy": [(0.0, math.nan), (0.0, 0.0)]}, "xy has numbers that are not finite"),
-        ({"xy": [0.0, 1.0]}, r"xy has shape \(2,\), must be \(tags, 2\)"),
+        ({"xy": [0.0, 1.0]}, r"xy has shape \(2,\), must be \(2, 2\)"),
         ({"time_s": [[0.0, 1.0]]}, "time_s has shape"),
     ],
 )

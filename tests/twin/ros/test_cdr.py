@@ -180,19 +180,6 @@ def any_tag() -> Any:
     return TwinTagState(readings=[SensorReading()])
 
 
-def test_a_shape_is_asked_for_what_it_has() -> None:
-    with pytest.raises(TypeError, match=r"no sequences \['tag_reading.reading'\]"):
-        shape_of(Observation, limits={"tag_reading.reading": 1, "tag_reading.readings": 1})
-
-    class Wide:
-        @classmethod
-        def get_fields_and_field_types(cls) -> dict[str, str]:
-            return {"text": "wstring"}
-
-    with pytest.raises(TypeError, match="text is of type 'wstring', which is not known here"):
-        shape_of(Wide)
-
-
 # In a process of its own: what ROS allocates for one lie would hide what it does for the next.
 MEASURE = """
 import os, resource, sys

@@ -87,23 +87,6 @@ def test_of_one_writer_every_lost_message_is_counted(skips: list[int], start: in
     assert gaps.lost == sum(skips)
 
 
-def test_who_has_said_nothing_for_long_begins_with_1() -> None:
-    gaps = Gaps()
-    assert gaps.see(7, lambda: 3) == 0
-    gaps.settle(3)
-    gaps.settle(3)
-    # Whose 951 is, is not told: the rest is counted as the other's number comes.
-    assert [gaps.see(number, lambda: 3) for number in (951, 8, 1, 952)] == [943, 7, 0, 0]
-    assert gaps.lost == 950
-
-
-def test_who_comes_behind_those_who_have_said_nothing_may_begin_anywhere() -> None:
-    gaps = Gaps()
-    gaps.settle(1)
-    gaps.unsettle()
-    assert gaps.see(951, lambda: 1) == 0
-
-
 def received(*numbers: Iterable[int]) -> TwinCount:
     """A count that has received these states, from two publishers in the graph."""
     count = TwinCount()

@@ -14,12 +14,11 @@ import rclpy
 import yaml
 from lupin_msgs.msg import TwinState
 from rcl_interfaces.srv import GetParameters, ListParameters
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
 
-from lupin_twin.field.engine import FieldJob, FieldRequest, FieldRules
+from lupin_twin.field.engine import FieldJob, FieldRequest
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.ros.node import TwinNode
 from tests.support.messages import occupancy_grid, scan
@@ -27,7 +26,6 @@ from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S
 
 SOURCES = [file for folder in ("ros_node", "backend") for file in Path(folder).rglob("*.py")]
-DEPTHS = {"/floranova/observations": 50, "/perception/discovered_tags": 50, "/map": 1}
 LIMITS = {
     "/floranova/observations": 1_000_000,
     "/perception/discovered_tags": 8_000_000,
@@ -69,23 +67,6 @@ def stage(domain: int) -> Iterator[Stage]:
 # --- the contract -------------------------------------------------------------------------------
 
 
-def test_the_parameters_are_the_rules_of_its_fields(domain: int) -> None:
-    values = {
-        "idw_power": 3.0,
-        "idw_falloff_radius_m": 2.5,
-        "idw_max_distance_m": 0.5,
-        "max_grid_cells": 123,
-    }
-    arguments = [word for name, value in values.items() for word in ("-p", f"{name}:={value}")]
-    with stage_in(domain, *arguments) as stage:
-        assert stage.node.fields.rules == FieldRules(
-            idw_power=3.0,
-            falloff_radius_m=2.5,
-            max_distance_m=0.5,
-            max_grid_cells=123,
-        )
-
-
 def test_a_rule_that_is_changed_takes_effect_at_once(stage: Stage) -> None:
     node = stage.node
     told: list[Any] = []
@@ -106,18 +87,6 @@ def test_a_rule_that_is_changed_takes_effect_at_once(stage: Stage) -> None:
     # What was computed by the old rules is theirs, and back with them.
     node.set_parameters([Parameter("idw_power", value=2.0)])
     assert isinstance(node.fields.lookup(request, node.store, None), FieldGrid)
-
-
-def test_the_state_is_published_at_the_new_rate(stage: Stage) -> None:
-    node = stage.node
-    timers = len(list(node.timers))
-    assert node._state_timer.timer_period_ns == 1e9
-    for rate_hz in (100.0, 0.01, 0.01):
-        assert node.set_parameters([Parameter("state_publish_rate_hz", value=rate_hz)])[
-            0
-        ].successful
-        assert node._state_timer.timer_period_ns == 1e9 / rate_hz
-    assert len(list(node.timers)) == timers
 
 
 def dumped(stage: Stage) -> str:
@@ -158,24 +127,6 @@ def test_a_dump_of_its_parameters_starts_a_twin_like_it(domain: int, tmp_path: P
 
 
 # --- one thread ---------------------------------------------------------------------------------
-
-
-def test_one_callback_group_keeps_all_callbacks_apart(stage: Stage) -> None:
-    """The store and the cache have no lock."""
-    node = stage.node
-    node.add_listener(lambda _: None, heartbeat_s=1.0)
-    ours = [
-        *(stage.subscription(topic) for topic in DEPTHS),
-        *(
-            service
-            for service in node.services
-            if service.srv_name == node.parameters.field_service_name
-        ),
-        *node.timers,
-    ]
-    assert len(ours) == 3 + 1 + 7
-    assert isinstance(node._group, MutuallyExclusiveCallbackGroup)
-    assert {id(each.callback_group) for each in ours} == {id(node._group)}
 
 
 # --- what is dropped, in which order ------------------------------------------------------------

@@ -37,14 +37,14 @@ class Stage:
         self.begun: list[Future[int]] = []
         self.answers: list[Any] = []
 
-    def ask(self, make: Any = str, cost_s: float = 0.0, key: Any = None) -> Future[int]:
+    def ask(self, make: Any = str, cost_s: float = 0.0) -> Future[int]:
         search: Future[int] = Future()
 
         def look_up() -> Future[int]:
             self.begun.append(search)
             return search
 
-        self.queue.ask(Query(look_up, self.answers.append, make, cost_s, key))
+        self.queue.ask(Query(look_up, self.answers.append, make, cost_s))
         return search
 
     def delivered(self) -> Any:
@@ -176,19 +176,3 @@ def test_so_many_queries_wait_and_one_more_is_told_to_come_again(
     searches[0].set_result(0)
     made.delivered()
     made.ask()
-
-
-def test_queries_of_one_key_share_a_search_while_it_is_under_way(made: Stage) -> None:
-    first = made.ask(key="a")
-    for _ in range(2):
-        made.ask(key="a")
-    other = made.ask(key="b")
-    assert made.begun == [first, other]
-    assert made.queue.waiting == 2
-    first.set_result(1)
-    wait_for(lambda: made.woken.acquire(blocking=False), "the answer")
-    made.queue.deliver()
-    assert made.answers == ["1", "1", "1"]
-    assert made.queue.answered == 1
-    made.ask(key="a")
-    assert len(made.begun) == 3, "a new one"

@@ -189,9 +189,9 @@ def test_a_simulation_that_starts_over_is_empty_and_one_that_goes_on_is_not(
         memory.apply(at(SCAN, 499 * S), NOW + 499 * S)
         memory.apply(at(SCAN, 600 * S), NOW + 600 * S)
     with twin(path, sim(605, 610)) as (_, store, _):
-        assert store.knows("7")
+        assert store.tag("7")
     with twin(path, sim(610, 86_400)) as (_, store, _):
-        assert not store.knows("7")
+        assert not store.tag("7")
 
 
 def test_nothing_is_known_before_a_simulated_clock_has_started(tmp_path: Path) -> None:
@@ -201,10 +201,10 @@ def test_nothing_is_known_before_a_simulated_clock_has_started(tmp_path: Path) -
         memory.apply(at(SCAN, 300 * S), NOW + 295 * S)
     with twin(path, Clock(0, NOW, is_simulated=True)) as (memory, store, _):
         memory.apply(at(LOOK, 301 * S), NOW + 296 * S)
-        assert not store.knows("7")
+        assert not store.tag("7")
         memory.follow(sim(305, 300))
-        assert store.knows("7")
-        assert store.knows("8")
+        assert store.tag("7")
+        assert store.tag("8")
 
 
 def test_a_clock_that_goes_back_begins_a_run_that_knows_what_the_twin_knew(tmp_path: Path) -> None:
@@ -241,7 +241,7 @@ def test_off_is_a_temporary_file_that_answers_and_is_gone_at_the_end(
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     with twin(None, wall(5)) as (memory, store, _):
         memory.apply(SCAN, NOW)
-        assert store.knows("7")
+        assert store.tag("7")
         wait_for(lambda: memory.condition.written == 2, "the scan and its place")
         answer = memory.recall.query(lambda c, _: state_at(c, NOW, "map")).result(10.0)
         assert [tag.tag_id for tag in answer.tags] == ["7"]

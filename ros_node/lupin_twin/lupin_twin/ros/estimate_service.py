@@ -20,7 +20,7 @@ from lupin_msgs.srv import GetEstimate, GetEstimateReport
 from lupin_twin.core.diagnostics import Estimates
 from lupin_twin.core.interfaces import GET_ESTIMATE, GET_ESTIMATE_REPORT
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Reading, Scan, TwinStore
-from lupin_twin.estimate import MAX_PER_TAG, FitFailed, Place
+from lupin_twin.estimate import MAX_PER_TAG, FitFailed
 from lupin_twin.estimate.engine import (
     MAX_TAGS,
     Estimate,
@@ -42,7 +42,6 @@ from lupin_twin.ros.responses import answer_later, refusal
 from lupin_twin.runtime.estimate_rounds import (
     ADVICE_S,
     Done,
-    Loaded,
     Report,
     ReportRequest,
     Round,
@@ -60,8 +59,6 @@ REST_FACTOR: Final = 9.0
 _GATHER_TAG_S: Final = 50e-6
 # Readings that are looked up in the journal, of all tags together: of few tags all of a day.
 _MAX_READINGS: Final = 20_000
-# Places for other tags that are cached, each until its sensor's next round.
-_MAX_ADVISED: Final = 64
 
 Gather = Callable[[str], Sequence[TagPast]]
 
@@ -120,9 +117,6 @@ class EstimateService:
         self._rests_until_s = -math.inf
         # Sensors whose estimates were reported as too narrow, and have not been better since.
         self._warned: set[str] = set()
-        self._advised: dict[
-            tuple[str, int], tuple[Loaded, OccupancyMap | None, tuple[Place, ...]]
-        ] = {}
 
     def offer(self, node: Any, group: Any) -> None:
         """Have `node` offer the services, by names relative to its namespace; some answer later."""
@@ -273,18 +267,7 @@ class EstimateService:
         if max_places is None:
             return lambda: known
         occupancy = self._occupancy()
-        key = (sensor, max_places)
-
-        def with_places() -> Report:
-            cached = self._advised.get(key)
-            if cached is None or cached[0] is not loaded or cached[1] is not occupancy:
-                cached = loaded, occupancy, advice(loaded, occupancy, max_places)
-                if len(self._advised) >= _MAX_ADVISED:
-                    self._advised.clear()
-                self._advised[key] = cached
-            return replace(known, places=cached[2])
-
-        return with_places
+        return lambda: replace(known, places=advice(loaded, occupancy, max_places))
 
     def state(self) -> Estimates:
         """How they do, for the twin's diagnostics."""

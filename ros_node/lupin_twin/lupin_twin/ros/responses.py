@@ -29,8 +29,6 @@ PATIENCE_S: Final = 30.0
 # Responses that are retained; what took longer to try, s, needs too much memory (60 MB took 0.5 s).
 MAX_UNSENT: Final = 8
 MAX_ATTEMPT_S: Final = 0.5
-# A failed attempt blocks the node's thread: then none for so many times as long.
-_REST: Final = 4.0
 
 Send = Callable[[Any, Any], None]
 
@@ -108,7 +106,6 @@ class Responses:
         self._warn = warn
         self._drain = drain
         self._unsent: deque[_Unsent] = deque()  # the first is tried next
-        self._rests_until_s = 0.0
         warnings.filterwarnings("error", re.escape(UNSENT), RuntimeWarning)
 
     def __len__(self) -> int:
@@ -137,16 +134,14 @@ class Responses:
     def go_on(self) -> None:
         """Try again until an attempt fails; to be called every `RETRY_S`.
 
-        The newest first, and what failed goes to the end: one that can be sent does not wait long
-        behind others that never will be.
+        An attempt that fails blocks the node's thread for 0.1 s. The newest first, and what failed
+        goes to the end: one that can be sent does not wait long behind others that never will be.
         """
-        while self._unsent and time.monotonic() >= self._rests_until_s:
-            one, began_s = self._unsent.popleft(), time.monotonic()
-            if began_s - one.since_s >= PATIENCE_S:
+        while self._unsent:
+            one = self._unsent.popleft()
+            if time.monotonic() - one.since_s >= PATIENCE_S:
                 self._give_up(one, f"for {PATIENCE_S:g} s DDS has found no reader for it")
             elif not _was_sent(one.send, one.response, one.header):
-                now_s = time.monotonic()
-                self._rests_until_s = now_s + _REST * (now_s - began_s)
                 self._unsent.append(one)
                 self._drain()
                 return

@@ -95,13 +95,6 @@ def test_age_is_since_the_last_observation_and_never_negative() -> None:
     assert tag(store, "1").stale_seconds(50 * S) == 0.0
 
 
-def test_a_tag_never_observed_is_infinitely_old() -> None:
-    store = TwinStore()
-    store.pin("1", at(1.0))
-    assert tag(store, "1").last_observed_ns is None
-    assert math.isinf(tag(store, "1").stale_seconds(5 * S))
-
-
 def test_samples_need_a_pose_and_a_finite_reading_and_keep_the_first_mention_order() -> None:
     store = TwinStore()
     store.record(scan("late", co2=5.0))

@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from lupin_twin.core.drops import MAX_TEXT_LENGTH
 from lupin_twin.core.state import Pose, Reading, Scan, TwinStore
@@ -27,9 +25,9 @@ from lupin_twin.field.engine import (
     default_box,
     default_request,
 )
-from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.field.idw import Abandoned
+from tests.support.maps import map_of
 
 MAX_CELLS = 1_000_000
 
@@ -70,22 +68,6 @@ def scan(tag_id: str, x: float, y: float, value: float) -> Scan:
     )
 
 
-def map_of(rows: Any, revision: int = 1) -> OccupancyMap:
-    cells = np.array(rows, dtype=np.int8)
-    return OccupancyMap(
-        frame_id="map",
-        stamp_ns=0,
-        width=cells.shape[1],
-        height=cells.shape[0],
-        resolution=1.0,
-        origin_x=0.0,
-        origin_y=0.0,
-        origin_yaw=0.0,
-        cells=cells.ravel(),
-        revision=revision,
-    )
-
-
 @pytest.fixture
 def store() -> TwinStore:
     """Two tags, at the centres of the request's cells (0, 0) and (3, 1)."""
@@ -106,18 +88,6 @@ def answer(engine: FieldEngine, request: FieldRequest, *args: Any) -> FieldGrid:
 
 
 # --- the request -----------------------------------------------------------------------------
-
-
-@settings(max_examples=200)
-@given(st.floats())
-def test_request_holds_what_the_wire_can(number: float) -> None:
-    request = request_of(resolution=number, bbox_min_x=number, bbox_max_y=-number)
-    with np.errstate(all="ignore"):
-        expected = np.float32(number)
-    np.testing.assert_equal(request.resolution, float(expected))
-    np.testing.assert_equal(request.bbox_min_x, float(expected))
-    np.testing.assert_equal(request.bbox_max_y, -float(expected))
-    assert type(request.resolution) is float
 
 
 def test_request_over_ros_and_over_http_is_the_same() -> None:
@@ -187,16 +157,6 @@ def test_grid_bomb_is_refused_without_an_allocation(
 # --- the engine ------------------------------------------------------------------------------
 
 
-def test_first_request_is_a_job_and_the_second_a_hit(store: TwinStore) -> None:
-    engine = engine_of()
-    job = engine.lookup(request_of(), store, None)
-    assert isinstance(job, FieldJob)
-    grid = job.compute()
-    engine.keep(job, grid)
-    assert engine.lookup(request_of(), store, None) is grid
-    assert (engine.cache.hits, engine.cache.misses) == (1, 1)
-
-
 def test_field_is_of_the_stores_samples_by_the_rules(store: TwinStore) -> None:
     grid = answer(engine_of(), request_of(), store, None)
     assert (grid.width, grid.height, grid.sample_count) == (4, 2, 2)
@@ -214,18 +174,6 @@ def test_field_is_of_the_stores_samples_by_the_rules(store: TwinStore) -> None:
     # With no tag within the falloff, the nearest is taken: "a", 1 m away.
     nearest = answer(engine_of(falloff_radius_m=0.5), request_of(), store, None)
     assert nearest.values.reshape(2, 4)[1, 0] == 10.0
-
-
-def test_every_write_that_can_change_a_field_makes_it_anew(store: TwinStore) -> None:
-    engine = engine_of()
-    unpinned = Scan("d", stamp_ns=1, readings=(Reading("temperature", 40.0),))
-    store.record(unpinned)
-    before = answer(engine, request_of(), store, None)
-    store.record(scan("a", 0.5, 0.5, 11.0))
-    assert answer(engine, request_of(), store, None).values[0] == 11.0
-    assert before.values[0] == 10.0
-    store.pin("d", Pose(2.5, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0))
-    assert answer(engine, request_of(), store, None).values[2] == 40.0
 
 
 def test_job_holds_the_moment_it_was_made_in(store: TwinStore) -> None:
@@ -304,11 +252,6 @@ def test_before_a_map_came_nothing_is_clipped_and_its_first_one_makes_fields_ane
 def test_default_box_is_that_of_the_tags_and_their_reach() -> None:
     positions = ((x, y) for x, y in [(1.0, 5.0), (-2.0, 3.0), (0.0, 8.5)])
     assert default_box(positions, 1.5) == (-3.5, 1.5, 2.5, 10.0)
-
-
-def test_default_box_goes_no_farther_for_a_tag_that_is_far_off() -> None:
-    positions = [(0.0, 0.0), (1.0, 2.0), (3.0, 1.0), (5000.0, 1.0)]
-    assert default_box(positions, 1.0) == (-1.0, -1.0, 4.0, 3.0)
 
 
 def test_cells_of_a_default_request_are_doubled_until_there_are_few_enough() -> None:

@@ -14,24 +14,7 @@ from hypothesis import strategies as st
 
 from lupin_twin.field import explored
 from lupin_twin.field.explored import OccupancyMap, explored_mask
-
-
-def map_of(rows: Any, **changes: Any) -> OccupancyMap:
-    """A map of these rows (row 0 first), 1 m cells from the origin unless changed."""
-    cells = np.array(rows, dtype=np.int8)
-    given = {
-        "frame_id": "map",
-        "stamp_ns": 5,
-        "width": cells.shape[1],
-        "height": cells.shape[0],
-        "resolution": 1.0,
-        "origin_x": 0.0,
-        "origin_y": 0.0,
-        "origin_yaw": 0.0,
-        "cells": cells.ravel(),
-        "revision": 1,
-    }
-    return OccupancyMap(**{**given, **changes})
+from tests.support.maps import map_of
 
 
 def mask_of(
@@ -60,11 +43,6 @@ def test_known_cells_are_explored_and_unknown_ones_are_not() -> None:
     np.testing.assert_array_equal(
         mask_of(occupancy, 3, 3), [[True, True, False], [True, False, False], [False, True, True]]
     )
-
-
-def test_row_zero_is_the_lowest() -> None:
-    occupancy = map_of([[0, 0], [-1, -1]])
-    np.testing.assert_array_equal(mask_of(occupancy, 2, 2), [[True, True], [False, False]])
 
 
 def test_centre_on_an_edge_belongs_to_the_upper_cell_whatever_the_rounding() -> None:
@@ -118,14 +96,6 @@ def test_mask_is_the_map_cell_under_each_centre(
             i, j = math.floor(along), math.floor(across)
             known = 0 <= i < 13 and 0 <= j < 9 and rows[j, i] >= 0
             assert mask[row, column] == known
-
-
-@pytest.mark.parametrize("yaw", [0.0, 0.3])
-@pytest.mark.parametrize("shape", [(0, 0), (0, 5), (5, 0)])
-def test_empty_map_explores_nothing(shape: tuple[int, int], yaw: float) -> None:
-    occupancy = map_of(np.zeros(shape), resolution=0.05, origin_yaw=yaw)
-    assert occupancy.cells.shape == shape
-    assert not mask_of(occupancy, 3, 2).any()
 
 
 @pytest.mark.parametrize(

@@ -68,20 +68,6 @@ def test_field_larger_than_the_whole_bound_is_not_kept_and_drops_nothing() -> No
     assert cache.bytes == 40
 
 
-def test_field_put_again_counts_once_and_is_the_newest() -> None:
-    cache = FieldCache(max_bytes=100)
-    cache.put(key(1), grid(10))
-    cache.put(key(2), grid(10))
-    again = grid(5)
-    cache.put(key(1), again)
-    assert cache.get(key(1)) is again
-    assert (cache.bytes, len(cache)) == (60, 2)
-    cache.put(key(1), grid(10))
-    cache.put(key(3), grid(10))
-    assert cache.get(key(2)) is None
-    assert cache.get(key(1)) is not None
-
-
 CHANGES: tuple[dict[str, Any], ...] = (
     {"request": replace(key(1).request, resolution=2.0)},
     {"request": replace(key(1).request, bbox_max_y=2.0)},

@@ -13,23 +13,13 @@ from lupin_twin.field.explored import (
     floor,
     free_of,
 )
+from tests.support.maps import map_of
 
 TAGS = np.array([(1.0, 1.0), (3.0, 2.0)])
 
 
-def a_map(rows: list[list[int]], yaw: float = 0.0, resolution: float = 1.0) -> OccupancyMap:
-    return OccupancyMap(
-        frame_id="map",
-        stamp_ns=0,
-        width=len(rows[0]),
-        height=len(rows),
-        resolution=resolution,
-        origin_x=10.0,
-        origin_y=20.0,
-        origin_yaw=yaw,
-        cells=np.array([cell for row in rows for cell in row], dtype=np.int8),
-        revision=1,
-    )
+def a_map(rows: list[list[int]], resolution: float = 1.0) -> OccupancyMap:
+    return map_of(rows, resolution=resolution, origin_x=10.0, origin_y=20.0)
 
 
 def test_without_a_map_it_is_about_the_tags() -> None:

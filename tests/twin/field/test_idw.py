@@ -72,23 +72,6 @@ def test_sample_a_little_closer_than_that_is_exact_beside_a_very_large_one() -> 
     assert field_at_origin([(0.97 * COINCIDENT_EPS_M, 0.0, 0.0), (0.5, 0.0, 1e6)]) == 0.0
 
 
-def test_weights_are_the_inverse_power_of_the_distance() -> None:
-    samples = [(1.0, 0.0, 10.0), (0.0, 0.5, 20.0)]
-    assert field_at_origin(samples, power=2.0) == pytest.approx((10 + 20 * 4) / 5, rel=1e-7)
-    assert field_at_origin(samples, power=1.0) == pytest.approx((10 + 20 * 2) / 3, rel=1e-7)
-    assert field_at_origin(samples, power=3.0) == pytest.approx((10 + 20 * 8) / 9, rel=1e-7)
-    assert field_at_origin(samples, power=0.0) == pytest.approx(15.0)
-
-
-@pytest.mark.parametrize("power", [2.0, 3.0])
-def test_falloff_takes_in_samples_at_its_radius_and_not_beyond(power: float) -> None:
-    beyond = math.nextafter(1.0, 2.0)
-    rules = {"falloff_radius_m": 1.0, "max_distance_m": 2.0, "power": power}
-    assert field_at_origin([(1.0, 0.0, 10.0), (0.0, -1.0, 20.0)], **rules) == 15.0
-    assert field_at_origin([(1.0, 0.0, 10.0), (0.0, -beyond, 20.0)], **rules) == 10.0
-    assert field_at_origin([(beyond, 0.0, 10.0), (0.0, -1.0, 20.0)], **rules) == 20.0
-
-
 def test_equal_distances_tie_although_their_squares_are_a_rounding_apart() -> None:
     """The tie is one of distances. These two are the same float64, and their squares are not."""
     first, second = (0.3, 1.1), (1.0, 0.55)
@@ -162,14 +145,6 @@ def test_range_is_that_of_the_finite_cells() -> None:
     assert (grid.value_min, grid.value_max) == (-3.5, 8.25)
     assert type(grid.value_min) is float
     assert np.isnan(grid.values[2])
-
-
-def test_range_is_zero_where_nothing_is_known() -> None:
-    for samples in ([], [(50.0, 50.0, 9.0)]):
-        grid = field_over(3, 3, samples)
-        assert np.isnan(grid.values).all()
-        assert (grid.value_min, grid.value_max) == (0.0, 0.0)
-        assert grid.sample_count == len(samples)
 
 
 def test_range_leaves_out_what_float32_cannot_hold() -> None:

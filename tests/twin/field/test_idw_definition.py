@@ -168,24 +168,6 @@ def test_field_of_many_parts_is_the_definitions(
     assert_same_values(case.by_twin().values, case.by_loop(), case.samples)
 
 
-@pytest.mark.parametrize(("width", "height"), [(6, 6), (40, 1), (1, 40)])
-def test_field_of_more_samples_than_fit_at_once_is_the_definitions(width: int, height: int) -> None:
-    rng = np.random.default_rng(11)
-    spots = rng.uniform(0.0, 1.0, (9000, 2)) * (width, height)
-    case = Case(
-        samples=tuple((x, y, 20 + x) for x, y in spots.tolist()),
-        width=width,
-        height=height,
-        min_x=0.0,
-        min_y=0.0,
-        resolution=1.0,
-        falloff=30.0,
-        max_distance=50.0,
-        power=2.0,
-    )
-    assert_same_values(case.by_twin().values, case.by_loop(), case.samples)
-
-
 # --- what may not change it ------------------------------------------------------------------
 
 

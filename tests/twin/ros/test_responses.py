@@ -71,14 +71,6 @@ def stage(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stage]:
         yield made
 
 
-def test_what_could_be_sent_is_sent_once(stage: Stage) -> None:
-    stage.found = {"a"}
-    stage.send_response("response", "a")
-    assert stage.sent == [("response", "a")]
-    assert len(stage.responses) == 0
-    assert stage.go_on() == []
-
-
 def test_an_answer_is_sent_as_soon_as_its_reader_is_found_and_once(stage: Stage) -> None:
     stage.send_response("response", "a")
     assert stage.drained == 1, "what came meanwhile"
@@ -121,16 +113,6 @@ def test_it_is_given_up_aloud_where_nobody_reads(stage: Stage) -> None:
         "gave up a response of /ask: for 30 s DDS has found no reader for it; is the QoS of a "
         "client another than the default of services?"
     )
-
-
-def test_only_so_many_are_kept(stage: Stage) -> None:
-    for who in range(MAX_UNSENT + 1):
-        stage.send_response("response", who)
-    assert len(stage.responses) == MAX_UNSENT
-    [said] = stage.warned
-    assert said.startswith("gave up a response of /ask: too much else waits to be sent again; ")
-    stage.found = set(range(MAX_UNSENT + 1))
-    assert stage.go_on() == [*range(MAX_UNSENT, 0, -1)], "the oldest was given up"
 
 
 class Service:

@@ -142,17 +142,6 @@ def test_a_twin_that_starts_again_knows_all_that_it_knew(tmp_path: Path) -> None
         assert after.observation_count >= before.observation_count
 
 
-def test_a_place_is_as_old_as_the_scan_that_brought_it_and_a_discovery_is_of_now(
-    tmp_path: Path,
-) -> None:
-    path = tmp_path / "j.sqlite"
-    with twin(path, wall(5)) as (memory, _, _):
-        memory.apply(SCAN, NOW)
-        memory.apply(Pin("9", HERE), NOW)
-    stamps = select(path, "SELECT stamp_ns FROM place ORDER BY seq")
-    assert stamps == [(NOW,), (NOW + 5 * S,)]
-
-
 def test_what_is_heard_again_changes_nothing_and_is_not_written(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     with twin(path, wall(5)) as (memory, _, _):
@@ -167,18 +156,6 @@ def test_what_is_heard_again_changes_nothing_and_is_not_written(tmp_path: Path) 
         assert history.of("7") == past
         wait_for(lambda: memory.condition.repeated == 5, "all that were there")
         assert memory.condition.written == 0
-
-
-def test_a_place_is_written_once_by_whatever_gives_it(tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-    other = replace(HERE, x=9.0)
-    with twin(path, wall(5)) as (memory, _, _):
-        memory.apply(SCAN, NOW)
-        memory.apply(Pin("7", other), NOW)
-        memory.apply(replace(at(SCAN, NOW + S), pose=other), NOW)
-    with twin(path, wall(9)) as (_, store, _):
-        [tag] = store.snapshot(NOW, "map").tags
-        assert tag.pose == HERE
 
 
 def test_a_simulation_that_starts_over_is_empty_and_one_that_goes_on_is_not(
@@ -226,13 +203,6 @@ def test_a_clock_that_goes_back_all_the_time_begins_few_runs(tmp_path: Path) -> 
             memory.follow(sim(1000, number / 100))
             memory.follow(sim(9000, number / 100))
     assert select(path, "SELECT count(*) FROM run") == [(1 + MAX_NEW_RUNS,)]
-
-
-def test_what_is_refused_is_not_written(tmp_path: Path) -> None:
-    with twin(tmp_path / "j.sqlite", wall(5)) as (memory, _, _):
-        assert memory.apply(replace(SCAN, tag_id="x" * 1000), NOW) is not None
-        memory.apply(LOOK, NOW)
-        wait_for(lambda: memory.condition.written == 1, "the look alone")
 
 
 def test_off_is_a_temporary_file_that_answers_and_is_gone_at_the_end(

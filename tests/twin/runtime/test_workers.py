@@ -68,13 +68,6 @@ def result(future: Future[T]) -> T:
     return future.result(PATIENCE_S)
 
 
-def test_a_result_and_an_error_come_to_whoever_waits() -> None:
-    with workers() as (running, _):
-        assert result(running.submit(lambda _: 7)) == 7
-        with pytest.raises(ZeroDivisionError):
-            result(running.submit(lambda _: 1 // 0))
-
-
 def test_a_small_job_does_not_wait_for_large_ones_at_work_or_in_the_queue() -> None:
     with workers() as (running, _):
         set_free = occupy(running, LARGE_S, LARGE_THREADS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -15,25 +16,19 @@ from lupin_twin.ros import convert_field
 from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities
 from lupin_twin.ros.parameters import naming
 from lupin_twin.ros.responses import answer_later, refusal
-from lupin_twin.runtime.workers import LARGE_THREADS, JobQueue, Query, Workers
+from lupin_twin.runtime.workers import JobQueue, Query, Workers
 
 
+@dataclass(frozen=True, slots=True)
 class FieldService:
     """The service of one node; belongs to its thread."""
 
-    def __init__(
-        self,
-        utilities: NodeUtilities,
-        workers: Workers,
-        fields: FieldEngine,
-        store: TwinStore,
-        *,
-        occupancy: Callable[[], OccupancyMap | None],
-        wake: Callable[[], None],
-    ) -> None:
-        self._utilities, self._workers = utilities, workers
-        self._fields, self._store, self._occupancy = fields, store, occupancy
-        self.queue = JobQueue(workers, wake, large_at_once=LARGE_THREADS)
+    utilities: NodeUtilities
+    workers: Workers
+    queue: JobQueue
+    fields: FieldEngine
+    store: TwinStore
+    occupancy: Callable[[], OccupancyMap | None]
 
     def offer(self, node: Any, name: str, group: Any) -> None:
         """Have `node` offer the service.
@@ -49,11 +44,11 @@ class FieldService:
 
     def _on_get_field(self, request: Any, response: Any) -> Any:
         def refused(error: Exception) -> Any:
-            return refusal(response, error, self._utilities.report)
+            return refusal(response, error, self.utilities.report)
 
         try:
             wanted = convert_field.field_request_of(request)
-            found = self._fields.lookup(wanted, self._store, self._occupancy())
+            found = self.fields.lookup(wanted, self.store, self.occupancy())
         except Exception as error:  # noqa: BLE001  # no client waits for ever
             return refused(error)
         if not isinstance(found, FieldJob):
@@ -63,11 +58,11 @@ class FieldService:
         def prepare(reply: Callable[[Any], None]) -> Query:
             def keep(grid: Any) -> None:
                 if not isinstance(grid, Exception):
-                    self._fields.keep(job, grid)
+                    self.fields.keep(job, grid)
                     grid = convert_field.fill_response(response, grid)
                 reply(grid)
 
-            search = partial(self._workers.submit, job.compute, job.cost_s)
+            search = partial(self.workers.submit, job.compute, job.cost_s)
             return Query(search, keep, cost_s=job.cost_s)
 
         return answer_later(self.queue, prepare, refused)

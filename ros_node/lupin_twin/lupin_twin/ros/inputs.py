@@ -11,6 +11,7 @@ import math
 import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -204,46 +205,41 @@ class TwinCount:
         return is_several
 
 
+@dataclass(slots=True)
 class OtherTwins:
     """Counts who publishes the topic `name`, the node's own state; subscribes where it is several.
 
     Its own states come too then; a dead twin, still in the graph, publishes nothing.
     """
 
-    def __init__(
-        self,
-        node: Node,
-        utilities: Any,
-        count: TwinCount,
-        name: str,
-        *,
-        group: Any,
-    ) -> None:
-        self._node, self._utilities, self._count = node, utilities, count
-        self._name, self._group = name, group
-        self._subscription: Any = None
+    node: Node
+    utilities: Any
+    count: TwinCount
+    name: str
+    group: Any
+    _subscription: Any = None
 
     def check(self, topic: str) -> None:
         """Count who publishes it; `topic` is the name as ROS has resolved it."""
-        publishers = int(self._node.count_publishers(topic))
+        publishers = int(self.node.count_publishers(topic))
         self._subscribe(publishers > 1)
-        if self._count.see(publishers):
-            self._utilities.warn(
+        if self.count.see(publishers):
+            self.utilities.warn(
                 ("twins", 0),
-                f"{self._count.value} nodes publish {topic}: consumers get a mixture; "
+                f"{self.count.value} nodes publish {topic}: consumers get a mixture; "
                 "stop all twins but one, or give them ROS domains of their own",
             )
 
     def _subscribe(self, wanted: bool) -> None:
         if wanted and self._subscription is None:
-            self._subscription = self._node.create_subscription(
+            self._subscription = self.node.create_subscription(
                 TwinState,
-                self._name,
-                lambda _, info: self._count.add(int(info["publication_sequence_number"])),
+                self.name,
+                lambda _, info: self.count.add(int(info["publication_sequence_number"])),
                 QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE),
-                callback_group=self._group,
+                callback_group=self.group,
                 raw=True,
             )
         elif not wanted and self._subscription is not None:
-            self._node.destroy_subscription(self._subscription)
+            self.node.destroy_subscription(self._subscription)
             self._subscription = None

@@ -37,7 +37,7 @@ from lupin_twin.ros.parameters import AdjustableNode, declare, naming, naming_ow
 from lupin_twin.ros.past_service import PastService
 from lupin_twin.ros.responses import RETRY_S, Responses
 from lupin_twin.runtime.memory import Memory, journal_path, open_journal
-from lupin_twin.runtime.workers import JobQueue, Workers
+from lupin_twin.runtime.workers import LARGE_THREADS, JobQueue, Workers
 
 NODE_NAME: Final = "lupin_twin"
 # How often ROS time is checked, s, however rarely the state is published.
@@ -93,10 +93,10 @@ class TwinNode(AdjustableNode):
         self._field_service = FieldService(
             self.utilities,
             self._workers,
+            JobQueue(self._workers, wake, large_at_once=LARGE_THREADS),
             self.fields,
             self.store,
-            occupancy=lambda: self.occupancy_map,
-            wake=wake,
+            lambda: self.occupancy_map,
         )
         self._past_queue = JobQueue(self._workers, wake, lambda: self.utilities.is_behind)
         self.estimates = EstimateService(
@@ -197,8 +197,8 @@ class TwinNode(AdjustableNode):
             self._past_queue,
             self.memory.recall,
             self.store,
-            now_ns=self.now_ns,
-            frame_id=p.frame_id,
+            self.now_ns,
+            p.frame_id,
         ).offer(self, group)
         self.estimates.offer(self, group)
         self.layers.offer(self, p.layers, p.frame_id)

@@ -10,13 +10,10 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from copy import deepcopy
 from dataclasses import replace
 from math import dist
 from random import Random
 from typing import Any
-
-from greenhouse_sim.simulator import SensorRegistry
 
 from lupin_patrol.greenhouse import TABLE_HEIGHT_M, Greenhouse, Point, Table, Tag
 from lupin_twin.core.state import Bloom, Flower
@@ -150,13 +147,7 @@ class Climate:
     """The climate of one greenhouse, anywhere on its floor and at any time of day."""
 
     def __init__(self, simulator: Any) -> None:
-        self._noisy = simulator.sensor_registry
-        quiet = deepcopy(simulator.sim_config)
-        for components in quiet["sensors"].values():
-            for component in components:
-                component["noise_sigma"] = 0.0
-        self._quiet = SensorRegistry(quiet)
-        self.sensors: tuple[str, ...] = tuple(simulator.sensors())
+        self._registry = simulator.sensor_registry
 
     def read(
         self,
@@ -168,19 +159,12 @@ class Climate:
         """Read sensors at a place (m, map) and time (s since midnight), noise included."""
         with _as_global_random(chance):
             return tuple(
-                (name, _value(self._noisy, name, position, time_of_day_s)) for name in sensors
+                (name, value_of(self._registry, name, position, time_of_day_s)) for name in sensors
             )
 
-    def truth(self, sensor: str, position: Point, time_of_day_s: float) -> float:
-        """Return the value without noise, from the same dynamics. Pure: no chance, no state.
 
-        Where a sensor is the largest of several noisy components, its readings lie above this on
-        average wherever the components are close to each other.
-        """
-        return _value(self._quiet, sensor, position, time_of_day_s)
-
-
-def _value(registry: Any, sensor: str, position: Point, time_of_day_s: float) -> float:
+def value_of(registry: Any, sensor: str, position: Point, time_of_day_s: float) -> float:
+    """A sensor's value at a place (m, map) and time (s since midnight), in the contract's unit."""
     value = registry.get_sensor(sensor).retrieve_data(position, time_of_day_s % SECONDS_PER_DAY)
     return float(value) * _TO_CONTRACT_UNIT.get(sensor, 1.0)
 

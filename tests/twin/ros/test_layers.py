@@ -16,7 +16,6 @@ from lupin_twin.estimate import EstimateGrid
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.ros.layers import (
     ERROR_UNKNOWN,
-    layer_request,
     points,
     topic_of,
     topics_of,
@@ -55,11 +54,6 @@ def test_the_points_are_those_of_a_plain_loop(data: st.DataObject, width: int, h
     bare = points(grid, None)
     np.testing.assert_array_equal(bare[:, :4], found[:, :4])
     assert (bare[:, 4] == ERROR_UNKNOWN).all()
-
-
-def test_tags_too_far_apart_for_any_grid_are_left_out() -> None:
-    request = layer_request("co2", [(0.0, 0.0), (1e39, 0.0)], 1.0, 1_000)
-    assert (request.bbox_min_x, request.bbox_max_x) == (-1.0, 1.0)
 
 
 @pytest.mark.parametrize(

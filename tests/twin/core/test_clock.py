@@ -44,14 +44,6 @@ def test_one_that_stands_and_is_still_told_is_paused() -> None:
     assert look(watch, 5.1, 17.0) == "running"
 
 
-def test_what_was_heard_before_the_clock_stood_still_counts_no_more() -> None:
-    watch = ClockWatch()
-    look(watch, 5, 10.0)
-    watch.add_message(10.1)
-    look(watch, 6, 10.2)
-    assert look(watch, 6, 10.2 + STANDS_AFTER_S) == "stopped"
-
-
 def test_it_listens_only_while_the_clock_stands() -> None:
     watch = ClockWatch()
     look(watch, 5, 10.0)

@@ -7,7 +7,6 @@ import pytest
 
 from lupin_twin.core.diagnostics import (
     ERROR,
-    MAX_PROBLEMS,
     MAX_SHOWN,
     OK,
     STALE,
@@ -167,17 +166,6 @@ def test_what_is_said_of_the_journal_is_read_again() -> None:
         values = {"state": "recording", "complete to": stretch, "kept": stretch}
         read = self_report([Finding("journal", OK, "", values)]).journal
         assert (read.complete_ns, read.kept_ns) == (1 if stretch == "1" else None, ())
-
-
-def test_what_is_said_of_inputs_is_read_again_up_to_a_limit() -> None:
-    for count in (0, MAX_PROBLEMS):
-        problems = tuple(f"{number}: use UDP" for number in range(count))
-        assert self_report(findings(replace(WELL, input_problems=problems))).input_problems == (
-            problems
-        )
-    values = {f"problem {number}": "x" * (MAX_SHOWN + 1) for number in range(1, MAX_PROBLEMS + 2)}
-    read = self_report([Finding("inputs", WARN, "", values)]).input_problems
-    assert [len(each) for each in read] == [MAX_SHOWN] * MAX_PROBLEMS
 
 
 def test_who_says_nothing_is_not_said_to_have_dropped_nothing() -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from lupin_twin.core import history as history_module
 from lupin_twin.core import ingest
 from lupin_twin.core.history import History, PastAttempt, PastScan, TagHistory
-from lupin_twin.core.state import Attempt, Inspection, Reading, Scan, TagState, TwinStore
+from lupin_twin.core.state import Attempt, Inspection, Reading, Scan, TwinStore
 from tests.support.store import SCAN_FAILED, S, failed_look, look, scan
 
 
@@ -173,23 +173,6 @@ def test_who_follows_a_twin_sees_what_was_really_scanned_when() -> None:
     assert [past.kind for past in followed.attempts] == [0, 1, 0, None]
 
 
-def test_who_comes_late_knows_what_the_state_still_shows() -> None:
-    twin, late = Twin(), History()
-    twin.write(scan("1", at_s=10.0, co2=400.0, light=1.0))
-    twin.write(scan("1", at_s=7210.0, light=2.0))
-    twin.write(look("1", at_s=7300.0))
-    twin.write(scan("1", at_s=7400.0, succeeded=False))
-    [tag] = twin.store.snapshot(0, "map").tags
-    for _ in range(2):
-        late.follow(tag)
-    assert values(late, "co2") == [(10.0, 400.0)]
-    assert values(late, "light") == [(7210.0, 2.0)]
-    assert [(past.stamp_ns / S, past.kind) for past in late.of("1").attempts] == [
-        (7300.0, 1),
-        (7400.0, None),
-    ]
-
-
 def test_who_follows_a_twin_follows_its_clock_back() -> None:
     twin = Twin()
     for at_s in (40.0, 3600.0):
@@ -210,12 +193,6 @@ def test_a_twin_that_was_started_anew_and_knows_less_moves_nothing() -> None:
     history.follow(successor.store.snapshot(0, "map").tags[0])
     assert values(history, "co2") == [(1000.0, 1000.0), (2800.0, 2800.0)]
     assert stamps_s(history.of("1").attempts) == [1000.0, 2800.0]
-
-
-def test_without_times_there_is_nothing_to_follow() -> None:
-    history = History()
-    history.follow(TagState("1", readings=(Reading("co2", 1.0),), last_observed_ns=S))
-    assert history.of("1") == TagHistory()
 
 
 def test_tags_that_a_twin_does_not_know_any_more_are_forgotten(

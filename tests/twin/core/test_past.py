@@ -99,13 +99,6 @@ def test_why_there_is_no_answer_is_told_in_words_and_read_again(
         assert read.is_lasting is error.is_lasting
 
 
-def test_a_failure_of_the_twin_is_nobodys_mistake_and_may_pass() -> None:
-    read = error_of(message_of(KeyError("stamp")))
-    assert isinstance(read, NotRemembered)
-    assert not read.is_lasting
-    assert str(read) == "the twin failed to answer: 'stamp': ask again later"
-
-
 @pytest.mark.parametrize(
     ("asked", "expected"),
     [

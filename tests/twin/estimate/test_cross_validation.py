@@ -61,15 +61,6 @@ def test_a_tag_is_left_out_with_all_that_are_nearer_than_tags_are_to_gaps() -> N
     assert (mean, sd) == pytest.approx(by_the_textbook(beside, rows, h), rel=1e-6)
 
 
-def test_of_a_tag_with_too_few_others_nothing_is_said() -> None:
-    few = a_day(tags=4)
-    assert fit(few).posterior(few, DAY_S).left_out(np.arange(4)) == []
-    clump = Readings(few.time_s, few.tag, few.value, few.xy * 1e-6)
-    assert fit(clump).posterior(clump, DAY_S).left_out(np.arange(4)) == []
-    enough = a_day(tags=12)
-    assert len(fit(enough).posterior(enough, DAY_S).left_out(np.array([0, 5]))) == 2
-
-
 def with_offset(day: Readings, tag: int, scans: int, offset: float) -> tuple[Readings, FloatArray]:
     """The last scans of a tag are off; and when they were."""
     own = np.flatnonzero(day.tag == tag)

@@ -43,15 +43,6 @@ def test_readings_are_told_by_seconds_before_the_moment() -> None:
     assert readings.tag.tolist() == [0, 0, 2], "numbers are those of the tags asked about"
 
 
-def test_what_is_later_or_older_than_a_day_does_not_count() -> None:
-    tags = [tag_past(0, 1.0, 26.0)]
-    at_ns = int(25.0 * 3600 * S)
-    assert readings_of(tags, at_ns, DAY_S).value.tolist() == [21.0]
-    with pytest.raises(FieldRefused, match=r"no tag has a reading of the 86400 s before"):
-        readings_of(tags, at_ns + S, DAY_S)
-    assert len(readings_of(tags, at_ns + S, 2 * DAY_S)) == 1
-
-
 def test_many_tags_share_what_can_be_solved_at_once() -> None:
     hours = [index / 2.0 for index in range(40)]
     at_ns = int(24 * 3600 * S)

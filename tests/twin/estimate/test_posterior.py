@@ -95,15 +95,6 @@ def test_of_more_readings_than_can_be_solved_at_once_the_nearest_say_nearly_the_
     assert grid.mean == pytest.approx(near.points(centres)[0].reshape(24, 24), rel=1e-5)
 
 
-def test_tags_at_one_place_however_many_make_an_estimate() -> None:
-    tag = np.arange(MAX_EXACT + 1)
-    time_s = np.linspace(0.0, DAY_S, len(tag))
-    same = Readings(time_s, tag, 20.0 + np.sin(time_s), np.zeros((len(tag), 2)))
-    mean, sd = fit(same).posterior(same, DAY_S).points(PLACES)
-    assert np.isfinite(mean).all()
-    assert (sd > 0.0).all()
-
-
 @pytest.mark.parametrize("tags", [8, MAX_EXACT])
 def test_who_is_not_waited_for_ends_soon(tags: int) -> None:
     day = a_day(tags=tags, passes=2)

@@ -70,17 +70,6 @@ def test_of_more_the_newest_quarter_and_others_from_all_over_the_day(
             assert gaps_h.max() <= 2.0 * 24.0 / parts + 1.0 + 23.0 / max(count - 1, 1)
 
 
-def test_a_day_is_one_to_the_second() -> None:
-    old = readings_of([(0.0, 0, 1.0)], [(0.0, 0.0)])
-    assert len(old.recent(DAY_S)) == 1
-    assert len(old.recent(DAY_S + 1.0)) == 0
-    assert len(old.recent(1_440.0, day_length_s=1_440.0)) == 1
-    assert len(old.recent(1_441.0, day_length_s=1_440.0)) == 0
-    assert len(old.recent(-1.0)) == 0, "what comes later is not known yet"
-    twice = readings_of([(1.0, 0, float(number)) for number in range(6)], [(0.0, 0.0)])
-    assert twice.recent(DAY_S, per_tag=1).value.tolist() == [5.0], "the later of equal stamps"
-
-
 def test_the_spread_lies_between_a_quarter_of_the_ideal_range_and_the_readings_own() -> None:
     values = np.array([20.0, 22.0, 24.0, 30.0])
     scale = scale_of(values, (18.0, 26.0))

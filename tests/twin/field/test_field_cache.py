@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
-
-import pytest
-
 from lupin_twin.field.engine import MAX_ENTRIES, FieldCache, FieldKey, FieldRequest, FieldRules
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.field.idw import compute_idw_field
@@ -66,21 +61,3 @@ def test_field_larger_than_the_whole_bound_is_not_kept_and_drops_nothing() -> No
     assert cache.get(key(2)) is None
     assert cache.get(key(1)) is not None
     assert cache.bytes == 40
-
-
-CHANGES: tuple[dict[str, Any], ...] = (
-    {"request": replace(key(1).request, resolution=2.0)},
-    {"request": replace(key(1).request, bbox_max_y=2.0)},
-    {"request": replace(key(1).request, sensor_type="humidity")},
-    {"observation_count": 4},
-    {"map_revision": 1},
-    {"rules": replace(RULES, idw_power=3.0)},
-)
-
-
-@pytest.mark.parametrize("changed", CHANGES)
-def test_every_part_of_the_key_counts(changed: dict[str, Any]) -> None:
-    cache = FieldCache(max_bytes=1000)
-    cache.put(key(1), grid(1))
-    assert cache.get(key(1)._replace(**changed)) is None
-    assert cache.get(key(1)) is not None

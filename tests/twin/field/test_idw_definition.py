@@ -169,36 +169,3 @@ def test_field_of_many_parts_is_the_definitions(
 
 
 # --- what may not change it ------------------------------------------------------------------
-
-
-@st.composite
-def exact_cases(draw: st.DrawFn) -> Case:
-    """All lengths are multiples of 1/8 m below 2⁸ m: sums and differences of them are exact."""
-    width, height = draw(st.integers(1, 8)), draw(st.integers(1, 8))
-    eighths = st.integers(-16, 80).map(lambda number: number / 8)
-    return Case(
-        samples=tuple(draw(st.lists(st.tuples(eighths, eighths, VALUES), max_size=10))),
-        width=width,
-        height=height,
-        min_x=draw(st.integers(-8, 8)) / 8,
-        min_y=draw(st.integers(-8, 8)) / 8,
-        resolution=draw(st.sampled_from([0.25, 0.5, 1.0])),
-        falloff=draw(st.integers(0, 40)) / 8,
-        max_distance=draw(st.integers(0, 40)) / 8,
-        power=draw(st.sampled_from([2.0, 1.0, 3.0])),
-    )
-
-
-@settings(max_examples=300)
-@given(exact_cases(), st.sampled_from([-(2.0**20), 2.0**8, 2.0**24]))
-def test_moving_everything_moves_the_field(case: Case, by: float) -> None:
-    moved = Case(
-        **{
-            **vars(case),
-            "samples": tuple((x + by, y - by, value) for x, y, value in case.samples),
-            "min_x": case.min_x + by,
-            "min_y": case.min_y - by,
-        }
-    ).by_twin()
-    assert (moved.origin_x, moved.origin_y) == (case.min_x + by, case.min_y - by)
-    assert_same_values(moved.values, case.by_twin().values.tolist(), case.samples)

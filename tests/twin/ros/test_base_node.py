@@ -18,7 +18,6 @@ from lupin_twin.core.drops import LOST, Drop, Reason
 from lupin_twin.ros.base_node import (
     BEHIND_S,
     BELIEVED_S,
-    DRAIN_S,
     WARNING_PERIOD_S,
     NodeUtilities,
     read_message,
@@ -194,38 +193,6 @@ def test_messages_that_wait_are_taken_one_right_behind_the_other(
         assert heard == list(map(float, range(90)))
         assert utilities.counts().dropped.get(LOST, 0) == 0
     executor.shutdown()
-
-
-def test_those_that_wait_keep_nobody_waiting_for_long(
-    utilities: NodeUtilities, logged: Logged, domain: int
-) -> None:
-    heard: list[Any] = []
-
-    def hear(message: Any) -> None:
-        heard.append(message)
-        logged.now_s += DRAIN_S / 2 + 0.001
-
-    group = utilities.node.default_callback_group
-    utilities.subscribe("topic", "many", SHAPE, depth=5, group=group, callback=hear)
-    (subscription,) = [s for s in utilities.node.subscriptions if s.topic_name == "/many"]
-    with Peer(domain) as peer:
-        publisher = peer.publisher("/many", Observation)
-        peer.until(publisher.get_subscription_count, "the subscription")
-
-        def publish() -> None:
-            for _ in range(5):
-                publisher.publish(scan("1"))
-            assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE_S))
-
-        publish()
-        one = serialize_message(scan("1"))
-        for count in (3, 6):  # one that the executor brings, and two behind it
-            subscription.callback(one, INFO)
-            assert len(heard) == count
-        publish()
-        # Before what keeps the thread for longer, all that there is room for.
-        utilities.drain()
-        assert len(heard) == 11
 
 
 def test_a_message_that_waited_long_tells_that_the_thread_is_behind_for_a_while(

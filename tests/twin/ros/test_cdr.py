@@ -5,7 +5,6 @@ import re
 import struct
 import subprocess
 import sys
-from array import array
 from typing import Any
 
 import pytest
@@ -16,7 +15,6 @@ from hypothesis import strategies as st
 from lupin_msgs.msg import (
     DiscoveredTags,
     Observation,
-    SensorReading,
     TagReading,
     TwinState,
 )
@@ -142,42 +140,6 @@ def test_a_sequence_holds_as_many_as_fit_into_its_bytes_and_not_one_more() -> No
         MalformedError, match="points: 4 of at least 12 bytes are claimed, 36 bytes are left"
     ):
         shape.check(bytes(data))
-
-
-def test_a_limit_of_the_type_itself_holds() -> None:
-    data = bytearray(serialize_message(ParameterDescriptor()))
-    at = len(data) - 8  # of the two last sequences
-    data[at : at + 4] = struct.pack("<I", 2)
-    with pytest.raises(MalformedError, match="floating_point_range: 2, the limit is 1"):
-        SHAPES[ParameterDescriptor].check(bytes(data) + bytes(100))
-    kind = TypeDescription()
-    for length, is_taken in ((255, True), (256, False)):
-        # Behind the header: a length, the text, and the two empty sequences.
-        text = struct.pack("<I", length + 1) + b"x" * length + b"\0"
-        raw = LITTLE + text + bytes(-len(text) % 4) + bytes(8)
-        if is_taken:
-            assert SHAPES[TypeDescription].check(raw) == len(raw)
-        else:
-            with pytest.raises(MalformedError, match="has 256 bytes, the limit is 255"):
-                SHAPES[TypeDescription].check(raw)
-    assert SHAPES[TypeDescription].check(serialize_message(kind))
-
-
-def test_all_sequences_of_messages_have_a_limit_together_numbers_none() -> None:
-    shape = shape_of(TwinState, max_elements=4)
-    state = TwinState(tags=[tag() for tag in (any_tag, any_tag)])
-    assert shape.check(serialize_message(state))
-    state.tags[0].readings.append(SensorReading())
-    with pytest.raises(MalformedError, match="more elements in all sequences than the limit"):
-        shape.check(serialize_message(state))
-    grid = OccupancyGrid(data=array("b", bytes(100)))
-    assert shape_of(OccupancyGrid, max_elements=0).check(serialize_message(grid))
-
-
-def any_tag() -> Any:
-    from lupin_msgs.msg import TwinTagState
-
-    return TwinTagState(readings=[SensorReading()])
 
 
 # In a process of its own: what ROS allocates for one lie would hide what it does for the next.

@@ -119,13 +119,6 @@ def over_the_wire(msg: Any) -> Any:
     return deserialize_message(serialize_message(msg), type(msg))
 
 
-def test_no_pose_is_published_as_w_zero_and_no_observation_as_infinitely_old() -> None:
-    tag = convert.StateMessages().build(Snapshot(9 * S, "map", (UNPINNED,))).tags[0]
-    assert tag.pose.orientation.w == 0.0
-    assert (tag.last_observed.sec, tag.last_observed.nanosec) == (0, 0)
-    assert math.isinf(tag.stale_seconds)
-
-
 def test_only_a_changed_tag_is_built_anew_and_every_age_is_current() -> None:
     build = convert.StateMessages().build
     first = build(Snapshot(9 * S, "map", (PINNED, UNPINNED)))
@@ -136,13 +129,6 @@ def test_only_a_changed_tag_is_built_anew_and_every_age_is_current() -> None:
     assert second.tags[1] is not kept[1]
     assert second.tags[0].stale_seconds == 7.0
     assert [r.value for r in second.tags[1].readings] == [1.0]
-
-
-@pytest.mark.parametrize("w", [1.0, 0.0, math.nan])
-def test_a_pose_is_heard_as_it_was_sent(w: float) -> None:
-    heard = convert.pose_of(messages.pose(1.0, 2.0, w=w))
-    assert (heard.x, heard.y) == (1.0, 2.0)
-    assert repr(heard.qw) == repr(w)
 
 
 def test_a_tag_reading_is_heard_field_by_field() -> None:
@@ -184,14 +170,6 @@ def test_the_kinds_and_the_status_are_the_messages() -> None:
     assert history.KIND_FLOWER == ObservationMsg.KIND_FLOWER
     assert ingest.KIND_ANOMALY == ObservationMsg.KIND_ANOMALY
     assert STATUS_OK == ObservationMsg.STATUS_OK
-
-
-def test_discovered_tags_are_heard_and_a_pose_is_made_when_it_is_asked_for() -> None:
-    heard = convert.received_tags(
-        messages.discovered({"1": messages.pose(1.0), "2": messages.pose(2.0)})
-    )
-    assert (heard.frame_id, list(heard.tag_ids)) == ("map", ["1", "2"])
-    assert heard.pose(1) == Pose(2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 @given(st.floats(width=32))

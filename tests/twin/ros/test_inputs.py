@@ -14,7 +14,6 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 
 from lupin_twin.ros.inputs import (
     MAX_ROWS,
-    MAX_WRITERS,
     Gaps,
     Input,
     OtherTwins,
@@ -67,14 +66,6 @@ def test_a_number_that_may_be_a_new_writers_first_is_no_gap() -> None:
 
 def test_a_writer_that_starts_anew_is_no_gap() -> None:
     assert lost([700, 701, 1, 2]) == [0, 0, 0, 0]
-
-
-def test_only_so_many_writers_are_followed() -> None:
-    gaps = Gaps()
-    for start in range(0, 1000 * (MAX_WRITERS + 1), 1000):
-        gaps.see(start, lambda: MAX_WRITERS + 1)
-    assert gaps.see(1, lambda: 1) == 0, "the first is forgotten"
-    assert len(gaps._next) == MAX_WRITERS
 
 
 @given(st.lists(st.integers(0, 3), min_size=1), st.integers(1, 10**6))

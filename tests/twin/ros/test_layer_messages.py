@@ -84,9 +84,3 @@ def test_a_tag_is_a_ball_of_its_colour_and_its_name_above() -> None:
     assert name.pose.position.z > ball.pose.position.z
     # At whatever time it is looked at, and until it is deleted.
     assert ball.header.stamp.sec == ball.lifetime.sec == 0
-
-
-def test_no_colour_is_one_of_a_verdict() -> None:
-    """On the page green is healthy and red critical; a marker says neither."""
-    for look, (red, green, blue) in COLOURS.items():
-        assert blue >= max(red, green) or (look == "failed" and min(red, blue) > 2 * green), look

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -11,19 +10,15 @@ from typing import Any
 
 import pytest
 import rclpy
-import yaml
 from lupin_msgs.msg import TwinState
-from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.parameter import Parameter
 
 from lupin_twin.field.engine import FieldJob, FieldRequest
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.ros.node import TwinNode
 from tests.support.messages import occupancy_grid, scan
 from tests.support.ros import Peer
-from tests.support.waiting import PATIENCE_S
 
 SOURCES = [file for folder in ("ros_node", "backend") for file in Path(folder).rglob("*.py")]
 LIMITS = {
@@ -87,43 +82,6 @@ def test_a_rule_that_is_changed_takes_effect_at_once(stage: Stage) -> None:
     # What was computed by the old rules is theirs, and back with them.
     node.set_parameters([Parameter("idw_power", value=2.0)])
     assert isinstance(node.fields.lookup(request, node.store, None), FieldGrid)
-
-
-def dumped(stage: Stage) -> str:
-    """What `ros2 param dump` writes: its two services are asked, as that asks them."""
-    executor = SingleThreadedExecutor(context=stage.node.context)
-    asker = rclpy.create_node("asker", context=stage.node.context)
-    executor.add_node(stage.node)
-    executor.add_node(asker)
-
-    def ask(kind: Any, name: str, **arguments: Any) -> Any:
-        client = asker.create_client(kind, f"/lupin_twin/{name}")
-        assert client.wait_for_service(timeout_sec=PATIENCE_S)
-        future = client.call_async(kind.Request(**arguments))
-        executor.spin_until_future_complete(future, timeout_sec=PATIENCE_S)
-        return future.result()
-
-    names = sorted(ask(ListParameters, "list_parameters").result.names)
-    values = ask(GetParameters, "get_parameters", names=names).values
-    executor.shutdown()
-    asker.destroy_node()
-    read = [parameter_value_to_python(value) for value in values]
-    plain = [list(value) if isinstance(value, array) else value for value in read]
-    told = {"/lupin_twin": {"ros__parameters": dict(zip(names, plain, strict=True))}}
-    return yaml.dump(told, default_flow_style=False)
-
-
-def test_a_dump_of_its_parameters_starts_a_twin_like_it(domain: int, tmp_path: Path) -> None:
-    changed = ("journal:=off", "layers:=[co2, light]", "idw_power:=3", "buffer_len:=7")
-    file = tmp_path / "dump.yaml"
-    with stage_in(domain, *(word for one in changed for word in ("-p", one))) as stage:
-        stage.node.set_parameters([Parameter("idw_falloff_radius_m", value=4.5)])
-        parameters = stage.node.parameters
-        file.write_text(dumped(stage), encoding="utf-8")
-    assert (parameters.layers, parameters.idw_falloff_radius_m) == (("co2", "light"), 4.5)
-    with stage_in(domain, "--params-file", str(file)) as again:
-        assert again.node.parameters == parameters
-        assert again.warnings == []
 
 
 # --- one thread ---------------------------------------------------------------------------------

@@ -19,7 +19,6 @@ from lupin_twin.ros.parameters import (
     declare,
     naming,
     naming_own_parameters,
-    unknown_overrides,
 )
 
 
@@ -39,13 +38,6 @@ def node_with(domain: int, *overrides: str, made: Any = Node) -> Iterator[Any]:
 def test_all_are_declared_and_what_is_set_is_read(domain: int) -> None:
     with node_with(domain, "idw_power:=3", "state_topic:=/s") as node:
         assert declare(node) == TwinParameters(idw_power=3.0, state_topic="/s")
-
-
-def test_some_are_declared_and_the_others_are_neither_read_nor_unknown(domain: int) -> None:
-    with node_with(domain, "idw_power:=3.0", "buffer_len:=5") as node:
-        assert declare(node, ["buffer_len"]) == TwinParameters(buffer_len=5)
-        assert not node.has_parameter("idw_power")
-        assert unknown_overrides(node) == []
 
 
 def test_descriptors_tell_meaning_range_and_why_it_is_read_only(domain: int) -> None:

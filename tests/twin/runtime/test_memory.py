@@ -184,18 +184,6 @@ def test_nothing_is_known_before_a_simulated_clock_has_started(tmp_path: Path) -
         assert store.tag("8")
 
 
-def test_a_clock_that_goes_back_begins_a_run_that_knows_what_the_twin_knew(tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-    with twin(path, sim(100, 100)) as (memory, store, _):
-        memory.apply(at(SCAN, 99 * S), NOW + 99 * S)
-        memory.follow(sim(50, 101))
-        store.hold_to(50 * S)
-        memory.apply(at(LOOK, 50 * S), NOW + 102 * S)
-        before = store.snapshot(50 * S, "map")
-    with twin(path, sim(300, 110)) as (_, store, _):
-        assert store.snapshot(50 * S, "map").tags == before.tags
-
-
 def test_a_clock_that_goes_back_all_the_time_begins_few_runs(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     with twin(path, sim(9000, 0)) as (memory, _, _):

@@ -113,17 +113,6 @@ def test_it_stays_known_however_much_else_was_tried_meanwhile(path: Path) -> Non
         assert count(path) == 12
 
 
-def test_within_one_tick_of_the_clock_what_has_no_stamp_is_one_write(path: Path) -> None:
-    with twin(path, is_simulated=True) as life:
-        life.at(50)
-        life.hear(None, t=20.0)
-        life.hear(None, t=25.0, h=60.0)
-        assert life.says("t") == (20.0, 0.0)
-        assert life.says("h") == (60.0, 0.0)
-        life.hear(None, source="b", t=25.0)
-        assert life.says("t") == (25.0, 0.0)
-
-
 # --- 3: runs and steps ----------------------------------------------------------------------------
 
 
@@ -352,10 +341,3 @@ def test_a_place_counts_from_the_earliest_stamp_that_came_with_one(path: Path) -
 
 
 # --- 7 and 8: what many sources leave, and the end ------------------------------------------------
-
-
-def test_many_sources_and_missions_make_no_series(path: Path) -> None:
-    with twin(path) as life:
-        for number in range(50):
-            life.hear(number - 100, source=f"robot {number}", t=1.0)
-    assert select(path, "SELECT count(*) FROM series") == [(1,)]

@@ -36,7 +36,7 @@ def test_what_is_expected_is_what_the_textbook_says_without_the_last_four(
     for tag, change in enumerate(found):
         own = [int(row) for row in order if readings.tag[row] == tag]
         assert (change is None) == (not own)
-        if change is None or change.has_changed:
+        if change is None or change.since_s is not None:
             continue
         mean, sd = by_the_textbook(readings, own[-4:], h)
         assert change.expected == pytest.approx(mean, rel=1e-5, abs=1e-5)
@@ -74,10 +74,10 @@ def with_offset(day: Readings, tag: int, scans: int, offset: float) -> tuple[Rea
 def test_a_sensor_that_reads_three_degrees_more_has_changed_since_then(scans: int) -> None:
     day = a_day(passes=24)
     model = fit(day)
-    assert not any(one.has_changed for one in model.posterior(day, DAY_S).changes() if one)
+    assert not any(one.since_s is not None for one in model.posterior(day, DAY_S).changes() if one)
     off, since = with_offset(day, 3, scans, 3.0)
     found = model.posterior(off, DAY_S).changes()
-    assert [tag for tag, one in enumerate(found) if one and one.has_changed] == [3]
+    assert [tag for tag, one in enumerate(found) if one and one.since_s is not None] == [3]
     change = found[3]
     assert change is not None
     assert change.since_s == since[0]
@@ -91,7 +91,7 @@ def test_one_odd_reading_is_no_change_nor_is_a_place_that_was_always_different()
     for scans in (1, 24):
         off, _ = with_offset(day, 3, scans, 3.0)
         found = model.posterior(off, DAY_S).changes()
-        assert not any(one.has_changed for one in found if one)
+        assert not any(one.since_s is not None for one in found if one)
 
 
 def test_of_many_tags_each_is_judged_by_those_near_it() -> None:
@@ -100,7 +100,7 @@ def test_of_many_tags_each_is_judged_by_those_near_it() -> None:
     model = fit(day)
     off, since = with_offset(day, 50, 3, 4.0)
     found = model.posterior(off, DAY_S).changes()
-    assert [tag for tag, one in enumerate(found) if one and one.has_changed] == [50]
+    assert [tag for tag, one in enumerate(found) if one and one.since_s is not None] == [50]
     change = found[50]
     assert change is not None
     assert change.since_s == since[0]

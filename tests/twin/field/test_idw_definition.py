@@ -130,7 +130,7 @@ def small_parts() -> Iterator[None]:
         yield
 
 
-@settings(max_examples=500)
+@settings(max_examples=250)
 @given(cases())
 def test_field_is_the_definitions(case: Case) -> None:
     grid = case.by_twin()
@@ -138,7 +138,7 @@ def test_field_is_the_definitions(case: Case) -> None:
     assert_same_values(grid.values, case.by_loop(), case.samples)
 
 
-@settings(max_examples=300)
+@settings(max_examples=150)
 @given(cases())
 def test_field_is_the_definitions_however_it_is_split(case: Case) -> None:
     with small_parts():

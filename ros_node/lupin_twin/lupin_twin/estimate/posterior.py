@@ -61,12 +61,7 @@ class Cells:
 
     @classmethod
     def of(cls, min_x: float, min_y: float, max_x: float, max_y: float, resolution: float) -> Cells:
-        """Of a box, m.
-
-        Raises:
-            ValueError: see `grid.grid_dimensions`.
-
-        """
+        """Of a box, m."""
         width, height = grid_dimensions(min_x, min_y, max_x, max_y, resolution)
         return cls(
             cell_centres(min_x, width, resolution),
@@ -195,10 +190,6 @@ class Posterior:
 
         Fine grids are interpolated between places that are no farther apart than a fifth of the
         length over which the truth changes.
-
-        Raises:
-            ValueError: see `grid.grid_dimensions`.
-
         """
         cells = Cells.of(bbox_min_x, bbox_min_y, bbox_max_x, bbox_max_y, resolution)
         x, y = cells.lattice(self.hyper.l)

@@ -151,10 +151,6 @@ def cost_s(request: FieldRequest, samples: int, rules: FieldRules) -> float:
     """About how long a field of so many samples takes, seconds of one core; for ordering work.
 
     As if all samples lay within the box: one outside costs less.
-
-    Raises:
-        FieldRefused: see `check_request`.
-
     """
     width, height = check_request(request, rules.max_grid_cells)
     reach = 2.0 * max(rules.falloff_radius_m, rules.max_distance_m) / request.resolution
@@ -275,12 +271,7 @@ class FieldEngine:
     def lookup(
         self, request: FieldRequest, store: TwinStore, occupancy: OccupancyMap | None
     ) -> FieldGrid | FieldJob:
-        """The field as it was computed before, or a job; `occupancy` is the latest map, if any.
-
-        Raises:
-            FieldRefused: see `check_request`.
-
-        """
+        """The field as it was computed before, or a job; `occupancy` is the latest map, if any."""
         check_request(request, self.rules.max_grid_cells)
         revision = None if occupancy is None else occupancy.revision
         key = FieldKey(request, store.observation_count, revision, self.rules)

@@ -113,12 +113,7 @@ def estimate_of(response: Any) -> Estimate:
 
 
 def report_request_of(msg: Any) -> ReportRequest:
-    """GetEstimateReport.Request as a value.
-
-    Raises:
-        FieldRefused: see `ReportRequest`.
-
-    """
+    """GetEstimateReport.Request as a value."""
     return ReportRequest(msg.sensor_type, int(msg.max_places) or DEFAULT_PLACES)
 
 

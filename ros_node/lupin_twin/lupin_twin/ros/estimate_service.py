@@ -38,7 +38,7 @@ from lupin_twin.journal.fold import STATE_S_PER_TAG, recent_readings
 from lupin_twin.journal.queries import SERIES_S
 from lupin_twin.ros import convert_field
 from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities
-from lupin_twin.ros.responses import answer_later, refusal
+from lupin_twin.ros.responses import answer_later
 from lupin_twin.runtime.estimate_rounds import (
     ADVICE_S,
     Done,
@@ -295,7 +295,7 @@ class EstimateService:
                 task.cost_s,
             )
 
-        return answer_later(self._queue, prepare, partial(self._refusal, response))
+        return answer_later(self._queue, prepare, response, self.utilities.report)
 
     def _on_get_report(self, request: Any, response: Any) -> Any:
         def prepare(reply: Callable[[Any], None]) -> Query:
@@ -307,10 +307,7 @@ class EstimateService:
                 ADVICE_S,
             )
 
-        return answer_later(self._queue, prepare, partial(self._refusal, response))
-
-    def _refusal(self, response: Any, error: Exception) -> Any:
-        return refusal(response, error, self.utilities.report)
+        return answer_later(self._queue, prepare, response, self.utilities.report)
 
     def _look_up(self, request: EstimateRequest) -> Callable[[], Future[Any]]:
         sensor, at_ns = request.box.sensor_type, request.at_ns

@@ -43,14 +43,12 @@ class FieldService:
             )
 
     def _on_get_field(self, request: Any, response: Any) -> Any:
-        def refused(error: Exception) -> Any:
-            return refusal(response, error, self.utilities.report)
-
+        report = self.utilities.report
         try:
             wanted = convert_field.field_request_of(request)
             found = self.fields.lookup(wanted, self.store, self.occupancy())
         except Exception as error:  # noqa: BLE001  # no client waits for ever
-            return refused(error)
+            return refusal(response, error, report)
         if not isinstance(found, FieldJob):
             return convert_field.fill_response(response, found)
         job = found
@@ -65,4 +63,4 @@ class FieldService:
             search = partial(self.workers.submit, job.compute, job.cost_s)
             return Query(search, keep, cost_s=job.cost_s)
 
-        return answer_later(self.queue, prepare, refused)
+        return answer_later(self.queue, prepare, response, report)

@@ -17,8 +17,8 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from lupin_twin.core import ingest, interfaces
-from lupin_twin.core.clock import CLOCK_TEXTS, LATCHED_AFTER_S, ClockWatch, Lateness
-from lupin_twin.core.diagnostics import Health, Origin, findings, origin_of
+from lupin_twin.core.clock import LATCHED_AFTER_S, ClockWatch, Lateness
+from lupin_twin.core.diagnostics import CLOCK, ERROR, Health, Origin, findings, origin_of
 from lupin_twin.core.drops import Drop, Reason
 from lupin_twin.core.history import History, TagHistory, kind_of
 from lupin_twin.core.parameters import ParameterError, TwinParameters, World
@@ -380,11 +380,12 @@ class TwinNode(AdjustableNode):
         state = watch.update(now_ns, time.monotonic(), is_simulated=is_simulated)
         if state != self._clock_reported:
             self._clock_reported = state
+            level, text = CLOCK[state]
             # Two lines: rclpy lets one line log at one level only.
-            if state in ("none", "stopped"):
-                self.get_logger().warning(CLOCK_TEXTS[state])
+            if level == ERROR:
+                self.get_logger().warning(text)
             else:
-                self.get_logger().info(CLOCK_TEXTS[state])
+                self.get_logger().info(text)
         # Only while it stands: a simulator that runs may publish the time a thousand times a
         # second.
         if watch.should_subscribe and self._clock_subscription is None:

@@ -18,7 +18,7 @@ from lupin_twin.journal.follow import WRITES_S, writes
 from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG, series
 from lupin_twin.ros import convert, convert_past
 from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities
-from lupin_twin.ros.responses import answer_later, refusal
+from lupin_twin.ros.responses import answer_later
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import SMALL_S, JobQueue, Query
 
@@ -103,8 +103,4 @@ class PastService:
                 make_s,
             )
 
-        return answer_later(
-            self.queue,
-            prepare,
-            lambda error: refusal(response, error, self.utilities.report),
-        )
+        return answer_later(self.queue, prepare, response, self.utilities.report)

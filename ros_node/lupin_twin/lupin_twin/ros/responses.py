@@ -31,6 +31,7 @@ MAX_UNSENT: Final = 8
 MAX_ATTEMPT_S: Final = 0.5
 
 Send = Callable[[Any, Any], None]
+Report = Callable[[str, Exception], None]
 
 
 class Later:
@@ -57,26 +58,27 @@ class Later:
 def answer_later(
     queue: JobQueue,
     prepare: Callable[[Callable[[Any], None]], Query],
-    refused: Callable[[Exception], Any],
+    response: Any,
+    report: Report,
 ) -> Any:
-    """What a service's callback returns: the response to come of a query, or a refusal.
+    """What a service's callback returns: the response to come of a query, or a `refusal`.
 
-    `prepare(reply)` makes the query, or raises; `refused(error)` makes the response that says why
-    there is no answer, so that no client waits for ever.
+    `prepare(reply)` makes the query, or raises.
     """
     later = Later()
 
     def reply(answer: Any) -> None:
-        later.answer(refused(answer) if isinstance(answer, Exception) else answer)
+        is_error = isinstance(answer, Exception)
+        later.answer(refusal(response, answer, report) if is_error else answer)
 
     try:
         queue.ask(prepare(reply))
-    except Exception as error:  # noqa: BLE001  # see above
-        return refused(error)
+    except Exception as error:  # noqa: BLE001  # no client waits for ever
+        return refusal(response, error, report)
     return later
 
 
-def refusal(response: Any, error: Exception, report: Callable[[str, Exception], None]) -> Any:
+def refusal(response: Any, error: Exception, report: Report) -> Any:
     """A fresh response of the same type, empty but for why; what nobody expected is reported."""
     if isinstance(error, FieldRefused):
         return type(response)(error_message=str(error))

@@ -35,7 +35,7 @@ def posterior_at(all_read: Readings, at_s: float) -> Posterior:
 
 def changed(all_read: Readings, at_s: float) -> list[int]:
     found = posterior_at(all_read, at_s).changes()
-    return [tag for tag, one in enumerate(found) if one is not None and one.has_changed]
+    return [tag for tag, one in enumerate(found) if one is not None and one.since_s is not None]
 
 
 def found_after(all_read: Readings, tag: int) -> tuple[dict[int, bool], int]:

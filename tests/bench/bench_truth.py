@@ -16,7 +16,6 @@ from greenhouse_sim.simulator import GreenhouseSimulator
 
 from lupin_patrol import node as messages
 from lupin_patrol.mission import FlowersSeen, Mission, PassCompleted, TagScanned, TagsDiscovered
-from lupin_patrol.plants import Climate
 from lupin_twin.core import ingest
 from lupin_twin.core.drops import Drop
 from lupin_twin.core.history import History
@@ -26,6 +25,7 @@ from lupin_twin.field.engine import FieldCache, FieldEngine, FieldJob, FieldRequ
 from lupin_twin.field.grid import FieldGrid, cell_centres
 from lupin_twin.field.quality import leave_one_out, painted_share
 from lupin_twin.ros import convert
+from tests.support.climate import Truth
 
 WIDTH_M, HEIGHT_M, CELL_M = 4.0, 8.0, 0.05
 RULES = FieldRules.of(TwinParameters())
@@ -41,7 +41,7 @@ def after_one_pass(day_speed: float) -> tuple[TwinStore, float]:
             time_of_day_s = event.time_of_day_s
             write(store, messages.tag_reading(event, stamp, "map"))
         elif isinstance(event, FlowersSeen):
-            write(store, messages.flower(event, stamp, "map"))
+            write(store, messages.inspection(event, stamp, "map"))
         elif isinstance(event, TagsDiscovered):
             pin_all(store, messages.discovered_tags(event, stamp, "map"))
         elif isinstance(event, PassCompleted):
@@ -67,12 +67,12 @@ def field_of(store: TwinStore, sensor: str) -> FieldGrid:
     return answer.compute() if isinstance(answer, FieldJob) else answer
 
 
-def errors(grid: FieldGrid, climate: Climate, sensor: str, time_of_day_s: float) -> Any:
+def errors(grid: FieldGrid, truth_of: Truth, sensor: str, time_of_day_s: float) -> Any:
     """Field less truth, cell by cell, of the painted cells."""
     xs = cell_centres(grid.origin_x, grid.width, grid.resolution)
     ys = cell_centres(grid.origin_y, grid.height, grid.resolution)
     truth = np.array(
-        [[climate.truth(sensor, (float(x), float(y)), time_of_day_s) for x in xs] for y in ys]
+        [[truth_of.of(sensor, (float(x), float(y)), time_of_day_s) for x in xs] for y in ys]
     )
     difference = grid.values.reshape(truth.shape) - truth
     return difference[np.isfinite(difference)], truth
@@ -80,7 +80,7 @@ def errors(grid: FieldGrid, climate: Climate, sensor: str, time_of_day_s: float)
 
 def main() -> None:
     simulator = GreenhouseSimulator()
-    climate = Climate(simulator)
+    truth_of = Truth(simulator)
     moving, at_the_end = after_one_pass(day_speed=60.0)
     still, standing = after_one_pass(day_speed=0.0)
     print("\nFields after one full pass against the simulator's truth, 0.05 m cells, 4 x 8 m")
@@ -88,10 +88,10 @@ def main() -> None:
         f"{'sensor':<14}{'tags':>5}{'painted':>9}{'RMSE':>9}{'of spread':>10}"
         f"{'without drift':>14}{'leave-one-out':>14}"
     )
-    for sensor in climate.sensors:
+    for sensor in simulator.sensors():
         grid = field_of(moving, sensor)
-        off, truth = errors(grid, climate, sensor, at_the_end)
-        off_still, _ = errors(field_of(still, sensor), climate, sensor, standing)
+        off, truth = errors(grid, truth_of, sensor, at_the_end)
+        off_still, _ = errors(field_of(still, sensor), truth_of, sensor, standing)
         judged = leave_one_out(
             moving.snapshot(0, "map").tags,
             sensor,

@@ -10,7 +10,7 @@ import pytest
 from websockets.asyncio.client import connect
 
 from lupin_bridge.feed.source import TwinUpdate
-from lupin_bridge.judge.verdict import Health, judge_house, judge_tag
+from lupin_bridge.judge.verdict import Health, judge_site, judge_tag
 from lupin_bridge.stream.hub import Client
 from lupin_twin.core.state import Reading, Snapshot, TagState
 from tests.bridge.test_bridge import Ear, Stage
@@ -71,9 +71,9 @@ def test_a_state_that_cannot_be_judged_goes_out_and_all_is_unknown(
     def judge(*args: Any, **more: Any) -> Health:
         if is_broken:
             raise ZeroDivisionError("a defect")
-        return judge_house(*args, **more)
+        return judge_site(*args, **more)
 
-    monkeypatch.setattr("lupin_bridge.judge.judging.judge_house", judge)
+    monkeypatch.setattr("lupin_bridge.judge.judging.judge_site", judge)
 
     def verdicts(frame: dict[str, Any]) -> list[str]:
         health = frame["health"]

@@ -10,6 +10,7 @@ import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 
 from lupin_patrol.plants import Climate, stream
+from tests.support.climate import Truth
 
 NOON_S = 12 * 3600.0
 ALL = ("temperature", "humidity", "co2", "light", "soil_moisture")
@@ -25,8 +26,9 @@ def climate(simulator: Any) -> Climate:
     return Climate(simulator)
 
 
-def test_the_sensors_are_the_simulators(climate: Climate) -> None:
-    assert climate.sensors == ALL
+@pytest.fixture(scope="module")
+def truth(simulator: Any) -> Truth:
+    return Truth(simulator)
 
 
 def test_readings_come_in_the_order_asked_for_and_no_others(climate: Climate) -> None:
@@ -82,30 +84,18 @@ def test_reading_leaves_the_processs_random_numbers_alone(climate: Climate) -> N
     ],
 )
 def test_the_truth_follows_the_configuration(
-    climate: Climate, sensor: str, position: tuple[float, float], hour: float, expected: float
+    truth: Truth, sensor: str, position: tuple[float, float], hour: float, expected: float
 ) -> None:
-    assert climate.truth(sensor, position, hour * 3600.0) == pytest.approx(expected)
+    assert truth.of(sensor, position, hour * 3600.0) == pytest.approx(expected)
 
 
-def test_the_truth_is_pure(climate: Climate) -> None:
-    for name in ALL:
-        value = climate.truth(name, (1.0, 6.0), NOON_S)
-        assert all(climate.truth(name, (1.0, 6.0), NOON_S) == value for _ in range(5))
-
-
-def test_the_day_wraps(climate: Climate) -> None:
-    assert climate.truth("temperature", (1.0, 1.0), NOON_S + 86_400.0) == pytest.approx(
-        climate.truth("temperature", (1.0, 1.0), NOON_S)
-    )
-
-
-def test_readings_scatter_around_the_truth(climate: Climate) -> None:
+def test_readings_scatter_around_the_truth(climate: Climate, truth: Truth) -> None:
     # Where one component stands out, noise of 30 ppm around it is all there is.
     chance = stream(0, "many")
     values = [climate.read(("co2",), (5.0, 3.0), NOON_S, chance)[0][1] for _ in range(400)]
-    assert fmean(values) == pytest.approx(climate.truth("co2", (5.0, 3.0), NOON_S), abs=6.0)
+    assert fmean(values) == pytest.approx(truth.of("co2", (5.0, 3.0), NOON_S), abs=6.0)
     assert stdev(values) == pytest.approx(30.0, rel=0.15)
     # The temperature has no noise at all.
-    assert climate.read(("temperature",), (1.0, 1.0), 0.0, chance)[0][1] == climate.truth(
+    assert climate.read(("temperature",), (1.0, 1.0), 0.0, chance)[0][1] == truth.of(
         "temperature", (1.0, 1.0), 0.0
     )

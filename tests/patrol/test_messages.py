@@ -18,15 +18,15 @@ from lupin_patrol.mission import (
     FlowersSeen,
     MapGrown,
     ScanStatus,
-    TagPose,
     TagScanned,
     TagsDiscovered,
+    pose_of,
 )
 from lupin_patrol.perception import Grid, Sighting
-from lupin_patrol.plants import Bloom, Inspection
+from lupin_twin.core.state import Bloom, Flower
 
 STAMP = Time(sec=12, nanosec=34)
-POSE = TagPose((1.5, 2.5), pi / 2)
+POSE = pose_of((1.5, 2.5), pi / 2)
 SCAN = TagScanned(
     at_s=3.0,
     pass_index=0,
@@ -38,9 +38,10 @@ SCAN = TagScanned(
     pose=POSE,
 )
 # Numbers that a float32 holds exactly: what was sent equals what comes.
-BLOOM = Bloom((1.5, 2.2), 0.25, "lupin", 0.875, anomaly=True)
-LOOK = Inspection("lupin", 0.75, anomaly=True, flower_count=12, bug_count=3, blooms=(BLOOM,))
-FLOWERS = FlowersSeen(3.2, 4, "7", POSE, LOOK, Rect(1.0, 2.0, 2.0, 2.25))
+BLOOM = Bloom(1.5, 2.2, 0.6, 0.25, "lupin", 0.875, anomaly=True)
+BOX = Rect(1.0, 2.0, 2.0, 2.25)
+CORNERS = tuple((x, y, 0.0) for x, y in BOX.corners)
+FLOWERS = FlowersSeen(3.2, 4, "7", POSE, Flower("lupin", 0.75, True, 12, 3, (BLOOM,), CORNERS))
 
 
 @pytest.fixture(autouse=True)
@@ -95,7 +96,7 @@ def test_a_failed_scan_says_why_and_has_no_pose(status: ScanStatus, expected: in
 
 
 def test_a_flower_observation() -> None:
-    message = over_the_wire(messages.flower(FLOWERS, STAMP, "map"))
+    message = over_the_wire(messages.inspection(FLOWERS, STAMP, "map"))
     assert message.kind == Observation.KIND_FLOWER
     assert message.status == Observation.STATUS_OK
     assert message.mission_id == "patrol-0005"
@@ -111,7 +112,7 @@ def test_a_flower_observation() -> None:
         (1.0, 2.25, 0.0),
     ]
     [bloom] = flower.flowers
-    assert (bloom.position.x, bloom.position.y) == BLOOM.position
+    assert (bloom.position.x, bloom.position.y) == (BLOOM.x, BLOOM.y)
     assert bloom.position.z == BLOOM.z
     assert bloom.height_m == 0.25
     assert (bloom.species, bloom.anomaly) == ("lupin", True)
@@ -119,7 +120,7 @@ def test_a_flower_observation() -> None:
 
 
 def test_the_list_of_discovered_tags() -> None:
-    table = Table("one", FLOWERS.box)
+    table = Table("one", BOX)
     tag = Tag("7", (1.5, 2.5), ("co2",), table, (1.5, 2.25), (0.0, 1.0), (1.5, 2.65))
     event = TagsDiscovered(1.0, (Sighting(tag, "tulip", 0.625, anomaly=False, sightings=4),))
     message = over_the_wire(messages.discovered_tags(event, STAMP, "hall"))

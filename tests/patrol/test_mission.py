@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator
 from itertools import pairwise
-from math import dist
+from math import atan2, dist
 from typing import TypeVar
 
 import numpy as np
@@ -25,6 +25,8 @@ from lupin_patrol.mission import (
     TagScanned,
     TagsDiscovered,
 )
+from lupin_twin.core.state import Pose
+from tests.support.climate import known_in
 
 DEFAULT_SEED = 0
 DAY_SPEED = 60.0
@@ -88,7 +90,7 @@ def test_the_map_grows_and_never_forgets(first_pass: list[Event]) -> None:
     grids = [event.grid for event in only(MapGrown, first_pass)]
     assert len(grids) > 10
     for before, after in pairwise(grids):
-        assert after.known > before.known
+        assert known_in(after) > known_in(before)
         old, new = (np.frombuffer(grid.cells, dtype=np.int8) for grid in (before, after))
         assert (new[old != -1] == old[old != -1]).all()
 
@@ -98,7 +100,7 @@ def test_the_whole_house_is_known_after_one_pass_and_the_map_is_silent_then(
 ) -> None:
     for events in many_first_passes:
         grid = only(MapGrown, events)[-1].grid
-        assert grid.known == grid.width * grid.height
+        assert known_in(grid) == grid.width * grid.height
     last = only(MapGrown, patrol)[-1]
     assert last.at_s <= only(PassCompleted, patrol)[0].at_s
 
@@ -109,7 +111,7 @@ def test_what_was_seen_since_the_last_map_is_published_at_the_end_of_the_pass(
     monkeypatch.setattr("lupin_patrol.mission._MAP_PERIOD_S", 1e9)
     first, last = only(MapGrown, played())
     assert first.at_s == 0.0
-    assert last.grid.known == len(last.grid.cells)
+    assert known_in(last.grid) == len(last.grid.cells)
 
 
 # --- discovery -----------------------------------------------------------------------------------
@@ -212,19 +214,23 @@ def test_every_pass_tries_every_tag(patrol: list[Event]) -> None:
         assert len(tried) == 29
 
 
+def yaw_of(pose: Pose) -> float:
+    return 2.0 * atan2(pose.qz, pose.qw)
+
+
 def test_poses_are_the_tags_own_at_first_and_jitter_a_little_later(patrol: list[Event]) -> None:
     greenhouse = Mission(GreenhouseSimulator(), 0, DAY_SPEED).greenhouse
     for scan in only(TagScanned, patrol):
         if scan.pose is None:
             continue
         tag = greenhouse.tag(scan.tag_id)
-        off = dist(scan.pose.position, tag.position)
+        off = dist((scan.pose.x, scan.pose.y), tag.position)
         if scan.pass_index == 0:
             assert off == 0.0
-            assert scan.pose.yaw == tag.yaw
+            assert yaw_of(scan.pose) == pytest.approx(tag.yaw)
         else:
             assert 0.0 < off < 0.06
-            assert scan.pose.yaw == pytest.approx(tag.yaw, abs=0.1)
+            assert yaw_of(scan.pose) == pytest.approx(tag.yaw, abs=0.1)
 
 
 # --- flowers -------------------------------------------------------------------------------------
@@ -243,17 +249,18 @@ def test_a_look_at_the_flowers_follows_every_scan_that_went_well(patrol: list[Ev
 def test_blooms_stand_in_the_box_and_the_box_is_the_tags_table(patrol: list[Event]) -> None:
     greenhouse = Mission(GreenhouseSimulator(), 0, DAY_SPEED).greenhouse
     for event in only(FlowersSeen, patrol):
-        assert event.box == greenhouse.tag(event.tag_id).table.rect
-        assert all(event.box.contains(bloom.position) for bloom in event.inspection.blooms)
+        box = greenhouse.tag(event.tag_id).table.rect
+        assert event.flower.footprint == tuple((x, y, 0.0) for x, y in box.corners)
+        assert all(box.contains((bloom.x, bloom.y)) for bloom in event.flower.blooms)
 
 
 def test_a_pest_is_seen_and_cleared_by_a_later_pass(patrol: list[Event]) -> None:
     looks = only(FlowersSeen, patrol)
-    infested = [look for look in looks if look.inspection.anomaly]
+    infested = [look for look in looks if look.flower.anomaly]
     assert infested[0].pass_index == 0
-    assert infested[0].inspection.bug_count > 0
+    assert infested[0].flower.bug_count > 0
     assert any(
-        not look.inspection.anomaly and look.inspection.bug_count == 0
+        not look.flower.anomaly and look.flower.bug_count == 0
         for look in looks
         if look.tag_id == infested[0].tag_id and look.pass_index > 0
     )

@@ -13,7 +13,7 @@ from lupin_patrol.cli import parse
 from lupin_patrol.greenhouse import read_greenhouse
 from lupin_patrol.mission import START_OF_DAY_S
 from lupin_patrol.past import DAYS, main, past
-from lupin_patrol.plants import Climate
+from tests.support.climate import Truth
 
 DAY_SPEED = 60.0
 
@@ -74,13 +74,13 @@ def test_places_are_exact_at_first(events: list[dict[str, Any]]) -> None:
 def test_its_time_of_day_is_that_of_the_patrol(scans: list[dict[str, Any]]) -> None:
     """Readings follow the climate's own curve, at the time of day that leads up to the start."""
     greenhouse = read_greenhouse(GreenhouseSimulator())
-    climate = Climate(GreenhouseSimulator())
+    truth = Truth(GreenhouseSimulator())
 
     def off_by(hours: float) -> float:
         return fmean(
             abs(
                 value
-                - climate.truth(
+                - truth.of(
                     "temperature",
                     greenhouse.tag(event["tag_id"]).position,
                     START_OF_DAY_S + event["at_s"] * DAY_SPEED + hours * 3600,

@@ -50,7 +50,7 @@ def test_blooms_stand_inside_the_tags_own_table(greenhouse: Greenhouse, plants: 
             assert look.blooms
             assert look.flower_count == len(look.blooms)
             for bloom in look.blooms:
-                assert tag.table.rect.contains(bloom.position)
+                assert tag.table.rect.contains((bloom.x, bloom.y))
                 assert bloom.species == look.species == plants.species(tag.tag_id)
                 assert 0.1 < bloom.height_m < 0.4
                 assert bloom.z == TABLE_HEIGHT_M + bloom.height_m
@@ -65,14 +65,14 @@ def test_a_bloom_belongs_to_the_nearest_tag_of_its_table(
         others = [t for t in greenhouse.tags if t.table == tag.table and t != tag]
         for bloom in plants.inspect(tag.tag_id, 0, 0).blooms:
             # The look places it 1 cm off in each axis, so the border is a little soft.
-            nearest = min(dist(bloom.position, other.position) for other in others)
-            assert dist(bloom.position, tag.position) < nearest + 0.03
+            nearest = min(dist((bloom.x, bloom.y), other.position) for other in others)
+            assert dist((bloom.x, bloom.y), tag.position) < nearest + 0.03
 
 
 def test_a_flower_stays_where_it_is(plants: Plants) -> None:
-    first = [bloom.position for bloom in plants.inspect("12", 0, 0).blooms]
+    first = [(bloom.x, bloom.y) for bloom in plants.inspect("12", 0, 0).blooms]
     for bloom in plants.inspect("12", 7, 0).blooms:
-        assert min(dist(bloom.position, position) for position in first) < 0.09
+        assert min(dist((bloom.x, bloom.y), position) for position in first) < 0.09
 
 
 def test_some_flowers_are_overlooked(greenhouse: Greenhouse, plants: Plants) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, Board
-from lupin_bridge.alarms.ledger import Page, change_between, page_of
+from lupin_bridge.alarms.ledger import change_between, page_of
 from lupin_bridge.judge.alarm import Alarm, alarm_id
 from lupin_bridge.judge.daylight import Day, judge_day
 from lupin_bridge.judge.judging import judge_once
@@ -50,7 +50,7 @@ def seen(
     return GreenhouseState(
         snapshot=snapshot,
         judged=judge_once(snapshot, (), SENSORS, lambda *_: Day(True, "assumed"), HOLDS_NS / 1e9),
-        board=Board(Page.of(alarms), "heard", NOW_NS, 1),
+        board=Board(page_of(alarms), "heard", NOW_NS, 1),
         holds_ns=holds,
         now_ns=now_ns,
         is_live=is_live,

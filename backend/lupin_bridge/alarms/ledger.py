@@ -50,11 +50,6 @@ class Page:
     worst: tuple[Alarm, ...] = ()
     by_tag: Mapping[str, tuple[Alarm, ...]] = field(default_factory=dict)
 
-    @classmethod
-    def of(cls, alarms: Iterable[Alarm]) -> Page:
-        """All of it, of alarms in any order."""
-        return page_of(alarms)
-
 
 def page_of(alarms: Iterable[Alarm], since_ns: int = 0) -> Page:
     """Alarms in their order, without what was over before `since_ns`."""

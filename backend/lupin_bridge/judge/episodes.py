@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from lupin_bridge.judge.alarm import Alarm, alarm_id
@@ -74,6 +74,7 @@ class _Finding:
     worse: Callable[[float, float], float] | None = None
 
 
+@dataclass(slots=True)
 class TagEpisodes:
     """A tag's episodes in one run of the clock; `step` takes its occasions in the order of time.
 
@@ -81,49 +82,28 @@ class TagEpisodes:
     the clock alone: the days of a quantity of a day.
     """
 
-    __slots__ = (
-        "_clock",
-        "_courses",
-        "_done",
-        "_received_ns",
-        "_recent_ns",
-        "_run_ns",
-        "_scans_ns",
-        "_sensors",
-        "_species",
-        "_tag_id",
-        "_watches",
-    )
-
-    def __init__(
-        self,
-        tag_id: str,
-        run_ns: int,
-        sensors: Sensors,
-        recent_ns: int | None = None,
-        clock: IsDay = lambda _: True,
-    ) -> None:
-        self._tag_id = tag_id
-        self._run_ns = run_ns
-        self._sensors = sensors
-        self._recent_ns = recent_ns
-        self._clock = clock
-        self._species = ""
-        # Since the last dawn, of each sensor of which a judged quantity of a day is made.
-        self._courses: dict[str, Course] = {}
-        self._scans_ns: tuple[int, ...] = ()
-        # Of each sensor, the last scan that had it, and how long it was from the one before.
-        self._received_ns: dict[str, tuple[int, int]] = {}
-        self._watches: dict[Key, _Watch] = {}
-        self._done: tuple[Alarm, ...] = ()
+    tag_id: str
+    run_ns: int
+    sensors: Sensors
+    recent_ns: int | None = None
+    clock: IsDay = lambda _: True
+    _species: str = ""
+    # Since the last dawn, of each sensor of which a judged quantity of a day is made.
+    _courses: dict[str, Course] = field(default_factory=dict)
+    _scans_ns: tuple[int, ...] = ()
+    # Of each sensor, the last scan that had it, and how long it was from the one before.
+    _received_ns: dict[str, tuple[int, int]] = field(default_factory=dict)
+    _watches: dict[Key, _Watch] = field(default_factory=dict)
+    _done: tuple[Alarm, ...] = ()
 
     def copy(self) -> TagEpisodes:
         """The same, to go on from here apart."""
-        other = TagEpisodes(self._tag_id, self._run_ns, self._sensors, self._recent_ns, self._clock)
-        other._species, other._done = self._species, self._done
-        other._scans_ns, other._received_ns = self._scans_ns, dict(self._received_ns)
-        other._watches, other._courses = dict(self._watches), dict(self._courses)
-        return other
+        return replace(
+            self,
+            _courses=dict(self._courses),
+            _received_ns=dict(self._received_ns),
+            _watches=dict(self._watches),
+        )
 
     def alarms(self, ended_ns: int | None = None) -> Iterator[Alarm]:
         """All of them; those that are open end at `ended_ns`, where the run has."""
@@ -159,7 +139,7 @@ class TagEpisodes:
         day: bool | None = None
         for reading in (*readings, *derive(readings)):
             name = reading.name
-            sensor = self._sensors.named(name)
+            sensor = self.sensors.named(name)
             is_good = sensor.is_plausible(reading.value)
             key = (Kind.READING_FAILED, name, "")
             if name not in DERIVED and (not is_good or key in self._watches):
@@ -167,7 +147,7 @@ class TagEpisodes:
             if is_good:
                 day = is_day(stamp_ns) if day is None else day
                 yield from self._of_range(reading, is_day=day)
-                if name in self._sensors.judged_by_the_day:
+                if name in self.sensors.judged_by_the_day:
                     yield from self._of_days(reading, stamp_ns)
         if readings:
             yield from self._of_age({reading.name for reading in readings}, stamp_ns)
@@ -184,7 +164,7 @@ class TagEpisodes:
             yield _Finding((Kind.PEST, "", ""), look.anomaly, look.anomaly, reason, max)
 
     def _of_range(self, reading: Reading, *, is_day: bool) -> Iterator[_Finding]:
-        ranges = self._sensors.named(reading.name).ranges(is_day=is_day, species=self._species)
+        ranges = self.sensors.named(reading.name).ranges(is_day=is_day, species=self._species)
         ideal, value = ranges.ideal, reading.value
         for side in ("low", "high"):
             key = (Kind.RANGE, reading.name, side)
@@ -202,15 +182,15 @@ class TagEpisodes:
     def _of_days(self, reading: Reading, stamp_ns: int) -> Iterator[_Finding]:
         """What the first reading of a day says of the day before."""
         name, value = reading.name, reading.value
-        before, by_day = self._courses.get(name), self._clock(stamp_ns)
+        before, by_day = self._courses.get(name), self.clock(stamp_ns)
         if before is None:
             self._courses[name] = Course.begin(stamp_ns, value, is_day=by_day)
             return
-        self._courses[name] = course = before.after(stamp_ns, value, self._clock)
+        self._courses[name] = course = before.after(stamp_ns, value, self.clock)
         if not before.ends(stamp_ns, is_day=by_day):
             return
         self._courses[name] = Course.begin(stamp_ns, value, is_day=by_day)
-        for quantity in self._sensors.judged_by_the_day[name]:
+        for quantity in self.sensors.judged_by_the_day[name]:
             known = DAILY[quantity].of(course)
             # A sensor of that name goes first.
             if quantity not in self._received_ns and math.isfinite(known):
@@ -228,7 +208,7 @@ class TagEpisodes:
             if holds is None:
                 holds = holds_ns(interval_ns(self._scans_ns))
             own = holds_ns(interval or None)
-            limit_ns = self._recent_ns or max(holds, own)
+            limit_ns = self.recent_ns or max(holds, own)
             is_old = stamp_ns - last_ns > limit_ns
             old = Reason(Kind.OLD, Verdict.UNKNOWN, name, limit=limit_ns / 1e9, since_ns=last_ns)
             yield _Finding(key, is_old, is_old, old)
@@ -292,9 +272,9 @@ class TagEpisodes:
         assert watch.raised_at_ns is not None
         kind, sensor, which = key
         return Alarm(
-            id=alarm_id(self._tag_id, f"{kind} {which}", sensor, self._run_ns, watch.began_ns),
+            id=alarm_id(self.tag_id, f"{kind} {which}", sensor, self.run_ns, watch.began_ns),
             reason=watch.reason,
-            tag_id=self._tag_id,
+            tag_id=self.tag_id,
             raised_at_ns=watch.raised_at_ns,
             cleared_at_ns=cleared_at_ns,
             worst=watch.worst,

@@ -33,7 +33,7 @@ from lupin_bridge.judge.verdict import (
     Reason,
     Verdict,
     is_overdue,
-    judge_house,
+    judge_site,
     judge_tag,
     stopped,
 )
@@ -68,7 +68,7 @@ NOTHING_JUDGED: Final = Judged(_UNKNOWN, {}, frozenset(), Day(True, "assumed"))
 
 def silenced(judged: Judged) -> Judged:
     """The same of a greenhouse whose twin has fallen silent since."""
-    return replace(judged, house=judge_house({}, is_silent=True))
+    return replace(judged, house=judge_site({}, is_silent=True))
 
 
 def unjudged(snapshot: Snapshot) -> Judged:
@@ -118,7 +118,7 @@ def judge_once(
     patrol = scans.patrol(sum(map(is_overdue, healths.values())))
     once = sum(_is_once(recent.tag(tag_id), recent_s) for tag_id in healths)
     stop = stopped(patrol.last_scan_ns, now_ns, once, len(healths))
-    house = judge_house(counts, is_silent=now_ns is None, stopped=stop)
+    house = judge_site(counts, is_silent=now_ns is None, stopped=stop)
     day = recent.day(snapshot.stamp_ns)
     return Judged(house, healths, frozenset(healths), day, patrol=patrol)
 
@@ -345,7 +345,7 @@ class Judge:
                 tags.pop(tag_id, None)
         patrol = self._scans.patrol(self._overdue)
         stop = stopped(patrol.last_scan_ns, now_ns, len(self._once), len(tags))
-        house = judge_house(self._counts, is_silent=now_ns is None, stopped=stop)
+        house = judge_site(self._counts, is_silent=now_ns is None, stopped=stop)
         is_same = (house, day, patrol) == (before.house, before.day, before.patrol)
         if tags is before.tags and is_same and before.number:
             return before

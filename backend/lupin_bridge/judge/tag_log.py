@@ -114,20 +114,7 @@ class TagLog:
             if self._numbers[at - 1] == number:
                 return False
             at -= 1
-        other = PastWrite(
-            0,
-            write.run,
-            write.tag_id,
-            0,
-            write.kind,
-            write.status,
-            write.sensors,
-            (),
-            write.has_seen,
-            write.species,
-            write.anomaly,
-            write.bug_count,
-        )
+        other = replace(write, number=0, stamp_ns=0, values=())
         self._stamps_ns.insert(at, stamp_ns)
         self._numbers.insert(at, number)
         self._values.insert(at, array("d", write.values).tobytes())
@@ -154,20 +141,11 @@ class TagLog:
             self._known = {other: other for other in self._others}
 
     def _write(self, index: int) -> PastWrite:
-        other = self._others[index]
-        return PastWrite(
-            self._numbers[index],
-            other.run,
-            other.tag_id,
-            self._stamps_ns[index],
-            other.kind,
-            other.status,
-            other.sensors,
-            tuple(array("d", self._values[index])),
-            other.has_seen,
-            other.species,
-            other.anomaly,
-            other.bug_count,
+        return replace(
+            self._others[index],
+            number=self._numbers[index],
+            stamp_ns=self._stamps_ns[index],
+            values=tuple(array("d", self._values[index])),
         )
 
 

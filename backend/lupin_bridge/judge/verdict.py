@@ -245,7 +245,7 @@ def with_derived(tags: Sequence[TagState], sensor_type: str) -> Sequence[TagStat
     return [replace(tag, readings=(*tag.readings, *derive(tag.readings))) for tag in tags]
 
 
-def judge_house(
+def judge_site(
     tags: Mapping[Verdict, int], *, is_silent: bool, stopped: Reason | None = None
 ) -> Health:
     """The greenhouse is its worst tag; unknown where more than half are, or nothing is scanned.

@@ -83,7 +83,8 @@ def main() -> int:
     from rclpy.utilities import remove_ros_args  # noqa: PLC0415
 
     from lupin_patrol.mission import Mission  # noqa: PLC0415
-    from lupin_patrol.node import ParameterError, play  # noqa: PLC0415
+    from lupin_patrol.node import play  # noqa: PLC0415
+    from lupin_twin.core.parameters import ParameterError  # noqa: PLC0415
 
     try:
         options = parse(remove_ros_args(sys.argv)[1:])

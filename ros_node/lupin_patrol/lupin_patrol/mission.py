@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from enum import Enum
+from enum import IntEnum
 from itertools import count
 from math import cos, sin
 from random import Random
@@ -18,7 +18,6 @@ from typing import Any
 from lupin_patrol.greenhouse import (
     TAG_HEIGHT_M,
     Point,
-    Rect,
     Roadmap,
     Tag,
     length_of,
@@ -27,29 +26,21 @@ from lupin_patrol.greenhouse import (
     walk,
 )
 from lupin_patrol.perception import Exploration, Grid, Sighting, TagDetector
-from lupin_patrol.plants import SECONDS_PER_DAY, Climate, Inspection, Plants, stream
+from lupin_patrol.plants import SECONDS_PER_DAY, Climate, Plants, stream
+from lupin_twin.core.state import Flower, Pose
 
 
-class ScanStatus(Enum):
-    """How a scan went; the names are those of lupin_msgs/Observation's STATUS_*."""
+class ScanStatus(IntEnum):
+    """How a scan went: lupin_msgs/Observation's STATUS_*."""
 
-    OK = "OK"
-    UNREACHABLE = "UNREACHABLE"
-    SCAN_FAILED = "SCAN_FAILED"
+    OK = 0
+    UNREACHABLE = 1
+    SCAN_FAILED = 2
 
 
-@dataclass(frozen=True, slots=True)
-class TagPose:
-    """Where a tag was located. `yaw` (rad, from x towards y) points from the tag into the aisle."""
-
-    position: Point
-    yaw: float
-
-    @property
-    def numbers(self) -> tuple[float, float, float, float, float, float, float]:
-        """x, y, z (m) and the quaternion's x, y, z, w, as a pose of ROS has them."""
-        x, y = self.position
-        return x, y, TAG_HEIGHT_M, 0.0, 0.0, sin(self.yaw / 2), cos(self.yaw / 2)
+def pose_of(position: Point, yaw: float) -> Pose:
+    """Where a tag is located; `yaw` (rad, from x towards y) points from it into the aisle."""
+    return Pose(*position, TAG_HEIGHT_M, 0.0, 0.0, sin(yaw / 2), cos(yaw / 2))
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,19 +70,18 @@ class TagScanned:
     status_detail: str
     time_of_day_s: float
     readings: tuple[tuple[str, float], ...]
-    pose: TagPose | None
+    pose: Pose | None
 
 
 @dataclass(frozen=True, slots=True)
 class FlowersSeen:
-    """One look at the plants around a tag; `box` is the outline of their table."""
+    """One inspection of the plants around a tag; its footprint is the outline of their table."""
 
     at_s: float
     pass_index: int
     tag_id: str
-    pose: TagPose
-    inspection: Inspection
-    box: Rect
+    pose: Pose
+    flower: Flower
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +207,7 @@ class Mission:
         yield from self._drive(tag.stop, pass_index, _BLOCKED_SHORT_M if blocked else 0.0)
         self._now_s += _READ_S
         time_of_day_s = (START_OF_DAY_S + self._now_s * self._day_speed) % SECONDS_PER_DAY
-        pose: TagPose | None = None
+        pose: Pose | None = None
         readings: tuple[tuple[str, float], ...] = ()
         if status is ScanStatus.OK:
             chance = stream(self._seed, "scan", tag.tag_id, pass_index, attempt)
@@ -237,8 +227,8 @@ class Mission:
         )
         if pose is not None:
             self._now_s += _PICTURE_S
-            look = self._plants.inspect(tag.tag_id, pass_index, attempt)
-            yield FlowersSeen(self._now_s, pass_index, tag.tag_id, pose, look, tag.table.rect)
+            flower = self._plants.inspect(tag.tag_id, pass_index, attempt)
+            yield FlowersSeen(self._now_s, pass_index, tag.tag_id, pose, flower)
 
     def _drive(self, goal: Point, pass_index: int, short_m: float = 0.0) -> Iterator[Event]:
         """Drive to a goal, or stop a little before it, and look around on the way."""
@@ -267,12 +257,7 @@ class Mission:
         return length_of(self._roadmap.way(self._position, goal))
 
 
-def _locate(tag: Tag, noise: float, chance: Random) -> TagPose:
+def _locate(tag: Tag, noise: float, chance: Random) -> Pose:
     """Say where a tag is, to about a centimetre times `noise`."""
-    return TagPose(
-        (
-            tag.position[0] + noise * chance.gauss(0.0, _POSE_NOISE_M),
-            tag.position[1] + noise * chance.gauss(0.0, _POSE_NOISE_M),
-        ),
-        tag.yaw + noise * chance.gauss(0.0, _YAW_NOISE_RAD),
-    )
+    x, y = (at + noise * chance.gauss(0.0, _POSE_NOISE_M) for at in tag.position)
+    return pose_of((x, y), tag.yaw + noise * chance.gauss(0.0, _YAW_NOISE_RAD))

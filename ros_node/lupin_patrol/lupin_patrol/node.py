@@ -18,11 +18,10 @@ from typing import Any
 
 import rclpy
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Point, Point32, Pose, PoseStamped, Quaternion
+from geometry_msgs.msg import Point, PoseStamped
 from lupin_msgs.msg import (
     DiscoveredTag,
     DiscoveredTags,
-    FlowerPoint,
     Observation,
     SensorReading,
 )
@@ -31,7 +30,6 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.duration import Duration
 from rclpy.exceptions import (
     InvalidParameterTypeException,
-    InvalidTopicNameException,
 )
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -44,14 +42,15 @@ from lupin_patrol.mission import (
     MapGrown,
     PassCompleted,
     ScanStatus,
-    TagPose,
     TagScanned,
     TagsDiscovered,
+    pose_of,
 )
-from lupin_patrol.mission import TagsDiscovered as TagsDiscoveredEvent
 from lupin_patrol.perception import Sighting
-from lupin_patrol.plants import Bloom
+from lupin_twin.core.parameters import ParameterError
 from lupin_twin.ros.base_node import NodeUtilities, end_spinning, latched, spin_until_shutdown
+from lupin_twin.ros.convert import bloom_message, polygon_message, pose_message
+from lupin_twin.ros.parameters import naming, naming_own_parameters
 from lupin_twin.runtime import process
 from lupin_twin.runtime.process import remove_stale_shared_memory
 
@@ -67,18 +66,12 @@ _DELIVERY_S = 5.0
 _POLL_S = 0.05
 
 
-class ParameterError(ValueError):
-    """A ROS parameter that stops the node at start; the message names it, its value, its limit."""
-
-
 class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
     """Publishes observations, discovered tags and the map, all of them latched."""
 
     def __init__(self) -> None:
-        try:
+        with naming_own_parameters():
             super().__init__("lupin_patrol")
-        except InvalidParameterTypeException as error:
-            raise ParameterError(f"parameter use_sim_time is no bool: {error}") from error
         self.utilities = NodeUtilities(self)
         self._frame_id = self._name("frame_id", "map")
         self.observations = self._latched(
@@ -105,7 +98,7 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
                         f"tag {event.tag_id}: {event.status.name}, {event.status_detail}"
                     )
             case FlowersSeen():
-                self.observations.publish(flower(event, stamp, self._frame_id))
+                self.observations.publish(inspection(event, stamp, self._frame_id))
             case PassCompleted():
                 self.get_logger().info(
                     f"pass {event.pass_index + 1} completed;"
@@ -121,11 +114,8 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _latched(self, message: type[Any], parameter: str, default: str, depth: int) -> Any:
         topic = self._name(parameter, default)
-        try:
+        with naming(parameter, topic):
             return self.create_publisher(message, topic, latched(depth))
-        except InvalidTopicNameException as error:
-            reason = str(error).partition("\n")[0].rstrip(":")
-            raise ParameterError(f"parameter {parameter} is {topic!r}: {reason}") from error
 
     def _name(self, parameter: str, default: str) -> str:
         try:
@@ -210,18 +200,12 @@ def _stopped_before(stop: Flag, condition: Callable[[], bool], timeout_s: float)
 
 SOURCE = "lupin_patrol"
 
-_STATUS = {
-    ScanStatus.OK: Observation.STATUS_OK,
-    ScanStatus.UNREACHABLE: Observation.STATUS_UNREACHABLE,
-    ScanStatus.SCAN_FAILED: Observation.STATUS_SCAN_FAILED,
-}
-
 
 def tag_reading(event: TagScanned, stamp: Time, frame_id: str) -> Observation:
     """Return a KIND_TAG_READING observation; without success it has no readings and no pose."""
     message = _observation(event, stamp, frame_id)
     message.kind = Observation.KIND_TAG_READING
-    message.status = _STATUS[event.status]
+    message.status = int(event.status)
     message.status_detail = event.status_detail
     message.tag_reading.tag_id = event.tag_id
     message.tag_reading.stamp = stamp
@@ -232,7 +216,7 @@ def tag_reading(event: TagScanned, stamp: Time, frame_id: str) -> Observation:
     return message
 
 
-def flower(event: FlowersSeen, stamp: Time, frame_id: str) -> Observation:
+def inspection(event: FlowersSeen, stamp: Time, frame_id: str) -> Observation:
     """Return a KIND_FLOWER observation."""
     message = _observation(event, stamp, frame_id)
     message.kind = Observation.KIND_FLOWER
@@ -240,19 +224,18 @@ def flower(event: FlowersSeen, stamp: Time, frame_id: str) -> Observation:
     seen = message.flower
     seen.tag_id = event.tag_id
     seen.pose = PoseStamped(header=message.header, pose=message.tag_pose_in_map)
-    seen.species = event.inspection.species
-    seen.confidence = float(event.inspection.confidence)
-    seen.anomaly = event.inspection.anomaly
-    seen.flower_count = int(event.inspection.flower_count)
-    seen.bug_count = int(event.inspection.bug_count)
-    seen.flowers = [_flower_point(bloom) for bloom in event.inspection.blooms]
-    seen.box_footprint.points = [
-        Point32(x=float(x), y=float(y), z=0.0) for x, y in event.box.corners
-    ]
+    flower = event.flower
+    seen.species = flower.species
+    seen.confidence = float(flower.confidence)
+    seen.anomaly = flower.anomaly
+    seen.flower_count = int(flower.flower_count)
+    seen.bug_count = int(flower.bug_count)
+    seen.flowers = [bloom_message(bloom) for bloom in flower.blooms]
+    seen.box_footprint = polygon_message(flower.footprint)
     return message
 
 
-def discovered_tags(event: TagsDiscoveredEvent, stamp: Time, frame_id: str) -> DiscoveredTags:
+def discovered_tags(event: TagsDiscovered, stamp: Time, frame_id: str) -> DiscoveredTags:
     """Return perception's whole list."""
     return DiscoveredTags(
         header=Header(stamp=stamp, frame_id=frame_id),
@@ -278,33 +261,14 @@ def _observation(event: TagScanned | FlowersSeen, stamp: Time, frame_id: str) ->
         header=Header(stamp=stamp, frame_id=frame_id),
         mission_id=f"patrol-{event.pass_index + 1:04d}",
         source=SOURCE,
-        tag_pose_in_map=_pose(event.pose),
-    )
-
-
-def _pose(pose: TagPose | None) -> Pose:
-    if pose is None:
-        # w defaults to 1 in ROS 2, which would pin the tag at the origin.
-        return Pose(orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=0.0))
-    x, y, z, qx, qy, qz, qw = map(float, pose.numbers)
-    return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
-
-
-def _flower_point(bloom: Bloom) -> FlowerPoint:
-    x, y = bloom.position
-    return FlowerPoint(
-        position=Point(x=float(x), y=float(y), z=float(bloom.z)),
-        height_m=float(bloom.height_m),
-        species=bloom.species,
-        confidence=float(bloom.confidence),
-        anomaly=bloom.anomaly,
+        tag_pose_in_map=pose_message(event.pose),
     )
 
 
 def _discovered_tag(sighting: Sighting) -> DiscoveredTag:
     return DiscoveredTag(
         tag_id=sighting.tag.tag_id,
-        pose_in_map=_pose(TagPose(sighting.tag.position, sighting.tag.yaw)),
+        pose_in_map=pose_message(pose_of(sighting.tag.position, sighting.tag.yaw)),
         species=sighting.species,
         species_confidence=float(sighting.species_confidence),
         anomaly=sighting.anomaly,

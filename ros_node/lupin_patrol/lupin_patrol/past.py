@@ -12,19 +12,18 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict, astuple
 from typing import Any
 
 from greenhouse_sim.simulator import GreenhouseSimulator
 
 from lupin_patrol.cli import parse
-from lupin_patrol.mission import FlowersSeen, Mission, ScanStatus, TagScanned
+from lupin_patrol.mission import Mission, TagScanned
 from lupin_patrol.plants import SECONDS_PER_DAY
 
 DAYS = 3
 # So far before the patrol's own passes that none of them is alike.
 _FIRST_PASS = -1_000_000
-# lupin_msgs/Observation.STATUS_*
-_STATUS = {ScanStatus.OK: 0, ScanStatus.UNREACHABLE: 1, ScanStatus.SCAN_FAILED: 2}
 
 
 def past(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
@@ -46,40 +45,14 @@ def past(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
             "tag_id": event.tag_id,
             "at_s": event.at_s / options.speed,
             "pass": event.pass_index - _FIRST_PASS + 1,
-            "pose": event.pose and event.pose.numbers,
+            "pose": event.pose and astuple(event.pose),
         }
-        yield common | (_scan(event) if isinstance(event, TagScanned) else _look(event))
-
-
-def _scan(event: TagScanned) -> dict[str, Any]:
-    return {
-        "status": _STATUS[event.status],
-        "detail": event.status_detail,
-        "readings": event.readings,
-    }
-
-
-def _look(event: FlowersSeen) -> dict[str, Any]:
-    look = event.inspection
-    return {
-        "species": look.species,
-        "confidence": look.confidence,
-        "anomaly": look.anomaly,
-        "flower_count": look.flower_count,
-        "bug_count": look.bug_count,
-        "blooms": [
-            (
-                *bloom.position,
-                bloom.z,
-                bloom.height_m,
-                bloom.species,
-                bloom.confidence,
-                bloom.anomaly,
-            )
-            for bloom in look.blooms
-        ],
-        "footprint": [(*corner, 0.0) for corner in event.box.corners],
-    }
+        if isinstance(event, TagScanned):
+            detail, readings = event.status_detail, event.readings
+            yield common | {"status": event.status, "detail": detail, "readings": readings}
+        else:
+            blooms = [astuple(bloom) for bloom in event.flower.blooms]
+            yield common | asdict(event.flower) | {"blooms": blooms}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

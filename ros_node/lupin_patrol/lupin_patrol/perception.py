@@ -105,11 +105,6 @@ class Grid:
     origin: Point
     cells: bytes
 
-    @property
-    def known(self) -> int:
-        """How many cells are known."""
-        return len(self.cells) - self.cells.count(UNKNOWN.to_bytes(1, "little", signed=True))
-
 
 class Exploration:
     """What the robot has seen of the floor so far. Cells become known and never unknown again."""

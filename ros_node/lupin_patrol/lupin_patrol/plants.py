@@ -10,15 +10,13 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import dist
 from random import Random
 from typing import Any
 
-from greenhouse_sim.simulator import SensorRegistry
-
 from lupin_patrol.greenhouse import TABLE_HEIGHT_M, Greenhouse, Point, Table, Tag
+from lupin_twin.core.state import Bloom, Flower
 
 
 def stream(seed: int, *occasion: str | int) -> random.Random:
@@ -43,34 +41,6 @@ _OUTBREAK = 0.6
 _LONGEST_OUTBREAK = 2
 
 
-@dataclass(frozen=True, slots=True)
-class Bloom:
-    """One flower: position in m (map), height above the soil in m, confidence 0 to 1."""
-
-    position: Point
-    height_m: float
-    species: str
-    confidence: float
-    anomaly: bool
-
-    @property
-    def z(self) -> float:
-        """Height above the floor, m."""
-        return TABLE_HEIGHT_M + self.height_m
-
-
-@dataclass(frozen=True, slots=True)
-class Inspection:
-    """What the camera made of the plants around a tag."""
-
-    species: str
-    confidence: float
-    anomaly: bool
-    flower_count: int
-    bug_count: int
-    blooms: tuple[Bloom, ...]
-
-
 class Plants:
     """All plants of a greenhouse. Each table grows one species; a bloom belongs to one tag."""
 
@@ -78,6 +48,10 @@ class Plants:
         self._seed = seed
         self._first_pass = first_pass
         self._tag_ids = [tag.tag_id for tag in greenhouse.tags]
+        self._boxes = {
+            tag.tag_id: tuple((x, y, 0.0) for x, y in tag.table.rect.corners)
+            for tag in greenhouse.tags
+        }
         self._blooms: dict[str, list[Bloom]] = {tag_id: [] for tag_id in self._tag_ids}
         self._species: dict[str, str] = {}
         for table in greenhouse.tables:
@@ -86,7 +60,7 @@ class Plants:
             for tag in tags:
                 self._species[tag.tag_id] = species
             for bloom in _grow(table, species, seed) if tags else ():
-                self._blooms[_nearest(tags, bloom.position).tag_id].append(bloom)
+                self._blooms[_nearest(tags, (bloom.x, bloom.y)).tag_id].append(bloom)
 
     def species(self, tag_id: str) -> str:
         """Return what grows at a tag."""
@@ -111,7 +85,7 @@ class Plants:
                 bugs = max(bugs, at_first // (1 + pass_index - start))
         return bugs
 
-    def inspect(self, tag_id: str, pass_index: int, attempt: int) -> Inspection:
+    def inspect(self, tag_id: str, pass_index: int, attempt: int) -> Flower:
         """Look at the plants of a tag: some flowers are overlooked, the others placed to 1 cm."""
         chance = stream(self._seed, "look", tag_id, pass_index, attempt)
         bugs = self.bugs(tag_id, pass_index)
@@ -119,21 +93,21 @@ class Plants:
         infested = set(chance.sample(range(len(blooms)), min(len(blooms), bugs, 3)))
         seen = tuple(
             replace(
-                bloom,
-                position=_jitter(bloom.position, chance),
+                _jittered(bloom, chance),
                 confidence=chance.uniform(0.72, 0.99),
                 anomaly=index in infested,
             )
             for index, bloom in enumerate(blooms)
             if index in infested or chance.random() > _OVERLOOKED
         )
-        return Inspection(
+        return Flower(
             species=self.species(tag_id),
             confidence=chance.uniform(0.8, 0.99),
             anomaly=bugs > 0,
             flower_count=len(seen),
             bug_count=bugs,
             blooms=seen,
+            footprint=self._boxes[tag_id],
         )
 
 
@@ -145,22 +119,22 @@ def _grow(table: Table, species: str, seed: int) -> Iterator[Bloom]:
     rows = max(1, round((rect.y1 - rect.y0) / _PLANT_SPACING_M))
     for row in range(rows):
         for column in range(columns):
-            position = (
-                rect.x0 + (column + 0.5) * (rect.x1 - rect.x0) / columns,
-                rect.y0 + (row + 0.5) * (rect.y1 - rect.y0) / rows,
-            )
+            x = rect.x0 + (column + 0.5) * (rect.x1 - rect.x0) / columns
+            y = rect.y0 + (row + 0.5) * (rect.y1 - rect.y0) / rows
             height_m = chance.uniform(0.12, 0.38)
             if chance.random() < _IN_FLOWER:
-                yield Bloom(_jitter(position, chance), height_m, species, 1.0, anomaly=False)
+                z = TABLE_HEIGHT_M + height_m
+                yield _jittered(Bloom(x, y, z, height_m, species, 1.0, anomaly=False), chance)
 
 
 def _nearest(tags: list[Tag], position: Point) -> Tag:
     return min(tags, key=lambda tag: dist(tag.position, position))
 
 
-def _jitter(position: Point, chance: Random) -> Point:
+def _jittered(bloom: Bloom, chance: Random) -> Bloom:
     noise = _POSITION_NOISE_M
-    return position[0] + chance.uniform(-noise, noise), position[1] + chance.uniform(-noise, noise)
+    x, y = (at + chance.uniform(-noise, noise) for at in (bloom.x, bloom.y))
+    return replace(bloom, x=x, y=y)
 
 
 SECONDS_PER_DAY = 86_400.0
@@ -173,13 +147,7 @@ class Climate:
     """The climate of one greenhouse, anywhere on its floor and at any time of day."""
 
     def __init__(self, simulator: Any) -> None:
-        self._noisy = simulator.sensor_registry
-        quiet = deepcopy(simulator.sim_config)
-        for components in quiet["sensors"].values():
-            for component in components:
-                component["noise_sigma"] = 0.0
-        self._quiet = SensorRegistry(quiet)
-        self.sensors: tuple[str, ...] = tuple(simulator.sensors())
+        self._registry = simulator.sensor_registry
 
     def read(
         self,
@@ -191,19 +159,12 @@ class Climate:
         """Read sensors at a place (m, map) and time (s since midnight), noise included."""
         with _as_global_random(chance):
             return tuple(
-                (name, _value(self._noisy, name, position, time_of_day_s)) for name in sensors
+                (name, value_of(self._registry, name, position, time_of_day_s)) for name in sensors
             )
 
-    def truth(self, sensor: str, position: Point, time_of_day_s: float) -> float:
-        """Return the value without noise, from the same dynamics. Pure: no chance, no state.
 
-        Where a sensor is the largest of several noisy components, its readings lie above this on
-        average wherever the components are close to each other.
-        """
-        return _value(self._quiet, sensor, position, time_of_day_s)
-
-
-def _value(registry: Any, sensor: str, position: Point, time_of_day_s: float) -> float:
+def value_of(registry: Any, sensor: str, position: Point, time_of_day_s: float) -> float:
+    """A sensor's value at a place (m, map) and time (s since midnight), in the contract's unit."""
     value = registry.get_sensor(sensor).retrieve_data(position, time_of_day_s % SECONDS_PER_DAY)
     return float(value) * _TO_CONTRACT_UNIT.get(sensor, 1.0)
 

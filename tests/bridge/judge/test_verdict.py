@@ -14,7 +14,7 @@ import pytest
 from lupin_bridge.judge.daylight import Day
 from lupin_bridge.judge.recent_scans import RecentScans
 from lupin_bridge.judge.sensors_file import parse
-from lupin_bridge.judge.verdict import Health, Kind, Verdict, judge_house, judge_tag, worst
+from lupin_bridge.judge.verdict import Health, Kind, Verdict, judge_site, judge_tag, worst
 from lupin_twin.core.state import NO_FLOWER, Attempt, Flower, Reading, TagState
 
 CASES = json.loads(Path(__file__).with_name("verdicts.json").read_text(encoding="utf-8"))
@@ -104,11 +104,11 @@ def test_what_was_observed_after_now_is_as_old_as_now() -> None:
 def test_a_house_is_its_worst_tag_and_unknown_where_most_tags_are(
     tags: list[str], house: str
 ) -> None:
-    assert judge_house(Counter(map(Verdict, tags)), is_silent=False).verdict == house
+    assert judge_site(Counter(map(Verdict, tags)), is_silent=False).verdict == house
 
 
 def test_of_a_silent_twin_nothing_is_known() -> None:
-    judged = judge_house({Verdict.HEALTHY: 1}, is_silent=True)
+    judged = judge_site({Verdict.HEALTHY: 1}, is_silent=True)
     assert judged.verdict is Verdict.UNKNOWN
     assert [reason.kind for reason in judged.reasons] == [Kind.SILENT]
 

@@ -7,7 +7,6 @@ import pytest
 
 from lupin_twin.core.diagnostics import (
     ERROR,
-    MAX_PROBLEMS,
     MAX_SHOWN,
     OK,
     STALE,
@@ -83,9 +82,9 @@ def test_a_twin_that_is_well_is_ok_in_all() -> None:
         ("inputs", {"observed_ago_s": None}, STALE, "no observation"),
         ("inputs", {"inputs": {"/map": 0}}, WARN, "nobody publishes /map"),
         ("inputs", {"observed_ago_s": None, "input_problems": ("use UDP",)}, WARN, "use UDP"),
-        ("drops", {"counts": Counts({"frame": 40}, 0, (FRAME,))}, WARN, "12 lately"),
-        ("drops", {"counts": Counts({"frame": 40})}, OK, "nothing lately"),
-        ("drops", {"counts": Counts(callback_errors=1)}, WARN, "nothing lately"),
+        ("drops", {"counts": Counts({"frame": 40}, 0, (FRAME,))}, WARN, "12 recently"),
+        ("drops", {"counts": Counts({"frame": 40})}, OK, "nothing recently"),
+        ("drops", {"counts": Counts(callback_errors=1)}, WARN, "nothing recently"),
         (
             "queues",
             {"counts": Counts({"lost": 5}, 0, (Recent("lost", "", 5),))},
@@ -123,16 +122,6 @@ def test_the_numbers_are_there() -> None:
     assert found("queues", counts=counts).values == {"lost": "5"}
     assert found("fields").values == {"computed": "3", "slowest, s": "0.250"}
     assert found("inputs").values["last observation, s ago"] == "2.0"
-
-
-def test_a_journal_that_cannot_be_written_is_an_error_and_one_that_is_off_is_none() -> None:
-    failing = Condition(JournalState.FAILING, "the disk is full", "/j.sqlite", lost=3)
-    [told] = [f for f in findings(replace(WELL, journal=failing)) if f.name == "journal"]
-    assert (told.level, told.message) == (ERROR, "the disk is full")
-    assert told.values["lost"] == "3"
-    off = Condition(JournalState.OFF, "kept in a temporary file")
-    [told] = [f for f in findings(replace(WELL, journal=off)) if f.name == "journal"]
-    assert (told.level, told.message) == (OK, "kept in a temporary file")
 
 
 @pytest.mark.parametrize("clock", ["running", "paused", "stopped", "none"])
@@ -177,17 +166,6 @@ def test_what_is_said_of_the_journal_is_read_again() -> None:
         values = {"state": "recording", "complete to": stretch, "kept": stretch}
         read = self_report([Finding("journal", OK, "", values)]).journal
         assert (read.complete_ns, read.kept_ns) == (1 if stretch == "1" else None, ())
-
-
-def test_what_is_said_of_inputs_is_read_again_up_to_a_limit() -> None:
-    for count in (0, MAX_PROBLEMS):
-        problems = tuple(f"{number}: use UDP" for number in range(count))
-        assert self_report(findings(replace(WELL, input_problems=problems))).input_problems == (
-            problems
-        )
-    values = {f"problem {number}": "x" * (MAX_SHOWN + 1) for number in range(1, MAX_PROBLEMS + 2)}
-    read = self_report([Finding("inputs", WARN, "", values)]).input_problems
-    assert [len(each) for each in read] == [MAX_SHOWN] * MAX_PROBLEMS
 
 
 def test_who_says_nothing_is_not_said_to_have_dropped_nothing() -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from lupin_twin.core import history as history_module
 from lupin_twin.core import ingest
 from lupin_twin.core.history import History, PastAttempt, PastScan, TagHistory
-from lupin_twin.core.state import Attempt, Inspection, Reading, Scan, TagState, TwinStore
+from lupin_twin.core.state import Attempt, Inspection, Reading, Scan, TwinStore
 from tests.support.store import SCAN_FAILED, S, failed_look, look, scan
 
 
@@ -46,39 +46,6 @@ def test_scans_that_brought_readings_are_kept_and_every_try() -> None:
     )
 
 
-def test_it_is_in_the_order_of_time_and_keeps_the_newest() -> None:
-    history = History(buffer_len=3)
-    for at_s in (2.0, 4.0, 3.0):
-        history.add(scan("1", at_s=at_s, co2=at_s))
-    assert stamps_s(history.of("1").scans) == [2.0, 3.0, 4.0]
-    history.add(scan("1", at_s=1.0, co2=1.0))
-    assert stamps_s(history.of("1").scans) == stamps_s(history.of("1").attempts) == [2.0, 3.0, 4.0]
-    history.add(scan("1", at_s=5.0, co2=1.0))
-    assert stamps_s(history.of("1").scans) == [3.0, 4.0, 5.0]
-
-
-def test_failed_tries_push_no_scan_out() -> None:
-    history = History(buffer_len=2)
-    history.add(scan("1", at_s=1.0, co2=1.0))
-    for at_s in (2.0, 3.0, 4.0):
-        history.add(scan("1", at_s=at_s, succeeded=False))
-    assert stamps_s(history.of("1").scans) == [1.0]
-    assert stamps_s(history.of("1").attempts) == [3.0, 4.0]
-
-
-def test_the_same_observation_heard_three_times_is_one() -> None:
-    history = History()
-    for _ in range(3):
-        for write in (scan("1", at_s=5.0, co2=1.0), look("1", at_s=5.0), failed_look("1", 6.0)):
-            history.add(write)
-    assert stamps_s(history.of("1").scans) == [5.0]
-    assert [(tried.stamp_ns / S, tried.kind) for tried in history.of("1").attempts] == [
-        (5.0, 0),
-        (5.0, 1),
-        (6.0, 1),
-    ]
-
-
 def test_what_was_heard_is_known_by_kind_stamp_and_source() -> None:
     history = History()
     history.add(scan("1", at_s=5.0, source="a", co2=1.0))
@@ -92,32 +59,11 @@ def test_what_was_heard_is_known_by_kind_stamp_and_source() -> None:
         assert history.news(other) == other
 
 
-def test_two_sources_at_one_moment_are_two_in_the_order_of_their_arrival() -> None:
-    history = History()
-    for number in range(4):
-        history.add(scan("1", at_s=5.0, source=f"robot {number}", co2=float(number)))
-    assert values(history, "co2") == [(5.0, 0.0), (5.0, 1.0), (5.0, 2.0), (5.0, 3.0)]
-
-
-def test_readings_of_one_stamp_that_come_in_parts_are_one_scan() -> None:
-    history = History()
-    history.add(scan("1", at_s=5.0, co2=1.0))
-    history.add(scan("1", at_s=5.0, light=2.0))
-    history.add(scan("1", at_s=5.0, co2=3.0))
-    assert history.of("1").scans == (PastScan(5 * S, (Reading("co2", 3.0), Reading("light", 2.0))),)
-
-
 def test_what_has_no_stamp_of_its_own_is_known_by_the_moment_it_came() -> None:
     history = History()
     for at_s in (1.0, 2.0):
         history.add(replace(scan("1", at_s=at_s, co2=1.0), own_stamp_ns=0))
     assert stamps_s(history.of("1").scans) == [1.0, 2.0]
-
-
-def test_a_sensor_that_a_scan_names_many_times_is_kept_once() -> None:
-    history = History()
-    history.add(Scan("1", S, tuple(Reading("co2", float(i)) for i in range(1_000))))
-    assert values(history, "co2") == [(1.0, 999.0)]
 
 
 def test_the_histories_of_all_tags_are_bounded_and_a_tag_makes_room_of_its_own(
@@ -227,23 +173,6 @@ def test_who_follows_a_twin_sees_what_was_really_scanned_when() -> None:
     assert [past.kind for past in followed.attempts] == [0, 1, 0, None]
 
 
-def test_who_comes_late_knows_what_the_state_still_shows() -> None:
-    twin, late = Twin(), History()
-    twin.write(scan("1", at_s=10.0, co2=400.0, light=1.0))
-    twin.write(scan("1", at_s=7210.0, light=2.0))
-    twin.write(look("1", at_s=7300.0))
-    twin.write(scan("1", at_s=7400.0, succeeded=False))
-    [tag] = twin.store.snapshot(0, "map").tags
-    for _ in range(2):
-        late.follow(tag)
-    assert values(late, "co2") == [(10.0, 400.0)]
-    assert values(late, "light") == [(7210.0, 2.0)]
-    assert [(past.stamp_ns / S, past.kind) for past in late.of("1").attempts] == [
-        (7300.0, 1),
-        (7400.0, None),
-    ]
-
-
 def test_who_follows_a_twin_follows_its_clock_back() -> None:
     twin = Twin()
     for at_s in (40.0, 3600.0):
@@ -264,12 +193,6 @@ def test_a_twin_that_was_started_anew_and_knows_less_moves_nothing() -> None:
     history.follow(successor.store.snapshot(0, "map").tags[0])
     assert values(history, "co2") == [(1000.0, 1000.0), (2800.0, 2800.0)]
     assert stamps_s(history.of("1").attempts) == [1000.0, 2800.0]
-
-
-def test_without_times_there_is_nothing_to_follow() -> None:
-    history = History()
-    history.follow(TagState("1", readings=(Reading("co2", 1.0),), last_observed_ns=S))
-    assert history.of("1") == TagHistory()
 
 
 def test_tags_that_a_twin_does_not_know_any_more_are_forgotten(

@@ -99,12 +99,6 @@ def test_a_frame_is_the_expected_one_or_empty_and_a_looks_own_comes_first() -> N
     assert reason_of(replace(heard_look(), frame_id="odom")) is Reason.FRAME
 
 
-def test_the_frame_is_looked_at_before_the_tag_id() -> None:
-    assert reason_of(heard_reading("", frame_id="odom")) is Reason.FRAME
-    assert reason_of(heard_reading("")) is Reason.TAG_ID
-    assert reason_of(heard_look("")) is Reason.TAG_ID
-
-
 @pytest.mark.parametrize(
     ("stamp_s", "now_s", "expected_s"),
     [
@@ -121,12 +115,6 @@ def test_when_an_observation_was_made(stamp_s: float, now_s: float, expected_s: 
 
 
 # --- poses --------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("w", [1.0, -0.5, 1e-17])
-def test_a_scans_pose_counts_with_any_w_but_zero(w: float) -> None:
-    pose = replace(at(1.0, 2.0), qw=w)
-    assert ingest.scanned_pose(pose) == pose
 
 
 def test_a_scans_pose_with_w_zero_or_a_broken_number_is_none() -> None:

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from lupin_twin.core.journal_condition import UNKNOWN, Condition, JournalState
+from lupin_twin.core.journal_condition import Condition, JournalState
 
 WELL = {JournalState.UNKNOWN, JournalState.OFF, JournalState.STARTING, JournalState.RECORDING}
 
@@ -10,7 +10,3 @@ WELL = {JournalState.UNKNOWN, JournalState.OFF, JournalState.STARTING, JournalSt
 @pytest.mark.parametrize("state", JournalState)
 def test_what_does_not_keep_its_promise_has_to_be_told(state: JournalState) -> None:
     assert Condition(state).is_well == (state in WELL)
-
-
-def test_who_does_not_know_says_so() -> None:
-    assert UNKNOWN.state is JournalState.UNKNOWN

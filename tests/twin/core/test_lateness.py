@@ -55,22 +55,6 @@ def test_a_clock_that_stepped_back_is_told_after_a_few_and_counted_with_them(rob
     assert robot.lateness.counts == {"robot": FEW + 3}
 
 
-def test_it_is_told_by_name_and_by_how_much() -> None:
-    told = str(Late("robot-1", 7, 600.0, "robot-1"))
-    assert told.startswith("7 observations in a row from source 'robot-1' are older than its own")
-    assert "by 600 s" in told
-
-
-def test_a_few_out_of_order_are_no_matter(robot: Robot) -> None:
-    for start in range(1000, 1100, 10):
-        assert robot.says(start + 9.0, *(start + i for i in range(FEW))) == []
-    assert robot.lateness.counts == {}
-
-
-def test_equal_stamps_are_in_order(robot: Robot) -> None:
-    assert robot.says(*[1000.0] * 20) == []
-
-
 def test_kinds_have_an_order_each(robot: Robot) -> None:
     looks = Robot(robot.lateness, kind=1)
     for at_s in range(1000, 1040):

@@ -5,7 +5,7 @@ from itertools import repeat
 
 import pytest
 
-from lupin_twin.core.state import Attempt, Pose, Reading, TagState
+from lupin_twin.core.state import Attempt, Reading
 from lupin_twin.journal.fold import make_many
 
 
@@ -14,11 +14,6 @@ def test_many_are_what_they_would_be_one_by_one() -> None:
     assert made == [Reading("a", 1.0, 7), Reading("b", 2.0, 8), Reading("c", 3.0, 9)]
     with pytest.raises(FrozenInstanceError):
         made[0].value = 2.0  # type: ignore[misc]
-
-
-@pytest.mark.parametrize("kind", [Reading, Pose, TagState, Attempt])
-def test_nothing_is_made_of_nothing(kind: type) -> None:
-    assert make_many(kind, 0, *[()] * len(kind.__slots__)) == []  # type: ignore[attr-defined]
 
 
 def test_each_field_has_to_be_given() -> None:

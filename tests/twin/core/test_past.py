@@ -11,11 +11,9 @@ from lupin_twin.core.past import (
     HOUR_NS,
     MAX_POINTS,
     SLOT_NS,
-    Event,
     Grid,
     NotRemembered,
     PastRefused,
-    SeriesPast,
     SeriesRequest,
     check_moment,
     error_of,
@@ -69,16 +67,6 @@ def test_the_limits_themselves_are_allowed(right: dict[str, Any]) -> None:
     assert SeriesRequest(**(ASKED | right)).event is None
 
 
-def test_events_are_asked_for_like_sensors() -> None:
-    for event in Event:
-        assert SeriesRequest("*", event.value).event is event
-
-
-def test_buckets_have_a_length() -> None:
-    assert SeriesPast(0, 10, bucket_ns=5).is_bucketed
-    assert not SeriesPast(0, 10).is_bucketed
-
-
 @pytest.mark.parametrize(
     ("at_ns", "says"),
     [
@@ -89,11 +77,6 @@ def test_buckets_have_a_length() -> None:
 def test_a_moment_has_to_have_passed(at_ns: int, says: str) -> None:
     with pytest.raises(PastRefused, match=re.escape(says)):
         check_moment(at_ns, 5_000_000_001)
-
-
-@pytest.mark.parametrize("at_ns", [0, 5])
-def test_now_has_passed(at_ns: int) -> None:
-    check_moment(at_ns, 5)
 
 
 @pytest.mark.parametrize(
@@ -114,13 +97,6 @@ def test_why_there_is_no_answer_is_told_in_words_and_read_again(
     assert message_of(read) == message
     if isinstance(error, NotRemembered) and isinstance(read, NotRemembered):
         assert read.is_lasting is error.is_lasting
-
-
-def test_a_failure_of_the_twin_is_nobodys_mistake_and_may_pass() -> None:
-    read = error_of(message_of(KeyError("stamp")))
-    assert isinstance(read, NotRemembered)
-    assert not read.is_lasting
-    assert str(read) == "the twin failed to answer: 'stamp': ask again later"
 
 
 @pytest.mark.parametrize(

@@ -11,16 +11,13 @@ import pytest
 from lupin_twin.core import drops, state
 from lupin_twin.core.drops import Rejected
 from lupin_twin.core.state import (
-    Attempt,
     Bloom,
-    Flower,
     Inspection,
     Reading,
     Scan,
     TwinStore,
-    age_seconds,
 )
-from tests.support.store import S, at, failed_look, look, scan
+from tests.support.store import S, at, look, scan
 
 
 def write(store: TwinStore, observation: Scan | Inspection) -> None:
@@ -32,17 +29,6 @@ def write(store: TwinStore, observation: Scan | Inspection) -> None:
 
 def tag(store: TwinStore, tag_id: str) -> state.TagState:
     return next(t for t in store.snapshot(0, "map").tags if t.tag_id == tag_id)
-
-
-def test_readings_are_latest_per_name_and_keep_their_order() -> None:
-    store = TwinStore()
-    store.record(scan("1", co2=1.0, light=2.0))
-    store.record(scan("1", light=3.0, humidity=4.0))
-    assert [(r.name, r.value) for r in tag(store, "1").readings] == [
-        ("co2", 1.0),
-        ("light", 3.0),
-        ("humidity", 4.0),
-    ]
 
 
 def test_first_pose_wins_whoever_brings_it() -> None:
@@ -62,17 +48,6 @@ def test_first_pose_wins_whoever_brings_it() -> None:
         assert tag(store, "1").pose == at(0.0), (first, second, third)
 
 
-def test_a_tag_without_a_pose_takes_the_first_that_comes() -> None:
-    store = TwinStore()
-    store.record(scan("1", co2=1.0))
-    assert tag(store, "1").pose is None
-    assert store.pin("1", at(5.0))
-    assert not store.pin("1", at(6.0))
-    assert tag(store, "1").pose == at(5.0)
-    assert store.is_pinned("1")
-    assert not store.is_pinned("2")
-
-
 def test_a_pin_touches_neither_readings_nor_species_nor_time() -> None:
     store = TwinStore()
     store.record(scan("1", at_s=3.0, co2=1.0))
@@ -80,16 +55,6 @@ def test_a_pin_touches_neither_readings_nor_species_nor_time() -> None:
     before = tag(store, "1")
     store.pin("1", at(5.0))
     assert tag(store, "1") == dataclasses.replace(before, pose=at(5.0))
-
-
-def test_flower_results_replace_and_leave_readings_alone() -> None:
-    store = TwinStore()
-    bloom = Bloom(0.0, 0.0, 0.0, 0.1, "rose", 0.9, anomaly=True)
-    store.record(scan("1", co2=1.0))
-    store.record_inspection(look("1", species="rose", anomaly=True, bug_count=2, blooms=(bloom,)))
-    store.record_inspection(look("1", species="lupin"))
-    assert tag(store, "1").flower == Flower(species="lupin")
-    assert [r.value for r in tag(store, "1").readings] == [1.0]
 
 
 def test_a_write_counts_when_it_changes_what_is_shown_and_a_refused_one_never() -> None:
@@ -123,59 +88,11 @@ def test_a_write_that_changes_nothing_that_is_shown_does_not_count() -> None:
     assert store.observation_count == 3, "it pins the tag"
 
 
-def test_the_last_try_is_kept_apart_from_what_was_observed() -> None:
-    store = TwinStore()
-    store.record(scan("1", at_s=10.0, co2=1.0))
-    assert tag(store, "1").last_try == Attempt(10 * S)
-    store.record(Scan("1", 30 * S, status=1, status_detail="blocked"))
-    store.record_inspection(failed_look("1", at_s=20.0))
-    kept = tag(store, "1")
-    assert kept.last_try == Attempt(30 * S, 1, "blocked")
-    assert (kept.last_observed_ns, kept.looked_at_ns) == (10 * S, None)
-    store.record_inspection(look("1", at_s=40.0))
-    assert tag(store, "1").last_try == Attempt(40 * S)
-    store.pin("2", at(1.0))
-    assert tag(store, "2").last_try is None
-
-
-def test_every_reading_has_its_own_time_and_a_look_makes_none_younger() -> None:
-    store = TwinStore()
-    store.record(scan("1", at_s=10.0, co2=1.0, light=2.0))
-    store.record_inspection(look("1", at_s=3610.0))
-    store.record(scan("1", at_s=7210.0, light=3.0))
-    kept = tag(store, "1")
-    assert kept.readings == (Reading("co2", 1.0, 10 * S), Reading("light", 3.0, 7210 * S))
-    assert (kept.looked_at_ns, kept.last_observed_ns) == (3610 * S, 7210 * S)
-
-
 def test_age_is_since_the_last_observation_and_never_negative() -> None:
     store = TwinStore()
     store.record(scan("1", at_s=100.0, co2=1.0))
     assert tag(store, "1").stale_seconds(130 * S) == 30.0
     assert tag(store, "1").stale_seconds(50 * S) == 0.0
-
-
-def test_an_age_is_of_a_moment_and_never_negative() -> None:
-    assert age_seconds(3 * S, 5 * S) == 2.0
-    assert age_seconds(5 * S, 3 * S) == 0.0
-
-
-def test_a_tag_never_observed_is_infinitely_old() -> None:
-    store = TwinStore()
-    store.pin("1", at(1.0))
-    assert tag(store, "1").last_observed_ns is None
-    assert math.isinf(tag(store, "1").stale_seconds(5 * S))
-
-
-def test_a_failed_scan_is_listed_and_makes_nothing_look_younger() -> None:
-    store = TwinStore()
-    store.record(scan("1", at_s=10.0, succeeded=False))
-    assert tag(store, "1").last_observed_ns == 10 * S
-    store.record(scan("1", at_s=20.0, co2=1.0))
-    store.record(scan("1", at_s=30.0, succeeded=False))
-    assert tag(store, "1").last_observed_ns == 20 * S
-    store.record(scan("1", at_s=40.0, succeeded=False, light=1.0))
-    assert tag(store, "1").last_observed_ns == 40 * S
 
 
 def test_samples_need_a_pose_and_a_finite_reading_and_keep_the_first_mention_order() -> None:
@@ -234,13 +151,6 @@ def test_a_bound_belongs_to_what_is_allowed_and_one_more_is_refused_by_both_numb
     assert store.snapshot(0, "map").tags == before
 
 
-def test_a_pinned_tags_id_is_bounded_like_a_scanned_ones() -> None:
-    store = TwinStore()
-    store.pin("t" * drops.MAX_TEXT_LENGTH, at(1.0))
-    with pytest.raises(Rejected, match="limit is"):
-        store.pin("t" * (drops.MAX_TEXT_LENGTH + 1), at(1.0))
-
-
 def test_one_tag_too_many_is_refused_and_the_known_ones_go_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -274,34 +184,3 @@ def test_what_all_tags_hold_is_bounded_and_what_is_known_goes_on(
     store.record_inspection(look("2", blooms=(BLOOM,), footprint=((0.0, 0.0, 0.0),)))
     store.record(scan("3", co2=3.0))
     assert tag(store, "3").readings[0].value == 3.0
-
-
-def test_a_sensor_that_a_scan_names_many_times_is_kept_once() -> None:
-    store = TwinStore()
-    store.record(Scan("1", S, tuple(Reading("co2", float(i)) for i in range(1_000))))
-    assert tag(store, "1").readings == (Reading("co2", 999.0, S),)
-
-
-def test_a_snapshot_stays_as_it_was() -> None:
-    store = TwinStore()
-    store.record(scan("1", co2=1.0))
-    before = store.snapshot(7, "map")
-    store.record(scan("1", co2=2.0))
-    assert (before.stamp_ns, before.frame_id) == (7, "map")
-    assert before.tags[0].readings[0].value == 1.0
-
-
-@pytest.mark.parametrize("field", ["x", "y", "z", "qx", "qy", "qz", "qw"])
-@pytest.mark.parametrize("broken", [math.nan, math.inf, -math.inf])
-def test_one_number_that_is_not_finite_makes_a_pose_not_finite(field: str, broken: float) -> None:
-    assert at(1.0).is_finite
-    assert not dataclasses.replace(at(1.0), **{field: broken}).is_finite
-
-
-def test_the_size_is_that_of_what_is_kept() -> None:
-    store = TwinStore()
-    assert store.size == (0, 0)
-    store.record(scan("1", co2=1.0, light=2.0))
-    store.record(scan("1", co2=3.0))
-    store.pin("2", at(1.0))
-    assert store.size == (2, 2)

@@ -19,48 +19,6 @@ def tag(store: TwinStore, tag_id: str) -> TagState:
     return next(t for t in store.snapshot(0, "map").tags if t.tag_id == tag_id)
 
 
-def test_an_older_scan_replaces_nothing_newer_and_adds_what_was_not_known() -> None:
-    store = TwinStore()
-    store.record(scan("1", at_s=20.0, co2=2.0))
-    store.record(scan("1", at_s=10.0, pose=at(5.0), co2=1.0, light=1.0))
-    kept = tag(store, "1")
-    assert [(r.name, r.value) for r in kept.readings] == [("co2", 2.0), ("light", 1.0)]
-    assert (kept.pose, kept.last_observed_ns) == (at(5.0), 20 * S)
-    # Of each sensor its own time counts: light is known from 10 s only.
-    store.record(scan("1", at_s=15.0, co2=3.0, light=3.0))
-    assert [r.value for r in tag(store, "1").readings] == [2.0, 3.0]
-
-
-def test_an_older_look_replaces_no_newer_one_but_may_pin() -> None:
-    store = TwinStore()
-    store.record_inspection(look("1", at_s=20.0, species="rose", anomaly=True))
-    store.record_inspection(look("1", at_s=10.0, pose=at(5.0), species="lupin"))
-    kept = tag(store, "1")
-    assert kept.flower == Flower(species="rose", anomaly=True)
-    assert (kept.pose, kept.last_observed_ns) == (at(5.0), 20 * S)
-    # A newer scan is no look: the flowers' own time counts.
-    store.record(scan("1", at_s=40.0, co2=1.0))
-    store.record_inspection(look("1", at_s=30.0, species="lupin"))
-    assert tag(store, "1").flower == Flower(species="lupin")
-    assert tag(store, "1").last_observed_ns == 40 * S
-
-
-def test_of_equal_stamps_the_later_arrival_counts() -> None:
-    store = TwinStore()
-    for value, species in ((1.0, "rose"), (2.0, "lupin")):
-        store.record(scan("1", at_s=5.0, co2=value))
-        store.record_inspection(look("1", at_s=5.0, species=species))
-    assert tag(store, "1").readings[0].value == 2.0
-    assert tag(store, "1").flower.species == "lupin"
-
-
-def test_the_time_of_a_failed_scan_gives_way_to_any_observation() -> None:
-    store = TwinStore()
-    store.record(scan("1", at_s=20.0, succeeded=False))
-    store.record(scan("1", at_s=10.0, co2=1.0))
-    assert tag(store, "1").last_observed_ns == 10 * S
-
-
 def test_after_a_clock_that_went_back_all_ages_from_there_and_news_is_news() -> None:
     store = TwinStore()
     store.record(scan("1", at_s=40.0, co2=1.0))
@@ -87,15 +45,6 @@ def test_after_a_clock_that_went_back_all_ages_from_there_and_news_is_news() -> 
     kept = tag(store, "1")
     assert (kept.readings[0].value, kept.flower.species) == (3.0, "lupin")
     assert kept.last_observed_ns == 55 * S
-
-
-def test_a_try_that_is_newer_than_all_that_was_observed_follows_the_clock_too() -> None:
-    store = TwinStore()
-    store.record(scan("1", at_s=10.0, co2=1.0))
-    store.record(scan("1", at_s=90.0, succeeded=False))
-    assert store.hold_to(50 * S)
-    assert tag(store, "1").last_try == Attempt(50 * S, SCAN_FAILED)
-    assert tag(store, "1").last_observed_ns == 10 * S
 
 
 def test_a_refused_write_leaves_no_stamp_behind(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -224,31 +173,3 @@ def as_shown(state_of_tag: TagState | None) -> object:
         return None
     readings = tuple(replace(reading, observed_at_ns=None) for reading in state_of_tag.readings)
     return replace(state_of_tag, readings=readings, looked_at_ns=None, last_try=None)
-
-
-@given(
-    st.lists(SCANS | LOOKS, max_size=12).flatmap(
-        lambda w: st.tuples(st.just(w), st.permutations(w))
-    )
-)
-def test_what_has_stamps_of_its_own_is_the_same_in_any_order(
-    orders: tuple[list[Write], list[Write]],
-) -> None:
-    """Poses apart, which the first to come keeps."""
-    unique = {(write.tag_id, write.stamp_ns): write for write in orders[0]}
-    states = []
-    for order in orders:
-        store = TwinStore()
-        for write in order:
-            if unique[write.tag_id, write.stamp_ns] is write:
-                store.record(write) if isinstance(write, Scan) else store.record_inspection(write)
-        states.append({t.tag_id: by_name(t) for t in store.snapshot(0, "map").tags})
-    assert states[0] == states[1]
-
-
-@pytest.mark.parametrize("name", ["a", "b"])
-def test_the_first_pose_stays(name: str) -> None:
-    store = TwinStore()
-    for x in range(3):
-        store.record(scan(name, at_s=9.0 - x, pose=at(float(x))))
-    assert tag(store, name).pose == at(0.0)

@@ -47,20 +47,6 @@ def test_each_place_is_the_best_of_those_left_and_its_error_the_textbook_s(
         assert place.error_ratio == pytest.approx(error / at_first, rel=1e-6)
 
 
-def test_it_is_far_from_the_tags_there_are_and_each_more_helps() -> None:
-    day = a_day(tags=4)
-    beside = Readings(day.time_s, day.tag, day.value, day.xy * (1.0, 0.25))  # all at y < 2
-    posterior = fit(beside, ideal=(18.0, 26.0)).posterior(beside, DAY_S)
-    places = np.array([(x, y) for x in (0.5, 2.0, 3.5) for y in (1.0, 3.0, 5.0, 7.0)])
-    advice = posterior.advice(places, 20, over=places)
-    assert len(advice) == len(places), "no more than there are, and each once"
-    assert len({(place.x, place.y) for place in advice}) == len(places)
-    assert advice[0].y > 4.0
-    ratios = [place.error_ratio for place in advice]
-    assert ratios == sorted(ratios, reverse=True)
-    assert 0.0 < ratios[-1] < ratios[0] < 1.0
-
-
 def test_who_is_to_be_helped_nowhere_is_refused_and_who_asks_for_none_gets_none() -> None:
     day = a_day(tags=3, passes=2)
     posterior = fit(day).posterior(day, DAY_S)

@@ -59,13 +59,6 @@ def test_the_covariance_is_the_formula_pair_by_pair(readings: Readings, h: Hyper
     assert Pairs(fast, DAY_S / 60.0).covariance(h) == pytest.approx(expected, rel=1e-12)
 
 
-def test_the_prior_s_median_is_the_start() -> None:
-    assert hyper_of(START) == pytest.approx(PRIOR_MEDIAN)
-    one = START.copy()
-    one[0] = 1.0
-    assert hyper_of(one).sg == pytest.approx(PRIOR_MEDIAN.sg * np.exp(PRIOR_LOG_SD.sg))
-
-
 def test_a_minimum_is_found_where_the_gradient_vanishes() -> None:
     objective = objective_of(a_day())
     best = minimise(objective, START)
@@ -86,11 +79,3 @@ def test_what_cannot_be_factorised_has_no_density_and_ends_no_search() -> None:
     assert minimise(steep, np.zeros(1))[0] == pytest.approx(0.5, abs=0.1)
     with pytest.raises(FitFailed, match="singular at the prior's own median"):
         minimise(lambda at: (np.inf, at), START)
-
-
-def test_readings_without_noise_of_their_own_are_fitted_too() -> None:
-    still = a_day()
-    same = Readings(still.time_s, still.tag, np.full(len(still), 22.0), still.xy)
-    best = hyper_of(minimise(objective_of(same), START))
-    assert isinstance(best, Hyper)
-    assert best.tau < PRIOR_MEDIAN.tau

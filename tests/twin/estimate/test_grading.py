@@ -7,11 +7,6 @@ from lupin_twin.estimate.grading import LEAST_SCANS, Grades, Record, Tally
 HOUR_NS = 3_600 * 1_000_000_000
 
 
-def test_a_share_is_of_those_that_were_predicted() -> None:
-    assert Tally(4, 3).share == 0.75
-    assert Tally().share is None
-
-
 def test_counts_are_of_the_last_day_and_week() -> None:
     grades = Grades(86_400.0)
     assert grades.record(0) == Record(None, Tally(), Tally())
@@ -24,13 +19,6 @@ def test_counts_are_of_the_last_day_and_week() -> None:
     assert grades.record(7 * 24 * HOUR_NS) == Record(5, Tally(), Tally(2, 1))
     grades.add(Tally(1, 1), 8 * 24 * HOUR_NS)
     assert grades.record(8 * 24 * HOUR_NS) == Record(5, Tally(1, 1), Tally(1, 1))
-
-
-def test_a_day_is_as_long_as_the_greenhouse_s() -> None:
-    grades = Grades(1_440.0)
-    grades.add(Tally(2, 2), 0)
-    assert grades.record(1_379 * 1_000_000_000).day.scans == 2
-    assert grades.record(1_440 * 1_000_000_000).day.scans == 0
 
 
 def test_a_clock_that_goes_back_leaves_nothing_that_is_to_come() -> None:

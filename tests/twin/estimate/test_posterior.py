@@ -7,45 +7,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from lupin_twin.estimate import MAX_EXACT, EstimateGrid, Model, Posterior, Readings, fit
-from lupin_twin.estimate.kernel import Hyper, Pairs, Scale
+from lupin_twin.estimate import MAX_EXACT, EstimateGrid, Posterior, Readings, fit
+from lupin_twin.estimate.kernel import Pairs
 from lupin_twin.estimate.posterior import INFLATION, Cells
 from lupin_twin.field.grid import FloatArray
 from lupin_twin.field.idw import Abandoned
 from tests.support import textbook_gp
-from tests.support.estimates import DAY_S, a_day, hypers, some_readings, spot_at, spots_of
+from tests.support.estimates import DAY_S, a_day, spot_at, spots_of
 
 PLACES = np.array([(0.0, 0.0), (1.3, -2.0), (-4.0, 4.5)])
 BOX = {"bbox_min_x": 0.0, "bbox_min_y": 0.0, "bbox_max_x": 4.0, "bbox_max_y": 8.0}
-
-
-def variance(h: Hyper, readings: Readings) -> FloatArray:
-    model = Model(Scale(0.0, 1.0), 1.0, DAY_S, h)
-    _, sd = model.posterior(readings, DAY_S).points(PLACES)
-    result: FloatArray = (sd / INFLATION) ** 2
-    return result
-
-
-@given(some_readings(), hypers)
-def test_the_variance_is_never_negative_and_never_above_the_prior_s(
-    readings: Readings, h: Hyper
-) -> None:
-    found = variance(h, readings)
-    assert (found >= 0.0).all()
-    assert (found <= h.common_variance + h.local_variance + 1e-9).all()
-
-
-@given(some_readings(), hypers, st.data())
-def test_the_variance_never_grows_with_a_new_reading(
-    readings: Readings, h: Hyper, data: st.DataObject
-) -> None:
-    without = data.draw(st.integers(0, len(readings) - 1))
-    fewer = readings.take(np.delete(np.arange(len(readings)), without))
-    if len(fewer):
-        assert (variance(h, readings) <= variance(h, fewer) + 1e-9).all()
 
 
 @pytest.mark.parametrize(("resolution", "tags"), [(0.5, 8), (0.5, 30)])
@@ -123,15 +95,6 @@ def test_of_more_readings_than_can_be_solved_at_once_the_nearest_say_nearly_the_
     assert grid.mean == pytest.approx(near.points(centres)[0].reshape(24, 24), rel=1e-5)
 
 
-def test_tags_at_one_place_however_many_make_an_estimate() -> None:
-    tag = np.arange(MAX_EXACT + 1)
-    time_s = np.linspace(0.0, DAY_S, len(tag))
-    same = Readings(time_s, tag, 20.0 + np.sin(time_s), np.zeros((len(tag), 2)))
-    mean, sd = fit(same).posterior(same, DAY_S).points(PLACES)
-    assert np.isfinite(mean).all()
-    assert (sd > 0.0).all()
-
-
 @pytest.mark.parametrize("tags", [8, MAX_EXACT])
 def test_who_is_not_waited_for_ends_soon(tags: int) -> None:
     day = a_day(tags=tags, passes=2)
@@ -144,12 +107,3 @@ def test_who_is_not_waited_for_ends_soon(tags: int) -> None:
             ask()
     with pytest.raises(Abandoned):
         fit(day, should_stop=lambda: True)
-
-
-def test_the_error_grows_with_the_distance_and_with_the_age() -> None:
-    day = a_day(tags=6, passes=20)
-    model = fit(day, ideal=(18.0, 26.0))
-    near, far = np.array([day.xy[0]]), np.array([[60.0, 60.0]])
-    at_once, later = model.posterior(day, DAY_S), model.posterior(day, DAY_S + 6 * 3600.0)
-    assert at_once.points(near)[1][0] < at_once.points(far)[1][0]
-    assert at_once.points(near)[1][0] < later.points(near)[1][0]

@@ -5,13 +5,10 @@ from __future__ import annotations
 import itertools
 import math
 import tracemalloc
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from lupin_twin.core.drops import MAX_TEXT_LENGTH
 from lupin_twin.core.state import Pose, Reading, Scan, TwinStore
@@ -28,9 +25,9 @@ from lupin_twin.field.engine import (
     default_box,
     default_request,
 )
-from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.field.idw import Abandoned
+from tests.support.maps import map_of
 
 MAX_CELLS = 1_000_000
 
@@ -71,22 +68,6 @@ def scan(tag_id: str, x: float, y: float, value: float) -> Scan:
     )
 
 
-def map_of(rows: Any, revision: int = 1) -> OccupancyMap:
-    cells = np.array(rows, dtype=np.int8)
-    return OccupancyMap(
-        frame_id="map",
-        stamp_ns=0,
-        width=cells.shape[1],
-        height=cells.shape[0],
-        resolution=1.0,
-        origin_x=0.0,
-        origin_y=0.0,
-        origin_yaw=0.0,
-        cells=cells.ravel(),
-        revision=revision,
-    )
-
-
 @pytest.fixture
 def store() -> TwinStore:
     """Two tags, at the centres of the request's cells (0, 0) and (3, 1)."""
@@ -109,36 +90,10 @@ def answer(engine: FieldEngine, request: FieldRequest, *args: Any) -> FieldGrid:
 # --- the request -----------------------------------------------------------------------------
 
 
-@settings(max_examples=200)
-@given(st.floats())
-def test_request_holds_what_the_wire_can(number: float) -> None:
-    request = request_of(resolution=number, bbox_min_x=number, bbox_max_y=-number)
-    with np.errstate(all="ignore"):
-        expected = np.float32(number)
-    np.testing.assert_equal(request.resolution, float(expected))
-    np.testing.assert_equal(request.bbox_min_x, float(expected))
-    np.testing.assert_equal(request.bbox_max_y, -float(expected))
-    assert type(request.resolution) is float
-
-
 def test_request_over_ros_and_over_http_is_the_same() -> None:
     over_ros = request_of(resolution=float(np.float32(0.1)), bbox_max_x=float(np.float32(1.1)))
     assert over_ros == request_of(resolution=0.1, bbox_max_x=1.1)
     assert check_request(over_ros, MAX_CELLS) == (11, 20)
-
-
-def test_request_is_frozen() -> None:
-    with pytest.raises(AttributeError):
-        request_of().resolution = 2.0  # type: ignore[misc]
-
-
-def test_dimensions_of_a_good_request() -> None:
-    assert check_request(request_of(), MAX_CELLS) == (4, 2)
-    assert check_request(request_of(), 8) == (4, 2)
-
-
-def test_box_without_extent_is_one_cell() -> None:
-    assert check_request(request_of(bbox_max_x=0.0, bbox_max_y=0.0), MAX_CELLS) == (1, 1)
 
 
 @pytest.mark.parametrize(
@@ -172,12 +127,6 @@ def test_bad_request_is_refused(changes: dict[str, Any], message: str, store: Tw
     assert (engine.cache.hits, engine.cache.misses) == (0, 0)
 
 
-def test_one_cell_too_many_is_refused() -> None:
-    assert check_request(request_of(resolution=0.5), 32) == (8, 4)
-    with pytest.raises(FieldRefused, match="makes 8 x 4 cells, the limit is 31 in all"):
-        check_request(request_of(resolution=0.5), 31)
-
-
 @pytest.mark.parametrize(
     "changes",
     [
@@ -205,31 +154,7 @@ def test_grid_bomb_is_refused_without_an_allocation(
     assert peak < 20_000
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"idw_power": -1.0}, r"idw_power is -1\.0, must be finite and not less than 0"),
-        ({"falloff_radius_m": math.nan}, "falloff_radius_m is nan, must be finite"),
-        ({"max_distance_m": math.inf}, "max_distance_m is inf, must be finite"),
-        ({"max_grid_cells": 0}, "max_grid_cells is 0, must not be less than 1"),
-    ],
-)
-def test_rules_out_of_range_are_refused(changes: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        rules_of(**changes)
-
-
 # --- the engine ------------------------------------------------------------------------------
-
-
-def test_first_request_is_a_job_and_the_second_a_hit(store: TwinStore) -> None:
-    engine = engine_of()
-    job = engine.lookup(request_of(), store, None)
-    assert isinstance(job, FieldJob)
-    grid = job.compute()
-    engine.keep(job, grid)
-    assert engine.lookup(request_of(), store, None) is grid
-    assert (engine.cache.hits, engine.cache.misses) == (1, 1)
 
 
 def test_field_is_of_the_stores_samples_by_the_rules(store: TwinStore) -> None:
@@ -251,24 +176,6 @@ def test_field_is_of_the_stores_samples_by_the_rules(store: TwinStore) -> None:
     assert nearest.values.reshape(2, 4)[1, 0] == 10.0
 
 
-def test_sensor_that_nobody_reported_is_no_error(store: TwinStore) -> None:
-    grid = answer(engine_of(), request_of(sensor_type="sound"), store, None)
-    assert np.isnan(grid.values).all()
-    assert (grid.sample_count, grid.value_min, grid.value_max) == (0, 0.0, 0.0)
-
-
-def test_every_write_that_can_change_a_field_makes_it_anew(store: TwinStore) -> None:
-    engine = engine_of()
-    unpinned = Scan("d", stamp_ns=1, readings=(Reading("temperature", 40.0),))
-    store.record(unpinned)
-    before = answer(engine, request_of(), store, None)
-    store.record(scan("a", 0.5, 0.5, 11.0))
-    assert answer(engine, request_of(), store, None).values[0] == 11.0
-    assert before.values[0] == 10.0
-    store.pin("d", Pose(2.5, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0))
-    assert answer(engine, request_of(), store, None).values[2] == 40.0
-
-
 def test_job_holds_the_moment_it_was_made_in(store: TwinStore) -> None:
     engine = engine_of()
     job = engine.lookup(request_of(), store, None)
@@ -280,29 +187,6 @@ def test_job_holds_the_moment_it_was_made_in(store: TwinStore) -> None:
     assert answer(engine, request_of(), store, None).values[0] == 11.0
 
 
-def test_field_that_comes_late_is_no_answer_to_a_newer_request(store: TwinStore) -> None:
-    engine = engine_of()
-    late = engine.lookup(request_of(), store, None)
-    assert isinstance(late, FieldJob)
-    store.record(scan("a", 0.5, 0.5, 11.0))
-    newer = answer(engine, request_of(), store, None)
-    engine.keep(late, late.compute())
-    assert engine.lookup(request_of(), store, None) is newer
-
-
-def test_any_thread_may_compute(store: TwinStore) -> None:
-    engine = engine_of()
-    jobs = [
-        engine.lookup(request_of(resolution=0.01 * step), store, map_of([[0] * 4] * 2))
-        for step in range(1, 9)
-    ]
-    with ThreadPoolExecutor(4) as pool:
-        grids = list(pool.map(FieldJob.compute, jobs))
-    for job, grid in zip(jobs, grids, strict=True):
-        assert isinstance(job, FieldJob)
-        np.testing.assert_array_equal(grid.values, job.compute().values)
-
-
 def test_a_job_that_nobody_waits_for_ends_between_two_parts(store: TwinStore) -> None:
     """Asked so often that no two questions are more than some milliseconds apart."""
     for number in range(100):
@@ -312,7 +196,7 @@ def test_a_job_that_nobody_waits_for_ends_between_two_parts(store: TwinStore) ->
     assert isinstance(job, FieldJob)
     asked = itertools.count(1)
     job.compute(lambda: next(asked) == 0)
-    assert next(asked) > 400 * 200 * 100 / idw._MAX_PAIRS
+    assert next(asked) > 400 * 200 * 100 / idw.MAX_PAIRS
     answers = iter([False, False, True])
     with pytest.raises(Abandoned):
         job.compute(lambda: next(answers))
@@ -335,23 +219,6 @@ def test_cost_follows_cells_and_the_windows_of_the_samples(
 ) -> None:
     cost = cost_s(request_of(**changes), samples, rules_of(**rules))
     assert cost == pytest.approx(expected_s, rel=0.01)
-
-
-def test_a_jobs_cost_is_that_of_its_samples(store: TwinStore) -> None:
-    job = engine_of().lookup(request_of(), store, None)
-    assert isinstance(job, FieldJob)
-    assert len(job.samples) == 2
-    assert job.cost_s == cost_s(request_of(), 2, rules_of())
-
-
-def test_sliding_box_keeps_the_cache_within_its_bounds(store: TwinStore) -> None:
-    engine = FieldEngine(rules_of(), FieldCache(max_bytes=10_000))
-    for step in range(200):
-        box = {"bbox_min_x": step * 0.1, "bbox_max_x": step * 0.1 + 10.0}
-        answer(engine, request_of(resolution=0.5, **box), store, None)
-        assert len(engine.cache) <= 64
-        assert engine.cache.bytes <= 10_000
-    assert engine.cache.misses == 200
 
 
 # --- explored --------------------------------------------------------------------------------
@@ -379,38 +246,12 @@ def test_before_a_map_came_nothing_is_clipped_and_its_first_one_makes_fields_ane
     assert (clipped.sample_count, clipped.value_min, clipped.value_max) == (2, 0.0, 0.0)
 
 
-def test_a_new_map_makes_fields_anew(store: TwinStore) -> None:
-    first, second = map_of([[0] * 4] * 2, revision=1), map_of([[-1] * 4] * 2, revision=2)
-    clipping = engine_of()
-    assert not np.isnan(answer(clipping, request_of(), store, first).values).all()
-    assert np.isnan(answer(clipping, request_of(), store, second).values).all()
-    assert clipping.cache.hits == 0
-
-
-def test_mask_has_the_fields_own_grid(store: TwinStore) -> None:
-    """1.1 m at 0.1 m, in float32: both count 11 columns, or the mask would not fit."""
-    engine = engine_of()
-    request = request_of(resolution=0.1, bbox_max_x=1.1, bbox_max_y=2.3)
-    grid = answer(engine, request, store, map_of([[0] * 4] * 4))
-    assert (grid.width, grid.height) == (11, 23)
-    assert not np.isnan(grid.values[0])
-
-
 # --- the default box -------------------------------------------------------------------------
 
 
 def test_default_box_is_that_of_the_tags_and_their_reach() -> None:
     positions = ((x, y) for x, y in [(1.0, 5.0), (-2.0, 3.0), (0.0, 8.5)])
     assert default_box(positions, 1.5) == (-3.5, 1.5, 2.5, 10.0)
-
-
-def test_default_box_without_a_tag_is_the_reach_around_the_origin() -> None:
-    assert default_box([], 2.5) == (-2.5, -2.5, 2.5, 2.5)
-
-
-def test_default_box_goes_no_farther_for_a_tag_that_is_far_off() -> None:
-    positions = [(0.0, 0.0), (1.0, 2.0), (3.0, 1.0), (5000.0, 1.0)]
-    assert default_box(positions, 1.0) == (-1.0, -1.0, 4.0, 3.0)
 
 
 def test_cells_of_a_default_request_are_doubled_until_there_are_few_enough() -> None:

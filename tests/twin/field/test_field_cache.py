@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
-
-import pytest
-
 from lupin_twin.field.engine import MAX_ENTRIES, FieldCache, FieldKey, FieldRequest, FieldRules
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.field.idw import compute_idw_field
@@ -33,16 +28,6 @@ def grid(cells: int) -> FieldGrid:
         max_distance_m=1.0,
         power=2.0,
     )
-
-
-def test_what_was_put_is_got_and_counted() -> None:
-    cache = FieldCache(max_bytes=1000)
-    kept = grid(10)
-    assert cache.get(key(1)) is None
-    cache.put(key(1), kept)
-    assert cache.get(key(1)) is kept
-    assert cache.get(key(2)) is None
-    assert (cache.hits, cache.misses, cache.bytes, len(cache)) == (1, 2, 40, 1)
 
 
 def test_64_fields_are_kept_and_the_least_recently_used_goes_first() -> None:
@@ -76,63 +61,3 @@ def test_field_larger_than_the_whole_bound_is_not_kept_and_drops_nothing() -> No
     assert cache.get(key(2)) is None
     assert cache.get(key(1)) is not None
     assert cache.bytes == 40
-
-
-def test_field_put_again_counts_once_and_is_the_newest() -> None:
-    cache = FieldCache(max_bytes=100)
-    cache.put(key(1), grid(10))
-    cache.put(key(2), grid(10))
-    again = grid(5)
-    cache.put(key(1), again)
-    assert cache.get(key(1)) is again
-    assert (cache.bytes, len(cache)) == (60, 2)
-    cache.put(key(1), grid(10))
-    cache.put(key(3), grid(10))
-    assert cache.get(key(2)) is None
-    assert cache.get(key(1)) is not None
-
-
-def test_sliding_box_does_not_grow_it() -> None:
-    cache = FieldCache(max_bytes=10_000)
-    for number in range(1000):
-        cache.put(key(number), grid(100))
-        assert cache.bytes <= 10_000
-        assert len(cache) <= 25
-    assert cache.bytes == 10_000
-
-
-def test_cache_without_room_keeps_nothing() -> None:
-    for cache in (FieldCache(max_bytes=0), FieldCache(max_bytes=100, max_entries=0)):
-        cache.put(key(1), grid(1))
-        assert cache.get(key(1)) is None
-        assert (cache.bytes, len(cache)) == (0, 0)
-
-
-CHANGES: tuple[dict[str, Any], ...] = (
-    {"request": replace(key(1).request, resolution=2.0)},
-    {"request": replace(key(1).request, bbox_max_y=2.0)},
-    {"request": replace(key(1).request, sensor_type="humidity")},
-    {"observation_count": 4},
-    {"map_revision": 1},
-    {"rules": replace(RULES, idw_power=3.0)},
-)
-
-
-@pytest.mark.parametrize("changed", CHANGES)
-def test_every_part_of_the_key_counts(changed: dict[str, Any]) -> None:
-    cache = FieldCache(max_bytes=1000)
-    cache.put(key(1), grid(1))
-    assert cache.get(key(1)._replace(**changed)) is None
-    assert cache.get(key(1)) is not None
-
-
-@pytest.mark.parametrize(
-    ("bounds", "message"),
-    [
-        ({"max_bytes": -1}, "max_bytes is -1, must not be less than 0"),
-        ({"max_bytes": 1, "max_entries": -1}, "max_entries is -1, must not be less than 0"),
-    ],
-)
-def test_negative_bound_is_refused(bounds: dict[str, int], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        FieldCache(**bounds)

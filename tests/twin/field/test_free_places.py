@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
@@ -15,23 +13,13 @@ from lupin_twin.field.explored import (
     floor,
     free_of,
 )
+from tests.support.maps import map_of
 
 TAGS = np.array([(1.0, 1.0), (3.0, 2.0)])
 
 
-def a_map(rows: list[list[int]], yaw: float = 0.0, resolution: float = 1.0) -> OccupancyMap:
-    return OccupancyMap(
-        frame_id="map",
-        stamp_ns=0,
-        width=len(rows[0]),
-        height=len(rows),
-        resolution=resolution,
-        origin_x=10.0,
-        origin_y=20.0,
-        origin_yaw=yaw,
-        cells=np.array([cell for row in rows for cell in row], dtype=np.int8),
-        revision=1,
-    )
+def a_map(rows: list[list[int]], resolution: float = 1.0) -> OccupancyMap:
+    return map_of(rows, resolution=resolution, origin_x=10.0, origin_y=20.0)
 
 
 def test_without_a_map_it_is_about_the_tags() -> None:
@@ -68,21 +56,11 @@ def test_on_a_map_it_is_what_is_free_and_known() -> None:
     assert sorted(map(tuple, places.tolist())) == [(10.5, 20.5), (10.5, 21.5), (12.5, 21.5)]
 
 
-def test_a_map_may_be_turned() -> None:
-    [place] = floor(TAGS, a_map([[100, 0]], yaw=math.pi / 2)).tolist()
-    assert np.allclose(place, (9.5, 21.5))
-
-
 def test_of_a_large_house_so_many_places_lie_anywhere() -> None:
     places = floor(TAGS, a_map([[0] * 1_000] * 500, resolution=0.05))
     assert len(places) == MAX_PLACES
     assert np.ptp(places, axis=0).min() > 20.0
     np.testing.assert_array_equal(places, floor(TAGS, a_map([[0] * 1_000] * 500, resolution=0.05)))
-
-
-def test_of_a_house_of_many_tags_they_are_fewer() -> None:
-    of_many = floor(np.zeros((65, 2)), a_map([[0] * 100] * 100))
-    assert len(of_many) == 100 < len(floor(np.zeros((64, 2)), a_map([[0] * 100] * 100)))
 
 
 def test_no_tag_stands_on_another() -> None:

@@ -50,13 +50,6 @@ def field_over(width: int, height: int, samples: Sequence[Sample], **changes: An
 # --- rule by rule ----------------------------------------------------------------------------
 
 
-def test_unexplored_cells_are_nan_whatever_lies_there() -> None:
-    mask = np.array([[True, False], [False, True]])
-    grid = field_over(2, 2, [(0.5, 0.5, 1.0), (1.5, 0.5, 2.0)], explored_mask=mask)
-    np.testing.assert_array_equal(np.isnan(grid.values), [False, True, True, False])
-    assert grid.values[0] == 1.0
-
-
 @pytest.mark.parametrize("power", [2.0, 3.0])
 @pytest.mark.parametrize("falloff", [0.5, 1.5, 3.0])
 def test_gate_lets_through_at_its_distance_and_not_beyond(falloff: float, power: float) -> None:
@@ -64,26 +57,6 @@ def test_gate_lets_through_at_its_distance_and_not_beyond(falloff: float, power:
     assert field_at_origin([(0.9, 1.2, 7.0)], **rules) == 7.0
     assert field_at_origin([(1.5, 0.0, 7.0)], **rules) == 7.0
     assert math.isnan(field_at_origin([(math.nextafter(1.5, 2.0), 0.0, 7.0)], **rules))
-
-
-@pytest.mark.parametrize("power", [2.0, 3.0])
-def test_gate_is_the_nearest_samples_and_comes_before_the_falloff(power: float) -> None:
-    samples = [(1.6, 0.0, 7.0), (0.0, 1.7, 9.0)]
-    assert math.isnan(
-        field_at_origin(samples, falloff_radius_m=5.0, max_distance_m=1.5, power=power)
-    )
-    near_too = [*samples, (1.4, 0.0, 8.0)]
-    value = field_at_origin(near_too, falloff_radius_m=5.0, max_distance_m=1.5, power=power)
-    assert 7.0 < value < 9.0
-    assert value != 8.0
-
-
-@pytest.mark.parametrize("power", [2.0, 3.0])
-def test_gate_comes_before_coincidence(power: float) -> None:
-    samples = [(0.0008, 0.0, 7.0)]
-    rules = {"falloff_radius_m": 0.0005, "max_distance_m": 0.0005, "power": power}
-    assert math.isnan(field_at_origin(samples, **rules))
-    assert field_at_origin(samples, **{**rules, "max_distance_m": 0.0008}) == 7.0
 
 
 @pytest.mark.parametrize("power", [2.0, 3.0])
@@ -97,55 +70,6 @@ def test_coincident_sample_is_taken_exactly(power: float, falloff: float) -> Non
 def test_sample_a_little_closer_than_that_is_exact_beside_a_very_large_one() -> None:
     # Its weight is hardly above that at the distance itself; averaged it would be 3.8.
     assert field_at_origin([(0.97 * COINCIDENT_EPS_M, 0.0, 0.0), (0.5, 0.0, 1e6)]) == 0.0
-
-
-@pytest.mark.parametrize(("power", "weights"), [(2.0, (1e6, 4.0)), (3.0, (1e9, 8.0))])
-def test_sample_at_the_coincidence_distance_is_averaged(
-    power: float, weights: tuple[float, float]
-) -> None:
-    samples = [(COINCIDENT_EPS_M, 0.0, 0.0), (0.5, 0.0, 1e6)]
-    expected = 1e6 * weights[1] / sum(weights)
-    assert field_at_origin(samples, power=power) == pytest.approx(expected, rel=1e-6)
-
-
-@pytest.mark.parametrize("power", [2.0, 3.0])
-def test_nearest_of_several_coincident_samples_is_taken(power: float) -> None:
-    samples = [(0.0005, 0.0, 1.0), (0.0002, 0.0, 2.0), (0.0, 0.0004, 3.0)]
-    assert field_at_origin(samples, power=power) == 2.0
-
-
-@pytest.mark.parametrize("power", [2.0, 3.0])
-@pytest.mark.parametrize("distance", [0.0, 0.0005])
-def test_first_of_equally_coincident_samples_wins(power: float, distance: float) -> None:
-    samples = [(distance, 0.0, 5.0), (0.0, distance, 6.0), (-distance, 0.0, 4.0)]
-    assert field_at_origin(samples, power=power) == 5.0
-    assert field_at_origin(samples[1:], power=power) == 6.0
-
-
-def test_weights_are_the_inverse_power_of_the_distance() -> None:
-    samples = [(1.0, 0.0, 10.0), (0.0, 0.5, 20.0)]
-    assert field_at_origin(samples, power=2.0) == pytest.approx((10 + 20 * 4) / 5, rel=1e-7)
-    assert field_at_origin(samples, power=1.0) == pytest.approx((10 + 20 * 2) / 3, rel=1e-7)
-    assert field_at_origin(samples, power=3.0) == pytest.approx((10 + 20 * 8) / 9, rel=1e-7)
-    assert field_at_origin(samples, power=0.0) == pytest.approx(15.0)
-
-
-@pytest.mark.parametrize("power", [2.0, 3.0])
-def test_falloff_takes_in_samples_at_its_radius_and_not_beyond(power: float) -> None:
-    beyond = math.nextafter(1.0, 2.0)
-    rules = {"falloff_radius_m": 1.0, "max_distance_m": 2.0, "power": power}
-    assert field_at_origin([(1.0, 0.0, 10.0), (0.0, -1.0, 20.0)], **rules) == 15.0
-    assert field_at_origin([(1.0, 0.0, 10.0), (0.0, -beyond, 20.0)], **rules) == 10.0
-    assert field_at_origin([(beyond, 0.0, 10.0), (0.0, -1.0, 20.0)], **rules) == 20.0
-
-
-@pytest.mark.parametrize("power", [2.0, 3.0])
-def test_nearest_sample_fills_the_gap_between_falloff_and_gate(power: float) -> None:
-    rules = {"falloff_radius_m": 0.5, "max_distance_m": 2.0, "power": power}
-    assert field_at_origin([(1.2, 0.0, 10.0), (0.0, 1.1, 20.0)], **rules) == 20.0
-    # Equally near: the first.
-    assert field_at_origin([(0.0, 1.5, 3.0), (0.9, 1.2, 1.0), (1.5, 0.0, 2.0)], **rules) == 3.0
-    assert field_at_origin([(0.9, 1.2, 1.0), (1.5, 0.0, 2.0)], **rules) == 1.0
 
 
 def test_equal_distances_tie_although_their_squares_are_a_rounding_apart() -> None:
@@ -176,11 +100,6 @@ def test_distance_at_a_radius_is_within_although_its_square_is_not(power: float)
     assert field_at_origin([(0.8, 1.5, 7.0)], **gate) == 7.0
     falloff = {"falloff_radius_m": 1.7, "max_distance_m": 3.0, "power": power}
     assert field_at_origin([(0.8, 1.5, 10.0), (1.5, 0.8, 20.0)], **falloff) == 15.0
-
-
-def test_sample_outside_the_box_reaches_into_it() -> None:
-    grid = field_over(2, 1, [(-0.5, 0.5, 7.0)], max_distance_m=1.0, falloff_radius_m=1.0)
-    np.testing.assert_array_equal(grid.values, np.array([7.0, np.nan], dtype=np.float32))
 
 
 # --- the grid --------------------------------------------------------------------------------
@@ -228,14 +147,6 @@ def test_range_is_that_of_the_finite_cells() -> None:
     assert np.isnan(grid.values[2])
 
 
-def test_range_is_zero_where_nothing_is_known() -> None:
-    for samples in ([], [(50.0, 50.0, 9.0)]):
-        grid = field_over(3, 3, samples)
-        assert np.isnan(grid.values).all()
-        assert (grid.value_min, grid.value_max) == (0.0, 0.0)
-        assert grid.sample_count == len(samples)
-
-
 def test_range_leaves_out_what_float32_cannot_hold() -> None:
     samples = [(0.5, 0.5, 1e39), (3.5, 0.5, 8.0), (6.5, 0.5, -1e39)]
     grid = field_over(7, 1, samples, max_distance_m=0.5, falloff_radius_m=0.5)
@@ -243,10 +154,6 @@ def test_range_leaves_out_what_float32_cannot_hold() -> None:
     assert (grid.value_min, grid.value_max) == (8.0, 8.0)
     only = field_over(1, 1, samples[:1])
     assert (only.value_min, only.value_max) == (0.0, 0.0)
-
-
-def test_sample_count_is_of_the_samples_given() -> None:
-    assert field_over(2, 2, [(0.0, 0.0, 1.0), (1.0, 1.0, 2.0), (99.0, 0.0, 3.0)]).sample_count == 3
 
 
 # --- refusals --------------------------------------------------------------------------------

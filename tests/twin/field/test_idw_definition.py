@@ -125,13 +125,12 @@ def cases(draw: st.DrawFn) -> Case:
 def small_parts() -> Iterator[None]:
     """Make the engine split even a tiny grid, down to single cells."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(idw, "_MAX_PAIRS", 12)
-        patch.setattr(idw, "_MIN_PAIRS", 12)
+        patch.setattr(idw, "MAX_PAIRS", 12)
         patch.setattr(idw, "_MIN_POINTS", 1)
         yield
 
 
-@settings(max_examples=500)
+@settings(max_examples=250)
 @given(cases())
 def test_field_is_the_definitions(case: Case) -> None:
     grid = case.by_twin()
@@ -139,7 +138,7 @@ def test_field_is_the_definitions(case: Case) -> None:
     assert_same_values(grid.values, case.by_loop(), case.samples)
 
 
-@settings(max_examples=300)
+@settings(max_examples=150)
 @given(cases())
 def test_field_is_the_definitions_however_it_is_split(case: Case) -> None:
     with small_parts():
@@ -169,87 +168,4 @@ def test_field_of_many_parts_is_the_definitions(
     assert_same_values(case.by_twin().values, case.by_loop(), case.samples)
 
 
-@pytest.mark.parametrize(("width", "height"), [(6, 6), (40, 1), (1, 40)])
-def test_field_of_more_samples_than_fit_at_once_is_the_definitions(width: int, height: int) -> None:
-    rng = np.random.default_rng(11)
-    spots = rng.uniform(0.0, 1.0, (9000, 2)) * (width, height)
-    case = Case(
-        samples=tuple((x, y, 20 + x) for x, y in spots.tolist()),
-        width=width,
-        height=height,
-        min_x=0.0,
-        min_y=0.0,
-        resolution=1.0,
-        falloff=30.0,
-        max_distance=50.0,
-        power=2.0,
-    )
-    assert_same_values(case.by_twin().values, case.by_loop(), case.samples)
-
-
 # --- what may not change it ------------------------------------------------------------------
-
-
-@st.composite
-def exact_cases(draw: st.DrawFn) -> Case:
-    """All lengths are multiples of 1/8 m below 2⁸ m: sums and differences of them are exact."""
-    width, height = draw(st.integers(1, 8)), draw(st.integers(1, 8))
-    eighths = st.integers(-16, 80).map(lambda number: number / 8)
-    return Case(
-        samples=tuple(draw(st.lists(st.tuples(eighths, eighths, VALUES), max_size=10))),
-        width=width,
-        height=height,
-        min_x=draw(st.integers(-8, 8)) / 8,
-        min_y=draw(st.integers(-8, 8)) / 8,
-        resolution=draw(st.sampled_from([0.25, 0.5, 1.0])),
-        falloff=draw(st.integers(0, 40)) / 8,
-        max_distance=draw(st.integers(0, 40)) / 8,
-        power=draw(st.sampled_from([2.0, 1.0, 3.0])),
-    )
-
-
-@settings(max_examples=300)
-@given(exact_cases(), st.sampled_from([-(2.0**20), 2.0**8, 2.0**24]))
-def test_moving_everything_moves_the_field(case: Case, by: float) -> None:
-    moved = Case(
-        **{
-            **vars(case),
-            "samples": tuple((x + by, y - by, value) for x, y, value in case.samples),
-            "min_x": case.min_x + by,
-            "min_y": case.min_y - by,
-        }
-    ).by_twin()
-    assert (moved.origin_x, moved.origin_y) == (case.min_x + by, case.min_y - by)
-    assert_same_values(moved.values, case.by_twin().values.tolist(), case.samples)
-
-
-@settings(max_examples=300)
-@given(exact_cases())
-def test_mirroring_everything_mirrors_the_field(case: Case) -> None:
-    mirrored = Case(
-        **{
-            **vars(case),
-            "samples": tuple((-x, y, value) for x, y, value in case.samples),
-            "min_x": -(case.min_x + case.width * case.resolution),
-        }
-    ).by_twin()
-    rows = case.by_twin().values.reshape(case.height, case.width)
-    assert_same_values(mirrored.values, rows[:, ::-1].ravel().tolist(), case.samples)
-
-
-@settings(max_examples=200)
-@given(exact_cases(), st.sampled_from([-2.0, 0.25, 1024.0]))
-def test_scaling_the_values_scales_the_field(case: Case, factor: float) -> None:
-    samples = tuple((x, y, value * factor) for x, y, value in case.samples)
-    scaled = Case(**{**vars(case), "samples": samples}).by_twin()
-    expected = [value * factor for value in case.by_twin().values.tolist()]
-    assert_same_values(scaled.values, expected, samples)
-
-
-@settings(max_examples=200)
-@given(exact_cases(), VALUES, st.integers(0, 10))
-def test_a_sample_out_of_reach_changes_nothing(case: Case, value: float, index: int) -> None:
-    # 80 m away from all of it; the reach is 5 m at most.
-    samples = (*case.samples[:index], (100.0, -80.0, value), *case.samples[index:])
-    grid = Case(**{**vars(case), "samples": samples}).by_twin()
-    assert_same_values(grid.values, case.by_twin().values.tolist(), samples)

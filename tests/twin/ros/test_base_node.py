@@ -11,22 +11,20 @@ from lupin_msgs.msg import Observation
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy
 from rclpy.serialization import serialize_message
 
 from lupin_twin.core.drops import LOST, Drop, Reason
 from lupin_twin.ros.base_node import (
     BEHIND_S,
     BELIEVED_S,
-    DRAIN_S,
     WARNING_PERIOD_S,
     NodeUtilities,
-    latched,
     read_message,
     waker,
 )
 from lupin_twin.ros.message_limits import MessageShape
-from tests.support.hostile import PACKAGES, lies
+from tests.support.hostile import PACKAGES
 from tests.support.messages import INFO, scan
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
@@ -65,33 +63,12 @@ def utilities(domain: int, logged: Logged) -> Iterator[NodeUtilities]:
     rclpy.try_shutdown(context=context)
 
 
-def test_latched_is_reliable_transient_local_and_keeps_the_last() -> None:
-    profile = latched(7)
-    assert profile.history == HistoryPolicy.KEEP_LAST
-    assert profile.depth == 7
-    assert profile.reliability == ReliabilityPolicy.RELIABLE
-    assert profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
-
-
 def test_a_message_is_read_up_to_its_limit_and_dropped_past_it() -> None:
     data = serialize_message(scan("1", {"co2": 1.0}))
     read: Any = read_message(data, MessageShape(Observation, PACKAGES, max_bytes=len(data)))
     assert read.tag_reading.tag_id == "1"
     drop = read_message(data, MessageShape(Observation, PACKAGES, max_bytes=len(data) - 1))
     assert drop == Drop(Reason.SIZE, f"{len(data)} bytes, the limit is {len(data) - 1}")
-
-
-def test_what_cannot_be_read_is_a_drop() -> None:
-    drop = read_message(serialize_message(scan("1", {"co2": 1.0}))[:50], SHAPE)
-    assert isinstance(drop, Drop)
-    assert drop.reason is Reason.UNREADABLE
-
-
-def test_a_length_that_lies_is_told_of_by_its_field() -> None:
-    drops = (read_message(lie, SHAPE) for lie in lies(serialize_message(scan("1"))))
-    whys = [drop.why for drop in drops if isinstance(drop, Drop)]
-    for field in ("header.frame_id claims", "tag_reading.readings: ", "flower.flowers: "):
-        assert any(why.startswith(field) and why.endswith(" bytes are left") for why in whys), field
 
 
 def test_a_subscription_hands_on_messages_and_tells_of_the_others(
@@ -216,38 +193,6 @@ def test_messages_that_wait_are_taken_one_right_behind_the_other(
         assert heard == list(map(float, range(90)))
         assert utilities.counts().dropped.get(LOST, 0) == 0
     executor.shutdown()
-
-
-def test_those_that_wait_keep_nobody_waiting_for_long(
-    utilities: NodeUtilities, logged: Logged, domain: int
-) -> None:
-    heard: list[Any] = []
-
-    def hear(message: Any) -> None:
-        heard.append(message)
-        logged.now_s += DRAIN_S / 2 + 0.001
-
-    group = utilities.node.default_callback_group
-    utilities.subscribe("topic", "many", SHAPE, depth=5, group=group, callback=hear)
-    (subscription,) = [s for s in utilities.node.subscriptions if s.topic_name == "/many"]
-    with Peer(domain) as peer:
-        publisher = peer.publisher("/many", Observation)
-        peer.until(publisher.get_subscription_count, "the subscription")
-
-        def publish() -> None:
-            for _ in range(5):
-                publisher.publish(scan("1"))
-            assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE_S))
-
-        publish()
-        one = serialize_message(scan("1"))
-        for count in (3, 6):  # one that the executor brings, and two behind it
-            subscription.callback(one, INFO)
-            assert len(heard) == count
-        publish()
-        # Before what keeps the thread for longer, all that there is room for.
-        utilities.drain()
-        assert len(heard) == 11
 
 
 def test_a_message_that_waited_long_tells_that_the_thread_is_behind_for_a_while(

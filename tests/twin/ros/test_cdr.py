@@ -5,7 +5,6 @@ import re
 import struct
 import subprocess
 import sys
-from array import array
 from typing import Any
 
 import pytest
@@ -14,10 +13,8 @@ from geometry_msgs.msg import Polygon, PoseWithCovarianceStamped
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lupin_msgs.msg import (
-    DiscoveredTag,
     DiscoveredTags,
     Observation,
-    SensorReading,
     TagReading,
     TwinState,
 )
@@ -28,7 +25,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import ByteMultiArray, Empty, Float64MultiArray
 from type_description_interfaces.msg import TypeDescription
 
-from lupin_twin.ros.message_limits import MalformedError, MessageShape, TooManyError
+from lupin_twin.ros.message_limits import MalformedError, MessageShape
 from tests.support.hostile import PACKAGES, lies
 
 OURS = (Observation, DiscoveredTags, TwinState, OccupancyGrid)
@@ -145,71 +142,6 @@ def test_a_sequence_holds_as_many_as_fit_into_its_bytes_and_not_one_more() -> No
         shape.check(bytes(data))
 
 
-def test_a_message_has_no_more_bytes_than_its_limit() -> None:
-    data = serialize_message(Time())
-    assert MessageShape(Time, PACKAGES, max_bytes=len(data)).check(data)
-    with pytest.raises(TooManyError, match=f"{len(data)} bytes, the limit is {len(data) - 1}"):
-        MessageShape(Time, PACKAGES, max_bytes=len(data) - 1).check(data)
-
-
-def test_a_limit_is_the_most_that_a_sequence_may_have() -> None:
-    shape = shape_of(DiscoveredTags, limits={"tags": 3})
-    tags = DiscoveredTags(tags=[DiscoveredTag()] * 3)
-    assert shape.check(serialize_message(tags))
-    tags.tags.append(DiscoveredTag())
-    with pytest.raises(TooManyError, match="tags: 4, the limit is 3"):
-        shape.check(serialize_message(tags))
-
-
-def test_a_limit_of_the_type_itself_holds() -> None:
-    data = bytearray(serialize_message(ParameterDescriptor()))
-    at = len(data) - 8  # of the two last sequences
-    data[at : at + 4] = struct.pack("<I", 2)
-    with pytest.raises(MalformedError, match="floating_point_range: 2, the limit is 1"):
-        SHAPES[ParameterDescriptor].check(bytes(data) + bytes(100))
-    kind = TypeDescription()
-    for length, is_taken in ((255, True), (256, False)):
-        # Behind the header: a length, the text, and the two empty sequences.
-        text = struct.pack("<I", length + 1) + b"x" * length + b"\0"
-        raw = LITTLE + text + bytes(-len(text) % 4) + bytes(8)
-        if is_taken:
-            assert SHAPES[TypeDescription].check(raw) == len(raw)
-        else:
-            with pytest.raises(MalformedError, match="has 256 bytes, the limit is 255"):
-                SHAPES[TypeDescription].check(raw)
-    assert SHAPES[TypeDescription].check(serialize_message(kind))
-
-
-def test_all_sequences_of_messages_have_a_limit_together_numbers_none() -> None:
-    shape = shape_of(TwinState, max_elements=4)
-    state = TwinState(tags=[tag() for tag in (any_tag, any_tag)])
-    assert shape.check(serialize_message(state))
-    state.tags[0].readings.append(SensorReading())
-    with pytest.raises(MalformedError, match="more elements in all sequences than the limit"):
-        shape.check(serialize_message(state))
-    grid = OccupancyGrid(data=array("b", bytes(100)))
-    assert shape_of(OccupancyGrid, max_elements=0).check(serialize_message(grid))
-
-
-def any_tag() -> Any:
-    from lupin_msgs.msg import TwinTagState
-
-    return TwinTagState(readings=[SensorReading()])
-
-
-def test_a_shape_is_asked_for_what_it_has() -> None:
-    with pytest.raises(TypeError, match=r"no sequences \['tag_reading.reading'\]"):
-        shape_of(Observation, limits={"tag_reading.reading": 1, "tag_reading.readings": 1})
-
-    class Wide:
-        @classmethod
-        def get_fields_and_field_types(cls) -> dict[str, str]:
-            return {"text": "wstring"}
-
-    with pytest.raises(TypeError, match="text is of type 'wstring', which is not known here"):
-        shape_of(Wide)
-
-
 # In a process of its own: what ROS allocates for one lie would hide what it does for the next.
 MEASURE = """
 import os, resource, sys
@@ -221,7 +153,7 @@ from lupin_twin.ros.message_limits import MalformedError, MessageShape
 from tests.support.hostile import PACKAGES, lies
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
 
-FILLER = 3_000_000
+FILLER = 1_000_000
 is_checked = sys.argv[1] == "checked"
 messages = (
     Observation(), DiscoveredTags(tags=[DiscoveredTag()]), TwinState(tags=[TwinTagState()]),
@@ -254,6 +186,6 @@ def grown_mb(how: str) -> dict[str, float]:
 def test_no_lie_costs_more_than_a_few_times_its_bytes() -> None:
     checked = grown_mb("checked")
     assert len(checked) == 4
-    assert max(checked.values()) < 60.0, checked  # an honest sequence of 3 MB, twice
+    assert max(checked.values()) < 30.0, checked  # an honest sequence of 1 MB, twice
     unchecked = grown_mb("unchecked")
-    assert unchecked["DiscoveredTags"] > 300.0, "the lies are none"
+    assert unchecked["DiscoveredTags"] > 100.0, "the lies are none"

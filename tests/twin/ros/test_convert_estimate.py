@@ -11,18 +11,13 @@ import pytest
 
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND as S
 from lupin_twin.estimate import Place
-from lupin_twin.estimate.engine import Estimate, EstimateRequest
+from lupin_twin.estimate.engine import Estimate
 from lupin_twin.estimate.grading import Record, Tally
-from lupin_twin.field.engine import FieldRefused, FieldRequest
+from lupin_twin.field.engine import FieldRefused
 from lupin_twin.ros import convert_field
 from lupin_twin.ros.convert_past import NotAnAnswerError
 from lupin_twin.runtime.estimate_rounds import DEFAULT_PLACES, Report, ReportRequest, TagCheck
 from tests.support.estimates import an_estimate
-
-
-def test_a_question_comes_back_as_it_was() -> None:
-    asked = EstimateRequest(FieldRequest("co2", 0.5, -1.0, 0.0, 2.0, 1.5), 1_500_000_000)
-    assert convert_field.estimate_request_of(convert_field.estimate_request_message(asked)) == asked
 
 
 def test_an_estimate_comes_back_as_it_was() -> None:

@@ -9,7 +9,6 @@ import pytest
 from lupin_msgs.srv import GetWrites
 from rclpy.serialization import deserialize_message, serialize_message
 
-from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.writes import DEFAULT_WRITES, PastWrite, PastWrites, RunSpan, WritesRequest
 from lupin_twin.journal.follow import Lot, NotALotError
 from lupin_twin.ros.convert_past import (
@@ -69,9 +68,3 @@ def test_rows_survive_the_wire() -> None:
 def test_what_leads_nowhere_or_names_no_journal_is_no_lot(lot: Lot) -> None:
     with pytest.raises(NotALotError):
         lot_of(rows_response(lot), 8)
-
-
-def test_a_refusal_is_read_again() -> None:
-    response = GetWrites.Response(error_message="not remembered: no journal")
-    with pytest.raises(NotRemembered, match="no journal"):
-        lot_of(response, 8)

@@ -28,10 +28,3 @@ def test_a_twin_is_known_by_the_state_that_it_publishes() -> None:
     msg.status = [*others, *msg.status, *others]
     assert list(findings_of(msg, "/gh1/twin/state")) == SAID
     assert not list(findings_of(msg, "/gh2/twin/state"))
-
-
-def test_what_is_not_said_as_the_nodes_own_is_not_taken_for_it() -> None:
-    msg = diagnostics(SAID, "/gh1/lupin_twin", 7 * S)
-    msg.status[0].hardware_id = "a board"
-    msg.status[1].name = "drops"
-    assert list(findings_of(msg, "/gh1/twin/state")) == SAID[2:]

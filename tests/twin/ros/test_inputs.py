@@ -14,7 +14,6 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 
 from lupin_twin.ros.inputs import (
     MAX_ROWS,
-    MAX_WRITERS,
     Gaps,
     Input,
     OtherTwins,
@@ -69,14 +68,6 @@ def test_a_writer_that_starts_anew_is_no_gap() -> None:
     assert lost([700, 701, 1, 2]) == [0, 0, 0, 0]
 
 
-def test_only_so_many_writers_are_followed() -> None:
-    gaps = Gaps()
-    for start in range(0, 1000 * (MAX_WRITERS + 1), 1000):
-        gaps.see(start, lambda: MAX_WRITERS + 1)
-    assert gaps.see(1, lambda: 1) == 0, "the first is forgotten"
-    assert len(gaps._next) == MAX_WRITERS
-
-
 @given(st.lists(st.integers(0, 3), min_size=1), st.integers(1, 10**6))
 def test_of_one_writer_every_lost_message_is_counted(skips: list[int], start: int) -> None:
     gaps, number = Gaps(), start
@@ -85,23 +76,6 @@ def test_of_one_writer_every_lost_message_is_counted(skips: list[int], start: in
         number += 1 + skip
         assert gaps.see(number, lambda: 1) == skip
     assert gaps.lost == sum(skips)
-
-
-def test_who_has_said_nothing_for_long_begins_with_1() -> None:
-    gaps = Gaps()
-    assert gaps.see(7, lambda: 3) == 0
-    gaps.settle(3)
-    gaps.settle(3)
-    # Whose 951 is, is not told: the rest is counted as the other's number comes.
-    assert [gaps.see(number, lambda: 3) for number in (951, 8, 1, 952)] == [943, 7, 0, 0]
-    assert gaps.lost == 950
-
-
-def test_who_comes_behind_those_who_have_said_nothing_may_begin_anywhere() -> None:
-    gaps = Gaps()
-    gaps.settle(1)
-    gaps.unsettle()
-    assert gaps.see(951, lambda: 1) == 0
 
 
 def received(*numbers: Iterable[int]) -> TwinCount:

@@ -31,10 +31,6 @@ def test_what_is_given_overrides_the_file_with_its_type() -> None:
     assert overrides(NOT_GIVEN | {"use_sim_time": "true"}) == {"use_sim_time": True}
 
 
-def test_the_packages_own_file_is_the_default() -> None:
-    assert params_file(NOT_GIVEN, "twin.yaml", lambda _: True) == "twin.yaml"
-
-
 def test_a_file_that_is_not_there_is_refused_by_name() -> None:
     given = NOT_GIVEN | {"params_file": "/no.yaml"}
     with pytest.raises(LaunchError, match=r"params_file is '/no\.yaml', expected a file"):

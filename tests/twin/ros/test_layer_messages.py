@@ -15,10 +15,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 from lupin_twin.ros.layers import (
     COLOURS,
     MarkerArrays,
-    PlanterMark,
     TagMark,
     cloud,
-    planter_markers,
     tag_markers,
 )
 
@@ -86,16 +84,3 @@ def test_a_tag_is_a_ball_of_its_colour_and_its_name_above() -> None:
     assert name.pose.position.z > ball.pose.position.z
     # At whatever time it is looked at, and until it is deleted.
     assert ball.header.stamp.sec == ball.lifetime.sec == 0
-
-
-def test_no_colour_is_one_of_a_verdict() -> None:
-    """On the page green is healthy and red critical; a marker says neither."""
-    for look, (red, green, blue) in COLOURS.items():
-        assert blue >= max(red, green) or (look == "failed" and min(red, blue) > 2 * green), look
-
-
-def test_a_planter_is_its_outline_closed() -> None:
-    corners = ((0.0, 0.0, 0.1), (1.0, 0.0, 0.1), (1.0, 0.5, 0.1))
-    [line] = planter_markers(PlanterMark(7, corners), "map")
-    assert (line.type, line.ns, line.id) == (Marker.LINE_STRIP, "planters", 7)
-    assert [(p.x, p.y, p.z) for p in line.points] == [*corners, corners[0]]

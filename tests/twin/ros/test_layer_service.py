@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import threading
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,14 +19,10 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.field.engine import DEFAULT_RESOLUTION_M
-from lupin_twin.field.idw import Abandoned
-from lupin_twin.ros import layer_service as module
-from lupin_twin.ros.layers import MarkerArrays
 from tests.support.domains import own_domain
 from tests.support.messages import look, scan
 from tests.support.processes import Process, twin_node
 from tests.support.ros import Peer, latched
-from tests.support.waiting import wait_for
 
 LAYERS = "layers:=[temperature, soil moisture, co2, humidity, light, soil_moisture]"
 SENSORS = Path("backend/lupin_bridge/sensors.json")
@@ -83,165 +77,6 @@ class Viewer(Peer):
     def says(self, topic: str, count: int) -> None:
         """Wait until the twin says so; that it says more is found here too."""
         self.until(lambda: self.said.get(topic) == str(count), f"{count} on {topic}")
-
-
-class Stage:
-    """A service with one topic: what is made of it, and when, is the test's."""
-
-    topic_name = "/t"
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.now_s = 0.0
-        self.key: object = 0
-        self.plans = 0
-        self.is_behind = False
-        self.is_free = threading.Event()
-        self.is_free.set()
-        self.fails: Exception | None = None
-        self.sent: list[bytes] = []
-        self.kept: list[Any] = []
-        self.keep, self.publish = lambda *field: self.kept.append(field), self.sent.append
-        anything: Any = self
-        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now_s))
-        make: Any = module.LayerService
-        self.service = make(*[anything] * 7, 1_440.0, lambda: None)
-        self.listeners, self.forgotten = 1, 0
-        self.topic = module._Topic(self, lambda: self.key, self.plan, self.forget)
-        self.service._topics.append(self.topic)
-
-    def get_subscription_count(self) -> int:
-        return self.listeners
-
-    def forget(self) -> None:
-        self.forgotten += 1
-
-    def drain(self) -> None: ...
-
-    def warn(self, *_: Any) -> None: ...
-
-    def plan(self) -> Any:
-        self.plans += 1
-        if isinstance(self.fails, ValueError):
-            raise self.fails
-        return None, self.make
-
-    def make(self, *_: Any) -> Any:
-        self.is_free.wait()
-        if self.fails is not None:
-            raise self.fails
-        job_and_grid: Any = ("job", "grid")
-        return module._Made(b"made", *job_and_grid)
-
-    def look(self, now_s: float) -> int:
-        """Look at this moment; returns how often something was begun so far."""
-        self.now_s = now_s
-        self.service.check()
-        return self.plans
-
-    def is_delivered(self) -> bool:
-        self.service.deliver()
-        return not self.topic.is_under_way
-
-
-@pytest.fixture
-def stage(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stage]:
-    made = Stage(monkeypatch)
-    yield made
-    made.is_free.set()
-    made.service.close()
-
-
-def test_what_has_changed_is_made_at_its_rate_and_not_twice_at_once(stage: Stage) -> None:
-    stage.is_free.clear()
-    assert stage.look(10.0) == 1
-    stage.key = 1
-    assert stage.look(20.0) == 1, "it is under way"
-    stage.is_free.set()
-    wait_for(stage.is_delivered, "the first")
-    assert (stage.sent, stage.kept) == ([b"made"], [("job", "grid")])
-    assert stage.look(10.999) == 1
-    stage.is_behind = True
-    assert stage.look(11.0) == 1, "the node is behind"
-    stage.is_behind = False
-    assert stage.look(11.0) == 2
-    wait_for(stage.is_delivered, "the second")
-    assert stage.look(30.0) == 2, "nothing has changed"
-
-
-def test_what_was_given_up_is_made_again_and_a_problem_ends(stage: Stage) -> None:
-    stage.fails = Abandoned()
-    stage.look(10.0)
-    wait_for(stage.is_delivered, "its end")
-    stage.fails = ValueError("too far apart")
-    assert stage.look(20.0) == 2, "though nothing has changed"
-    assert stage.service.state().problems == {"/t": "too far apart"}
-    stage.key, stage.fails = 1, None
-    stage.look(30.0)
-    wait_for(stage.is_delivered, "a good one")
-    assert stage.service.state().problems == {}
-    assert stage.sent == [b"made"]
-
-
-def test_while_nobody_looks_nothing_is_made_or_kept_and_at_the_end_no_thread_is_left(
-    stage: Stage, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    forgotten: list[str] = []
-    with monkeypatch.context() as patch:
-        patch.setattr(MarkerArrays, "forget", lambda _: forgotten.append("marks"))
-        stage.service.offer(SimpleNamespace(create_publisher=lambda *_: stage), (), "map")
-        stage.listeners = 0
-        assert (stage.look(10.0), stage.forgotten) == (0, 1)
-    assert len(forgotten) == 2, "tags and planters"
-    del stage.service._topics[1:]
-    stage.listeners = 1
-    assert (stage.look(20.0), stage.forgotten) == (1, 1)
-    wait_for(stage.is_delivered, "what is looked at")
-
-    def threads() -> list[str]:
-        return [it.name for it in threading.enumerate() if it.name.startswith("layers")]
-
-    assert threads()
-    stage.service.close()
-    wait_for(lambda: not threads(), "the end of its thread")
-
-
-def test_marks_that_are_as_before_are_not_sent_again() -> None:
-    marks: list[Any] = [[1], [1], [2]]
-    anything: Any = SimpleNamespace(build=lambda marks: b"%d" % marks[0])
-    marked = module._Marked(lambda _: marks.pop(0), anything)
-    snapshot: Any = None
-    assert [marked.make(snapshot).data for _ in range(3)] == [b"1", None, b"2"]
-
-
-def test_a_layer_is_another_when_the_map_is_or_a_minute_of_its_day_has_passed(stage: Stage) -> None:
-    now_ns, revision, model = 0, 1, object()
-    parts: dict[str, Any] = {
-        "fields": SimpleNamespace(rules=0),
-        "occupancy": lambda: SimpleNamespace(revision=revision),
-        "estimates": SimpleNamespace(
-            watch=SimpleNamespace(fit=lambda _: SimpleNamespace(model=model, at_ns=1))
-        ),
-        "store": SimpleNamespace(observation_count=1),
-        "now_ns": lambda: now_ns,
-        "day_length_s": 1_440.0,
-    }
-    for name, part in parts.items():
-        setattr(stage.service, name, part)
-
-    def key() -> object:
-        return stage.service._key_of_layer("co2")
-
-    first = key()
-    now_ns = 10**9 - 1
-    assert key() == first
-    now_ns = 10**9
-    assert key() != first, "a minute of a day of 24 minutes"
-    now_ns, revision = 0, 2
-    assert key() != first, "another map"
-    model = None
-    unknown = key()
-    revision = 3
-    assert key() != unknown, "also without an estimate"
 
 
 @pytest.fixture(scope="module")

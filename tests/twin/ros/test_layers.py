@@ -13,11 +13,9 @@ from rclpy.validate_topic_name import validate_topic_name
 
 from lupin_twin.core.parameters import ParameterError
 from lupin_twin.estimate import EstimateGrid
-from lupin_twin.field.grid import FieldGrid, grid_dimensions
+from lupin_twin.field.grid import FieldGrid
 from lupin_twin.ros.layers import (
     ERROR_UNKNOWN,
-    MAX_POINTS,
-    layer_request,
     points,
     topic_of,
     topics_of,
@@ -56,32 +54,6 @@ def test_the_points_are_those_of_a_plain_loop(data: st.DataObject, width: int, h
     bare = points(grid, None)
     np.testing.assert_array_equal(bare[:, :4], found[:, :4])
     assert (bare[:, 4] == ERROR_UNKNOWN).all()
-
-
-def test_a_field_of_which_nothing_is_known_has_no_points() -> None:
-    assert points(field(np.full((2, 3), np.nan, dtype=np.float32)), None).shape == (0, 5)
-
-
-def test_cells_are_twice_as_wide_until_there_are_few_enough() -> None:
-    # 10 m by 4 m and 1 m around it: 120 x 60 cells of 0.1 m, 60 x 30 of 0.2 m.
-    tags = [(0.0, 0.0), (10.0, 4.0)]
-    assert layer_request("co2", tags, 1.0, 7_200).resolution == np.float32(0.1)
-    coarser = layer_request("co2", tags, 1.0, 7_199)
-    assert coarser.resolution == np.float32(0.2)
-    assert (coarser.bbox_min_x, coarser.bbox_max_y, coarser.sensor_type) == (-1.0, 5.0, "co2")
-    assert layer_request("co2", tags, 1.0, 1_799).resolution == np.float32(0.4)
-    assert layer_request("co2", tags, 1.0, 1).resolution >= 12.0
-
-
-def test_no_message_has_more_points_than_there_may_be() -> None:
-    request = layer_request("co2", [(0.0, 0.0), (150.0, 150.0)], 1.0, 100_000_000)
-    width, height = grid_dimensions(-1.0, -1.0, 151.0, 151.0, request.resolution)
-    assert MAX_POINTS / 4 < width * height <= MAX_POINTS
-
-
-def test_tags_too_far_apart_for_any_grid_are_left_out() -> None:
-    request = layer_request("co2", [(0.0, 0.0), (1e39, 0.0)], 1.0, 1_000)
-    assert (request.bbox_min_x, request.bbox_max_x) == (-1.0, 1.0)
 
 
 @pytest.mark.parametrize(

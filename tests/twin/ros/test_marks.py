@@ -11,10 +11,8 @@ from lupin_twin.ros.layers import (
     FRESH_S,
     OLD_S,
     PlanterMark,
-    TagMark,
     appearance_of,
     planter_marks,
-    tag_marks,
 )
 
 NOW_NS = 10_000_000_000_000
@@ -45,22 +43,9 @@ def test_a_tag_looks_as_old_as_it_is(age_s: float, look: str) -> None:
     assert appearance_of(tag("a", age_s=age_s), NOW_NS) == look
 
 
-def test_a_tag_that_was_never_observed_or_nobody_knows_when_is_old() -> None:
-    assert appearance_of(TagState("a"), NOW_NS) == "old"
-    assert appearance_of(tag("a"), None) == "old"
-
-
 def test_a_tag_whose_last_try_failed_says_so_whatever_its_age() -> None:
     assert appearance_of(tag("a", last_try=Attempt(NOW_NS, 2)), NOW_NS) == "failed"
     assert appearance_of(tag("a", last_try=Attempt(NOW_NS, 0)), NOW_NS) == "fresh"
-
-
-def test_tags_keep_their_numbers_also_beside_one_without_a_place() -> None:
-    lost = tag("lost", None)
-    here = TagMark(1, "here", 1.0, 2.0, 0.5, "fresh")
-    assert tag_marks(house(lost, tag("here", 1.0))) == [here]
-    found = tag_marks(house(tag("lost", 3.0), tag("here", 1.0)))
-    assert found == [TagMark(0, "lost", 3.0, 2.0, 0.5, "fresh"), here]
 
 
 def test_planters_are_told_once_by_the_number_of_their_first_tag() -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Point32
 from lupin_msgs.msg import (
     DiscoveredTag,
@@ -101,14 +101,3 @@ def test_a_state_holds_as_many_items_as_a_twin_keeps_and_not_one_more() -> None:
         else:
             with pytest.raises(TooManyError, match=r"^tags.box_footprint.points: more elements"):
                 message_limits.STATE.check(data)
-
-
-def test_statuses_have_so_many_values_together_and_not_one_more() -> None:
-    def values(count: int) -> bytes:
-        status = DiagnosticStatus(values=[KeyValue()] * count)
-        return bytes(serialize_message(DiagnosticArray(status=[status])))
-
-    most = message_limits.MAX_STATUSES + message_limits.MAX_STATUS_VALUES - 1
-    assert message_limits.DIAGNOSTICS.check(values(most))
-    with pytest.raises(TooManyError, match=r"^status.values: more elements"):
-        message_limits.DIAGNOSTICS.check(values(most + 1))

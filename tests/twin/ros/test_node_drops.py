@@ -54,15 +54,6 @@ def test_an_anomaly_and_an_unknown_kind_are_dropped_with_a_throttled_warning(twi
     assert "odom" not in twin.process.output
 
 
-def test_an_empty_tag_id_is_dropped_on_each_path(twin: Twin) -> None:
-    twin.peer.observe(scan("", {"co2": 1.0}), look(""))
-    twin.peer.discover(discovered({"": messages.pose(1, 1), "good": messages.pose(2, 2)}))
-    twin.peer.tag("good")
-    twin.settled()
-    assert set(twin.tags()) == {"good", "marker"}
-    twin.warning("tag_id is empty")
-
-
 def test_a_message_cut_short_or_too_large_is_dropped_and_the_node_lives(twin: Twin) -> None:
     data = bytes(serialize_message(scan("broken", {"co2": 1.0})))
     publisher = twin.peer.publisher("/floranova/observations", Observation)
@@ -70,14 +61,6 @@ def test_a_message_cut_short_or_too_large_is_dropped_and_the_node_lives(twin: Tw
     twin.warning("unreadable")
     publisher.publish(scan("large", {f"sensor{i}": 1.0 for i in range(50_000)}))
     twin.warning("bytes", "limit is 1000000")
-    twin.settled()
-    assert set(twin.tags()) == {"marker"}
-
-
-def test_a_tag_past_its_bounds_is_refused_with_the_value_and_the_limit(twin: Twin) -> None:
-    twin.peer.observe(scan("many", {f"sensor{i}": 1.0 for i in range(65)}))
-    twin.warning("65", "limit is 64")
-    twin.peer.observe(scan("t" * 300, {"co2": 1.0}))
     twin.settled()
     assert set(twin.tags()) == {"marker"}
 

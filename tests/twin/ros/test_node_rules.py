@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -12,24 +10,17 @@ from typing import Any
 
 import pytest
 import rclpy
-import yaml
 from lupin_msgs.msg import TwinState
-from rcl_interfaces.srv import GetParameters, ListParameters
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.parameter import Parameter, parameter_value_to_python
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
+from rclpy.parameter import Parameter
 
-from lupin_twin.field.engine import FieldJob, FieldRequest, FieldRules
+from lupin_twin.field.engine import FieldJob, FieldRequest
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.ros.node import TwinNode
-from tests.support.messages import INFO, discovered, look, occupancy_grid, pose, scan
+from tests.support.messages import occupancy_grid, scan
 from tests.support.ros import Peer
-from tests.support.waiting import PATIENCE_S
 
 SOURCES = [file for folder in ("ros_node", "backend") for file in Path(folder).rglob("*.py")]
-DEPTHS = {"/floranova/observations": 50, "/perception/discovered_tags": 50, "/map": 1}
 LIMITS = {
     "/floranova/observations": 1_000_000,
     "/perception/discovered_tags": 8_000_000,
@@ -71,38 +62,6 @@ def stage(domain: int) -> Iterator[Stage]:
 # --- the contract -------------------------------------------------------------------------------
 
 
-def test_its_name_is_the_contracts(stage: Stage) -> None:
-    assert stage.node.get_fully_qualified_name() == "/lupin_twin"
-
-
-@pytest.mark.parametrize("topic", DEPTHS)
-def test_it_subscribes_to_latched_messages_and_as_many_as_the_contract_says(
-    stage: Stage, topic: str
-) -> None:
-    profile = stage.subscription(topic).qos_profile
-    assert profile.history == HistoryPolicy.KEEP_LAST
-    assert profile.depth == DEPTHS[topic]
-    assert profile.reliability == ReliabilityPolicy.RELIABLE
-    assert profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
-
-
-def test_the_parameters_are_the_rules_of_its_fields(domain: int) -> None:
-    values = {
-        "idw_power": 3.0,
-        "idw_falloff_radius_m": 2.5,
-        "idw_max_distance_m": 0.5,
-        "max_grid_cells": 123,
-    }
-    arguments = [word for name, value in values.items() for word in ("-p", f"{name}:={value}")]
-    with stage_in(domain, *arguments) as stage:
-        assert stage.node.fields.rules == FieldRules(
-            idw_power=3.0,
-            falloff_radius_m=2.5,
-            max_distance_m=0.5,
-            max_grid_cells=123,
-        )
-
-
 def test_a_rule_that_is_changed_takes_effect_at_once(stage: Stage) -> None:
     node = stage.node
     told: list[Any] = []
@@ -125,108 +84,10 @@ def test_a_rule_that_is_changed_takes_effect_at_once(stage: Stage) -> None:
     assert isinstance(node.fields.lookup(request, node.store, None), FieldGrid)
 
 
-def test_the_state_is_published_at_the_new_rate(stage: Stage) -> None:
-    node = stage.node
-    timers = len(list(node.timers))
-    assert node._state_timer.timer_period_ns == 1e9
-    for rate_hz in (100.0, 0.01, 0.01):
-        assert node.set_parameters([Parameter("state_publish_rate_hz", value=rate_hz)])[
-            0
-        ].successful
-        assert node._state_timer.timer_period_ns == 1e9 / rate_hz
-    assert len(list(node.timers)) == timers
-
-
-def dumped(stage: Stage) -> str:
-    """What `ros2 param dump` writes: its two services are asked, as that asks them."""
-    executor = SingleThreadedExecutor(context=stage.node.context)
-    asker = rclpy.create_node("asker", context=stage.node.context)
-    executor.add_node(stage.node)
-    executor.add_node(asker)
-
-    def ask(kind: Any, name: str, **arguments: Any) -> Any:
-        client = asker.create_client(kind, f"/lupin_twin/{name}")
-        assert client.wait_for_service(timeout_sec=PATIENCE_S)
-        future = client.call_async(kind.Request(**arguments))
-        executor.spin_until_future_complete(future, timeout_sec=PATIENCE_S)
-        return future.result()
-
-    names = sorted(ask(ListParameters, "list_parameters").result.names)
-    values = ask(GetParameters, "get_parameters", names=names).values
-    executor.shutdown()
-    asker.destroy_node()
-    read = [parameter_value_to_python(value) for value in values]
-    plain = [list(value) if isinstance(value, array) else value for value in read]
-    told = {"/lupin_twin": {"ros__parameters": dict(zip(names, plain, strict=True))}}
-    return yaml.dump(told, default_flow_style=False)
-
-
-def test_a_dump_of_its_parameters_starts_a_twin_like_it(domain: int, tmp_path: Path) -> None:
-    changed = ("journal:=off", "layers:=[co2, light]", "idw_power:=3", "buffer_len:=7")
-    file = tmp_path / "dump.yaml"
-    with stage_in(domain, *(word for one in changed for word in ("-p", one))) as stage:
-        stage.node.set_parameters([Parameter("idw_falloff_radius_m", value=4.5)])
-        parameters = stage.node.parameters
-        file.write_text(dumped(stage), encoding="utf-8")
-    assert (parameters.layers, parameters.idw_falloff_radius_m) == (("co2", "light"), 4.5)
-    with stage_in(domain, "--params-file", str(file)) as again:
-        assert again.node.parameters == parameters
-        assert again.warnings == []
-
-
 # --- one thread ---------------------------------------------------------------------------------
 
 
-def test_one_callback_group_keeps_all_callbacks_apart(stage: Stage) -> None:
-    """The store and the cache have no lock."""
-    node = stage.node
-    node.add_listener(lambda _: None, heartbeat_s=1.0)
-    ours = [
-        *(stage.subscription(topic) for topic in DEPTHS),
-        *(
-            service
-            for service in node.services
-            if service.srv_name == node.parameters.field_service_name
-        ),
-        *node.timers,
-    ]
-    assert len(ours) == 3 + 1 + 7
-    assert isinstance(node._group, MutuallyExclusiveCallbackGroup)
-    assert {id(each.callback_group) for each in ours} == {id(node._group)}
-
-
-def test_every_executor_has_one_thread_and_no_group_lets_two_callbacks_run() -> None:
-    text = "\n".join(file.read_text(encoding="utf-8") for file in SOURCES)
-    assert set(re.findall(r"\w+Executor\(", text)) == {"SingleThreadedExecutor("}
-    assert set(re.findall(r"\w+CallbackGroup\(", text)) == {"MutuallyExclusiveCallbackGroup("}
-
-
 # --- what is dropped, in which order ------------------------------------------------------------
-
-
-@pytest.mark.parametrize("message", [scan("", frame_id="odom"), look("", frame_id="odom")])
-def test_the_frame_is_looked_at_before_the_tag_id(stage: Stage, message: Any) -> None:
-    stage.node._on_observation(message)
-    [warning] = stage.warnings
-    assert "its frame is 'odom', expected 'map'" in warning
-
-
-def test_the_frame_of_a_discovery_is_looked_at_before_its_tags(stage: Stage) -> None:
-    stage.node._on_discovered_tags(discovered({"": pose(1, 1)}, frame_id="odom"))
-    [warning] = stage.warnings
-    assert "its frame is 'odom'" in warning
-
-
-@pytest.mark.parametrize("topic", LIMITS)
-def test_a_message_of_one_byte_too_many_is_dropped_unread(stage: Stage, topic: str) -> None:
-    take = stage.subscription(topic).callback
-    take(bytes(LIMITS[topic] + 1), INFO)
-    assert stage.warnings == [
-        f"dropped a message on {topic}: {LIMITS[topic] + 1} bytes, the limit is {LIMITS[topic]}"
-    ]
-    # Of all zeros, one that fits is an empty message: nothing more is said about its size.
-    take(bytes(LIMITS[topic]), INFO)
-    assert not any("bytes" in warning for warning in stage.warnings[1:])
 
 
 # --- the map ------------------------------------------------------------------------------------

@@ -19,7 +19,6 @@ from lupin_twin.ros.parameters import (
     declare,
     naming,
     naming_own_parameters,
-    unknown_overrides,
 )
 
 
@@ -39,13 +38,6 @@ def node_with(domain: int, *overrides: str, made: Any = Node) -> Iterator[Any]:
 def test_all_are_declared_and_what_is_set_is_read(domain: int) -> None:
     with node_with(domain, "idw_power:=3", "state_topic:=/s") as node:
         assert declare(node) == TwinParameters(idw_power=3.0, state_topic="/s")
-
-
-def test_some_are_declared_and_the_others_are_neither_read_nor_unknown(domain: int) -> None:
-    with node_with(domain, "idw_power:=3.0", "buffer_len:=5") as node:
-        assert declare(node, ["buffer_len"]) == TwinParameters(buffer_len=5)
-        assert not node.has_parameter("idw_power")
-        assert unknown_overrides(node) == []
 
 
 def test_descriptors_tell_meaning_range_and_why_it_is_read_only(domain: int) -> None:
@@ -102,12 +94,6 @@ def test_a_refused_change_changes_nothing_and_names_parameter_value_and_limit(
         assert node.parameters == TwinParameters()
         for one in ("idw_max_distance_m", name):
             assert node.get_parameter(one).value == getattr(TwinParameters(), one)
-
-
-def test_an_override_of_no_parameter_is_known_by_name(domain: int) -> None:
-    with node_with(domain, "idw_pwoer:=3.0", "use_sim_time:=false") as node:
-        declare(node)
-        assert unknown_overrides(node) == ["idw_pwoer"]
 
 
 def test_what_another_node_of_the_twins_reads_has_to_be_right_too(domain: int) -> None:

@@ -1,27 +1,15 @@
-"""The two services of the past: over stand-ins, and over DDS of a twin without a journal."""
+"""The services of the past, over DDS, of a twin without a journal."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Iterator
 
 import pytest
 from builtin_interfaces.msg import Time
 from lupin_msgs.srv import GetHistory, GetStateAt
 
-from lupin_twin.core.interfaces import GET_HISTORY, GET_STATE_AT
-from lupin_twin.core.past import (
-    MAX_POINTS,
-    NotRemembered,
-    PastRefused,
-    SeriesPast,
-)
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot, TwinStore
-from lupin_twin.ros.base_node import SERVICE_QOS
-from lupin_twin.ros.past_service import PastService
-from lupin_twin.runtime.workers import MAX_QUERIES, JobQueue, Workers
+from lupin_twin.core.interfaces import GET_HISTORY
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from tests.support import messages
 from tests.support.domains import own_domain
 from tests.support.processes import OFTEN, twin_node
@@ -30,174 +18,6 @@ from tests.support.waiting import wait_for
 
 S = NANOSECONDS_PER_SECOND
 NOW_NS = 100 * S
-FAR = Time(sec=2**31 - 1)
-
-
-# --- with stand-ins: no ROS runs ----------------------------------------------------------------
-
-
-class Log:
-    """A log in which is found what a test says."""
-
-    def __init__(self) -> None:
-        self.found: Future[Any] = Future()
-        self.asked = 0
-
-    def query(self, _search: object, _cost_s: float) -> Future[Any]:
-        self.asked += 1
-        return self.found
-
-
-@dataclass
-class Reports:
-    """What a node reports."""
-
-    reported: list[Exception] = field(default_factory=list)
-
-    def report(self, _what: str, error: Exception) -> None:
-        self.reported.append(error)
-
-
-class Node:
-    """As much of a node as the services need: it is asked by the services' names."""
-
-    def __init__(self) -> None:
-        self.memory, self.utilities = Log(), Reports()
-        self.workers = Workers("test")
-        self.queue = JobQueue(self.workers, lambda: None)
-        self.callbacks: dict[str, Callable[..., Any]] = {}
-        utilities: Any = self.utilities
-        recall: Any = self.memory
-        service = PastService(
-            utilities, self.queue, recall, TwinStore(), now_ns=lambda: NOW_NS, frame_id="map"
-        )
-        service.offer(self, None)
-
-    def create_service(
-        self, kind: Any, name: str, callback: Any, qos_profile: Any, callback_group: Any
-    ) -> Any:
-        assert (callback_group, qos_profile) == (None, SERVICE_QOS)
-        self.callbacks[name] = lambda **request: callback(kind.Request(**request), kind.Response())
-        return None
-
-    def answer(self, name: str, **request: Any) -> Any:
-        """The response, now or as soon as the queue has it."""
-        answer = self.callbacks[name](**request)
-        if hasattr(answer, "ok"):
-            return answer
-        sent: list[Any] = []
-        answer.goes_to(sent.append)
-
-        def look() -> bool:
-            self.queue.deliver()
-            return bool(sent)
-
-        wait_for(look, "the answer")
-        return sent[0]
-
-
-@pytest.fixture
-def node() -> Iterator[Node]:
-    node = Node()
-    yield node
-    node.workers.close()
-
-
-def test_a_state_is_asked_for_by_its_moment(node: Node) -> None:
-    node.memory.found.set_result(Snapshot(5 * S + 3, "map", ()))
-    response = node.answer(GET_STATE_AT.name, at=Time(sec=5, nanosec=3))
-    assert response.ok
-    assert response.state.header == response.times.header
-    assert node.memory.asked == 1
-
-
-@pytest.mark.parametrize("at", [Time(sec=100), Time()])
-def test_now_and_zero_can_be_asked_for(node: Node, at: Time) -> None:
-    node.memory.found.set_result(Snapshot(at.sec * S, "map", ()))
-    assert node.answer(GET_STATE_AT.name, at=at).ok
-
-
-@pytest.mark.parametrize(
-    ("at", "says"),
-    [
-        (Time(sec=100, nanosec=1), "at is 100.000000001 s, later than now, 100.000000000 s"),
-        (Time(sec=-1), "at is -1.000000000 s, before 0"),
-    ],
-)
-def test_a_moment_that_has_not_passed_is_refused_and_nothing_is_looked_up(
-    node: Node, at: Time, says: str
-) -> None:
-    response = node.answer(GET_STATE_AT.name, at=at)
-    assert response == GetStateAt.Response(error_message=says)
-    assert node.memory.asked == 0
-    assert node.utilities.reported == []
-
-
-def test_a_series_is_asked_for_as_it_stands_in_the_request(node: Node) -> None:
-    node.memory.found.set_result(SeriesPast(S, 9 * S, None, (S,), (1,), (2.5,), (2.5,), (2.5,)))
-    response = node.answer(
-        GET_HISTORY.name,
-        tag_id="1",
-        sensor_type="co2",
-        start=Time(sec=1),
-        end=Time(sec=9),
-        max_points=3,
-    )
-    assert response.ok
-    assert response.stamps == [Time(sec=1)]
-    assert list(response.means) == [2.5]
-    assert node.memory.asked == 1
-
-
-@pytest.mark.parametrize(
-    ("wrong", "says"),
-    [
-        ({"tag_id": ""}, "tag_id is empty"),
-        ({"sensor_type": ""}, "sensor_type is empty"),
-        ({"sensor_type": "~moods"}, "sensor_type '~moods' is none of"),
-        ({"start": Time(sec=3), "end": Time(sec=2)}, "is before start"),
-        ({"max_points": MAX_POINTS + 1}, "max_points is 5001, the limits are 1 and 5000"),
-        ({"tag_id": "1" * 257}, "has 257 characters, the limit is 256"),
-    ],
-)
-def test_a_bad_question_is_refused_with_everything_else_empty(
-    node: Node, wrong: dict[str, Any], says: str
-) -> None:
-    response = node.answer(GET_HISTORY.name, **({"tag_id": "1", "sensor_type": "co2"} | wrong))
-    assert says in response.error_message
-    response.error_message = ""
-    assert response == GetHistory.Response()
-    assert node.memory.asked == 0
-
-
-@pytest.mark.parametrize(
-    ("error", "says", "is_reported"),
-    [
-        (PastRefused("at is too far back"), "at is too far back", False),
-        (NotRemembered("no journal", is_lasting=True), "not remembered: no journal", False),
-        (NotRemembered("busy", is_lasting=False), "busy: ask again later", False),
-        (OSError("disk"), "the twin failed to answer: disk: ask again later", True),
-    ],
-)
-def test_what_the_memory_meets_is_told_and_what_it_should_not_is_reported(
-    node: Node, error: Exception, says: str, is_reported: bool
-) -> None:
-    node.memory.found.set_exception(error)
-    response = node.answer(GET_STATE_AT.name, at=Time(sec=5))
-    assert response == GetStateAt.Response(error_message=says)
-    assert bool(node.utilities.reported) is is_reported
-
-
-def test_one_request_too_many_is_told_to_come_again(node: Node) -> None:
-    for _ in range(MAX_QUERIES):
-        node.callbacks[GET_STATE_AT.name](at=Time(sec=5))
-    response = node.answer(GET_STATE_AT.name, at=Time(sec=5))
-    assert response == GetStateAt.Response(
-        error_message=f"{MAX_QUERIES} requests wait, which is the limit: ask again later"
-    )
-
-
-# --- over DDS, without a journal ----------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -243,7 +63,9 @@ def test_a_state_of_then_is_known_without_a_journal_too(peer: Peer) -> None:
     assert (tag.tag_id, tag.readings[0].value) == ("a", 410.0)
 
 
-def test_a_moment_to_come_is_refused_by_the_nodes_own_clock(peer: Peer) -> None:
-    response = peer.ask(GetStateAt, "/twin/get_state_at", at=FAR)
-    assert "at is 2147483647.000000000 s, later than now, 1" in response.error_message
-    assert not response.ok
+def test_what_cannot_be_answered_is_refused_by_name_and_empty(peer: Peer) -> None:
+    later = peer.ask(GetStateAt, "/twin/get_state_at", at=Time(sec=2**31 - 1))
+    assert "at is 2147483647.000000000 s, later than now, 1" in later.error_message
+    assert later == GetStateAt.Response(error_message=later.error_message)
+    nameless = peer.ask(GetHistory, "/twin/get_history", sensor_type="co2")
+    assert nameless == GetHistory.Response(error_message="tag_id is empty")

@@ -71,14 +71,6 @@ def stage(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stage]:
         yield made
 
 
-def test_what_could_be_sent_is_sent_once(stage: Stage) -> None:
-    stage.found = {"a"}
-    stage.send_response("response", "a")
-    assert stage.sent == [("response", "a")]
-    assert len(stage.responses) == 0
-    assert stage.go_on() == []
-
-
 def test_an_answer_is_sent_as_soon_as_its_reader_is_found_and_once(stage: Stage) -> None:
     stage.send_response("response", "a")
     assert stage.drained == 1, "what came meanwhile"
@@ -91,17 +83,6 @@ def test_an_answer_is_sent_as_soon_as_its_reader_is_found_and_once(stage: Stage)
     assert stage.warned == []
 
 
-def test_a_round_ends_with_the_first_failure_and_each_has_its_turn(stage: Stage) -> None:
-    for who in ("a", "b", "c", "d"):
-        stage.send_response("response", who)
-    stage.found = {"b", "d"}
-    assert stage.go_on() == ["d", "c"]
-    assert stage.go_on() == ["b", "a"]
-    assert stage.go_on() == ["c"]
-    assert stage.go_on() == ["a"]
-    assert [who for _, who in stage.sent] == ["d", "b"]
-
-
 def test_one_that_can_be_sent_does_not_wait_behind_many_that_never_will_be(stage: Stage) -> None:
     for who in range(MAX_UNSENT - 1):
         stage.send_response("response", who)
@@ -112,16 +93,6 @@ def test_one_that_can_be_sent_does_not_wait_behind_many_that_never_will_be(stage
     assert stage.go_on()[0] == "late"
     assert stage.sent == [("response", "late")]
     assert stage.warned == []
-
-
-def test_attempts_take_a_fifth_of_the_time(stage: Stage) -> None:
-    stage.takes_s = MAX_ATTEMPT_S
-    stage.send_response("response", "a")
-    assert stage.go_on() == ["a"]
-    at_s = stage.now_s
-    while not stage.go_on():
-        pass
-    assert stage.now_s - stage.takes_s - at_s == 4 * stage.takes_s
 
 
 def test_what_is_too_large_is_not_retained(stage: Stage) -> None:
@@ -144,28 +115,6 @@ def test_it_is_given_up_aloud_where_nobody_reads(stage: Stage) -> None:
     )
 
 
-def test_only_so_many_are_kept(stage: Stage) -> None:
-    for who in range(MAX_UNSENT + 1):
-        stage.send_response("response", who)
-    assert len(stage.responses) == MAX_UNSENT
-    [said] = stage.warned
-    assert said.startswith("gave up a response of /ask: too much else waits to be sent again; ")
-    stage.found = set(range(MAX_UNSENT + 1))
-    assert stage.go_on() == [*range(MAX_UNSENT, 0, -1)], "the oldest was given up"
-
-
-@pytest.mark.parametrize("error", [RuntimeWarning("other"), SystemError("other"), ValueError()])
-def test_another_error_is_that_of_who_sends(stage: Stage, error: Exception) -> None:
-    def fail(*_: Any) -> None:
-        raise error
-
-    service: Any = SimpleNamespace(send_response=fail, service_name="/ask")
-    stage.responses.watch(service)
-    with pytest.raises(type(error)):
-        service.send_response("response", "a")
-    assert len(stage.responses) == 0
-
-
 class Service:
     """What rclpy's executor does with one: it sends what the callback gave."""
 
@@ -176,13 +125,6 @@ class Service:
 
     def send_response(self, response: Any, header: Any) -> None:
         self.sent.append((response, header))
-
-
-def test_a_response_that_is_there_is_sent_at_once() -> None:
-    service = Service()
-    Responses(lambda *_: None, lambda: None).watch(service)
-    service.send_response("response", "header")
-    assert service.sent == [("response", "header")]
 
 
 def test_a_response_that_comes_later_goes_to_who_asked() -> None:

@@ -11,7 +11,6 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 
-from lupin_twin.ros import base_node as spinning_module
 from lupin_twin.ros.base_node import end_spinning, spin_until_shutdown
 from tests.support.waiting import wait_for
 
@@ -59,28 +58,6 @@ def test_a_callback_that_raises_is_reported_and_the_next_one_runs(spinning: Spin
     assert [str(error) for _, error in spinning.errors[:3]] == ["call 1", "call 2", "call 3"]
 
 
-def test_between_an_error_and_the_next_try_it_rests(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An executor that fails at once, again and again, must not take a whole core."""
-    happened: list[str] = []
-
-    class Broken:
-        def spin(self) -> None:
-            happened.append("spin")
-            if len(happened) < 5:
-                raise RuntimeError("broken")
-
-    monkeypatch.setattr(spinning_module, "sleep", lambda seconds: happened.append("rest"))
-    spin_until_shutdown(Broken(), lambda *_: None)
-    assert happened == ["spin", "rest", "spin", "rest", "spin"]
-
-
-def test_it_ends_when_it_is_asked_to(spinning: Spinning) -> None:
-    spinning.thread.start()
-    end_spinning(spinning.executor)
-    wait_for(spinning.has_ended, "the end of the spinning")
-    assert spinning.errors == []
-
-
 def test_the_end_breaks_no_spin_that_is_about_to_wait(
     spinning: Spinning, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -119,25 +96,3 @@ def test_a_callback_ends_before_the_spinning_does(spinning: Spinning) -> None:
     wait_for(spinning.has_ended, "the end of the spinning")
     assert ended.is_set()
     assert spinning.errors == []
-
-
-def test_it_ends_with_the_context(spinning: Spinning) -> None:
-    spinning.thread.start()
-    spinning.node.create_timer(0.01, lambda: rclpy.try_shutdown(context=spinning.context))
-    wait_for(spinning.has_ended, "the end of the spinning")
-    assert spinning.errors == []
-
-
-def test_what_is_no_exception_ends_it(spinning: Spinning, monkeypatch: pytest.MonkeyPatch) -> None:
-    """SystemExit and its like are meant to end a thread; that it has ended is for others to see."""
-    seen: list[Any] = []
-    monkeypatch.setattr(threading, "excepthook", seen.append)
-
-    def leave() -> None:
-        raise KeyboardInterrupt
-
-    spinning.node.create_timer(0.01, leave)
-    spinning.thread.start()
-    wait_for(spinning.has_ended, "the end of the spinning")
-    assert spinning.errors == []
-    assert seen[0].exc_type is KeyboardInterrupt

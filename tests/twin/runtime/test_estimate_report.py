@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from lupin_twin.estimate.engine import TagPast
 from lupin_twin.field.engine import FieldRefused
-from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.runtime.estimate_rounds import MAX_PLACES, ReportRequest, Round, advice
 from tests.support.estimates import DAY_S, a_day
+from tests.support.maps import map_of
 
 
 @pytest.mark.parametrize(
@@ -49,16 +48,5 @@ def test_advice_is_for_free_floor_and_the_best_first() -> None:
     assert len(places) == 3
     assert ratios == sorted(ratios, reverse=True)
     assert ratios[0] < 1.0
-    wall = OccupancyMap(
-        frame_id="map",
-        stamp_ns=0,
-        width=4,
-        height=8,
-        resolution=1.0,
-        origin_x=0.0,
-        origin_y=0.0,
-        origin_yaw=0.0,
-        cells=np.array([100] * 32, dtype=np.int8),
-        revision=1,
-    )
+    wall = map_of([[100] * 4] * 8)
     assert advice(loaded, wall, 3) == ()

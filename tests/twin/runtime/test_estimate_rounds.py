@@ -165,14 +165,15 @@ def test_a_model_is_fitted_anew_after_five_minutes_or_when_much_was_received() -
     received(watch, "co2", 100)
     assert take_turn(watch, 0.0).model is None
     received(watch, "co2", 49)
-    assert take_turn(watch, 30.0).model is MODEL
+    assert watch.due(0.0) is None
     received(watch, "co2", 1)
-    assert take_turn(watch, 60.0, done(OTHER_MODEL)).model is None
-    assert watch.fit("co2").model is OTHER_MODEL
+    assert take_turn(watch, 0.0, done(OTHER_MODEL)).model is None
     received(watch, "co2", 1)
-    assert take_turn(watch, 59.0 + FIT_PERIOD_S).model is OTHER_MODEL
+    assert take_turn(watch, 60.0).model is OTHER_MODEL
     received(watch, "co2", 1)
-    assert take_turn(watch, 90.0 + FIT_PERIOD_S).model is None
+    assert take_turn(watch, FIT_PERIOD_S - 1.0).model is MODEL
+    received(watch, "co2", 1)
+    assert take_turn(watch, FIT_PERIOD_S + 30.0).model is None
 
 
 def test_one_round_at_a_time_and_the_longest_waiting_first() -> None:

@@ -37,14 +37,14 @@ class Stage:
         self.begun: list[Future[int]] = []
         self.answers: list[Any] = []
 
-    def ask(self, make: Any = str, cost_s: float = 0.0, key: Any = None) -> Future[int]:
+    def ask(self, make: Any = str, cost_s: float = 0.0) -> Future[int]:
         search: Future[int] = Future()
 
         def look_up() -> Future[int]:
             self.begun.append(search)
             return search
 
-        self.queue.ask(Query(look_up, self.answers.append, make, cost_s, key))
+        self.queue.ask(Query(look_up, self.answers.append, make, cost_s))
         return search
 
     def delivered(self) -> Any:
@@ -82,24 +82,12 @@ def test_what_is_found_is_made_an_answer_elsewhere_and_handed_out_here(made: Sta
     assert made.queue.slowest_s > 0.0
 
 
-def test_one_wake_up_brings_one_answer_and_the_others_are_not_forgotten(made: Stage) -> None:
-    searches = [made.ask() for _ in range(SMALL_AT_ONCE)]
-    for number, search in enumerate(searches):
-        search.set_result(number)
-    assert {made.delivered() for _ in searches} == set("0123")
-
-
 @pytest.mark.parametrize("error", [PastRefused("at is 3 s"), OSError("no such file")])
 def test_an_error_of_the_search_is_the_answer(made: Stage, error: Exception) -> None:
     made.ask().set_exception(error)
     assert made.delivered() is error
     assert made.queue.answered == 0
     assert made.queue.waiting == 0
-
-
-def test_an_error_in_the_making_is_the_answer(made: Stage) -> None:
-    made.ask(lambda number: 1 // number).set_result(0)
-    assert isinstance(made.delivered(), ZeroDivisionError)
 
 
 def test_what_cannot_be_looked_up_is_answered_and_holds_up_nobody(made: Stage) -> None:
@@ -128,13 +116,6 @@ def test_an_answer_that_cannot_be_sent_holds_up_nobody(made: Stage) -> None:
         made.queue.deliver()
     after.set_result(2)
     assert made.delivered() == "2"
-
-
-def test_a_search_that_was_given_up_is_answered_too(made: Stage) -> None:
-    search = made.ask()
-    search.cancel()
-    search.set_running_or_notify_cancel()
-    assert isinstance(made.delivered(), Exception)
 
 
 def test_closed_workers_end_no_query_in_silence(made: Stage) -> None:
@@ -195,43 +176,3 @@ def test_so_many_queries_wait_and_one_more_is_told_to_come_again(
     searches[0].set_result(0)
     made.delivered()
     made.ask()
-
-
-def test_without_a_step_of_making_the_search_is_the_answer(made: Stage) -> None:
-    made.ask(None).set_result(7)
-    assert made.delivered() == 7
-
-
-def test_queries_of_one_key_share_a_search_while_it_is_under_way(made: Stage) -> None:
-    first = made.ask(key="a")
-    for _ in range(2):
-        made.ask(key="a")
-    other = made.ask(key="b")
-    assert made.begun == [first, other]
-    assert made.queue.waiting == 2
-    first.set_result(1)
-    wait_for(lambda: made.woken.acquire(blocking=False), "the answer")
-    made.queue.deliver()
-    assert made.answers == ["1", "1", "1"]
-    assert made.queue.answered == 1
-    made.ask(key="a")
-    assert len(made.begun) == 3, "a new one"
-
-
-def test_an_error_goes_to_all_who_share_it(made: Stage) -> None:
-    search = made.ask(key="a")
-    made.ask(key="a")
-    error = ValueError("too much")
-    search.set_exception(error)
-    wait_for(lambda: made.woken.acquire(blocking=False), "the answer")
-    made.queue.deliver()
-    assert made.answers == [error, error]
-
-
-def test_one_more_waits_for_what_is_under_way_when_all_places_are_taken(made: Stage) -> None:
-    searches = [made.ask(key=number) for number in range(MAX_QUERIES)]
-    made.ask(key=0)
-    searches[0].set_result(5)
-    wait_for(lambda: made.woken.acquire(blocking=False), "the answer")
-    made.queue.deliver()
-    assert made.answers == ["5", "5"]

@@ -19,7 +19,6 @@ from lupin_twin.runtime.workers import LARGE_THREADS, SMALL_THREADS, ShouldStop
 from tests.support.journal import kept, recording, scan, wait_state
 from tests.support.waiting import PATIENCE_S, wait_for
 
-LARGE_S = 10.0
 # Counts for longer than any test waits.
 ENDLESS = (
     "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 1000000000000)"
@@ -109,12 +108,6 @@ def test_a_file_in_the_place_of_another_is_read_from_then_on(path: Path) -> None
         assert answer(recall) == 2
 
 
-def test_a_foreign_file_is_told_with_what_to_do(path: Path) -> None:
-    sqlite3.connect(path).execute("CREATE TABLE theirs (x)").connection.close()
-    with recalling(path) as recall:
-        assert "not a journal of lupin-twin; name another file" in why_not(recall)
-
-
 @pytest.mark.parametrize("where", [0, 3 * 1024 + 100])
 def test_a_damaged_file_is_told_with_what_to_do_and_read_again_when_it_is_mended(
     path: Path, where: int
@@ -128,12 +121,6 @@ def test_a_damaged_file_is_told_with_what_to_do_and_read_again_when_it_is_mended
         assert answer(recall) == 199
 
 
-def test_a_file_that_cannot_be_read_now_is_told(path: Path) -> None:
-    path.mkdir()
-    with recalling(path) as recall:
-        assert f"{path} cannot be read now" in why_not(recall)
-
-
 def test_an_error_of_the_questions_own_is_its_askers(path: Path) -> None:
     kept(path, [scan()])
     with recalling(path) as recall:
@@ -141,17 +128,6 @@ def test_an_error_of_the_questions_own_is_its_askers(path: Path) -> None:
         with pytest.raises(sqlite3.OperationalError, match="no such column"):
             wrong.result(PATIENCE_S)
         assert answer(recall) == 1
-
-
-def test_a_small_question_waits_for_no_large_one(path: Path) -> None:
-    kept(path, [scan()])
-    with recalling(path) as recall:
-        endless = [
-            recall.query(lambda connection, _: connection.execute(ENDLESS).fetchone(), LARGE_S)
-            for _ in range(LARGE_THREADS + 5)
-        ]
-        assert answer(recall) == 1
-        assert not any(future.done() for future in endless)
 
 
 def test_a_question_that_nobody_waits_for_ends(path: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from lupin_twin.core.ingest import Pin
 from lupin_twin.core.journal_condition import JournalState
-from lupin_twin.core.state import NO_FLOWER, Flower
+from lupin_twin.core.state import NO_FLOWER
 from tests.support.journal import select
 from tests.support.memory_life import HERE, NOW, THERE, S, twin
 from tests.support.waiting import wait_for
@@ -68,24 +68,6 @@ def test_of_two_sources_with_one_stamp_the_later_received_counts_and_repeats_fli
     assert count(path) == 2
 
 
-def test_what_is_later_by_its_stamp_counts_whatever_comes_first(path: Path) -> None:
-    with twin(path) as life:
-        life.hear(-5, t=20.0)
-        life.hear(-9, t=25.0, h=60.0)
-        assert life.says() == (20.0, 5.0)
-        assert life.says("h") == (60.0, 9.0)
-
-
-def test_a_look_that_is_received_again_is_nothing_new(path: Path) -> None:
-    rose, lily = Flower("rose", 0.9, False, 3, 1), Flower("lily", 0.9, True, 3, 1)
-    with twin(path) as life:
-        life.hear(-5, flower=rose)
-        life.hear(-5, flower=lily)
-        assert life.live == life.past()
-        assert life.live["7"].flower == rose
-    assert select(path, "SELECT species FROM look") == [("rose",)]
-
-
 def test_a_try_that_failed_makes_nothing_younger(path: Path) -> None:
     with twin(path) as life:
         life.hear(-9, status=2)
@@ -129,17 +111,6 @@ def test_it_stays_known_however_much_else_was_tried_meanwhile(path: Path) -> Non
         life.hear(60, t=20.0)
         assert life.says("t") == (20.0, 100.0)
         assert count(path) == 12
-
-
-def test_within_one_tick_of_the_clock_what_has_no_stamp_is_one_write(path: Path) -> None:
-    with twin(path, is_simulated=True) as life:
-        life.at(50)
-        life.hear(None, t=20.0)
-        life.hear(None, t=25.0, h=60.0)
-        assert life.says("t") == (20.0, 0.0)
-        assert life.says("h") == (60.0, 0.0)
-        life.hear(None, source="b", t=25.0)
-        assert life.says("t") == (25.0, 0.0)
 
 
 # --- 3: runs and steps ----------------------------------------------------------------------------
@@ -370,17 +341,3 @@ def test_a_place_counts_from_the_earliest_stamp_that_came_with_one(path: Path) -
 
 
 # --- 7 and 8: what many sources leave, and the end ------------------------------------------------
-
-
-def test_many_sources_and_missions_make_no_series(path: Path) -> None:
-    with twin(path) as life:
-        for number in range(50):
-            life.hear(number - 100, source=f"robot {number}", t=1.0)
-    assert select(path, "SELECT count(*) FROM series") == [(1,)]
-
-
-def test_at_the_end_all_is_in_the_one_file(path: Path) -> None:
-    with twin(path) as life:
-        life.hear(-5, t=1.0)
-    assert not path.with_name(path.name + "-wal").exists()
-    assert sorted(file.name for file in path.parent.iterdir()) == ["j.sqlite", "j.sqlite.lock"]

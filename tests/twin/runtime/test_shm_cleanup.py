@@ -13,7 +13,7 @@ import pytest
 
 from lupin_twin.runtime.process import FOLDER, ports, remove_stale_shared_memory
 from tests.support.domains import own_domain
-from tests.support.processes import lupin_twin, twin_node, url_of
+from tests.support.processes import twin_node
 
 DOMAIN = 7
 PORT = 7400 + 250 * DOMAIN + 11
@@ -37,11 +37,6 @@ def test_what_is_half_made_is_removed_and_told(
     assert remove_stale_shared_memory(DOMAIN, tmp_path) == [path.name]
     assert not path.exists()
     assert caplog.messages == [f"removed {path}, left unfinished by a killed process"]
-
-
-def test_the_first_port_of_a_domain_and_the_last_are_looked_at(tmp_path: Path) -> None:
-    paths = [leave(tmp_path, BEING_MADE, port) for port in (9_150, 9_399)]
-    assert remove_stale_shared_memory(DOMAIN, tmp_path) == [path.name for path in paths]
 
 
 def test_what_is_made_or_just_being_made_or_of_another_domain_or_no_file_stays(
@@ -98,10 +93,3 @@ def test_a_twin_starts_where_one_was_killed_as_it_started(strewn: int) -> None:
     with twin_node(strewn) as twin:
         twin.wait_for_output("left unfinished by a killed process")
         twin.wait_for_output(f"in ROS domain {strewn} subscribes")
-
-
-@pytest.mark.parametrize("role", ["serve", "web"])
-def test_the_bridge_starts_there_too(strewn: int, role: str) -> None:
-    with lupin_twin(strewn, role) as bridge:
-        assert url_of(bridge)
-        assert "left unfinished by a killed process" in bridge.output

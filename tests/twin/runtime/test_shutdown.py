@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -82,37 +81,3 @@ def test_what_cannot_be_said_does_not_change_how_it_ends(how: str) -> None:
         ended = left(how, end, ">/dev/full")
         why = "cannot write to the standard output: No space left on device\n"
         assert (ended.returncode, ended.stderr) == (code, "" if code == 3 else why)
-
-
-OPEN = """
-import os, subprocess, sys
-from lupin_twin.runtime.process import exit_after
-
-def main():
-    # Also those that read and write are there.
-    assert sys.stdin.read() == ""
-    print("said")
-    sys.stderr.write("why")
-    with open(sys.argv[1], "w") as file:
-        # As a library in C, and a program that is started.
-        os.write(1, b"printed")
-        os.write(2, b"printed")
-        subprocess.run([sys.executable, "-c", "import os; os.write(1, b'1'); os.write(2, b'2')"])
-        file.write(str(file.fileno() > 2))
-    return 3
-
-exit_after(main)
-"""
-
-
-@pytest.mark.parametrize("closed", ["<&- >&- 2>&-", ">&- </dev/null", "2>&- </dev/null"])
-def test_what_is_printed_goes_into_no_file_where_the_output_is_closed(
-    closed: str, tmp_path: Path
-) -> None:
-    path = tmp_path / "recording"
-    ended = subprocess.run(
-        ["sh", "-c", f'exec "$@" {closed}', "sh", sys.executable, "-c", OPEN, path],
-        check=False,
-        timeout=PATIENCE_S,
-    )
-    assert (path.read_text(), ended.returncode) == ("True", 3)

@@ -20,7 +20,6 @@ from lupin_twin.runtime.workers import (
     LARGE_THREADS,
     PATIENCE,
     SMALL_S,
-    SMALL_THREADS,
     TURN_S,
     ShouldStop,
     Workers,
@@ -69,13 +68,6 @@ def result(future: Future[T]) -> T:
     return future.result(PATIENCE_S)
 
 
-def test_a_result_and_an_error_come_to_whoever_waits() -> None:
-    with workers() as (running, _):
-        assert result(running.submit(lambda _: 7)) == 7
-        with pytest.raises(ZeroDivisionError):
-            result(running.submit(lambda _: 1 // 0))
-
-
 def test_a_small_job_does_not_wait_for_large_ones_at_work_or_in_the_queue() -> None:
     with workers() as (running, _):
         set_free = occupy(running, LARGE_S, LARGE_THREADS)
@@ -83,18 +75,6 @@ def test_a_small_job_does_not_wait_for_large_ones_at_work_or_in_the_queue() -> N
         assert result(running.submit(lambda _: "small", SMALL_S)) == "small"
         assert running.waiting == len(queue)
         set_free()
-
-
-def test_one_past_small_is_large() -> None:
-    with workers(large_threads=0) as (running, _):
-        large = running.submit(lambda _: None, SMALL_S * 1.001)
-        assert result(running.submit(lambda _: "small", SMALL_S)) == "small"
-        assert not large.done()
-
-
-def test_small_jobs_may_take_every_thread() -> None:
-    with workers() as (running, _):
-        occupy(running, SMALL_S, LARGE_THREADS + SMALL_THREADS)()
 
 
 @settings(max_examples=50)
@@ -163,14 +143,6 @@ def test_what_is_cancelled_at_work_is_asked_to_stop() -> None:
         job.cancel()
         assert running.abandoned == 1, "once is enough"
         assert result(running.submit(lambda stop: stop())) is False, "that is another job"
-
-
-def test_what_is_done_is_not_abandoned_by_a_late_cancel() -> None:
-    with workers() as (running, _):
-        job = running.submit(lambda _: 1)
-        assert result(job) == 1
-        assert not job.cancel()
-        assert running.abandoned == 0
 
 
 def test_closing_drops_what_waits_stops_what_runs_and_ends_the_threads() -> None:

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -31,12 +30,6 @@ STANDS_AFTER_S: Final = 3.0
 REPORT_LAG_S: Final = 2.0
 # From here on it is worth listening whether `/clock` still comes.
 SUBSCRIBE_AFTER_S: Final = 1.0
-CLOCK_TEXTS: Final[Mapping[ClockState, str]] = {
-    "running": "ROS time runs",
-    "paused": "ROS time is paused: /clock is published and stands",
-    "stopped": "ROS time has stopped, nothing comes on /clock: ages are not known until it does",
-    "none": "there is no ROS time yet (use_sim_time, and nothing on /clock): ages are not known",
-}
 
 
 class ClockWatch:

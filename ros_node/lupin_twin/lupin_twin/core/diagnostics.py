@@ -37,11 +37,11 @@ WARN: Final = 1
 ERROR: Final = 2
 STALE: Final = 3
 
-_CLOCK: Final[Mapping[ClockState, tuple[int, str]]] = {
+CLOCK: Final[Mapping[ClockState, tuple[int, str]]] = {
     "running": (OK, "ROS time runs"),
-    "paused": (WARN, "ROS time is paused"),
-    "stopped": (ERROR, "ROS time has stopped: ages are not known"),
-    "none": (ERROR, "there is no ROS time: ages are not known"),
+    "paused": (WARN, "ROS time is paused: /clock is published and stands"),
+    "stopped": (ERROR, "ROS time has stopped, nothing comes on /clock: ages are not known"),
+    "none": (ERROR, "there is no ROS time, nothing comes on /clock: ages are not known"),
     "doubted": (ERROR, "ROS time contradicts the journal: ages are not known; set the clock"),
 }
 
@@ -126,7 +126,7 @@ class Finding:
 
 def findings(health: Health) -> Iterator[Finding]:
     """All that is reported, one by one."""
-    level, message = _CLOCK[health.clock]
+    level, message = CLOCK[health.clock]
     yield Finding("clock", level, message, {"state": health.clock})
     yield Finding("origin", OK, _ORIGIN[health.origin], {"origin": health.origin})
     yield _inputs(health)
@@ -135,8 +135,8 @@ def findings(health: Health) -> Iterator[Finding]:
     yield Finding(
         "drops",
         WARN if recent or counts.callback_errors else OK,
-        "; ".join(f"{drop.count} lately: {_shown(drop.message)}" for drop in recent)
-        or "nothing lately",
+        "; ".join(f"{drop.count} recently: {_shown(drop.message)}" for drop in recent)
+        or "nothing recently",
         {
             **{str(why): str(count) for why, count in counts.dropped.items() if why != LOST},
             **_recent_readings(recent),
@@ -147,7 +147,7 @@ def findings(health: Health) -> Iterator[Finding]:
     yield Finding(
         "queues",
         WARN if lost else OK,
-        f"{lost[0].count} messages lost lately" if lost else "nothing lost lately",
+        f"{lost[0].count} messages lost recently" if lost else "nothing lost recently",
         {LOST: str(counts.dropped.get(LOST, 0)), **_recent_readings(lost)},
     )
     late = {_shown(source): str(count) for source, count in health.late.items()}
@@ -268,7 +268,7 @@ def self_report(reported: Iterable[Finding]) -> SelfReport:
     by_name = {finding.name: finding for finding in reported}
     values = {name: finding.values for name, finding in by_name.items()}
     journal = _journal(by_name["journal"]) if "journal" in by_name else UNKNOWN_JOURNAL
-    clock = next((state for state in _CLOCK if state == values.get("clock", {}).get("state")), None)
+    clock = next((state for state in CLOCK if state == values.get("clock", {}).get("state")), None)
     origin = origin_of(values.get("origin", {}).get("origin", ""), is_simulated=False)
     inputs = values.get("inputs", {})
     problems = tuple(

@@ -77,18 +77,6 @@ class Tally:
         # By reason, (when the bucket began, how many): 30 buckets at most.
         self._buckets: dict[str, deque[tuple[float, int]]] = {}
 
-    def drop(self, drop: Drop, topic: str, now_s: float) -> None:
-        """Count something that was dropped."""
-        self._count(drop.reason.value, drop.on(topic), 1, now_s)
-
-    def lose(self, count: int, topic: str, now_s: float) -> None:
-        """Count messages that came faster than they were read."""
-        self._count(LOST, f"lost messages on {topic}: they came too fast", count, now_s)
-
-    def late(self, count: int, text: str, now_s: float) -> None:
-        """Count observations whose stamps are behind their producer's own earlier ones."""
-        self._count(LATE, text, count, now_s)
-
     def value(self, now_s: float) -> Counts:
         """The counts now."""
         return Counts(
@@ -101,7 +89,8 @@ class Tally:
             ),
         )
 
-    def _count(self, reason: str, text: str, count: int, now_s: float) -> None:
+    def add(self, reason: str, text: str, now_s: float, count: int = 1) -> None:
+        """Count what was dropped for a `Reason`, `LOST` or `LATE`; `text` is for a person."""
         self._dropped[reason] = self._dropped.get(reason, 0) + count
         self._texts[reason] = text
         buckets = self._buckets.setdefault(reason, deque())

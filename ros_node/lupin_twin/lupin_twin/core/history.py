@@ -11,9 +11,9 @@ one stamp, are one scan.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass, field, replace
-from typing import Final, Generic, Protocol, TypeVar
+from typing import Final
 
 from lupin_twin.core.state import STATUS_OK, Attempt, Inspection, Reading, Scan, TagState
 
@@ -59,12 +59,6 @@ class TagHistory:
     is_known: bool = True
 
 
-class _Past(Protocol):
-    @property
-    def stamp_ns(self) -> int: ...
-
-
-PastT = TypeVar("PastT", bound=_Past)
 # In the place of the stamp that was sent: what a clock that went back has moved, and no observation
 # that is received again is taken for.
 KNOWN_BY_NOTHING: Final = -1
@@ -75,50 +69,54 @@ Key = tuple[int | None, int, str]
 
 
 @dataclass(slots=True)
-class _Line(Generic[PastT]):
-    """One tag's past of one sort, by time."""
+class _Known:
+    """What one key stands for: an attempt (`status` None: not known of), readings, or both."""
 
-    entries: list[tuple[Key, PastT]] = field(default_factory=list)
-
-    def find(self, key: Key) -> int | None:
-        """The place of what is known by `key`; most often it is one of the newest."""
-        if key[1] != KNOWN_BY_NOTHING:
-            for index in range(len(self.entries) - 1, -1, -1):
-                if self.entries[index][0] == key:
-                    return index
-        return None
-
-    def put(self, key: Key, past: PastT) -> None:
-        """Put something where it belongs; of equal stamps, what came later is later."""
-        index = len(self.entries)
-        while index and self.entries[index - 1][1].stamp_ns > past.stamp_ns:
-            index -= 1
-        self.entries.insert(index, (key, past))
-
-    def hold_to(
-        self, now_ns: int, moved: Callable[[PastT, int], PastT], *, retains_key: bool
-    ) -> None:
-        """Nothing is later than `now_ns`; what was is known by its key still, or by nothing."""
-        self.entries = [
-            (key, past)
-            if past.stamp_ns <= now_ns
-            else (key if retains_key else (key[0], KNOWN_BY_NOTHING, key[2]), moved(past, now_ns))
-            for key, past in self.entries
-        ]
+    key: Key
+    stamp_ns: int
+    status: int | None = None
+    detail: str = ""
+    readings: tuple[Reading, ...] = ()
 
     @property
-    def past(self) -> tuple[PastT, ...]:
-        return tuple(past for _, past in self.entries)
+    def items(self) -> int:
+        return len(self.readings) + (self.status is not None)
+
+    def hold_to(self, now_ns: int, *, retains_key: bool) -> None:
+        """What was later is known by its key still, or by nothing."""
+        if self.stamp_ns > now_ns:
+            self.stamp_ns = now_ns
+            if not retains_key:
+                self.key = (self.key[0], KNOWN_BY_NOTHING, self.key[2])
 
 
 @dataclass(slots=True)
 class _Tag:
-    scans: _Line[PastScan] = field(default_factory=_Line)
-    attempts: _Line[PastAttempt] = field(default_factory=_Line)
+    """One tag's past, by time; of equal stamps, what came later is later."""
 
-    @property
-    def items(self) -> int:
-        return len(self.attempts.entries) + sum(len(scan.readings) for scan in self.scans.past)
+    known: list[_Known] = field(default_factory=list)
+    scans: int = 0
+    attempts: int = 0
+
+    def find(self, key: Key) -> _Known | None:
+        """What is known by `key`; most often it is one of the newest."""
+        return next((one for one in reversed(self.known) if one.key == key), None)
+
+    def put(self, new: _Known) -> None:
+        index = len(self.known)
+        while index and self.known[index - 1].stamp_ns > new.stamp_ns:
+            index -= 1
+        self.known.insert(index, new)
+
+    def past_scans(self) -> tuple[PastScan, ...]:
+        return tuple(PastScan(one.stamp_ns, one.readings) for one in self.known if one.readings)
+
+    def past_attempts(self) -> tuple[PastAttempt, ...]:
+        return tuple(
+            PastAttempt(Attempt(one.stamp_ns, one.status, one.detail), one.key[0])
+            for one in self.known
+            if one.status is not None
+        )
 
 
 class History:
@@ -138,7 +136,7 @@ class History:
     def of(self, tag_id: str) -> TagHistory:
         """What is known of a tag: nothing of one that was never tried."""
         tag = self._tags.get(tag_id)
-        return TagHistory() if tag is None else TagHistory(tag.scans.past, tag.attempts.past)
+        return TagHistory() if tag is None else TagHistory(tag.past_scans(), tag.past_attempts())
 
     # --- a twin's own: every observation ------------------------------------------------------
 
@@ -150,28 +148,25 @@ class History:
         already; others are further parts of the same scan.
         """
         tag, key = self._tags.get(write.tag_id), _key(write)
-        index = None if tag is None else tag.attempts.find(key)
-        if tag is None or index is None:
+        known = None if tag is None else tag.find(key)
+        if known is None:
             return None if (write.tag_id, key) in self._ahead else write
         if not isinstance(write, Scan):
             return None
-        found = tag.scans.find(key)
-        scan = None if found is None else tag.scans.entries[found][1]
-        known = frozenset(reading.name for reading in scan.readings) if scan else frozenset()
-        readings = tuple(reading for reading in write.readings if reading.name not in known)
-        first_ns = tag.attempts.entries[index][1].stamp_ns
-        stamp_ns = min(write.stamp_ns, first_ns)
+        names = frozenset(reading.name for reading in known.readings)
+        readings = tuple(reading for reading in write.readings if reading.name not in names)
+        stamp_ns = min(write.stamp_ns, known.stamp_ns)
         return replace(write, stamp_ns=stamp_ns, readings=readings) if readings else None
 
     def add(self, write: Scan | Inspection) -> None:
         """Keep an observation, or add to what is known of it."""
-        what = Attempt(write.stamp_ns, write.status, write.status_detail)
         if write.own_stamp_ns > write.stamp_ns:
             self._ahead[write.tag_id, _key(write)] = None
             if len(self._ahead) > MAX_AHEAD:
                 del self._ahead[next(iter(self._ahead))]
         readings = write.readings if isinstance(write, Scan) else ()
-        self._add(write.tag_id, _key(write), what, readings)
+        new = _Known(_key(write), write.stamp_ns, write.status, write.status_detail)
+        self._add(write.tag_id, new, readings)
 
     def hold_to(self, now_ns: int, *, retains_keys: bool = False) -> None:
         """Follow a clock that has gone back, see `TwinStore.hold_to`.
@@ -181,7 +176,8 @@ class History:
         if not retains_keys:
             self._ahead.clear()
         for tag in self._tags.values():
-            _hold(tag, now_ns, retains_keys=retains_keys)
+            for one in tag.known:
+                one.hold_to(now_ns, retains_key=retains_keys)
 
     def clear(self) -> None:
         """Forget everything."""
@@ -200,66 +196,64 @@ class History:
         """
         known = self._tags.get(tag.tag_id)
         if clock_went_back and known is not None and (times := _times_of(tag)):
-            _hold(known, max(times), retains_keys=False)
+            for one in known.known:
+                one.hold_to(max(times), retains_key=False)
         by_stamp: dict[int, list[Reading]] = {}
         for reading in tag.readings:
             if reading.observed_at_ns is not None and not _is_known(known, reading):
                 by_stamp.setdefault(reading.observed_at_ns, []).append(reading)
         for stamp_ns, readings in sorted(by_stamp.items()):
-            self._add_scan(tag.tag_id, (KIND_TAG_READING, stamp_ns, ""), stamp_ns, readings)
-        before = () if known is None else {past.what for past in known.attempts.past}
+            self._add(tag.tag_id, _Known((KIND_TAG_READING, stamp_ns, ""), stamp_ns), readings)
+        before = () if known is None else {past.what for past in known.past_attempts()}
         for past in _attempts_of(tag):
-            if past.what in before:
-                continue
-            self._add_attempt(tag.tag_id, (past.kind, past.stamp_ns, ""), past)
+            if past.what not in before:
+                key, what = (past.kind, past.stamp_ns, ""), past.what
+                self._add(tag.tag_id, _Known(key, what.stamp_ns, what.status, what.detail), ())
 
     def forget_all_but(self, tag_ids: Container[str]) -> None:
         """Drop the tags that a restarted twin does not know."""
         for tag_id in [tag_id for tag_id in self._tags if tag_id not in tag_ids]:
-            self._items -= self._tags.pop(tag_id).items
+            self._items -= sum(one.items for one in self._tags.pop(tag_id).known)
 
     # --- both ----------------------------------------------------------------------------------
 
-    def _add(self, tag_id: str, key: Key, what: Attempt, readings: Iterable[Reading]) -> None:
-        self._add_attempt(tag_id, key, PastAttempt(what, key[0]))
-        if readings:
-            self._add_scan(tag_id, key, what.stamp_ns, readings)
-
-    def _add_scan(self, tag_id: str, key: Key, stamp_ns: int, readings: Iterable[Reading]) -> None:
+    def _add(self, tag_id: str, new: _Known, readings: Iterable[Reading]) -> None:
+        """Put it in its place, or add it to what is known by its key."""
         tag = self._tags.setdefault(tag_id, _Tag())
-        line = tag.scans
-        latest = {r.name: Reading(r.name, r.value) for r in readings}
-        index = line.find(key)
-        if index is None:
-            line.put(key, PastScan(stamp_ns, _by_name(latest)))
-            self._items += len(latest)
-        else:
-            before = line.entries[index][1]
-            merged = {r.name: r for r in before.readings} | latest
-            line.entries[index] = (key, replace(before, readings=_by_name(merged)))
-            self._items += len(merged) - len(before.readings)
-        while line.entries and self._is_past_bounds(line):
-            self._items -= len(line.entries.pop(0)[1].readings)
+        known = tag.find(new.key) if new.key[1] != KNOWN_BY_NOTHING else None
+        if known is None:
+            known = replace(new, status=None)
+            tag.put(known)
+        before = known.items
+        if new.status is not None:
+            tag.attempts += known.status is None
+            known.status, known.detail = new.status, new.detail
+        latest = {r.name: r for r in known.readings}
+        latest |= {r.name: Reading(r.name, r.value) for r in readings}
+        tag.scans += bool(latest) and not known.readings
+        known.readings = tuple(latest[name] for name in sorted(latest))
+        self._items += known.items - before
+        self._trim(tag)
 
-    def _add_attempt(self, tag_id: str, key: Key, past: PastAttempt) -> None:
-        line = self._tags.setdefault(tag_id, _Tag()).attempts
-        index = line.find(key)
-        if index is not None:
-            stamp_ns = line.entries[index][1].stamp_ns
-            line.entries[index] = (key, replace(past, what=replace(past.what, stamp_ns=stamp_ns)))
-            return
-        line.put(key, past)
-        self._items += 1
-        while line.entries and self._is_past_bounds(line):
-            line.entries.pop(0)
-            self._items -= 1
-
-    def _is_past_bounds(self, line: _Line[PastT]) -> bool:
-        return len(line.entries) > self._buffer_len or self._items > MAX_HISTORY_ITEMS
-
-
-def _by_name(readings: dict[str, Reading]) -> tuple[Reading, ...]:
-    return tuple(readings[name] for name in sorted(readings))
+    def _trim(self, tag: _Tag) -> None:
+        """Drop the oldest, until the tag and all tags together are within bounds."""
+        is_full, has_gone = self._items > MAX_HISTORY_ITEMS, False
+        for one in tag.known:
+            many_scans, many_attempts = (
+                is_full or count > self._buffer_len for count in (tag.scans, tag.attempts)
+            )
+            if not (many_scans or many_attempts):
+                break
+            before = one.items
+            if many_scans and one.readings:
+                one.readings, tag.scans = (), tag.scans - 1
+            if many_attempts and one.status is not None:
+                one.status, tag.attempts = None, tag.attempts - 1
+            self._items -= before - one.items
+            is_full = self._items > MAX_HISTORY_ITEMS
+            has_gone |= not one.items
+        if has_gone:
+            tag.known = [one for one in tag.known if one.items]
 
 
 def kind_of(write: Scan | Inspection) -> int:
@@ -271,24 +265,13 @@ def _key(write: Scan | Inspection) -> Key:
     return kind_of(write), write.own_stamp_ns or write.stamp_ns, write.source
 
 
-def _hold(tag: _Tag, now_ns: int, *, retains_keys: bool) -> None:
-    tag.scans.hold_to(
-        now_ns, lambda scan, at_ns: replace(scan, stamp_ns=at_ns), retains_key=retains_keys
-    )
-    tag.attempts.hold_to(
-        now_ns,
-        lambda past, at_ns: replace(past, what=replace(past.what, stamp_ns=at_ns)),
-        retains_key=retains_keys,
-    )
-
-
 def _is_known(tag: _Tag | None, reading: Reading) -> bool:
     """Whether a scan of that moment has this reading: after a clock went back, not the last one."""
     return tag is not None and any(
         known.name == reading.name and repr(known.value) == repr(reading.value)
-        for scan in tag.scans.past
-        if scan.stamp_ns == reading.observed_at_ns
-        for known in scan.readings
+        for one in tag.known
+        if one.stamp_ns == reading.observed_at_ns
+        for known in one.readings
     )
 
 

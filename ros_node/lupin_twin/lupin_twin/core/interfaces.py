@@ -17,142 +17,129 @@ from lupin_twin.core.parameters import TwinParameters
 SERVICE_DEPTH: Final = 50
 
 
-@dataclass(frozen=True, slots=True)
-class Topic:
-    """A topic and its QoS; `type_name` such as `lupin_msgs/msg/TwinState`.
-
-    `is_latched`: TRANSIENT_LOCAL, so that a late subscriber gets the last `depth` messages.
-    `parameter` names the twin's parameter that renames the topic; empty: only remapping does.
-    """
-
-    name: str
-    type_name: str
-    meaning: str
-    depth: int = 1
-    is_latched: bool = True
-    is_reliable: bool = True
-    parameter: str = ""
+_DEFAULTS: Final = TwinParameters()
 
 
 @dataclass(frozen=True, slots=True)
 class Service:
-    """A service, reliable and volatile; `type_name` such as `lupin_msgs/srv/GetField`."""
+    """A service, reliable and volatile; `type_name` such as `lupin_msgs/srv/GetField`.
 
-    name: str
+    `parameter` names the twin's parameter that gives its name; empty: only remapping changes it.
+    """
+
     type_name: str
     meaning: str
+    name: str = ""
     parameter: str = ""
 
+    def __post_init__(self) -> None:
+        """The name that the parameter has by default."""
+        if self.parameter:
+            object.__setattr__(self, "name", getattr(_DEFAULTS, self.parameter))
 
-_DEFAULTS: Final = TwinParameters()
+
+@dataclass(frozen=True, slots=True)
+class Topic(Service):
+    """A topic and its QoS; `type_name` such as `lupin_msgs/msg/TwinState`.
+
+    `is_latched`: TRANSIENT_LOCAL, so that a late subscriber gets the last `depth` messages.
+    """
+
+    depth: int = 1
+    is_latched: bool = True
+    is_reliable: bool = True
+
+
 # Below it each layer's name is made of its sensor's, see `layers.topic_of`.
 LAYERS_BELOW: Final = "twin/field/"
 
 OBSERVATIONS: Final = Topic(
-    _DEFAULTS.observations_topic,
     "lupin_msgs/msg/Observation",
     "one scan, one inspection of flowers, or one failed attempt",
-    depth=50,
     parameter="observations_topic",
+    depth=50,
 )
 DISCOVERED_TAGS: Final = Topic(
-    _DEFAULTS.discovered_tags_topic,
     "lupin_msgs/msg/DiscoveredTags",
     "tags that perception has seen, and their places",
-    depth=50,
     parameter="discovered_tags_topic",
+    depth=50,
 )
 MAP: Final = Topic(
-    _DEFAULTS.map_topic,
-    "nav_msgs/msg/OccupancyGrid",
-    "the floor as SLAM knows it",
-    parameter="map_topic",
+    "nav_msgs/msg/OccupancyGrid", "the floor as SLAM knows it", parameter="map_topic"
 )
 CLOCK: Final = Topic(
-    "/clock",
     "rosgraph_msgs/msg/Clock",
     "simulated time; only with `use_sim_time`",
+    "/clock",
     is_latched=False,
     is_reliable=False,
 )
 SUBSCRIBED: Final = (OBSERVATIONS, DISCOVERED_TAGS, MAP, CLOCK)
 
 STATE: Final = Topic(
-    _DEFAULTS.state_topic,
     "lupin_msgs/msg/TwinState",
     "every tag as it is now, `state_publish_rate_hz` times a second",
     parameter="state_topic",
 )
 TIMES: Final = Topic(
-    "twin/times",
     "lupin_msgs/msg/TwinTimes",
     "when each value of the state was observed; published right behind it, with the same stamp",
+    "twin/times",
 )
 LAYERS: Final = Topic(
-    f"{LAYERS_BELOW}<sensor>",
     "sensor_msgs/msg/PointCloud2",
     "the field of a sensor as points, for each sensor of the parameter `layers`; published on "
     "change, while somebody subscribes",
+    f"{LAYERS_BELOW}<sensor>",
 )
 TAGS: Final = Topic(
-    "twin/tags",
     "visualization_msgs/msg/MarkerArray",
     "tags and their names; published on change, while somebody subscribes",
+    "twin/tags",
 )
 PLANTERS: Final = Topic(
-    "twin/planters",
     "visualization_msgs/msg/MarkerArray",
     "outlines of planters; published on change, while somebody subscribes",
+    "twin/planters",
 )
 DIAGNOSTICS: Final = Topic(
-    "/diagnostics",
     "diagnostic_msgs/msg/DiagnosticArray",
     "what the twin reports of itself, once a second: clock, inputs, drops, layers, journal",
+    "/diagnostics",
     depth=10,
     is_latched=False,
 )
 PUBLISHED: Final = (STATE, TIMES, LAYERS, TAGS, PLANTERS, DIAGNOSTICS)
 
 GET_FIELD: Final = Service(
-    _DEFAULTS.field_service_name,
-    "lupin_msgs/srv/GetField",
-    "one sensor's field over a box",
-    parameter="field_service_name",
+    "lupin_msgs/srv/GetField", "one sensor's field over a box", parameter="field_service_name"
 )
 GET_ESTIMATE: Final = Service(
-    "twin/get_estimate", "lupin_msgs/srv/GetEstimate", "one sensor's estimate and its error"
+    "lupin_msgs/srv/GetEstimate", "one sensor's estimate and its error", "twin/get_estimate"
 )
 GET_ESTIMATE_REPORT: Final = Service(
-    "twin/get_estimate_report",
     "lupin_msgs/srv/GetEstimateReport",
     "how good the estimates are, which sensors have changed, where another tag helps",
+    "twin/get_estimate_report",
 )
 GET_STATE_AT: Final = Service(
-    "twin/get_state_at", "lupin_msgs/srv/GetStateAt", "state and times as of a past moment"
+    "lupin_msgs/srv/GetStateAt", "state and times as of a past moment", "twin/get_state_at"
 )
 GET_HISTORY: Final = Service(
-    "twin/get_history", "lupin_msgs/srv/GetHistory", "one sensor's past, or events"
+    "lupin_msgs/srv/GetHistory", "one sensor's past, or events", "twin/get_history"
 )
 GET_WRITES: Final = Service(
-    "twin/get_writes",
     "lupin_msgs/srv/GetWrites",
     "all observations in the order in which they were received, for a follower",
+    "twin/get_writes",
 )
 SERVICES: Final = (
-    GET_FIELD,
-    GET_ESTIMATE,
-    GET_ESTIMATE_REPORT,
-    GET_STATE_AT,
-    GET_HISTORY,
-    GET_WRITES,
+    *(GET_FIELD, GET_ESTIMATE, GET_ESTIMATE_REPORT),
+    *(GET_STATE_AT, GET_HISTORY, GET_WRITES),
 )
 # Those that rclpy gives to each node, below its own name.
 OF_EVERY_NODE: Final = (
-    "describe_parameters",
-    "get_parameter_types",
-    "get_parameters",
-    "get_type_description",
-    "list_parameters",
-    "set_parameters",
-    "set_parameters_atomically",
+    *("describe_parameters", "get_parameter_types", "get_parameters", "get_type_description"),
+    *("list_parameters", "set_parameters", "set_parameters_atomically"),
 )

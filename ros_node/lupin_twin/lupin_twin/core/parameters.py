@@ -32,25 +32,25 @@ class ParameterError(ValueError):
     """A parameter out of its range; the message names it, its value and the limit."""
 
 
-def _parameter(
-    default: Any,
-    description: str,
-    low: float | None = None,
-    high: float = math.inf,
-    *,
-    may_be_empty: bool = False,
-    fixed: str = "",
-) -> Any:
-    return field(
-        default=default,
-        metadata={
-            "description": description,
-            "low": low,
-            "high": high,
-            "may_be_empty": may_be_empty,
-            "fixed": fixed,
-        },
-    )
+@dataclass(frozen=True, slots=True)
+class Described:
+    """A parameter's description; `low` None: it has no range. `fixed`: why it may not change."""
+
+    description: str
+    low: float | None = None
+    high: float = math.inf
+    may_be_empty: bool = False
+    fixed: str = ""
+
+    @property
+    def range(self) -> str:
+        """The allowed range in words; empty, where there is none."""
+        return "" if self.low is None else f"{self.low} to {self.high}"
+
+
+def _parameter(default: Any, description: str, *limits: float, **more: Any) -> Any:
+    described = Described(description, *limits, **more)  # type: ignore[arg-type]  # two at most
+    return field(default=default, metadata={"as": described})
 
 
 # Why a parameter is read at the start and never again.
@@ -130,11 +130,11 @@ class TwinParameters:
 
     def __post_init__(self) -> None:
         for spec in fields(self):
-            value = _checked(spec.name, getattr(self, spec.name), spec.default, spec.metadata)
+            value = _checked(spec.name, getattr(self, spec.name), spec.default, spec.metadata["as"])
             object.__setattr__(self, spec.name, value)
 
 
-def _checked(name: str, value: object, default: object, metadata: Any) -> object:
+def _checked(name: str, value: object, default: object, described: Described) -> object:
     if isinstance(default, tuple):
         return _names(name, value)
     expected: Final = type(default)
@@ -148,12 +148,11 @@ def _checked(name: str, value: object, default: object, metadata: Any) -> object
             f"parameter {name} is {_shown(value)} ({type(value).__name__}), "
             f"expected {expected.__name__}"
         )
-    if isinstance(value, str) and not value and not metadata["may_be_empty"]:
+    if isinstance(value, str) and not value and not described.may_be_empty:
         raise ParameterError(f"parameter {name} is empty, expected a name")
-    if isinstance(value, int | float):
-        low, high = metadata["low"], metadata["high"]
-        if not low <= value <= high:  # false for NaN too
-            raise ParameterError(f"parameter {name} is {value}, expected {low} to {high}")
+    low, high = described.low or 0.0, described.high
+    if isinstance(value, int | float) and not low <= value <= high:  # false for NaN too
+        raise ParameterError(f"parameter {name} is {value}, expected {described.range}")
     return value
 
 
@@ -176,26 +175,10 @@ def _shown(value: object) -> str:
     return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}…"
 
 
-@dataclass(frozen=True, slots=True)
-class Described:
-    """The description of a parameter; `low` None: it has no range. `fixed` empty: it may change."""
-
-    description: str
-    low: float | None
-    high: float
-    fixed: str
-
-    @property
-    def range(self) -> str:
-        """The allowed range in words; empty, where there is none."""
-        return "" if self.low is None else f"{self.low} to {self.high}"
-
-
 def describe(name: str) -> Described:
     """What `ros2 param describe` and the docs show of a parameter."""
-    spec = next(spec for spec in fields(TwinParameters) if spec.name == name)
-    metadata = spec.metadata
-    return Described(metadata["description"], metadata["low"], metadata["high"], metadata["fixed"])
+    described: Described = TwinParameters.__dataclass_fields__[name].metadata["as"]
+    return described
 
 
 def changed(now: TwinParameters, wanted: Mapping[str, object]) -> TwinParameters:

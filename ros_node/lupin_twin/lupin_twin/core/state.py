@@ -1,17 +1,15 @@
 """Per-tag store: the latest of what the robot has seen at each AprilTag, and when it was seen.
 
-Pure: standard library only, no clock, no ROS, no lock. Time is an argument everywhere, as
-nanoseconds of ROS time (`get_clock().now()` on hardware, `/clock` in simulation). Positions are
-metres in the map frame (x right, y up, z above the floor), orientations are unit quaternions.
-
-Every value handed out is immutable, so a snapshot can cross threads. The store belongs to one.
+Pure: no clock, no ROS, no lock. Time is an argument, nanoseconds of ROS time. Positions are metres
+in the map frame (x right, y up, z above the floor), orientations are unit quaternions. Every value
+handed out is immutable, so a snapshot can cross threads. The store belongs to one.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Container, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from typing import Literal
 
 from lupin_twin.core.drops import (
@@ -30,6 +28,8 @@ NANOSECONDS_PER_SECOND = 1_000_000_000
 # lupin_msgs/Observation: the status of an attempt that brought what it should; others say why not.
 STATUS_OK = 0
 
+# x, y (m) and a value, in the sensor's unit.
+Sample = tuple[float, float, float]
 # The largest number that a field, which is float32, can hold.
 FLOAT32_MAX = 3.4028234663852886e38
 
@@ -49,16 +49,14 @@ class Pose:
     @property
     def is_finite(self) -> bool:
         """Whether all seven numbers are finite; a pose that is not counts as no pose."""
-        numbers = (self.x, self.y, self.z, self.qx, self.qy, self.qz, self.qw)
-        return all(map(math.isfinite, numbers))
+        return all(map(math.isfinite, astuple(self)))
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
     """One sensor's value, in the sensor's own unit (°C, %, ppm, lx); may be NaN or infinite.
 
-    `observed_at_ns` is ROS time; None in a scan, which has one stamp for all, and where it is not
-    known: another twin may not publish it.
+    `observed_at_ns` is None in a scan, which has one stamp for all, and where it is not known.
     """
 
     name: str
@@ -104,9 +102,8 @@ def sure_species(species: str, confidence: float | None) -> str:
 class Scan:
     """One scan of a tag's sensors, or an attempt.
 
-    `stamp_ns` is ROS time, never later than now; `own_stamp_ns` is what the producer sent, 0 for
-    nothing, by which a message that is received again is known. An attempt that failed (`status`)
-    carries no pose, and readings only as far as they were taken.
+    `stamp_ns` is never later than now; `own_stamp_ns` is what the producer sent, 0 for nothing, by
+    which a message that is received again is known. An attempt that failed (`status`) has no pose.
     """
 
     tag_id: str
@@ -126,10 +123,7 @@ class Scan:
 
 @dataclass(frozen=True, slots=True)
 class Inspection:
-    """One inspection of a tag's flowers, or the attempt: `flower` is None where nothing was learnt.
-
-    The other fields are those of `Scan`.
-    """
+    """One inspection of a tag's flowers, or an attempt (`flower` None); else as `Scan`."""
 
     tag_id: str
     stamp_ns: int
@@ -154,10 +148,9 @@ class Attempt:
 class TagState:
     """Everything known about one tag. Replaced as a whole on every write, never changed.
 
-    `pose` is None until the tag is pinned. `last_observed_ns` is None for a tag that was
-    discovered and never scanned; it leaves out attempts that brought nothing, unless there is
-    nothing else. `looked_at_ns` is when its flowers were last seen, `last_try` the latest attempt
-    of any kind.
+    `pose` is None until the tag is pinned. `last_observed_ns` is None for a tag that was only
+    discovered; it leaves out attempts that brought nothing, unless there is nothing else.
+    `looked_at_ns` is when its flowers were last seen, `last_try` the latest attempt of any kind.
     """
 
     tag_id: str
@@ -169,11 +162,7 @@ class TagState:
     last_try: Attempt | None = None
 
     def stale_seconds(self, now_ns: int | None) -> float:
-        """Seconds since the last observation: never negative, infinite for a tag never observed.
-
-        NaN where now is not known. What was observed after `now_ns` has the age 0;
-        `TwinStore.hold_to` permits no such thing.
-        """
+        """Seconds since the last observation, 0 at least; infinite: never; NaN: now is unknown."""
         if self.last_observed_ns is None:
             return math.inf
         return math.nan if now_ns is None else age_seconds(self.last_observed_ns, now_ns)
@@ -190,15 +179,19 @@ class TagState:
 
     def held_to(self, now_ns: int) -> TagState:
         """The tag, with nothing in it that is later than `now_ns`."""
+
+        def held(stamp_ns: int | None) -> int | None:
+            return None if stamp_ns is None else min(stamp_ns, now_ns)
+
+        last = self.last_try
         return replace(
             self,
             readings=tuple(
-                replace(r, observed_at_ns=_held(r.observed_at_ns, now_ns)) for r in self.readings
+                replace(r, observed_at_ns=held(r.observed_at_ns)) for r in self.readings
             ),
-            last_observed_ns=_held(self.last_observed_ns, now_ns),
-            looked_at_ns=_held(self.looked_at_ns, now_ns),
-            last_try=self.last_try
-            and replace(self.last_try, stamp_ns=min(self.last_try.stamp_ns, now_ns)),
+            last_observed_ns=held(self.last_observed_ns),
+            looked_at_ns=held(self.looked_at_ns),
+            last_try=last and replace(last, stamp_ns=min(last.stamp_ns, now_ns)),
         )
 
 
@@ -210,7 +203,7 @@ ClockState = Literal["running", "paused", "stopped", "none", "doubted"]
 class Snapshot:
     """Every tag at one moment, in the order in which the tags were first seen.
 
-    Without `has_times`, it is not known when each reading, the flowers and the last attempt were.
+    Without `has_times`, only each tag's last observation has a known time.
     """
 
     stamp_ns: int
@@ -227,10 +220,7 @@ class Snapshot:
 
 @dataclass(slots=True)
 class TwinStore:
-    """The latest of everything, per tag.
-
-    Latest is what has the latest stamp, whatever came first: of two producers whose messages were
-    latched, either may come first. Of equal stamps the later arrival counts.
+    """The latest of everything, per tag: what has the latest stamp; of equal ones, what came later.
 
     `observation_count` grows with each write that changes what a field or the state shows.
     """
@@ -244,9 +234,8 @@ class TwinStore:
     def record(self, scan: Scan) -> None:
         """Store a scan: its readings (latest per name), its time, its pose if the tag has none.
 
-        A scan that failed and brought nothing does not make what is known seem younger: it is the
-        tag's last attempt, and its time counts as `last_observed_ns` only as long as nothing else
-        was observed at the tag.
+        One that failed and brought nothing is the tag's last attempt; its time counts as
+        `last_observed_ns` only as long as nothing else was observed at the tag.
 
         Raises:
             Rejected: a text or a list past its bound; nothing is stored then.
@@ -258,16 +247,15 @@ class TwinStore:
         for reading in scan.readings:
             new = replace(reading, observed_at_ns=scan.stamp_ns)
             known = readings.setdefault(reading.name, new)
-            if not _is_later(known.observed_at_ns, scan.stamp_ns) and not _same(known, new):
+            is_same = known.observed_at_ns == scan.stamp_ns and _same_value(known, new)
+            if not _is_later(known.observed_at_ns, scan.stamp_ns) and not is_same:
                 readings[reading.name] = new
         check_length("readings of a tag", len(readings), MAX_SENSORS_PER_TAG)
         tag = replace(tag, readings=tuple(readings.values()), pose=tag.pose or scan.pose)
         self._store_attempt(tag, scan, brought=scan.succeeded or bool(scan.readings))
 
     def record_inspection(self, inspection: Inspection) -> None:
-        """Store an inspection: all of it replaces an earlier one; readings stay.
-
-        One that failed is the tag's last attempt, and changes nothing else.
+        """Store an inspection: it replaces an earlier one, unless it failed; readings stay.
 
         Raises:
             Rejected: a text or a list past its bound; nothing is stored then.
@@ -289,9 +277,6 @@ class TwinStore:
     def pin(self, tag_id: str, pose: Pose) -> bool:
         """Give a discovered tag its place; False, and nothing changed, if it has one already.
 
-        The count grows here too: a tag that was scanned before it was discovered enters the field
-        by this write alone, and the count is what the field's cache is keyed by.
-
         Raises:
             Rejected: a text past its bound, or one tag too many.
 
@@ -306,9 +291,8 @@ class TwinStore:
     def hold_to(self, now_ns: int) -> bool:
         """Follow a clock that has gone back: whatever was observed after `now_ns` was, now.
 
-        It ages from here on, and new observations count as new. Otherwise a restarted simulation
-        or a looped bag would look fresh, and stand still, for as long as the old time had lasted.
-        Returns whether there was anything like that. 0 is a simulated clock that has not started.
+        It ages from here on, and new observations count as new. Returns whether there was anything
+        like that. 0 is a simulated clock that has not started.
         """
         if not 0 < now_ns < self._newest_ns:
             return False
@@ -320,10 +304,7 @@ class TwinStore:
         return True
 
     def restore(self, tags: Iterable[TagState], observed: Container[str]) -> None:
-        """Begin with what was known before, in the place of what is there.
-
-        `observed` are the tags at which anything was observed: others were only tried.
-        """
+        """Begin with what was known before; at tags not `observed` attempts alone were made."""
         self._tags, self._observed, self._newest_ns, self._items = {}, {}, 0, 0
         for tag in tags:
             try:
@@ -339,28 +320,21 @@ class TwinStore:
         """How many tags, and how many readings, flowers and footprint points of theirs."""
         return len(self._tags), self._items
 
-    def knows(self, tag_id: str) -> bool:
-        """Whether the tag is known."""
-        return tag_id in self._tags
+    def tag(self, tag_id: str) -> TagState | None:
+        """A tag as it is now; None: it is not known."""
+        return self._tags.get(tag_id)
 
     def is_pinned(self, tag_id: str) -> bool:
         """Whether the tag is known and has a pose."""
-        return self.pose_of(tag_id) is not None
-
-    def pose_of(self, tag_id: str) -> Pose | None:
-        """Where a tag is, None where that is not known."""
         tag = self._tags.get(tag_id)
-        return None if tag is None else tag.pose
+        return tag is not None and tag.pose is not None
 
     def snapshot(self, now_ns: int, frame_id: str) -> Snapshot:
         """Every tag at `now_ns` (ROS time, ns), poses in `frame_id`. O(tags), nothing is copied."""
         return Snapshot(stamp_ns=now_ns, frame_id=frame_id, tags=tuple(self._tags.values()))
 
-    def samples_for_sensor(self, sensor_type: str) -> tuple[tuple[float, float, float], ...]:
-        """(x, y, value) of every tag with a pose and a finite reading of a sensor (`samples_of`).
-
-        Metres in the map frame and the sensor's unit, in the order the tags were first seen.
-        """
+    def samples_for_sensor(self, sensor_type: str) -> tuple[Sample, ...]:
+        """`samples_of` all tags, in the order in which they were first seen."""
         return samples_of(self._tags.values(), sensor_type)
 
     def _tag(self, tag_id: str) -> TagState:
@@ -374,13 +348,10 @@ class TwinStore:
         """Keep a tag with the times of what was tried; `brought`: something was observed."""
         at_ns, observed_ns = tried.stamp_ns, self._observed.get(tag.tag_id)
         if brought:
-            observed_ns = at_ns if observed_ns is None else max(observed_ns, at_ns)
-        if observed_ns is not None:
-            last_observed_ns = observed_ns
-        elif tag.last_observed_ns is None:
-            last_observed_ns = at_ns
-        else:
-            last_observed_ns = min(tag.last_observed_ns, at_ns)
+            observed_ns = max(observed_ns or 0, at_ns)
+        last_observed_ns = observed_ns
+        if last_observed_ns is None:
+            last_observed_ns = min(tag.last_observed_ns or at_ns, at_ns)
         last_try = tag.last_try
         if last_try is None or at_ns >= last_try.stamp_ns:
             last_try = Attempt(at_ns, tried.status, tried.status_detail)
@@ -393,7 +364,7 @@ class TwinStore:
         known = self._tags.get(tag.tag_id)
         if known is not None and known == tag:
             return  # the very same value stays: change detection compares identities
-        items = self._items + items_of(tag) - (0 if known is None else items_of(known))
+        items = self._items + _items_of(tag) - (0 if known is None else _items_of(known))
         check_length("readings, flowers and footprint points of all tags", items, MAX_ITEMS)
         self._items = items
         self._tags[tag.tag_id] = tag
@@ -416,30 +387,19 @@ def _is_later(one_ns: int | None, other_ns: int) -> bool:
     return one_ns is not None and one_ns > other_ns
 
 
-def _held(stamp_ns: int | None, now_ns: int) -> int | None:
-    return None if stamp_ns is None else min(stamp_ns, now_ns)
-
-
 def _same_value(one: Reading, other: Reading) -> bool:
     is_same = one.value == other.value or (math.isnan(one.value) and math.isnan(other.value))
     return one.name == other.name and is_same
 
 
-def _same(one: Reading, other: Reading) -> bool:
-    return one.observed_at_ns == other.observed_at_ns and _same_value(one, other)
-
-
-def items_of(tag: TagState) -> int:
-    """How many readings, flowers and footprint points a tag has."""
+def _items_of(tag: TagState) -> int:
     return len(tag.readings) + len(tag.flower.blooms) + len(tag.flower.footprint)
 
 
-def samples_of(
-    tags: Iterable[TagState], sensor_type: str
-) -> tuple[tuple[float, float, float], ...]:
-    """(x, y, value) of the tags with a pose and a finite reading of `sensor_type`, in order.
+def samples_of(tags: Iterable[TagState], sensor_type: str) -> tuple[Sample, ...]:
+    """(x, y, value), m and the sensor's unit, of tags with a pose and a reading that is finite.
 
-    Finite in the field's own type: a NaN, or a number past float32, would poison a neighbourhood.
+    In the field's own type: a NaN, or a number past float32, would poison a neighbourhood.
     """
     return tuple(
         (tag.pose.x, tag.pose.y, reading.value)

@@ -44,11 +44,6 @@ class Change:
     expected_sd: float
     since_s: float | None
 
-    @property
-    def has_changed(self) -> bool:
-        """Whether that is more than chance brings."""
-        return self.since_s is not None
-
 
 @dataclass(frozen=True, slots=True)
 class Off:

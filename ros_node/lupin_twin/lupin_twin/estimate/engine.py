@@ -190,13 +190,7 @@ class EstimateJob:
             if model is None:
                 model = fit(readings, day_length_s=self.day_length_s, should_stop=should_stop)
             _go_on_unless(should_stop)
-            grid = model.posterior(readings, 0.0, should_stop).grid(
-                bbox_min_x=box.bbox_min_x,
-                bbox_min_y=box.bbox_min_y,
-                bbox_max_x=box.bbox_max_x,
-                bbox_max_y=box.bbox_max_y,
-                resolution=box.resolution,
-            )
+            grid = model.posterior(readings, 0.0, should_stop).grid(**box.cells)
         except (FitFailed, np.linalg.LinAlgError) as error:
             raise FieldRefused(f"these readings cannot be computed with: {error}") from error
         return Estimate(grid, len(np.unique(readings.tag)), len(readings))

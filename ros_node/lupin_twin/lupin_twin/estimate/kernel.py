@@ -57,28 +57,18 @@ class Readings:
 
     def __post_init__(self) -> None:
         """Refuse what nothing can be made of."""
-        for name, kind in (
-            ("time_s", np.float64),
-            ("tag", np.int64),
-            ("value", np.float64),
-            ("xy", np.float64),
-        ):
-            array = np.array(getattr(self, name), dtype=kind)
+        for name in ("time_s", "tag", "value", "xy"):
+            array = np.array(getattr(self, name), dtype=np.int64 if name == "tag" else np.float64)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
-        count = self.time_s.shape[0] if self.time_s.ndim == 1 else -1
-        for name, array in (("time_s", self.time_s), ("tag", self.tag), ("value", self.value)):
-            if array.shape != (count,):
-                raise ValueError(f"{name} has shape {array.shape}, must be ({max(count, 0)},)")
-            if not np.all(np.isfinite(array)):
+            shape = (len(array), 2) if name == "xy" else self.time_s.shape[:1]
+            if array.shape != shape:
+                raise ValueError(f"{name} has shape {array.shape}, must be {shape}")
+            if not np.isfinite(array).all():
                 raise ValueError(f"{name} has numbers that are not finite")
-        if self.xy.ndim != 2 or self.xy.shape[1] != 2:
-            raise ValueError(f"xy has shape {self.xy.shape}, must be (tags, 2)")
-        if not np.all(np.isfinite(self.xy)):
-            raise ValueError("xy has numbers that are not finite")
-        if count and not (self.tag.min() >= 0 and self.tag.max() < len(self.xy)):
-            wrong = self.tag.min() if self.tag.min() < 0 else self.tag.max()
-            raise ValueError(f"tag is {wrong}, the limits are 0 and {len(self.xy) - 1}")
+        wrong = self.tag[(self.tag < 0) | (self.tag >= len(self.xy))]
+        if len(wrong):
+            raise ValueError(f"tag is {wrong[0]}, the limits are 0 and {len(self.xy) - 1}")
 
     def __len__(self) -> int:
         """How many readings there are."""

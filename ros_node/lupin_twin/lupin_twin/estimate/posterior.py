@@ -18,7 +18,7 @@ import numpy.typing as npt
 from lupin_twin.estimate.cholesky import MAX_EXACT, Factor, Neighbours, Solved, shared_out
 from lupin_twin.estimate.cross_validation import Change, Gain, LeftOut, Place, best_places, gap_of
 from lupin_twin.estimate.kernel import Hyper, IntArray, Readings, Scale
-from lupin_twin.field.grid import BoolArray, FloatArray, cell_centres, grid_dimensions
+from lupin_twin.field.grid import BoolArray, CellGrid, FloatArray, cell_centres, grid_dimensions
 from lupin_twin.field.idw import Abandoned, never
 
 # Places of the lattice, as a share of the length over which the truth changes.
@@ -31,18 +31,13 @@ _CELLS_AT_ONCE: Final = 128
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class EstimateGrid:
+class EstimateGrid(CellGrid):
     """An estimate on the cells of `field.grid`; arrays are (height, width), row 0 at min y.
 
     `mean` and `sd` are in the sensor's unit, everywhere finite; `known` is where `sd` is below
     `sd_known`.
     """
 
-    width: int
-    height: int
-    origin_x: float
-    origin_y: float
-    resolution: float
     mean: npt.NDArray[np.float32]
     sd: npt.NDArray[np.float32]
     known: BoolArray
@@ -61,12 +56,7 @@ class Cells:
 
     @classmethod
     def of(cls, min_x: float, min_y: float, max_x: float, max_y: float, resolution: float) -> Cells:
-        """Of a box, m.
-
-        Raises:
-            ValueError: see `grid.grid_dimensions`.
-
-        """
+        """Of a box, m."""
         width, height = grid_dimensions(min_x, min_y, max_x, max_y, resolution)
         return cls(
             cell_centres(min_x, width, resolution),
@@ -195,10 +185,6 @@ class Posterior:
 
         Fine grids are interpolated between places that are no farther apart than a fifth of the
         length over which the truth changes.
-
-        Raises:
-            ValueError: see `grid.grid_dimensions`.
-
         """
         cells = Cells.of(bbox_min_x, bbox_min_y, bbox_max_x, bbox_max_y, resolution)
         x, y = cells.lattice(self.hyper.l)

@@ -39,6 +39,10 @@ class FieldRefused(ValueError):
     """A request that gets no field; the message names the field, the value and the limit."""
 
 
+# The fields of a request, but for the sensor.
+NUMBERS: Final = ("resolution", "bbox_min_x", "bbox_min_y", "bbox_max_x", "bbox_max_y")
+
+
 @dataclass(frozen=True, slots=True)
 class FieldRequest:
     """What to reconstruct: a sensor over a box (m, map frame) in cells of `resolution` (m).
@@ -58,7 +62,7 @@ class FieldRequest:
 
     def __post_init__(self) -> None:
         with np.errstate(over="ignore", under="ignore"):
-            for name in ("resolution", "bbox_min_x", "bbox_min_y", "bbox_max_x", "bbox_max_y"):
+            for name in NUMBERS:
                 sent = getattr(self, name)
                 rounded = float(np.float32(sent))
                 object.__setattr__(self, name, rounded)
@@ -67,25 +71,14 @@ class FieldRequest:
                     object.__setattr__(self, "past_float32", f"{name} is {sent}")
 
     @property
-    def cells(self) -> tuple[float, float, float, float, float]:
-        """The box, min and max x and y as in `grid_dimensions`, and the resolution; m."""
-        return (
-            self.bbox_min_x,
-            self.bbox_min_y,
-            self.bbox_max_x,
-            self.bbox_max_y,
-            self.resolution,
-        )
+    def cells(self) -> dict[str, float]:
+        """The box and the resolution, m, as `grid_dimensions` and all that make a grid take it."""
+        return {name: getattr(self, name) for name in NUMBERS}
 
 
 @dataclass(frozen=True, slots=True)
 class FieldRules:
-    """The node's parameters for fields; distances in metres.
-
-    Raises:
-        ValueError: a rule out of its range, named with its value and the limit.
-
-    """
+    """The node's parameters for fields; distances in metres."""
 
     idw_power: float
     falloff_radius_m: float
@@ -101,14 +94,6 @@ class FieldRules:
             max_distance_m=parameters.idw_max_distance_m,
             max_grid_cells=parameters.max_grid_cells,
         )
-
-    def __post_init__(self) -> None:
-        for name in ("idw_power", "falloff_radius_m", "max_distance_m"):
-            number = getattr(self, name)
-            if not (math.isfinite(number) and number >= 0.0):
-                raise ValueError(f"{name} is {number}, must be finite and not less than 0")
-        if self.max_grid_cells < 1:
-            raise ValueError(f"max_grid_cells is {self.max_grid_cells}, must not be less than 1")
 
 
 class FieldKey(NamedTuple):
@@ -128,11 +113,6 @@ class FieldCache:
     """An LRU of at most `max_entries` fields whose values take at most `max_bytes` together."""
 
     def __init__(self, max_bytes: int = MAX_BYTES, max_entries: int = MAX_ENTRIES) -> None:
-        """Raises ValueError for a bound below 0."""
-        if max_bytes < 0:
-            raise ValueError(f"max_bytes is {max_bytes}, must not be less than 0")
-        if max_entries < 0:
-            raise ValueError(f"max_entries is {max_entries}, must not be less than 0")
         self.max_bytes = max_bytes
         self.max_entries = max_entries
         self.hits = 0
@@ -171,10 +151,6 @@ def cost_s(request: FieldRequest, samples: int, rules: FieldRules) -> float:
     """About how long a field of so many samples takes, seconds of one core; for ordering work.
 
     As if all samples lay within the box: one outside costs less.
-
-    Raises:
-        FieldRefused: see `check_request`.
-
     """
     width, height = check_request(request, rules.max_grid_cells)
     reach = 2.0 * max(rules.falloff_radius_m, rules.max_distance_m) / request.resolution
@@ -210,7 +186,7 @@ def check_request(request: FieldRequest, max_grid_cells: int) -> tuple[int, int]
     if request.past_float32:
         raise FieldRefused(f"{request.past_float32} m, must fit into float32 (1.4e-45 to 3.4e38)")
     try:
-        width, height = grid_dimensions(*request.cells)
+        width, height = grid_dimensions(**request.cells)
     except ValueError as error:
         raise FieldRefused(str(error)) from error
     if width * height > max_grid_cells:
@@ -249,11 +225,7 @@ def compute_field(
         )
     return compute_idw_field(
         samples,
-        bbox_min_x=request.bbox_min_x,
-        bbox_min_y=request.bbox_min_y,
-        bbox_max_x=request.bbox_max_x,
-        bbox_max_y=request.bbox_max_y,
-        resolution=request.resolution,
+        **request.cells,
         falloff_radius_m=rules.falloff_radius_m,
         max_distance_m=rules.max_distance_m,
         power=rules.idw_power,
@@ -299,12 +271,7 @@ class FieldEngine:
     def lookup(
         self, request: FieldRequest, store: TwinStore, occupancy: OccupancyMap | None
     ) -> FieldGrid | FieldJob:
-        """The field as it was computed before, or a job; `occupancy` is the latest map, if any.
-
-        Raises:
-            FieldRefused: see `check_request`.
-
-        """
+        """The field as it was computed before, or a job; `occupancy` is the latest map, if any."""
         check_request(request, self.rules.max_grid_cells)
         revision = None if occupancy is None else occupancy.revision
         key = FieldKey(request, store.observation_count, revision, self.rules)
@@ -355,7 +322,7 @@ def default_request(
     resolution = DEFAULT_RESOLUTION_M
     while True:
         request = FieldRequest(sensor_type, resolution, *box)
-        width, height = grid_dimensions(*request.cells)
+        width, height = grid_dimensions(**request.cells)
         if width * height <= max_cells:
             return request
         resolution *= 2.0

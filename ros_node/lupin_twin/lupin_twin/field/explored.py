@@ -6,7 +6,6 @@ Pure: numpy and the standard library. Metres and radians in the map frame.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -69,7 +68,7 @@ class OccupancyMap:
             raise ValueError(
                 f"map is {width} x {height} = {width * height} cells, the limit is {MAX_MAP_CELLS}"
             )
-        cells = _int8_copy(self.cells)
+        cells = np.array(self.cells, dtype=np.int8)
         if cells.size != width * height:
             raise ValueError(
                 f"map data holds {cells.size} cells, must be width x height = {width} x {height} "
@@ -95,20 +94,6 @@ class OccupancyMap:
     def shows_the_same_as(self, other: OccupancyMap) -> bool:
         """Whether place and cells are the same, whenever and however often it was published."""
         return self.place == other.place and np.array_equal(self.cells, other.cells)
-
-
-def _int8_copy(data: Sequence[int] | npt.NDArray[np.int8]) -> npt.NDArray[np.int8]:
-    given = np.asarray(data)
-    if given.size and not np.issubdtype(given.dtype, np.integer):
-        raise ValueError(f"map data is {given.dtype}, must be int8")
-    limits = np.iinfo(np.int8)
-    if given.size and given.dtype != np.int8:
-        low, high = given.min(), given.max()
-        if low < limits.min or high > limits.max:
-            raise ValueError(
-                f"map data ranges from {low} to {high}, must be within {limits.min} to {limits.max}"
-            )
-    return given.astype(np.int8, copy=True)
 
 
 def explored_mask(

@@ -33,20 +33,25 @@ BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FieldGrid:
-    """A reconstructed field.
-
-    `origin_x`, `origin_y` (m, map frame) is the corner of cell (0, 0), not its centre. `values` is
-    flat, row-major, float32 and read-only, NaN where nothing is known. `value_min` and `value_max`
-    range over the finite cells and are both 0 where there are none. `sample_count` is the number
-    of samples the field was made from: all that were given, those out of reach of the box too.
-    """
+class CellGrid:
+    """`origin_x`, `origin_y` (m, map frame) is the corner of cell (0, 0), not its centre."""
 
     width: int
     height: int
     origin_x: float
     origin_y: float
     resolution: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FieldGrid(CellGrid):
+    """A reconstructed field.
+
+    `values` is flat, row-major, float32 and read-only, NaN where nothing is known. `value_min` and
+    `value_max` range over the finite cells and are both 0 where there are none. `sample_count` is
+    the number of samples that were given, those out of reach of the box too.
+    """
+
     values: npt.NDArray[np.float32]
     value_min: float
     value_max: float

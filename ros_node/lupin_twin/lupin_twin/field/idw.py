@@ -18,10 +18,10 @@ The definition (Shepard, "A two-dimensional interpolation function for irregular
 
 A distance is the float64 `sqrt(dx * dx + dy * dy)`; of equally near samples the first one counts.
 
-How it is computed: the grid is split into parts, and those again, and each part has only the
-samples that reach it, until its pairs of a cell and a sample fit the processor's cache; there the
-definition is evaluated for all pairs at once. A part that nothing reaches is dropped on the way.
-So the cost follows the painted cells, and memory beyond the grid's own is that of one part.
+How it is computed: the grid is halved again and again, and each part has only the samples that
+reach it, until its pairs of a cell and a sample fit the processor's cache; there the definition is
+evaluated for all pairs at once. A part that nothing reaches is dropped on the way. So the cost
+follows the painted cells, and memory beyond the grid's own is that of one part.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from itertools import chain, pairwise
+from itertools import chain
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -48,20 +48,10 @@ COINCIDENT_EPS_M: Final = 1e-3
 
 # So many pairs of a part are evaluated at once: two float64 arrays of that size stay in the
 # second-level cache, and numpy's work on them is several times the cost of calling it.
-_MAX_PAIRS: Final = 51_200
-_MIN_PAIRS: Final = 4_096
-# A small grid takes smaller parts, so that all of it stays within ten times the grid's own bytes:
-# 4 a cell, 25 a pair at most, and numpy's buffers whatever the size.
-_PAIR_BYTES: Final = 25
-_SPARE_BYTES_PER_CELL: Final = 10 * 4 - 4
-_BUFFER_BYTES: Final = 200_000
-# Parts are planned to come to this share of it, since samples never lie as evenly as assumed.
-_PLANNED_SHARE: Final = 0.8
+MAX_PAIRS: Final = 65_536
 # With fewer points than this to a sample, numpy's loops are all overhead. It takes memory past
-# _MAX_PAIRS only where more than a thousand samples reach one part.
+# MAX_PAIRS only where more than a thousand samples reach one part.
 _MIN_POINTS: Final = 32
-# A part is split into so many pieces along a side at most; it bounds what a split itself takes.
-_MAX_PIECES: Final = 8
 
 # 1/d² is used as it is up to here; past it (and for any power but 2) the weights are scaled by
 # the nearest distance of the cell, so that none overflows and the largest is exactly 1.
@@ -143,25 +133,22 @@ def compute_idw_field(
             f"of shape {(height, width)} (height, width)"
         )
     x, y, value = sample_columns(samples)
-    idw = PairwiseIdw(
-        falloff_radius_m=falloff_radius_m,
-        max_distance_m=max_distance_m,
-        power=power,
-        max_pairs=_pairs_at_once(width * height),
-    )
+    idw = PairwiseIdw(falloff_radius_m=falloff_radius_m, max_distance_m=max_distance_m, power=power)
+    cell_x = cell_centres(bbox_min_x, width, resolution)
+    cell_y = cell_centres(bbox_min_y, height, resolution)
     values = np.full((height, width), np.nan, dtype=np.float32)
-    painter = _Painter(
-        samples=(x, y, value),
-        cell_x=cell_centres(bbox_min_x, width, resolution),
-        cell_y=cell_centres(bbox_min_y, height, resolution),
-        resolution=resolution,
-        idw=idw,
-        explored=explored_mask,
-        values=values,
-        should_stop=should_stop,
-    )
     with np.errstate(all="ignore"):
-        painter.paint()
+        for rows, columns, near in _parts((x, y), (cell_x, cell_y), idw, explored_mask):
+            if should_stop():
+                raise Abandoned
+            dx = np.square(x[near][:, None] - cell_x[columns])
+            dy = np.square(y[near][:, None] - cell_y[rows])
+            shape = dy.shape[1], dx.shape[1]
+            square = idw.squares(near.size, shape[0] * shape[1])
+            np.add(dy[:, :, None], dx[:, None, :], out=square.reshape(-1, *shape))
+            values[rows, columns] = idw.evaluate(square, value[near]).reshape(shape)
+        if explored_mask is not None:
+            values[~explored_mask] = np.nan
         value_min, value_max = _finite_range(values)
     values.setflags(write=False)
     return FieldGrid(
@@ -175,11 +162,6 @@ def compute_idw_field(
         value_max=value_max,
         sample_count=len(samples),
     )
-
-
-def _pairs_at_once(cells: int) -> int:
-    within_memory = (_SPARE_BYTES_PER_CELL * cells - _BUFFER_BYTES) // _PAIR_BYTES
-    return min(max(within_memory, _MIN_PAIRS), _MAX_PAIRS)
 
 
 def sample_columns(
@@ -225,9 +207,7 @@ class PairwiseIdw:
 
     """
 
-    def __init__(
-        self, *, falloff_radius_m: float, max_distance_m: float, power: float, max_pairs: int
-    ) -> None:
+    def __init__(self, *, falloff_radius_m: float, max_distance_m: float, power: float) -> None:
         for name, number in (
             ("falloff_radius_m", falloff_radius_m),
             ("max_distance_m", max_distance_m),
@@ -244,18 +224,13 @@ class PairwiseIdw:
         self.reach_square = max(self.falloff_square, self.max_square)
         self._equal_radii = falloff_radius_m == max_distance_m
         self._plain_weights = power == 2.0 and falloff_radius_m <= _MAX_PLAIN_REACH_M
-        self.max_pairs = max_pairs
-        self._allocate(max_pairs)
+        self._allocate(MAX_PAIRS)
 
     def _allocate(self, pairs: int) -> None:
         # In one block: the allocator gives it back to the next field instead of to the system,
         # and a fifth of a small field's time, page faults, is saved.
         self._square, self._weight = np.empty((2, pairs))
         self._within = np.empty(pairs, dtype=np.bool_)
-
-    def fits(self, samples: int, points: int) -> bool:
-        """Whether so many are better evaluated at once than in parts."""
-        return samples * points <= self.max_pairs or points <= _MIN_POINTS
 
     def squares(self, samples: int, points: int) -> FloatArray:
         """An array (samples, points) to put the squared distances (m²) into, for `evaluate`."""
@@ -319,122 +294,47 @@ class PairwiseIdw:
         return points
 
 
-class _Part(NamedTuple):
-    """Rows `top` to `bottom`, columns `left` to `right` (exclusive), and the samples near them."""
-
-    top: int
-    bottom: int
-    left: int
-    right: int
-    reaching: IndexArray
-
-    @property
-    def rows(self) -> int:
-        return self.bottom - self.top
-
-    @property
-    def columns(self) -> int:
-        return self.right - self.left
+def fits(samples: int, points: int) -> bool:
+    """Whether so many are better evaluated at once than in parts."""
+    return samples * points <= MAX_PAIRS or points <= _MIN_POINTS
 
 
-class _Painter:
-    """Evaluates the definition part by part; `values` (height, width) is NaN at the start."""
+def _parts(
+    samples: tuple[FloatArray, FloatArray],
+    cells: tuple[FloatArray, FloatArray],
+    idw: PairwiseIdw,
+    explored: BoolArray | None,
+) -> Iterator[tuple[slice, slice, IndexArray]]:
+    """Rows, columns and the samples near them, without the parts that stay NaN as a whole.
 
-    def __init__(
-        self,
-        *,
-        samples: tuple[FloatArray, FloatArray, FloatArray],
-        cell_x: FloatArray,
-        cell_y: FloatArray,
-        resolution: float,
-        idw: PairwiseIdw,
-        explored: BoolArray | None,
-        values: npt.NDArray[np.float32],
-        should_stop: Callable[[], bool],
-    ) -> None:
-        self.x, self.y, self.value = samples
-        self.cell_x, self.cell_y = cell_x, cell_y
-        self.idw = idw
-        self.reach_in_cells = 2.0 * math.sqrt(idw.reach_square) / resolution
-        self.explored = explored
-        self.values = values
-        self.should_stop = should_stop
-
-    def paint(self) -> None:
-        """Fill `values`, part by part."""
-        height, width = self.values.shape
-        whole = _Part(0, height, 0, width, np.arange(self.value.size))
-        parts = list(self._split(whole, 1, 1)) if self.value.size else []
-        while parts:
-            if self.should_stop():
-                raise Abandoned
-            part = parts.pop()
-            if self.idw.fits(part.reaching.size, part.rows * part.columns):
-                self._evaluate(part)
-            else:
-                parts.extend(self._split(part, *self._pieces(part)))
-
-    def _pieces(self, part: _Part) -> tuple[int, int]:
-        """How many pieces down and across: the fewest that should be small enough.
-
-        As if the samples lay evenly over the part and its surroundings within their reach; where
-        they do not, a piece is split again.
-        """
-        around = self.reach_in_cells
-        density = part.reaching.size / ((part.rows + around) * (part.columns + around))
-        down, across = (2, 1) if part.rows > part.columns else (1, 2)
-        for pieces in range(2, _MAX_PIECES + 1):
-            rows, columns = part.rows / down, part.columns / across
-            reaching = density * (rows + around) * (columns + around)
-            if reaching * rows * columns <= _PLANNED_SHARE * self.idw.max_pairs:
-                break
-            side = max(part.rows, part.columns) / pieces
-            down = min(part.rows, math.ceil(part.rows / side))
-            across = min(part.columns, math.ceil(part.columns / side))
-        return down, across
-
-    def _split(self, part: _Part, down: int, across: int) -> Iterator[_Part]:
-        """`part` in `down` times `across` pieces, without those that stay NaN as a whole.
-
-        A piece has the samples that reach the nearest point of its cells. Rounding is monotonic,
-        so no cell's own squared distance is below that point's, and none is lost to float noise.
-        """
-        rows, columns = _edges(part.top, part.bottom, down), _edges(part.left, part.right, across)
-        x_gaps = _gap_squares(self.x.take(part.reaching), self.cell_x, columns)
-        y_gaps = _gap_squares(self.y.take(part.reaching), self.cell_y, rows)
-        for (top, bottom), y_gap in zip(pairwise(rows), y_gaps, strict=True):
-            for (left, right), x_gap in zip(pairwise(columns), x_gaps, strict=True):
-                if self.explored is not None and not self.explored[top:bottom, left:right].any():
-                    continue
-                gap = x_gap + y_gap
-                if gap.min() <= self.idw.max_square:
-                    reaching = part.reaching[gap <= self.idw.reach_square]
-                    yield _Part(top, bottom, left, right, reaching)
-
-    def _evaluate(self, part: _Part) -> None:
-        cells = slice(part.top, part.bottom), slice(part.left, part.right)
-        rows, columns = part.rows, part.columns
-        dx = self.x.take(part.reaching)[:, None] - self.cell_x[cells[1]]
-        dy = self.y.take(part.reaching)[:, None] - self.cell_y[cells[0]]
-        dx *= dx
-        dy *= dy
-        square = self.idw.squares(part.reaching.size, rows * columns)
-        np.add(dy[:, :, None], dx[:, None, :], out=square.reshape(-1, rows, columns))
-        points = self.idw.evaluate(square, self.value.take(part.reaching)).reshape(rows, columns)
-        if self.explored is not None:
-            points[~self.explored[cells]] = np.nan
-        self.values[cells] = points
+    A part has the samples that reach the nearest point of its cells. Rounding is monotonic, so no
+    cell's own squared distance is below that point's, and none is lost to float noise.
+    """
+    (x, y), (cell_x, cell_y) = samples, cells
+    whole = slice(0, cell_y.size), slice(0, cell_x.size), np.arange(x.size)
+    parts = [whole] if x.size else []
+    while parts:
+        rows, columns, near = parts.pop()
+        if explored is not None and not explored[rows, columns].any():
+            continue
+        gap = gap_squares(x[near], cell_x[columns]) + gap_squares(y[near], cell_y[rows])
+        if gap.min() > idw.max_square:
+            continue
+        near = near[gap <= idw.reach_square]
+        down, across = rows.stop - rows.start, columns.stop - columns.start
+        if fits(near.size, down * across):
+            yield rows, columns, near
+        elif down > across:
+            middle = rows.start + down // 2
+            halves = slice(rows.start, middle), slice(middle, rows.stop)
+            parts += [(half, columns, near) for half in halves]
+        else:
+            middle = columns.start + across // 2
+            halves = slice(columns.start, middle), slice(middle, columns.stop)
+            parts += [(rows, half, near) for half in halves]
 
 
-def _edges(first: int, end: int, pieces: int) -> list[int]:
-    return [first + (end - first) * piece // pieces for piece in range(pieces + 1)]
-
-
-def _gap_squares(position: FloatArray, centres: FloatArray, edges: list[int]) -> FloatArray:
-    """(pieces, positions): squared distance (m²) along one axis from each piece's cells."""
-    low = centres[edges[:-1]][:, None]
-    high = centres[[edge - 1 for edge in edges[1:]]][:, None]
-    gap: FloatArray = np.maximum(position, low)
-    np.minimum(gap, high, out=gap)
-    np.subtract(gap, position, out=gap)
+def gap_squares(position: FloatArray, part: FloatArray) -> FloatArray:
+    """Squared distance (m²) along one axis from each position to the extent of `part`."""
+    gap: FloatArray = np.clip(position, part.min(), part.max()) - position
     return np.square(gap, out=gap)

@@ -13,16 +13,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from lupin_twin.core.state import TagState, samples_of
 from lupin_twin.field.grid import FieldGrid, FloatArray
-from lupin_twin.field.idw import Abandoned, IndexArray, PairwiseIdw, never, sample_columns
-
-# Pairs of tags that are looked at together; bounds the memory, whatever the number of tags.
-_MAX_PAIRS: Final = 40_960
+from lupin_twin.field.idw import (
+    Abandoned,
+    IndexArray,
+    PairwiseIdw,
+    fits,
+    gap_squares,
+    never,
+    sample_columns,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,12 +81,7 @@ def leave_one_out(
             tag_ids.append(tag.tag_id)
             samples.append(sample)
     x, y, measured = sample_columns(samples)
-    idw = PairwiseIdw(
-        falloff_radius_m=falloff_radius_m,
-        max_distance_m=max_distance_m,
-        power=power,
-        max_pairs=_MAX_PAIRS,
-    )
+    idw = PairwiseIdw(falloff_radius_m=falloff_radius_m, max_distance_m=max_distance_m, power=power)
     predicted = _predictions(x, y, measured, idw, should_stop)
     judged = np.flatnonzero(~np.isnan(predicted))
     if judged.size == 0:
@@ -129,9 +128,9 @@ def _predictions(
             if should_stop():
                 raise Abandoned
             part, near = parts.pop()
-            gap = _gap_squares(x[part], x[near]) + _gap_squares(y[part], y[near])
+            gap = gap_squares(x[near], x[part]) + gap_squares(y[near], y[part])
             near = near[gap <= idw.reach_square]
-            if idw.fits(near.size, part.size):
+            if fits(near.size, part.size):
                 predicted[part] = _predict_part(part, near, (x, y, value), idw)
                 continue
             along = x[part] if np.ptp(x[part]) > np.ptp(y[part]) else y[part]
@@ -157,9 +156,3 @@ def _predict_part(
     # A sample has no say about itself. `near` is in recorded order and holds all of `part`.
     square[np.searchsorted(near, part), np.arange(part.size)] = np.inf
     return idw.evaluate(square, value[near])
-
-
-def _gap_squares(part: FloatArray, position: FloatArray) -> FloatArray:
-    """Squared distance (m²) along one axis from each position to the extent of `part`."""
-    gap: FloatArray = np.clip(position, part.min(), part.max()) - position
-    return np.square(gap, out=gap)

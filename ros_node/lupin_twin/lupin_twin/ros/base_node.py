@@ -24,7 +24,7 @@ from rclpy.serialization import deserialize_message
 
 from lupin_twin.core.clock import Late
 from lupin_twin.core.diagnostics import MAX_PROBLEMS
-from lupin_twin.core.drops import Counts, Drop, Reason, Tally, Throttle
+from lupin_twin.core.drops import LATE, LOST, Counts, Drop, Reason, Tally, Throttle
 from lupin_twin.core.interfaces import SERVICE_DEPTH, Topic
 from lupin_twin.ros.inputs import Input
 from lupin_twin.ros.message_limits import MessageShape, TooManyError
@@ -263,7 +263,7 @@ class NodeUtilities:
 
     def drop(self, drop: Drop, topic: str) -> None:
         """Count and report something that was dropped."""
-        self.tally.drop(drop, topic, time.monotonic())
+        self.tally.add(drop.reason.value, drop.on(topic), time.monotonic())
         self.warn((drop.reason, (topic, drop.case)), drop.on(topic))
 
     @property
@@ -277,16 +277,14 @@ class NodeUtilities:
 
     def lose(self, count: int, topic: str) -> None:
         """Count and report messages that came faster than they were read."""
-        self.tally.lose(count, topic, time.monotonic())
-        self.warn(
-            ("lost", topic),
-            f"lost {count} messages on {topic}: they came too fast to be read",
-        )
+        text = f"messages on {topic}: they came too fast"
+        self.tally.add(LOST, f"lost {text}", time.monotonic(), count)
+        self.warn((LOST, topic), f"lost {count} {text} to be read")
 
     def late(self, late: Late, topic: str) -> None:
         """Count and report a producer whose stamps stay behind its own earlier ones."""
         text = f"late stamps on {topic}: {late}"
-        self.tally.late(late.news, text, time.monotonic())
+        self.tally.add(LATE, text, time.monotonic(), late.news)
         self.warn(("late", late.counted_as), text)
 
     def warn(self, key: tuple[str, object], text: str) -> None:

@@ -392,12 +392,13 @@ def tag_message(tag: TagState) -> Any:
         anomaly=flower.anomaly,
         flower_count=_saturated(flower.flower_count),
         bug_count=_saturated(flower.bug_count),
-        flowers=[_bloom_message(bloom) for bloom in flower.blooms],
+        flowers=[bloom_message(bloom) for bloom in flower.blooms],
         box_footprint=polygon_message(flower.footprint),
     )
 
 
-def _bloom_message(bloom: Bloom) -> Any:
+def bloom_message(bloom: Bloom) -> Any:
+    """One flower as lupin_msgs/FlowerPoint."""
     return FlowerPoint(
         position=Point(x=float(bloom.x), y=float(bloom.y), z=float(bloom.z)),
         height_m=float(bloom.height_m),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from lupin_msgs.srv import GetEstimate, GetEstimateReport, GetField
@@ -11,7 +11,7 @@ from lupin_twin.core.drops import MAX_TAGS
 from lupin_twin.estimate import EstimateGrid, Place
 from lupin_twin.estimate.engine import Estimate, EstimateRequest
 from lupin_twin.estimate.grading import Record, Tally
-from lupin_twin.field.engine import FieldRequest
+from lupin_twin.field.engine import NUMBERS, FieldRequest
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.ros import convert
 from lupin_twin.ros.convert_past import NotAnAnswerError
@@ -23,49 +23,29 @@ from lupin_twin.runtime.estimate_rounds import (
     TagCheck,
 )
 
+# What a field and its response say by the same names.
+_GRID: Final = ("width", "height", "origin_x", "origin_y")
+_SHARED: Final = (*_GRID, "value_min", "value_max", "sample_count")
+_OF_ESTIMATES: Final = (*_GRID, "sd_known")
+
 
 def field_request_of(msg: Any) -> FieldRequest:
     """GetField.Request as a value; of GetEstimate.Request, what it shares with that."""
-    return FieldRequest(
-        sensor_type=msg.sensor_type,
-        resolution=float(msg.resolution),
-        bbox_min_x=float(msg.bbox_min_x),
-        bbox_min_y=float(msg.bbox_min_y),
-        bbox_max_x=float(msg.bbox_max_x),
-        bbox_max_y=float(msg.bbox_max_y),
-    )
+    return FieldRequest(msg.sensor_type, **{name: float(getattr(msg, name)) for name in NUMBERS})
 
 
 def field_request_message(request: FieldRequest) -> Any:
     """The other direction of `field_request_of`."""
-    return GetField.Request(**box_fields(request))
-
-
-def box_fields(request: FieldRequest) -> dict[str, Any]:
-    """The fields that the requests of GetField and GetEstimate share."""
-    return {
-        "sensor_type": request.sensor_type,
-        "resolution": float(request.resolution),
-        "bbox_min_x": float(request.bbox_min_x),
-        "bbox_min_y": float(request.bbox_min_y),
-        "bbox_max_x": float(request.bbox_max_x),
-        "bbox_max_y": float(request.bbox_max_y),
-    }
+    return GetField.Request(sensor_type=request.sensor_type, **request.cells)
 
 
 def fill_response(response: Any, grid: FieldGrid) -> Any:
     """Fill a GetField.Response from a grid, whose values are copied."""
     response.ok = True
-    response.error_message = ""
     response.values = convert.floats(grid.values)
-    response.width = int(grid.width)
-    response.height = int(grid.height)
-    response.origin_x = float(grid.origin_x)
-    response.origin_y = float(grid.origin_y)
-    response.resolution_used = float(grid.resolution)
-    response.value_min = float(grid.value_min)
-    response.value_max = float(grid.value_max)
-    response.sample_count = int(grid.sample_count)
+    response.resolution_used = grid.resolution
+    for name in _SHARED:
+        setattr(response, name, getattr(grid, name))
     return response
 
 
@@ -73,17 +53,8 @@ def grid_of(response: Any) -> FieldGrid:
     """A GetField.Response that is `ok` as a grid: the other direction of `fill_response`."""
     values = np.array(response.values, dtype=np.float32)
     values.setflags(write=False)
-    return FieldGrid(
-        width=int(response.width),
-        height=int(response.height),
-        origin_x=float(response.origin_x),
-        origin_y=float(response.origin_y),
-        resolution=float(response.resolution_used),
-        values=values,
-        value_min=float(response.value_min),
-        value_max=float(response.value_max),
-        sample_count=int(response.sample_count),
-    )
+    shared = {name: getattr(response, name) for name in _SHARED}
+    return FieldGrid(resolution=response.resolution_used, values=values, **shared)
 
 
 def estimate_request_of(msg: Any) -> EstimateRequest:
@@ -93,7 +64,8 @@ def estimate_request_of(msg: Any) -> EstimateRequest:
 
 def estimate_request_message(request: EstimateRequest) -> Any:
     """The other direction of `estimate_request_of`."""
-    return GetEstimate.Request(**box_fields(request.box), at=convert.time_msg(request.at_ns))
+    box, at = request.box, convert.time_msg(request.at_ns)
+    return GetEstimate.Request(sensor_type=box.sensor_type, **box.cells, at=at)
 
 
 def response_of(estimate: Estimate) -> Any:
@@ -103,12 +75,8 @@ def response_of(estimate: Estimate) -> Any:
         ok=True,
         mean=convert.floats(grid.mean),
         sd=convert.floats(grid.sd),
-        width=grid.width,
-        height=grid.height,
-        origin_x=grid.origin_x,
-        origin_y=grid.origin_y,
+        **{name: getattr(grid, name) for name in _OF_ESTIMATES},
         resolution_used=grid.resolution,
-        sd_known=grid.sd_known,
         sample_count=estimate.sample_count,
         reading_count=estimate.reading_count,
     )
@@ -132,15 +100,11 @@ def estimate_of(response: Any) -> Estimate:
         cells.append(values.reshape(shape))
     mean, sd = cells
     grid = EstimateGrid(
-        width=shape[1],
-        height=shape[0],
-        origin_x=float(response.origin_x),
-        origin_y=float(response.origin_y),
-        resolution=float(response.resolution_used),
+        **{name: getattr(response, name) for name in _OF_ESTIMATES},
+        resolution=response.resolution_used,
         mean=mean,
         sd=sd,
         known=sd < response.sd_known,
-        sd_known=float(response.sd_known),
     )
     return Estimate(grid, int(response.sample_count), int(response.reading_count))
 
@@ -149,12 +113,7 @@ def estimate_of(response: Any) -> Estimate:
 
 
 def report_request_of(msg: Any) -> ReportRequest:
-    """GetEstimateReport.Request as a value.
-
-    Raises:
-        FieldRefused: see `ReportRequest`.
-
-    """
+    """GetEstimateReport.Request as a value."""
     return ReportRequest(msg.sensor_type, int(msg.max_places) or DEFAULT_PLACES)
 
 
@@ -193,6 +152,12 @@ def report_response(report: Report) -> Any:
     )
 
 
+# Columns of a report, in the order of `TagCheck`.
+_CHECKED: Final = (
+    *("measured", "observed_at", "expected", "expected_sd", "z", "offset", "changed_since"),
+)
+
+
 def report_of(response: Any) -> Report:
     """A GetEstimateReport.Response that is `ok`: the other direction of `report_response`.
 
@@ -200,17 +165,7 @@ def report_of(response: Any) -> Report:
         NotAnAnswerError: its lists are not of one length, or are longer than a twin's.
 
     """
-    tags = (
-        response.tag_ids,
-        response.measured,
-        response.observed_at,
-        response.expected,
-        response.expected_sd,
-        response.z,
-        response.offset,
-        response.left_out,
-        response.changed_since,
-    )
+    tags = [getattr(response, name) for name in ("tag_ids", *_CHECKED, "left_out")]
     places = response.place_x, response.place_y, response.error_ratio
     for what, columns, most in (("tags", tags, MAX_TAGS), ("places", places, MAX_PLACES)):
         lengths = {len(column) for column in columns}
@@ -220,24 +175,16 @@ def report_of(response: Any) -> Report:
         TagCheck(
             tag_id,
             measured,
-            convert.nanoseconds(observed_at),
+            convert.nanoseconds(at),
             expected,
-            expected_sd,
+            sd,
             z,
             offset,
             convert.nanoseconds(since) if is_left_out else None,
         )
-        for (
-            tag_id,
-            measured,
-            observed_at,
-            expected,
-            expected_sd,
-            z,
-            offset,
-            is_left_out,
-            since,
-        ) in zip(*tags, strict=True)
+        for tag_id, measured, at, expected, sd, z, offset, since, is_left_out in zip(
+            *tags, strict=True
+        )
     )
     return Report(
         convert.nanoseconds(response.at),

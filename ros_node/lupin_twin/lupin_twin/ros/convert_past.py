@@ -28,12 +28,7 @@ _ID: Final = re.compile("[0-9a-f]{32}")
 
 
 def writes_request(request: Any) -> WritesRequest:
-    """GetWrites.Request as a value.
-
-    Raises:
-        PastRefused: see `WritesRequest`.
-
-    """
+    """GetWrites.Request as a value."""
     return WritesRequest(
         after=int(request.after),
         reach_s=float(request.reach_s),
@@ -145,12 +140,7 @@ def state_response(snapshot: Snapshot) -> Any:
 
 
 def series_request(request: Any) -> SeriesRequest:
-    """GetHistory.Request as a value.
-
-    Raises:
-        PastRefused: see `SeriesRequest`.
-
-    """
+    """GetHistory.Request as a value."""
     return SeriesRequest(
         tag_id=request.tag_id,
         sensor_type=request.sensor_type,

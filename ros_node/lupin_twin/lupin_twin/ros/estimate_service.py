@@ -10,7 +10,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Final
 
@@ -20,7 +20,7 @@ from lupin_msgs.srv import GetEstimate, GetEstimateReport
 from lupin_twin.core.diagnostics import Estimates
 from lupin_twin.core.interfaces import GET_ESTIMATE, GET_ESTIMATE_REPORT
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Reading, Scan, TwinStore
-from lupin_twin.estimate import MAX_PER_TAG, FitFailed, Place
+from lupin_twin.estimate import MAX_PER_TAG, FitFailed
 from lupin_twin.estimate.engine import (
     MAX_TAGS,
     Estimate,
@@ -38,11 +38,10 @@ from lupin_twin.journal.fold import STATE_S_PER_TAG, recent_readings
 from lupin_twin.journal.queries import SERIES_S
 from lupin_twin.ros import convert_field
 from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities
-from lupin_twin.ros.responses import answer_later, refusal
+from lupin_twin.ros.responses import answer_later
 from lupin_twin.runtime.estimate_rounds import (
     ADVICE_S,
     Done,
-    Loaded,
     Report,
     ReportRequest,
     Round,
@@ -60,8 +59,6 @@ REST_FACTOR: Final = 9.0
 _GATHER_TAG_S: Final = 50e-6
 # Readings that are looked up in the journal, of all tags together: of few tags all of a day.
 _MAX_READINGS: Final = 20_000
-# Places for other tags that are cached, each until its sensor's next round.
-_MAX_ADVISED: Final = 64
 
 Gather = Callable[[str], Sequence[TagPast]]
 
@@ -83,6 +80,7 @@ class Task:
         return self.job.compute(found, self.now_ns, should_stop)
 
 
+@dataclass(slots=True)
 class EstimateService:
     """The services of one node, and its models; belongs to the node's thread.
 
@@ -92,37 +90,32 @@ class EstimateService:
     something to do.
     """
 
-    def __init__(
-        self,
-        utilities: NodeUtilities,
-        store: TwinStore,
-        recall: Recall,
-        *,
-        occupancy: Callable[[], OccupancyMap | None],
-        day_length_s: float,
-        max_grid_cells: int,
-        now_ns: Callable[[], int],
-        wake: Callable[[], None],
-    ) -> None:
-        self.watch = Watch(day_length_s)
-        self._utilities = utilities
-        self._store, self._recall = store, recall
-        self._occupancy = occupancy
-        self._day_length_s, self._max_grid_cells = day_length_s, max_grid_cells
-        self._now_ns = now_ns
-        self._workers = Workers("estimate")
-        # Rounds have a queue of their own: no estimate waits behind one.
+    utilities: NodeUtilities
+    store: TwinStore
+    recall: Recall
+    occupancy: Callable[[], OccupancyMap | None]
+    day_length_s: float
+    max_grid_cells: int
+    now_ns: Callable[[], int]
+    wake: Callable[[], None]
+    watch: Watch = field(init=False)
+    _recent: RecentReadings = field(init=False)
+    _queue: JobQueue = field(init=False)
+    # Rounds have a queue of their own: no estimate waits behind one.
+    _rounds: JobQueue = field(init=False)
+    _workers: Workers = field(default_factory=lambda: Workers("estimate"))
+    _is_working: bool = False
+    _rests_until_s: float = -math.inf
+    # Sensors whose estimates were reported as too narrow, and have not been better since.
+    _warned: set[str] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        """Nothing is known, and nothing asked for."""
+        self.watch = Watch(self.day_length_s)
+        self._recent = RecentReadings(self.day_length_s)
         self._queue, self._rounds = (
-            JobQueue(self._workers, wake, lambda: utilities.is_behind) for _ in range(2)
+            JobQueue(self._workers, self.wake, lambda: self.utilities.is_behind) for _ in range(2)
         )
-        self._recent = RecentReadings(day_length_s)
-        self._is_working = False
-        self._rests_until_s = -math.inf
-        # Sensors whose estimates were reported as too narrow, and have not been better since.
-        self._warned: set[str] = set()
-        self._advised: dict[
-            tuple[str, int], tuple[Loaded, OccupancyMap | None, tuple[Place, ...]]
-        ] = {}
 
     def offer(self, node: Any, group: Any) -> None:
         """Have `node` offer the services, by names relative to its namespace; some answer later."""
@@ -135,7 +128,7 @@ class EstimateService:
     def restore(self) -> None:
         """What the journal holds is known again: rounds can begin before a scan comes."""
         sensors: set[str] = set()
-        for tag in self._store.snapshot(self._now_ns(), "").tags:
+        for tag in self.store.snapshot(self.now_ns(), "").tags:
             for reading in tag.readings:
                 sensors.add(reading.name)
                 if reading.observed_at_ns is not None:
@@ -155,7 +148,7 @@ class EstimateService:
                     self.watch.add(scan, is_new=False)
             self.go_on()
 
-        look_up = self._from_journal(sensor, self._now_ns())
+        look_up = self._from_journal(sensor, self.now_ns())
         self._rounds.ask(Query(look_up, remember, cost_s=_ROUND_S))
 
     def hold_to(self, now_ns: int) -> None:
@@ -183,26 +176,26 @@ class EstimateService:
             return
         if now_s < self._rests_until_s and self.watch.fit(due.sensor).model is not None:
             return
-        gather, now_ns = self._gather(), self._now_ns()
+        gather, now_ns = self._gather(), self.now_ns()
         self.watch.begin(due, now_s)
         self._begin(
             lambda stop: due.run(gather(due.sensor), now_ns, stop), partial(self._ended, due)
         )
 
     def _ended(self, round_: Round, outcome: Done | Exception) -> None:
-        now_ns, sensor = self._now_ns(), round_.sensor
+        now_ns, sensor = self.now_ns(), round_.sensor
         self.watch.end(round_, outcome, time.monotonic(), now_ns)
         if isinstance(outcome, FitFailed | np.linalg.LinAlgError):
-            self._utilities.warn(("estimate", sensor), f"no new model of {sensor}: {outcome}")
+            self.utilities.warn(("estimate", sensor), f"no new model of {sensor}: {outcome}")
         elif isinstance(outcome, Exception) and not isinstance(outcome, FieldRefused):
-            self._utilities.report("the estimate's round", outcome)
+            self.utilities.report("the estimate's round", outcome)
         record = self.watch.record(sensor, now_ns)
         if record.is_trusted is not False:
             self._warned.discard(sensor)
         elif sensor not in self._warned:
             # Once: for as long as it lasts, /diagnostics and the page say so.
             self._warned.add(sensor)
-            self._utilities.warn(
+            self.utilities.warn(
                 ("trust", sensor),
                 f"the estimate of {sensor} is too sure of itself: of {record.week.scans} scans, "
                 f"{record.week.inside} came to lie where 9 of 10 were predicted",
@@ -232,7 +225,7 @@ class EstimateService:
 
     def _gather(self) -> Gather:
         """What memory holds now of a sensor, to be called on any thread."""
-        tags, recent = self._store.snapshot(self._now_ns(), "").tags, self._recent
+        tags, recent = self.store.snapshot(self.now_ns(), "").tags, self._recent
 
         def gather(sensor: str) -> list[TagPast]:
             return [
@@ -250,19 +243,19 @@ class EstimateService:
             FieldRefused: a bad request.
 
         """
-        now_ns = self._now_ns()
-        request.check(now_ns, self._max_grid_cells)
+        now_ns = self.now_ns()
+        request.check(now_ns, self.max_grid_cells)
         sensor = request.box.sensor_type
         loaded = self.watch.loaded(sensor)
         changed = {} if loaded is None else loaded.changed
-        job = EstimateJob(request, self.watch.fit(sensor).model, self._day_length_s, changed)
-        tags = min(MAX_TAGS, self._store.size[0])
-        cost = cost_s(request, tags, self._max_grid_cells)
+        job = EstimateJob(request, self.watch.fit(sensor).model, self.day_length_s, changed)
+        tags = min(MAX_TAGS, self.store.size[0])
+        cost = cost_s(request, tags, self.max_grid_cells)
         return Task(job, now_ns, cost, self._look_up(request))
 
     def report(self, request: ReportRequest) -> Callable[[], Report]:
         """What makes the report, on a worker: working out places for other tags takes a while."""
-        sensor, now_ns = request.sensor_type, self._now_ns()
+        sensor, now_ns = request.sensor_type, self.now_ns()
         fit, loaded = self.watch.fit(sensor), self.watch.loaded(sensor)
         record = self.watch.record(sensor, now_ns)
         if loaded is None:
@@ -272,25 +265,14 @@ class EstimateService:
         max_places = request.max_places
         if max_places is None:
             return lambda: known
-        occupancy = self._occupancy()
-        key = (sensor, max_places)
-
-        def with_places() -> Report:
-            cached = self._advised.get(key)
-            if cached is None or cached[0] is not loaded or cached[1] is not occupancy:
-                cached = loaded, occupancy, advice(loaded, occupancy, max_places)
-                if len(self._advised) >= _MAX_ADVISED:
-                    self._advised.clear()
-                self._advised[key] = cached
-            return replace(known, places=cached[2])
-
-        return with_places
+        occupancy = self.occupancy()
+        return lambda: replace(known, places=advice(loaded, occupancy, max_places))
 
     def state(self) -> Estimates:
         """How they do, for the twin's diagnostics."""
         return Estimates(
             self.watch.problems(),
-            tuple(self.watch.distrusted(self._now_ns())),
+            tuple(self.watch.distrusted(self.now_ns())),
             self.watch.failed,
         )
 
@@ -313,7 +295,7 @@ class EstimateService:
                 task.cost_s,
             )
 
-        return answer_later(self._queue, prepare, partial(self._refusal, response))
+        return answer_later(self._queue, prepare, response, self.utilities.report)
 
     def _on_get_report(self, request: Any, response: Any) -> Any:
         def prepare(reply: Callable[[Any], None]) -> Query:
@@ -325,14 +307,11 @@ class EstimateService:
                 ADVICE_S,
             )
 
-        return answer_later(self._queue, prepare, partial(self._refusal, response))
-
-    def _refusal(self, response: Any, error: Exception) -> Any:
-        return refusal(response, error, self._utilities.report)
+        return answer_later(self._queue, prepare, response, self.utilities.report)
 
     def _look_up(self, request: EstimateRequest) -> Callable[[], Future[Any]]:
         sensor, at_ns = request.box.sensor_type, request.at_ns
-        tags = self._store.size[0]
+        tags = self.store.size[0]
         if not at_ns:
 
             def from_memory() -> Future[Sequence[TagPast]]:
@@ -343,10 +322,10 @@ class EstimateService:
         return self._from_journal(sensor, at_ns)
 
     def _from_journal(self, sensor: str, at_ns: int) -> Callable[[], Future[list[TagPast]]]:
-        reach_ns = int(self._day_length_s * NANOSECONDS_PER_SECOND)
-        tags = self._store.size[0]
+        reach_ns = int(self.day_length_s * NANOSECONDS_PER_SECOND)
+        tags = self.store.size[0]
         most = max(_MAX_READINGS, tags * MAX_PER_TAG)
-        return lambda: self._recall.query(
+        return lambda: self.recall.query(
             lambda connection, _: [
                 TagPast(tag_id, x, y, tuple(one for one in found if is_usable(one[1])))
                 for tag_id, x, y, found in recent_readings(

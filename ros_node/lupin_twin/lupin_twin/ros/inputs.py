@@ -11,6 +11,7 @@ import math
 import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -81,14 +82,6 @@ class Gaps:
         self.lost += lost
         return lost
 
-    def settle(self, writers: int) -> None:
-        """Note that of so many writers those without a message by now have published none yet."""
-        self._next[:0] = [1] * (writers - len(self._next))
-
-    def unsettle(self) -> None:
-        """Note that other writers are there than before: whoever is new may begin anywhere."""
-        self._next = [expected for expected in self._next if expected != 1]
-
 
 class Input:
     """Follows the messages and publishers of a topic; belongs to its node's thread."""
@@ -122,11 +115,8 @@ class Input:
         before, self._publishers = self._publishers, frozenset(_id(one) for one in publishers)
         if before != self._publishers:
             self._since_s = now_s
-            self.gaps.unsettle()
         unlike = [one for one in publishers if _faults(one)]
         has_settled = now_s - self._since_s >= SETTLED_S
-        if has_settled and not unlike:
-            self.gaps.settle(len(publishers))
         for one in unlike:
             why, remedies = zip(*_faults(one), strict=True)
             yield (
@@ -215,46 +205,41 @@ class TwinCount:
         return is_several
 
 
+@dataclass(slots=True)
 class OtherTwins:
     """Counts who publishes the topic `name`, the node's own state; subscribes where it is several.
 
     Its own states come too then; a dead twin, still in the graph, publishes nothing.
     """
 
-    def __init__(
-        self,
-        node: Node,
-        utilities: Any,
-        count: TwinCount,
-        name: str,
-        *,
-        group: Any,
-    ) -> None:
-        self._node, self._utilities, self._count = node, utilities, count
-        self._name, self._group = name, group
-        self._subscription: Any = None
+    node: Node
+    utilities: Any
+    count: TwinCount
+    name: str
+    group: Any
+    _subscription: Any = None
 
     def check(self, topic: str) -> None:
         """Count who publishes it; `topic` is the name as ROS has resolved it."""
-        publishers = int(self._node.count_publishers(topic))
+        publishers = int(self.node.count_publishers(topic))
         self._subscribe(publishers > 1)
-        if self._count.see(publishers):
-            self._utilities.warn(
+        if self.count.see(publishers):
+            self.utilities.warn(
                 ("twins", 0),
-                f"{self._count.value} nodes publish {topic}: consumers get a mixture; "
+                f"{self.count.value} nodes publish {topic}: consumers get a mixture; "
                 "stop all twins but one, or give them ROS domains of their own",
             )
 
     def _subscribe(self, wanted: bool) -> None:
         if wanted and self._subscription is None:
-            self._subscription = self._node.create_subscription(
+            self._subscription = self.node.create_subscription(
                 TwinState,
-                self._name,
-                lambda _, info: self._count.add(int(info["publication_sequence_number"])),
+                self.name,
+                lambda _, info: self.count.add(int(info["publication_sequence_number"])),
                 QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE),
-                callback_group=self._group,
+                callback_group=self.group,
                 raw=True,
             )
         elif not wanted and self._subscription is not None:
-            self._node.destroy_subscription(self._subscription)
+            self.node.destroy_subscription(self._subscription)
             self._subscription = None

@@ -23,16 +23,23 @@ from lupin_twin.core.diagnostics import Layers
 from lupin_twin.core.interfaces import LAYERS, PLANTERS, TAGS
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot, TwinStore
 from lupin_twin.estimate.engine import MINUTES_A_DAY, EstimateRequest, TagPast
-from lupin_twin.field.engine import FieldEngine, FieldJob, FieldRefused, FieldRequest
+from lupin_twin.field.engine import (
+    FieldEngine,
+    FieldJob,
+    FieldRefused,
+    FieldRequest,
+    default_box,
+    default_request,
+)
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.field.idw import Abandoned
 from lupin_twin.ros.base_node import NodeUtilities, qos_of
 from lupin_twin.ros.estimate_service import EstimateService, Task
 from lupin_twin.ros.layers import (
+    MAX_POINTS,
     MarkerArrays,
     cloud,
-    layer_request,
     planter_markers,
     planter_marks,
     points,
@@ -90,7 +97,7 @@ class _Marked:
     arrays: MarkerArrays
     before: Sequence[Any] | None = None
 
-    def make(self, snapshot: Snapshot) -> _Made:
+    def make(self, snapshot: Snapshot, *_: object) -> _Made:
         """The array, if it is another than the one before."""
         marks = self.marks(snapshot)
         if marks == self.before:
@@ -182,14 +189,12 @@ class LayerService:
             self._refuse(topic, error)
             return
         topic.is_under_way = True
-        search, make = plan
+        search, make = plan[0] or _nothing, plan[1]
 
         def made(found: Any) -> _Made:
             return make(found, lambda: not topic.is_wanted)
 
-        self._queue.ask(
-            Query(search or self._nothing, partial(self._publish, topic), made, _COST_S)
-        )
+        self._queue.ask(Query(search, partial(self._publish, topic), made, _COST_S))
 
     def _publish(self, topic: _Topic, made: _Made | Exception) -> None:
         topic.is_under_way = False
@@ -253,18 +258,13 @@ class LayerService:
         key = self.store.observation_count, rules
         if self._whole is None or self._whole[0] != key:
             places = ((tag.pose.x, tag.pose.y) for tag in snapshot.tags if tag.pose is not None)
-            whole = layer_request(sensor, places, rules.max_distance_m, rules.max_grid_cells)
-            self._whole = key, whole
+            box = default_box(places, rules.max_distance_m)
+            most = min(rules.max_grid_cells, MAX_POINTS)
+            self._whole = key, default_request(sensor, box, most)
         return replace(self._whole[1], sensor_type=sensor)
 
     def _plan_marks(self, marked: _Marked) -> _Plan:
-        snapshot = self.snapshot()
-        return None, lambda _, __: marked.make(snapshot)
-
-    def _nothing(self) -> Future[Any]:
-        nothing: Future[Any] = Future()
-        nothing.set_result(None)
-        return nothing
+        return None, partial(marked.make, self.snapshot())
 
     # --- the node's -------------------------------------------------------------------------
 
@@ -285,3 +285,9 @@ class LayerService:
         for topic in self._topics:
             topic.is_wanted = False
         self._workers.close()
+
+
+def _nothing() -> Future[Any]:
+    nothing: Future[Any] = Future()
+    nothing.set_result(None)
+    return nothing

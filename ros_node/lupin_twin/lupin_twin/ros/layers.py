@@ -26,7 +26,6 @@ from lupin_twin.core.interfaces import LAYERS_BELOW
 from lupin_twin.core.parameters import ParameterError
 from lupin_twin.core.state import STATUS_OK, Snapshot, TagState
 from lupin_twin.estimate import EstimateGrid
-from lupin_twin.field.engine import FieldRequest, default_box, default_request
 from lupin_twin.field.grid import FieldGrid, cell_centres
 from lupin_twin.ros.convert import time_msg
 from lupin_twin.runtime.workers import in_turns
@@ -132,20 +131,6 @@ def topics_of(sensors: Iterable[str]) -> dict[str, str]:
             )
         named[topic] = sensor
     return named
-
-
-def layer_request(
-    sensor: str,
-    positions: Iterable[tuple[float, float]],
-    max_distance_m: float,
-    max_grid_cells: int,
-) -> FieldRequest:
-    """The field of a whole site: the box of the tags' `positions`, and all that they can paint.
-
-    Cells are as `default_request` has them, and not more than `MAX_POINTS`.
-    """
-    box = default_box(positions, max_distance_m)
-    return default_request(sensor, box, min(max_grid_cells, MAX_POINTS))
 
 
 def points(grid: FieldGrid, estimate: EstimateGrid | None) -> PointArray:

@@ -13,31 +13,31 @@ from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticArray
 from lupin_msgs.msg import TwinState, TwinTimes
-from lupin_msgs.srv import GetField
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from lupin_twin.core import ingest, interfaces
-from lupin_twin.core.clock import CLOCK_TEXTS, LATCHED_AFTER_S, ClockWatch, Lateness
-from lupin_twin.core.diagnostics import Health, Origin, findings, origin_of
+from lupin_twin.core.clock import LATCHED_AFTER_S, ClockWatch, Lateness
+from lupin_twin.core.diagnostics import CLOCK, ERROR, Health, Origin, findings, origin_of
 from lupin_twin.core.drops import Drop, Reason
 from lupin_twin.core.history import History, TagHistory, kind_of
 from lupin_twin.core.parameters import ParameterError, TwinParameters, World
 from lupin_twin.core.state import ClockState, Inspection, Scan, Snapshot, TwinStore
-from lupin_twin.field.engine import FieldCache, FieldEngine, FieldJob, FieldRules
+from lupin_twin.field.engine import FieldCache, FieldEngine, FieldRules
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.runs import Clock as RunClock
-from lupin_twin.ros import convert, convert_field, message_limits
-from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities, qos_of, waker
+from lupin_twin.ros import convert, message_limits
+from lupin_twin.ros.base_node import NodeUtilities, qos_of, waker
 from lupin_twin.ros.convert import diagnostics
 from lupin_twin.ros.estimate_service import EstimateService
+from lupin_twin.ros.field_service import FieldService
 from lupin_twin.ros.inputs import OtherTwins, TwinCount
 from lupin_twin.ros.layer_service import LAYERS_PERIOD_S, LayerService
 from lupin_twin.ros.parameters import AdjustableNode, declare, naming, naming_own_parameters
 from lupin_twin.ros.past_service import PastService
-from lupin_twin.ros.responses import RETRY_S, Responses, answer_later, refusal
+from lupin_twin.ros.responses import RETRY_S, Responses
 from lupin_twin.runtime.memory import Memory, journal_path, open_journal
-from lupin_twin.runtime.workers import LARGE_THREADS, JobQueue, Query, Workers
+from lupin_twin.runtime.workers import LARGE_THREADS, JobQueue, Workers
 
 NODE_NAME: Final = "lupin_twin"
 # How often ROS time is checked, s, however rarely the state is published.
@@ -90,7 +90,14 @@ class TwinNode(AdjustableNode):
             self.utilities.guarded("an answer", self._deliver), self._group
         )
         wake = waker(done)
-        self._field_queue = JobQueue(self._workers, wake, large_at_once=LARGE_THREADS)
+        self._field_service = FieldService(
+            self.utilities,
+            self._workers,
+            JobQueue(self._workers, wake, large_at_once=LARGE_THREADS),
+            self.fields,
+            self.store,
+            lambda: self.occupancy_map,
+        )
         self._past_queue = JobQueue(self._workers, wake, lambda: self.utilities.is_behind)
         self.estimates = EstimateService(
             self.utilities,
@@ -149,7 +156,7 @@ class TwinNode(AdjustableNode):
 
     def history_of(self, tag_id: str) -> TagHistory | None:
         """The last scans and attempts of a tag; None: no such tag."""
-        return self.history.of(tag_id) if self.store.knows(tag_id) else None
+        return self.history.of(tag_id) if self.store.tag(tag_id) else None
 
     # --- set-up -----------------------------------------------------------------------------
 
@@ -184,16 +191,14 @@ class TwinNode(AdjustableNode):
         with naming("state_topic", p.state_topic):
             self._state_publisher = self.create_publisher(TwinState, p.state_topic, qos_of(state))
         self._times_publisher = self.create_publisher(TwinTimes, times.name, qos_of(times))
-        kind, name, answer = GetField, p.field_service_name, self._on_get_field
-        with naming("field_service_name", name):
-            self.create_service(kind, name, answer, qos_profile=SERVICE_QOS, callback_group=group)
+        self._field_service.offer(self, p.field_service_name, group)
         PastService(
             self.utilities,
             self._past_queue,
             self.memory.recall,
             self.store,
-            now_ns=self.now_ns,
-            frame_id=p.frame_id,
+            self.now_ns,
+            p.frame_id,
         ).offer(self, group)
         self.estimates.offer(self, group)
         self.layers.offer(self, p.layers, p.frame_id)
@@ -285,40 +290,9 @@ class TwinNode(AdjustableNode):
         self._map_revision += 1
         self.notify_listeners()
 
-    def _on_get_field(self, request: Any, response: Any) -> Any:
-        def refused(error: Exception) -> Any:
-            return refusal(response, error, self.report)
-
-        try:
-            found = self.fields.lookup(
-                convert_field.field_request_of(request), self.store, self.occupancy_map
-            )
-        except Exception as error:  # noqa: BLE001  # no client waits for ever
-            return refused(error)
-        if not isinstance(found, FieldJob):
-            return convert_field.fill_response(response, found)
-        job = found
-
-        def prepare(reply: Callable[[Any], None]) -> Query:
-            def keep(grid: Any) -> None:
-                if not isinstance(grid, Exception):
-                    self.fields.keep(job, grid)
-                    grid = convert_field.fill_response(response, grid)
-                reply(grid)
-
-            # Longer than a tick, perhaps: not on this thread, where messages wait.
-            return Query(
-                lambda: self._workers.submit(job.compute, job.cost_s),
-                keep,
-                cost_s=job.cost_s,
-                key=job.key,
-            )
-
-        return answer_later(self._field_queue, prepare, refused)
-
     def _deliver(self) -> None:
         self.utilities.drain()
-        self._field_queue.deliver()
+        self._field_service.queue.deliver()
         self._past_queue.deliver()
         self.estimates.deliver()
         self.layers.deliver()
@@ -342,9 +316,9 @@ class TwinNode(AdjustableNode):
             late=self.lateness.counts,
             twins=self.twins.value,
             state_topic=self._state_publisher.topic_name,
-            fields_computing=self._field_queue.waiting,
-            fields_computed=self._field_queue.answered,
-            slowest_field_s=self._field_queue.slowest_s,
+            fields_computing=self._field_service.queue.waiting,
+            fields_computed=self._field_service.queue.answered,
+            slowest_field_s=self._field_service.queue.slowest_s,
             estimates=self.estimates.state(),
             layers=self.layers.state(),
             origin=self.origin,
@@ -406,11 +380,12 @@ class TwinNode(AdjustableNode):
         state = watch.update(now_ns, time.monotonic(), is_simulated=is_simulated)
         if state != self._clock_reported:
             self._clock_reported = state
+            level, text = CLOCK[state]
             # Two lines: rclpy lets one line log at one level only.
-            if state in ("none", "stopped"):
-                self.get_logger().warning(CLOCK_TEXTS[state])
+            if level == ERROR:
+                self.get_logger().warning(text)
             else:
-                self.get_logger().info(CLOCK_TEXTS[state])
+                self.get_logger().info(text)
         # Only while it stands: a simulator that runs may publish the time a thousand times a
         # second.
         if watch.should_subscribe and self._clock_subscription is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Final
 
 from lupin_msgs.srv import GetHistory, GetStateAt, GetWrites
@@ -17,7 +18,7 @@ from lupin_twin.journal.follow import WRITES_S, writes
 from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG, series
 from lupin_twin.ros import convert, convert_past
 from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities
-from lupin_twin.ros.responses import answer_later, refusal
+from lupin_twin.ros.responses import answer_later
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import SMALL_S, JobQueue, Query
 
@@ -26,6 +27,7 @@ MESSAGE_S: Final = SMALL_S
 EVERY_TAG_S: Final = 1.0
 
 
+@dataclass(frozen=True, slots=True)
 class PastService:
     """The services of one node; belongs to its thread.
 
@@ -33,22 +35,12 @@ class PastService:
     state may be is estimated by the `store`, that of now.
     """
 
-    def __init__(
-        self,
-        utilities: NodeUtilities,
-        queue: JobQueue,
-        recall: Recall,
-        store: TwinStore,
-        *,
-        now_ns: Callable[[], int],
-        frame_id: str,
-    ) -> None:
-        self._utilities = utilities
-        self._queue = queue
-        self._recall = recall
-        self._store = store
-        self._now_ns = now_ns
-        self._frame_id = frame_id
+    utilities: NodeUtilities
+    queue: JobQueue
+    recall: Recall
+    store: TwinStore
+    now_ns: Callable[[], int]
+    frame_id: str
 
     def offer(self, node: Any, group: Any) -> None:
         """Have `node` offer the services, by names relative to its namespace; some answer later."""
@@ -62,10 +54,10 @@ class PastService:
     def _on_get_state_at(self, request: Any, response: Any) -> Any:
         def check() -> Callable[[sqlite3.Connection], Any]:
             at_ns = convert.nanoseconds(request.at)
-            check_moment(at_ns, self._now_ns())
-            return lambda connection: state_at(connection, at_ns, self._frame_id)
+            check_moment(at_ns, self.now_ns())
+            return lambda connection: state_at(connection, at_ns, self.frame_id)
 
-        tags, items = self._store.size
+        tags, items = self.store.size
         return self._ask(
             response,
             check,
@@ -76,10 +68,10 @@ class PastService:
 
     def _on_get_history(self, request: Any, response: Any) -> Any:
         def check() -> Callable[[sqlite3.Connection], Any]:
-            query, now_ns = convert_past.series_request(request), self._now_ns()
+            query, now_ns = convert_past.series_request(request), self.now_ns()
             return lambda connection: series(connection, query, now_ns)
 
-        tags = self._store.size[0] if request.tag_id == EVERY_TAG else 0
+        tags = self.store.size[0] if request.tag_id == EVERY_TAG else 0
         search_s = SERIES_S + tags * SERIES_S_PER_TAG
         make_s = EVERY_TAG_S if request.tag_id == EVERY_TAG else MESSAGE_S
         return self._ask(response, check, search_s, convert_past.series_response, make_s)
@@ -105,14 +97,10 @@ class PastService:
         def prepare(reply: Callable[[Any], None]) -> Query:
             search = check()
             return Query(
-                lambda: self._recall.query(lambda connection, _: search(connection), search_s),
+                lambda: self.recall.query(lambda connection, _: search(connection), search_s),
                 reply,
                 make,
                 make_s,
             )
 
-        return answer_later(
-            self._queue,
-            prepare,
-            lambda error: refusal(response, error, self._utilities.report),
-        )
+        return answer_later(self.queue, prepare, response, self.utilities.report)

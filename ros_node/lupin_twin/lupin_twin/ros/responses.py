@@ -29,10 +29,9 @@ PATIENCE_S: Final = 30.0
 # Responses that are retained; what took longer to try, s, needs too much memory (60 MB took 0.5 s).
 MAX_UNSENT: Final = 8
 MAX_ATTEMPT_S: Final = 0.5
-# A failed attempt blocks the node's thread: then none for so many times as long.
-_REST: Final = 4.0
 
 Send = Callable[[Any, Any], None]
+Report = Callable[[str, Exception], None]
 
 
 class Later:
@@ -59,26 +58,27 @@ class Later:
 def answer_later(
     queue: JobQueue,
     prepare: Callable[[Callable[[Any], None]], Query],
-    refused: Callable[[Exception], Any],
+    response: Any,
+    report: Report,
 ) -> Any:
-    """What a service's callback returns: the response to come of a query, or a refusal.
+    """What a service's callback returns: the response to come of a query, or a `refusal`.
 
-    `prepare(reply)` makes the query, or raises; `refused(error)` makes the response that says why
-    there is no answer, so that no client waits for ever.
+    `prepare(reply)` makes the query, or raises.
     """
     later = Later()
 
     def reply(answer: Any) -> None:
-        later.answer(refused(answer) if isinstance(answer, Exception) else answer)
+        is_error = isinstance(answer, Exception)
+        later.answer(refusal(response, answer, report) if is_error else answer)
 
     try:
         queue.ask(prepare(reply))
-    except Exception as error:  # noqa: BLE001  # see above
-        return refused(error)
+    except Exception as error:  # noqa: BLE001  # no client waits for ever
+        return refusal(response, error, report)
     return later
 
 
-def refusal(response: Any, error: Exception, report: Callable[[str, Exception], None]) -> Any:
+def refusal(response: Any, error: Exception, report: Report) -> Any:
     """A fresh response of the same type, empty but for why; what nobody expected is reported."""
     if isinstance(error, FieldRefused):
         return type(response)(error_message=str(error))
@@ -108,7 +108,6 @@ class Responses:
         self._warn = warn
         self._drain = drain
         self._unsent: deque[_Unsent] = deque()  # the first is tried next
-        self._rests_until_s = 0.0
         warnings.filterwarnings("error", re.escape(UNSENT), RuntimeWarning)
 
     def __len__(self) -> int:
@@ -137,16 +136,14 @@ class Responses:
     def go_on(self) -> None:
         """Try again until an attempt fails; to be called every `RETRY_S`.
 
-        The newest first, and what failed goes to the end: one that can be sent does not wait long
-        behind others that never will be.
+        An attempt that fails blocks the node's thread for 0.1 s. The newest first, and what failed
+        goes to the end: one that can be sent does not wait long behind others that never will be.
         """
-        while self._unsent and time.monotonic() >= self._rests_until_s:
-            one, began_s = self._unsent.popleft(), time.monotonic()
-            if began_s - one.since_s >= PATIENCE_S:
+        while self._unsent:
+            one = self._unsent.popleft()
+            if time.monotonic() - one.since_s >= PATIENCE_S:
                 self._give_up(one, f"for {PATIENCE_S:g} s DDS has found no reader for it")
             elif not _was_sent(one.send, one.response, one.header):
-                now_s = time.monotonic()
-                self._rests_until_s = now_s + _REST * (now_s - began_s)
                 self._unsent.append(one)
                 self._drain()
                 return

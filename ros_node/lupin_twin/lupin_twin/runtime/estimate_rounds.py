@@ -26,11 +26,11 @@ from lupin_twin.runtime.workers import in_turns
 
 # With fewer readings there is little to learn: each answer is fitted by itself.
 FIRST_FIT: Final = 10
-# A model is fitted anew as often, s, where anything was received since, and where this much was.
+# A sensor's round comes as often, s, where anything was received since: tags are scanned minutes
+# apart. A model is fitted anew as often. Both come at once where half as much again was received.
+ROUND_REST_S: Final = 30.0
 FIT_PERIOD_S: Final = 300.0
 GROWN: Final = 1.5
-# A round of a sensor comes as often at most, s: tags are scanned minutes apart.
-ROUND_REST_S: Final = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,18 +168,23 @@ class Fit:
 class _Sensor:
     grades: Grades
     count: int = 0
+    count_of_round: int = 0
     fitted_count: int = 0
     fitted_s: float = -math.inf
     rested_s: float = -math.inf
     fit: Fit = Fit()
     received: dict[str, int] = field(default_factory=dict)
-    is_stale: bool = True
     loaded: Loaded | None = None
 
+    def needs_round(self, now_s: float) -> bool:
+        if self.count < FIRST_FIT or self.count == self.count_of_round:
+            return False
+        has_grown = self.count >= GROWN * self.count_of_round
+        return has_grown or now_s - self.rested_s >= ROUND_REST_S
+
     def needs_fit(self, now_s: float) -> bool:
-        since_s = now_s - self.fitted_s
-        is_new = self.count > self.fitted_count
-        return is_new and (since_s >= FIT_PERIOD_S or self.count >= GROWN * self.fitted_count)
+        has_grown = self.count >= GROWN * self.fitted_count
+        return has_grown or now_s - self.fitted_s >= FIT_PERIOD_S
 
 
 class Watch:
@@ -203,7 +208,6 @@ class Watch:
                 continue
             one = self._sensors.setdefault(reading.name, _Sensor(Grades(self._day_length_s)))
             one.count += 1
-            one.is_stale = True
             is_enough = is_enough or one.count == FIRST_FIT
             if is_new and one.fit.model is not None:
                 one.received[scan.tag_id] = max(one.received.get(scan.tag_id, 0), scan.stamp_ns)
@@ -214,9 +218,7 @@ class Watch:
         if self._running is not None:
             return None
         waiting = [
-            (one.rested_s, name)
-            for name, one in self._sensors.items()
-            if one.count >= FIRST_FIT and one.is_stale and now_s - one.rested_s >= ROUND_REST_S
+            (one.rested_s, name) for name, one in self._sensors.items() if one.needs_round(now_s)
         ]
         if not waiting:
             return None
@@ -230,7 +232,7 @@ class Watch:
         """It has begun."""
         self._running = round_.sensor
         one = self._sensors[round_.sensor]
-        one.is_stale, one.received = False, {}
+        one.count_of_round, one.received = one.count, {}
         if round_.model is None:
             one.fitted_s, one.fitted_count = now_s, one.count
 

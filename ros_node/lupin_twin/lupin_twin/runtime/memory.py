@@ -215,11 +215,10 @@ class Memory:
         if write.pose is not None:
             # A place belongs to the moment of the scan that brought it, as its readings do.
             stamp_ns = now_ns if isinstance(write, Pin) else write.stamp_ns
-            pose = self._store.pose_of(write.tag_id)
-            placed_ns = self._placed_ns.get(write.tag_id)
-            if pose is not None and (placed_ns is None or stamp_ns < placed_ns):
+            tag, placed_ns = self._store.tag(write.tag_id), self._placed_ns.get(write.tag_id)
+            if tag and tag.pose and (placed_ns is None or stamp_ns < placed_ns):
                 self._placed_ns[write.tag_id] = stamp_ns
-                self._journal.write(PinRow(write.tag_id, stamp_ns, arrival_ns, pose), now_ns)
+                self._journal.write(PinRow(write.tag_id, stamp_ns, arrival_ns, tag.pose), now_ns)
         if not isinstance(write, Pin):
             self._journal.write(_row(write, arrival_ns, mission[:MAX_TEXT_LENGTH]), now_ns)
 

@@ -15,7 +15,7 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Hashable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
@@ -211,15 +211,13 @@ class Query:
     """What is looked up, what is made of the result, and who gets it.
 
     `look_up` begins the search; `make`, if there is one, is called on a worker with its result, as
-    `cost_s` estimates, s of one core. `reply` gets the answer, or the exception. Queries of one
-    `key` that are under way at the same time share one search.
+    `cost_s` estimates, s of one core. `reply` gets the answer, or the exception.
     """
 
     look_up: Callable[[], Future[Any]]
     reply: Callable[[Any], None]
     make: Callable[[Any], Any] | None = None
     cost_s: float = 0.0
-    key: Hashable = None
 
 
 class JobQueue:
@@ -247,12 +245,11 @@ class JobQueue:
         self._is_behind = is_behind
         self._clock = clock
         self._lanes = (_Lane(SMALL_AT_ONCE), _Lane(large_at_once))
-        self._under_way: dict[Hashable, _Waiting] = {}
         self._done: SimpleQueue[tuple[_Waiting, Any]] = SimpleQueue()
 
     @property
     def waiting(self) -> int:
-        """Queries whose answer has not been delivered yet; those of one key count once."""
+        """Queries whose answer has not been delivered yet."""
         return sum(len(lane.waiting) + lane.under_way for lane in self._lanes)
 
     def ask(self, query: Query) -> None:
@@ -262,19 +259,12 @@ class JobQueue:
             NotRemembered: too many wait.
 
         """
-        shared = self._under_way.get(query.key)
-        if shared is not None:
-            shared.replies.append(query.reply)
-            return
         if self.waiting >= MAX_QUERIES:
             raise NotRemembered(
                 f"{MAX_QUERIES} requests wait, which is the limit", is_lasting=False
             )
-        waiting = _Waiting(query, [query.reply], time.monotonic())
-        if query.key is not None:
-            self._under_way[query.key] = waiting
         lane = self._lane(query)
-        lane.waiting.append(waiting)
+        lane.waiting.append(_Waiting(query, time.monotonic()))
         self._begin(lane)
 
     def go_on(self) -> None:
@@ -296,10 +286,8 @@ class JobQueue:
         if not isinstance(answer, Exception):
             self.answered += 1
             self.slowest_s = max(self.slowest_s, time.monotonic() - waiting.since_s)
-        self._under_way.pop(waiting.query.key, None)
         try:
-            for reply in waiting.replies:
-                reply(answer)
+            waiting.query.reply(answer)
         finally:
             lane = self._lane(waiting.query)
             lane.under_way -= 1
@@ -353,7 +341,6 @@ class JobQueue:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Waiting:
     query: Query
-    replies: list[Callable[[Any], None]]
     since_s: float
 
 

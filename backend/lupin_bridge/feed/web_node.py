@@ -19,7 +19,6 @@ from lupin_msgs.srv import (
 )
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 
-from lupin_bridge.feed.pairing import Pairing
 from lupin_twin.core import ingest, interfaces
 from lupin_twin.core.clock import StampWatch
 from lupin_twin.core.diagnostics import Origin, SelfReport, self_report
@@ -141,7 +140,9 @@ class WebNode(AdjustableNode):
         self._on_state = on_state
         self._on_map = on_map
         self._newest: Snapshot | None = None
-        self._pairing = Pairing()
+        # What came last of each: they belong together where their stamps are the same.
+        self._state: Any = None
+        self._times: Any = None
         self._stamp_watch = StampWatch()
         self._report = SelfReport()
         self._reported_s = -math.inf
@@ -264,23 +265,31 @@ class WebNode(AdjustableNode):
     # --- callbacks ----------------------------------------------------------------------------
 
     def _take_state(self, msg: Any) -> None:
-        times = self._pairing.take_state(convert.nanoseconds(msg.header.stamp), msg)
-        if times is not None:
-            self._show(msg, times)
-        elif not self.count_publishers(self._topics["times"]):
+        self._state = msg
+        if self._show_pair():
+            return
+        if not self.count_publishers(self._topics["times"]):
             self._show_without_times()
         elif self._patience.is_canceled():
             self._patience.reset()
 
     def _take_times(self, msg: Any) -> None:
-        state = self._pairing.take_times(convert.nanoseconds(msg.header.stamp), msg)
-        if state is not None:
-            self._show(state, msg)
+        self._times = msg
+        self._show_pair()
+
+    def _show_pair(self) -> bool:
+        """Show the state with its times, once both are here: two topics keep no order."""
+        state, times = self._state, self._times
+        if state is None or times is None or state.header.stamp != times.header.stamp:
+            return False
+        self._state = self._times = None
+        self._show(state, times)
+        return True
 
     def _show_without_times(self) -> None:
-        state = self._pairing.give_up_waiting()
-        if state is not None:
-            self._show(state, None)
+        # They may still come.
+        if self._state is not None:
+            self._show(self._state, None)
 
     def _show(self, msg: Any, times: Any) -> None:
         self._patience.cancel()

@@ -96,7 +96,6 @@ class Fleet:
     async def start(self) -> None:
         """Begin to watch the archive."""
         self.watching.start()
-        self.past.start()
         self._tidying = asyncio.create_task(self._tidy(), name="tidy")
 
     async def stop(self) -> None:

@@ -49,13 +49,13 @@ def test_a_state_as_of_then_is_the_journals(domain: int, stage_of: Callable[...,
 
             now_ns = await stage.twin.thread.call(take)
             await until(lambda: stage.twin.journal().written == 2, "both in the journal")
-            past = await stage.twin.state_at(now_ns - 5)
+            past = await stage.twin.ask(Itself(now_ns - 5), 0.0)
             assert past.stamp_ns == now_ns - 5
             assert past.frame_id == "map"
             assert past.tags[0].readings == (Reading("co2", 400.0, now_ns - 9),)
-            (tag,) = (await stage.twin.state_at(now_ns - 1)).tags
+            (tag,) = (await stage.twin.ask(Itself(now_ns - 1), 0.0)).tags
             assert tag == stage.told[-1].snapshot.tags[0]
-            assert (await stage.twin.state_at(0)).tags == ()
+            assert (await stage.twin.ask(Itself(0), 0.0)).tags == ()
 
     run(domain, test())
 
@@ -73,9 +73,11 @@ def test_series_and_rows_are_the_journals(domain: int, stage_of: Callable[..., A
 
             await twin.thread.call(take)
             await until(lambda: twin.journal().written == 20, "all in the journal")
-            past = await twin.series(SeriesRequest("1", "co2"))
+            past = await twin.ask(Itself(SeriesRequest("1", "co2")), 0.0)
             assert past.means == values
-            assert (await twin.series(SeriesRequest(EVERY_TAG, Event.SCANS))).means == (1.0,) * 20
+            assert (await twin.ask(Itself(SeriesRequest(EVERY_TAG, Event.SCANS)), 0.0)).means == (
+                1.0,
+            ) * 20
             lots = [lot async for lot in twin.rows(0, past.end_ns, "1", "co2", list)]
             assert tuple(row.value for lot in lots for row in lot) == values
 
@@ -115,13 +117,13 @@ def test_the_future_is_refused(domain: int, stage_of: Callable[..., Any]) -> Non
     async def test() -> None:
         async with stage_of(*SILENT) as stage:
             now_ns = stage.twin.update.snapshot.stamp_ns
-            assert (await stage.twin.state_at(now_ns)).stamp_ns == now_ns
+            assert (await stage.twin.ask(Itself(now_ns), 0.0)).stamp_ns == now_ns
             # Time goes on between two heartbeats.
             between_ns = stage.twin.now_ns
-            assert (await stage.twin.state_at(between_ns)).stamp_ns == between_ns > now_ns
+            assert (await stage.twin.ask(Itself(between_ns), 0.0)).stamp_ns == between_ns > now_ns
             later_ns = now_ns + 3600 * 10**9
             with pytest.raises(PastRefused, match=f"at is {seconds(later_ns)} s, later than now"):
-                await stage.twin.state_at(later_ns)
+                await stage.twin.ask(Itself(later_ns), 0.0)
 
     run(domain, test())
 
@@ -143,7 +145,7 @@ def test_a_journal_that_is_off_remembers_for_as_long_as_the_twin_lives(
             await until(lambda: stage.twin.journal().written, "the scan")
             # The source's clock goes on from its last update, a moment behind the node's.
             await until(lambda: stage.twin.now_ns >= at_ns, "the moment of the scan")
-            [tag] = (await stage.twin.state_at(at_ns)).tags
+            [tag] = (await stage.twin.ask(Itself(at_ns), 0.0)).tags
             assert tag.readings[0].value == 400.0
             assert folder.exists()
         assert not folder.exists()
@@ -159,7 +161,7 @@ def test_an_answer_that_takes_too_long_ends_and_delays_no_observation(
     async def test() -> None:
         async with stage_of() as stage:
             await until(lambda: stage.twin.journal().state == "recording", "the journal")
-            await stage.twin.past.ask(Itself(0), stage.twin.now(), 0.0)
+            await stage.twin.past.ask(Itself(0), await stage.twin.now(), 0.0)
             waiting = asyncio.create_task(stage.twin.ask(Endless(), 0.0))
             await until(lambda: len(stage.twin.past.asked) == 1, "the question")
             await stage.record("1", 400.0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -18,7 +17,6 @@ from lupin_bridge.feed.query import Itself
 from lupin_bridge.feed.source import (
     STUCK_AFTER_S,
     TwinSource,
-    TwinTimeoutError,
     TwinUnavailableError,
     TwinUpdate,
     ailment,
@@ -37,29 +35,7 @@ from tests.support.store import S
 from tests.support.waiting import PATIENCE_S, until, until_answered
 
 SOURCES = [LocalTwin, WebTwin]
-MEMBERS = [name for name in vars(TwinSource) if not name.startswith("_")]
 REQUEST = FieldRequest("co2", 0.5, 0.0, 0.0, 3.0, 1.0)
-
-
-@pytest.mark.parametrize("source", SOURCES)
-@pytest.mark.parametrize("name", MEMBERS)
-def test_a_member_is_as_the_protocol_has_it(source: type, name: str) -> None:
-    declared, made = vars(TwinSource)[name], inspect.getattr_static(source, name)
-    assert type(made) is type(declared)
-    if isinstance(declared, property):
-        declared, made = declared.fget, made.fget
-    assert inspect.signature(made) == inspect.signature(declared)
-    assert inspect.iscoroutinefunction(made) == inspect.iscoroutinefunction(declared)
-    assert made.__doc__
-
-
-def test_a_time_out_is_a_kind_of_not_being_there() -> None:
-    assert issubclass(TwinTimeoutError, TwinUnavailableError)
-
-
-def test_when_a_state_was_made_is_no_part_of_what_it_is() -> None:
-    first = TwinUpdate(snapshot=None, revision="r", made_s=1.0)  # type: ignore[arg-type]
-    assert first == TwinUpdate(snapshot=None, revision="r", made_s=2.0)  # type: ignore[arg-type]
 
 
 class Stage:
@@ -205,13 +181,14 @@ def test_a_source_tells_of_the_past(domain: int, source_type: type) -> None:
             # The last of them is kept.
             failures = SeriesRequest("*", "~failures", 1, 100 * S)
             failed = await until_answered(
-                lambda: source.series(failures), "the failure", lambda it: it.stamps_ns
+                lambda: source.ask(Itself(failures), 0.0), "the failure", lambda it: it.stamps_ns
             )
-            past = await source.series(co2)
+            past = await source.ask(Itself(co2), 0.0)
             assert (past.means, past.start_ns) == ((400.0, 500.0), 5 * S)
             await until(lambda: stage.told[-1].snapshot.stamp_ns >= past.end_ns - 1, "time to pass")
             assert (failed.stamps_ns, failed.means, failed.bucket_ns) == ((60 * S,), (2.0,), None)
-            counted = await source.series(replace(co2, start_ns=5 * S, end_ns=65 * S, max_points=1))
+            few = replace(co2, start_ns=5 * S, end_ns=65 * S, max_points=1)
+            counted = await source.ask(Itself(few), 0.0)
             assert (counted.counts, counted.bucket_ns) == ((2,), 60 * S)
 
             then = await source.ask(Itself(49 * S), 0.0)
@@ -264,10 +241,12 @@ def test_a_journal_that_is_off_can_be_asked_too(domain: int, source_type: type) 
                 "both",
             )
             past = await until_answered(
-                lambda: source.series(SeriesRequest("1", "co2")), "it", lambda it: it.stamps_ns
+                lambda: source.ask(Itself(SeriesRequest("1", "co2")), 0.0),
+                "it",
+                lambda it: it.stamps_ns,
             )
             assert (past.stamps_ns, past.means) == ((5 * S,), (400.0,))
-            scans = await source.series(SeriesRequest("*", "~scans", 1, 100 * S))
+            scans = await source.ask(Itself(SeriesRequest("*", "~scans", 1, 100 * S)), 0.0)
             assert scans.stamps_ns == (5 * S,)
             [tag] = (await source.ask(Itself(5 * S), 0.0)).tags
             assert tag.readings[0].value == 400.0

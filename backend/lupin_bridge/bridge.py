@@ -25,7 +25,8 @@ from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.messages import GreenhouseState
 from lupin_bridge.past.plans import Answered
 from lupin_bridge.past.recent_scans import learn_recent
-from lupin_bridge.serving.admission import Admission, Answer, AnswerCache, Limits, RateLimit
+from lupin_bridge.rate_limit import RateLimit
+from lupin_bridge.serving.admission import Admission, Answer, AnswerCache, Limits
 from lupin_bridge.serving.middleware import Shutdown, route_class
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import FrameWriter, text_frame

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.serving.admission import RateLimit, client_key
+from lupin_bridge.rate_limit import RateLimit
+from lupin_bridge.serving.admission import client_key
 
 
 def taken(limit: RateLimit, client: str, now_s: float, tries: int) -> int:
@@ -51,7 +52,7 @@ def test_clients_do_not_use_up_each_others_turns() -> None:
 
 
 def test_the_table_is_bounded_and_the_least_recently_active_leaves_first() -> None:
-    limit = RateLimit(rate_hz=0.001, burst=1.0, max_clients=3)
+    limit = RateLimit(rate_hz=0.001, burst=1.0, max_keys=3)
     for client in ("a", "b", "c", "d", "e"):
         assert limit.take(client, 0.0) == 0.0
     assert len(limit) == 3

@@ -25,7 +25,6 @@ from lupin_bridge.feed.query import Now, Question, Work
 from lupin_twin.core.journal_condition import UNKNOWN
 from lupin_twin.core.past import SeriesRequest, check_moment
 from lupin_twin.core.writes import RecentRequest, WritesRequest
-from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.follow import recent, writes
 from lupin_twin.journal.queries import Export, series
@@ -51,7 +50,8 @@ class Child:
         self._condition = UNKNOWN
         self._recall = recall(lambda: self._condition)
         self._running: dict[int, Future[Any]] = {}
-        self._map: OccupancyMap | None = None
+        # Of its type nothing is imported before one comes.
+        self._map: Any = None
         self._sending = threading.Lock()
         self._out: IO[bytes]
 
@@ -63,10 +63,10 @@ class Child:
                 number, message = pickle.load(questions)  # noqa: S301  # the parent's own
             except EOFError:
                 return
-            if isinstance(message, OccupancyMap):
-                self._map = message
-            elif message is not None:
+            if isinstance(message, bytes):
                 self._ask(number, message)
+            elif message is not None:
+                self._map = message
             elif (running := self._running.pop(number, None)) is not None:
                 running.cancel()
 
@@ -113,11 +113,11 @@ class Child:
 class _Unpickler(pickle.Unpickler):
     """Reads a question, of which the map was sent before (see `past_process`)."""
 
-    def __init__(self, message: bytes, occupancy_map: OccupancyMap | None) -> None:
+    def __init__(self, message: bytes, occupancy_map: Any) -> None:
         super().__init__(io.BytesIO(message))
         self._map = occupancy_map
 
-    def persistent_load(self, _: Any) -> OccupancyMap | None:
+    def persistent_load(self, _: Any) -> Any:
         """The map."""
         return self._map
 

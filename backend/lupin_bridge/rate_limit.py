@@ -29,14 +29,15 @@ class RateLimit:
     def __len__(self) -> int:
         return len(self._full_at_s)
 
-    def wait_s(self, key: Hashable, now_s: float) -> float:
-        """How long until the key's next turn, s; 0: now."""
-        wait = self._full_at_s.get(key, now_s) - self._slack_s - now_s
+    def wait_s(self, key: Hashable, now_s: float, count: int = 1) -> float:
+        """How long until the key's next turns, s; 0: now."""
+        full_at = max(self._full_at_s.get(key, now_s), now_s) + (count - 1) * self._interval_s
+        wait = full_at - self._slack_s - now_s
         return wait if wait > _NOISE_S else 0.0
 
     def take(self, key: Hashable, now_s: float, count: int = 1) -> float:
-        """Take turns if there is one; returns `wait_s`, and more than 0 means: not taken."""
-        wait = self.wait_s(key, now_s)
+        """Take turns if they are there; returns `wait_s`, and more than 0 means: not taken."""
+        wait = self.wait_s(key, now_s, count)
         if wait == 0.0:
             full_at = max(self._full_at_s.get(key, now_s), now_s)
             self._full_at_s[key] = full_at + count * self._interval_s

@@ -22,6 +22,13 @@ def test_a_burst_is_taken_at_once_and_the_next_turn_waits_an_interval() -> None:
     assert taken(limit, "a", 100.05, 2) == 1
 
 
+def test_many_turns_are_taken_together_or_not_at_all() -> None:
+    limit = RateLimit(rate_hz=10.0, burst=5.0)
+    assert limit.take("a", 0.0, 6) == pytest.approx(0.1)
+    assert limit.take("a", 0.0, 5) == 0.0
+    assert limit.take("a", 0.0) == pytest.approx(0.1)
+
+
 def test_a_refused_turn_costs_nothing() -> None:
     limit = RateLimit(rate_hz=1.0, burst=1.0)
     assert limit.take("a", 0.0) == 0.0

@@ -21,7 +21,7 @@ from typing import Final
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
 from lupin_bridge.feed.topics import Topic, TwinNames, topics_of
 from lupin_bridge.message_schemas import schema_text
-from lupin_bridge.serving.ws_protocol import ClientPace, shown
+from lupin_bridge.serving.ws_protocol import shown
 from lupin_bridge.viewers import foxglove_protocol as protocol
 from lupin_bridge.viewers.foxglove_protocol import MAX_SUBSCRIPTIONS, Channel, Refused, Subscribe
 
@@ -62,21 +62,14 @@ class Session:
 
     def __init__(self, counts: Counts) -> None:
         self._counts = counts
-        self._pace = ClientPace()
         self._subscriptions: dict[int, Channel] = {}
         self._advertised: dict[int, Channel] = {}
         self._waiting: dict[int, Message] = {}
         self._too_large: set[int] = set()
         self._time_ns: int | None = None
 
-    def receive(self, message: str | bytes, now_s: float) -> Reaction:
-        """Take one message from the client.
-
-        Raises:
-            TooManyMessages: the client is to be closed.
-
-        """
-        self._pace.take(now_s)
+    def receive(self, message: str | bytes) -> Reaction:
+        """Take one message from the client."""
         try:
             request = protocol.parse(message)
         except Refused as refused:

@@ -14,7 +14,6 @@ from websockets.protocol import State
 from websockets.uri import parse_uri
 
 from lupin_bridge.feed.topics import TwinNames
-from lupin_bridge.serving.ws_protocol import MAX_BURST, MAX_MESSAGES_PER_S, TooManyMessages
 from lupin_bridge.stream.frames import FrameWriter, StateFrame
 from lupin_bridge.stream.hub import Client, Hub
 from lupin_bridge.stream.status import Liveness
@@ -31,8 +30,8 @@ def session() -> Session:
     return Session(NAMES)
 
 
-def send(session: Session, now_s: float = 0.0, **members: Any) -> Reaction:
-    return session.receive(json.dumps(members), now_s)
+def send(session: Session, **members: Any) -> Reaction:
+    return session.receive(json.dumps(members))
 
 
 def replies(reaction: Reaction) -> list[Any]:
@@ -326,25 +325,6 @@ def test_who_is_told_nothing_still_gets_the_response_to_a_call(session: Session)
     assert response["result"] is False
 
 
-# --- pace -------------------------------------------------------------------------------------
-
-
-def test_a_client_may_send_a_burst_and_then_keep_a_pace(session: Session) -> None:
-    for _ in range(MAX_BURST):
-        unsubscribe(session)
-    with pytest.raises(TooManyMessages, match="more than 100 messages a second"):
-        unsubscribe(session)
-    for step in range(1, 2 * MAX_MESSAGES_PER_S):
-        send(session, step / MAX_MESSAGES_PER_S, op="unsubscribe", topic=TOPIC)
-
-
-def test_messages_that_are_refused_count_too(session: Session) -> None:
-    for _ in range(MAX_BURST):
-        session.receive(b"\xff", 0.0)
-    with pytest.raises(TooManyMessages):
-        session.receive("{", 0.0)
-
-
 # --- anything at all --------------------------------------------------------------------------
 
 STEPS = st.lists(
@@ -378,6 +358,6 @@ def test_rubbish_leaves_the_session_as_it_was(messages: list[str | bytes]) -> No
     session = Session(NAMES)
     subscribe(session, "a", throttle_rate=100)
     for message in messages:
-        reaction = session.receive(message, 0.0)
+        reaction = session.receive(message)
         assert [reply["op"] for reply in replies(reaction)] == ["status"]
     assert session.min_interval_s == 0.1

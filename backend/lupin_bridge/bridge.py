@@ -9,6 +9,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping
+from dataclasses import replace
 from typing import Final
 
 from lupin_bridge.alarms.board import AlarmBoard, Board
@@ -174,7 +175,7 @@ class Bridge:
     @property
     def origin(self) -> Origin:
         """Where observations come from, as the twin says."""
-        return self.liveness.origin
+        return self.liveness.known.origin
 
     @property
     def ros_time_ns(self) -> int | None:
@@ -306,13 +307,16 @@ class Bridge:
         now_s = self._clock()
         self.liveness.last_state_s = now_s
         self.liveness.silent_s = state.silent_s
-        self.liveness.twin_count = state.twin_count
-        self.liveness.has_map = state.occupancy_map is not None
         self.liveness.clock = state.snapshot.clock
-        self.liveness.drops = state.drops
-        self.liveness.journal = state.journal
-        self.liveness.origin = state.origin
-        self.liveness.input_problems = state.input_problems
+        self.liveness.known = replace(
+            self.liveness.known,
+            twin_count=state.twin_count,
+            has_map=state.occupancy_map is not None,
+            drops=state.drops,
+            journal=state.journal,
+            origin=state.origin,
+            input_problems=state.input_problems,
+        )
         self._alarm_feed.on_state(state)
         if self._push_timer is not None:
             return  # it will take this state along
@@ -402,7 +406,7 @@ class Bridge:
     # --- the watch ----------------------------------------------------------------------------
 
     def _publish_status(self) -> None:
-        self.liveness.outward = self.outward.status()
+        self.liveness.known = replace(self.liveness.known, outward=self.outward.status())
         status = self.status
         if not status.is_news_after(self._published):
             return

@@ -188,51 +188,45 @@ def test_an_export_goes_on_where_it_was_in_another_process_too(
     asyncio.run(test())
 
 
-def test_one_that_dies_is_told_of_and_started_again(
+async def test_one_that_dies_is_told_of_and_started_again(
     path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(past_process, "REST_S", 0.2)
 
-    async def test() -> None:
-        async with looking_back() as past:
-            waiting = asyncio.create_task(past.ask(Endless(), now(path), 0.0))
-            await until(lambda: past.pid is not None, "a process")
-            os.kill(past.pid or 0, signal.SIGKILL)
-            with pytest.raises(NotRemembered, match="was killed by SIGKILL") as caught:
-                await waiting
-            assert not caught.value.is_lasting
-            with pytest.raises(NotRemembered, match="is about to be started again"):
-                await past.ask(Count(NOW_NS), now(path), 0.0)
-            await until(lambda: not past.why_down, "the next one")
-            assert past.pid is None, "nobody asked"
-            with pytest.raises(NotRemembered, match="was killed by SIGABRT"):
-                await past.ask(Dying(), now(path), 0.0)
-            await until(lambda: not past.why_down, "another one")
-            assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
-            told = [r.getMessage() for r in caplog.records if r.levelno == logging.ERROR]
-            assert told == [
-                "the process that looks back was killed by SIGKILL",
-                "the process that looks back was killed by SIGABRT",
-            ]
-
-    asyncio.run(test())
+    async with looking_back() as past:
+        waiting = asyncio.create_task(past.ask(Endless(), now(path), 0.0))
+        await until(lambda: past.pid is not None, "a process")
+        os.kill(past.pid or 0, signal.SIGKILL)
+        with pytest.raises(NotRemembered, match="was killed by SIGKILL") as caught:
+            await waiting
+        assert not caught.value.is_lasting
+        with pytest.raises(NotRemembered, match="is about to be started again"):
+            await past.ask(Count(NOW_NS), now(path), 0.0)
+        await until(lambda: not past.why_down, "the next one")
+        assert past.pid is None, "nobody asked"
+        with pytest.raises(NotRemembered, match="was killed by SIGABRT"):
+            await past.ask(Dying(), now(path), 0.0)
+        await until(lambda: not past.why_down, "another one")
+        assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
+        told = [r.getMessage() for r in caplog.records if r.levelno == logging.ERROR]
+        assert told == [
+            "the process that looks back was killed by SIGKILL",
+            "the process that looks back was killed by SIGABRT",
+        ]
 
 
-def test_one_that_cannot_be_started_is_tried_again(
+async def test_one_that_cannot_be_started_is_tried_again(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(past_process, "REST_S", 0.01)
 
-    async def test() -> None:
-        async with looking_back() as past:
-            with monkeypatch.context() as nowhere:
-                nowhere.setattr(sys, "executable", "/nowhere/python")
-                with pytest.raises(NotRemembered, match="cannot be started"):
-                    await past.ask(Count(NOW_NS), now(path), 0.0)
-            await until(lambda: not past.why_down, "the rest")
-            assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
-
-    asyncio.run(test())
+    async with looking_back() as past:
+        with monkeypatch.context() as nowhere:
+            nowhere.setattr(sys, "executable", "/nowhere/python")
+            with pytest.raises(NotRemembered, match="cannot be started"):
+                await past.ask(Count(NOW_NS), now(path), 0.0)
+        await until(lambda: not past.why_down, "the rest")
+        assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
 
 
 PARENT = """

@@ -134,7 +134,7 @@ def test_who_goes_before_he_is_let_in_does_no_harm(live: Served) -> None:
     assert raw_http.status(raw_http.answer(live.url, GET)) == 200
 
 
-def test_nobody_is_turned_out_before_somebody_else_comes() -> None:
+async def test_nobody_is_turned_out_before_somebody_else_comes() -> None:
     room = 3
 
     class Waiting(asyncio.Protocol):
@@ -153,23 +153,20 @@ def test_nobody_is_turned_out_before_somebody_else_comes() -> None:
     guests: list[Waiting] = []
     lost: list[Waiting] = []
 
-    async def test() -> None:
-        with listen("127.0.0.1", 0) as listener, ExitStack() as stack:
-            for _ in range(room):
-                stack.enter_context(raw_http.connect(address_of(listener)))
-            door = Acceptor(listener, Waiting, guests, room=room, tls=None, timeout_s=PATIENCE_S)
-            await until(lambda: guests and not door._handshakes, "all who wait outside")
-            assert len(guests) == room
-            first = guests[0]
+    with listen("127.0.0.1", 0) as listener, ExitStack() as stack:
+        for _ in range(room):
             stack.enter_context(raw_http.connect(address_of(listener)))
-            await until(lambda: lost and not door._handshakes, "one more")
-            assert (lost, len(guests)) == ([first], room)
-            door.close()
-            await door.wait_closed()
-            stack.close()
-            await until(lambda: not guests, "their end")
-
-    asyncio.run(test())
+        door = Acceptor(listener, Waiting, guests, room=room, tls=None, timeout_s=PATIENCE_S)
+        await until(lambda: guests and not door._handshakes, "all who wait outside")
+        assert len(guests) == room
+        first = guests[0]
+        stack.enter_context(raw_http.connect(address_of(listener)))
+        await until(lambda: lost and not door._handshakes, "one more")
+        assert (lost, len(guests)) == ([first], room)
+        door.close()
+        await door.wait_closed()
+        stack.close()
+        await until(lambda: not guests, "their end")
 
 
 def test_room_is_what_the_limit_leaves(monkeypatch: pytest.MonkeyPatch) -> None:

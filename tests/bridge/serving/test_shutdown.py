@@ -49,76 +49,62 @@ class Stage:
         return int(self.sent[0]["status"])
 
 
-def test_who_waits_at_the_good_bye_or_comes_after_it_is_told_so() -> None:
-    async def test() -> None:
-        stage = Stage()
-        waiting = stage.ask()
-        await until(lambda: stage.calls, "the application to be asked")
-        stage.shutdown.begin()
-        await asyncio.wait_for(waiting, PATIENCE_S)
-        assert stage.status == 503
-        assert json.loads(stage.sent[1]["body"]) == {"detail": "the bridge is shutting down"}
-        assert (b"retry-after", b"3") in stage.sent[0]["headers"]
+async def test_who_waits_at_the_good_bye_or_comes_after_it_is_told_so() -> None:
+    stage = Stage()
+    waiting = stage.ask()
+    await until(lambda: stage.calls, "the application to be asked")
+    stage.shutdown.begin()
+    await asyncio.wait_for(waiting, PATIENCE_S)
+    assert stage.status == 503
+    assert json.loads(stage.sent[1]["body"]) == {"detail": "the bridge is shutting down"}
+    assert (b"retry-after", b"3") in stage.sent[0]["headers"]
 
-        stage.sent.clear()
-        await asyncio.wait_for(stage.ask(), PATIENCE_S)
-        assert (stage.status, stage.calls) == (503, 1)
-
-    asyncio.run(test())
+    stage.sent.clear()
+    await asyncio.wait_for(stage.ask(), PATIENCE_S)
+    assert (stage.status, stage.calls) == (503, 1)
 
 
 @pytest.mark.parametrize("says_goodbye", [False, True])
-def test_an_answer_that_has_begun_goes_on(says_goodbye: bool) -> None:
-    async def test() -> None:
-        stage = Stage(begin_first=says_goodbye)
-        asked = stage.ask()
-        await until(lambda: stage.calls, "the application to be asked")
-        if says_goodbye:
-            stage.shutdown.begin()
-        stage.gate.set()
-        await asked
-        assert stage.sent == [START, BODY]
-        assert not stage.shutdown._waits
-
-    asyncio.run(test())
-
-
-def test_an_answer_that_begins_as_the_good_bye_has_begun_goes_on() -> None:
-    async def test() -> None:
-        stage, rest = Stage(), asyncio.Event()
-
-        async def app(_scope: Any, _receive: Any, send: Callable[[Any], Awaitable[None]]) -> None:
-            stage.calls += 1
-            await stage.gate.wait()
-            await send(START)
-            await rest.wait()
-            await send(BODY)
-
-        asked = asyncio.ensure_future(
-            EndsAtShutdown(app, stage.shutdown)(HTTP, nothing, stage.send)
-        )
-        await until(lambda: stage.calls, "the application to be asked")
-        stage.gate.set()
+async def test_an_answer_that_has_begun_goes_on(says_goodbye: bool) -> None:
+    stage = Stage(begin_first=says_goodbye)
+    asked = stage.ask()
+    await until(lambda: stage.calls, "the application to be asked")
+    if says_goodbye:
         stage.shutdown.begin()
-        await until(lambda: stage.sent, "the beginning of an answer")
-        rest.set()
-        await asked
-        assert stage.sent == [START, BODY]
-
-    asyncio.run(test())
+    stage.gate.set()
+    await asked
+    assert stage.sent == [START, BODY]
+    assert not stage.shutdown._waits
 
 
-def test_what_the_application_raises_is_its_own() -> None:
+async def test_an_answer_that_begins_as_the_good_bye_has_begun_goes_on() -> None:
+    stage, rest = Stage(), asyncio.Event()
+
+    async def app(_scope: Any, _receive: Any, send: Callable[[Any], Awaitable[None]]) -> None:
+        stage.calls += 1
+        await stage.gate.wait()
+        await send(START)
+        await rest.wait()
+        await send(BODY)
+
+    asked = asyncio.ensure_future(EndsAtShutdown(app, stage.shutdown)(HTTP, nothing, stage.send))
+    await until(lambda: stage.calls, "the application to be asked")
+    stage.gate.set()
+    stage.shutdown.begin()
+    await until(lambda: stage.sent, "the beginning of an answer")
+    rest.set()
+    await asked
+    assert stage.sent == [START, BODY]
+
+
+async def test_what_the_application_raises_is_its_own() -> None:
     async def app(*_: Any) -> None:
         raise TimeoutError("of its own")
 
-    async def test() -> None:
-        goodbye = Shutdown()
-        with pytest.raises(TimeoutError, match="of its own"):
-            await EndsAtShutdown(app, goodbye)(HTTP, nothing, nothing)  # type: ignore[arg-type]
-        assert not goodbye._waits
-
-    asyncio.run(test())
+    goodbye = Shutdown()
+    with pytest.raises(TimeoutError, match="of its own"):
+        await EndsAtShutdown(app, goodbye)(HTTP, nothing, nothing)  # type: ignore[arg-type]
+    assert not goodbye._waits
 
 
 def test_websockets_pass_through() -> None:

@@ -115,18 +115,6 @@ async def test_a_field_is_computed_once_until_something_is_recorded(
         np.testing.assert_array_equal(newer.grid.values, np.full(16, 500.0, np.float32))
 
 
-async def test_identical_requests_in_flight_are_computed_once(
-    domain: int, stage_of: Callable[..., Any]
-) -> None:
-    async with stage_of() as stage:
-        await stage.record("1", 400.0)
-        tasks = await stage.waiting(*[REQUEST] * 20)
-        stage.gate.set()
-        results = await asyncio.gather(*tasks)
-        assert stage.computed == [REQUEST]
-        assert len({id(result.grid) for result in results}) == 1
-
-
 async def test_a_heavy_request_does_not_hold_up_another_one(
     domain: int, stage_of: Callable[..., Any]
 ) -> None:
@@ -152,45 +140,6 @@ async def test_a_request_made_after_a_change_does_not_get_the_field_from_before(
         assert (await old).grid.value_max == 400.0
         assert (await new).grid.value_max == 500.0
         assert (await old).revision != (await new).revision
-
-
-async def test_who_leaves_does_not_end_what_others_wait_for(
-    domain: int, stage_of: Callable[..., Any]
-) -> None:
-    async with stage_of() as stage:
-        first, second = await stage.waiting(REQUEST, REQUEST)
-        first.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await first
-        stage.gate.set()
-        assert (await second).grid.width == 4
-        assert stage.computed == [REQUEST]
-
-
-async def test_an_error_is_everybodys_and_is_not_kept(
-    domain: int, stage_of: Callable[..., Any]
-) -> None:
-    async with stage_of() as stage:
-        tasks = await stage.waiting(REQUEST, REQUEST)
-        stage.failure = MemoryError("too much")
-        stage.gate.set()
-        for task in tasks:
-            with pytest.raises(MemoryError):
-                await task
-        stage.failure = None
-        assert (await stage.twin.field(REQUEST)).grid.width == 4
-        assert len(stage.computed) == 2
-
-
-async def test_an_error_that_nobody_waits_for_any_more_is_no_warning(
-    domain: int, stage_of: Callable[..., Any]
-) -> None:
-    async with stage_of() as stage:
-        (task,) = await stage.waiting(REQUEST)
-        task.cancel()
-        stage.failure = MemoryError("too much")
-        stage.gate.set()
-        await until(lambda: not stage.twin._computing, "the end of the computation")
 
 
 async def test_a_computation_that_nobody_waits_for_is_taken_back(

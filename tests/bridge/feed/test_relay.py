@@ -163,15 +163,6 @@ async def test_what_comes_while_it_is_handed_out_is_handed_out_too(ros: Ros, rel
     assert (heard, ros.wake_ups) == ([b"1", b"2"], 2)
 
 
-async def test_what_was_left_out_is_counted_for_good(ros: Ros, relay: Relay) -> None:
-    relay.linger_s = 0.0
-    listening = await relay.listen(STATE, Ear())
-    ros.takes[STATE.name](Sample(bytes(11), 1))
-    listening.close()
-    await until(lambda: not len(relay), "its end")
-    assert relay.skipped == 1
-
-
 async def test_a_topic_is_heard_until_the_last_has_closed(ros: Ros, relay: Relay) -> None:
     relay.linger_s = 0.0
     ear = Ear()
@@ -266,8 +257,3 @@ async def test_without_its_thread_nothing_is_heard_and_nothing_breaks(
         await relay.listen(LIVE, Ear())
     with pytest.raises(TwinUnavailableError):
         await relay.published(lambda _name, _type: True)
-
-
-async def test_what_is_published_is_asked_by_name_and_type(ros: Ros, relay: Relay) -> None:
-    assert await relay.published(lambda name, _type: name != "/a") == {"/b": "a/msg/B"}
-    assert await relay.time() == RosTime(5, is_simulated=True)

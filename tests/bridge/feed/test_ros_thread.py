@@ -287,13 +287,6 @@ async def test_the_end_of_the_thread_is_told_once_and_said_aloud(
     assert "the end" in str(record.exc_info[1])
 
 
-async def test_a_stop_is_no_death(domain: int) -> None:
-    async with Stage() as stage:
-        pass
-    await until(lambda: not stage.ros.is_alive, "the end of the thread")
-    assert stage.deaths == 0
-
-
 async def test_what_the_making_of_a_node_raises_is_the_starts(domain: int) -> None:
     def make_node(context: Any, post: Callable[[int], None]) -> Probe:
         raise LookupError("no node today")

@@ -15,7 +15,6 @@ import pytest
 from lupin_msgs.msg import SensorReading, TwinState, TwinTagState
 from lupin_msgs.srv import GetField
 
-from lupin_bridge.feed import revisions
 from lupin_bridge.feed.revisions import REVISION_TTL_S
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.web import MAX_REQUESTS, WebTwin
@@ -212,21 +211,6 @@ async def test_an_answer_that_came_after_a_change_stands_for_nothing(domain: int
             async with service.answering():
                 await asked
             assert twin.field_revision(REQUEST) is None
-
-
-async def test_so_many_answers_stand_and_the_oldest_goes_first(
-    domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(revisions, "MAX_REVISIONS", 2)
-
-    with service_in(domain) as service:
-        async with started() as (twin, _), service.answering():
-            await found(twin)
-            requests = [FieldRequest("co2", 0.5, 0.0, 0.0, 1.0, n) for n in (1, 2, 3)]
-            for request in requests:
-                await twin.field(request)
-            known = [twin.field_revision(request) is not None for request in requests]
-            assert known == [False, True, True]
 
 
 async def test_a_small_field_does_not_wait_behind_large_ones(domain: int) -> None:

@@ -15,9 +15,7 @@ from lupin_bridge.serving.admission import (
     BURST_S,
     CLIENT_EXPORTS,
     EXPORTS,
-    IN_FLIGHT,
     LARGE,
-    RATE,
     TOTAL,
     Admission,
     BusyError,
@@ -207,16 +205,6 @@ def test_of_six_clients_that_ask_for_all_they_may_each_has_a_place(is_large: boo
         assert places["a"] == limits.concurrency, "who is alone has all that he may have"
         assert min(places[client] for client in "abcdef") >= 1
     assert admission.being_computed == 0
-
-
-def test_refusals_are_counted_by_reason() -> None:
-    admission = Admission(rate_hz=1.0, concurrency=1, total_concurrency=1)
-    with admission.request("a", 0.0), suppress(ClientLimitError), admission.request("a", 0.0):
-        pytest.fail("let in")
-    for _ in range(3):
-        with suppress(ClientLimitError), admission.request("a", 0.0):
-            pass
-    assert admission.refused == {IN_FLIGHT: 1, RATE: 2}
 
 
 def test_clients_that_are_gone_leave_nothing_behind() -> None:

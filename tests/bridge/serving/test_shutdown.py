@@ -105,14 +105,3 @@ async def test_what_the_application_raises_is_its_own() -> None:
     with pytest.raises(TimeoutError, match="of its own"):
         await EndsAtShutdown(app, goodbye)(HTTP, nothing, nothing)  # type: ignore[arg-type]
     assert not goodbye._waits
-
-
-def test_websockets_pass_through() -> None:
-    seen: list[Any] = []
-
-    async def app(*arguments: Any) -> None:
-        seen.append(arguments)
-
-    given: Any = ({"type": "websocket"}, object(), object())
-    asyncio.run(EndsAtShutdown(app, Shutdown())(*given))
-    assert seen == [given]

@@ -99,11 +99,6 @@ def test_a_delta_frame_is_the_contracts() -> None:
     assert delta.header == schema.Header(stamp=schema.Time(sec=10, nanosec=0), frame_id="map")
 
 
-def test_seq_grows_by_one_a_frame() -> None:
-    writer = FrameWriter()
-    assert [writer.state(snapshot(), "r").seq for _ in range(4)] == [1, 2, 3, 4]
-
-
 # --- made once, kept no longer than needed ------------------------------------------------------
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any, get_args
 
 import pytest
@@ -34,13 +33,6 @@ def test_an_age_is_never_negative() -> None:
     assert Liveness(last_state_s=10.0).status(9.0) == Status("live", 0.0)
 
 
-def test_a_twin_that_is_heard_again_is_live_again() -> None:
-    liveness = Liveness(last_state_s=0.0)
-    assert liveness.status(50.0).reason == "stale"
-    liveness.last_state_s = 50.0
-    assert liveness.status(50.0).is_live
-
-
 def test_the_reason_nearest_to_the_cure_comes_first() -> None:
     liveness = Liveness(last_state_s=0.0)
     liveness.thread_dead = True
@@ -58,16 +50,6 @@ def test_every_status_has_a_frame_of_the_contract(reason: Reason, age_s: float |
     assert frame.has_map is False
     assert frame.message
     assert frame.state_age_seconds == (None if age_s is None else 1.235)
-
-
-def test_the_first_map_is_news_for_a_page_and_not_for_a_person() -> None:
-    liveness = Liveness(last_state_s=0.0)
-    before = liveness.status(0.0)
-    liveness.known = replace(liveness.known, has_map=True)
-    status = liveness.status(0.1)
-    assert status.is_news_after(before)
-    assert not status.says_more_than(before)
-    assert schema.StatusFrame.model_validate(status.frame()).has_map is True
 
 
 def test_more_than_one_twin_is_said_as_long_as_they_live() -> None:

@@ -276,8 +276,10 @@ VALUES = st.recursive(
 )
 OPS = st.sampled_from(["subscribe", "unsubscribe", "call_service", "set_level", "publish", "auth"])
 NAMES = st.sampled_from(
-    ["id", "topic", "type", "service", "args", "level"]
-    + ["throttle_rate", "queue_length", "compression", "timeout"]
+    [
+        *("id", "topic", "type", "service", "args", "level"),
+        *("throttle_rate", "queue_length", "compression", "timeout"),
+    ]
 )
 MESSAGES = st.builds(
     lambda op, members: json.dumps({**members, "op": op}),

@@ -19,7 +19,7 @@ from typing import Final
 from lupin_bridge.feed.relay import Bounded, NotRelayedError, Relay, Sample
 from lupin_bridge.feed.shared_work import Shared
 from lupin_bridge.feed.source import TwinUnavailableError
-from lupin_bridge.feed.topics import Topic, TwinNames, topics_of
+from lupin_bridge.feed.topics import Topic, TwinNames, absolute, topics_of
 from lupin_bridge.serving.ws_protocol import shown
 from lupin_bridge.stream.frames import StateFrame, text_frame
 from lupin_bridge.viewers.rosbridge_protocol import (
@@ -37,7 +37,7 @@ from lupin_bridge.viewers.rosbridge_protocol import (
     service_response,
     status,
 )
-from lupin_bridge.viewers.rosbridge_services import FieldCall, absolute, answer, is_type, json_of
+from lupin_bridge.viewers.rosbridge_services import FieldCall, answer, is_type, json_of
 from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)

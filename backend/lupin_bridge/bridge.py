@@ -28,7 +28,7 @@ from lupin_bridge.past.plans import Answered
 from lupin_bridge.past.recent_scans import learn_recent
 from lupin_bridge.rate_limit import RateLimit
 from lupin_bridge.serving.admission import Admission, Answer, AnswerCache, Limits
-from lupin_bridge.serving.middleware import Shutdown, route_class
+from lupin_bridge.serving.middleware import route_class
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import FrameWriter, text_frame
 from lupin_bridge.stream.health_json import alarms_frame, alarms_in_frame
@@ -89,7 +89,6 @@ class Bridge:
         self.cache = AnswerCache()
         self.answering: Shared[Answer] = Shared()
         self.looking_back: Shared[Answered] = Shared()
-        self.shutdown = Shutdown()
         self.frames = FrameWriter()
         self.offer = Offer(source)
         self.criteria = criteria or Criteria.of(settings)
@@ -155,10 +154,9 @@ class Bridge:
         await asyncio.gather(self.outward.stop(), self.source.stop())
 
     def announce_shutdown(self) -> None:
-        """Tell every client that the bridge is about to go, those who wait for an answer too."""
+        """Tell every client that the bridge is about to go."""
         self.liveness.shutting_down = True
         self._publish_status()
-        self.shutdown.begin()
 
     # --- for the routes -----------------------------------------------------------------------
 

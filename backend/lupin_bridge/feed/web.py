@@ -100,16 +100,17 @@ class WebTwin(RosSource[WebNode, _Received]):
 
             def pass_on(snapshot: Snapshot) -> None:
                 nonlocal update
+                report = node.self_report
                 update = TwinUpdate(
                     snapshot,
                     node.revision,
                     node.twins.value,
                     node.occupancy_map,
-                    node.twin_counts,
+                    report.counts,
                     node.utilities.counts(),
-                    journal=node.journal,
-                    origin=node.origin,
-                    input_problems=node.input_problems,
+                    journal=report.journal,
+                    origin=report.origin,
+                    input_problems=report.input_problems,
                 )
                 post_all()
 
@@ -230,12 +231,10 @@ class WebTwin(RosSource[WebNode, _Received]):
     async def _find(self, service: Service) -> None:
         # From here on too: a twin that comes and goes would be a new one for ever.
         until_s = time.monotonic() + web_node.NEW_TWIN_S
-        while not await self.thread.call(lambda node: node.offers(service)):
+        while why := await self.thread.call(lambda node: node.why_not(service)):
             is_new = await self.thread.call(lambda node: node.has_new_twin)
             if not is_new or time.monotonic() > until_s:
-                raise TwinUnavailableError(
-                    await self.thread.call(lambda node: node.why_not(service))
-                )
+                raise TwinUnavailableError(why)
             await asyncio.sleep(SERVICE_LOOK_S)
 
     async def _request(self, service: Service, request: Any, cost_s: float) -> Any:

@@ -311,8 +311,8 @@ def test_only_the_twin_that_is_followed_is_heard_on_diagnostics(stage: Stage, pe
     publish = peer.node.create_publisher(DiagnosticArray, "/diagnostics", 10).publish
 
     stage.take(peer, tag("1"))
-    assert stage.node.journal.state == "unknown"
-    assert stage.node.twin_counts is None, "a twin that says nothing has not dropped nothing"
+    assert stage.node.self_report.journal.state == "unknown"
+    assert stage.node.self_report.counts is None, "a twin that says nothing has not dropped nothing"
     # Another greenhouse's is in the same message, before it and behind it, and in one of its own.
     others = [Finding("drops", 0, "", {"kind": "100"}), of_state("/gh2/twin/state")]
     theirs = diagnostics(others, "/gh2/peer", 0)
@@ -325,13 +325,16 @@ def test_only_the_twin_that_is_followed_is_heard_on_diagnostics(stage: Stage, pe
         stage.take(peer, tag("1"))
         publish(ours)
         publish(theirs)
-        return stage.node.twin_counts
+        return stage.node.self_report.counts
 
     counts = stage.until(heard, "what the twin says")
     assert counts == Counts({"frame": 7}, 0, (Recent("frame", "odom", 2),))
     assert stage.node.utilities.counts().dropped == {}
-    assert (stage.node.journal.state, stage.node.journal.detail) == ("failing", "no room")
-    assert stage.node.origin == "simulated"
+    assert (stage.node.self_report.journal.state, stage.node.self_report.journal.detail) == (
+        "failing",
+        "no room",
+    )
+    assert stage.node.self_report.origin == "simulated"
 
 
 # --- the rest -----------------------------------------------------------------------------------

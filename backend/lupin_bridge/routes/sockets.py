@@ -34,8 +34,8 @@ from lupin_bridge.field.formats import JSON
 from lupin_bridge.routes.answers import error_response
 from lupin_bridge.routes.field import field_answer
 from lupin_bridge.serving.admission import AdmissionError
-from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
-from lupin_bridge.stream.frames import binary_head, text_frame
+from lupin_bridge.serving.ws_protocol import BINARY, CONNECTION_KEY, Connection, frame_head
+from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.stream.hub import CLOSE_TRY_AGAIN_LATER, Client, Hub
 from lupin_bridge.viewers import foxglove_protocol, foxglove_session
 from lupin_bridge.viewers.foxglove_protocol import SUBPROTOCOLS, Channel
@@ -203,7 +203,7 @@ class _FoxgloveConversation(_Conversation):
     # --- what is written ------------------------------------------------------------------------
 
     def _on_sample(self, key: int, sample: Sample) -> None:
-        note = self._session.put(key, foxglove_session.Message(sample.data, sample.stamp_ns))
+        note = self._session.put(key, sample)
         if note is not None:
             self._due.append(note)
         self._write_all()
@@ -231,7 +231,7 @@ class _FoxgloveConversation(_Conversation):
                 self._write(text_frame(self._due.popleft()))
             elif (message := self._session.next()) is not None:
                 head, payload = message
-                self._write(binary_head(len(head) + len(payload)) + head, payload)
+                self._write(frame_head(BINARY, len(head) + len(payload)) + head, payload)
             else:
                 return
 

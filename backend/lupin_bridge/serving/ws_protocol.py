@@ -74,6 +74,8 @@ PIECE_BYTES: Final = 131_072
 # A frame's head, perhaps with the beginning of its payload, and what follows it.
 Piece = tuple[bytes, bytes | memoryview]
 
+# The first byte of a whole binary message.
+BINARY: Final = 0x82
 _FIN: Final = 0x80
 _OPCODE: Final = 0x0F
 _CONTINUATION: Final = 0
@@ -93,7 +95,7 @@ def pieces(frame: bytes, rest: bytes = b"") -> Iterator[Piece]:
         for start in range(0, len(part), PIECE_BYTES):
             payload = part[start : start + PIECE_BYTES]
             is_last = part is parts[-1] and start + PIECE_BYTES >= len(part)
-            yield _head(opcode | (_FIN if is_last else 0), len(payload)), payload
+            yield frame_head(opcode | (_FIN if is_last else 0), len(payload)), payload
             opcode = _CONTINUATION
 
 
@@ -101,7 +103,8 @@ def _head_bytes(frame: bytes) -> int:
     return {126: 4, 127: 10}.get(frame[1], 2)
 
 
-def _head(first: int, length: int) -> bytes:
+def frame_head(first: int, length: int) -> bytes:
+    """What stands before so many bytes of payload; a server does not mask (RFC 6455, 5.1)."""
     if length < 126:
         return bytes((first, length))
     if length < 1 << 16:

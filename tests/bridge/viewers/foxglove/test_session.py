@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
+from lupin_bridge.feed.relay import Sample
 from lupin_bridge.viewers.foxglove_protocol import MAX_SUBSCRIPTIONS, Channel
 from lupin_bridge.viewers.foxglove_session import (
     MAX_MESSAGE_BYTES,
     Counts,
-    Message,
     Reaction,
     Session,
 )
@@ -88,17 +88,17 @@ def test_a_refusal_is_told_and_changes_nothing(stage: Stage) -> None:
 def test_the_newest_of_each_subscription_waits_and_each_has_its_turn(stage: Stage) -> None:
     stage.subscribe((1, 10), (2, 20))
     for key, payload in ((1, b"a"), (2, b"b"), (1, b"c"), (9, b"nobody")):
-        assert stage.session.put(key, Message(payload, 5)) is None
+        assert stage.session.put(key, Sample(payload, 5)) is None
     assert stage.written() == [(2, b"b"), (1, b"c")]
     assert stage.counts == Counts(sent=2, skipped=1)
-    stage.session.put(1, Message(b"d", 5))
+    stage.session.put(1, Sample(b"d", 5))
     stage.unsubscribe(1)
     assert stage.written() == [], "who has unsubscribed hears nothing more"
 
 
 def test_time_goes_before_messages_and_only_the_newest(stage: Stage) -> None:
     stage.subscribe((1, 10))
-    stage.session.put(1, Message(b"a", 5))
+    stage.session.put(1, Sample(b"a", 5))
     stage.session.put_time(7)
     stage.session.put_time(8)
     assert stage.session.next() == (b"\x02\x08" + bytes(7), b"")
@@ -108,9 +108,9 @@ def test_time_goes_before_messages_and_only_the_newest(stage: Stage) -> None:
 def test_a_message_past_the_limit_is_left_out_and_said_once(stage: Stage) -> None:
     stage.subscribe((1, 10))
     most = bytes(MAX_MESSAGE_BYTES)
-    assert stage.session.put(1, Message(most, 5)) is None
+    assert stage.session.put(1, Sample(most, 5)) is None
     assert len(stage.written()[0][1]) == MAX_MESSAGE_BYTES
-    too_large = Message(most + b"x", 5)
+    too_large = Sample(most + b"x", 5)
     note = stage.session.put(1, too_large)
     assert note is not None
     assert json.loads(note)["level"] == 1
@@ -121,7 +121,7 @@ def test_a_message_past_the_limit_is_left_out_and_said_once(stage: Stage) -> Non
 
 def test_channels_that_come_and_go_are_told_and_their_subscriptions_end(stage: Stage) -> None:
     stage.subscribe((1, 10), (2, 20))
-    stage.session.put(1, Message(b"a", 5))
+    stage.session.put(1, Sample(b"a", 5))
     now = {n: channel for n, channel in CHANNELS.items() if n != 10}
     now[300] = Channel(300, "/new", "a/msg/B", "")
     reaction = stage.session.offer(now, {**WIRES, 300: now[300].json()})

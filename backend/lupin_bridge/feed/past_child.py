@@ -31,8 +31,9 @@ from lupin_twin.journal.queries import Export, series
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 
-# Before each answer: how long its pickle is, and the body behind that, which is sent as it is.
-HEAD: Final = struct.Struct(">IQ")
+# Before each answer: its number, how long its pickle is, and the body behind that, which is sent
+# as it is.
+HEAD: Final = struct.Struct(">QIQ")
 # nice(2): beside a busy twin it gets a quarter of the core that they share.
 NICENESS: Final = 5
 
@@ -96,17 +97,17 @@ class Child:
         buffers: list[pickle.PickleBuffer] = []
         try:
             text = pickle.dumps(
-                (number, is_error, _portable(value) if is_error else value),
+                (is_error, _portable(value) if is_error else value),
                 5,
                 buffer_callback=lambda one: buffers.append(one) if not buffers else True,
             )
         except Exception as unfit:  # noqa: BLE001  # an answer of any kind may not be for pickling
             buffers = []
-            text = pickle.dumps((number, True, _portable(unfit)))
+            text = pickle.dumps((True, _portable(unfit)))
         body = buffers[0].raw() if buffers else b""
         # Whoever sends waits until the parent has taken it: so much is kept for it, and no more.
         with self._sending:
-            self._out.writelines((HEAD.pack(len(text), len(body)), text, body))
+            self._out.writelines((HEAD.pack(number, len(text), len(body)), text, body))
             self._out.flush()
 
 

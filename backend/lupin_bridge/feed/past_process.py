@@ -124,6 +124,9 @@ class PastProcess:
             ended = await self._until_it_ends()
         except OSError as error:
             ended = f"cannot be started: {error}"
+        except Exception as error:  # or nobody would ever be answered again
+            log.exception("the process that looks back met an error here")
+            ended = f"met an error: {error}"
         log.error("the process that looks back %s", ended)
         self.why_down = f"the process that looks back {ended}; it is about to be started again"
         self._refuse_all()
@@ -145,7 +148,9 @@ class PastProcess:
             self._send()
             with contextlib.suppress(asyncio.IncompleteReadError):
                 while True:
-                    self._take(*await _message(process.stdout))
+                    number, *counts = HEAD.unpack(await process.stdout.readexactly(HEAD.size))
+                    text, body = [await _piece(process.stdout, count) for count in counts]
+                    self._take(number, text, body.toreadonly())
             return _exit_text(await process.wait())
         finally:
             self.pid = self._questions = None
@@ -156,20 +161,18 @@ class PastProcess:
                     os.kill(process.pid, signal.SIGKILL)
             await process.wait()
 
-    def _take(self, number: int, is_error: bool, value: Any) -> None:
+    def _take(self, number: int, text: memoryview, body: memoryview) -> None:
         answer = self.asked.get(number)
         if answer is None or answer.done():
             return  # nobody waits any more
+        try:
+            is_error, value = pickle.loads(text, buffers=[body])  # noqa: S301  # our own
+        except Exception as error:  # noqa: BLE001  # goes to the caller
+            is_error, value = True, error
         if is_error:
             answer.set_exception(value)
         else:
             answer.set_result(value)
-
-
-async def _message(answers: asyncio.StreamReader) -> Any:
-    head = HEAD.unpack(await answers.readexactly(HEAD.size))
-    text, body = [await _piece(answers, count) for count in head]
-    return pickle.loads(text, buffers=[body.toreadonly()])  # noqa: S301  # our own
 
 
 async def _piece(answers: asyncio.StreamReader, count: int) -> memoryview:

@@ -20,7 +20,7 @@ from lupin_bridge.access.policy import BehindProxies, Proxies
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.routes import estimate, field, pages, past, sockets, state, status
 from lupin_bridge.routes.answers import add_refusals, error_response
-from lupin_bridge.serving.middleware import EndsAtShutdown, Metered, PieceByPiece
+from lupin_bridge.serving.middleware import Metered, PieceByPiece
 from lupin_bridge.stream import schema
 
 STATIC_FOLDER = Path(__file__).parent / "static"
@@ -64,7 +64,6 @@ def create_app(
     # The last one added runs first.
     if bridge is not None:
         app.add_middleware(PieceByPiece)
-        app.add_middleware(EndsAtShutdown, shutdown=bridge.shutdown)
     app.add_middleware(ReadOnly)
     app.add_middleware(AccessControl, access=access)
     app.add_middleware(BehindProxies, proxies=proxies or Proxies())

@@ -9,6 +9,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping
+from dataclasses import replace
 from typing import Final
 
 from lupin_bridge.alarms.board import AlarmBoard, Board
@@ -25,8 +26,9 @@ from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.messages import GreenhouseState
 from lupin_bridge.past.plans import Answered
 from lupin_bridge.past.recent_scans import learn_recent
-from lupin_bridge.serving.admission import Admission, Answer, AnswerCache, Limits, RateLimit
-from lupin_bridge.serving.middleware import Shutdown, route_class
+from lupin_bridge.rate_limit import RateLimit
+from lupin_bridge.serving.admission import Admission, Answer, AnswerCache, Limits
+from lupin_bridge.serving.middleware import route_class
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import FrameWriter, text_frame
 from lupin_bridge.stream.health_json import alarms_frame, alarms_in_frame
@@ -87,7 +89,6 @@ class Bridge:
         self.cache = AnswerCache()
         self.answering: Shared[Answer] = Shared()
         self.looking_back: Shared[Answered] = Shared()
-        self.shutdown = Shutdown()
         self.frames = FrameWriter()
         self.offer = Offer(source)
         self.criteria = criteria or Criteria.of(settings)
@@ -153,10 +154,9 @@ class Bridge:
         await asyncio.gather(self.outward.stop(), self.source.stop())
 
     def announce_shutdown(self) -> None:
-        """Tell every client that the bridge is about to go, those who wait for an answer too."""
+        """Tell every client that the bridge is about to go."""
         self.liveness.shutting_down = True
         self._publish_status()
-        self.shutdown.begin()
 
     # --- for the routes -----------------------------------------------------------------------
 
@@ -173,7 +173,7 @@ class Bridge:
     @property
     def origin(self) -> Origin:
         """Where observations come from, as the twin says."""
-        return self.liveness.origin
+        return self.liveness.known.origin
 
     @property
     def ros_time_ns(self) -> int | None:
@@ -305,13 +305,16 @@ class Bridge:
         now_s = self._clock()
         self.liveness.last_state_s = now_s
         self.liveness.silent_s = state.silent_s
-        self.liveness.twin_count = state.twin_count
-        self.liveness.has_map = state.occupancy_map is not None
         self.liveness.clock = state.snapshot.clock
-        self.liveness.drops = state.drops
-        self.liveness.journal = state.journal
-        self.liveness.origin = state.origin
-        self.liveness.input_problems = state.input_problems
+        self.liveness.known = replace(
+            self.liveness.known,
+            twin_count=state.twin_count,
+            has_map=state.occupancy_map is not None,
+            drops=state.drops,
+            journal=state.journal,
+            origin=state.origin,
+            input_problems=state.input_problems,
+        )
         self._alarm_feed.on_state(state)
         if self._push_timer is not None:
             return  # it will take this state along
@@ -401,7 +404,7 @@ class Bridge:
     # --- the watch ----------------------------------------------------------------------------
 
     def _publish_status(self) -> None:
-        self.liveness.outward = self.outward.status()
+        self.liveness.known = replace(self.liveness.known, outward=self.outward.status())
         status = self.status
         if not status.is_news_after(self._published):
             return

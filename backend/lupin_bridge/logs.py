@@ -7,10 +7,12 @@ import logging
 import re
 import sys
 import time
-from collections import OrderedDict
+from collections import Counter
 from collections.abc import Hashable
 from datetime import UTC, datetime
 from typing import Final
+
+from lupin_bridge.rate_limit import RateLimit
 
 # Of a repeated message: so many at once of our own, and one a period from then on.
 AT_ONCE: Final = 20
@@ -42,34 +44,6 @@ class JsonFormatter(logging.Formatter):
         return json.dumps(fields, ensure_ascii=False)
 
 
-class Ration:
-    """So many of a kind at once, and one a period from then on; pure, the time is an argument.
-
-    Generic cell rate algorithm (ITU-T I.371), as in `serving.rate_limit`. Of `MAX_KINDS` kinds it
-    knows the last time, of the one longest unheard of no more.
-    """
-
-    def __init__(self, period_s: float) -> None:
-        self._period_s = period_s
-        # When all that was let through would have been at one a period, and what was not.
-        self._kinds: OrderedDict[Hashable, tuple[float, int]] = OrderedDict()
-
-    def __len__(self) -> int:
-        return len(self._kinds)
-
-    def admit(self, kind: Hashable, at_once: int, now_s: float) -> int | None:
-        """How many of the kind were held back since the last one, or None: this one is, too."""
-        through_s, held_back = self._kinds.pop(kind, (now_s, 0))
-        through_s = max(through_s, now_s) + self._period_s
-        is_let_through = through_s - now_s <= at_once * self._period_s
-        self._kinds[kind] = (
-            (through_s, 0) if is_let_through else (through_s - self._period_s, held_back + 1)
-        )
-        if len(self._kinds) > MAX_KINDS:
-            self._kinds.popitem(last=False)
-        return held_back if is_let_through else None
-
-
 class OnceInAWhile(logging.Filter):
     """Lets few records of a kind through, and not too many of one logger, whatever their kinds.
 
@@ -79,8 +53,10 @@ class OnceInAWhile(logging.Filter):
 
     def __init__(self) -> None:
         super().__init__()
-        self._kinds = Ration(PERIOD_S)
-        self._loggers = Ration(LOGGER_PERIOD_S)
+        self._ours = RateLimit(1.0 / PERIOD_S, AT_ONCE, MAX_KINDS)
+        self._libraries = RateLimit(1.0 / PERIOD_S, 1, MAX_KINDS)
+        self._loggers = RateLimit(1.0 / LOGGER_PERIOD_S, LOGGER_AT_ONCE, MAX_KINDS)
+        self._held_back: Counter[Hashable] = Counter()
 
     def filter(self, record: logging.LogRecord) -> bool:
         """Whether to write the record; what it says of those before it is added."""
@@ -88,9 +64,12 @@ class OnceInAWhile(logging.Filter):
         text = record.getMessage() if record.msg == "%s" else str(record.msg)
         error = record.exc_info[0] if record.exc_info else None
         kind = (record.name, record.levelno, _NUMBER.sub("#", text[:200].partition("\n")[0]), error)
-        held_back = self._kinds.admit(kind, AT_ONCE if is_ours(record.name) else 1, now_s)
-        if held_back is None or self._loggers.admit(record.name, LOGGER_AT_ONCE, now_s) is None:
+        kinds = self._ours if is_ours(record.name) else self._libraries
+        if kinds.take(kind, now_s) or self._loggers.take(record.name, now_s):
+            if len(self._held_back) < MAX_KINDS:
+                self._held_back[kind] += 1
             return False
+        held_back = self._held_back.pop(kind, 0)
         if record.msg == _NO_TEXT:
             record.exc_info = record.exc_text = None
         if held_back:

@@ -147,23 +147,3 @@ def test_one_logger_has_an_end_whatever_it_thinks_of(
     err = capsys.readouterr().err
     assert err.count(" lupin_twin: ") == logs.LOGGER_AT_ONCE
     assert "is heard" in err
-
-
-def test_a_ration_is_exact() -> None:
-    ration = logs.Ration(5.0)
-    assert [ration.admit("a", 2, 100.0) for _ in range(4)] == [0, 0, None, None]
-    assert ration.admit("b", 2, 100.0) == 0, "another kind has its own"
-    assert ration.admit("a", 2, 104.9) is None
-    assert ration.admit("a", 2, 105.0) == 3
-    assert ration.admit("a", 2, 105.0) is None
-    assert [ration.admit("a", 2, 200.0) for _ in range(3)] == [1, 0, None]
-
-
-def test_a_ration_keeps_no_more_kinds_than_its_limit() -> None:
-    ration = logs.Ration(5.0)
-    for number in range(3 * logs.MAX_KINDS):
-        ration.admit(number, 1, 100.0)
-        ration.admit("known", 1, 100.0)
-        assert len(ration) <= logs.MAX_KINDS
-    assert len(ration) == logs.MAX_KINDS
-    assert ration.admit("known", 1, 100.0) is None, "the one longest unheard of is forgotten"

@@ -112,7 +112,14 @@ class Failing:
             raise ZeroDivisionError("a fault")
         if self.how == "local":
             raise _local_error()
+        if self.how == "unreadable":
+            return _Unreadable()
         return lambda: None
+
+
+class _Unreadable:
+    def __reduce__(self) -> tuple[Any, ...]:
+        return int, ("no number",)
 
 
 def _local_error() -> Exception:

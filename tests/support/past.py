@@ -37,7 +37,7 @@ async def look_up(question: Question[ResultT], past: Any, workers: Workers) -> R
     return await asyncio.wrap_future(workers.submit(work.do, work.cost_s))
 
 
-@dataclass(slots=True)
+@dataclass
 class MadeUp:
     """The three questions that a source answers about the past, and what was asked of it.
 

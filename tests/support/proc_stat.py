@@ -33,13 +33,17 @@ def resident_mb(pid: int) -> float:
 
 
 def open_files(pid: int) -> int:
-    """How many descriptors it has open, without its end of a socket to a process of its own.
+    """How many descriptors it has open, without those to processes of its own.
 
-    That one is there from the first question about the past on, or from some seconds on.
+    Those are there from the first question about the past on, or from some seconds on.
     """
     own = {line.split()[6] for line in Path("/proc/net/unix").read_text("ascii").splitlines()[1:]}
     files = (_target(path) for path in Path(f"/proc/{pid}/fd").iterdir())
-    return sum(file.removeprefix("socket:[").rstrip("]") not in own for file in files)
+    return sum(
+        not file.startswith(("pipe:", "anon_inode:[pidfd]"))
+        and file.removeprefix("socket:[").rstrip("]") not in own
+        for file in files
+    )
 
 
 def _target(descriptor: Path) -> str:

@@ -27,7 +27,8 @@ from lupin_bridge.access.credentials import (
     cookies_of,
 )
 from lupin_bridge.access.policy import AccessPolicy, HostError, OriginError, RequestSource, path_of
-from lupin_bridge.serving.admission import RateLimit, client_key
+from lupin_bridge.rate_limit import RateLimit
+from lupin_bridge.serving.admission import client_key
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.settings import SettingError, Settings
 

@@ -18,19 +18,19 @@ from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
 from mcap.records import Statistics
 
+from lupin_twin.core import interfaces
+
 # Of the files' names.
 SUFFIX: Final = ".mcap"
 MESSAGE_ENCODING: Final = "cdr"
-CLOCK_TOPIC: Final = "/clock"
-CLOCK_TYPE: Final = "rosgraph_msgs/msg/Clock"
-OBSERVATION_TYPE: Final = "lupin_msgs/msg/Observation"
-TAGS_TYPE: Final = "lupin_msgs/msg/DiscoveredTags"
-MAP_TYPE: Final = "nav_msgs/msg/OccupancyGrid"
+CLOCK_TOPIC: Final = interfaces.CLOCK.name
+CLOCK_TYPE: Final = interfaces.CLOCK.type_name
+OBSERVATION_TYPE: Final = interfaces.OBSERVATIONS.type_name
+TAGS_TYPE: Final = interfaces.DISCOVERED_TAGS.type_name
+MAP_TYPE: Final = interfaces.MAP.type_name
 # What a twin subscribes to, and which of its parameters names the topic.
 INPUTS: Final = {
-    OBSERVATION_TYPE: "observations_topic",
-    TAGS_TYPE: "discovered_tags_topic",
-    MAP_TYPE: "map_topic",
+    topic.type_name: topic.parameter for topic in interfaces.SUBSCRIBED if topic.parameter
 }
 # CDR: the second byte of the header gives the byte order; then come sec and nanosec.
 _CLOCK: Final = {0: struct.Struct(">iI"), 1: struct.Struct("<iI")}

@@ -2,7 +2,7 @@
 
 Which file is the twin's own is known by its identity, not by its path alone. Where that cannot be
 read, the log is followed by `get_writes` into a file of this user, one for each journal: a twin
-that begins another one has another file.
+that begins another one has another file. A file that is damaged is deleted and copied anew.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import shutil
 import time
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
@@ -23,7 +22,6 @@ from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.journal.follow import Followed, Lot, NotALotError, followed, write
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
-    DamagedFile,
     Empty,
     Foreign,
     get_meta,
@@ -38,7 +36,7 @@ ResultT = TypeVar("ResultT")
 
 # How often it is looked whether more was written; what is shown as past is as old at most.
 LOOK_S: Final = 0.3
-# After an error, and where the twin says nothing of its journal.
+# After an error, and where there is nothing to follow.
 RETRY_S: Final = 1.0
 # A twin that is heard says within a second where its journal is.
 FOUND_S: Final = 3.0
@@ -46,36 +44,36 @@ FOUND_S: Final = 3.0
 RETAINED_S: Final = 90 * 86_400.0
 # What putting a lot into the file takes, about, s.
 _WRITE_S: Final = 0.05
+_FILE_ERRORS: Final = (Foreign, OSError, *FILE_ERRORS)
 _ERRORS: Final = (
     *(NotALotError, NotRemembered, PastRefused, TwinUnavailableError),
-    *(Foreign, OSError, *FILE_ERRORS),
+    *_FILE_ERRORS,
 )
 
 
 class FollowedLog:
     """`condition` is that of the log which is read here; None: there is none yet.
 
-    `query(after)` gives the rows behind a number. Belongs to the event loop.
+    `query(after)` gives the rows behind a number. `reported` is what the twin said last of its
+    journal. Belongs to the event loop.
     """
 
     def __init__(self, query: Callable[[int], Awaitable[Lot]], workers: Workers) -> None:
         self._query = query
-        self._folder: Path | None = None
         self._workers = workers
+        self._folder: Path | None = None
         self._reported = UNKNOWN
-        self._own: Path | None = None
+        self._is_own = False
         self._followed: Followed | None = None
-        self._task: asyncio.Task[None] | None = None
-        self._is_damaged = False
-        self._is_new = asyncio.Event()
         self._is_known = asyncio.Event()
+        self._task: asyncio.Task[None] | None = None
 
     @property
     def condition(self) -> Condition | None:
         """See above."""
-        if self._own is not None:
+        if self._is_own:
             return self._reported
-        if self._followed is None or self._folder is None:
+        if self._followed is None:
             return None
         # A twin that cannot write its journal, or is gone, keeps nobody from reading what is here.
         return replace(
@@ -89,22 +87,17 @@ class FollowedLog:
     def on_update(self, journal: Condition) -> None:
         """What the twin says of its journal; what it said last holds while it says nothing."""
         if journal.state is not JournalState.UNKNOWN and journal.journal_id:
-            if (journal.path, journal.journal_id) != (
-                self._reported.path,
-                self._reported.journal_id,
-            ):
-                self._is_new.set()
             self._reported = journal
 
-    def explain(self, error: NotRemembered) -> NotRemembered:
+    async def explain(self, error: NotRemembered) -> NotRemembered:
         """The same error, but of a copy: that is made anew here, and not by the twin."""
-        if self._own is not None or self._followed is None:
+        if self._is_own or self._followed is None:
             return error
         path = self._path(self._followed.journal)
         if str(path) not in str(error):
             return error
-        self._is_damaged |= bool(error.damage)
-        self._is_new.set()
+        if error.damage:
+            await self._on_worker(lambda: _delete(path))
         why = f"{path}, the copy of the twin's journal, cannot be read; it is made anew"
         return NotRemembered(f"{why} as soon as the twin answers", is_lasting=False)
 
@@ -116,9 +109,9 @@ class FollowedLog:
     async def start(self, folder: Path | None) -> None:
         """Begin with the file that was followed last into a folder; None: there is no place."""
         self._folder = folder
-        with contextlib.suppress(*_ERRORS):
-            self._followed = await self._on_worker(self._newest)
-        self._note()
+        if folder is not None:
+            with contextlib.suppress(*_ERRORS):
+                self._followed = await self._on_worker(lambda: _newest(folder))
         self._task = asyncio.create_task(self._keep(), name="log")
 
     async def stop(self) -> None:
@@ -132,57 +125,33 @@ class FollowedLog:
         assert self._folder is not None
         return self._folder / f"{journal}.sqlite"
 
-    def _newest(self) -> Followed | None:
-        files = [] if self._folder is None else list(self._folder.glob("*.sqlite"))
-        if not files:
-            return None
-        *others, newest = sorted(files, key=_written_s)
-        for path in others:
-            if _written_s(path) < time.time() - RETAINED_S:
-                log.info("%s is deleted: its twin has written nothing for 90 days", path)
-                for end in ("", "-wal", "-shm"):
-                    path.with_name(path.name + end).unlink(missing_ok=True)
-        return followed(newest)
-
     async def _keep(self) -> None:
         why = ""
         while True:
+            if self.condition is not None:
+                self._is_known.set()
             try:
-                wait_s = await self._look()
+                await asyncio.sleep(await self._look())
                 why = ""
             except _ERRORS as error:
-                wait_s = RETRY_S
                 if str(error) != why:
                     why = str(error)
                     log.info("the twin's journal is not followed: %s", why)
+                await asyncio.sleep(RETRY_S)
             except Exception:  # nobody waits for this task, and all of the past depends on it
-                wait_s = RETRY_S
                 log.exception("the twin's journal is not followed")
-            self._note()
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._is_new.wait(), wait_s)
-            self._is_new.clear()
-
-    def _note(self) -> None:
-        if self.condition is not None:
-            self._is_known.set()
+                await asyncio.sleep(RETRY_S)
 
     async def _look(self) -> float:
         """See where the log is, or take what is new of it; returns when to look again, s."""
         twin = self._reported
         if not twin.journal_id:
-            return RETRY_S
-        path = Path(twin.path)
-        if await self._on_worker(lambda: _is_journal(path, twin.journal_id)):
-            self._own = path
-            return RETRY_S
-        self._own = None
-        if self._folder is None:
+            return LOOK_S
+        self._is_own = await self._on_worker(lambda: _is_journal(Path(twin.path), twin.journal_id))
+        if self._is_own or self._folder is None:
             return RETRY_S
         here = self._path(twin.journal_id)
         try:
-            if self._is_damaged:
-                raise DamagedFile("a reader met damage")
             # Each time: another `web` may write it too, and anybody may delete it.
             after = await self._on_worker(lambda: _last(here))
             lot = await self._query(after)
@@ -191,17 +160,35 @@ class FollowedLog:
             self._followed = await self._on_worker(
                 lambda: write(here, lot, twin.complete_ns, after)
             )
-        except (Foreign, OSError, *FILE_ERRORS) as error:
-            if isinstance(error, Foreign) or says_damaged(error) or here.is_dir():
+        except _FILE_ERRORS as error:
+            if isinstance(error, Foreign) or says_damaged(error):
                 self._followed = None
-                await self._on_worker(lambda: _quarantine(here))
-                self._is_damaged = False
+                await self._on_worker(lambda: _delete(here))
                 log.warning("%s cannot be used (%s): the log is copied anew", here, error)
             raise
         return LOOK_S if lot.is_all else 0.0
 
     async def _on_worker(self, work: Callable[[], ResultT]) -> ResultT:
         return await asyncio.wrap_future(self._workers.submit(lambda _: work(), _WRITE_S))
+
+
+def _newest(folder: Path) -> Followed | None:
+    """The copy that was written last; others that are old are deleted."""
+    files = sorted(folder.glob("*.sqlite"), key=_written_s)
+    for path in files[:-1]:
+        if _written_s(path) < time.time() - RETAINED_S:
+            log.info("%s is deleted: its twin has written nothing for 90 days", path)
+            _delete(path)
+    return followed(files[-1]) if files else None
+
+
+def _written_s(path: Path) -> float:
+    return path.stat().st_mtime
+
+
+def _delete(path: Path) -> None:
+    for end in ("", "-wal", "-shm"):
+        path.with_name(path.name + end).unlink(missing_ok=True)
 
 
 def _last(path: Path) -> int:
@@ -211,25 +198,9 @@ def _last(path: Path) -> int:
         return 0
 
 
-def _written_s(path: Path) -> float:
-    return path.stat().st_mtime
-
-
-def _quarantine(path: Path) -> None:
-    # A copy of what the twin has: one that is damaged is kept, the one before it is not.
-    for end in ("-wal", "-shm"):
-        path.with_name(path.name + end).unlink(missing_ok=True)
-    target = path.with_suffix(".damaged")
-    if target.is_dir():
-        shutil.rmtree(target)
-    else:
-        target.unlink(missing_ok=True)
-    path.rename(target)
-
-
 def _is_journal(path: Path, journal: str) -> bool:
     try:
         with contextlib.closing(open_reader(path)) as connection:
             return get_meta(connection, "journal_id") == journal
-    except (Foreign, OSError, *FILE_ERRORS):
+    except _FILE_ERRORS:
         return False

@@ -5,66 +5,46 @@ from __future__ import annotations
 import asyncio
 import time
 import uuid
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from contextlib import nullcontext
-from typing import Any, TypeVar
+from typing import Any
 
-from lupin_bridge.feed.log_reader import LogReader
-from lupin_bridge.feed.past_child import Now
-from lupin_bridge.feed.past_process import PastProcess
-from lupin_bridge.feed.relay import Relay
-from lupin_bridge.feed.relay_ros import RelayRos, names_of
-from lupin_bridge.feed.revisions import RevisedEstimate, RevisionCache, revised
-from lupin_bridge.feed.ros_thread import RosThread
+from lupin_bridge.feed.query import Now
+from lupin_bridge.feed.revisions import RevisedEstimate, revised
+from lupin_bridge.feed.ros_source import RosSource
 from lupin_bridge.feed.shared_work import Shared
-from lupin_bridge.feed.source import CacheCounts, RevisedGrid, TwinTimeoutError, TwinUpdate
-from lupin_bridge.feed.topics import TwinNames
+from lupin_bridge.feed.source import CacheCounts, RevisedGrid, TwinUpdate
 from lupin_twin.core.history import TagHistory
 from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
 from lupin_twin.estimate.engine import EstimateRequest, TagPast
-from lupin_twin.field.engine import FieldJob, FieldRequest, FieldRules
+from lupin_twin.field.engine import FieldJob, FieldRequest
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.ros.estimate_service import Task
 from lupin_twin.ros.node import TwinNode
 from lupin_twin.runtime.estimate_rounds import ADVICE_S, Report, ReportRequest
-from lupin_twin.runtime.workers import SMALL_S, Workers
+from lupin_twin.runtime.workers import SMALL_S
 
 # A third of what counts as silence (`status.STALE_AFTER_S`).
 HEARTBEAT_S = 1.0
-ResultT = TypeVar("ResultT")
 
 
-class LocalTwin(LogReader):
+class LocalTwin(RosSource[TwinNode, TwinUpdate]):
     """`TwinSource` over a `TwinNode` of this process."""
 
     def __init__(
-        self,
-        *,
-        ros_args: Sequence[str],
-        timeout_s: float,
-        world: World = World(),
+        self, *, ros_args: Sequence[str], timeout_s: float, world: World = World()
     ) -> None:
-        self._ros_args = ros_args
+        super().__init__(ros_args=ros_args, timeout_s=timeout_s)
         self._world = world
-        self.timeout_s = timeout_s
         # A restarted server must never match an ETag of its predecessor, whose counts it repeats.
-        self._identity = uuid.uuid4().hex[:12]
-        self.thread: RosThread[TwinNode, TwinUpdate]
+        self.identity = uuid.uuid4().hex[:12]
         self.update: TwinUpdate
-        self._rules: FieldRules
-        # The same for as long as the node lives.
-        self._names: TwinNames
-        self.past = PastProcess()
-        self.workers = Workers("work")
-        self.relay = Relay(lambda: self.thread, RelayRos())
         self._computing: Shared[FieldGrid] = Shared()
-        self._estimating: Shared[RevisedEstimate] = Shared()
-        self._revisions = RevisionCache()
         # One at a time: fields have the other workers, and frames the other cores.
         self._large_estimate = asyncio.Semaphore(1)
 
@@ -101,24 +81,7 @@ class LocalTwin(LogReader):
                 self._rules = update.rules
             on_state(update)
 
-        self.thread = RosThread(
-            make_node, ros_args=self._ros_args, on_event=on_update, on_death=on_death
-        )
-        await self.thread.start()
-        self._rules, self._names = await self.thread.call(
-            lambda node: (node.fields.rules, names_of(node))
-        )
-        self.past.start()
-
-    async def stop(self) -> None:
-        """Stop the ROS thread, the workers and the process that looks back."""
-        self.workers.close()
-        await asyncio.gather(self.past.stop(), self.thread.stop())
-
-    @property
-    def identity(self) -> str:
-        """Of this process: its counts start over with the next one."""
-        return self._identity
+        await self._start_thread(make_node, on_update, on_death, lambda node: node.fields.rules)
 
     def revision(self) -> str:
         """The process's identity, the observation count and the map's revision, as updated last.
@@ -130,14 +93,6 @@ class LocalTwin(LogReader):
     def field_revision(self, request: FieldRequest) -> str | None:  # noqa: ARG002  # all alike
         """The revision now: here every field is made of the store as it stands."""
         return self.update.revision
-
-    def rules(self) -> FieldRules:
-        """The node's parameters for fields."""
-        return self._rules
-
-    def names(self) -> TwinNames:
-        """The twin's, as ROS resolves and remaps them."""
-        return self._names
 
     def journal(self) -> Condition:
         """The node's journal."""
@@ -180,10 +135,7 @@ class LocalTwin(LogReader):
             return now.stamp_ns
         return now.stamp_ns + int((time.monotonic() - self.update.made_s) * NANOSECONDS_PER_SECOND)
 
-    async def _found(self) -> None:
-        """It is the node's, from its start."""
-
-    def now(self) -> Now:
+    async def now(self) -> Now:
         """What who looks back has to know of now."""
         update = self.update
         return Now(self.now_ns, update.snapshot.frame_id, update.journal)
@@ -226,20 +178,14 @@ class LocalTwin(LogReader):
         work = await self.thread.call(lambda node: node.estimates.report(request))
         return await asyncio.wrap_future(self.workers.submit(lambda _: work(), ADVICE_S))
 
-    async def _in_time(self, answer: Awaitable[ResultT]) -> ResultT:
-        try:
-            async with asyncio.timeout(self.timeout_s):
-                return await answer
-        except TimeoutError:
-            raise TwinTimeoutError(f"the twin did not answer within {self.timeout_s:g} s") from None
-        except NotRemembered as error:
-            damage = error.damage
-            if damage:
-                await self.thread.call(lambda node: node.memory.heal(damage))
-            raise
+    async def _explain(self, error: NotRemembered) -> NotRemembered:
+        damage = error.damage
+        if damage:
+            await self.thread.call(lambda node: node.memory.heal(damage))
+        return error
 
     def _revision_of(self, node: TwinNode) -> str:
-        return "-".join((self._identity, *map(str, node.revision)))
+        return "-".join((self.identity, *map(str, node.revision)))
 
 
 def _cache_counts(node: TwinNode) -> CacheCounts:

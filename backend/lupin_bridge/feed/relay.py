@@ -4,26 +4,25 @@
     ...
     listening.close()
 
-`topic` is one of `names.topics_of(source.names())`, or a `Topic` of one's own. `on_sample(sample)`
+`topic` is one of `topics.topics_of(source.names())`, or a `Topic` of one's own. `on_sample(sample)`
 is called on the event loop for each sample, and must not wait. Of a latched topic the newest ones
-come first, before `listen` returns if they are here, or soon after. One `Topic` is one
-subscription, however many listen; it ends some seconds after the last of them has closed, so that
-who comes and goes makes no work in the ROS thread. While nobody listens there is none.
+come first. One `Topic` is one subscription, however many listen; it ends some seconds after the
+last of them has closed, so that who comes and goes makes no work in the ROS thread. While nobody
+listens there is none.
 
 The ROS thread hands over bytes and does nothing else with them. Of what the loop has not taken yet,
-as of what is kept for who listens later, the oldest give way to the newest within the topic's
-bounds. A sample that is larger than these is left out, and counted.
+as of what is kept for who listens later, the oldest give way to the newest. A sample that is larger
+than the topic's bytes is left out, and counted.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
-import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final, Protocol
 
 from lupin_bridge.feed.topics import Topic
@@ -32,8 +31,6 @@ log = logging.getLogger(__name__)
 
 # How long, s, a topic that nobody listens to any more is still relayed.
 LINGER_S: Final = 5.0
-# More at once nobody needs, and each has its buffers.
-MAX_TOPICS: Final = 100
 
 
 class NotRelayedError(RuntimeError):
@@ -122,13 +119,6 @@ class Bounded:
         self._bytes -= len(sample.data)
         return sample
 
-    def take_all(self) -> list[Sample]:
-        """Take them out."""
-        taken = list(self._samples)
-        self._samples.clear()
-        self._bytes = 0
-        return taken
-
     def all(self) -> list[Sample]:
         """Look at them, oldest first."""
         return list(self._samples)
@@ -137,24 +127,22 @@ class Bounded:
 class Listening:
     """Somebody's ear on a topic, until it is closed."""
 
-    def __init__(self, on_sample: Callable[[Sample], None], leave: Callable[[], None]) -> None:
-        self._on_sample: Callable[[Sample], None] | None = on_sample
+    def __init__(
+        self, on_sample: Callable[[Sample], None], leave: Callable[[Listening], None]
+    ) -> None:
+        self._on_sample = on_sample
         self._leave = leave
-
-    @property
-    def is_open(self) -> bool:
-        """Whether it hears."""
-        return self._on_sample is not None
+        self._is_open = True
 
     def close(self) -> None:
         """Hear no more; harmless if it is closed already."""
-        if self._on_sample is not None:
-            self._on_sample = None
-            self._leave()
+        if self._is_open:
+            self._is_open = False
+            self._leave(self)
 
     def hear(self, sample: Sample) -> None:
         """Pass a sample on; an error is the listener's, and the others' ears are spared it."""
-        if self._on_sample is not None:
+        if self._is_open:
             try:
                 self._on_sample(sample)
             except Exception:  # whatever it is: the other listeners hear it all the same
@@ -166,40 +154,20 @@ class _Relayed:
 
     def __init__(self, topic: Topic) -> None:
         self.topic = topic
+        # What the ROS thread has put there, and the loop has not taken.
+        self.incoming: deque[Sample] = deque(maxlen=topic.depth)
+        self.latched = Bounded(topic)
         self.opening: asyncio.Task[Callable[[], None]]
         self.listeners: list[Listening] = []
-        self.users = 0
-        self.ending: asyncio.TimerHandle | None = None
-        self.skipped = 0
-        self._lock = threading.Lock()
-        self._incoming = Bounded(topic)
-        self._latched = Bounded(topic)
-
-    def put(self, sample: Sample) -> bool:
-        """Take a sample from the ROS thread; whether there is one to hand out."""
-        with self._lock:
-            if len(sample.data) > self.topic.max_bytes:
-                self.skipped += 1
-                return False
-            self.skipped += self._incoming.put(sample)
-            return True
 
     def hand_out(self) -> None:
         """Give all that has come to all who listen."""
-        with self._lock:
-            samples = self._incoming.take_all()
-        self.listeners = [listening for listening in self.listeners if listening.is_open]
-        for sample in samples:
+        while self.incoming:
+            sample = self.incoming.popleft()
             if self.topic.latched:
-                self._latched.put(sample)
+                self.latched.put(sample)
             for listening in list(self.listeners):
                 listening.hear(sample)
-
-    def add(self, listening: Listening) -> None:
-        """Have somebody listen, from what is kept on."""
-        for sample in self._latched.all():
-            listening.hear(sample)
-        self.listeners.append(listening)
 
 
 class Relay:
@@ -212,38 +180,40 @@ class Relay:
         self._thread = thread
         self._ros = ros
         self.linger_s = linger_s
+        # Samples that were too large, or gave way before the loop had taken them.
+        self.skipped = 0
         self._topics: dict[Topic, _Relayed] = {}
-        self._lock = threading.Lock()
-        self._is_waking = False
-        self._skipped = 0
         self._closing: set[asyncio.Task[None]] = set()
 
     def __len__(self) -> int:
         """How many topics are relayed."""
         return len(self._topics)
 
-    @property
-    def skipped(self) -> int:
-        """Samples that were too large, or gave way before the loop had taken them."""
-        return self._skipped + sum(relayed.skipped for relayed in self._topics.values())
-
     async def listen(self, topic: Topic, on_sample: Callable[[Sample], None]) -> Listening:
         """Listen to a topic; whether anybody publishes it is another matter.
 
         Raises:
-            NotRelayedError: its type is not installed here, ROS takes no such name, or too many
-                others are listened to.
+            NotRelayedError: its type is not installed here, or ROS takes no such name.
             TwinUnavailableError: the ROS thread has ended.
 
         """
-        relayed = self._topics.get(topic) or self._open(topic)
-        with self._in_use(relayed):
+        relayed = self._topics.get(topic)
+        if relayed is None:
+            relayed = self._topics[topic] = _Relayed(topic)
+            relayed.opening = asyncio.create_task(self._subscribe(relayed))
+            # Looked at, should all who waited have left.
+            relayed.opening.add_done_callback(lambda task: task.cancelled() or task.exception())
+        listening = Listening(on_sample, partial(self._leave, relayed))
+        for sample in relayed.latched.all():
+            listening.hear(sample)
+        relayed.listeners.append(listening)
+        try:
             # Not ended with who asked first: others may wait for it by now.
             await asyncio.shield(relayed.opening)
-            relayed.users += 1
-            listening = Listening(on_sample, lambda: self._let_go(relayed))
-            relayed.add(listening)
-            return listening
+        except BaseException:
+            listening.close()
+            raise
+        return listening
 
     async def published(self, is_wanted: Callable[[str, str], bool]) -> Mapping[str, str]:
         """Topics that somebody publishes now, and their types; `is_wanted(name, type)` takes them.
@@ -276,61 +246,41 @@ class Relay:
         """
         return self._ros.read(topic, sample.data)
 
-    # --- how long a topic is relayed --------------------------------------------------------------
-
-    def _open(self, topic: Topic) -> _Relayed:
-        if len(self._topics) >= MAX_TOPICS:
-            unused = next((relayed for relayed in self._topics.values() if not relayed.users), None)
-            if unused is None:
-                raise NotRelayedError(
-                    f"{MAX_TOPICS} topics are listened to, the limit: no room for {topic.name}"
-                )
-            self._end(unused)
-        relayed = self._topics[topic] = _Relayed(topic)
-        relayed.opening = asyncio.create_task(self._subscribe(relayed), name=f"open {topic.name}")
-        relayed.opening.add_done_callback(lambda task: task.cancelled() or task.exception())
-        return relayed
-
     async def _subscribe(self, relayed: _Relayed) -> Callable[[], None]:
         topic, thread = relayed.topic, self._thread()
 
         def take(sample: Sample) -> None:
-            if relayed.put(sample):
-                self._wake(thread)
+            is_too_large = len(sample.data) > topic.max_bytes
+            self.skipped += is_too_large or len(relayed.incoming) == topic.depth
+            if not is_too_large:
+                relayed.incoming.append(sample)
+                thread.to_loop(relayed.hand_out)
 
-        with ExitStack() as otherwise:
-            otherwise.callback(self._forget, relayed)
-            try:
-                close: Callable[[], None] = await thread.call(
-                    lambda node: self._ros.subscribe(node, topic, take)
-                )
-            except (LookupError, ValueError) as error:
+        try:
+            close: Callable[[], None] = await thread.call(
+                lambda node: self._ros.subscribe(node, topic, take)
+            )
+        except BaseException as error:
+            self._forget(relayed)
+            if isinstance(error, LookupError | ValueError):
                 raise NotRelayedError(f"{topic.name} cannot be relayed here: {error}") from None
-            otherwise.pop_all()
+            raise
         return close
 
-    @contextmanager
-    def _in_use(self, relayed: _Relayed) -> Iterator[None]:
-        relayed.users += 1
-        if relayed.ending is not None:
-            relayed.ending.cancel()
-            relayed.ending = None
-        try:
-            yield
-        finally:
-            self._let_go(relayed)
+    def _forget(self, relayed: _Relayed) -> None:
+        if self._topics.get(relayed.topic) is relayed:
+            del self._topics[relayed.topic]
 
-    def _let_go(self, relayed: _Relayed) -> None:
-        relayed.users -= 1
-        if not relayed.users and self._topics.get(relayed.topic) is relayed:
-            loop = asyncio.get_running_loop()
-            relayed.ending = loop.call_later(self.linger_s, self._end, relayed)
+    def _leave(self, relayed: _Relayed, listening: Listening) -> None:
+        relayed.listeners.remove(listening)
+        if not relayed.listeners:
+            asyncio.get_running_loop().call_later(self.linger_s, self._end, relayed)
 
     def _end(self, relayed: _Relayed) -> None:
-        if relayed.ending is not None:
-            relayed.ending.cancel()
+        if relayed.listeners or self._topics.get(relayed.topic) is not relayed:
+            return  # somebody listens again, or it has ended
         self._forget(relayed)
-        task = asyncio.create_task(self._unsubscribe(relayed), name=f"close {relayed.topic.name}")
+        task = asyncio.create_task(self._unsubscribe(relayed))
         self._closing.add(task)
         task.add_done_callback(self._closing.discard)
 
@@ -341,25 +291,3 @@ class Relay:
         except Exception as error:  # noqa: BLE001  # nobody waits for this task
             # As a rule the thread has ended, and all with it.
             log.info("%s was not unsubscribed: %r", relayed.topic.name, error)
-
-    def _forget(self, relayed: _Relayed) -> None:
-        if self._topics.get(relayed.topic) is relayed:
-            del self._topics[relayed.topic]
-            self._skipped += relayed.skipped
-
-    # --- from the ROS thread --------------------------------------------------------------------
-
-    def _wake(self, thread: RosSide) -> None:
-        # One wake-up for as many samples as come before the loop gets round to it.
-        with self._lock:
-            if self._is_waking:
-                return
-            self._is_waking = True
-        thread.to_loop(self._drain)
-
-    def _drain(self) -> None:
-        # First the flag, then the samples: one that comes in between wakes the loop once more.
-        with self._lock:
-            self._is_waking = False
-        for relayed in list(self._topics.values()):
-            relayed.hand_out()

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from diagnostic_msgs import msg as diagnostic
-from lupin_msgs import msg as lupin
-from nav_msgs import msg as nav
+from diagnostic_msgs.msg import DiagnosticArray
+from lupin_msgs.msg import DiscoveredTags, Observation, TwinState
+from nav_msgs.msg import OccupancyGrid
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.qos import QoSProfile
-from sensor_msgs import msg as sensor
-from visualization_msgs import msg as visualization
+from sensor_msgs.msg import PointCloud2
+from visualization_msgs.msg import MarkerArray
 
 from lupin_bridge.feed.relay import RosTime, Sample
 from lupin_bridge.feed.topics import Topic, TwinNames
@@ -21,14 +21,16 @@ from lupin_twin.ros import message_limits
 from lupin_twin.ros.base_node import latched, read_message
 
 # A name that comes from outside imports nothing.
-_PACKAGES: Final[Mapping[str, Any]] = {
-    "diagnostic_msgs": diagnostic,
-    "lupin_msgs": lupin,
-    "nav_msgs": nav,
-    "sensor_msgs": sensor,
-    "visualization_msgs": visualization,
+_CLASSES: Final[Mapping[str, Any]] = {
+    "lupin_msgs/msg/TwinState": TwinState,
+    "lupin_msgs/msg/Observation": Observation,
+    "lupin_msgs/msg/DiscoveredTags": DiscoveredTags,
+    "nav_msgs/msg/OccupancyGrid": OccupancyGrid,
+    "diagnostic_msgs/msg/DiagnosticArray": DiagnosticArray,
+    "sensor_msgs/msg/PointCloud2": PointCloud2,
+    "visualization_msgs/msg/MarkerArray": MarkerArray,
 }
-# What is also made into messages here: the topics of `names.topics_of`.
+# What is also made into messages here: the topics of `topics.topics_of`.
 _SHAPES: Final = {
     "lupin_msgs/msg/TwinState": message_limits.STATE,
     "lupin_msgs/msg/Observation": message_limits.OBSERVATION,
@@ -38,20 +40,6 @@ _SHAPES: Final = {
 }
 
 
-def message_class(type_name: str) -> Any:
-    """The class of a message, such as `nav_msgs/msg/OccupancyGrid`.
-
-    Raises:
-        LookupError: it is not installed, or of a package that is not relayed.
-
-    """
-    package, _, name = type_name.partition("/msg/")
-    # A message begins with a capital; what a module has beside its messages does not.
-    if package not in _PACKAGES or not name[:1].isupper() or not hasattr(_PACKAGES[package], name):
-        raise LookupError(f"there is no message {type_name!r} in {', '.join(_PACKAGES)}")
-    return getattr(_PACKAGES[package], name)
-
-
 class RelayRos:
     """`relay.Ros` over rclpy."""
 
@@ -59,7 +47,9 @@ class RelayRos:
         self, node: Any, topic: Topic, take: Callable[[Sample], None]
     ) -> Callable[[], None]:
         """Subscribe raw: nothing is made of the bytes in this thread."""
-        message_type = message_class(topic.type_name)
+        message_type = _CLASSES.get(topic.type_name)
+        if message_type is None:
+            raise LookupError(f"messages of {topic.type_name!r} are not relayed")
         clock = node.get_clock()
 
         def hand_over(data: bytes) -> None:

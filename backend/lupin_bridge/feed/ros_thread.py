@@ -201,11 +201,10 @@ class RosThread(Generic[NodeT, EventT]):
         result: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
         # Both in the ROS thread, where the one that was handed over first may run last.
         future: Any = None
-        is_given_up = False
 
         def begin(node: NodeT) -> None:
             nonlocal future
-            if is_given_up:
+            if result.cancelled():
                 return
             future = start(node)
             future.add_done_callback(
@@ -215,8 +214,6 @@ class RosThread(Generic[NodeT, EventT]):
             )
 
         def end() -> None:
-            nonlocal is_given_up
-            is_given_up = True
             if future is not None:
                 give_up(self.require_node(), future)
 
@@ -224,6 +221,7 @@ class RosThread(Generic[NodeT, EventT]):
             await self.call(begin)
             return await result
         except asyncio.CancelledError:
+            result.cancel()
             if self._executor is not None and not self._is_stopping:
                 self._executor.create_task(end)
             raise

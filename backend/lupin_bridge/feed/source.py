@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
+import pickle
 import time
-from collections.abc import AsyncIterator, Callable, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import AsyncGenerator, Awaitable, Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final, Protocol, TypeVar
+from typing import Final, TypeVar
 
-from lupin_bridge.feed.query import Question
+from lupin_bridge.feed.past_process import PastProcess
+from lupin_bridge.feed.query import ExportStep, Itself, Now, Question
 from lupin_bridge.feed.relay import Relay
 from lupin_bridge.feed.revisions import RevisedEstimate
 from lupin_bridge.feed.topics import TwinNames
@@ -15,13 +19,15 @@ from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import Counts, Recent
 from lupin_twin.core.history import TagHistory
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
-from lupin_twin.core.past import PastRow, SeriesPast, SeriesRequest
+from lupin_twin.core.past import NotRemembered, PastRow
 from lupin_twin.core.state import Snapshot
 from lupin_twin.core.writes import PastWrites, WritesRequest
 from lupin_twin.estimate.engine import EstimateRequest
 from lupin_twin.field.engine import FieldRequest, FieldRules
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.grid import FieldGrid
+from lupin_twin.journal.follow import WRITES_S
+from lupin_twin.journal.queries import STRETCH_S, Export
 from lupin_twin.runtime.estimate_rounds import Report, ReportRequest
 from lupin_twin.runtime.workers import Workers
 
@@ -92,68 +98,85 @@ class RevisedGrid:
     revision: str
 
 
-class TwinSource(Protocol):
-    """A twin in this process, or one elsewhere. Everything here is called on the event loop.
+class TwinSource(ABC):
+    """A twin in this process, one elsewhere, or what an archive has of one; and its log.
 
-    `workers` is where this process does what takes longer than a tick; `stop` closes it. `relay`
-    is where ROS topics are listened to as they are on the wire.
+    Everything here is called on the event loop. `workers` is where this process does what takes
+    longer than a tick; `stop` closes it. `relay` is where ROS topics are listened to as they are on
+    the wire. `past` reads the log; what is observed within the journal's 100 ms may be missing.
     """
 
+    past: PastProcess
     workers: Workers
     relay: Relay
+    timeout_s: float
+    # Who is named where an answer takes too long.
+    answerer = "the twin"
+    # Tells the counts of one process from another's; empty where revisions are digests.
+    identity = ""
 
+    @abstractmethod
     async def start(
         self, on_state: Callable[[TwinUpdate], None], on_death: Callable[[], None]
     ) -> None:
         """Start; `on_state` gets every change (the newest, where they come fast)."""
 
+    @abstractmethod
     async def stop(self) -> None:
         """Stop and release everything."""
 
     @property
-    def identity(self) -> str:
-        """Tells the counts of one process from another's; empty where revisions are digests."""
-
-    @property
     def is_alive(self) -> bool:
-        """Whether the thread behind this source runs."""
+        """Whether the thread behind this source runs, where there is one."""
+        return True
 
     @property
     def stuck_s(self) -> float:
         """How long the thread has not answered a heartbeat, s; 0 between two."""
+        return 0.0
 
     @property
     def calls_waiting(self) -> int:
         """Calls that wait for the ROS thread now."""
+        return 0
 
     @property
     def callback_errors(self) -> int:
         """Errors met by ROS callbacks so far, as of the last heartbeat through the thread."""
+        return 0
 
+    @abstractmethod
     def revision(self) -> str:
         """The revision now: opaque, changes exactly when a field could."""
 
+    @abstractmethod
     def field_revision(self, request: FieldRequest) -> str | None:
         """The revision of the field asked for now; None: only the answer will tell.
 
         What is claimed here holds for the field: two different ones never have the same.
         """
 
+    @abstractmethod
     def rules(self) -> FieldRules:
         """The rules by which fields are made, and their limit."""
 
+    @abstractmethod
     def names(self) -> TwinNames:
         """What the twin's topics and service are called."""
 
     def cache_counts(self) -> CacheCounts:
         """How the cache of fields does; all 0 where it is not in this process."""
+        return CacheCounts()
 
+    @abstractmethod
     def journal(self) -> Condition:
         """How the twin's journal does, as far as it tells."""
 
+    @abstractmethod
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map, if any has come."""
 
+    @abstractmethod
     async def field(self, request: FieldRequest) -> RevisedGrid:
         """Compute a field.
 
@@ -163,9 +186,11 @@ class TwinSource(Protocol):
 
         """
 
+    @abstractmethod
     def estimate_revision(self, request: EstimateRequest) -> str | None:
         """The revision of the estimate asked for now; None: only the answer will tell."""
 
+    @abstractmethod
     async def estimate(self, request: EstimateRequest) -> RevisedEstimate:
         """Estimate a sensor over a box.
 
@@ -176,6 +201,7 @@ class TwinSource(Protocol):
 
         """
 
+    @abstractmethod
     async def estimate_report(self, request: ReportRequest) -> Report:
         """What a sensor's estimates are worth.
 
@@ -184,33 +210,59 @@ class TwinSource(Protocol):
 
         """
 
+    @abstractmethod
     async def history(self, tag_id: str) -> TagHistory | None:
         """The last scans and tries of a tag; None: no such tag."""
 
     # --- the past; each may raise `PastRefused`, `NotRemembered` or `TwinUnavailableError` --------
 
+    @abstractmethod
+    async def now(self) -> Now:
+        """At what a question is asked, and of which log, once that is known."""
+
+    async def _explain(self, error: NotRemembered) -> NotRemembered:
+        """The error as the caller gets it."""
+        return error
+
     async def ask(self, question: Question[ResultT], cost_s: float) -> ResultT:
         """The answer to a question; `cost_s` estimates all that it takes, s of one core."""
-
-    async def series(self, request: SeriesRequest) -> SeriesPast:
-        """Readings of one sensor of one tag, or events, as they were or in buckets."""
+        now = await self.now()
+        try:
+            return await self._in_time(self.past.ask(question, now, cost_s))
+        except NotRemembered as error:
+            raise await self._explain(error) from None
 
     async def writes(self, request: WritesRequest) -> PastWrites:
         """What was heard, scan by scan and look by look, in the order of hearing."""
+        return await self.ask(Itself(request), WRITES_S)
 
-    def rows(
+    async def rows(
         self,
         start_ns: int,
         end_ns: int,
         tag_id: str | None,
         sensor_type: str | None,
         write: Callable[[Sequence[PastRow]], ResultT],
-    ) -> AsyncIterator[ResultT]:
+    ) -> AsyncGenerator[ResultT]:
         """Every reading and failed try of a period, at the pace of whoever takes them.
 
-        They come in lots, each through `write`, which may be called in another process. None: all
-        tags, all sensors.
+        They come in lots, each through `write`, which is called in another process. None: all tags,
+        all sensors.
         """
+        export: bytes | None = pickle.dumps(Export(start_ns, end_ns, tag_id, sensor_type))
+        while export is not None:
+            export, lots = await self.ask(ExportStep(export, write), STRETCH_S)
+            for lot in lots:
+                yield lot
+
+    async def _in_time(self, answer: Awaitable[ResultT]) -> ResultT:
+        try:
+            async with asyncio.timeout(self.timeout_s):
+                return await answer
+        except TimeoutError:
+            raise TwinTimeoutError(
+                f"{self.answerer} did not answer within {self.timeout_s:g} s"
+            ) from None
 
 
 def ailment(source: TwinSource) -> str | None:

@@ -11,19 +11,24 @@ from lupin_twin.core import interfaces
 _LARGEST: Final = 64_000_000
 
 
+def absolute(name: str) -> str:
+    """A ROS name as seen from the root namespace: `a/b` is `/a/b`."""
+    return name if name.startswith("/") else f"/{name}"
+
+
 @dataclass(frozen=True, slots=True)
 class TwinNames:
     """From the root on and after remapping; `field_layers` is what those of fields begin with."""
 
     state_topic: str
     field_service: str
-    observations_topic: str = "/floranova/observations"
-    discovered_tags_topic: str = "/perception/discovered_tags"
-    map_topic: str = "/map"
-    diagnostics_topic: str = "/diagnostics"
-    field_layers: str = "/twin/field/"
-    tags_layer: str = "/twin/tags"
-    planters_layer: str = "/twin/planters"
+    observations_topic: str = absolute(interfaces.OBSERVATIONS.name)
+    discovered_tags_topic: str = absolute(interfaces.DISCOVERED_TAGS.name)
+    map_topic: str = absolute(interfaces.MAP.name)
+    diagnostics_topic: str = absolute(interfaces.DIAGNOSTICS.name)
+    field_layers: str = absolute(interfaces.LAYERS_BELOW)
+    tags_layer: str = absolute(interfaces.TAGS.name)
+    planters_layer: str = absolute(interfaces.PLANTERS.name)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ import asyncio
 import math
 import os
 import time
-from collections.abc import Awaitable, Callable, Coroutine, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from hashlib import blake2b
@@ -15,22 +15,16 @@ from typing import Any, Final, TypeVar
 
 from lupin_bridge.feed import web_node
 from lupin_bridge.feed.followed_log import FollowedLog
-from lupin_bridge.feed.log_reader import LogReader
-from lupin_bridge.feed.past_child import Now
-from lupin_bridge.feed.past_process import PastProcess
-from lupin_bridge.feed.relay import Relay
-from lupin_bridge.feed.relay_ros import RelayRos, names_of
-from lupin_bridge.feed.revisions import RevisedEstimate, RevisionCache, revised
-from lupin_bridge.feed.ros_thread import RosThread
+from lupin_bridge.feed.query import Now
+from lupin_bridge.feed.revisions import RevisedEstimate, revised
+from lupin_bridge.feed.ros_source import RosSource
 from lupin_bridge.feed.shared_work import Shared
 from lupin_bridge.feed.source import (
-    CacheCounts,
     RevisedGrid,
     TwinTimeoutError,
     TwinUnavailableError,
     TwinUpdate,
 )
-from lupin_bridge.feed.topics import TwinNames
 from lupin_bridge.feed.web_node import Service, WebNode
 from lupin_twin.core.history import TagHistory
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
@@ -45,7 +39,7 @@ from lupin_twin.ros import convert_field, convert_past
 from lupin_twin.ros.convert_past import NotAnAnswerError
 from lupin_twin.runtime.estimate_rounds import ADVICE_S, Report, ReportRequest
 from lupin_twin.runtime.memory import journal_path
-from lupin_twin.runtime.workers import SMALL_S, Workers
+from lupin_twin.runtime.workers import SMALL_S
 
 ResultT = TypeVar("ResultT")
 
@@ -54,8 +48,6 @@ ResultT = TypeVar("ResultT")
 MAX_REQUESTS = 4
 
 SERVICE_LOOK_S = 0.02
-# How often who waits for an answer looks whether the twin has fallen silent.
-SILENCE_LOOK_S: Final = 0.2
 
 # ROS time beyond this, in 2001, is that of a wall's clock, and goes on while nobody tells it.
 _A_DATE_NS: Final = 10**18
@@ -65,34 +57,35 @@ _READ_CELL_S: Final = 10e-9
 _READ_TAG_S: Final = 20e-6
 
 
-class WebTwin(LogReader):
+@dataclass(frozen=True, slots=True)
+class _Received:
+    """All that crosses to the loop: the newest update, and what holds now.
+
+    `epoch`, `revision`, the map and the rules are newer than `update` where a map has come since.
+    """
+
+    update: TwinUpdate | None = None
+    epoch: int = 0
+    revision: str = ""
+    occupancy_map: OccupancyMap | None = None
+    rules: FieldRules | None = None
+
+
+class WebTwin(RosSource[WebNode, _Received]):
     """`TwinSource` over the ROS contracts of a twin in another process.
 
     One that was received, and then for `stale_after_s` no more, is asked nothing.
     """
 
     def __init__(
-        self,
-        *,
-        ros_args: Sequence[str],
-        timeout_s: float,
-        stale_after_s: float = math.inf,
+        self, *, ros_args: Sequence[str], timeout_s: float, stale_after_s: float = math.inf
     ) -> None:
-        self._ros_args = ros_args
-        self.timeout_s = timeout_s
+        super().__init__(ros_args=ros_args, timeout_s=timeout_s)
         self._stale_after_s = stale_after_s
-        self.thread: RosThread[WebNode, _Received]
         self._received = _Received()
-        self._rules: FieldRules
-        # The same for as long as the node lives.
-        self._names: TwinNames
-        self.workers = Workers("work")
-        self.relay = Relay(lambda: self.thread, RelayRos())
+        self._frame_id: str
         self._requests: Shared[RevisedGrid] = Shared()
         self._log = FollowedLog(self._rows_behind, self.workers)
-        self.past = PastProcess()
-        self._estimating: Shared[RevisedEstimate] = Shared()
-        self._revisions = RevisionCache()
         self._slots = asyncio.Semaphore(MAX_REQUESTS)
         # One way is left to the small, which would wait behind the large otherwise.
         self._large_slots = asyncio.Semaphore(MAX_REQUESTS - 1)
@@ -107,16 +100,17 @@ class WebTwin(LogReader):
 
             def pass_on(snapshot: Snapshot) -> None:
                 nonlocal update
+                report = node.self_report
                 update = TwinUpdate(
                     snapshot,
                     node.revision,
                     node.twins.value,
                     node.occupancy_map,
-                    node.twin_counts,
+                    report.counts,
                     node.utilities.counts(),
-                    journal=node.journal,
-                    origin=node.origin,
-                    input_problems=node.input_problems,
+                    journal=report.journal,
+                    origin=report.origin,
+                    input_problems=report.input_problems,
                 )
                 post_all()
 
@@ -135,47 +129,25 @@ class WebTwin(LogReader):
                 self._log.on_update(received.update.journal)
                 on_state(received.update)
 
-        self.thread = RosThread(
-            make_node, ros_args=self._ros_args, on_event=on_received, on_death=on_death
-        )
-        await self.thread.start()
-        self._rules, self._names, self._frame_id, folder = await self.thread.call(
-            lambda node: (node.rules, names_of(node), node.parameters.frame_id, _folder(node))
+        await self._start_thread(make_node, on_received, on_death, lambda node: node.rules)
+        self._frame_id, folder = await self.thread.call(
+            lambda node: (node.parameters.frame_id, _folder(node))
         )
         await self._log.start(folder)
-        self.past.start()
 
     async def stop(self) -> None:
-        """Stop the ROS thread, the workers, and the process that looks back."""
+        """See `RosSource`."""
         await self._log.stop()
-        self.workers.close()
-        await asyncio.gather(self.past.stop(), self.thread.stop())
-
-    @property
-    def identity(self) -> str:
-        """None: all replicas, and a restarted one, give the same content the same ETag."""
-        return ""
+        await super().stop()
 
     def revision(self) -> str:
         """A digest of poses and readings, and the map's revision."""
         return self._received.revision
 
-    def rules(self) -> FieldRules:
-        """The twin's parameters for fields, as far as this process was given the same."""
-        return self._rules
-
-    def names(self) -> TwinNames:
-        """The twin's, as ROS resolves and remaps them."""
-        return self._names
-
     def journal(self) -> Condition:
         """The twin's, as far as it is read here; before that, what is said on `/diagnostics`."""
         update = self._received.update
         return self._log.condition or (UNKNOWN if update is None else update.journal)
-
-    def cache_counts(self) -> CacheCounts:
-        """Nothing: the cache is the twin's."""
-        return CacheCounts()
 
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map."""
@@ -230,8 +202,10 @@ class WebTwin(LogReader):
         update = self._received.update
         return 0 if update is None else len(update.snapshot.tags)
 
-    def now(self) -> Now:
+    async def now(self) -> Now:
         """What who looks back has to know of now, and where the log is."""
+        if self._received.update is not None:
+            await self._log.wait()
         condition, update = self._log.condition, self._received.update
         if condition is None:
             raise TwinUnavailableError("the twin's journal is not known here yet")
@@ -245,20 +219,8 @@ class WebTwin(LogReader):
             now_ns += int((time.monotonic() - update.made_s) * NANOSECONDS_PER_SECOND)
         return Now(now_ns, snapshot.frame_id, condition)
 
-    async def _found(self) -> None:
-        if self._received.update is not None:
-            await self._log.wait()
-
-    async def _in_time(self, answer: Awaitable[ResultT]) -> ResultT:
-        try:
-            async with asyncio.timeout(self.timeout_s):
-                return await answer
-        except TimeoutError:
-            raise TwinTimeoutError(
-                f"the answer was not there within {self.timeout_s:g} s (field_timeout_s)"
-            ) from None
-        except NotRemembered as error:
-            raise self._log.explain(error) from None
+    async def _explain(self, error: NotRemembered) -> NotRemembered:
+        return await self._log.explain(error)
 
     async def _rows_behind(self, after: int) -> Lot:
         response = await self._request(
@@ -269,12 +231,10 @@ class WebTwin(LogReader):
     async def _find(self, service: Service) -> None:
         # From here on too: a twin that comes and goes would be a new one for ever.
         until_s = time.monotonic() + web_node.NEW_TWIN_S
-        while not await self.thread.call(lambda node: node.offers(service)):
+        while why := await self.thread.call(lambda node: node.why_not(service)):
             is_new = await self.thread.call(lambda node: node.has_new_twin)
             if not is_new or time.monotonic() > until_s:
-                raise TwinUnavailableError(
-                    await self.thread.call(lambda node: node.why_not(service))
-                )
+                raise TwinUnavailableError(why)
             await asyncio.sleep(SERVICE_LOOK_S)
 
     async def _request(self, service: Service, request: Any, cost_s: float) -> Any:
@@ -285,15 +245,13 @@ class WebTwin(LogReader):
 
         """
         lane = self._large_slots if cost_s > SMALL_S else nullcontext()
+        self._check_live()
         try:
             async with asyncio.timeout(self.timeout_s), lane, self._slots:
-                self._check_live()
                 await self._find(service)
-                return await self._while_live(
-                    self.thread.ask(
-                        lambda node: node.ask(service, request),
-                        lambda node, future: node.forget(service, future),
-                    )
+                return await self.thread.ask(
+                    lambda node: node.ask(service, request),
+                    lambda node, future: node.forget(service, future),
                 )
         except TimeoutError:
             raise TwinTimeoutError(f"the twin did not answer within {self.timeout_s:g} s") from None
@@ -307,17 +265,6 @@ class WebTwin(LogReader):
                 "is the twin running?"
             )
 
-    async def _while_live(self, answer: Coroutine[Any, Any, Any]) -> Any:
-        asking = asyncio.create_task(answer)
-        try:
-            while not asking.done():
-                self._check_live()
-                await asyncio.wait((asking,), timeout=SILENCE_LOOK_S)
-            return asking.result()
-        finally:
-            asking.cancel()
-            await asyncio.wait((asking,))
-
     async def _request_field(self, epoch: int, request: FieldRequest) -> RevisedGrid:
         response = await self._request(
             Service.FIELD,
@@ -325,10 +272,8 @@ class WebTwin(LogReader):
             cost_s(request, self._tags, self._rules),
         )
         _check_ok(response)
-        result = await asyncio.wrap_future(
-            self.workers.submit(
-                lambda _: _revised(response), response.width * response.height * _READ_CELL_S
-            )
+        result = await self._read(
+            lambda: _revised(response), response.width * response.height * _READ_CELL_S
         )
         self._remember(request, epoch, result.revision)
         return result
@@ -357,20 +302,6 @@ class WebTwin(LogReader):
         # Else it was asked for before a change, and nobody knows how long before.
         if epoch == self._received.epoch:
             self._revisions.put(request, epoch, revision)
-
-
-@dataclass(frozen=True, slots=True)
-class _Received:
-    """All that crosses to the loop: the newest update, and what holds now.
-
-    `epoch`, `revision`, the map and the rules are newer than `update` where a map has come since.
-    """
-
-    update: TwinUpdate | None = None
-    epoch: int = 0
-    revision: str = ""
-    occupancy_map: OccupancyMap | None = None
-    rules: FieldRules | None = None
 
 
 def _folder(node: WebNode) -> Path | None:

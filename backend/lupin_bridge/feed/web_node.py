@@ -19,13 +19,11 @@ from lupin_msgs.srv import (
 )
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 
-from lupin_bridge.feed.pairing import Pairing
 from lupin_twin.core import ingest, interfaces
 from lupin_twin.core.clock import StampWatch
-from lupin_twin.core.diagnostics import Origin, SelfReport, self_report
-from lupin_twin.core.drops import Counts, Drop, Reason
+from lupin_twin.core.diagnostics import SelfReport, self_report
+from lupin_twin.core.drops import Drop, Reason
 from lupin_twin.core.history import History, TagHistory
-from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.core.state import Snapshot, TagState
 from lupin_twin.field.engine import FieldRules
@@ -141,7 +139,9 @@ class WebNode(AdjustableNode):
         self._on_state = on_state
         self._on_map = on_map
         self._newest: Snapshot | None = None
-        self._pairing = Pairing()
+        # What came last of each: they belong together where their stamps are the same.
+        self._state: Any = None
+        self._times: Any = None
         self._stamp_watch = StampWatch()
         self._report = SelfReport()
         self._reported_s = -math.inf
@@ -214,32 +214,16 @@ class WebNode(AdjustableNode):
         return time.monotonic() - self._publishers_since_s < NEW_TWIN_S
 
     @property
-    def twin_counts(self) -> Counts | None:
-        """What the twin says that it dropped, lost and met; None: it says nothing."""
-        return self._self_report(time.monotonic()).counts
-
-    @property
-    def journal(self) -> Condition:
-        """What the twin says of its journal."""
-        return self._self_report(time.monotonic()).journal
-
-    @property
-    def origin(self) -> Origin:
-        """Where the twin says that its observations come from."""
-        return self._self_report(time.monotonic()).origin
-
-    @property
-    def input_problems(self) -> tuple[str, ...]:
-        """Why the twin says that it does not hear all."""
-        return self._self_report(time.monotonic()).input_problems
-
-    def offers(self, service: Service) -> bool:
-        """Whether a twin offers it now."""
-        return bool(self.clients_of_twin[service].service_is_ready())
+    def self_report(self) -> SelfReport:
+        """What the twin that is followed said of itself lately."""
+        is_recent = time.monotonic() - self._reported_s < REPORT_HOLDS_S
+        return self._report if is_recent else SelfReport()
 
     def why_not(self, service: Service) -> str:
-        """What is to be said where no twin offers it: its name, and where to look."""
-        if self.offers(Service.FIELD):
+        """What is to be said where no twin offers it; empty: one does."""
+        if self.clients_of_twin[service].service_is_ready():
+            return ""
+        if self.clients_of_twin[Service.FIELD].service_is_ready():
             guess = "is it an older one?"
         elif self.count_publishers(self._topics["state_topic"]):
             guess = "its state is heard, so ask again; or does it have another name there?"
@@ -264,23 +248,31 @@ class WebNode(AdjustableNode):
     # --- callbacks ----------------------------------------------------------------------------
 
     def _take_state(self, msg: Any) -> None:
-        times = self._pairing.take_state(convert.nanoseconds(msg.header.stamp), msg)
-        if times is not None:
-            self._show(msg, times)
-        elif not self.count_publishers(self._topics["times"]):
+        self._state = msg
+        if self._show_pair():
+            return
+        if not self.count_publishers(self._topics["times"]):
             self._show_without_times()
         elif self._patience.is_canceled():
             self._patience.reset()
 
     def _take_times(self, msg: Any) -> None:
-        state = self._pairing.take_times(convert.nanoseconds(msg.header.stamp), msg)
-        if state is not None:
-            self._show(state, msg)
+        self._times = msg
+        self._show_pair()
+
+    def _show_pair(self) -> bool:
+        """Show the state with its times, once both are here: two topics keep no order."""
+        state, times = self._state, self._times
+        if state is None or times is None or state.header.stamp != times.header.stamp:
+            return False
+        self._state = self._times = None
+        self._show(state, times)
+        return True
 
     def _show_without_times(self) -> None:
-        state = self._pairing.give_up_waiting()
-        if state is not None:
-            self._show(state, None)
+        # They may still come.
+        if self._state is not None:
+            self._show(self._state, None)
 
     def _show(self, msg: Any, times: Any) -> None:
         self._patience.cancel()
@@ -292,7 +284,7 @@ class WebNode(AdjustableNode):
             snapshot.stamp_ns,
             now_s,
             ages_are_known=not any(math.isnan(tag.stale_seconds) for tag in msg.tags),
-            reported=self._self_report(now_s).clock,
+            reported=self.self_report.clock,
         )
         snapshot = replace(snapshot, clock=clock)
         if snapshot.has_times:
@@ -360,11 +352,6 @@ class WebNode(AdjustableNode):
         ids = {tag.tag_id for tag in tags}
         self._history.forget_all_but(ids)
         self._digests = {tag_id: kept for tag_id, kept in self._digests.items() if tag_id in ids}
-
-    def _self_report(self, now_s: float) -> SelfReport:
-        """What the twin that is followed said of itself lately."""
-        is_recent = now_s - self._reported_s < REPORT_HOLDS_S
-        return self._report if is_recent else SelfReport()
 
     def _digest_of(self, tags: Sequence[TagState]) -> str:
         total = blake2b(digest_size=12)

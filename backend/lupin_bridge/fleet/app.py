@@ -33,7 +33,7 @@ from lupin_bridge.routes import pages
 from lupin_bridge.routes.answers import NEVER_STORE, error_response, json_response, list_header
 from lupin_bridge.routes.sockets import has_place, next_message
 from lupin_bridge.serving.admission import REVALIDATE, Limits
-from lupin_bridge.serving.middleware import EndsAtShutdown, PieceByPiece, Shutdown
+from lupin_bridge.serving.middleware import PieceByPiece
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.hub import Client, Hub
@@ -81,7 +81,6 @@ class Fleet:
     ) -> None:
         self.watching = Watching(settings, self._on_news)
         self.past = PastProcess("lupin_bridge.fleet.reader")
-        self.shutdown = Shutdown()
         self.hub = Hub(
             settings.max_clients, limits.client_timeout_s, lambda _: Status("live", None)
         )
@@ -96,7 +95,6 @@ class Fleet:
     async def start(self) -> None:
         """Begin to watch the archive."""
         self.watching.start()
-        self.past.start()
         self._tidying = asyncio.create_task(self._tidy(), name="tidy")
 
     async def stop(self) -> None:
@@ -113,7 +111,6 @@ class Fleet:
         """Tell every client that this is about to go."""
         for opened in self._open.values():
             opened.bridge.announce_shutdown()
-        self.shutdown.begin()
 
     # --- the overview -------------------------------------------------------------------------
 
@@ -276,7 +273,6 @@ def create_fleet_app(
     # The last one added is the first to be asked.
     app.add_middleware(Sites, fleet=fleet)
     app.add_middleware(PieceByPiece)
-    app.add_middleware(EndsAtShutdown, shutdown=fleet.shutdown)
     app.add_middleware(ReadOnly)
     app.add_middleware(AccessControl, access=access)
     app.add_middleware(BehindProxies, proxies=proxies)

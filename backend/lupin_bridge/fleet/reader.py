@@ -7,7 +7,6 @@ path of a journal does otherwise.
 from __future__ import annotations
 
 import os
-import socket
 import sqlite3
 from collections.abc import Callable
 from contextlib import suppress
@@ -16,8 +15,8 @@ from typing import Any, Final, TypeVar
 
 from lupin_bridge.archive.database import ArchiveError, explained
 from lupin_bridge.feed import past_child
-from lupin_bridge.feed.past_child import Child, Now, Step
-from lupin_bridge.feed.query import Question, Work
+from lupin_bridge.feed.past_child import Child, Search
+from lupin_bridge.feed.query import Now, Question, Work
 from lupin_bridge.fleet.site_log import SiteConnection, open_archive
 from lupin_bridge.settings import variable
 from lupin_twin.core.history import History, TagHistory
@@ -72,12 +71,10 @@ class OfTag:
 class ArchiveChild(Child):
     """Answers questions about sites."""
 
-    def __init__(self, peer: socket.socket) -> None:
-        super().__init__(peer, ArchiveRecall)
+    def __init__(self) -> None:
+        super().__init__(ArchiveRecall)
 
-    def _search(
-        self, question: Question[Any] | Step | Latest | OfTag, now: Now
-    ) -> Callable[[Any, ShouldStop], Work[Any]]:
+    def _search(self, question: Question[Any] | Latest | OfTag, now: Now) -> Search:
         site = now.condition.path
         if isinstance(question, Latest | OfTag):
             return lambda connection, _: _done(_of_site(SiteConnection(connection, site), question))

@@ -6,20 +6,18 @@ import asyncio
 import contextlib
 import logging
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Final, TypeVar, cast
+from typing import Any, Final, cast
 
-from lupin_bridge.feed.log_reader import LogReader
-from lupin_bridge.feed.past_child import Now
 from lupin_bridge.feed.past_process import PastProcess
+from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.relay import Relay, Ros
 from lupin_bridge.feed.revisions import RevisedEstimate
 from lupin_bridge.feed.shared_work import Shared
 from lupin_bridge.feed.source import (
-    CacheCounts,
     RevisedGrid,
-    TwinTimeoutError,
+    TwinSource,
     TwinUnavailableError,
     TwinUpdate,
 )
@@ -39,7 +37,6 @@ from lupin_twin.runtime.estimate_rounds import Report, ReportRequest
 from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)
-ResultT = TypeVar("ResultT")
 
 HEARTBEAT_S: Final = 1.0
 _RETRY_S: Final = 1.0
@@ -47,8 +44,10 @@ _FIRST_S: Final = 5.0
 _NO_ESTIMATES: Final = "estimates are made by the twin of the greenhouse itself, not of the archive"
 
 
-class SiteTwin(LogReader):
+class SiteTwin(TwinSource):
     """`TwinSource` over a site's log; `past` is the process that reads those of all sites."""
+
+    answerer = "the archive"
 
     def __init__(self, site: str, watching: Watching, past: PastProcess, timeout_s: float) -> None:
         self.site = site
@@ -190,12 +189,6 @@ class SiteTwin(LogReader):
 
     # --- see `TwinSource` ---------------------------------------------------------------------
 
-    identity = ""
-    is_alive = True
-    stuck_s = 0.0
-    calls_waiting = 0
-    callback_errors = 0
-
     def revision(self) -> str:
         """Of what was read: the same in all replicas."""
         return f"{self.site}-{self._seq}"
@@ -211,10 +204,6 @@ class SiteTwin(LogReader):
     def names(self) -> TwinNames:
         """As a twin's are called unless they are renamed; nobody is heard by them here."""
         return TwinNames("/twin/state", "/twin/get_field")
-
-    def cache_counts(self) -> CacheCounts:
-        """Nothing: answers alone are kept."""
-        return CacheCounts()
 
     def journal(self) -> Condition:
         """The site's log."""
@@ -262,7 +251,7 @@ class SiteTwin(LogReader):
         found: TagHistory = await self._in_time(self._reading(OfTag(tag_id)))
         return found
 
-    def now(self) -> Now:
+    async def now(self) -> Now:
         """What who looks back has to know of now."""
         reported = self._reported
         if reported is None:
@@ -273,18 +262,6 @@ class SiteTwin(LogReader):
     async def _reading(self, question: Any) -> Any:
         about = Now(0, self._parameters.frame_id, self._condition(None))
         return await self.past.ask(question, about, 0.0)
-
-    async def _found(self) -> None:
-        """It is where it is."""
-
-    async def _in_time(self, answer: Awaitable[ResultT]) -> ResultT:
-        try:
-            async with asyncio.timeout(self.timeout_s):
-                return await answer
-        except TimeoutError:
-            raise TwinTimeoutError(
-                f"the archive did not answer within {self.timeout_s:g} s"
-            ) from None
 
 
 def _no_ros() -> Any:

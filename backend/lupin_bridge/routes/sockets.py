@@ -34,9 +34,9 @@ from lupin_bridge.field.formats import JSON
 from lupin_bridge.routes.answers import error_response
 from lupin_bridge.routes.field import field_answer
 from lupin_bridge.serving.admission import AdmissionError
-from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection, TooManyMessages
-from lupin_bridge.stream.frames import binary_head, text_frame
-from lupin_bridge.stream.hub import CLOSE_POLICY, CLOSE_TRY_AGAIN_LATER, Client, Hub
+from lupin_bridge.serving.ws_protocol import BINARY, CONNECTION_KEY, Connection, frame_head
+from lupin_bridge.stream.frames import text_frame
+from lupin_bridge.stream.hub import CLOSE_TRY_AGAIN_LATER, Client, Hub
 from lupin_bridge.viewers import foxglove_protocol, foxglove_session
 from lupin_bridge.viewers.foxglove_protocol import SUBPROTOCOLS, Channel
 from lupin_bridge.viewers.rosbridge_protocol import service_failure, service_response
@@ -72,13 +72,6 @@ async def next_message(websocket: WebSocket) -> str | bytes | None:
     return message
 
 
-async def dismiss(websocket: WebSocket, connection: Connection, error: TooManyMessages) -> None:
-    """Close with the reason, and ignore what the client sends until it has gone."""
-    connection.dismiss(CLOSE_POLICY, str(error))
-    while await next_message(websocket) is not None:
-        await asyncio.sleep(0)
-
-
 class _Conversation:
     """One client of a viewer's protocol, until it has gone."""
 
@@ -101,8 +94,6 @@ class _Conversation:
         self._bridge.join(self._client)
         try:
             await self._converse()
-        except TooManyMessages as error:
-            await dismiss(self._websocket, self._connection, error)
         finally:
             self._connection.on_writable = None
             self._bridge.hub.leave(self._client)
@@ -178,7 +169,7 @@ class _FoxgloveConversation(_Conversation):
 
     async def _receive_all(self) -> None:
         while (message := await next_message(self._websocket)) is not None:
-            reaction = self._session.receive(message, time.monotonic())
+            reaction = self._session.receive(message)
             self._stop_listening(reaction)
             for key, channel in reaction.begun:
                 await self._begin(key, channel)
@@ -212,7 +203,7 @@ class _FoxgloveConversation(_Conversation):
     # --- what is written ------------------------------------------------------------------------
 
     def _on_sample(self, key: int, sample: Sample) -> None:
-        note = self._session.put(key, foxglove_session.Message(sample.data, sample.stamp_ns))
+        note = self._session.put(key, sample)
         if note is not None:
             self._due.append(note)
         self._write_all()
@@ -240,7 +231,7 @@ class _FoxgloveConversation(_Conversation):
                 self._write(text_frame(self._due.popleft()))
             elif (message := self._session.next()) is not None:
                 head, payload = message
-                self._write(binary_head(len(head) + len(payload)) + head, payload)
+                self._write(frame_head(BINARY, len(head) + len(payload)) + head, payload)
             else:
                 return
 
@@ -297,7 +288,7 @@ class _RosbridgeConversation(_Conversation):
             call.cancel()
 
     async def _take(self, message: str | bytes) -> None:
-        reaction = self._session.receive(message, time.monotonic())
+        reaction = self._session.receive(message)
         for reply in reaction.replies:
             await self._send(reply)
         if reaction.field_call is not None:

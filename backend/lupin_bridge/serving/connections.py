@@ -40,21 +40,23 @@ _PHRASES: Final = {
     413: "Content Too Large",
     414: "URI Too Long",
     431: "Request Header Fields Too Large",
+    503: "Service Unavailable",
 }
 
 
-def refusal(status: int, detail: str) -> bytes:
+def refusal(status: int, detail: str, *headers: str) -> bytes:
     """A whole HTTP answer (`schema.ErrorMessage`), after which the connection ends."""
     body = orjson.dumps({"detail": detail})
     head = (
-        f"HTTP/1.1 {status} {_PHRASES[status]}\r\n"
-        "Content-Type: application/json\r\n"
-        f"Content-Length: {len(body)}\r\n"
-        "Cache-Control: no-store\r\n"
-        "X-Content-Type-Options: nosniff\r\n"
-        "Connection: close\r\n\r\n"
+        f"HTTP/1.1 {status} {_PHRASES[status]}",
+        "Content-Type: application/json",
+        f"Content-Length: {len(body)}",
+        "Cache-Control: no-store",
+        "X-Content-Type-Options: nosniff",
+        "Connection: close",
+        *headers,
     )
-    return head.encode() + body
+    return "\r\n".join((*head, "", "")).encode() + body
 
 
 # What the kernel may hold that the network has not taken; what is under way does not count. On its

@@ -167,14 +167,24 @@ class HttpConnection(H11Protocol):
         """
         reset(self.transport)
 
+    def end_waiting(self) -> None:
+        """Who waits for an answer is told that none comes; an answer that has begun goes on."""
+        cycle = cast("RequestResponseCycle | None", self.cycle)
+        if cycle is not None and not cycle.response_started:
+            # To the application, its client has left: it ends its work.
+            cycle.disconnected = True
+            cycle.message_event.set()
+            # Whoever restarts services takes about as long.
+            self._refuse(503, "the bridge is shutting down", "Retry-After: 3")
+
     def _should_upgrade(self) -> bool:
         # RFC 9110, section 7.8: an upgrade in HTTP/1.0 is to be ignored.
         return self.scope["http_version"] == "1.1" and super()._should_upgrade()
 
-    def _refuse(self, status: int, detail: str) -> None:
+    def _refuse(self, status: int, detail: str, *headers: str) -> None:
         """Answer, and end; no other answer is under way now."""
         self._is_refused = True
-        self.transport.write(refusal(status, detail))
+        self.transport.write(refusal(status, detail, *headers))
         # Closed at once, with more of the client's still on its way, the connection would be
         # reset, and the answer lost.
         if self.transport.can_write_eof():

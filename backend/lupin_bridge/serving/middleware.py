@@ -1,13 +1,11 @@
-"""ASGI middleware: notes every answer, ends waits at the shutdown, sends large bodies in pieces."""
+"""ASGI middleware: notes every answer, sends large bodies in pieces."""
 
 from __future__ import annotations
 
-import asyncio
 import time
 from collections.abc import Callable, Iterator
 from typing import Final
 
-from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 # Of a body, for a slow reader: the next piece follows when the socket has taken this one.
@@ -53,76 +51,6 @@ class Metered:
             await send(message)
 
         await self._app(scope, receive, send_and_note)
-
-
-# `schema.ErrorMessage`
-BODY = {"detail": "the bridge is shutting down"}
-# Whoever restarts services takes about as long.
-HEADERS = {"Retry-After": "3", "Connection": "close", "Cache-Control": "no-store"}
-
-
-class Shutdown:
-    """The bridge's shutdown, and the requests that it ends. Belongs to the event loop.
-
-    Without it, uvicorn would wait a second for the answers under way and then cancel them, each
-    with a trace in the log and a bare 500.
-    """
-
-    def __init__(self) -> None:
-        self.has_begun = False
-        self._waits: set[asyncio.Timeout] = set()
-
-    def begin(self) -> None:
-        """End every wait, now and from now on."""
-        self.has_begun = True
-        now_s = asyncio.get_running_loop().time()
-        for wait in self._waits:
-            wait.reschedule(now_s)
-        self._waits.clear()
-
-    def watch(self, wait: asyncio.Timeout) -> None:
-        """Let the shutdown end this wait."""
-        self._waits.add(wait)
-
-    def release(self, wait: asyncio.Timeout) -> None:
-        """Let it go on; harmless for one that has ended."""
-        self._waits.discard(wait)
-
-
-class EndsAtShutdown:
-    """A request without an answer at the shutdown gets 503; an answer that has begun goes on."""
-
-    def __init__(self, app: ASGIApp, shutdown: Shutdown) -> None:
-        self._app = app
-        self._shutdown = shutdown
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Wait for the application, or for the shutdown."""
-        if scope["type"] != "http":
-            await self._app(scope, receive, send)
-        elif self._shutdown.has_begun or not await self._answered(scope, receive, send):
-            await JSONResponse(BODY, 503, HEADERS)(scope, receive, send)
-
-    async def _answered(self, scope: Scope, receive: Receive, send: Send) -> bool:
-        wait = asyncio.timeout(None)
-
-        async def send_on(message: Message) -> None:
-            self._shutdown.release(wait)
-            if wait.when() is not None and not wait.expired():
-                wait.reschedule(None)  # the shutdown began just before, and has not come through
-            await send(message)
-
-        try:
-            async with wait:
-                self._shutdown.watch(wait)
-                await self._app(scope, receive, send_on)
-        except TimeoutError:
-            if not wait.expired():
-                raise
-            return False
-        finally:
-            self._shutdown.release(wait)
-        return True
 
 
 def pieces_of(message: Message) -> Iterator[Message]:

@@ -225,8 +225,15 @@ class BridgeServer(uvicorn.Server):
         super().handle_exit(sig, frame)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Tell the clients, then close."""
+        """Tell the clients, then close.
+
+        uvicorn would wait a second for the answers under way and then cancel them, each with a
+        trace in the log and a bare 500.
+        """
         self._announce_shutdown()
+        for connection in list(self.server_state.connections):
+            if isinstance(connection, HttpConnection):
+                connection.end_waiting()
         asyncio.get_running_loop().call_later(CLOSE_AFTER_S, self._cut_off_clients)
         await super().shutdown(sockets)
 

@@ -17,37 +17,9 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.frames import CloseCode, Frame
 from websockets.protocol import State
 
-from lupin_bridge.serving.admission import RateLimit, client_key
+from lupin_bridge.rate_limit import RateLimit
+from lupin_bridge.serving.admission import client_key
 from lupin_bridge.serving.connections import CLOSE_GRACE_S, refusal, tear_down
-
-# A page subscribes a few times as it opens, a layout with twenty panels twenty times, and both
-# hardly ever from then on; more fields than 50 a second nobody gets anyway.
-MAX_MESSAGES_PER_S: Final = 100
-MAX_BURST: Final = 500
-
-
-class TooManyMessages(ValueError):
-    """A client that sends faster than any use of it could need."""
-
-
-class ClientPace:
-    """One client's messages, counted whatever they say."""
-
-    def __init__(self) -> None:
-        self._limit = RateLimit(MAX_MESSAGES_PER_S, MAX_BURST)
-
-    def take(self, now_s: float) -> None:
-        """Count a message at `now_s`, seconds of a clock that never jumps.
-
-        Raises:
-            TooManyMessages: the client has to go.
-
-        """
-        if self._limit.take("", now_s) > 0.0:
-            raise TooManyMessages(
-                f"more than {MAX_MESSAGES_PER_S} messages a second after {MAX_BURST} at once"
-            )
-
 
 # No message that we serve has more than some hundred bytes.
 MAX_MESSAGE_LENGTH: Final = 16_384
@@ -102,6 +74,8 @@ PIECE_BYTES: Final = 131_072
 # A frame's head, perhaps with the beginning of its payload, and what follows it.
 Piece = tuple[bytes, bytes | memoryview]
 
+# The first byte of a whole binary message.
+BINARY: Final = 0x82
 _FIN: Final = 0x80
 _OPCODE: Final = 0x0F
 _CONTINUATION: Final = 0
@@ -121,7 +95,7 @@ def pieces(frame: bytes, rest: bytes = b"") -> Iterator[Piece]:
         for start in range(0, len(part), PIECE_BYTES):
             payload = part[start : start + PIECE_BYTES]
             is_last = part is parts[-1] and start + PIECE_BYTES >= len(part)
-            yield _head(opcode | (_FIN if is_last else 0), len(payload)), payload
+            yield frame_head(opcode | (_FIN if is_last else 0), len(payload)), payload
             opcode = _CONTINUATION
 
 
@@ -129,7 +103,8 @@ def _head_bytes(frame: bytes) -> int:
     return {126: 4, 127: 10}.get(frame[1], 2)
 
 
-def _head(first: int, length: int) -> bytes:
+def frame_head(first: int, length: int) -> bytes:
+    """What stands before so many bytes of payload; a server does not mask (RFC 6455, 5.1)."""
     if length < 126:
         return bytes((first, length))
     if length < 1 << 16:
@@ -140,13 +115,15 @@ def _head(first: int, length: int) -> bytes:
 CONNECTION_KEY = "connection"
 
 # Clients have next to nothing to say, and everybody else waits while a frame of theirs is parsed:
-# 3 ms at a time, of the smallest frames, and a hundredth of a second at once.
+# 3 ms at a time, of the smallest frames. A page subscribes a few times as it opens, a layout with
+# twenty panels twenty times, and both hardly ever from then on; more fields than 50 a second nobody
+# gets anyway.
 READ_BYTES = 8_192
-FRAMES_PER_S = 1_000
-FRAMES_AT_ONCE = 5_000
+FRAMES_PER_S = 100
+FRAMES_AT_ONCE = 500
 # Of one message. The parser bounds what they weigh, and not how many they are: empty ones without
 # an end would be kept, every one.
-MAX_PIECES = 1_000
+MAX_PIECES = 400
 
 
 _READ_BUFFER = memoryview(bytearray(READ_BYTES))
@@ -172,9 +149,7 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         # Since when it is being closed, with time left for its client to read why, s.
         self._closing_since_s: float | None = None
         self.on_writable: Callable[[], None] | None = None
-        self._handshake_deadline: asyncio.TimerHandle | None = None
-        # When all frames received would be through at the allowed rate (ITU-T I.371).
-        self._frames_through_s = 0.0
+        self._pace = RateLimit(FRAMES_PER_S, FRAMES_AT_ONCE)
         # What is left of large messages, for as long as the socket does not take it.
         self._pieces: deque[Piece] = deque()
         self._is_full = False
@@ -195,13 +170,9 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         # An earlier answer over HTTP may still fill the socket. Then HTTP's protocol was notified.
         if self.transport.get_write_buffer_size() > 0:
             self.pause_writing()
-        self._handshake_deadline = self.loop.call_later(
-            self.config.timeout_keep_alive, self._look_for_handshake
-        )
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the connection."""
-        self._end_handshake()
         self._pieces.clear()
         super().connection_lost(exc)
 
@@ -233,16 +204,11 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
 
     def handle_events(self) -> None:
         """Handle the frames that a client has sent, unless it sends too many."""
-        now_s = self.loop.time()
-        through_s = max(self._frames_through_s, now_s) + len(self.conn.events) / FRAMES_PER_S
-        if through_s - now_s <= FRAMES_AT_ONCE / FRAMES_PER_S:
-            self._frames_through_s = through_s
+        if self._pace.take("", self.loop.time(), len(self.conn.events)) == 0.0:
             super().handle_events()
         else:
-            self.transport.pause_reading()
-            self.dismiss(
-                CloseCode.POLICY_VIOLATION,
-                f"sent more than {FRAMES_PER_S} frames a second after {FRAMES_AT_ONCE} at once",
+            self._dismiss_for(
+                f"more than {FRAMES_PER_S} messages a second after {FRAMES_AT_ONCE} at once"
             )
 
     def pause_writing(self) -> None:
@@ -266,8 +232,6 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         uvicorn would take it for one that the application forgot, and log an error for each.
         """
         await super().send(message)
-        if self.handshake_complete:
-            self._end_handshake()
         if self.close_sent:
             self._note_closing()
         if message["type"] == "websocket.http.response.body" and self.close_sent:
@@ -278,10 +242,11 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         if len(self.frames) < MAX_PIECES:
             super().handle_cont(event)
         else:
-            self.transport.pause_reading()
-            self.dismiss(
-                CloseCode.POLICY_VIOLATION, f"sent a message in more than {MAX_PIECES} pieces"
-            )
+            self._dismiss_for(f"sent a message in more than {MAX_PIECES} pieces")
+
+    def _dismiss_for(self, reason: str) -> None:
+        self.transport.pause_reading()
+        self.dismiss(CloseCode.POLICY_VIOLATION, reason)
 
     def handle_ping(self) -> None:
         """Answer a ping, unless its sender does not read: unread answers would only pile up."""
@@ -340,15 +305,6 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
     def _note_closing(self) -> None:
         if self._closing_since_s is None:
             self._closing_since_s = self.loop.time()
-
-    def _end_handshake(self) -> None:
-        if self._handshake_deadline is not None:
-            self._handshake_deadline.cancel()
-            self._handshake_deadline = None
-
-    def _look_for_handshake(self) -> None:
-        self._handshake_deadline = None
-        self.abort()
 
     def _send_close(self) -> None:
         """Write the close frame that the protocol has ready, and end after the grace."""

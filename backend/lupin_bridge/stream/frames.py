@@ -5,7 +5,6 @@ Pure. A frame is written when the first client asks for it, and kept for the oth
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -22,16 +21,6 @@ from lupin_twin.core.state import Snapshot, TagState
 def text_frame(payload: bytes) -> bytes:
     """UTF-8 text as one WebSocket text frame; a server does not mask (RFC 6455, section 5.1)."""
     return Frame(Opcode.TEXT, payload).serialize(mask=False)
-
-
-def binary_head(length: int) -> bytes:
-    """What stands before so many bytes of a binary frame: they need not be copied for it."""
-    frame = Frame(Opcode.BINARY, b"").serialize(mask=False)[:1]
-    if length < 126:
-        return frame + bytes((length,))
-    if length < 1 << 16:
-        return frame + struct.pack("!BH", 126, length)
-    return frame + struct.pack("!BQ", 127, length)
 
 
 def status_frame(status: Status) -> bytes:

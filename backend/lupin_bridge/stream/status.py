@@ -5,7 +5,7 @@ Pure: the time is an argument, seconds of a clock that never jumps.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from lupin_twin.core.diagnostics import Origin
@@ -163,22 +163,17 @@ def _time(stamp_ns: int) -> dict[str, int]:
 
 @dataclass(slots=True)
 class Liveness:
-    """What is known of the twin: when its last state came, and whether the thread still runs.
+    """When the twin's last state came and what it said, and whether the thread still runs.
 
-    `silent_s` is for how long the twin had been silent when that came: what an archive tells.
+    `silent_s` is for how long the twin had been silent when that came: what an archive tells. Of
+    `known` reason and age are those of then.
     """
 
     stale_after_s: float = STALE_AFTER_S
     last_state_s: float | None = None
     silent_s: float = 0.0
-    twin_count: int = 1
-    has_map: bool = False
     clock: ClockState = "running"
-    drops: tuple[Recent, ...] = ()
-    journal: Condition = UNKNOWN
-    outward: tuple[Outward, ...] = ()
-    origin: Origin = "unknown"
-    input_problems: tuple[str, ...] = ()
+    known: Status = Status("never_seen", None)
     thread_dead: bool = False
     shutting_down: bool = False
 
@@ -187,17 +182,7 @@ class Liveness:
         age = None
         if self.last_state_s is not None:
             age = max(0.0, now_s - self.last_state_s) + self.silent_s
-        return Status(
-            self._reason(age),
-            age,
-            self.twin_count,
-            self.has_map,
-            self.drops,
-            self.journal,
-            self.outward,
-            self.origin,
-            self.input_problems,
-        )
+        return replace(self.known, reason=self._reason(age), state_age_s=age)
 
     def _reason(self, age_s: float | None) -> Reason:
         if self.shutting_down:

@@ -18,10 +18,11 @@ from functools import partial
 from itertools import count
 from typing import Final
 
+from lupin_bridge.feed.relay import Sample
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
 from lupin_bridge.feed.topics import Topic, TwinNames, topics_of
 from lupin_bridge.message_schemas import schema_text
-from lupin_bridge.serving.ws_protocol import ClientPace, shown
+from lupin_bridge.serving.ws_protocol import shown
 from lupin_bridge.viewers import foxglove_protocol as protocol
 from lupin_bridge.viewers.foxglove_protocol import MAX_SUBSCRIPTIONS, Channel, Refused, Subscribe
 
@@ -30,14 +31,6 @@ log = logging.getLogger(__name__)
 # The largest message that one client is sent: a map of 4,000 × 4,000 cells has 16 MB, a layer of a
 # million points 20. What waits for one that does not read is one such message.
 MAX_MESSAGE_BYTES: Final = 24_000_000
-
-
-@dataclass(frozen=True, slots=True)
-class Message:
-    """A message on its way: its payload is the relay's own bytes, shared with everybody."""
-
-    payload: bytes
-    stamp_ns: int
 
 
 @dataclass(slots=True)
@@ -62,21 +55,14 @@ class Session:
 
     def __init__(self, counts: Counts) -> None:
         self._counts = counts
-        self._pace = ClientPace()
         self._subscriptions: dict[int, Channel] = {}
         self._advertised: dict[int, Channel] = {}
-        self._waiting: dict[int, Message] = {}
+        self._waiting: dict[int, Sample] = {}
         self._too_large: set[int] = set()
         self._time_ns: int | None = None
 
-    def receive(self, message: str | bytes, now_s: float) -> Reaction:
-        """Take one message from the client.
-
-        Raises:
-            TooManyMessages: the client is to be closed.
-
-        """
-        self._pace.take(now_s)
+    def receive(self, message: str | bytes) -> Reaction:
+        """Take one message from the client."""
         try:
             request = protocol.parse(message)
         except Refused as refused:
@@ -112,17 +98,17 @@ class Session:
         if subscription_id in self._subscriptions:
             self._end(subscription_id)
 
-    def put(self, subscription_id: int, message: Message) -> bytes | None:
+    def put(self, subscription_id: int, sample: Sample) -> bytes | None:
         """A message has come for a subscription; returns a reply, if there is something to say."""
         channel = self._subscriptions.get(subscription_id)
         if channel is None:
             return None
-        if len(message.payload) > MAX_MESSAGE_BYTES:
-            return self._leave_out(channel, len(message.payload))
+        if len(sample.data) > MAX_MESSAGE_BYTES:
+            return self._leave_out(channel, len(sample.data))
         self._counts.skipped += subscription_id in self._waiting
         # Behind the others that wait: one fast channel must not keep them from their turn.
         self._waiting.pop(subscription_id, None)
-        self._waiting[subscription_id] = message
+        self._waiting[subscription_id] = sample
         return None
 
     def put_time(self, stamp_ns: int) -> None:
@@ -138,9 +124,9 @@ class Session:
         if not self._waiting:
             return None
         subscription_id = next(iter(self._waiting))
-        message = self._waiting.pop(subscription_id)
+        sample = self._waiting.pop(subscription_id)
         self._counts.sent += 1
-        return protocol.message_head(subscription_id, message.stamp_ns), message.payload
+        return protocol.message_head(subscription_id, sample.stamp_ns), sample.data
 
     def _subscribe(self, request: Subscribe) -> Reaction:
         begun: list[tuple[int, Channel]] = []
@@ -217,7 +203,7 @@ class Offer:
         self._known: dict[Topic, Channel] = {}
         self._missing: set[str] = set()
         self._followers: dict[Callable[[int | None], None], None] = {}
-        self._following: list[asyncio.Task[None]] = []
+        self._following: asyncio.Task[None] | None = None
         self._looking: asyncio.Task[None] | None = None
 
     @contextmanager
@@ -227,23 +213,19 @@ class Offer:
         Of time that stands, at once: the others have it, and it may never go on.
         """
         self._followers[on_news] = None
-        if self._following:
+        if self._following is not None:
             if self._sent_ns is not None:
                 on_news(self._sent_ns)
         else:
             self._sent_ns = None
-            self._following = [
-                asyncio.create_task(self._keep_looking(), name="foxglove channels"),
-                asyncio.create_task(self._follow_time(), name="foxglove time"),
-            ]
+            self._following = asyncio.create_task(self._follow(), name="foxglove")
         try:
             yield
         finally:
             del self._followers[on_news]
             if not self._followers:
-                for task in self._following:
-                    task.cancel()
-                self._following = []
+                self._following.cancel()
+                self._following = None
 
     async def look(self) -> None:
         """Bring the channels up to date; concurrent callers share one look."""
@@ -286,26 +268,27 @@ class Offer:
             return None
         return Channel(next(self._ids), topic.name, topic.type_name, text)
 
-    async def _keep_looking(self) -> None:
+    async def _follow(self) -> None:
+        loop = asyncio.get_running_loop()
+        look_s = loop.time() + LOOK_S
         while True:
-            await asyncio.sleep(LOOK_S)
+            await asyncio.sleep(TICK_S if self.has_time else LOOK_S)
             try:
-                await self.look()
+                if self.has_time:
+                    await self._tell_time()
+                if loop.time() >= look_s:
+                    look_s = loop.time() + LOOK_S
+                    await self.look()
+            except TwinUnavailableError:
+                continue
             except Exception:  # nobody awaits this task: the next look comes whatever it was
                 log.exception("looking for layers met an error and goes on")
 
-    async def _follow_time(self) -> None:
-        while True:
-            await asyncio.sleep(TICK_S)
-            if not self.has_time:
-                continue
-            try:
-                now_ns = (await self._source.relay.time()).now_ns
-            except TwinUnavailableError:
-                continue
-            if now_ns not in (0, self._sent_ns):  # 0: there is no time yet
-                self._sent_ns = now_ns
-                self._notify(now_ns)
+    async def _tell_time(self) -> None:
+        now_ns = (await self._source.relay.time()).now_ns
+        if now_ns not in (0, self._sent_ns):  # 0: there is no time yet
+            self._sent_ns = now_ns
+            self._notify(now_ns)
 
     def _notify(self, time_ns: int | None) -> None:
         for on_news in list(self._followers):

@@ -20,7 +20,7 @@ from typing import Any, Final
 import numpy as np
 import orjson
 
-from lupin_bridge.feed.topics import TwinNames, topics_of
+from lupin_bridge.feed.topics import TwinNames, absolute, topics_of
 from lupin_bridge.field.query import BOX_NAMES
 from lupin_bridge.serving.ws_protocol import shown
 from lupin_bridge.viewers.rosbridge_protocol import CallService, Refused
@@ -125,11 +125,6 @@ class FieldCall:
 
     call: CallService
     request: FieldRequest
-
-
-def absolute(name: str) -> str:
-    """A ROS name as seen from the root namespace, where rosbridge stands: `a/b` is `/a/b`."""
-    return name if name.startswith("/") else f"/{name}"
 
 
 def is_type(given: str, expected: str) -> bool:

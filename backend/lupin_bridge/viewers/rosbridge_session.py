@@ -19,8 +19,8 @@ from typing import Final
 from lupin_bridge.feed.relay import Bounded, NotRelayedError, Relay, Sample
 from lupin_bridge.feed.shared_work import Shared
 from lupin_bridge.feed.source import TwinUnavailableError
-from lupin_bridge.feed.topics import Topic, TwinNames, topics_of
-from lupin_bridge.serving.ws_protocol import ClientPace, shown
+from lupin_bridge.feed.topics import Topic, TwinNames, absolute, topics_of
+from lupin_bridge.serving.ws_protocol import shown
 from lupin_bridge.stream.frames import StateFrame, text_frame
 from lupin_bridge.viewers.rosbridge_protocol import (
     LEVELS,
@@ -37,7 +37,7 @@ from lupin_bridge.viewers.rosbridge_protocol import (
     service_response,
     status,
 )
-from lupin_bridge.viewers.rosbridge_services import FieldCall, absolute, answer, is_type, json_of
+from lupin_bridge.viewers.rosbridge_services import FieldCall, answer, is_type, json_of
 from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)
@@ -73,7 +73,6 @@ class Session:
     def __init__(self, names: TwinNames) -> None:
         self._names = names
         self._level: Level = "warning"
-        self._pace = ClientPace()
         self._topics = {topic.name: topic for topic in topics_of(names)}
         # By (topic as the client spells it, subscription's id); the last made is the last.
         self._subscriptions: dict[tuple[str, Id], Subscribe] = {}
@@ -114,14 +113,8 @@ class Session:
         """The spellings of the state's topic under which it is wanted."""
         return {name: None for name, _ in self._subscriptions if self._is_state(name)}
 
-    def receive(self, message: str | bytes, now_s: float) -> Reaction:
-        """Take one frame from the client.
-
-        Raises:
-            TooManyMessages: the client is to be closed.
-
-        """
-        self._pace.take(now_s)
+    def receive(self, message: str | bytes) -> Reaction:
+        """Take one frame from the client."""
         try:
             request = parse(message)
             match request:

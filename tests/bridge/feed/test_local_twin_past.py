@@ -25,7 +25,6 @@ from lupin_twin.core.state import Reading, Scan
 from lupin_twin.journal.runs import Clock
 from lupin_twin.ros.node import TwinNode
 from tests.bridge.feed.test_local import SILENT, stage_of
-from tests.support.inprocess import run
 from tests.support.journal import SECOND, kept, scan
 from tests.support.looking import Endless
 from tests.support.waiting import until
@@ -35,54 +34,52 @@ __all__ = ["stage_of"]  # a fixture
 pytestmark = pytest.mark.usefixtures("children_know_the_tests")
 
 
-def test_a_state_as_of_then_is_the_journals(domain: int, stage_of: Callable[..., Any]) -> None:
-    async def test() -> None:
-        async with stage_of() as stage:
+async def test_a_state_as_of_then_is_the_journals(
+    domain: int, stage_of: Callable[..., Any]
+) -> None:
+    async with stage_of() as stage:
 
-            def take(node: TwinNode) -> int:
-                now_ns = node.now_ns()
-                for at_ns, value in ((now_ns - 9, 400.0), (now_ns - 4, 500.0)):
-                    scan = Scan("1", at_ns, (Reading("co2", value),))
-                    assert node.memory.apply(scan, at_ns) is None
-                node.notify_listeners()
-                return now_ns
+        def take(node: TwinNode) -> int:
+            now_ns = node.now_ns()
+            for at_ns, value in ((now_ns - 9, 400.0), (now_ns - 4, 500.0)):
+                scan = Scan("1", at_ns, (Reading("co2", value),))
+                assert node.memory.apply(scan, at_ns) is None
+            node.notify_listeners()
+            return now_ns
 
-            now_ns = await stage.twin.thread.call(take)
-            await until(lambda: stage.twin.journal().written == 2, "both in the journal")
-            past = await stage.twin.state_at(now_ns - 5)
-            assert past.stamp_ns == now_ns - 5
-            assert past.frame_id == "map"
-            assert past.tags[0].readings == (Reading("co2", 400.0, now_ns - 9),)
-            (tag,) = (await stage.twin.state_at(now_ns - 1)).tags
-            assert tag == stage.told[-1].snapshot.tags[0]
-            assert (await stage.twin.state_at(0)).tags == ()
-
-    run(domain, test())
-
-
-def test_series_and_rows_are_the_journals(domain: int, stage_of: Callable[..., Any]) -> None:
-    async def test() -> None:
-        async with stage_of() as stage:
-            twin = stage.twin
-            values = tuple(map(float, range(20)))
-
-            def take(node: TwinNode) -> None:
-                for at_ns, value in enumerate(values, node.now_ns() - 9_000):
-                    node.memory.apply(Scan("1", at_ns, (Reading("co2", value),)), at_ns)
-                node.notify_listeners()
-
-            await twin.thread.call(take)
-            await until(lambda: twin.journal().written == 20, "all in the journal")
-            past = await twin.series(SeriesRequest("1", "co2"))
-            assert past.means == values
-            assert (await twin.series(SeriesRequest(EVERY_TAG, Event.SCANS))).means == (1.0,) * 20
-            lots = [lot async for lot in twin.rows(0, past.end_ns, "1", "co2", list)]
-            assert tuple(row.value for lot in lots for row in lot) == values
-
-    run(domain, test())
+        now_ns = await stage.twin.thread.call(take)
+        await until(lambda: stage.twin.journal().written == 2, "both in the journal")
+        past = await stage.twin.ask(Itself(now_ns - 5), 0.0)
+        assert past.stamp_ns == now_ns - 5
+        assert past.frame_id == "map"
+        assert past.tags[0].readings == (Reading("co2", 400.0, now_ns - 9),)
+        (tag,) = (await stage.twin.ask(Itself(now_ns - 1), 0.0)).tags
+        assert tag == stage.told[-1].snapshot.tags[0]
+        assert (await stage.twin.ask(Itself(0), 0.0)).tags == ()
 
 
-def test_damage_that_is_met_looking_back_has_the_file_set_aside(
+async def test_series_and_rows_are_the_journals(domain: int, stage_of: Callable[..., Any]) -> None:
+    async with stage_of() as stage:
+        twin = stage.twin
+        values = tuple(map(float, range(20)))
+
+        def take(node: TwinNode) -> None:
+            for at_ns, value in enumerate(values, node.now_ns() - 9_000):
+                node.memory.apply(Scan("1", at_ns, (Reading("co2", value),)), at_ns)
+            node.notify_listeners()
+
+        await twin.thread.call(take)
+        await until(lambda: twin.journal().written == 20, "all in the journal")
+        past = await twin.ask(Itself(SeriesRequest("1", "co2")), 0.0)
+        assert past.means == values
+        assert (await twin.ask(Itself(SeriesRequest(EVERY_TAG, Event.SCANS)), 0.0)).means == (
+            1.0,
+        ) * 20
+        lots = [lot async for lot in twin.rows(0, past.end_ns, "1", "co2", list)]
+        assert tuple(row.value for lot in lots for row in lot) == values
+
+
+async def test_damage_that_is_met_looking_back_has_the_file_set_aside(
     domain: int, stage_of: Callable[..., Any], tmp_path: Path
 ) -> None:
     path = tmp_path / "j.sqlite"
@@ -94,81 +91,69 @@ def test_damage_that_is_met_looking_back_has_the_file_set_aside(
     )
     end_ns = begun_ns + 5_000 * SECOND
 
-    async def test() -> None:
-        async with stage_of("--ros-args", "-p", f"journal:={path}") as stage:
-            twin = stage.twin
-            with path.open("r+b") as file:
-                file.seek(path.stat().st_size // 4)
-                file.write(b"\xff" * (path.stat().st_size // 2))
-            with pytest.raises(NotRemembered, match="is damaged") as caught:
-                [lot async for lot in twin.rows(0, end_ns, None, None, len)]
-            assert not caught.value.is_lasting
-            await until(lambda: twin.journal().set_aside, "the damaged file to be set aside")
-            assert Path(twin.journal().set_aside).exists()
-            await until(lambda: twin.journal().state is JournalState.RECORDING, "a new file")
-            assert 0 < sum([lot async for lot in twin.rows(0, end_ns, None, None, len)]) < 5_000
-
-    run(domain, test())
+    async with stage_of("--ros-args", "-p", f"journal:={path}") as stage:
+        twin = stage.twin
+        with path.open("r+b") as file:
+            file.seek(path.stat().st_size // 4)
+            file.write(b"\xff" * (path.stat().st_size // 2))
+        with pytest.raises(NotRemembered, match="is damaged") as caught:
+            [lot async for lot in twin.rows(0, end_ns, None, None, len)]
+        assert not caught.value.is_lasting
+        await until(lambda: twin.journal().set_aside, "the damaged file to be set aside")
+        assert Path(twin.journal().set_aside).exists()
+        await until(lambda: twin.journal().state is JournalState.RECORDING, "a new file")
+        assert 0 < sum([lot async for lot in twin.rows(0, end_ns, None, None, len)]) < 5_000
 
 
-def test_the_future_is_refused(domain: int, stage_of: Callable[..., Any]) -> None:
-    async def test() -> None:
-        async with stage_of(*SILENT) as stage:
-            now_ns = stage.twin.update.snapshot.stamp_ns
-            assert (await stage.twin.state_at(now_ns)).stamp_ns == now_ns
-            # Time goes on between two heartbeats.
-            between_ns = stage.twin.now_ns
-            assert (await stage.twin.state_at(between_ns)).stamp_ns == between_ns > now_ns
-            later_ns = now_ns + 3600 * 10**9
-            with pytest.raises(PastRefused, match=f"at is {seconds(later_ns)} s, later than now"):
-                await stage.twin.state_at(later_ns)
-
-    run(domain, test())
+async def test_the_future_is_refused(domain: int, stage_of: Callable[..., Any]) -> None:
+    async with stage_of(*SILENT) as stage:
+        now_ns = stage.twin.update.snapshot.stamp_ns
+        assert (await stage.twin.ask(Itself(now_ns), 0.0)).stamp_ns == now_ns
+        # Time goes on between two heartbeats.
+        between_ns = stage.twin.now_ns
+        assert (await stage.twin.ask(Itself(between_ns), 0.0)).stamp_ns == between_ns > now_ns
+        later_ns = now_ns + 3600 * 10**9
+        with pytest.raises(PastRefused, match=f"at is {seconds(later_ns)} s, later than now"):
+            await stage.twin.ask(Itself(later_ns), 0.0)
 
 
-def test_a_journal_that_is_off_remembers_for_as_long_as_the_twin_lives(
+async def test_a_journal_that_is_off_remembers_for_as_long_as_the_twin_lives(
     domain: int, stage_of: Callable[..., Any]
 ) -> None:
-    async def test() -> None:
-        async with stage_of("--ros-args", "-p", "journal:=off") as stage:
-            await until(lambda: stage.twin.journal().state == "off", "the journal")
-            folder = Path(stage.twin.journal().path).parent
+    async with stage_of("--ros-args", "-p", "journal:=off") as stage:
+        await until(lambda: stage.twin.journal().state == "off", "the journal")
+        folder = Path(stage.twin.journal().path).parent
 
-            def take(node: TwinNode) -> int:
-                at_ns = node.now_ns()
-                node.memory.apply(Scan("1", at_ns, (Reading("co2", 400.0),)), at_ns)
-                return at_ns
+        def take(node: TwinNode) -> int:
+            at_ns = node.now_ns()
+            node.memory.apply(Scan("1", at_ns, (Reading("co2", 400.0),)), at_ns)
+            return at_ns
 
-            at_ns = await stage.twin.thread.call(take)
-            await until(lambda: stage.twin.journal().written, "the scan")
-            # The source's clock goes on from its last update, a moment behind the node's.
-            await until(lambda: stage.twin.now_ns >= at_ns, "the moment of the scan")
-            [tag] = (await stage.twin.state_at(at_ns)).tags
-            assert tag.readings[0].value == 400.0
-            assert folder.exists()
-        assert not folder.exists()
-
-    run(domain, test())
+        at_ns = await stage.twin.thread.call(take)
+        await until(lambda: stage.twin.journal().written, "the scan")
+        # The source's clock goes on from its last update, a moment behind the node's.
+        await until(lambda: stage.twin.now_ns >= at_ns, "the moment of the scan")
+        [tag] = (await stage.twin.ask(Itself(at_ns), 0.0)).tags
+        assert tag.readings[0].value == 400.0
+        assert folder.exists()
+    assert not folder.exists()
 
 
-def test_an_answer_that_takes_too_long_ends_and_delays_no_observation(
+async def test_an_answer_that_takes_too_long_ends_and_delays_no_observation(
     domain: int, stage_of: Callable[..., Any]
 ) -> None:
     """Meanwhile the ROS thread answers as ever."""
 
-    async def test() -> None:
-        async with stage_of() as stage:
-            await until(lambda: stage.twin.journal().state == "recording", "the journal")
-            await stage.twin.past.ask(Itself(0), stage.twin.now(), 0.0)
-            waiting = asyncio.create_task(stage.twin.ask(Endless(), 0.0))
-            await until(lambda: len(stage.twin.past.asked) == 1, "the question")
-            await stage.record("1", 400.0)
-            assert not waiting.done()
-            stage.twin.timeout_s = 0.1
-            with pytest.raises(TwinTimeoutError, match=r"within 0\.1 s"):
-                await stage.twin.ask(Endless(), 0.0)
-            assert len(stage.twin.past.asked) == 1
-            waiting.cancel()
-            await until(lambda: stage.twin.past.asked == {}, "the end of both")
-
-    run(domain, test())
+    async with stage_of() as stage:
+        await until(lambda: stage.twin.journal().state == "recording", "the journal")
+        await stage.twin.past.ask(Itself(0), await stage.twin.now(), 0.0)
+        waiting = asyncio.create_task(stage.twin.ask(Endless(), 0.0))
+        await until(lambda: len(stage.twin.past.asked) == 1, "the question")
+        await stage.record("1", 400.0)
+        assert not waiting.done()
+        stage.twin.timeout_s = 0.1
+        with pytest.raises(TwinTimeoutError, match=r"within 0\.1 s"):
+            await stage.twin.ask(Endless(), 0.0)
+        assert len(stage.twin.past.asked) == 1
+        waiting.cancel()
+        await until(lambda: stage.twin.past.asked == {}, "the end of both")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import pickle
 import signal
 import sys
-import threading
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -16,35 +16,45 @@ import numpy as np
 import pytest
 
 from lupin_bridge.feed import past_process
-from lupin_bridge.feed.past_child import Now
-from lupin_bridge.feed.past_process import MAX_ASKED, NICENESS, PastProcess
+from lupin_bridge.feed.past_child import NICENESS
+from lupin_bridge.feed.past_process import MAX_ASKED, PastProcess
+from lupin_bridge.feed.query import ExportStep, Now
 from lupin_bridge.past.plans import Answered
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.journal.queries import Export
 from tests.support.domains import ros_env
 from tests.support.journal import NOW, SECOND, kept, scan
 from tests.support.looking import Body, Count, Dying, Endless, Failing, MapCells, Running
 from tests.support.processes import Process
-from tests.support.waiting import PATIENCE_S, until, wait_for
+from tests.support.waiting import until, wait_for
 
 pytestmark = pytest.mark.usefixtures("children_know_the_tests")
 
 NOW_NS = NOW + SECOND
 
 
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    """A journal of one scan."""
-    found = tmp_path / "j.sqlite"
-    kept(found, [scan()])
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A journal of 2,500 scans of one tag."""
+    found = tmp_path_factory.mktemp("past") / "j.sqlite"
+    kept(found, [scan(at_ns=NOW + number) for number in range(2_500)])
     return found
+
+
+@pytest.fixture(scope="module")
+def shared() -> Iterator[tuple[asyncio.Runner, PastProcess]]:
+    """One process for all who only ask, and the loop that it belongs to."""
+    past = PastProcess()
+    with asyncio.Runner() as runner:
+        yield runner, past
+        runner.run(past.stop())
 
 
 @asynccontextmanager
 async def looking_back() -> AsyncIterator[PastProcess]:
     past = PastProcess()
-    past.start()
     try:
         yield past
     finally:
@@ -64,158 +74,78 @@ def is_there(pid: int) -> bool:
     return state != "Z"
 
 
-def test_it_answers_at_a_lower_priority_and_its_bodies_come_as_they_are(path: Path) -> None:
-    async def test() -> None:
-        async with looking_back() as past:
-            assert past.starts == 0, "nothing was asked"
-            assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
-            assert await past.ask(Running(), now(path), 0.0) == (0, NICENESS)
-            for count in (0, 65_536, 65_537, 3_000_000):
-                answered: Answered = await past.ask(Body(count), now(path), 0.0)
-                assert answered.answer is not None
-                assert bytes(answered.answer.body) == b"7" * count
-                assert isinstance(answered.answer.body, memoryview) is (count > 65_536)
-            assert past.starts == 1
-
-    asyncio.run(test())
+Shared = tuple[asyncio.Runner, PastProcess]
 
 
-def test_what_it_meets_is_raised_here(path: Path) -> None:
-    async def test() -> None:
-        async with looking_back() as past:
-            with pytest.raises(PastRefused, match="x is 7, the limit is 6"):
-                await past.ask(Failing("refused"), now(path), 0.0)
-            with pytest.raises(PastRefused, match="later than now"):
-                await past.ask(Count(NOW_NS + 1), now(path), 0.0)
-            with pytest.raises(ZeroDivisionError) as caught:
-                await past.ask(Failing("fault"), now(path), 0.0)
-            assert "in _fail" in caught.value.__notes__[0], "where it was"
-            with pytest.raises(RuntimeError, match=r"LocalError.*nobody's knowledge"):
-                await past.ask(Failing("local"), now(path), 0.0)
-            with pytest.raises(AttributeError, match="Can't pickle"):
-                await past.ask(Failing("unfit"), now(path), 0.0)
-            with pytest.raises(NotRemembered, match="is not there") as missing:
-                await past.ask(Count(1), now(path.with_name("none")), 0.0)
-            assert not missing.value.is_lasting
-            assert past.starts == 1
-
-    asyncio.run(test())
-
-
-def test_what_nobody_waits_for_any_more_ends_there(path: Path) -> None:
-    async def test() -> None:
-        async with looking_back() as past:
-            asking = [
-                asyncio.create_task(past.ask(Endless(), now(path), 0.0)) for _ in range(MAX_ASKED)
-            ]
-            await until(lambda: len(past.asked) == MAX_ASKED, "all of them")
-            with pytest.raises(NotRemembered, match=f"{MAX_ASKED} questions .* the limit"):
-                await past.ask(Running(), now(path), 0.0)
-            asking.pop().cancel()
-            await until(lambda: len(past.asked) < MAX_ASKED, "one to go")
-            running, _ = await past.ask(Running(), now(path), 0.0)
-            assert running <= 3, "those that no thread has taken wait"
-            for asked in asking:
-                asked.cancel()
-            while (await past.ask(Running(), now(path), 0.0))[0]:
-                pass
-            assert past.asked == {}
-
-    asyncio.run(test())
-
-
-def test_one_that_dies_is_told_of_and_started_again(
-    path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+def test_it_answers_at_a_lower_priority_and_its_bodies_come_as_they_are(
+    path: Path, shared: Shared
 ) -> None:
-    monkeypatch.setattr(past_process, "FIRST_WAIT_S", 0.2)
+    runner, past = shared
 
     async def test() -> None:
-        async with looking_back() as past:
-            assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
-            waiting = asyncio.create_task(past.ask(Endless(), now(path), 0.0))
-            await until(lambda: len(past.asked) == 1, "a question")
-            assert past.pid is not None
-            os.kill(past.pid, signal.SIGKILL)
-            with pytest.raises(NotRemembered, match="was killed by SIGKILL") as caught:
-                await waiting
-            assert not caught.value.is_lasting
-            with pytest.raises(NotRemembered, match="is about to be started again"):
-                await past.ask(Count(NOW_NS), now(path), 0.0)
-            await until(lambda: not past.why_down, "the next one")
-            assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
-            with pytest.raises(NotRemembered, match="was killed by SIGABRT"):
-                await past.ask(Dying(), now(path), 0.0)
-            await until(lambda: past._life is not None, "another one")
-            assert past.pid is not None
-            os.kill(past.pid, signal.SIGRTMIN + 6)
-            await until(lambda: bool(past.why_down), "its end")
-            told = [r.getMessage() for r in caplog.records if r.levelno == logging.ERROR]
-            assert told == [
-                "the process that looks back was killed by SIGKILL; it is started in 0.2 s",
-                "the process that looks back was killed by SIGABRT; it is started in 0.4 s",
-                "the process that looks back was killed by signal 40; it is started in 0.8 s",
-            ]
+        assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
+        assert await past.ask(Running(), now(path), 0.0) == (0, NICENESS)
+        for count in (0, 65_536, 65_537, 3_000_000):
+            answered: Answered = await past.ask(Body(count), now(path), 0.0)
+            assert answered.answer is not None
+            assert bytes(answered.answer.body) == b"7" * count
+            assert isinstance(answered.answer.body, memoryview) is (count > 65_536)
+        assert past.starts == 1
 
-    asyncio.run(test())
+    runner.run(test())
 
 
-def test_one_that_cannot_be_started_is_tried_again(
-    path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(past_process, "FIRST_WAIT_S", 0.01)
-    monkeypatch.setattr(sys, "executable", "/nowhere/python")
+def test_what_it_meets_is_raised_here(path: Path, shared: Shared) -> None:
+    runner, past = shared
 
     async def test() -> None:
-        async with looking_back() as past:
-            with pytest.raises(NotRemembered, match="cannot be started"):
-                await past.ask(Count(NOW_NS), now(path), 0.0)
-            await until(lambda: len(caplog.records) > 2, "other tries")
-            monkeypatch.undo()
-            await until(lambda: not past.why_down and past._life is not None, "one that can")
-            assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
+        with pytest.raises(PastRefused, match="x is 7, the limit is 6"):
+            await past.ask(Failing("refused"), now(path), 0.0)
+        with pytest.raises(PastRefused, match="later than now"):
+            await past.ask(Count(NOW_NS + 1), now(path), 0.0)
+        with pytest.raises(ZeroDivisionError) as caught:
+            await past.ask(Failing("fault"), now(path), 0.0)
+        assert "in _fail" in caught.value.__notes__[0], "where it was"
+        with pytest.raises(RuntimeError, match=r"LocalError.*nobody's knowledge"):
+            await past.ask(Failing("local"), now(path), 0.0)
+        with pytest.raises(AttributeError, match="Can't pickle"):
+            await past.ask(Failing("unfit"), now(path), 0.0)
+        with pytest.raises(ValueError, match="no number"):
+            await past.ask(Failing("unreadable"), now(path), 0.0)
+        with pytest.raises(NotRemembered, match="is not there") as missing:
+            await past.ask(Count(1), now(path.with_name("none")), 0.0)
+        assert not missing.value.is_lasting
+        assert past.starts == 1
 
-    asyncio.run(test())
-
-
-def test_one_that_has_ended_meanwhile_is_not_killed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What that would raise would take the place of the word that all is to end."""
-    monkeypatch.setattr(past_process, "_END_S", 0.0)
-
-    async def test() -> None:
-        process = await asyncio.create_subprocess_exec(sys.executable, "-c", "")
-        await process.wait()
-        await past_process._end(process)
-        assert process.returncode == 0
-
-    asyncio.run(test())
+    runner.run(test())
 
 
-def test_the_end_of_one_that_ends_as_it_is_killed_is_not_missed(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.setattr(past_process, "_END_S", 0.0)
-    killed, wait = threading.Event(), os.waitpid
-
-    def late(pid: int, options: int) -> tuple[int, int]:
-        if threading.current_thread() is not threading.main_thread():
-            killed.wait(PATIENCE_S)
-        return wait(pid, options)
-
-    monkeypatch.setattr(os, "waitpid", late)
+def test_what_nobody_waits_for_any_more_ends_there(path: Path, shared: Shared) -> None:
+    runner, past = shared
 
     async def test() -> None:
-        process = await asyncio.create_subprocess_exec(sys.executable, "-c", "exit(7)")
-        # It has ended, and asyncio does not know yet.
-        os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
-        asyncio.get_running_loop().call_later(0.1, killed.set)
-        await past_process._end(process)
-        assert process.returncode == 7
+        asking = [
+            asyncio.create_task(past.ask(Endless(), now(path), 1.0)) for _ in range(MAX_ASKED)
+        ]
+        await until(lambda: len(past.asked) == MAX_ASKED, "all of them")
+        with pytest.raises(NotRemembered, match=f"{MAX_ASKED} questions .* the limit"):
+            await past.ask(Running(), now(path), 0.0)
+        asking.pop().cancel()
+        await until(lambda: len(past.asked) < MAX_ASKED, "one to go")
+        running, _ = await past.ask(Running(), now(path), 0.0)
+        assert running <= 3, "those that no thread has taken wait"
+        for asked in asking:
+            asked.cancel()
+        while (await past.ask(Running(), now(path), 0.0))[0]:
+            pass
+        assert past.asked == {}
 
-    asyncio.run(test())
-    assert caplog.records == []
+    runner.run(test())
 
 
-def test_a_map_is_sent_once(path: Path) -> None:
+def test_a_map_is_sent_once(path: Path, shared: Shared) -> None:
+    runner, past = shared
+
     def a_map(revision: int) -> OccupancyMap:
         return OccupancyMap(
             frame_id="map",
@@ -231,37 +161,74 @@ def test_a_map_is_sent_once(path: Path) -> None:
         )
 
     async def test() -> None:
-        async with looking_back() as past:
-            first, second = a_map(1), a_map(2)
-            cells, over_there = await past.ask(MapCells(first), now(path), 0.0)
-            assert cells == 1_000
-            assert (await past.ask(MapCells(first), now(path), 0.0))[1] == over_there
-            assert (await past.ask(MapCells(second), now(path), 0.0))[0] == 2_000
+        first, second = a_map(1), a_map(2)
+        cells, over_there = await past.ask(MapCells(first), now(path), 0.0)
+        assert cells == 1_000
+        assert (await past.ask(MapCells(first), now(path), 0.0))[1] == over_there
+        assert (await past.ask(MapCells(second), now(path), 0.0))[0] == 2_000
 
-    asyncio.run(test())
+    runner.run(test())
 
 
-def test_an_export_is_read_as_it_is_taken(path: Path) -> None:
-    kept(path, [scan(at_ns=NOW + number) for number in range(2_500)])
-
+def test_an_export_goes_on_where_it_was_in_another_process_too(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     async def test() -> None:
         async with looking_back() as past:
-            rows = past.rows((0, NOW_NS, None, None), len, lambda: now(path))
-            assert await anext(rows) == 1_000
-            assert past.asked == {}, "nobody reads on"
-            assert [count async for count in rows] == [1_000, 500]
-            # One that is given up in the middle, and one that the process does not outlive.
-            broken = past.rows((0, NOW_NS, None, None), len, lambda: now(path))
-            assert await anext(broken) == 1_000
-            given_up = past.rows((0, NOW_NS, None, None), len, lambda: now(path))
-            assert await anext(given_up) == 1_000
-            await given_up.aclose()
-            assert past.pid is not None
-            os.kill(past.pid, signal.SIGKILL)
-            with pytest.raises(NotRemembered):
-                await anext(broken)
+            export: bytes | None = pickle.dumps(Export(0, NOW_NS, None, None))
+            found: list[int] = []
+            while export is not None:
+                export, lots = await past.ask(ExportStep(export, len), now(path), 0.0)
+                found += lots
+                if past.starts == 1:
+                    assert past.pid is not None
+                    os.kill(past.pid, signal.SIGKILL)
+                    await until(lambda: past.pid is None and not past.why_down, "its end")
+            assert (found, past.starts) == ([1_000, 1_000, 500], 2)
 
+    monkeypatch.setattr(past_process, "REST_S", 0.0)
     asyncio.run(test())
+
+
+async def test_one_that_dies_is_told_of_and_started_again(
+    path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(past_process, "REST_S", 0.2)
+
+    async with looking_back() as past:
+        waiting = asyncio.create_task(past.ask(Endless(), now(path), 0.0))
+        await until(lambda: past.pid is not None, "a process")
+        os.kill(past.pid or 0, signal.SIGKILL)
+        with pytest.raises(NotRemembered, match="was killed by SIGKILL") as caught:
+            await waiting
+        assert not caught.value.is_lasting
+        with pytest.raises(NotRemembered, match="is about to be started again"):
+            await past.ask(Count(NOW_NS), now(path), 0.0)
+        await until(lambda: not past.why_down, "the next one")
+        assert past.pid is None, "nobody asked"
+        with pytest.raises(NotRemembered, match="was killed by SIGABRT"):
+            await past.ask(Dying(), now(path), 0.0)
+        await until(lambda: not past.why_down, "another one")
+        assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
+        told = [r.getMessage() for r in caplog.records if r.levelno == logging.ERROR]
+        assert told == [
+            "the process that looks back was killed by SIGKILL",
+            "the process that looks back was killed by SIGABRT",
+        ]
+
+
+async def test_one_that_cannot_be_started_is_tried_again(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(past_process, "REST_S", 0.01)
+
+    async with looking_back() as past:
+        with monkeypatch.context() as nowhere:
+            nowhere.setattr(sys, "executable", "/nowhere/python")
+            with pytest.raises(NotRemembered, match="cannot be started"):
+                await past.ask(Count(NOW_NS), now(path), 0.0)
+        await until(lambda: not past.why_down, "the rest")
+        assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
 
 
 PARENT = """

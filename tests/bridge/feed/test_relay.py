@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 
 from lupin_bridge.feed.relay import (
-    MAX_TOPICS,
     Listening,
     NotRelayedError,
     Relay,
@@ -95,12 +94,14 @@ class Ear:
         self.heard.append(sample.data)
 
 
-def play(scene: Callable[[Ros, Relay], Any], linger_s: float = 3600.0) -> None:
-    async def test() -> None:
-        ros = Ros()
-        await scene(ros, Relay(lambda: ros, ros, linger_s))
+@pytest.fixture
+def ros() -> Ros:
+    return Ros()
 
-    asyncio.run(test())
+
+@pytest.fixture
+def relay(ros: Ros) -> Relay:
+    return Relay(lambda: ros, ros, linger_s=3600.0)
 
 
 async def all_has_ended(ros: Ros, relay: Relay) -> None:
@@ -109,204 +110,150 @@ async def all_has_ended(ros: Ros, relay: Relay) -> None:
     await until(lambda: LIVE.name not in ros.takes, "the end of the last that was closed")
 
 
-def test_all_who_listen_share_one_subscription_and_one_wake_up() -> None:
-    async def scene(ros: Ros, relay: Relay) -> None:
-        assert (ros.subscribed, len(relay)) == ([], 0)
-        ears = [Ear() for _ in range(3)]
-        await asyncio.gather(*(relay.listen(STATE, ear) for ear in ears))
-        await ros.publish(b"1", b"2")
-        assert [ear.heard for ear in ears] == [[b"1", b"2"]] * 3
-        assert (ros.subscribed, ros.wake_ups, len(relay)) == (["/twin/state"], 1, 1)
-        await ros.publish(b"3")
-        assert (ears[0].heard[-1], ros.wake_ups) == (b"3", 2)
-
-    play(scene)
+async def test_all_who_listen_share_one_subscription(ros: Ros, relay: Relay) -> None:
+    assert (ros.subscribed, len(relay)) == ([], 0)
+    ears = [Ear() for _ in range(3)]
+    await asyncio.gather(*(relay.listen(STATE, ear) for ear in ears))
+    await ros.publish(b"1", b"2")
+    assert [ear.heard for ear in ears] == [[b"1", b"2"]] * 3
+    assert (ros.subscribed, ros.wake_ups, len(relay)) == (["/twin/state"], 2, 1)
 
 
-def test_who_comes_late_hears_the_last_of_what_is_latched_and_nothing_else() -> None:
-    async def scene(ros: Ros, relay: Relay) -> None:
-        for topic, expected in ((STATE, [b"2", b"3"]), (LIVE, [])):
-            await relay.listen(topic, Ear())
-            for data in (b"1", b"2", b"3"):
-                await ros.publish(data, topic=topic)
-            late = Ear()
-            await relay.listen(topic, late)
-            assert late.heard == expected
+async def test_who_comes_late_hears_the_last_of_what_is_latched_and_nothing_else(
+    ros: Ros, relay: Relay
+) -> None:
+    for topic, expected in ((STATE, [b"2", b"3"]), (LIVE, [])):
+        await relay.listen(topic, Ear())
+        for data in (b"1", b"2", b"3"):
+            await ros.publish(data, topic=topic)
+        late = Ear()
+        await relay.listen(topic, late)
+        assert late.heard == expected
 
-    play(scene)
 
-
-def test_the_oldest_give_way_within_depth_and_bytes_and_the_too_large_never_comes() -> None:
-    async def scene(ros: Ros, relay: Relay) -> None:
-        ear = Ear()
-        await relay.listen(STATE, ear)
-        await ros.publish(b"1", b"2", b"3")
-        assert (ear.heard, relay.skipped) == ([b"2", b"3"], 1)
-        await ros.publish(b"four", b"fivefi")  # 10 bytes: both
-        assert (ear.heard[2:], relay.skipped) == ([b"four", b"fivefi"], 1)
-        await ros.publish(b"four", b"fivefiv")  # 11
-        assert (ear.heard[4:], relay.skipped) == ([b"fivefiv"], 2)
-        await ros.publish(b"0123456789", b"0123456789a")
-        assert (ear.heard[5:], relay.skipped) == ([b"0123456789"], 3)
+async def test_the_oldest_give_way_within_depth_and_bytes_and_the_too_large_never_comes(
+    ros: Ros, relay: Relay
+) -> None:
+    ear = Ear()
+    await relay.listen(STATE, ear)
+    await ros.publish(b"1", b"2", b"3")
+    assert (ear.heard, relay.skipped) == ([b"2", b"3"], 1)
+    for samples, kept in (
+        ((b"four", b"fivefi"), [b"four", b"fivefi"]),  # 10 bytes: both
+        ((b"four", b"fivefiv"), [b"fivefiv"]),  # 11
+        ((b"0123456789", b"0123456789a"), [b"0123456789"]),
+    ):
+        await ros.publish(*samples)
         late = Ear()
         await relay.listen(STATE, late)
-        assert late.heard == [b"0123456789"]
-
-    play(scene)
-
-
-def test_what_comes_while_it_is_handed_out_is_handed_out_too() -> None:
-    async def scene(ros: Ros, relay: Relay) -> None:
-        heard: list[bytes] = []
-
-        def hear(sample: Sample) -> None:
-            heard.append(sample.data)
-            if sample.data == b"1":
-                ros.takes[STATE.name](Sample(b"2", 2))
-
-        await relay.listen(STATE, hear)
-        await ros.publish(b"1")
-        assert (heard, ros.wake_ups) == ([b"1", b"2"], 2)
-
-    play(scene)
+        assert late.heard == kept
+    assert relay.skipped == 2, "the oldest, and the one that is too large"
 
 
-def test_what_was_left_out_is_counted_for_good() -> None:
-    async def scene(ros: Ros, relay: Relay) -> None:
+async def test_what_comes_while_it_is_handed_out_is_handed_out_too(ros: Ros, relay: Relay) -> None:
+    heard: list[bytes] = []
+
+    def hear(sample: Sample) -> None:
+        heard.append(sample.data)
+        if sample.data == b"1":
+            ros.takes[STATE.name](Sample(b"2", 2))
+
+    await relay.listen(STATE, hear)
+    await ros.publish(b"1")
+    assert (heard, ros.wake_ups) == ([b"1", b"2"], 2)
+
+
+async def test_a_topic_is_heard_until_the_last_has_closed(ros: Ros, relay: Relay) -> None:
+    relay.linger_s = 0.0
+    ear = Ear()
+    first = await relay.listen(STATE, Ear())
+    second = await relay.listen(STATE, ear)
+    first.close()
+    first.close()
+    await all_has_ended(ros, relay)
+    await ros.publish(b"1")
+    assert ear.heard == [b"1"], "however often the first one closes"
+    second.close()
+    await ros.publish(b"2")
+    await until(lambda: not ros.takes, "the end of the subscription")
+    assert (ear.heard, len(relay)) == ([b"1"], 0)
+    await relay.listen(STATE, Ear())
+    assert ros.subscribed == ["/twin/state", "/diagnostics", "/twin/state"]
+
+
+async def test_who_comes_and_goes_makes_no_work_for_ros(ros: Ros, relay: Relay) -> None:
+    gone: list[weakref.ref[Listening]] = []
+    for _ in range(100):
         listening = await relay.listen(STATE, Ear())
-        ros.takes[STATE.name](Sample(bytes(11), 1))
         listening.close()
-        await until(lambda: not len(relay), "its end")
-        assert relay.skipped == 1
-
-    play(scene, linger_s=0.0)
-
-
-def test_a_topic_is_heard_until_the_last_has_closed() -> None:
-    async def scene(ros: Ros, relay: Relay) -> None:
-        ear = Ear()
-        first = await relay.listen(STATE, Ear())
-        second = await relay.listen(STATE, ear)
-        first.close()
-        first.close()
-        await all_has_ended(ros, relay)
-        await ros.publish(b"1")
-        assert ear.heard == [b"1"], "however often the first one closes"
-        second.close()
-        await ros.publish(b"2")
-        await until(lambda: not ros.takes, "the end of the subscription")
-        assert (ear.heard, len(relay)) == ([b"1"], 0)
-        await relay.listen(STATE, Ear())
-        assert ros.subscribed == ["/twin/state", "/diagnostics", "/twin/state"]
-
-    play(scene, linger_s=0.0)
+        gone.append(weakref.ref(listening))
+    del listening
+    await ros.publish(b"1")
+    assert not any(ref() for ref in gone), "nothing is kept of them"
+    ear = Ear()
+    await relay.listen(STATE, ear)
+    assert ear.heard == [b"1"], "it was heard all the while"
+    assert (ros.subscribed, ros.calls, len(relay)) == (["/twin/state"], 1, 1)
 
 
-def test_who_comes_and_goes_makes_no_work_for_ros() -> None:
-    async def scene(ros: Ros, relay: Relay) -> None:
-        gone: list[weakref.ref[Listening]] = []
-        for _ in range(100):
-            listening = await relay.listen(STATE, Ear())
-            listening.close()
-            gone.append(weakref.ref(listening))
-        del listening
-        await ros.publish(b"1")
-        assert not any(ref() for ref in gone), "nothing is kept of them"
-        ear = Ear()
-        await relay.listen(STATE, ear)
-        assert ear.heard == [b"1"], "it was heard all the while"
-        assert (ros.subscribed, ros.calls, len(relay)) == (["/twin/state"], 1, 1)
-
-    play(scene)
+async def test_who_comes_just_in_time_keeps_it(ros: Ros, relay: Relay) -> None:
+    relay.linger_s = 0.0
+    (await relay.listen(STATE, Ear())).close()
+    ear = Ear()
+    await relay.listen(STATE, ear)
+    await all_has_ended(ros, relay)
+    await ros.publish(b"1")
+    assert (ear.heard, ros.subscribed) == ([b"1"], ["/twin/state", "/diagnostics"])
 
 
-def test_who_comes_just_in_time_keeps_it() -> None:
-    async def scene(ros: Ros, relay: Relay) -> None:
-        (await relay.listen(STATE, Ear())).close()
-        ear = Ear()
-        await relay.listen(STATE, ear)
-        await all_has_ended(ros, relay)
-        await ros.publish(b"1")
-        assert (ear.heard, ros.subscribed) == ([b"1"], ["/twin/state", "/diagnostics"])
-
-    play(scene, linger_s=0.0)
-
-
-def test_a_topic_of_no_known_type_is_refused_and_can_be_asked_for_again() -> None:
-    async def scene(ros: Ros, relay: Relay) -> None:
-        for _ in range(2):
-            with pytest.raises(NotRelayedError, match=r"/x cannot be relayed .*'unknown/msg/X'"):
-                await relay.listen(Topic("/x", "unknown/msg/X"), Ear())
-        with pytest.raises(NotRelayedError, match="/x/ cannot be relayed here: ROS takes no such"):
-            await relay.listen(Topic("/x/", "a/msg/B"), Ear())
-        assert len(relay) == 0
-
-    play(scene)
+async def test_a_topic_of_no_known_type_is_refused_and_can_be_asked_for_again(
+    ros: Ros, relay: Relay
+) -> None:
+    for _ in range(2):
+        with pytest.raises(NotRelayedError, match=r"/x cannot be relayed .*'unknown/msg/X'"):
+            await relay.listen(Topic("/x", "unknown/msg/X"), Ear())
+    with pytest.raises(NotRelayedError, match="/x/ cannot be relayed here: ROS takes no such"):
+        await relay.listen(Topic("/x/", "a/msg/B"), Ear())
+    assert len(relay) == 0
 
 
-def test_there_is_room_for_so_many_topics_and_for_one_in_place_of_an_unused() -> None:
-    async def scene(ros: Ros, relay: Relay) -> None:
-        topics = [Topic(f"/t{i}", "a/msg/B") for i in range(MAX_TOPICS + 1)]
-        open_ones = [await relay.listen(topic, Ear()) for topic in topics[:-1]]
-        with pytest.raises(NotRelayedError, match=rf"{MAX_TOPICS} topics .* no room for /t100"):
-            await relay.listen(topics[-1], Ear())
-        open_ones[7].close()
-        await relay.listen(topics[-1], Ear())
-        await until(lambda: "/t7" not in ros.takes, "the unused one's end")
-        assert len(relay) == MAX_TOPICS
-
-    play(scene)
-
-
-def test_one_who_leaves_while_it_opens_spoils_it_for_nobody() -> None:
-    async def scene(ros: Ros, relay: Relay) -> None:
-        ros.gate.clear()
-        ear = Ear()
-        leaving = asyncio.create_task(relay.listen(STATE, Ear()))
-        staying = asyncio.create_task(relay.listen(STATE, ear))
-        await until(lambda: ros.calls, "the subscription on its way, for both")
-        leaving.cancel()
-        await until(leaving.done, "its end")
-        ros.gate.set()
-        await staying
-        await ros.publish(b"1")
-        assert ear.heard == [b"1"]
-
-    play(scene)
+async def test_one_who_leaves_while_it_opens_spoils_it_for_nobody(ros: Ros, relay: Relay) -> None:
+    ros.gate.clear()
+    ear = Ear()
+    leaving = asyncio.create_task(relay.listen(STATE, Ear()))
+    staying = asyncio.create_task(relay.listen(STATE, ear))
+    await until(lambda: ros.calls, "the subscription on its way, for both")
+    leaving.cancel()
+    await until(leaving.done, "its end")
+    ros.gate.set()
+    await staying
+    await ros.publish(b"1")
+    assert ear.heard == [b"1"]
 
 
-def test_a_listener_that_fails_costs_the_others_nothing(caplog: pytest.LogCaptureFixture) -> None:
-    async def scene(ros: Ros, relay: Relay) -> None:
-        def fail(_: Sample) -> None:
-            raise ZeroDivisionError
+async def test_a_listener_that_fails_costs_the_others_nothing(
+    ros: Ros, relay: Relay, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail(_: Sample) -> None:
+        raise ZeroDivisionError
 
-        ear = Ear()
-        await relay.listen(STATE, fail)
-        await relay.listen(STATE, ear)
-        await ros.publish(b"1")
-        assert ear.heard == [b"1"]
-        assert "a listener met an error" in caplog.text
-
-    play(scene)
-
-
-def test_without_its_thread_nothing_is_heard_and_nothing_breaks() -> None:
-    async def scene(ros: Ros, relay: Relay) -> None:
-        listening = await relay.listen(STATE, Ear())
-        ros.has_ended = True
-        listening.close()
-        await until(lambda: len(relay) == 0, "its end")
-        with pytest.raises(TwinUnavailableError):
-            await relay.listen(LIVE, Ear())
-        with pytest.raises(TwinUnavailableError):
-            await relay.published(lambda _name, _type: True)
-
-    play(scene, linger_s=0.0)
+    ear = Ear()
+    await relay.listen(STATE, fail)
+    await relay.listen(STATE, ear)
+    await ros.publish(b"1")
+    assert ear.heard == [b"1"]
+    assert "a listener met an error" in caplog.text
 
 
-def test_what_is_published_is_asked_by_name_and_type() -> None:
-    async def scene(ros: Ros, relay: Relay) -> None:
-        assert await relay.published(lambda name, _type: name != "/a") == {"/b": "a/msg/B"}
-        assert await relay.time() == RosTime(5, is_simulated=True)
-
-    play(scene)
+async def test_without_its_thread_nothing_is_heard_and_nothing_breaks(
+    ros: Ros, relay: Relay
+) -> None:
+    relay.linger_s = 0.0
+    listening = await relay.listen(STATE, Ear())
+    ros.has_ended = True
+    listening.close()
+    await until(lambda: len(relay) == 0, "its end")
+    with pytest.raises(TwinUnavailableError):
+        await relay.listen(LIVE, Ear())
+    with pytest.raises(TwinUnavailableError):
+        await relay.published(lambda _name, _type: True)

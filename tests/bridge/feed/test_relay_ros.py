@@ -12,23 +12,12 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import PointCloud2
 
 from lupin_bridge.feed.relay import NotRelayedError, Relay, Sample
-from lupin_bridge.feed.relay_ros import message_class
 from lupin_bridge.feed.topics import Topic, topics_of
 from lupin_twin.ros import convert
 from tests.bridge.feed.test_source import SOURCES, stage_of
-from tests.support.inprocess import run
 from tests.support.messages import occupancy_grid, scan
 from tests.support.ros import Peer
 from tests.support.waiting import until, until_answered
-
-
-def test_a_message_is_found_by_its_name_and_nothing_else_is() -> None:
-    assert message_class("lupin_msgs/msg/TwinState") is TwinState
-    assert message_class("nav_msgs/msg/OccupancyGrid") is OccupancyGrid
-    assert message_class("diagnostic_msgs/msg/DiagnosticArray") is DiagnosticArray
-    for name in ("", "os/msg/Path", "lupin_msgs/TwinState", "lupin_msgs/msg/__class__", "x/msg/"):
-        with pytest.raises(LookupError, match="there is no message"):
-            message_class(name)
 
 
 async def only_what_is_published_as_wanted(relay: Relay, topic: Topic, domain: int) -> None:
@@ -47,76 +36,73 @@ async def only_what_is_published_as_wanted(relay: Relay, topic: Topic, domain: i
 
 
 @pytest.mark.parametrize("source_type", SOURCES)
-def test_a_twins_topics_come_as_they_are_on_the_wire(domain: int, source_type: type) -> None:
-    async def test() -> None:
-        async with stage_of(source_type, domain) as stage:
-            relay: Relay = stage.source.relay
-            relay.linger_s = 0.0
-            state, observations, discovered, map_, diagnostics = topics_of(stage.source.names())
-            grid, seen = occupancy_grid([[0, 100]]), scan("1", {"co2": 400.0}, stamp_s=5.0)
-            stage.peer.publish_map(grid)
-            stage.peer.observe(seen)
-            await stage.tag("1")
-            assert len(relay) == 0, "nobody has asked"
+async def test_a_twins_topics_come_as_they_are_on_the_wire(domain: int, source_type: type) -> None:
+    async with stage_of(source_type, domain) as stage:
+        relay: Relay = stage.source.relay
+        relay.linger_s = 0.0
+        state, observations, discovered, map_, diagnostics = topics_of(stage.source.names())
+        grid, seen = occupancy_grid([[0, 100]]), scan("1", {"co2": 400.0}, stamp_s=5.0)
+        stage.peer.publish_map(grid)
+        stage.peer.observe(seen)
+        await stage.tag("1")
+        assert len(relay) == 0, "nobody has asked"
 
-            heard: dict[str, list[Sample]] = {}
-            listening = [
-                await relay.listen(topic, heard.setdefault(topic.name, []).append)
-                for topic in (state, observations, map_, diagnostics)
-            ]
-            await until(lambda: all(heard.values()), "a sample of each")
+        heard: dict[str, list[Sample]] = {}
+        listening = [
+            await relay.listen(topic, heard.setdefault(topic.name, []).append)
+            for topic in (state, observations, map_, diagnostics)
+        ]
+        await until(lambda: all(heard.values()), "a sample of each")
 
-            def first(topic: Topic, message_type: Any) -> Any:
-                return deserialize_message(heard[topic.name][0].data, message_type)
+        def first(topic: Topic, message_type: Any) -> Any:
+            return deserialize_message(heard[topic.name][0].data, message_type)
 
-            # Latched, and from before anybody asked.
-            assert first(observations, Observation) == seen
-            assert first(map_, OccupancyGrid) == grid
-            # And as a message, its lengths checked before it is made.
-            assert relay.read(observations, heard[observations.name][0]) == seen
-            for data in (heard[map_.name][0].data[:-1], b"\0" * (map_.max_bytes + 1)):
-                with pytest.raises(ValueError, match="bytes"):
-                    relay.read(map_, Sample(data, 0))
+        # Latched, and from before anybody asked.
+        assert first(observations, Observation) == seen
+        assert first(map_, OccupancyGrid) == grid
+        # And as a message, its lengths checked before it is made.
+        assert relay.read(observations, heard[observations.name][0]) == seen
+        for data in (heard[map_.name][0].data[:-1], b"\0" * (map_.max_bytes + 1)):
+            with pytest.raises(ValueError, match="bytes"):
+                relay.read(map_, Sample(data, 0))
 
-            def newest() -> Any:
-                message: Any = deserialize_message(heard[state.name][-1].data, TwinState)
-                return message if message.tags else None
+        def newest() -> Any:
+            message: Any = deserialize_message(heard[state.name][-1].data, TwinState)
+            return message if message.tags else None
 
-            last = await until(newest, "a state with the tag")
-            assert [tag.tag_id for tag in last.tags] == ["1"]
-            assert first(diagnostics, DiagnosticArray).status
-            came_ns = heard[state.name][-1].stamp_ns
-            assert 0 <= came_ns - convert.nanoseconds(last.header.stamp) < 60e9
+        last = await until(newest, "a state with the tag")
+        assert [tag.tag_id for tag in last.tags] == ["1"]
+        assert first(diagnostics, DiagnosticArray).status
+        came_ns = heard[state.name][-1].stamp_ns
+        assert 0 <= came_ns - convert.nanoseconds(last.header.stamp) < 60e9
 
-            def count(node: Any) -> int:
-                return len(list(node.subscriptions))
+        def count(node: Any) -> int:
+            return len(list(node.subscriptions))
 
-            thread: Any = relay._thread()
-            before = await thread.call(count)
-            for each in listening:
-                each.close()
-            left = before - len(listening)
-            await until_answered(lambda: thread.call(count), "its leaving", lambda it: it == left)
-            assert (len(relay), stage.source.callback_errors) == (0, 0)
+        thread: Any = relay._thread()
+        before = await thread.call(count)
+        for each in listening:
+            each.close()
+        left = before - len(listening)
+        await until_answered(lambda: thread.call(count), "its leaving", lambda it: it == left)
+        assert (len(relay), stage.source.callback_errors) == (0, 0)
 
-            names = stage.source.names()
-            assert (names.field_layers, names.tags_layer, names.planters_layer) == (
-                "/twin/field/",
-                "/twin/tags",
-                "/twin/planters",
-            )
-            assert await relay.published(lambda name, _: name.endswith(("/state", "/times"))) == {
-                "/twin/state": "lupin_msgs/msg/TwinState",
-                "/twin/times": "lupin_msgs/msg/TwinTimes",
-            }
-            await only_what_is_published_as_wanted(relay, discovered, domain)
-            now = await relay.time()
-            assert (now.is_simulated, abs(now.now_ns - came_ns) < 60e9) == (False, True)
-            for topic, said in (
-                (Topic("/a", "sensor_smsgs/msg/A"), "there is no message"),
-                (Topic("/a b", "lupin_msgs/msg/TwinState"), "topic name"),
-            ):
-                with pytest.raises(NotRelayedError, match=said):
-                    await relay.listen(topic, lambda _: None)
-
-    run(domain, test())
+        names = stage.source.names()
+        assert (names.field_layers, names.tags_layer, names.planters_layer) == (
+            "/twin/field/",
+            "/twin/tags",
+            "/twin/planters",
+        )
+        assert await relay.published(lambda name, _: name.endswith(("/state", "/times"))) == {
+            "/twin/state": "lupin_msgs/msg/TwinState",
+            "/twin/times": "lupin_msgs/msg/TwinTimes",
+        }
+        await only_what_is_published_as_wanted(relay, discovered, domain)
+        now = await relay.time()
+        assert (now.is_simulated, abs(now.now_ns - came_ns) < 60e9) == (False, True)
+        for topic, said in (
+            (Topic("/a", "sensor_smsgs/msg/A"), "are not relayed"),
+            (Topic("/a b", "lupin_msgs/msg/TwinState"), "topic name"),
+        ):
+            with pytest.raises(NotRelayedError, match=said):
+                await relay.listen(topic, lambda _: None)

@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.feed import estimates
 from lupin_bridge.feed.estimates import FRESH_S, Reports
 from lupin_twin.runtime.estimate_rounds import ReportRequest
 
@@ -48,19 +47,6 @@ def test_all_who_ask_at_once_and_soon_after_get_one_answer(
         assert await known.of(LIGHT) == 2
         now_s[0] += FRESH_S
         assert await known.of(CO2) == 3
-
-    asyncio.run(test())
-    assert source.asked == ["co2", "light", "co2"]
-
-
-def test_so_many_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(estimates, "MAX_KEPT", 1)
-    source: Any = Source()
-
-    async def test() -> None:
-        known = Reports(source)
-        for request in (CO2, LIGHT, CO2):
-            await known.of(request)
 
     asyncio.run(test())
     assert source.asked == ["co2", "light", "co2"]

@@ -38,59 +38,47 @@ async def waiting(shared: Shared[int], work: Work, *keys: str) -> list[asyncio.T
     return tasks
 
 
-def test_who_asks_for_the_same_gets_the_same_work() -> None:
-    async def test() -> None:
-        shared, work = Shared[int](), Work()
-        tasks = await waiting(shared, work, "a", "a", "b", "a")
-        assert (work.started, len(shared)) == (2, 2)
-        work.may_end.set()
-        assert await asyncio.gather(*tasks) == [1, 1, 2, 1]
-        assert len(shared) == 0
-        assert await shared.get("a", work) == 3, "what is done is not kept"
-
-    asyncio.run(test())
+async def test_who_asks_for_the_same_gets_the_same_work() -> None:
+    shared, work = Shared[int](), Work()
+    tasks = await waiting(shared, work, "a", "a", "b", "a")
+    assert (work.started, len(shared)) == (2, 2)
+    work.may_end.set()
+    assert await asyncio.gather(*tasks) == [1, 1, 2, 1]
+    assert len(shared) == 0
+    assert await shared.get("a", work) == 3, "what is done is not kept"
 
 
-def test_it_lives_while_anyone_waits_and_ends_with_the_last() -> None:
-    async def test() -> None:
-        shared, work = Shared[int](), Work()
-        first, second = await waiting(shared, work, "a", "a")
-        first.cancel()
-        await asyncio.wait([first])
-        assert (first.cancelled(), work.cancelled) == (True, 0)
-        second.cancel()
-        await asyncio.wait([second])
-        await until(lambda: work.cancelled == 1, "the end of the work")
-        assert len(shared) == 0
-
-    asyncio.run(test())
+async def test_it_lives_while_anyone_waits_and_ends_with_the_last() -> None:
+    shared, work = Shared[int](), Work()
+    first, second = await waiting(shared, work, "a", "a")
+    first.cancel()
+    await asyncio.wait([first])
+    assert (first.cancelled(), work.cancelled) == (True, 0)
+    second.cancel()
+    await asyncio.wait([second])
+    await until(lambda: work.cancelled == 1, "the end of the work")
+    assert len(shared) == 0
 
 
-def test_who_comes_as_the_last_one_leaves_gets_work_of_its_own() -> None:
-    async def test() -> None:
-        shared, work = Shared[int](), Work()
-        (leaving,) = await waiting(shared, work, "a")
-        leaving.cancel()
-        await asyncio.sleep(0)  # it has left; the work has not heard of it yet
-        coming = asyncio.create_task(shared.get("a", work))
-        await asyncio.wait([leaving])
-        work.may_end.set()
-        assert await coming == 2
-        assert (work.cancelled, len(shared)) == (1, 0)
-
-    asyncio.run(test())
+async def test_who_comes_as_the_last_one_leaves_gets_work_of_its_own() -> None:
+    shared, work = Shared[int](), Work()
+    (leaving,) = await waiting(shared, work, "a")
+    leaving.cancel()
+    await asyncio.sleep(0)  # it has left; the work has not heard of it yet
+    coming = asyncio.create_task(shared.get("a", work))
+    await asyncio.wait([leaving])
+    work.may_end.set()
+    assert await coming == 2
+    assert (work.cancelled, len(shared)) == (1, 0)
 
 
-def test_an_error_is_everybodys_and_is_not_kept() -> None:
-    async def test() -> None:
-        shared, work = Shared[int](), Work()
-        tasks = await waiting(shared, work, "a", "a")
-        work.failure = MemoryError("too much")
-        work.may_end.set()
-        for task in tasks:
-            with pytest.raises(MemoryError):
-                await task
-        work.failure = None
-        assert await shared.get("a", work) == 2
-
-    asyncio.run(test())
+async def test_an_error_is_everybodys_and_is_not_kept() -> None:
+    shared, work = Shared[int](), Work()
+    tasks = await waiting(shared, work, "a", "a")
+    work.failure = MemoryError("too much")
+    work.may_end.set()
+    for task in tasks:
+        with pytest.raises(MemoryError):
+            await task
+    work.failure = None
+    assert await shared.get("a", work) == 2

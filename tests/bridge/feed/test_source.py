@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -18,7 +17,6 @@ from lupin_bridge.feed.query import Itself
 from lupin_bridge.feed.source import (
     STUCK_AFTER_S,
     TwinSource,
-    TwinTimeoutError,
     TwinUnavailableError,
     TwinUpdate,
     ailment,
@@ -29,7 +27,6 @@ from lupin_twin.core.state import Reading
 from lupin_twin.estimate.engine import EstimateRequest
 from lupin_twin.field.engine import FieldRefused, FieldRequest
 from lupin_twin.runtime.estimate_rounds import ReportRequest
-from tests.support.inprocess import run
 from tests.support.messages import discovered, occupancy_grid, pose, scan
 from tests.support.processes import OFTEN, twin_node
 from tests.support.ros import Peer
@@ -37,29 +34,7 @@ from tests.support.store import S
 from tests.support.waiting import PATIENCE_S, until, until_answered
 
 SOURCES = [LocalTwin, WebTwin]
-MEMBERS = [name for name in vars(TwinSource) if not name.startswith("_")]
 REQUEST = FieldRequest("co2", 0.5, 0.0, 0.0, 3.0, 1.0)
-
-
-@pytest.mark.parametrize("source", SOURCES)
-@pytest.mark.parametrize("name", MEMBERS)
-def test_a_member_is_as_the_protocol_has_it(source: type, name: str) -> None:
-    declared, made = vars(TwinSource)[name], inspect.getattr_static(source, name)
-    assert type(made) is type(declared)
-    if isinstance(declared, property):
-        declared, made = declared.fget, made.fget
-    assert inspect.signature(made) == inspect.signature(declared)
-    assert inspect.iscoroutinefunction(made) == inspect.iscoroutinefunction(declared)
-    assert made.__doc__
-
-
-def test_a_time_out_is_a_kind_of_not_being_there() -> None:
-    assert issubclass(TwinTimeoutError, TwinUnavailableError)
-
-
-def test_when_a_state_was_made_is_no_part_of_what_it_is() -> None:
-    first = TwinUpdate(snapshot=None, revision="r", made_s=1.0)  # type: ignore[arg-type]
-    assert first == TwinUpdate(snapshot=None, revision="r", made_s=2.0)  # type: ignore[arg-type]
 
 
 class Stage:
@@ -112,58 +87,55 @@ async def started(source_type: Any, arguments: Any, peer: Peer) -> AsyncIterator
 
 
 @pytest.mark.parametrize("source_type", SOURCES)
-def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
+async def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
     domain: int, source_type: type
 ) -> None:
-    async def test() -> None:
-        async with stage_of(source_type, domain) as stage:
-            source, peer = stage.source, stage.peer
-            assert source.is_alive
-            assert source.occupancy_map() is None
-            revisions = []
+    async with stage_of(source_type, domain) as stage:
+        source, peer = stage.source, stage.peer
+        assert source.is_alive
+        assert source.occupancy_map() is None
+        revisions = []
 
-            peer.observe(scan("1", {"co2": 400.0}, stamp_s=5.0))
-            revisions.append((await stage.tag("1")).revision)
-            grid = (await source.field(REQUEST)).grid
-            assert (grid.sample_count, math.isnan(grid.values[0])) == (0, True)
+        peer.observe(scan("1", {"co2": 400.0}, stamp_s=5.0))
+        revisions.append((await stage.tag("1")).revision)
+        grid = (await source.field(REQUEST)).grid
+        assert (grid.sample_count, math.isnan(grid.values[0])) == (0, True)
 
-            peer.discover(discovered({"1": pose(0.5, 0.5)}))
-            revisions.append((await stage.tag("1", has_pose=True)).revision)
-            result = await source.field(REQUEST)
-            assert (result.grid.width, result.grid.height, result.grid.sample_count) == (6, 2, 1)
-            assert result.revision == source.field_revision(REQUEST)
-            known = np.array([[True, True, True, True, False, False]] * 2).ravel()
-            np.testing.assert_array_equal(np.isfinite(result.grid.values), known)
-            assert (result.grid.value_min, result.grid.value_max) == (400.0, 400.0)
+        peer.discover(discovered({"1": pose(0.5, 0.5)}))
+        revisions.append((await stage.tag("1", has_pose=True)).revision)
+        result = await source.field(REQUEST)
+        assert (result.grid.width, result.grid.height, result.grid.sample_count) == (6, 2, 1)
+        assert result.revision == source.field_revision(REQUEST)
+        known = np.array([[True, True, True, True, False, False]] * 2).ravel()
+        np.testing.assert_array_equal(np.isfinite(result.grid.values), known)
+        assert (result.grid.value_min, result.grid.value_max) == (400.0, 400.0)
 
-            peer.publish_map(occupancy_grid([[0, 100]]))
-            await until(lambda: source.occupancy_map() is not None, "the map")
-            await until(lambda: stage.told[-1].revision not in revisions, "the map's revision")
-            revisions.append(stage.told[-1].revision)
-            assert len(set(revisions)) == 3
+        peer.publish_map(occupancy_grid([[0, 100]]))
+        await until(lambda: source.occupancy_map() is not None, "the map")
+        await until(lambda: stage.told[-1].revision not in revisions, "the map's revision")
+        revisions.append(stage.told[-1].revision)
+        assert len(set(revisions)) == 3
 
-            # A state's times may come behind it.
-            history = await until_answered(
-                lambda: source.history("1"), "the scan", lambda it: it is not None and it.scans
-            )
-            assert history is not None
-            assert [(scan.stamp_ns, scan.readings[0].value) for scan in history.scans] == [
-                (5_000_000_000, 400.0)
-            ]
-            assert await source.history("nobody") is None
-            assert stage.told[-1].twin_count == 1
-            assert source.names().state_topic == "/twin/state"
-            assert source.rules().max_grid_cells == 1000
-            assert (source.callback_errors, source.calls_waiting) == (0, 0)
-            with pytest.raises(FieldRefused, match="sensor_type is empty"):
-                await source.field(FieldRequest("", 0.5, 0.0, 0.0, 1.0, 1.0))
-        # A thread that has not ended in time is left behind, and ends for itself.
-        await until(lambda: not source.is_alive, "its end")
-        assert stage.deaths == []
-        with pytest.raises(TwinUnavailableError):
-            await source.field(REQUEST)
-
-    run(domain, test())
+        # A state's times may come behind it.
+        history = await until_answered(
+            lambda: source.history("1"), "the scan", lambda it: it is not None and it.scans
+        )
+        assert history is not None
+        assert [(scan.stamp_ns, scan.readings[0].value) for scan in history.scans] == [
+            (5_000_000_000, 400.0)
+        ]
+        assert await source.history("nobody") is None
+        assert stage.told[-1].twin_count == 1
+        assert source.names().state_topic == "/twin/state"
+        assert source.rules().max_grid_cells == 1000
+        assert (source.callback_errors, source.calls_waiting) == (0, 0)
+        with pytest.raises(FieldRefused, match="sensor_type is empty"):
+            await source.field(FieldRequest("", 0.5, 0.0, 0.0, 1.0, 1.0))
+    # A thread that has not ended in time is left behind, and ends for itself.
+    await until(lambda: not source.is_alive, "its end")
+    assert stage.deaths == []
+    with pytest.raises(TwinUnavailableError):
+        await source.field(REQUEST)
 
 
 class Thread:
@@ -190,86 +162,83 @@ def test_a_thread_that_only_a_restart_helps_is_told(
 
 
 @pytest.mark.parametrize("source_type", SOURCES)
-def test_a_source_tells_of_the_past(domain: int, source_type: type) -> None:
-    async def test() -> None:
-        async with stage_of(source_type, domain) as stage:
-            source = stage.source
-            stage.peer.observe(
-                scan("1", {"co2": 400.0}, stamp_s=5.0, at=(0.5, 2.5)),
-                scan("1", {"co2": 500.0, "light": 9.0}, stamp_s=50.0),
-                scan("1", status=2, stamp_s=60.0),
-            )
-            co2 = SeriesRequest("1", "co2")
-            await stage.tag("1")
+async def test_a_source_tells_of_the_past(domain: int, source_type: type) -> None:
+    async with stage_of(source_type, domain) as stage:
+        source = stage.source
+        stage.peer.observe(
+            scan("1", {"co2": 400.0}, stamp_s=5.0, at=(0.5, 2.5)),
+            scan("1", {"co2": 500.0, "light": 9.0}, stamp_s=50.0),
+            scan("1", status=2, stamp_s=60.0),
+        )
+        co2 = SeriesRequest("1", "co2")
+        await stage.tag("1")
 
-            # The last of them is kept.
-            failures = SeriesRequest("*", "~failures", 1, 100 * S)
-            failed = await until_answered(
-                lambda: source.series(failures), "the failure", lambda it: it.stamps_ns
-            )
-            past = await source.series(co2)
-            assert (past.means, past.start_ns) == ((400.0, 500.0), 5 * S)
-            await until(lambda: stage.told[-1].snapshot.stamp_ns >= past.end_ns - 1, "time to pass")
-            assert (failed.stamps_ns, failed.means, failed.bucket_ns) == ((60 * S,), (2.0,), None)
-            counted = await source.series(replace(co2, start_ns=5 * S, end_ns=65 * S, max_points=1))
-            assert (counted.counts, counted.bucket_ns) == ((2,), 60 * S)
+        # The last of them is kept.
+        failures = SeriesRequest("*", "~failures", 1, 100 * S)
+        failed = await until_answered(
+            lambda: source.ask(Itself(failures), 0.0), "the failure", lambda it: it.stamps_ns
+        )
+        past = await source.ask(Itself(co2), 0.0)
+        assert (past.means, past.start_ns) == ((400.0, 500.0), 5 * S)
+        await until(lambda: stage.told[-1].snapshot.stamp_ns >= past.end_ns - 1, "time to pass")
+        assert (failed.stamps_ns, failed.means, failed.bucket_ns) == ((60 * S,), (2.0,), None)
+        few = replace(co2, start_ns=5 * S, end_ns=65 * S, max_points=1)
+        counted = await source.ask(Itself(few), 0.0)
+        assert (counted.counts, counted.bucket_ns) == ((2,), 60 * S)
 
-            then = await source.ask(Itself(49 * S), 0.0)
-            assert (then.stamp_ns, then.frame_id, then.has_times) == (49 * S, "map", True)
-            [tag] = [tag for tag in then.tags if tag.readings]
-            assert tag.readings == (Reading("co2", 400.0, 5 * S),)
-            assert tag.stale_seconds(then.now_ns) == 44.0
-            with pytest.raises(PastRefused, match="later than now"):
-                await source.ask(Itself(2**31 * S - 1), 0.0)
+        then = await source.ask(Itself(49 * S), 0.0)
+        assert (then.stamp_ns, then.frame_id, then.has_times) == (49 * S, "map", True)
+        [tag] = [tag for tag in then.tags if tag.readings]
+        assert tag.readings == (Reading("co2", 400.0, 5 * S),)
+        assert tag.stale_seconds(then.now_ns) == 44.0
+        with pytest.raises(PastRefused, match="later than now"):
+            await source.ask(Itself(2**31 * S - 1), 0.0)
 
-            box = FieldRequest("co2", 0.5, 0.0, 0.0, 3.0, 1.0)
-            result = await source.estimate(EstimateRequest(box, 55 * S))
-            assert (result.estimate.sample_count, result.estimate.reading_count) == (1, 2)
-            assert result.estimate.grid.mean.shape == (2, 6)
-            assert source.estimate_revision(EstimateRequest(box, 55 * S)) == result.revision
-            assert source.estimate_revision(EstimateRequest(box, 54 * S)) is None
-            with pytest.raises(FieldRefused, match="no tag has a reading"):
-                await source.estimate(EstimateRequest(box))
+        box = FieldRequest("co2", 0.5, 0.0, 0.0, 3.0, 1.0)
+        result = await source.estimate(EstimateRequest(box, 55 * S))
+        assert (result.estimate.sample_count, result.estimate.reading_count) == (1, 2)
+        assert result.estimate.grid.mean.shape == (2, 6)
+        assert source.estimate_revision(EstimateRequest(box, 55 * S)) == result.revision
+        assert source.estimate_revision(EstimateRequest(box, 54 * S)) is None
+        with pytest.raises(FieldRefused, match="no tag has a reading"):
+            await source.estimate(EstimateRequest(box))
 
-            report = await source.estimate_report(ReportRequest("co2"))
-            assert (report.fitted_at_ns, report.tags, report.record.since_ns) == (None, (), None)
+        report = await source.estimate_report(ReportRequest("co2"))
+        assert (report.fitted_at_ns, report.tags, report.record.since_ns) == (None, (), None)
 
-            rows = [row async for lot in source.rows(1, 100 * S, None, None, list) for row in lot]
-            assert [(row.stamp_ns, row.sensor, row.status) for row in rows] == [
-                (5 * S, "co2", 0),
-                (50 * S, "co2", 0),
-                (50 * S, "light", 0),
-                (60 * S, "", 2),
-            ]
-            assert {(row.tag_id, row.x, row.y) for row in rows} == {("1", 0.5, 2.5)}
-            assert {row.source for row in rows} == {"test"}
-
-    run(domain, test())
+        rows = [row async for lot in source.rows(1, 100 * S, None, None, list) for row in lot]
+        assert [(row.stamp_ns, row.sensor, row.status) for row in rows] == [
+            (5 * S, "co2", 0),
+            (50 * S, "co2", 0),
+            (50 * S, "light", 0),
+            (60 * S, "", 2),
+        ]
+        assert {(row.tag_id, row.x, row.y) for row in rows} == {("1", 0.5, 2.5)}
+        assert {row.source for row in rows} == {"test"}
 
 
 @pytest.mark.parametrize("source_type", SOURCES)
-def test_a_journal_that_is_off_can_be_asked_too(domain: int, source_type: type) -> None:
-    async def test() -> None:
-        async with stage_of(source_type, domain, "-p", "journal:=off") as stage:
-            source = stage.source
-            stage.peer.observe(
-                scan("1", {"co2": 400.0}, stamp_s=5.0), scan("1", status=2, stamp_s=60.0)
-            )
-            await until(
-                lambda: any(
-                    tag.last_try is not None and tag.last_try.status
-                    for told in stage.told[-1:]
-                    for tag in told.snapshot.tags
-                ),
-                "both",
-            )
-            past = await until_answered(
-                lambda: source.series(SeriesRequest("1", "co2")), "it", lambda it: it.stamps_ns
-            )
-            assert (past.stamps_ns, past.means) == ((5 * S,), (400.0,))
-            scans = await source.series(SeriesRequest("*", "~scans", 1, 100 * S))
-            assert scans.stamps_ns == (5 * S,)
-            [tag] = (await source.ask(Itself(5 * S), 0.0)).tags
-            assert tag.readings[0].value == 400.0
-
-    run(domain, test())
+async def test_a_journal_that_is_off_can_be_asked_too(domain: int, source_type: type) -> None:
+    async with stage_of(source_type, domain, "-p", "journal:=off") as stage:
+        source = stage.source
+        stage.peer.observe(
+            scan("1", {"co2": 400.0}, stamp_s=5.0), scan("1", status=2, stamp_s=60.0)
+        )
+        await until(
+            lambda: any(
+                tag.last_try is not None and tag.last_try.status
+                for told in stage.told[-1:]
+                for tag in told.snapshot.tags
+            ),
+            "both",
+        )
+        past = await until_answered(
+            lambda: source.ask(Itself(SeriesRequest("1", "co2")), 0.0),
+            "it",
+            lambda it: it.stamps_ns,
+        )
+        assert (past.stamps_ns, past.means) == ((5 * S,), (400.0,))
+        scans = await source.ask(Itself(SeriesRequest("*", "~scans", 1, 100 * S)), 0.0)
+        assert scans.stamps_ns == (5 * S,)
+        [tag] = (await source.ask(Itself(5 * S), 0.0)).tags
+        assert tag.readings[0].value == 400.0

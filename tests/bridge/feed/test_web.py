@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import io
 import time
 from collections.abc import AsyncIterator, Iterator, Sized
 from contextlib import asynccontextmanager, contextmanager
@@ -11,24 +10,21 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import httpx
 import numpy as np
 import pytest
 from lupin_msgs.msg import SensorReading, TwinState, TwinTagState
 from lupin_msgs.srv import GetField
 
-from lupin_bridge.feed import revisions
 from lupin_bridge.feed.revisions import REVISION_TTL_S
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.web import MAX_REQUESTS, WebTwin
 from lupin_bridge.feed.web_node import Service as Asked
 from lupin_twin.field.engine import FieldRefused, FieldRequest
 from tests.support.inprocess import run
-from tests.support.live import attached, wait_until_ready
 from tests.support.messages import occupancy_grid, scan
-from tests.support.processes import limits, lupin_twin, twin_node
+from tests.support.processes import twin_node
 from tests.support.ros import Peer
-from tests.support.waiting import until, wait_for
+from tests.support.waiting import until
 
 # A state every 3 s.
 SLOW = ("--ros-args", "-p", "state_publish_rate_hz:=0.33")
@@ -100,60 +96,49 @@ def pending(twin: WebTwin) -> int:
     return len(twin.thread.require_node().clients_of_twin[Asked.FIELD]._pending_requests)
 
 
-def test_without_a_twin_a_field_is_refused_at_once_by_the_services_name(domain: int) -> None:
-    async def test() -> None:
-        async with started() as (twin, _):
-            with pytest.raises(TwinUnavailableError, match="/twin/get_field: is it running"):
-                await twin.field(REQUEST)
-
-    run(domain, test())
+async def test_without_a_twin_a_field_is_refused_at_once_by_the_services_name(domain: int) -> None:
+    async with started() as (twin, _):
+        with pytest.raises(TwinUnavailableError, match="/twin/get_field: is it running"):
+            await twin.field(REQUEST)
 
 
-def test_a_field_and_a_refusal_are_the_services(domain: int) -> None:
-    async def test() -> None:
-        with service_in(domain) as service:
-            async with started() as (twin, _), service.answering():
-                await found(twin)
-                result = await twin.field(REQUEST)
-                np.testing.assert_array_equal(
-                    result.grid.values, np.array([1.0, np.nan], np.float32)
-                )
-                assert (result.grid.width, result.grid.height) == (2, 1)
-                assert service.asked[0].bbox_max_x == 1.0
-                with pytest.raises(FieldRefused, match="not that one"):
-                    await twin.field(replace(REQUEST, sensor_type="refused"))
-                # Nobody's mistake, and it passes.
-                with pytest.raises(TwinUnavailableError, match="32 fields are being computed"):
-                    await twin.field(replace(REQUEST, sensor_type="busy"))
-
-    run(domain, test())
+async def test_a_field_and_a_refusal_are_the_services(domain: int) -> None:
+    with service_in(domain) as service:
+        async with started() as (twin, _), service.answering():
+            await found(twin)
+            result = await twin.field(REQUEST)
+            np.testing.assert_array_equal(result.grid.values, np.array([1.0, np.nan], np.float32))
+            assert (result.grid.width, result.grid.height) == (2, 1)
+            assert service.asked[0].bbox_max_x == 1.0
+            with pytest.raises(FieldRefused, match="not that one"):
+                await twin.field(replace(REQUEST, sensor_type="refused"))
+            # Nobody's mistake, and it passes.
+            with pytest.raises(TwinUnavailableError, match="32 fields are being computed"):
+                await twin.field(replace(REQUEST, sensor_type="busy"))
 
 
-def test_identical_requests_in_flight_are_asked_once_and_a_change_is_asked_for_anew(
+async def test_identical_requests_in_flight_are_asked_once_and_a_change_is_asked_for_anew(
     domain: int,
 ) -> None:
-    async def test() -> None:
-        with service_in(domain) as service:
-            async with started() as (twin, told):
-                await found(twin)
-                first = [asyncio.create_task(twin.field(REQUEST)) for _ in range(10)]
-                await until(lambda: pending(twin), "the request to be on its way")
-                reading = SensorReading(name="co2", value=1.0)
-                state = TwinState(tags=[TwinTagState(tag_id="1", readings=[reading])])
-                service.peer.publish("/twin/state", state, depth=1)
-                await until(lambda: told, "the change")
-                second = [asyncio.create_task(twin.field(REQUEST)) for _ in range(10)]
-                async with service.answering():
-                    old = await asyncio.gather(*first)
-                    new = await asyncio.gather(*second)
-                assert len(service.asked) == 2
-                assert {result.grid.value_max for result in old} == {1.0}
-                assert {result.grid.value_max for result in new} == {2.0}
-                assert len({result.revision for result in old}) == 1
-                assert old[0].revision != new[0].revision
-                assert twin.field_revision(REQUEST) == new[0].revision
-
-    run(domain, test())
+    with service_in(domain) as service:
+        async with started() as (twin, told):
+            await found(twin)
+            first = [asyncio.create_task(twin.field(REQUEST)) for _ in range(10)]
+            await until(lambda: pending(twin), "the request to be on its way")
+            reading = SensorReading(name="co2", value=1.0)
+            state = TwinState(tags=[TwinTagState(tag_id="1", readings=[reading])])
+            service.peer.publish("/twin/state", state, depth=1)
+            await until(lambda: told, "the change")
+            second = [asyncio.create_task(twin.field(REQUEST)) for _ in range(10)]
+            async with service.answering():
+                old = await asyncio.gather(*first)
+                new = await asyncio.gather(*second)
+            assert len(service.asked) == 2
+            assert {result.grid.value_max for result in old} == {1.0}
+            assert {result.grid.value_max for result in new} == {2.0}
+            assert len({result.revision for result in old}) == 1
+            assert old[0].revision != new[0].revision
+            assert twin.field_revision(REQUEST) == new[0].revision
 
 
 def state_of(value: float, seconds: int = 0) -> TwinState:
@@ -167,111 +152,81 @@ def has_more_than(things: Sized, number: int) -> bool:
     return len(things) > number
 
 
-def test_an_answer_stands_for_the_field_until_something_else_is_heard(
+async def test_an_answer_stands_for_the_field_until_something_else_is_heard(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    async def test() -> None:
-        with service_in(domain) as service:
-            async with started() as (twin, told), service.answering():
-                await found(twin)
-                assert twin.field_revision(REQUEST) is None, "nothing was answered yet"
-                service.peer.publish("/twin/state", state_of(1.0), depth=1)
-                await until(lambda: told, "a state")
-                first = await twin.field(REQUEST)
-                assert twin.field_revision(REQUEST) == first.revision
-                assert twin.field_revision(replace(REQUEST, resolution=0.25)) is None
-                # The service knows more by now than any state has told: another answer.
-                second = await twin.field(REQUEST)
-                assert second.revision != first.revision
-                assert twin.field_revision(REQUEST) == second.revision
-                # A value that comes back to what it was is a change all the same.
-                for value in (2.0, 1.0):
-                    before = len(told)
-                    service.peer.publish("/twin/state", state_of(value), depth=1)
-                    await until(partial(has_more_than, told, before), "the change")
-                    assert twin.field_revision(REQUEST) is None
-                assert told[-1].revision == told[0].revision
-                # And there are changes that no state tells.
-                await twin.field(REQUEST)
-                now_s = time.monotonic()
-                monkeypatch.setattr(time, "monotonic", lambda: now_s + REVISION_TTL_S + 1.0)
-                assert twin.field_revision(REQUEST) is None
-
-    run(domain, test())
-
-
-def test_a_map_alone_ends_what_stood_and_is_no_sign_of_life(domain: int) -> None:
-    async def test() -> None:
-        with service_in(domain) as service:
-            async with started() as (twin, told), service.answering():
-                await found(twin)
-                service.peer.publish("/twin/state", state_of(1.0), depth=1)
-                await until(lambda: told and twin.revision() == told[-1].revision, "a state")
-                await twin.field(REQUEST)
-                assert twin.field_revision(REQUEST) is not None
+    with service_in(domain) as service:
+        async with started() as (twin, told), service.answering():
+            await found(twin)
+            assert twin.field_revision(REQUEST) is None, "nothing was answered yet"
+            service.peer.publish("/twin/state", state_of(1.0), depth=1)
+            await until(lambda: told, "a state")
+            first = await twin.field(REQUEST)
+            assert twin.field_revision(REQUEST) == first.revision
+            assert twin.field_revision(replace(REQUEST, resolution=0.25)) is None
+            # The service knows more by now than any state has told: another answer.
+            second = await twin.field(REQUEST)
+            assert second.revision != first.revision
+            assert twin.field_revision(REQUEST) == second.revision
+            # A value that comes back to what it was is a change all the same.
+            for value in (2.0, 1.0):
                 before = len(told)
-                service.peer.publish_map(occupancy_grid([[0, 100]]))
-                await until(lambda: twin.occupancy_map() is not None, "the map")
+                service.peer.publish("/twin/state", state_of(value), depth=1)
+                await until(partial(has_more_than, told, before), "the change")
                 assert twin.field_revision(REQUEST) is None
-                assert twin.revision() != told[-1].revision
-                assert len(told) == before
+            assert told[-1].revision == told[0].revision
+            # And there are changes that no state tells.
+            await twin.field(REQUEST)
+            now_s = time.monotonic()
+            monkeypatch.setattr(time, "monotonic", lambda: now_s + REVISION_TTL_S + 1.0)
+            assert twin.field_revision(REQUEST) is None
 
-    run(domain, test())
+
+async def test_a_map_alone_ends_what_stood_and_is_no_sign_of_life(domain: int) -> None:
+    with service_in(domain) as service:
+        async with started() as (twin, told), service.answering():
+            await found(twin)
+            service.peer.publish("/twin/state", state_of(1.0), depth=1)
+            await until(lambda: told and twin.revision() == told[-1].revision, "a state")
+            await twin.field(REQUEST)
+            assert twin.field_revision(REQUEST) is not None
+            before = len(told)
+            service.peer.publish_map(occupancy_grid([[0, 100]]))
+            await until(lambda: twin.occupancy_map() is not None, "the map")
+            assert twin.field_revision(REQUEST) is None
+            assert twin.revision() != told[-1].revision
+            assert len(told) == before
 
 
-def test_an_answer_that_came_after_a_change_stands_for_nothing(domain: int) -> None:
+async def test_an_answer_that_came_after_a_change_stands_for_nothing(domain: int) -> None:
     """It may be from before: nobody knows, and a 304 by it would be a lie."""
 
-    async def test() -> None:
-        with service_in(domain) as service:
-            async with started() as (twin, told):
-                await found(twin)
-                asked = asyncio.create_task(twin.field(REQUEST))
-                await until(lambda: pending(twin), "the request to be on its way")
-                service.peer.publish("/twin/state", state_of(1.0), depth=1)
-                await until(lambda: told, "the change")
-                async with service.answering():
-                    await asked
-                assert twin.field_revision(REQUEST) is None
-
-    run(domain, test())
+    with service_in(domain) as service:
+        async with started() as (twin, told):
+            await found(twin)
+            asked = asyncio.create_task(twin.field(REQUEST))
+            await until(lambda: pending(twin), "the request to be on its way")
+            service.peer.publish("/twin/state", state_of(1.0), depth=1)
+            await until(lambda: told, "the change")
+            async with service.answering():
+                await asked
+            assert twin.field_revision(REQUEST) is None
 
 
-def test_so_many_answers_stand_and_the_oldest_goes_first(
-    domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(revisions, "MAX_REVISIONS", 2)
-
-    async def test() -> None:
-        with service_in(domain) as service:
-            async with started() as (twin, _), service.answering():
-                await found(twin)
-                requests = [FieldRequest("co2", 0.5, 0.0, 0.0, 1.0, n) for n in (1, 2, 3)]
-                for request in requests:
-                    await twin.field(request)
-                known = [twin.field_revision(request) is not None for request in requests]
-                assert known == [False, True, True]
-
-    run(domain, test())
-
-
-def test_a_small_field_does_not_wait_behind_large_ones(domain: int) -> None:
-    async def test() -> None:
-        with service_in(domain) as service:
-            async with started() as (twin, told):
-                await found(twin)
-                tags = [TwinTagState(tag_id=f"{number}") for number in range(50)]
-                service.peer.publish("/twin/state", TwinState(tags=tags), depth=1)
-                await until(lambda: told, "as many tags as make a field dear")
-                large = [FieldRequest("co2", 0.002, n, 0.0, n + 2.0, 1.0) for n in range(8)]
-                tasks = [asyncio.create_task(twin.field(request)) for request in large]
-                await until(lambda: pending(twin) == MAX_REQUESTS - 1, "large ones on their way")
-                small = asyncio.create_task(twin.field(REQUEST))
-                await until(lambda: pending(twin) == MAX_REQUESTS, "the small one beside them")
-                async with service.answering():
-                    await asyncio.gather(small, *tasks)
-
-    run(domain, test())
+async def test_a_small_field_does_not_wait_behind_large_ones(domain: int) -> None:
+    with service_in(domain) as service:
+        async with started() as (twin, told):
+            await found(twin)
+            tags = [TwinTagState(tag_id=f"{number}") for number in range(50)]
+            service.peer.publish("/twin/state", TwinState(tags=tags), depth=1)
+            await until(lambda: told, "as many tags as make a field dear")
+            large = [FieldRequest("co2", 0.002, n, 0.0, n + 2.0, 1.0) for n in range(8)]
+            tasks = [asyncio.create_task(twin.field(request)) for request in large]
+            await until(lambda: pending(twin) == MAX_REQUESTS - 1, "large ones on their way")
+            small = asyncio.create_task(twin.field(REQUEST))
+            await until(lambda: pending(twin) == MAX_REQUESTS, "the small one beside them")
+            async with service.answering():
+                await asyncio.gather(small, *tasks)
 
 
 # --- one tag, one field: with a real twin, while observations come -------------------------------
@@ -304,79 +259,24 @@ def test_two_fields_of_a_real_twin_never_have_one_revision(domain: int) -> None:
         run(domain, test(peer))
 
 
-def test_one_tag_never_covers_two_fields_and_no_stale_one_is_confirmed(domain: int) -> None:
-    """A twin that tells its state every 3 s, and answers GetField from what it has by then."""
-    box = {"bbox_min_x": 0.0, "bbox_min_y": 0.0, "bbox_max_x": 2.0, "bbox_max_y": 2.0}
-    query: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.5, **box}
-    with (
-        twin_node(domain, *SLOW),
-        lupin_twin(domain, "web", *limits(answers_per_s=10_000)) as process,
-        Peer(domain) as peer,
-        attached(process, peer) as live,
-    ):
-        wait_until_ready(live)
-        peer.observe(scan("1", {"co2": 0.0}, at=(1.0, 1.0)))
-        live.tag("1")
-        wait_for(lambda: live.get("/api/field", **query).status_code == 200, "the service")
-        bodies: dict[str, bytes] = {}
-
-        def ask(suffix: str, known: str | None = None) -> httpx.Response:
-            headers = {} if known is None else {"If-None-Match": known}
-            answer = live.get(f"/api/field.{suffix}", headers, **query)
-            if answer.status_code == 304:
-                assert known == answer.headers["etag"]
-            else:
-                assert answer.status_code == 200
-                tag = answer.headers["etag"]
-                assert bodies.setdefault(tag, answer.content) == answer.content, (
-                    "one tag, one field"
-                )
-            return answer
-
-        def twin_has(value: float) -> bool:
-            return bool(peer.get_field(**query).value_max == value)
-
-        def is_at(value: float, tag: Any) -> bool:
-            return bool(tag["readings"][0]["value"] == value)
-
-        for value in range(1, 4):
-            before = ask("json")
-            peer.observe(scan("1", {"co2": float(value)}))
-            wait_for(partial(twin_has, value), "the twin to have it")
-            # Asked in another format, nobody has answered it since: the twin's own word of now.
-            fresh = ask("npy")
-            assert np.nanmax(np.load(io.BytesIO(fresh.content))) in (value, value - 1)
-            ask("json")
-            live.tag("1", partial(is_at, value))
-            after = ask("json", before.headers["etag"])
-            assert (after.status_code, after.json()["value_max"]) == (200, value), "not confirmed"
-            assert ask("json", after.headers["etag"]).status_code == 304
+async def test_only_so_many_requests_are_on_their_way_at_once(domain: int) -> None:
+    with service_in(domain) as service:
+        async with started() as (twin, _):
+            await found(twin)
+            requests = [FieldRequest("co2", 0.5, 0.0, 0.0, 1.0, n) for n in range(1, 11)]
+            tasks = [asyncio.create_task(twin.field(request)) for request in requests]
+            await until(lambda: pending(twin) >= MAX_REQUESTS, "requests to be on their way")
+            assert pending(twin) == MAX_REQUESTS
+            async with service.answering():
+                await asyncio.gather(*tasks)
+            assert len(service.asked) == 10
+            await until(lambda: pending(twin) == 0, "all of them to be forgotten")
 
 
-def test_only_so_many_requests_are_on_their_way_at_once(domain: int) -> None:
-    async def test() -> None:
-        with service_in(domain) as service:
-            async with started() as (twin, _):
-                await found(twin)
-                requests = [FieldRequest("co2", 0.5, 0.0, 0.0, 1.0, n) for n in range(1, 11)]
-                tasks = [asyncio.create_task(twin.field(request)) for request in requests]
-                await until(lambda: pending(twin) >= MAX_REQUESTS, "requests to be on their way")
-                assert pending(twin) == MAX_REQUESTS
-                async with service.answering():
-                    await asyncio.gather(*tasks)
-                assert len(service.asked) == 10
-                await until(lambda: pending(twin) == 0, "all of them to be forgotten")
-
-    run(domain, test())
-
-
-def test_a_twin_that_does_not_answer_in_time_is_given_up(domain: int) -> None:
-    async def test() -> None:
-        with service_in(domain):
-            async with started(timeout_s=0.3) as (twin, _):
-                await found(twin)
-                with pytest.raises(TwinTimeoutError, match=r"within 0\.3 s"):
-                    await twin.field(REQUEST)
-                await until(lambda: not pending(twin), "the request to be forgotten")
-
-    run(domain, test())
+async def test_a_twin_that_does_not_answer_in_time_is_given_up(domain: int) -> None:
+    with service_in(domain):
+        async with started(timeout_s=0.3) as (twin, _):
+            await found(twin)
+            with pytest.raises(TwinTimeoutError, match=r"within 0\.3 s"):
+                await twin.field(REQUEST)
+            await until(lambda: not pending(twin), "the request to be forgotten")

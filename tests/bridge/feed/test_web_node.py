@@ -147,15 +147,6 @@ def test_the_revision_changes_with_poses_and_readings_and_with_nothing_else(
     assert stage.node.revision == revisions[-1]
 
 
-def test_all_replicas_have_the_same_revision_of_the_same_state(domain: int, peer: Peer) -> None:
-    with stage_in(domain) as one, stage_in(domain) as two:
-        one.take(peer, tag("0"))
-        for replica in (one, two):
-            replica.stamp_s = 10
-            replica.take(peer, tag("1", 2.0))
-        assert one.node.revision == two.node.revision
-
-
 def test_a_twin_that_was_started_anew_is_another_revision_for_all_replicas(domain: int) -> None:
     with stage_in(domain) as one, stage_in(domain) as two:
         replicas, revisions = (one, two), set[str]()
@@ -204,41 +195,11 @@ def test_history_is_what_was_seen_from_here(domain: int, peer: Peer) -> None:
         assert co2(stage.node.history_of("1")) == [], "a successor that knows fewer starts anew"
 
 
-def test_a_look_and_a_scan_of_one_sensor_restamp_no_other(stage: Stage, peer: Peer) -> None:
-    """10 s: both sensors; 3610 s: the flowers; 7210 s: light alone."""
-    both = (Reading("co2", 400.0, 10 * S), Reading("light", 1.0, 10 * S))
-    light = (both[0], Reading("light", 2.0, 7210 * S))
-    for state in (
-        TagState("1", None, both, 10 * S, last_try=Attempt(10 * S)),
-        TagState("1", None, both, 3610 * S, looked_at_ns=3610 * S, last_try=Attempt(3610 * S)),
-        TagState("1", None, light, 7210 * S, looked_at_ns=3610 * S, last_try=Attempt(7210 * S)),
-    ):
-        stage.take_with_times(peer, state)
-    past = stage.node.history_of("1")
-    assert past is not None
-    assert [(scan.stamp_ns // S, len(scan.readings)) for scan in past.scans] == [(10, 2), (7210, 1)]
-    assert [(each.stamp_ns // S, each.kind) for each in past.attempts] == [
-        (10, 0),
-        (3610, 1),
-        (7210, 0),
-    ]
-
-
 def test_history_follows_a_clock_that_goes_back_as_the_twins_does(stage: Stage, peer: Peer) -> None:
     # The third is the twin's last reading held to the new time, the fourth a new one.
     for now_s, at_s, value in ((101, 100, 1.0), (201, 200, 2.0), (7, 7, 2.0), (10, 9, 3.0)):
         stage.take_with_times(peer, scanned(at_s, value), at_s=now_s)
     assert co2(stage.node.history_of("1")) == [(7.0, 1.0), (7.0, 2.0), (9.0, 3.0)]
-
-
-def test_what_is_observed_as_the_clock_goes_back_is_in_the_history(
-    stage: Stage, peer: Peer
-) -> None:
-    for at_s, value in ((100, 1.0), (7, 2.0)):
-        stage.take_with_times(peer, scanned(at_s, value), at_s=at_s)
-    past = stage.node.history_of("1")
-    assert past is not None
-    assert {reading.value for scan in past.scans for reading in scan.readings} == {1.0, 2.0}
 
 
 # --- times --------------------------------------------------------------------------------------
@@ -350,8 +311,8 @@ def test_only_the_twin_that_is_followed_is_heard_on_diagnostics(stage: Stage, pe
     publish = peer.node.create_publisher(DiagnosticArray, "/diagnostics", 10).publish
 
     stage.take(peer, tag("1"))
-    assert stage.node.journal.state == "unknown"
-    assert stage.node.twin_counts is None, "a twin that says nothing has not dropped nothing"
+    assert stage.node.self_report.journal.state == "unknown"
+    assert stage.node.self_report.counts is None, "a twin that says nothing has not dropped nothing"
     # Another greenhouse's is in the same message, before it and behind it, and in one of its own.
     others = [Finding("drops", 0, "", {"kind": "100"}), of_state("/gh2/twin/state")]
     theirs = diagnostics(others, "/gh2/peer", 0)
@@ -364,13 +325,16 @@ def test_only_the_twin_that_is_followed_is_heard_on_diagnostics(stage: Stage, pe
         stage.take(peer, tag("1"))
         publish(ours)
         publish(theirs)
-        return stage.node.twin_counts
+        return stage.node.self_report.counts
 
     counts = stage.until(heard, "what the twin says")
     assert counts == Counts({"frame": 7}, 0, (Recent("frame", "odom", 2),))
     assert stage.node.utilities.counts().dropped == {}
-    assert (stage.node.journal.state, stage.node.journal.detail) == ("failing", "no room")
-    assert stage.node.origin == "simulated"
+    assert (stage.node.self_report.journal.state, stage.node.self_report.journal.detail) == (
+        "failing",
+        "no room",
+    )
+    assert stage.node.self_report.origin == "simulated"
 
 
 # --- the rest -----------------------------------------------------------------------------------

@@ -164,7 +164,7 @@ def test_who_asks_the_same_at_once_asks_once(domain: int) -> None:
 
     async def test() -> None:
         async with remembering(past) as it:
-            it.twin.state_at = held  # type: ignore[method-assign]
+            past.state_at = held  # type: ignore[method-assign]
             number = it.bridge.state_number
             asking = [asyncio.create_task(it.http.get(f"{PATHS[0]}&at=9")) for _ in range(5)]
             in_flight = it.bridge.admission.in_flight
@@ -227,8 +227,9 @@ def test_a_client_that_leaves_takes_its_question_along(domain: int) -> None:
         raise AssertionError(at_ns)
 
     async def test() -> None:
-        async with remembering(MadeUp()) as it:
-            it.twin.state_at = for_ever  # type: ignore[method-assign]
+        past = MadeUp()
+        async with remembering(past) as it:
+            past.state_at = for_ever  # type: ignore[method-assign]
             asking = asyncio.create_task(it.http.get("/api/state?at=9"))
             await until(lambda: it.bridge.admission.being_computed == 1, "the question")
             asking.cancel()

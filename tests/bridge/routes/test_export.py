@@ -205,7 +205,7 @@ def test_a_bridge_that_ends_breaks_it_off(domain: int) -> None:
     async def test() -> None:
         async with remembering(past) as it, it.http.stream("GET", PATH) as answer:
             it.server.should_exit = True
-            await until(lambda: it.bridge.shutdown.has_begun, "the good-bye")
+            await until(lambda: it.bridge.liveness.shutting_down, "the good-bye")
             with pytest.raises(httpx.TransportError):
                 async for _ in answer.aiter_raw():
                     pass

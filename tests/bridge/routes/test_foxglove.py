@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from lupin_bridge.serving.ws_protocol import MAX_BURST
+from lupin_bridge.serving.ws_protocol import FRAMES_AT_ONCE
 from tests.support import messages
 from tests.support.domains import ros_env
 from tests.support.foxglove import SDK, WEBSOCKET, Viewer, reader_of, viewer
@@ -175,7 +175,7 @@ def test_a_flood_ends_its_sender_alone_and_makes_no_subscriptions(
     with viewer(house.url) as loud:
         channel = loud.channels["/perception/discovered_tags"]["id"]
         with suppress(ConnectionClosed):  # it may hear the answer before it has said all
-            for _ in range(20 * MAX_BURST):
+            for _ in range(20 * FRAMES_AT_ONCE):
                 loud.send(op="subscribe", subscriptions=[{"id": 1, "channelId": channel}])
                 loud.send(op="unsubscribe", subscriptionIds=[1])
         with pytest.raises(ConnectionClosed) as closed:

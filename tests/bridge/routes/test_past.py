@@ -33,12 +33,10 @@ async def remembering(past: MadeUp, limits: Limits | None = None) -> AsyncIterat
     """A bridge whose twin has this past."""
     async with running(limits) as it:
         twin = it.twin
-        twin.state_at, twin.series = past.state_at, past.series  # type: ignore[method-assign]
-        twin.recent = past.recent  # type: ignore[method-assign]
         twin.rows = past.rows  # type: ignore[method-assign]
 
         async def ask(question: Question[Any], cost_s: float) -> Any:  # all alike
-            return await look_up(question, twin, twin.workers)
+            return await look_up(question, past, twin.workers)
 
         twin.ask = ask  # type: ignore[method-assign]
         await until(lambda: it.bridge.latest is not None, "the first state")
@@ -101,7 +99,7 @@ def test_events_that_come_in_five_minutes_share_one_grid_with_those_that_come_on
 
     async def series(request: SeriesRequest) -> SeriesPast:
         if request.event is not Event.SCANS:
-            return await past.series(request)
+            return await MadeUp.series(past, request)
         told = grid(request.start_ns, request.end_ns, request.max_points, slot_ns)
         found = (20_000.0,) * 2
         stamps = (slot_ns, 2 * slot_ns)
@@ -110,7 +108,7 @@ def test_events_that_come_in_five_minutes_share_one_grid_with_those_that_come_on
 
     async def test() -> None:
         async with remembering(past) as it:
-            it.twin.series = series  # type: ignore[method-assign]
+            past.series = series  # type: ignore[method-assign]
             answer = await it.http.get("/api/timeline?from=400&to=700&points=100")
             found = schema.Timeline.model_validate_json(answer.content)
             assert (found.from_.sec, found.to.sec, found.bucket_s) == (300, 900, 300.0)
@@ -200,7 +198,7 @@ def test_a_client_that_leaves_takes_its_question_along(domain: int) -> None:
 
     async def test() -> None:
         async with remembering(past) as it:
-            it.twin.series = for_ever  # type: ignore[method-assign]
+            past.series = for_ever  # type: ignore[method-assign]
             asking = asyncio.create_task(it.http.get(HISTORY))
             await until(lambda: it.bridge.admission.being_computed == 1, "the question")
             asking.cancel()

@@ -11,7 +11,7 @@ import pytest
 from lupin_msgs.msg import TwinTagState
 from websockets.exceptions import ConnectionClosed
 
-from lupin_bridge.serving.ws_protocol import MAX_BURST
+from lupin_bridge.serving.ws_protocol import FRAMES_AT_ONCE
 from tests.support import messages
 from tests.support.proc_stat import resident_mb
 from tests.support.processes import limits
@@ -207,7 +207,7 @@ def test_who_floods_is_closed_with_the_reason(house: Bridge) -> None:
     with ros_at(house.url) as flood, ros_at(house.url) as other:
         flood.send(op="set_level", level="none")
         with suppress(ConnectionClosed):  # it may hear the answer before it has said all
-            for _ in range(100 * MAX_BURST):
+            for _ in range(100 * FRAMES_AT_ONCE):
                 flood.connection.send("{}")
         with pytest.raises(ConnectionClosed) as closed:
             flood.next()
@@ -249,7 +249,7 @@ def test_ten_thousand_malformed_frames_change_nothing(house: Bridge) -> None:
 
     def some_rubbish() -> None:
         with ros_at(house.url) as ros:
-            for _ in range(MAX_BURST - 100):
+            for _ in range(FRAMES_AT_ONCE - 100):
                 ros.connection.send(garbage(chance))
                 # Each has its answer: a status, or the response to a call that could not be made.
                 reply = ros.next()

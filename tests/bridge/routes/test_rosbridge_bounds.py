@@ -189,9 +189,9 @@ def test_many_messages_at_once_do_not_hold_up_the_others(
         turns, at_turn = 0, list[int]()
         plain = Session.receive
 
-        def receive(session: Session, message: str | bytes, now_s: float) -> Reaction:
+        def receive(session: Session, message: str | bytes) -> Reaction:
             at_turn.append(turns)
-            return plain(session, message, now_s)
+            return plain(session, message)
 
         async def somebody_else() -> None:
             nonlocal turns

@@ -6,9 +6,8 @@ import asyncio
 import resource
 import socket
 import sys
-import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, suppress
 
 import pytest
 
@@ -32,19 +31,31 @@ STUCK = 250
 GET = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n"
 
 
-@contextmanager
-def frugal(*options: str) -> Iterator[Served]:
-    """`lupin-twin serve` that may open no more than `FILES` files."""
+@pytest.fixture(scope="module")
+def shared() -> Iterator[tuple[Served, int]]:
+    """`lupin-twin serve` that may open no more than `FILES` files, and how many it has open."""
     shell = ["/bin/sh", "-c", f'ulimit -n {FILES} && exec "$@"', "sh"]
-    command = [sys.executable, "-m", "tests.support.limited", "serve", "--port", "0", *options]
-    # Without a journal, no process that looks back, which would want files too.
-    command += ["--ros-args", "-p", "journal:=off"]
+    # No deadline ends who waits. Without a journal, no process that looks back, which would want
+    # files too.
+    command = [
+        *(sys.executable, "-m", "tests.support.limited", "serve", "--port", "0"),
+        *limits(client_timeout_s=3_600),
+        *("--ros-args", "-p", "journal:=off"),
+    ]
     with own_domain() as domain, Process([*shell, *command], ros_env(domain)) as process:
         live = Served(process, url_of(process))
         assert live.get("/healthz").status_code == 200
-        yield live
+        yield live, open_files(process.pid)
         assert "Traceback" not in process.output
-        assert len(process.output) < 4_000, "one line for all of them"
+        assert len(process.output) < 6_000, "a line for all of them, now and then"
+
+
+@pytest.fixture
+def live(shared: tuple[Served, int]) -> Iterator[Served]:
+    """It, with nobody connected any more."""
+    served, files = shared
+    yield served
+    wait_for(lambda: open_files(served.process.pid) <= files, "the end of all connections")
 
 
 @pytest.mark.parametrize(
@@ -56,9 +67,8 @@ def frugal(*options: str) -> Iterator[Served]:
     ],
     ids=["nothing", "half a request", "a request, and no more"],
 )
-def test_who_asks_for_nothing_makes_room_for_who_does(said: bytes) -> None:
-    # No deadline ends them: they wait for an hour.
-    with frugal(*limits(client_timeout_s=3_600)) as live, ExitStack() as stack:
+def test_who_asks_for_nothing_makes_room_for_who_does(live: Served, said: bytes) -> None:
+    with ExitStack() as stack:
         kept = open_files(live.process.pid)
         for _ in range(STUCK):
             stack.enter_context(raw_http.connect(live.url)).sendall(said)
@@ -70,19 +80,20 @@ def test_who_asks_for_nothing_makes_room_for_who_does(said: bytes) -> None:
         live.process.wait_for_output("evicted the ")
 
 
-def test_one_address_crowds_out_none_but_itself() -> None:
-    with frugal(*limits(client_timeout_s=3_600)) as live, ExitStack() as stack:
+def test_one_address_crowds_out_none_but_itself(live: Served) -> None:
+    with ExitStack() as stack:
         quiet = stack.enter_context(raw_http.connect(live.url, "127.0.7.1"))
         quiet.sendall(GET[:-2])
-        for _ in range(2 * STUCK):
-            stack.enter_context(raw_http.connect(live.url, "127.0.7.2"))
-        live.process.wait_for_output("evicted the ")
+        others = [
+            stack.enter_context(raw_http.connect(live.url, "127.0.7.2")) for _ in range(2 * STUCK)
+        ]
+        assert others[0].recv(1) == b"", "it made room for the last of its own"
         quiet.sendall(GET[-2:])
         assert raw_http.status(raw_http.heard(quiet)) == 200
 
 
-def test_websockets_leave_room_for_requests_and_stay() -> None:
-    with frugal() as live, ExitStack() as stack:
+def test_websockets_leave_room_for_requests_and_stay(live: Served) -> None:
+    with ExitStack() as stack:
         line = live.process.wait_for_output("--max-clients is 5000")
         listeners = [stack.enter_context(deaf_client(live.url)) for _ in range(FILES)]
 
@@ -93,7 +104,7 @@ def test_websockets_leave_room_for_requests_and_stay() -> None:
         assert FILES // 8 < served_clients < FILES // 2
 
         def open_websockets() -> int:
-            text = live.get("/metrics").text
+            text = raw_http.answer(live.url, GET.replace(b"healthz", b"metrics")).decode()
             return int(float(text.partition("\nlupin_clients ")[2].split()[0]))
 
         wait_for(
@@ -102,8 +113,8 @@ def test_websockets_leave_room_for_requests_and_stay() -> None:
         assert len(listeners) == FILES
 
 
-def test_out_of_files_it_waits_says_so_once_and_recovers() -> None:
-    with frugal(*limits(client_timeout_s=3_600)) as live, ExitStack() as stack:
+def test_out_of_files_it_waits_says_so_once_and_recovers(live: Served) -> None:
+    with ExitStack() as stack:
         pid = live.process.pid
         # All files that it may have are open, as far as it can tell, and no connection among them.
         resource.prlimit(pid, resource.RLIMIT_NOFILE, (open_files(pid) - 1, FILES))
@@ -111,15 +122,19 @@ def test_out_of_files_it_waits_says_so_once_and_recovers() -> None:
         for client in waiting:
             client.sendall(GET)
         live.process.wait_for_output("no new connections for now: Too many open files")
-        length, start_s = len(live.process.output), time.monotonic()
-        wait_for(lambda: time.monotonic() > start_s + 2.0, "some more tries")
-        assert "serving.acceptor" not in live.process.output[length:]
         resource.prlimit(pid, resource.RLIMIT_NOFILE, (FILES, FILES))
         assert all(raw_http.status(raw_http.heard(client)) == 200 for client in waiting)
         assert live.process.output.count("no new connections") == 1
 
 
-def test_nobody_is_turned_out_before_somebody_else_comes() -> None:
+def test_who_goes_before_he_is_let_in_does_no_harm(live: Served) -> None:
+    for _ in range(200):
+        with raw_http.connect(live.url) as client, suppress(OSError):
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+    assert raw_http.status(raw_http.answer(live.url, GET)) == 200
+
+
+async def test_nobody_is_turned_out_before_somebody_else_comes() -> None:
     room = 3
 
     class Waiting(asyncio.Protocol):
@@ -138,23 +153,20 @@ def test_nobody_is_turned_out_before_somebody_else_comes() -> None:
     guests: list[Waiting] = []
     lost: list[Waiting] = []
 
-    async def test() -> None:
-        with listen("127.0.0.1", 0) as listener, ExitStack() as stack:
-            for _ in range(room):
-                stack.enter_context(raw_http.connect(address_of(listener)))
-            door = Acceptor(listener, Waiting, guests, room=room, tls=None, timeout_s=PATIENCE_S)
-            await until(lambda: guests and not door._handshakes, "all who wait outside")
-            assert len(guests) == room
-            first = guests[0]
+    with listen("127.0.0.1", 0) as listener, ExitStack() as stack:
+        for _ in range(room):
             stack.enter_context(raw_http.connect(address_of(listener)))
-            await until(lambda: lost and not door._handshakes, "one more")
-            assert (lost, len(guests)) == ([first], room)
-            door.close()
-            await door.wait_closed()
-            stack.close()
-            await until(lambda: not guests, "their end")
-
-    asyncio.run(test())
+        door = Acceptor(listener, Waiting, guests, room=room, tls=None, timeout_s=PATIENCE_S)
+        await until(lambda: guests and not door._handshakes, "all who wait outside")
+        assert len(guests) == room
+        first = guests[0]
+        stack.enter_context(raw_http.connect(address_of(listener)))
+        await until(lambda: lost and not door._handshakes, "one more")
+        assert (lost, len(guests)) == ([first], room)
+        door.close()
+        await door.wait_closed()
+        stack.close()
+        await until(lambda: not guests, "their end")
 
 
 def test_room_is_what_the_limit_leaves(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -168,11 +180,3 @@ def test_room_is_what_the_limit_leaves(monkeypatch: pytest.MonkeyPatch) -> None:
     assert room_for_connections() == MIN_CONNECTIONS
     limits.append((resource.RLIM_INFINITY, resource.RLIM_INFINITY))
     assert room_for_connections() > 100_000
-
-
-def test_who_goes_before_he_is_let_in_does_no_harm() -> None:
-    with frugal() as live:
-        for _ in range(200):
-            with raw_http.connect(live.url) as client, suppress(OSError):
-                client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
-        assert raw_http.status(raw_http.answer(live.url, GET)) == 200

@@ -15,9 +15,7 @@ from lupin_bridge.serving.admission import (
     BURST_S,
     CLIENT_EXPORTS,
     EXPORTS,
-    IN_FLIGHT,
     LARGE,
-    RATE,
     TOTAL,
     Admission,
     BusyError,
@@ -27,7 +25,7 @@ from lupin_bridge.serving.admission import (
 )
 from lupin_bridge.stream import schema
 from tests.support.access import Served, served
-from tests.support.inprocess import run, running
+from tests.support.inprocess import running
 from tests.support.processes import limits
 from tests.support.waiting import until
 
@@ -209,16 +207,6 @@ def test_of_six_clients_that_ask_for_all_they_may_each_has_a_place(is_large: boo
     assert admission.being_computed == 0
 
 
-def test_refusals_are_counted_by_reason() -> None:
-    admission = Admission(rate_hz=1.0, concurrency=1, total_concurrency=1)
-    with admission.request("a", 0.0), suppress(ClientLimitError), admission.request("a", 0.0):
-        pytest.fail("let in")
-    for _ in range(3):
-        with suppress(ClientLimitError), admission.request("a", 0.0):
-            pass
-    assert admission.refused == {IN_FLIGHT: 1, RATE: 2}
-
-
 def test_clients_that_are_gone_leave_nothing_behind() -> None:
     admission = Admission(rate_hz=1000.0, concurrency=1, total_concurrency=1)
     for number in range(100):
@@ -294,44 +282,38 @@ def test_a_client_past_its_limit_holds_up_no_other(slow: Served) -> None:
         assert modest.get(fields[-1]).status_code == 200
 
 
-def test_with_all_places_taken_it_is_503_until_one_is_free(domain: int) -> None:
-    async def test() -> None:
-        async with running(Limits(total_concurrency=2)) as it:
-            with ExitStack() as taken:
-                for client in "ab":
-                    taken.enter_context(it.bridge.admission.computing(client))
-                busy = await it.http.get("/api/field" + QUERY)
-                assert it.bridge.admission.refused == {TOTAL: 1}
-                assert busy.status_code == 503
-                assert busy.headers["retry-after"] == "1"
-                assert "the limit is 2" in busy.json()["detail"]
-                # What is live and cheap takes no place.
-                for live in ("/api/state", "/api/health"):
-                    assert (await it.http.get(live)).status_code == 200
-            free = await asyncio.gather(*(it.http.get("/api/field" + QUERY) for _ in range(2)))
-            assert [answer.status_code for answer in free] == [200, 200]
-
-    run(domain, test())
+async def test_with_all_places_taken_it_is_503_until_one_is_free(domain: int) -> None:
+    async with running(Limits(total_concurrency=2)) as it:
+        with ExitStack() as taken:
+            for client in "ab":
+                taken.enter_context(it.bridge.admission.computing(client))
+            busy = await it.http.get("/api/field" + QUERY)
+            assert it.bridge.admission.refused == {TOTAL: 1}
+            assert busy.status_code == 503
+            assert busy.headers["retry-after"] == "1"
+            assert "the limit is 2" in busy.json()["detail"]
+            # What is live and cheap takes no place.
+            for live in ("/api/state", "/api/health"):
+                assert (await it.http.get(live)).status_code == 200
+        free = await asyncio.gather(*(it.http.get("/api/field" + QUERY) for _ in range(2)))
+        assert [answer.status_code for answer in free] == [200, 200]
 
 
-def test_a_place_is_held_until_the_twin_has_answered_and_then_given_back(domain: int) -> None:
+async def test_a_place_is_held_until_the_twin_has_answered_and_then_given_back(domain: int) -> None:
     """Of a twin that does not answer, no more clients wait than the limit allows."""
 
-    async def test() -> None:
-        time_is_up = asyncio.Event()
+    time_is_up = asyncio.Event()
 
-        async def never(_work: object) -> None:
-            await time_is_up.wait()
-            raise TimeoutError
+    async def never(_work: object) -> None:
+        await time_is_up.wait()
+        raise TimeoutError
 
-        async with running(Limits(concurrency=3)) as it:
-            it.twin.thread.call = never  # type: ignore[method-assign, assignment]
-            fields = [f"/api/field{QUERY.replace('co2', f'{n}')}" for n in range(8)]
-            asked = [asyncio.create_task(it.http.get(field)) for field in fields]
-            await until(lambda: sum(each.done() for each in asked) == 5, "the refusals")
-            time_is_up.set()
-            answers = await asyncio.gather(*asked)
-            assert sorted(answer.status_code for answer in answers) == [429] * 5 + [504] * 3
-            assert not it.bridge.admission.in_flight
-
-    run(domain, test())
+    async with running(Limits(concurrency=3)) as it:
+        it.twin.thread.call = never  # type: ignore[method-assign, assignment]
+        fields = [f"/api/field{QUERY.replace('co2', f'{n}')}" for n in range(8)]
+        asked = [asyncio.create_task(it.http.get(field)) for field in fields]
+        await until(lambda: sum(each.done() for each in asked) == 5, "the refusals")
+        time_is_up.set()
+        answers = await asyncio.gather(*asked)
+        assert sorted(answer.status_code for answer in answers) == [429] * 5 + [504] * 3
+        assert not it.bridge.admission.in_flight

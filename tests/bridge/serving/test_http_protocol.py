@@ -82,17 +82,6 @@ def test_a_streamed_body_goes_on_after_a_large_part() -> None:
     assert [message["more_body"] for message in reader.messages[1:]].count(False) == 1
 
 
-def test_websockets_pass_through() -> None:
-    seen: list[Any] = []
-
-    async def app(*arguments: Any) -> None:
-        seen.append(arguments)
-
-    given: Any = ({"type": "websocket"}, object(), object())
-    asyncio.run(PieceByPiece(app)(*given))
-    assert seen == [given]
-
-
 # --- served -------------------------------------------------------------------------------------
 
 

@@ -7,8 +7,8 @@ from websockets.frames import Frame, Opcode
 from websockets.protocol import CLIENT, State
 from websockets.protocol import Protocol as Reader
 
-from lupin_bridge.serving.ws_protocol import PIECE_BYTES, pieces
-from lupin_bridge.stream.frames import binary_head, text_frame
+from lupin_bridge.serving.ws_protocol import BINARY, PIECE_BYTES, frame_head, pieces
+from lupin_bridge.stream.frames import text_frame
 
 
 def read(wire: bytes) -> list[Frame]:
@@ -28,7 +28,7 @@ def test_a_message_stays_the_same_and_no_piece_is_larger_than_the_limit(more: in
     message = bytes(n % 251 for n in range(PIECE_BYTES + more))
     for given, rest, opcode in (
         (text_frame(message), b"", Opcode.TEXT),
-        (binary_head(len(message)) + message[:13], message[13:], Opcode.BINARY),
+        (frame_head(BINARY, len(message)) + message[:13], message[13:], Opcode.BINARY),
     ):
         frames = read(wire(given, rest))
         assert b"".join(frame.data for frame in frames) == message
@@ -43,7 +43,7 @@ def test_a_small_message_stays_one_frame() -> None:
 
 
 def test_between_two_pieces_there_is_room_for_a_ping() -> None:
-    row = pieces(binary_head(200_000) + bytes(200_000))
+    row = pieces(frame_head(BINARY, 200_000) + bytes(200_000))
     first, *others = (head + bytes(payload) for head, payload in row)
     ping = Frame(Opcode.PING, b"?").serialize(mask=False)
     assert [frame.opcode for frame in read(first + ping + b"".join(others))] == [
@@ -55,5 +55,5 @@ def test_between_two_pieces_there_is_room_for_a_ping() -> None:
 
 def test_nothing_is_copied() -> None:
     message = bytes(300_000)
-    views = [payload for _, payload in pieces(binary_head(len(message)), message)]
+    views = [payload for _, payload in pieces(frame_head(BINARY, len(message)), message)]
     assert {payload.obj for payload in views if isinstance(payload, memoryview)} == {message}

@@ -63,30 +63,24 @@ def test_the_kernel_hoards_little_for_who_does_not_read() -> None:
     assert hoarded(lambda _: None, 4 * UNSENT_BYTES), "otherwise this shows nothing"
 
 
-def test_who_does_not_read_is_reset() -> None:
-    async def test() -> None:
-        async with connection() as (transport, theirs):
-            transport.write(MUCH)
-            tear_down(transport)
-            await until(lambda: theirs.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR), "a reset")
-
-    asyncio.run(test())
+async def test_who_does_not_read_is_reset() -> None:
+    async with connection() as (transport, theirs):
+        transport.write(MUCH)
+        tear_down(transport)
+        await until(lambda: theirs.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR), "a reset")
 
 
-def test_who_has_read_all_is_closed() -> None:
-    async def test() -> None:
-        async with connection() as (transport, theirs):
-            transport.write(b"the end")
-            tear_down(transport)
-            loop = asyncio.get_running_loop()
-            theirs.setblocking(False)
-            assert await loop.sock_recv(theirs, 100) == b"the end"
-            assert await loop.sock_recv(theirs, 100) == b""
-
-    asyncio.run(test())
+async def test_who_has_read_all_is_closed() -> None:
+    async with connection() as (transport, theirs):
+        transport.write(b"the end")
+        tear_down(transport)
+        loop = asyncio.get_running_loop()
+        theirs.setblocking(False)
+        assert await loop.sock_recv(theirs, 100) == b"the end"
+        assert await loop.sock_recv(theirs, 100) == b""
 
 
-def test_over_tls_what_has_ended_bears_to_be_ended_again(tmp_path: Path) -> None:
+async def test_over_tls_what_has_ended_bears_to_be_ended_again(tmp_path: Path) -> None:
     ours = certificate(tmp_path)
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.load_cert_chain(ours.cert, ours.key)
@@ -101,15 +95,12 @@ def test_over_tls_what_has_ended_bears_to_be_ended_again(tmp_path: Path) -> None
             self.transport.close()  # as uvicorn does
             ended.append(self.transport)
 
-    async def test() -> None:
-        server = await asyncio.get_running_loop().create_server(Ours, "127.0.0.1", 0, ssl=context)
-        host, port = server.sockets[0].getsockname()
-        _, writer = await asyncio.open_connection(host, port, ssl=ours.trust)
-        writer.close()
-        await until(lambda: ended, "the end")
-        tear_down(ended[0])
-        reset(ended[0])
-        server.close()
-        await server.wait_closed()
-
-    asyncio.run(test())
+    server = await asyncio.get_running_loop().create_server(Ours, "127.0.0.1", 0, ssl=context)
+    host, port = server.sockets[0].getsockname()
+    _, writer = await asyncio.open_connection(host, port, ssl=ours.trust)
+    writer.close()
+    await until(lambda: ended, "the end")
+    tear_down(ended[0])
+    reset(ended[0])
+    server.close()
+    await server.wait_closed()

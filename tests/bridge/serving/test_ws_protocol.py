@@ -101,22 +101,19 @@ async def joined(served: Running) -> Connection:
     return found
 
 
-def test_a_socket_that_is_free_again_says_so_by_itself(domain: int) -> None:
-    async def test() -> None:
-        async with running(ros_args=SILENT) as served:
-            with deaf_client(served.url) as slow:
-                connection = await joined(served)
-                freed: list[bool] = []
-                connection.on_writable = lambda: freed.append(connection.can_take)
-                while connection.can_take:
-                    connection.write(SMALL_FRAME)
-                taken = [connection.can_take]
-                queued = connection.transport.get_write_buffer_size()
-                assert 0 < queued <= len(SMALL_FRAME), "of what the socket does not take, one frame"
-                await asyncio.to_thread(drain, slow, freed)
-                assert (taken, freed[0]) == ([False], True)
-
-    run(domain, test())
+async def test_a_socket_that_is_free_again_says_so_by_itself(domain: int) -> None:
+    async with running(ros_args=SILENT) as served:
+        with deaf_client(served.url) as slow:
+            connection = await joined(served)
+            freed: list[bool] = []
+            connection.on_writable = lambda: freed.append(connection.can_take)
+            while connection.can_take:
+                connection.write(SMALL_FRAME)
+            taken = [connection.can_take]
+            queued = connection.transport.get_write_buffer_size()
+            assert 0 < queued <= len(SMALL_FRAME), "of what the socket does not take, one frame"
+            await asyncio.to_thread(drain, slow, freed)
+            assert (taken, freed[0]) == ([False], True)
 
 
 def test_who_does_not_read_gets_no_answer_to_his_pings(domain: int) -> None:
@@ -178,44 +175,41 @@ def test_a_client_that_takes_nothing_is_closed_and_told_why_and_the_others_are_n
         assert "Traceback" not in live.process.output
 
 
-def test_who_is_told_to_go_waits_from_then_on_and_a_client_does_not(
+async def test_who_is_told_to_go_waits_from_then_on_and_a_client_does_not(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(ws_protocol, "CLOSE_GRACE_S", PATIENCE_S)
 
-    async def test() -> None:
-        async with running(None, SILENT, Settings(max_clients=1)) as served:
-            with deaf_client(served.url), deaf_client(served.url):
+    async with running(None, SILENT, Settings(max_clients=1)) as served:
+        with deaf_client(served.url), deaf_client(served.url):
 
-                def both() -> list[Connection] | None:
-                    found = [
-                        connection
-                        for connection in served.server.server_state.connections
-                        if isinstance(connection, Connection) and connection.handshake_complete
-                    ]
-                    return found if [c.close_sent for c in found].count(True) == 1 else None
+            def both() -> list[Connection] | None:
+                found = [
+                    connection
+                    for connection in served.server.server_state.connections
+                    if isinstance(connection, Connection) and connection.handshake_complete
+                ]
+                return found if [c.close_sent for c in found].count(True) == 1 else None
 
-                found = await until(both, "one client, and one for whom there is no place")
-                assert found is not None
-                client, refused = sorted(found, key=lambda connection: connection.close_sent)
-                now_s = asyncio.get_running_loop().time()
-                refused_s = refused.waiting_since_s
-                assert refused_s is not None
-                assert (client.waiting_since_s, refused_s <= now_s) == (None, True)
-                # No longer than any other, however long uvicorn waits for an answer to a close.
-                assert refused.close_timer is not None
-                assert refused.close_timer.when() - refused_s > PATIENCE_S / 2
-                client.dismiss(CloseCode.POLICY_VIOLATION, "enough")
-                dismissed_s = client.waiting_since_s
-                assert dismissed_s is not None
-                assert dismissed_s >= now_s
-                for connection in (client, refused):
-                    connection.dismiss(CloseCode.POLICY_VIOLATION, "once more")
-                assert (client.waiting_since_s, refused.waiting_since_s) == (dismissed_s, refused_s)
-                refused.abort()
-                client.abort()
-
-    run(domain, test())
+            found = await until(both, "one client, and one for whom there is no place")
+            assert found is not None
+            client, refused = sorted(found, key=lambda connection: connection.close_sent)
+            now_s = asyncio.get_running_loop().time()
+            refused_s = refused.waiting_since_s
+            assert refused_s is not None
+            assert (client.waiting_since_s, refused_s <= now_s) == (None, True)
+            # No longer than any other, however long uvicorn waits for an answer to a close.
+            assert refused.close_timer is not None
+            assert refused.close_timer.when() - refused_s > PATIENCE_S / 2
+            client.dismiss(CloseCode.POLICY_VIOLATION, "enough")
+            dismissed_s = client.waiting_since_s
+            assert dismissed_s is not None
+            assert dismissed_s >= now_s
+            for connection in (client, refused):
+                connection.dismiss(CloseCode.POLICY_VIOLATION, "once more")
+            assert (client.waiting_since_s, refused.waiting_since_s) == (dismissed_s, refused_s)
+            refused.abort()
+            client.abort()
 
 
 @pytest.mark.parametrize(
@@ -226,7 +220,7 @@ def test_who_is_told_to_go_waits_from_then_on_and_a_client_does_not(
         (masked(TEXT, b"", rsv=1), CloseCode.PROTOCOL_ERROR),
     ],
 )
-def test_who_is_cut_short_can_read_why(
+async def test_who_is_cut_short_can_read_why(
     domain: int, monkeypatch: pytest.MonkeyPatch, said: bytes, code: CloseCode
 ) -> None:
     # However long a busy machine takes to say and to hear it all.
@@ -245,11 +239,8 @@ def test_who_is_cut_short_can_read_why(
             client.socket.shutdown(socket.SHUT_WR)
             assert client.socket.recv(BLOCK) == b""
 
-    async def test() -> None:
-        async with running(ros_args=SILENT) as served:
-            await asyncio.to_thread(say_and_hear, served.url)
-
-    run(domain, test())
+    async with running(ros_args=SILENT) as served:
+        await asyncio.to_thread(say_and_hear, served.url)
 
 
 def test_the_listener_of_this_file_reads_what_is_sent() -> None:

@@ -102,15 +102,6 @@ def test_who_joins_gets_the_status_and_then_the_newest_state_at_once(stage: Stag
     assert late.got == ["live", 2]
 
 
-def test_who_joins_before_there_is_a_state_gets_the_status_alone(stage: Stage) -> None:
-    stage.announce("never_seen")
-    early = Socket()
-    stage.join(early)
-    assert early.got == ["never_seen"]
-    stage.publish()
-    assert early.got == ["never_seen", 1]
-
-
 def test_a_status_tells_the_age_of_the_moment_at_which_a_client_gets_it(stage: Stage) -> None:
     stage.announce("stale", 3.0)
     sockets = [Socket(), Socket(), Socket(room=0)]
@@ -157,15 +148,6 @@ def test_who_wants_no_status_or_no_state_gets_none(stage: Stage) -> None:
     stage.publish()
     stage.announce("stale")
     assert (no_status.got, no_state.got) == ([1], ["live", "stale"])
-
-
-def test_who_has_left_gets_nothing_more(stage: Stage) -> None:
-    socket = Socket()
-    client = stage.join(socket)
-    stage.hub.leave(client)
-    stage.hub.leave(client)
-    stage.publish()
-    assert socket.got == ["live"]
 
 
 def test_the_hub_is_full_at_its_limit_and_has_room_when_somebody_leaves() -> None:

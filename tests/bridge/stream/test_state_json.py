@@ -224,28 +224,6 @@ def test_tags_that_are_gone_are_forgotten() -> None:
     assert set(writer._kept) == {"4-0", "4-1", "4-2"}
 
 
-def test_a_tag_is_written_anew_when_it_was_replaced() -> None:
-    writer = StateJson()
-    tag = TagState("7", POSE, readings=(Reading("co2", 400.0),))
-    writer.tag(tag, 0)
-    changed = replace(tag, readings=(Reading("co2", 500.0),))
-    assert json.loads(writer.tag(changed, 0))["readings"][0]["value"] == 500.0
-
-
-def test_a_tag_never_observed_and_never_pinned_says_so() -> None:
-    text = StateJson().tag(TagState("7"), 5_000_000_000)
-    tag = schema.TwinTagState.model_validate_json(text)
-    assert tag.stale_seconds is None
-    assert tag.last_observed == schema.Time(sec=0, nanosec=0)
-    assert tag.pose.orientation.w == 0
-
-
-def test_numbers_that_are_none_are_null() -> None:
-    readings = tuple(Reading(str(value), value) for value in (math.nan, math.inf, -math.inf))
-    text = StateJson().tag(TagState("7", readings=readings), 0)
-    assert {reading["value"] for reading in json.loads(text)["readings"]} == {None}
-
-
 def test_a_history_is_sorted_by_sensor_and_keeps_its_order() -> None:
     past = TagHistory(
         (

@@ -78,7 +78,7 @@ def topics(offer: Offer) -> list[str]:
     return [channel.topic for channel in offer.channels.values()]
 
 
-def test_a_twins_topics_are_offered_and_the_layers_that_are_published() -> None:
+async def test_a_twins_topics_are_offered_and_the_layers_that_are_published() -> None:
     source = Source(
         {
             "/n/twin/field/co2": POINTS,
@@ -90,119 +90,101 @@ def test_a_twins_topics_are_offered_and_the_layers_that_are_published() -> None:
         }
     )
 
-    async def test() -> None:
-        offer = offer_of(source)
-        await asyncio.gather(offer.look(), offer.look())
-        assert (topics(offer), source.looks) == ([*OWN, "/n/twin/field/co2"], 1)
-        assert offer.channels[1].schema == "# lupin_msgs/msg/TwinState"
-
-    asyncio.run(test())
+    offer = offer_of(source)
+    await asyncio.gather(offer.look(), offer.look())
+    assert (topics(offer), source.looks) == ([*OWN, "/n/twin/field/co2"], 1)
+    assert offer.channels[1].schema == "# lupin_msgs/msg/TwinState"
 
 
-def test_a_client_that_goes_does_not_end_the_look_of_another() -> None:
-    async def test() -> None:
-        source = Source()
-        offer = offer_of(source)
-        source.answers.clear()
-        gone, waiting = (asyncio.create_task(offer.look()) for _ in range(2))
-        await until(lambda: source.looks == 1, "the look of both")
-        gone.cancel()
-        await asyncio.wait([gone])
-        source.answers.set()
-        await waiting
-        assert (topics(offer), source.looks) == (OWN, 1)
-
-    asyncio.run(test())
+async def test_a_client_that_goes_does_not_end_the_look_of_another() -> None:
+    source = Source()
+    offer = offer_of(source)
+    source.answers.clear()
+    gone, waiting = (asyncio.create_task(offer.look()) for _ in range(2))
+    await until(lambda: source.looks == 1, "the look of both")
+    gone.cancel()
+    await asyncio.wait([gone])
+    source.answers.set()
+    await waiting
+    assert (topics(offer), source.looks) == (OWN, 1)
 
 
-def test_looking_goes_on_after_an_error(
+async def test_looking_goes_on_after_an_error(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(module, "LOOK_S", 0.0)
 
-    async def test() -> None:
-        source = Source()
-        source.fault = RuntimeError("a fault")
-        offer = offer_of(source)
-        with offer.followed(lambda _: None):
-            await until(lambda: "met an error and goes on" in caplog.text, "the error")
-            source.fault = None
-            await until(lambda: offer.topics, "the topics")
-
-    asyncio.run(test())
+    source = Source()
+    source.fault = RuntimeError("a fault")
+    offer = offer_of(source)
+    with offer.followed(lambda _: None):
+        await until(lambda: "met an error and goes on" in caplog.text, "the error")
+        source.fault = None
+        await until(lambda: offer.topics, "the topics")
 
 
-def test_what_has_no_definition_is_left_out_and_warned_of_once(
+async def test_what_has_no_definition_is_left_out_and_warned_of_once(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    async def test() -> None:
-        offer = offer_of(Source({"/n/twin/tags": MARKERS, "/n/twin/planters": MARKERS}))
-        for _ in range(3):
-            await offer.look()
-        assert topics(offer) == OWN
-        assert caplog.text.count("is not offered to viewers") == 1
-
-    asyncio.run(test())
-
-
-def test_layers_are_bounded_and_without_ros_there_are_none() -> None:
-    async def test() -> None:
-        source = Source({f"/n/twin/field/s{n:03}": POINTS for n in range(MAX_LAYERS + 1)})
-        offer = offer_of(source)
+    offer = offer_of(Source({"/n/twin/tags": MARKERS, "/n/twin/planters": MARKERS}))
+    for _ in range(3):
         await offer.look()
-        assert len(topics(offer)) == len(OWN) + MAX_LAYERS
-        source.has_ended = True
-        await offer.look()
-        assert topics(offer) == OWN
-
-    asyncio.run(test())
+    assert topics(offer) == OWN
+    assert caplog.text.count("is not offered to viewers") == 1
 
 
-def test_followers_are_told_of_news_alone_and_an_id_never_comes_back(
+async def test_layers_are_bounded_and_without_ros_there_are_none() -> None:
+    source = Source({f"/n/twin/field/s{n:03}": POINTS for n in range(MAX_LAYERS + 1)})
+    offer = offer_of(source)
+    await offer.look()
+    assert len(topics(offer)) == len(OWN) + MAX_LAYERS
+    source.has_ended = True
+    await offer.look()
+    assert topics(offer) == OWN
+
+
+async def test_followers_are_told_of_news_alone_and_an_id_never_comes_back(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(module, "LOOK_S", 0.0)
     monkeypatch.setattr(module, "TICK_S", 0.0)
 
-    async def test() -> None:
-        source = Source({"/n/twin/field/a": POINTS})
-        offer = offer_of(source)
-        await offer.look()
-        news: list[int | None] = []
-        with offer.followed(news.append):
-            looks = source.looks
-            await until(lambda: source.looks > looks + 2, "some looks")
-            assert news == []
-            del source.now_published["/n/twin/field/a"]
-            await until(lambda: news == [None], "the layer's end")
-            assert topics(offer) == OWN
-            source.now_published["/n/twin/field/a"] = POINTS
-            await until(lambda: news == [None, None], "the layer again")
-            assert max(offer.channels) == len(OWN) + 2
-            source.now = RosTime(0, is_simulated=True)
-            await until(lambda: offer.has_time, "simulated time")
-            source.now = RosTime(7, is_simulated=True)
-            await until(lambda: news[2:] == [7], "its first moment")
-            looks = source.looks
-            await until(lambda: source.looks > looks + 2, "some looks")
-            assert news[2:] == [7], "time that stands is told once"
-            late: list[int | None] = []
-            with offer.followed(late.append):
-                assert late == [7], "and once to whoever comes meanwhile"
+    source = Source({"/n/twin/field/a": POINTS})
+    offer = offer_of(source)
+    await offer.look()
+    news: list[int | None] = []
+    with offer.followed(news.append):
+        looks = source.looks
+        await until(lambda: source.looks > looks + 2, "some looks")
+        assert news == []
+        del source.now_published["/n/twin/field/a"]
+        await until(lambda: news == [None], "the layer's end")
+        assert topics(offer) == OWN
+        source.now_published["/n/twin/field/a"] = POINTS
+        await until(lambda: news == [None, None], "the layer again")
+        assert max(offer.channels) == len(OWN) + 2
+        source.now = RosTime(0, is_simulated=True)
+        await until(lambda: offer.has_time, "simulated time")
+        source.now = RosTime(7, is_simulated=True)
+        await until(lambda: news[2:] == [7], "its first moment")
+        looks = source.looks
+        await until(lambda: source.looks > looks + 2, "some looks")
+        assert news[2:] == [7], "time that stands is told once"
+        late: list[int | None] = []
+        with offer.followed(late.append):
+            assert late == [7], "and once to whoever comes meanwhile"
 
-        def following() -> list[str]:
-            names = (task.get_name() for task in asyncio.all_tasks())
-            return [name for name in names if name.startswith("foxglove")]
+    def following() -> list[str]:
+        names = (task.get_name() for task in asyncio.all_tasks())
+        return [name for name in names if name.startswith("foxglove")]
 
-        await until(lambda: not following(), "an end of looking: nobody follows")
-        next_one: list[int | None] = []
-        with offer.followed(next_one.append):
-            await until(lambda: next_one == [7], "the time that still stands")
-
-    asyncio.run(test())
+    await until(lambda: not following(), "an end of looking: nobody follows")
+    next_one: list[int | None] = []
+    with offer.followed(next_one.append):
+        await until(lambda: next_one == [7], "the time that still stands")
 
 
-def test_a_follower_that_fails_costs_the_others_nothing(
+async def test_a_follower_that_fails_costs_the_others_nothing(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(module, "LOOK_S", 0.0)
@@ -211,21 +193,18 @@ def test_a_follower_that_fails_costs_the_others_nothing(
     def fail(_: int | None) -> None:
         raise ZeroDivisionError
 
-    async def test() -> None:
-        source = Source()
-        offer = offer_of(source)
-        await offer.look()
-        news: list[int | None] = []
-        with offer.followed(fail), offer.followed(news.append):
-            source.now_published["/n/twin/field/a"] = POINTS
-            await until(lambda: news == [None], "the layer")
-            source.now = RosTime(7, is_simulated=True)
-            await until(lambda: news == [None, 7], "its first moment")
-            source.now = RosTime(8, is_simulated=True)
-            await until(lambda: news == [None, 7, 8], "and the next")
-        assert caplog.text.count("a viewer met an error") == 3
-
-    asyncio.run(test())
+    source = Source()
+    offer = offer_of(source)
+    await offer.look()
+    news: list[int | None] = []
+    with offer.followed(fail), offer.followed(news.append):
+        source.now_published["/n/twin/field/a"] = POINTS
+        await until(lambda: news == [None], "the layer")
+        source.now = RosTime(7, is_simulated=True)
+        await until(lambda: news == [None, 7], "its first moment")
+        source.now = RosTime(8, is_simulated=True)
+        await until(lambda: news == [None, 7, 8], "and the next")
+    assert caplog.text.count("a viewer met an error") == 3
 
 
 def test_the_layout_shows_what_is_offered_and_each_of_its_panels_has_a_place() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -82,154 +82,143 @@ def feed(**options: Any) -> Feed:
     return replace(Feed(INPUT, "in", 0.0), **options)
 
 
-def play(scene: Callable[[Relay, Writer], Awaitable[None]]) -> None:
-    async def test() -> None:
-        relay, workers = Relay(), Workers("work")
-        try:
-            await scene(relay, Writer(relay, workers))  # type: ignore[arg-type]
-        finally:
-            workers.close()
-
-    asyncio.run(test())
+@pytest.fixture
+def relay() -> Relay:
+    return Relay()
 
 
-def test_a_message_is_written_once_for_all_who_want_it_alike() -> None:
-    async def scene(relay: Relay, writer: Writer) -> None:
-        clients = [Client(writer) for _ in range(3)]
-        for client in clients:
-            client.feeding.follow({"in": feed()}, "in")
-        await until(lambda: len(relay.ears) == 3, "the clients to listen")
-        relay.publish("a")
-        await until(lambda: all(client.frames for client in clients), "the message")
-        assert [client.frames for client in clients] == [[json_frame("a")]] * 3
-        assert relay.read_count == 1
-        for client in clients:
-            client.feeding.close()
-        await until(lambda: not relay.ears, "nobody to listen")
-
-    play(scene)
+@pytest.fixture
+def writer(relay: Relay) -> Iterator[Writer]:
+    workers = Workers("work")
+    yield Writer(relay, workers)  # type: ignore[arg-type]
+    workers.close()
 
 
-def test_of_what_waits_for_a_slow_client_the_topics_depth_is_kept() -> None:
-    async def scene(relay: Relay, writer: Writer) -> None:
-        slow = Client(writer)
-        slow.gate.clear()
-        slow.feeding.follow({"in": feed()}, "in")
-        await until(lambda: bool(relay.ears), "it to listen")
-        relay.publish("0")
-        await until(lambda: bool(slow.frames), "the first")
-        relay.publish("1", "2", "3", "4")
-        slow.gate.set()
-        await until(lambda: len(slow.frames) == 4, "the rest")
-        assert slow.frames == [json_frame(text) for text in "0234"]
+async def test_a_message_is_written_once_for_all_who_want_it_alike(
+    relay: Relay, writer: Writer
+) -> None:
+    clients = [Client(writer) for _ in range(3)]
+    for client in clients:
+        client.feeding.follow({"in": feed()}, "in")
+    await until(lambda: len(relay.ears) == 3, "the clients to listen")
+    relay.publish("a")
+    await until(lambda: all(client.frames for client in clients), "the message")
+    assert [client.frames for client in clients] == [[json_frame("a")]] * 3
+    assert relay.read_count == 1
+    for client in clients:
+        client.feeding.close()
+    await until(lambda: not relay.ears, "nobody to listen")
 
-    play(scene)
+
+async def test_of_what_waits_for_a_slow_client_the_topics_depth_is_kept(
+    relay: Relay, writer: Writer
+) -> None:
+    slow = Client(writer)
+    slow.gate.clear()
+    slow.feeding.follow({"in": feed()}, "in")
+    await until(lambda: bool(relay.ears), "it to listen")
+    relay.publish("0")
+    await until(lambda: bool(slow.frames), "the first")
+    relay.publish("1", "2", "3", "4")
+    slow.gate.set()
+    await until(lambda: len(slow.frames) == 4, "the rest")
+    assert slow.frames == [json_frame(text) for text in "0234"]
 
 
-def test_what_waits_for_a_slow_client_is_no_more_than_the_topics_bytes() -> None:
-    async def scene(relay: Relay, writer: Writer) -> None:
-        slow = Client(writer)
-        slow.gate.clear()
-        slow.feeding.follow({"in": feed(topic=replace(INPUT, max_bytes=10))}, "in")
-        await until(lambda: bool(relay.ears), "it to listen")
-        relay.publish("0")
-        await until(lambda: bool(slow.frames), "the first")
-        relay.publish("11111", "22222", "33333")
-        slow.gate.set()
-        await until(lambda: json_frame("33333") in slow.frames, "the last")
-        assert slow.frames == [json_frame(text) for text in ("0", "22222", "33333")]
-
-    play(scene)
+async def test_what_waits_for_a_slow_client_is_no_more_than_the_topics_bytes(
+    relay: Relay, writer: Writer
+) -> None:
+    slow = Client(writer)
+    slow.gate.clear()
+    slow.feeding.follow({"in": feed(topic=replace(INPUT, max_bytes=10))}, "in")
+    await until(lambda: bool(relay.ears), "it to listen")
+    relay.publish("0")
+    await until(lambda: bool(slow.frames), "the first")
+    relay.publish("11111", "22222", "33333")
+    slow.gate.set()
+    await until(lambda: json_frame("33333") in slow.frames, "the last")
+    assert slow.frames == [json_frame(text) for text in ("0", "22222", "33333")]
 
 
 @pytest.mark.parametrize(("size", "is_told"), [(20, True), (21, False)])
-def test_a_message_that_is_too_large_is_left_out_and_the_client_told(
-    monkeypatch: pytest.MonkeyPatch, size: int, is_told: bool
+async def test_a_message_that_is_too_large_is_left_out_and_the_client_told(
+    relay: Relay, writer: Writer, monkeypatch: pytest.MonkeyPatch, size: int, is_told: bool
 ) -> None:
     monkeypatch.setattr(feeds, "MAX_MESSAGE_BYTES", 20)
 
-    async def scene(relay: Relay, writer: Writer) -> None:
-        client = Client(writer)
-        client.feeding.follow({"in": feed()}, "in")
-        await until(lambda: bool(relay.ears), "it to listen")
-        relay.publish("x" * size)
-        await until(lambda: bool(client.frames), "an answer")
-        assert (client.frames == [json_frame("x" * size)]) is is_told
-        assert is_told or b"it has 21 bytes, the limit is 20" in client.frames[0]
-
-    play(scene)
+    client = Client(writer)
+    client.feeding.follow({"in": feed()}, "in")
+    await until(lambda: bool(relay.ears), "it to listen")
+    relay.publish("x" * size)
+    await until(lambda: bool(client.frames), "an answer")
+    assert (client.frames == [json_frame("x" * size)]) is is_told
+    assert is_told or b"it has 21 bytes, the limit is 20" in client.frames[0]
 
 
-def test_who_is_throttled_gets_the_newest_and_not_before_its_time() -> None:
-    async def scene(relay: Relay, writer: Writer) -> None:
-        quick, often, rare = (Client(writer) for _ in range(3))
-        quick.feeding.follow({"in": feed()}, "in")
-        often.feeding.follow({"in": feed(min_interval_s=0.001)}, "in")
-        rare.feeding.follow({"in": feed(min_interval_s=3600.0)}, "in")
-        await until(lambda: len(relay.ears) == 3, "them to listen")
-        often.gate.clear()
-        relay.publish("0")
-        await until(lambda: all(c.frames for c in (quick, often, rare)), "the first")
-        relay.publish("1", "2", "3")
-        await until(lambda: len(quick.frames) == 4, "the rest")
-        often.gate.set()
-        await until(lambda: len(often.frames) == 2, "the newest")
-        assert often.frames == [json_frame("0"), json_frame("3")]
-        assert rare.frames == [json_frame("0")]
-
-    play(scene)
-
-
-def test_what_cannot_be_told_is_an_error_for_the_client_and_the_next_one_comes() -> None:
-    async def scene(relay: Relay, writer: Writer) -> None:
-        client = Client(writer)
-        client.feeding.follow({"in": feed()}, "in")
-        await until(lambda: bool(relay.ears), "it to listen")
-        relay.publish("bad", "half", "good")
-        await until(lambda: len(client.frames) == 3, "all of them")
-        assert b"a message of topic 'in' is none: not a message" in client.frames[0]
-        assert b"a message of topic 'in' is none: " in client.frames[1]
-        assert client.frames[2] == json_frame("good")
-        relay.refuses = True
-        client.feeding.follow({"in": feed()}, "in")
-        await until(lambda: len(client.frames) == 4, "the refusal")
-        assert b"no such type" in client.frames[3]
-
-    play(scene)
-
-
-def test_whatever_the_error_the_feed_goes_on_and_the_log_has_each_kind_once(
-    caplog: pytest.LogCaptureFixture,
+async def test_who_is_throttled_gets_the_newest_and_not_before_its_time(
+    relay: Relay, writer: Writer
 ) -> None:
-    async def scene(relay: Relay, writer: Writer) -> None:
-        client = Client(writer)
-        client.feeding.follow({"in": feed()}, "in")
-        await until(lambda: bool(relay.ears), "it to listen")
-        relay.publish("odd", "bad", "good")
-        await until(lambda: len(client.frames) == 3, "all three")
-        relay.publish("odd", "bad", "good")
-        await until(lambda: len(client.frames) == 6, "and again")
-        for odd, bad, good in (client.frames[:3], client.frames[3:]):
-            assert b"the bridge met an error of its own" in odd
-            assert b"not a message" in bad
-            assert good == json_frame("good")
-        assert caplog.text.count("Traceback") == 1
-        assert caplog.text.count("not a message") == 1
-
-    play(scene)
+    quick, often, rare = (Client(writer) for _ in range(3))
+    quick.feeding.follow({"in": feed()}, "in")
+    often.feeding.follow({"in": feed(min_interval_s=0.001)}, "in")
+    rare.feeding.follow({"in": feed(min_interval_s=3600.0)}, "in")
+    await until(lambda: len(relay.ears) == 3, "them to listen")
+    often.gate.clear()
+    relay.publish("0")
+    await until(lambda: all(c.frames for c in (quick, often, rare)), "the first")
+    relay.publish("1", "2", "3")
+    await until(lambda: len(quick.frames) == 4, "the rest")
+    often.gate.set()
+    await until(lambda: len(often.frames) == 2, "the newest")
+    assert often.frames == [json_frame("0"), json_frame("3")]
+    assert rare.frames == [json_frame("0")]
 
 
-def test_what_is_kept_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_what_cannot_be_told_is_an_error_for_the_client_and_the_next_one_comes(
+    relay: Relay, writer: Writer
+) -> None:
+    client = Client(writer)
+    client.feeding.follow({"in": feed()}, "in")
+    await until(lambda: bool(relay.ears), "it to listen")
+    relay.publish("bad", "half", "good")
+    await until(lambda: len(client.frames) == 3, "all of them")
+    assert b"a message of topic 'in' is none: not a message" in client.frames[0]
+    assert b"a message of topic 'in' is none: " in client.frames[1]
+    assert client.frames[2] == json_frame("good")
+    relay.refuses = True
+    client.feeding.follow({"in": feed()}, "in")
+    await until(lambda: len(client.frames) == 4, "the refusal")
+    assert b"no such type" in client.frames[3]
+
+
+async def test_whatever_the_error_the_feed_goes_on_and_the_log_has_each_kind_once(
+    relay: Relay, writer: Writer, caplog: pytest.LogCaptureFixture
+) -> None:
+    client = Client(writer)
+    client.feeding.follow({"in": feed()}, "in")
+    await until(lambda: bool(relay.ears), "it to listen")
+    relay.publish("odd", "bad", "good")
+    await until(lambda: len(client.frames) == 3, "all three")
+    relay.publish("odd", "bad", "good")
+    await until(lambda: len(client.frames) == 6, "and again")
+    for odd, bad, good in (client.frames[:3], client.frames[3:]):
+        assert b"the bridge met an error of its own" in odd
+        assert b"not a message" in bad
+        assert good == json_frame("good")
+    assert caplog.text.count("Traceback") == 1
+    assert caplog.text.count("not a message") == 1
+
+
+async def test_what_is_kept_is_bounded(
+    relay: Relay, writer: Writer, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(feeds, "MAX_CACHE_BYTES", 2 * len(json_frame("a")))
 
-    async def scene(relay: Relay, writer: Writer) -> None:
-        samples = [Sample(text.encode(), 0) for text in "abc"]
-        for sample in samples:
-            await writer.frame(feed(), sample)
-        assert relay.read_count == 3
-        await writer.frame(feed(), samples[2])
-        assert relay.read_count == 3
-        await writer.frame(feed(), samples[0])
-        assert relay.read_count == 4
-
-    play(scene)
+    samples = [Sample(text.encode(), 0) for text in "abc"]
+    for sample in samples:
+        await writer.frame(feed(), sample)
+    assert relay.read_count == 3
+    await writer.frame(feed(), samples[2])
+    assert relay.read_count == 3
+    await writer.frame(feed(), samples[0])
+    assert relay.read_count == 4

@@ -81,25 +81,16 @@ def test_a_longer_queue_is_served_as_one_with_a_warning(length: int, warned: boo
     assert request.warnings == expected
 
 
-@pytest.mark.parametrize(
-    ("option", "warning"),
-    [
-        ({"compression": "png"}, "compression 'png' is not served: messages are plain JSON"),
-        ({"compression": "cbor"}, "compression 'cbor' is not served: messages are plain JSON"),
-        (
-            {"compression": "cbor-raw"},
-            "compression 'cbor-raw' is not served: messages are plain JSON",
-        ),
-    ],
-)
+@pytest.mark.parametrize("compression", ["png", "cbor-raw"])
 @pytest.mark.parametrize(
     "message", [{"op": "subscribe", "topic": TOPIC}, {"op": "call_service", "service": SERVICE}]
 )
-def test_an_encoding_that_does_not_change_the_message_is_left_out_with_a_warning(
-    message: dict[str, Any], option: dict[str, Any], warning: str
+def test_an_encoding_that_is_not_served_is_left_out_with_a_warning(
+    message: dict[str, Any], compression: str
 ) -> None:
-    request = read(**message, **option)
+    request = read(**message, compression=compression)
     assert isinstance(request, Subscribe | CallService)
+    warning = f"compression {compression!r} is not served: messages are plain JSON"
     assert request.warnings == (warning,)
     assert read(**message, compression="none", fragment_size=9) == read(**message)
 
@@ -144,27 +135,7 @@ def test_members_that_are_not_known_are_passed_over() -> None:
 EXPECTED = "expected subscribe, unsubscribe, call_service or set_level"
 
 
-@pytest.mark.parametrize(
-    "op",
-    [
-        "advertise",
-        "unadvertise",
-        "publish",
-        "advertise_service",
-        "unadvertise_service",
-        "service_response",
-        "advertise_action",
-        "unadvertise_action",
-        "send_action_goal",
-        "cancel_action_goal",
-        "action_feedback",
-        "action_result",
-        "fragment",
-        "png",
-        "auth",
-        "reboot",
-    ],
-)
+@pytest.mark.parametrize("op", ["advertise", "publish", "send_action_goal", "png", "reboot"])
 def test_what_writes_is_refused_by_name(op: str) -> None:
     refused = refusal_of(op=op, id="a", topic=TOPIC, type="std_msgs/String", msg={"data": "x"})
     assert (str(refused), refused.id) == (
@@ -247,13 +218,6 @@ def test_an_id_of_another_kind_is_refused_and_not_repeated(message_id: object) -
     assert refused.id is None
 
 
-@pytest.mark.parametrize("name", ["topic", "type", "id"])
-def test_a_name_as_long_as_the_limit_is_none_too_long(name: str) -> None:
-    longest = "x" * MAX_NAME_LENGTH
-    request = parse(json.dumps({"op": "subscribe", "topic": TOPIC, name: longest}))
-    assert getattr(request, name) == longest
-
-
 @pytest.mark.parametrize("name", ["id", "topic", "type", "op"])
 def test_a_long_name_is_refused_and_not_repeated(name: str) -> None:
     message = {"op": "subscribe", "topic": TOPIC, name: "x" * (MAX_NAME_LENGTH + 1)}
@@ -313,17 +277,8 @@ VALUES = st.recursive(
 OPS = st.sampled_from(["subscribe", "unsubscribe", "call_service", "set_level", "publish", "auth"])
 NAMES = st.sampled_from(
     [
-        "id",
-        "topic",
-        "type",
-        "service",
-        "args",
-        "level",
-        "throttle_rate",
-        "queue_length",
-        "fragment_size",
-        "compression",
-        "timeout",
+        *("id", "topic", "type", "service", "args", "level"),
+        *("throttle_rate", "queue_length", "compression", "timeout"),
     ]
 )
 MESSAGES = st.builds(

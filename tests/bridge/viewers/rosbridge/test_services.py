@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from lupin_bridge.feed.topics import TwinNames
 from lupin_bridge.viewers.rosbridge_protocol import CallService, Refused
-from lupin_bridge.viewers.rosbridge_services import FieldCall, absolute, answer, is_type
+from lupin_bridge.viewers.rosbridge_services import FieldCall, answer, is_type
 from lupin_twin.field.engine import FieldRequest
 
 NAMES = TwinNames("/house/state", "/house/get_field")
@@ -165,10 +165,6 @@ def test_a_type_is_known_in_both_of_its_forms() -> None:
     assert is_type("lupin_msgs/TwinState", "lupin_msgs/msg/TwinState")
     assert not is_type("lupin_msgs/srv/TwinState", "lupin_msgs/msg/TwinState")
     assert not is_type("TwinState", "lupin_msgs/msg/TwinState")
-
-
-def test_a_name_counts_from_the_root() -> None:
-    assert (absolute("a/b"), absolute("/a/b"), absolute("")) == ("/a/b", "/a/b", "/")
 
 
 ARGS = st.dictionaries(

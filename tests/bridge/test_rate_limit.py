@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.serving.admission import RateLimit, client_key
+from lupin_bridge.rate_limit import RateLimit
+from lupin_bridge.serving.admission import client_key
 
 
 def taken(limit: RateLimit, client: str, now_s: float, tries: int) -> int:
@@ -19,6 +20,13 @@ def test_a_burst_is_taken_at_once_and_the_next_turn_waits_an_interval() -> None:
     assert limit.take("a", 100.0) == pytest.approx(0.05)
     assert limit.wait_s("a", 100.04) == pytest.approx(0.01)
     assert taken(limit, "a", 100.05, 2) == 1
+
+
+def test_many_turns_are_taken_together_or_not_at_all() -> None:
+    limit = RateLimit(rate_hz=10.0, burst=5.0)
+    assert limit.take("a", 0.0, 6) == pytest.approx(0.1)
+    assert limit.take("a", 0.0, 5) == 0.0
+    assert limit.take("a", 0.0) == pytest.approx(0.1)
 
 
 def test_a_refused_turn_costs_nothing() -> None:
@@ -51,7 +59,7 @@ def test_clients_do_not_use_up_each_others_turns() -> None:
 
 
 def test_the_table_is_bounded_and_the_least_recently_active_leaves_first() -> None:
-    limit = RateLimit(rate_hz=0.001, burst=1.0, max_clients=3)
+    limit = RateLimit(rate_hz=0.001, burst=1.0, max_keys=3)
     for client in ("a", "b", "c", "d", "e"):
         assert limit.take(client, 0.0) == 0.0
     assert len(limit) == 3

@@ -1,0 +1,89 @@
+"""What both sources over ROS have in common: a node of ours in a thread, and the topics' relay."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+from typing import Any, Generic, TypeVar
+
+from rclpy.context import Context
+
+from lupin_bridge.feed.past_process import PastProcess
+from lupin_bridge.feed.relay import Relay
+from lupin_bridge.feed.relay_ros import RelayRos, names_of
+from lupin_bridge.feed.revisions import RevisedEstimate, RevisionCache
+from lupin_bridge.feed.ros_thread import BridgedNode, RosThread
+from lupin_bridge.feed.shared_work import Shared
+from lupin_bridge.feed.source import TwinSource
+from lupin_bridge.feed.topics import TwinNames
+from lupin_twin.field.engine import FieldRules
+from lupin_twin.runtime.workers import Workers
+
+NodeT = TypeVar("NodeT", bound=BridgedNode)
+EventT = TypeVar("EventT")
+
+
+class RosSource(TwinSource, Generic[NodeT, EventT]):
+    """A source with a node; who extends it says which, and what its events are."""
+
+    thread: RosThread[NodeT, EventT]
+
+    def __init__(self, *, ros_args: Sequence[str], timeout_s: float) -> None:
+        self._ros_args = ros_args
+        self.timeout_s = timeout_s
+        self.workers = Workers("work")
+        self.past = PastProcess()
+        self.relay = Relay(lambda: self.thread, RelayRos())
+        self._estimating: Shared[RevisedEstimate] = Shared()
+        self._revisions = RevisionCache()
+        self._rules: FieldRules
+        # The same for as long as the node lives.
+        self._names: TwinNames
+
+    async def _start_thread(
+        self,
+        make_node: Callable[[Context, Callable[[EventT], None]], NodeT],
+        on_event: Callable[[EventT], None],
+        on_death: Callable[[], None],
+        rules: Callable[[Any], FieldRules],
+    ) -> None:
+        self.thread = RosThread(
+            make_node, ros_args=self._ros_args, on_event=on_event, on_death=on_death
+        )
+        await self.thread.start()
+        self._rules, self._names = await self.thread.call(
+            lambda node: (rules(node), names_of(node))
+        )
+
+    async def stop(self) -> None:
+        """Stop the ROS thread, the workers and the process that looks back."""
+        self.workers.close()
+        await asyncio.gather(self.past.stop(), self.thread.stop())
+
+    @property
+    def is_alive(self) -> bool:
+        """See `TwinSource`."""
+        return self.thread.is_alive
+
+    @property
+    def stuck_s(self) -> float:
+        """See `TwinSource`."""
+        return self.thread.stuck_s
+
+    @property
+    def calls_waiting(self) -> int:
+        """See `TwinSource`."""
+        return self.thread.calls_waiting
+
+    @property
+    def callback_errors(self) -> int:
+        """See `TwinSource`."""
+        return self.thread.callback_errors
+
+    def rules(self) -> FieldRules:
+        """The node's parameters for fields: the twin's, as far as it was given the same."""
+        return self._rules
+
+    def names(self) -> TwinNames:
+        """The twin's, as ROS resolves and remaps them."""
+        return self._names

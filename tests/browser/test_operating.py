@@ -7,9 +7,8 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.hmi import Hmi, OpenPage
+from tests.browser.hmi import Hmi
 from tests.browser.house import TAGS
-from tests.support.web import Bridge
 
 # --- sensors ------------------------------------------------------------------------------------
 
@@ -223,8 +222,8 @@ def test_each_layer_goes_and_comes_back(hmi: Hmi) -> None:
     free = panel.bounding_box()
     assert free is not None
     width = round(free["x"]) - left - 20
+    with_it = hmi.settled_picture(width)
     for box in panel.get_by_role("checkbox").all():
-        with_it = hmi.settled_picture(width)
         box.click()
         hmi.expect_change(with_it)
         box.click()
@@ -349,16 +348,3 @@ def test_single_keys_can_be_switched_off(hmi: Hmi) -> None:
     hmi.page.keyboard.press("n")
     expect(hmi.test_id("tag-card")).to_have_count(0)
     expect(hmi.test_id("legend")).to_contain_text("Temperature")
-
-
-@pytest.mark.parametrize("width", [360, 720, 820, 1280, 1440, 1920])
-def test_no_column_of_the_table_is_out_of_sight(
-    house: Bridge, open_page: OpenPage, width: int
-) -> None:
-    hmi = open_page(house.url, viewport={"width": width, "height": 1000})
-    if width == 360:
-        hmi.page.get_by_role("navigation").get_by_role("button", name="Tags").click()
-    expect(hmi.row("1")).to_be_visible()
-    table = hmi.page.locator(".table-scroll")
-    hidden = "table => table.scrollWidth - table.clientWidth"
-    hmi.expect(lambda: table.evaluate(hidden) == 0, "a table without anything hidden")

@@ -28,7 +28,12 @@ from pathlib import Path
 from typing import IO, Any, Final
 
 # The programs that it can be, by the module that `python -m` would run.
-PROGRAMS: Final = ("lupin_bridge.cli.command", "lupin_twin.cli", "tests.support.limited")
+PROGRAMS: Final = (
+    "lupin_bridge.cli.command",
+    "lupin_twin.cli",
+    "lupin_patrol",
+    "tests.support.limited",
+)
 # What they import once they run.
 IMPORTED: Final = (
     "lupin_bridge.cli.roles",
@@ -36,6 +41,9 @@ IMPORTED: Final = (
     "lupin_twin.ros.parameters",
     "lupin_twin.ros.base_node",
     "lupin_bridge.cli.fleet",
+    "lupin_patrol.mission",
+    "lupin_patrol.node",
+    "greenhouse_sim.simulator",
     "psycopg",
 )
 # Variables that are read where a program runs, by us or by rcl. Of all others some are read as
@@ -204,7 +212,9 @@ def main() -> None:
     os.environ.update(request["env"])
     program = import_module(request["program"])
     sys.argv = [str(program.__file__), *request["arguments"]]
-    program.command()
+    if hasattr(program, "command"):
+        program.command()
+    import_module(f"{request['program']}.__main__")
 
 
 if __name__ == "__main__":

@@ -68,7 +68,8 @@ def test_the_chosen_row_comes_into_view_and_the_focus_is_never_lost(open_house: 
     hmi.page.locator(".table-scroll").evaluate("e => { e.scrollTop = 0; }")
     hmi.row("1").get_by_role("button").focus()
     focused = hmi.page.locator("tr[data-tag-id]:focus-within")
-    for index in range(MOST):
+    further = len(hmi.rows()) + 5
+    for index in range(further):
         hmi.page.keyboard.press("Tab")
         # No finger is as quick as to outrun the rows that come with the scrolling.
         expect(focused).to_have_attribute("data-tag-id", str(index + 2))
@@ -76,7 +77,7 @@ def test_the_chosen_row_comes_into_view_and_the_focus_is_never_lost(open_house: 
     # Scrolled far away it keeps its focus, and goes on from there.
     hmi.page.locator(".table-scroll").evaluate("e => { e.scrollTop = e.scrollHeight; }")
     expect(hmi.row(str(TAGS))).to_be_in_viewport()
-    expect(focused).to_have_attribute("data-tag-id", str(MOST + 1))
+    expect(focused).to_have_attribute("data-tag-id", str(further + 1))
     hmi.page.keyboard.press("Shift+Tab")
     expect(focused).to_be_in_viewport()
 

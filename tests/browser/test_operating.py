@@ -69,12 +69,12 @@ def test_a_range_is_fixed_within_reason_and_fahrenheit_is_kept(hmi: Hmi) -> None
 
     hmi.page.get_by_role("radio", name="Fixed").check()
     low, legend = hmi.page.get_by_label("Lowest °C"), hmi.test_id("range-low")
-    high = hmi.test_id("range-high").inner_text()
+    highest = hmi.test_id("range-high").inner_text()
     was, in_force = low.input_value(), legend.inner_text()
     low.fill("99")
     expect(low).to_have_attribute("aria-invalid", "true")
     expect(hmi.page.locator(".bound").get_by_role("alert")).to_have_text(
-        f"Not below {high}: not in use"
+        f"Not below {highest}: not in use"
     )
     low.press("Escape")
     expect(low).to_have_value(was)

@@ -25,6 +25,15 @@ def climate(simulator: Any) -> Climate:
     return Climate(simulator)
 
 
+def test_the_sensors_are_the_simulators(climate: Climate) -> None:
+    assert climate.sensors == ALL
+
+
+def test_readings_come_in_the_order_asked_for_and_no_others(climate: Climate) -> None:
+    readings = climate.read(("light", "co2"), (1.0, 1.0), NOON_S, stream(0))
+    assert [name for name, _ in readings] == ["light", "co2"]
+
+
 def test_readings_are_the_simulators_own_values_soil_moisture_in_percent(
     climate: Climate, simulator: Any
 ) -> None:
@@ -33,6 +42,19 @@ def test_readings_are_the_simulators_own_values_soil_moisture_in_percent(
         random.seed(5)
         raw = simulator.sensor_registry.get_sensor(name).retrieve_data((1.3, 2.6), NOON_S)
         assert value == pytest.approx(raw * 100.0 if name == "soil_moisture" else raw)
+
+
+def test_readings_repeat_with_the_same_chance_and_differ_with_another(climate: Climate) -> None:
+    first = climate.read(ALL, (2.0, 2.0), NOON_S, stream(1, "scan"))
+    random.seed(123)  # whatever else in the process draws numbers
+    assert climate.read(ALL, (2.0, 2.0), NOON_S, stream(1, "scan")) == first
+    assert climate.read(ALL, (2.0, 2.0), NOON_S, stream(2, "scan")) != first
+
+
+def test_one_chance_gives_new_noise_at_each_reading(climate: Climate) -> None:
+    chance = stream(1, "scan")
+    first = climate.read(("co2",), (2.0, 2.0), NOON_S, chance)
+    assert climate.read(("co2",), (2.0, 2.0), NOON_S, chance) != first
 
 
 def test_reading_leaves_the_processs_random_numbers_alone(climate: Climate) -> None:
@@ -63,6 +85,18 @@ def test_the_truth_follows_the_configuration(
     climate: Climate, sensor: str, position: tuple[float, float], hour: float, expected: float
 ) -> None:
     assert climate.truth(sensor, position, hour * 3600.0) == pytest.approx(expected)
+
+
+def test_the_truth_is_pure(climate: Climate) -> None:
+    for name in ALL:
+        value = climate.truth(name, (1.0, 6.0), NOON_S)
+        assert all(climate.truth(name, (1.0, 6.0), NOON_S) == value for _ in range(5))
+
+
+def test_the_day_wraps(climate: Climate) -> None:
+    assert climate.truth("temperature", (1.0, 1.0), NOON_S + 86_400.0) == pytest.approx(
+        climate.truth("temperature", (1.0, 1.0), NOON_S)
+    )
 
 
 def test_readings_scatter_around_the_truth(climate: Climate) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import dist
 
 import numpy as np
+import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 
 from lupin_patrol.greenhouse import Greenhouse, Point, Rect, Table, read_greenhouse
@@ -47,6 +48,19 @@ def everywhere(greenhouse: Greenhouse) -> list[Point]:
     ]
 
 
+def test_at_first_nothing_is_known() -> None:
+    grid = Exploration(HALL).snapshot()
+    assert grid.known == 0
+    assert set(np.frombuffer(grid.cells, dtype=np.int8)) == {UNKNOWN}
+
+
+def test_the_grid_covers_the_house_and_a_ring_of_wall() -> None:
+    grid = Exploration(read_greenhouse(GreenhouseSimulator())).snapshot()
+    assert (grid.width, grid.height, grid.resolution_m) == (82, 162, 0.05)
+    assert grid.origin == (-0.05, -0.05)
+    assert len(grid.cells) == 82 * 162
+
+
 def test_a_complete_map_has_tables_and_walls_and_else_free_floor() -> None:
     greenhouse = read_greenhouse(GreenhouseSimulator())
     grid = explored_from(*everywhere(greenhouse), greenhouse=greenhouse)
@@ -75,6 +89,13 @@ def test_what_stands_behind_a_table_is_hidden() -> None:
     assert cell(grid, (2.2, 2.9)) == FREE  # past the table's end
 
 
+def test_a_table_is_hidden_by_another_one() -> None:
+    behind = Table("behind", Rect(2.5, 1.3, 2.7, 1.7))
+    greenhouse = Greenhouse(HALL.interior, (*HALL.tables, behind), ())
+    assert cell(explored_from(LEFT, greenhouse=greenhouse), (2.6, 1.5)) == UNKNOWN
+    assert cell(explored_from((2.2, 1.5), greenhouse=greenhouse), (2.6, 1.5)) == OCCUPIED
+
+
 def test_nothing_is_known_beyond_the_view_radius() -> None:
     far = Greenhouse(Rect(0.0, 0.0, 8.0, 2.0), (), ())
     grid = explored_from((0.5, 1.0), greenhouse=far)
@@ -84,3 +105,38 @@ def test_nothing_is_known_beyond_the_view_radius() -> None:
         assert dist((x, y), (0.5, 1.0)) <= VIEW_RADIUS_M
     assert cell(grid, (0.5 + VIEW_RADIUS_M - 0.1, 1.0)) == FREE
     assert cell(grid, (0.5 + VIEW_RADIUS_M + 0.1, 1.0)) == UNKNOWN
+
+
+def test_the_map_only_ever_grows() -> None:
+    exploration = Exploration(HALL)
+    before = np.frombuffer(exploration.snapshot().cells, dtype=np.int8)
+    for position in everywhere(HALL):
+        exploration.observe_from(position)
+        after = np.frombuffer(exploration.snapshot().cells, dtype=np.int8)
+        assert (after[before != UNKNOWN] == before[before != UNKNOWN]).all()
+        before = after
+
+
+def test_a_look_says_whether_it_showed_anything_new() -> None:
+    exploration = Exploration(HALL)
+    assert exploration.observe_from(LEFT)
+    assert not exploration.observe_from(LEFT)
+    for position in everywhere(HALL):
+        exploration.observe_from(position)
+    assert not exploration.observe_from((2.5, 2.5))
+
+
+def test_a_snapshot_does_not_change_any_more() -> None:
+    exploration = Exploration(HALL)
+    exploration.observe_from(LEFT)
+    snapshot = exploration.snapshot()
+    known = snapshot.known
+    exploration.observe_from((2.5, 1.5))
+    assert snapshot.known == known < exploration.snapshot().known
+
+
+@pytest.mark.parametrize("extent", [3.0, 3.01, 2.99])
+def test_a_house_that_is_no_multiple_of_the_cell_is_covered(extent: float) -> None:
+    grid = Exploration(Greenhouse(Rect(0.0, 0.0, extent, 3.0), (), ())).snapshot()
+    wall_starts = grid.origin[0] + (grid.width - 1) * RESOLUTION_M
+    assert extent - 1e-9 <= wall_starts < extent + RESOLUTION_M - 1e-9

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import dist
 
 import numpy as np
@@ -19,6 +20,29 @@ point = st.tuples(coordinate, coordinate)
 
 def crosses(start: Point, goal: Point, rect: Rect = BOX) -> bool:
     return bool(crossings(start, np.array([goal]), [rect])[0, 0])
+
+
+def test_a_rectangle_grows_and_shrinks_on_every_side() -> None:
+    assert BOX.grown(0.5) == Rect(0.5, 1.5, 3.5, 4.5)
+    assert BOX.grown(0.5).grown(-0.5) == BOX
+
+
+def test_a_rectangle_contains_its_inside_without_its_edges() -> None:
+    assert BOX.contains((2.0, 3.0))
+    for outside in ((1.0, 3.0), (3.0, 3.0), (2.0, 2.0), (2.0, 4.0), (0.0, 3.0), (2.0, 5.0)):
+        assert not BOX.contains(outside)
+
+
+def test_the_nearest_point_is_on_the_edge_for_points_outside_and_itself_inside() -> None:
+    assert BOX.nearest((0.0, 3.0)) == (1.0, 3.0)
+    assert BOX.nearest((9.0, 9.0)) == (3.0, 4.0)
+    assert BOX.nearest((2.0, 2.5)) == (2.0, 2.5)
+
+
+def test_corners_go_round_counter_clockwise() -> None:
+    corners = BOX.corners
+    area = sum(a[0] * b[1] - b[0] * a[1] for a, b in pairwise([*corners, corners[0]])) / 2
+    assert area == pytest.approx(4.0)
 
 
 @pytest.mark.parametrize(
@@ -57,6 +81,18 @@ def test_crossing_agrees_with_stepping_along_the_line(start: Point, goal: Point)
     assert crosses(start, goal) is surely_inside
 
 
+def test_crossings_has_a_row_for_each_target_and_a_column_for_each_rectangle() -> None:
+    targets = np.array([(5.0, 3.0), (0.0, 5.0), (5.0, 0.5)])
+    crossed = crossings((0.0, 3.0), targets, [BOX, Rect(4.0, 0.0, 4.5, 5.0)])
+    assert crossed.tolist() == [[True, True], [False, False], [True, True]]
+    assert crossings((0.0, 3.0), targets, []).shape == (3, 0)
+
+
+def test_the_length_of_a_polyline() -> None:
+    assert length_of([(0.0, 0.0), (3.0, 4.0), (3.0, 5.0)]) == pytest.approx(6.0)
+    assert length_of([(1.0, 1.0)]) == 0.0
+
+
 @given(
     points=st.lists(point, min_size=1, max_size=6),
     step_m=st.floats(0.05, 2.0),
@@ -75,3 +111,12 @@ def test_a_walk_covers_its_length_in_steps_no_longer_than_asked(
     assert covered == pytest.approx(min(wanted, whole), abs=1e-5)
     if share >= 1.0:
         assert last == pytest.approx(points[-1], abs=1e-5)
+
+
+def test_a_walk_follows_its_polyline_round_the_corner() -> None:
+    positions = [p for p, _ in walk([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)], 0.5, 1.75)]
+    np.testing.assert_allclose(positions, [(0.5, 0.0), (1.0, 0.0), (1.0, 0.5), (1.0, 0.75)])
+
+
+def test_a_walk_of_no_length_yields_where_it_stands() -> None:
+    assert list(walk([(1.0, 2.0), (1.0, 2.0)], 0.2, 5.0)) == [((1.0, 2.0), 0.0)]

@@ -79,6 +79,18 @@ def test_the_robot_fits_where_it_stops_and_faces_the_tag(
         assert CLEARANCE_M <= round(hypot(*away), 6) <= 0.4
 
 
+def test_free_means_the_clearance_from_tables_and_walls(tmp_path: Path) -> None:
+    greenhouse = made_of(tmp_path, {}, {"one": box(1.0, 1.0, 2.0, 2.0)})
+    assert greenhouse.is_free((0.2, 0.2))
+    assert greenhouse.is_free((0.8, 1.5))
+    assert greenhouse.is_free((3.8, 3.8))
+    assert not greenhouse.is_free((0.19, 2.0))
+    assert not greenhouse.is_free((3.0, 3.81))
+    assert not greenhouse.is_free((0.81, 1.5))
+    assert not greenhouse.is_free((1.5, 1.5))
+    assert not greenhouse.is_free((9.0, 9.0))
+
+
 def test_a_tag_faces_the_side_it_is_nearest_to(tmp_path: Path) -> None:
     tags = {
         "left": {"x": 1.02, "y": 1.5, "sensors": []},

@@ -72,6 +72,10 @@ def test_the_same_seed_gives_the_same_events(patrol: list[Event]) -> None:
     assert played(passes=PASSES) == patrol
 
 
+def test_another_seed_gives_other_events(first_pass: list[Event]) -> None:
+    assert played(seed=1) != first_pass
+
+
 def test_time_never_goes_back(patrol: list[Event]) -> None:
     assert all(a.at_s <= b.at_s for a, b in pairwise(patrol))
     assert patrol[0].at_s == 0.0
@@ -202,6 +206,12 @@ def test_a_retry_may_fail_too_and_a_later_pass_brings_the_tag_back(patrol: list[
     )
 
 
+def test_every_pass_tries_every_tag(patrol: list[Event]) -> None:
+    for pass_index in range(PASSES):
+        tried = {s.tag_id for s in only(TagScanned, patrol) if s.pass_index == pass_index}
+        assert len(tried) == 29
+
+
 def test_poses_are_the_tags_own_at_first_and_jitter_a_little_later(patrol: list[Event]) -> None:
     greenhouse = Mission(GreenhouseSimulator(), 0, DAY_SPEED).greenhouse
     for scan in only(TagScanned, patrol):
@@ -278,3 +288,7 @@ def test_the_day_goes_on_at_its_own_speed_and_wraps_at_midnight() -> None:
             (START_OF_DAY_S + 1_000.0 * scan.at_s) % 86_400.0
         )
     assert any(later.time_of_day_s < earlier.time_of_day_s for earlier, later in pairwise(scans))
+
+
+def test_a_day_may_stand_still() -> None:
+    assert {s.time_of_day_s for s in only(TagScanned, played(day_speed=0.0))} == {START_OF_DAY_S}

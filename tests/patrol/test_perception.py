@@ -48,6 +48,31 @@ def test_a_table_in_between_hides_a_tag() -> None:
     assert not sees(in_front(0, 0.8), Greenhouse(HALL.interior, (TABLE, post), (TAG,)))
 
 
+def test_a_tag_is_new_once_and_counted_each_time() -> None:
+    detector = TagDetector(HALL, Plants(HALL, 0), 0)
+    assert detector.sightings() == ()
+    assert detector.observe_from(in_front(0, 0.4), 0)
+    assert not detector.observe_from(in_front(10, 0.4), 0)
+    assert not detector.observe_from((3.0, 3.0), 0)
+    [sighting] = detector.sightings()
+    assert sighting.tag == TAG
+    assert sighting.sightings == 2
+
+
+def test_every_tag_of_the_greenhouse_is_seen_from_its_stop_in_the_order_of_the_looks() -> None:
+    greenhouse = read_greenhouse(GreenhouseSimulator())
+    plants = Plants(greenhouse, 0)
+    for tag in greenhouse.tags:
+        detector = TagDetector(greenhouse, plants, 0)
+        assert detector.observe_from(tag.stop, 0)
+        assert tag in [sighting.tag for sighting in detector.sightings()]
+    detector = TagDetector(greenhouse, plants, 0)
+    detector.observe_from(greenhouse.tag("2").stop, 0)
+    detector.observe_from(greenhouse.tag("21").stop, 0)
+    found = [sighting.tag.tag_id for sighting in detector.sightings()]
+    assert found.index("2") < found.index("21")
+
+
 def test_the_guess_at_the_species_is_mostly_right_and_never_changes() -> None:
     greenhouse = read_greenhouse(GreenhouseSimulator())
     right = 0

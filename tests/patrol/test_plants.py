@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from math import dist
+
 import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 
-from lupin_patrol.greenhouse import Greenhouse, read_greenhouse
+from lupin_patrol.greenhouse import TABLE_HEIGHT_M, Greenhouse, read_greenhouse
 from lupin_patrol.plants import SPECIES, Plants
 
 PASSES = range(30)
@@ -39,6 +41,43 @@ def test_looks_repeat_with_the_seed_and_differ_without(
     assert Plants(greenhouse, 1).inspect("12", 3, 0) != plants.inspect("12", 3, 0)
     assert plants.inspect("12", 4, 0) != plants.inspect("12", 3, 0)
     assert plants.inspect("12", 3, 1) != plants.inspect("12", 3, 0)
+
+
+def test_blooms_stand_inside_the_tags_own_table(greenhouse: Greenhouse, plants: Plants) -> None:
+    for tag in greenhouse.tags:
+        for pass_index in range(5):
+            look = plants.inspect(tag.tag_id, pass_index, 0)
+            assert look.blooms
+            assert look.flower_count == len(look.blooms)
+            for bloom in look.blooms:
+                assert tag.table.rect.contains(bloom.position)
+                assert bloom.species == look.species == plants.species(tag.tag_id)
+                assert 0.1 < bloom.height_m < 0.4
+                assert bloom.z == TABLE_HEIGHT_M + bloom.height_m
+                assert 0.0 <= bloom.confidence <= 1.0
+            assert 0.0 <= look.confidence <= 1.0
+
+
+def test_a_bloom_belongs_to_the_nearest_tag_of_its_table(
+    greenhouse: Greenhouse, plants: Plants
+) -> None:
+    for tag in greenhouse.tags:
+        others = [t for t in greenhouse.tags if t.table == tag.table and t != tag]
+        for bloom in plants.inspect(tag.tag_id, 0, 0).blooms:
+            # The look places it 1 cm off in each axis, so the border is a little soft.
+            nearest = min(dist(bloom.position, other.position) for other in others)
+            assert dist(bloom.position, tag.position) < nearest + 0.03
+
+
+def test_a_flower_stays_where_it_is(plants: Plants) -> None:
+    first = [bloom.position for bloom in plants.inspect("12", 0, 0).blooms]
+    for bloom in plants.inspect("12", 7, 0).blooms:
+        assert min(dist(bloom.position, position) for position in first) < 0.09
+
+
+def test_some_flowers_are_overlooked(greenhouse: Greenhouse, plants: Plants) -> None:
+    counts = {plants.inspect("12", pass_index, 0).flower_count for pass_index in PASSES}
+    assert len(counts) > 1
 
 
 def test_the_first_pass_has_a_pest_for_every_seed(greenhouse: Greenhouse) -> None:

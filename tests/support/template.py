@@ -97,6 +97,7 @@ class Template:
         """End it, and all that it has started."""
         self._link.close()
         self._process.wait()
+        self._said.close()
 
     def _ask(self, request: Mapping[str, Any], files: Sequence[int] = ()) -> int:
         with self._lock:

@@ -17,17 +17,15 @@ from lupin_twin.core.drops import Drop
 from lupin_twin.core.history import History
 from lupin_twin.core.state import TagState, TwinStore
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.rows import KIND_FLOWER, Row, ScanRow
+from lupin_twin.journal.rows import Row
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
 from lupin_twin.ros import convert
+from tests.bridge.bags.test_journal_messages import FAILED_LOOK
 from tests.bridge.cli.test_journal import Said
 from tests.support.bags import is_open, no_file_above, read
 from tests.support.journal import NOW, SECOND, kept, look, pin, scan
 
-FAILED_LOOK = ScanRow(
-    "7", NOW, NOW + 1, kind=KIND_FLOWER, status=2, detail="dark", source="robot", mission="m1"
-)
 ROWS: list[Row] = [
     pin("7"),
     scan("7", temperature=20.0, humidity=60.0),

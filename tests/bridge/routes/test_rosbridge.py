@@ -291,6 +291,16 @@ def test_names_are_the_ones_that_ros_knows() -> None:
         assert "expected one of /house/state, /flor" in ros.first("status")["msg"]
 
 
+def test_one_client_too_many_is_turned_away_and_told_so() -> None:
+    with bridge("--max-clients", "1") as house, ros_at(house.url) as ros:
+        assert ros.is_quiet()
+        with ros_at(house.url) as late, pytest.raises(ConnectionClosed) as closed:
+            late.next()
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1013
+        assert closed.value.rcvd.reason == "1 clients are connected, the limit"
+
+
 def test_the_limits_of_fields_hold_here_too() -> None:
     with bridge(*limits(answers_per_s=0.01)) as house, ros_at(house.url) as ros:
         assert ros.call(FIELD, args=FIELD_ARGS)["result"] is True

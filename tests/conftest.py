@@ -7,6 +7,7 @@ import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -15,6 +16,10 @@ from tests.support.domains import own_domain
 from tests.support.needs import is_quick, let_nothing_in
 from tests.support.shared_memory import remove_what_the_dead_left
 from tests.support.state_home import use_own
+
+if TYPE_CHECKING:
+    from tests.support.archive import Archive
+    from tests.support.postgres import Postgres
 
 # What twins keep in a user's folder, the tests' keep in one of their own, in every process.
 STATE = use_own()
@@ -70,6 +75,26 @@ def domain() -> Iterator[int]:
     """A ROS domain of the test's own."""
     with own_domain() as leased:
         yield leased
+
+
+@pytest.fixture(scope="session")
+def postgresql() -> Iterator[Postgres]:
+    """A PostgreSQL for all tests of a worker that leave the server as it is."""
+    from tests.support.postgres import server
+
+    with server() as made:
+        yield made
+
+
+@pytest.fixture
+def archive(postgresql: Postgres) -> Iterator[Archive]:
+    """A new archive, with the user of the site gh1, and one that may read all."""
+    from tests.support.archive import Archive
+
+    made = Archive(postgresql)
+    made.add_user("page", "lupin_page")
+    yield made
+    made.drop()
 
 
 @pytest.fixture

@@ -26,7 +26,7 @@ from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import ROUTES, Bridge, bridge
 
 NO_LIMITS = limits(answers_per_s=10_000, concurrency=1_000)
-BROKEN_REQUESTS = 3_000
+BROKEN_REQUESTS = 1_500
 MEMORY_MB = 5.0
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -20,12 +19,6 @@ from tests.support.ros import Peer
 from tests.support.waiting import wait_for
 
 MOMENTS = 6
-
-
-@pytest.fixture(scope="module")
-def postgresql() -> Iterator[Postgres]:
-    with server() as made:
-        yield made
 
 
 def test_kills_at_any_moment_lose_nothing_and_double_nothing(

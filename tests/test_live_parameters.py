@@ -38,10 +38,8 @@ def parameter_file(tmp_path: Path) -> str:
     return str(path)
 
 
-@pytest.mark.parametrize("renaming", [[], ["-r", "__node:=other", "-r", "__ns:=/house1"]])
-def test_the_same_file_means_the_same_to_both(
-    domain: int, parameter_file: str, renaming: list[str]
-) -> None:
+def test_the_same_file_means_the_same_to_both(domain: int, parameter_file: str) -> None:
+    renaming = ["-r", "__node:=other", "-r", "__ns:=/house1"]
     file = ["--ros-args", "--params-file", parameter_file]
     with (
         Peer(domain) as peer,

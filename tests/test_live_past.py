@@ -122,10 +122,6 @@ def test_as_of_now_it_is_the_state_of_now(peer: Peer) -> None:
     assert by_id["pinned"].pose.orientation.w == 1.0
 
 
-def test_before_everything_known_there_is_nothing(peer: Peer) -> None:
-    assert [tag.readings for tag in state_at(peer, T - 1.0).state.tags if tag.readings] == []
-
-
 def test_readings_are_told_one_by_one_or_in_buckets(peer: Peer) -> None:
     assert told(series(peer, "a", "co2")) == [(0.0, 400.0), (100.5, 500.0)]
     half = series(peer, "a", "co2", start=stamp(T + 0.0), end=stamp(T + 100.5))
@@ -157,39 +153,6 @@ def test_runs_of_the_clock_are_told_with_their_lengths(peer: Peer) -> None:
     runs = series(peer, "*", "~runs")
     assert list(runs.minima) == list(runs.maxima) == [0.0]
     assert runs.means[0] > time.time() - T - 3_600.0
-
-
-@pytest.mark.parametrize(
-    ("kind", "service", "request_", "says"),
-    [
-        (GetStateAt, STATE_AT, {"at": Time(sec=2**31 - 1)}, "later than now, 1"),
-        (GetStateAt, STATE_AT, {"at": Time(sec=-5)}, "at is -5.000000000 s, before 0"),
-        (GetHistory, HISTORY, {"tag_id": "a"}, "sensor_type is empty"),
-        (GetHistory, HISTORY, {"sensor_type": "co2"}, "tag_id is empty"),
-        (GetHistory, HISTORY, {"tag_id": "a", "sensor_type": "~x"}, "is none of ~scans"),
-        (GetHistory, HISTORY, {"tag_id": "a", "sensor_type": "~runs"}, "are those of '*'"),
-        (GetHistory, HISTORY, {"tag_id": "a", "sensor_type": "x" * 999}, "999 characters, the lim"),
-        (
-            GetHistory,
-            HISTORY,
-            {"tag_id": "a", "sensor_type": "co2", "max_points": 5_001},
-            "max_points is 5001, the limits are 1 and 5000",
-        ),
-        (
-            GetHistory,
-            HISTORY,
-            {"tag_id": "a", "sensor_type": "co2", "start": Time(sec=9), "end": Time(sec=8)},
-            "before start",
-        ),
-    ],
-)
-def test_every_refusal_says_why_and_has_nothing_else(
-    peer: Peer, kind: Any, service: str, request_: dict[str, Any], says: str
-) -> None:
-    response = peer.ask(kind, service, **request_)
-    assert says in response.error_message
-    response.error_message = ""
-    assert response == kind.Response()
 
 
 def test_a_namespace_has_services_and_a_past_of_its_own(peer: Peer) -> None:

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import os
 import subprocess
-from functools import cache
-
-import pytest
 
 from tests.support.needs import TESTS
 
 
-@cache
 def told(*target: str) -> str:
     """The commands of a target, none of them run."""
     own = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")
@@ -23,9 +19,9 @@ def told(*target: str) -> str:
     return result.stdout
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
+def test_every_check_is_among_those_of_make_test_and_two_are_run_at_a_time() -> None:
+    lines = told("test")
+    for command in (
         "ruff check",
         "ruff format --check",
         "lint-imports",
@@ -37,27 +33,17 @@ def told(*target: str) -> str:
         "npm run --silent test",
         "npm run --silent size",
         "pytest",
-    ],
-)
-def test_every_check_is_among_those_of_make_test(command: str) -> None:
-    lines = told("test").splitlines(keepends=True)
-    assert any(command in line for line in lines), lines
-
-
-@pytest.mark.parametrize(
-    ("target", "parts"),
-    [("test", "lint types docs hmi-test collect"), ("check", "quick lint types hmi-test")],
-)
-def test_what_keeps_no_two_cores_busy_is_run_two_at_a_time(target: str, parts: str) -> None:
-    assert f"-j 2 --output-sync=target {parts}" in told(target)
+        "-j 2 --output-sync=target lint types docs hmi-test collect",
+    ):
+        assert command in lines
+    assert "-j 2 --output-sync=target quick lint types hmi-test" in told("check")
 
 
 def test_a_warning_ends_the_build_of_the_guide() -> None:
     assert "sphinx-build --quiet -n -W " in told("--what-if=docs/conf.py", "docs")
 
 
-@pytest.mark.parametrize("target", ["unit", "quick", "collect"])
-def test_what_the_tests_start_compiles_no_module_again(target: str) -> None:
-    pytest_lines = [line for line in told(target).splitlines() if "/pytest " in line]
-    assert pytest_lines
-    assert all(line.startswith("PYTHONDONTWRITEBYTECODE= ") for line in pytest_lines)
+def test_what_the_tests_start_compiles_no_module_again() -> None:
+    lines = [line for line in told("test", "quick").splitlines() if "/pytest " in line]
+    assert len(lines) == 3
+    assert all(line.startswith("PYTHONDONTWRITEBYTECODE= ") for line in lines)

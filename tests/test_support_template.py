@@ -63,7 +63,7 @@ def test_what_is_read_as_it_is_imported_has_to_be_the_same(template: Template) -
     assert template.can_be(TWIN, {**env, "ROS_DOMAIN_ID": "7", "LUPIN_PORT": "0"})
     assert not template.can_be(TWIN, {**env, "OPENBLAS_NUM_THREADS": "2"})
     assert not template.can_be(TWIN, {k: env[k] for k in env if k != "ROS_PYTHON_CHECK_FIELDS"})
-    assert not template.can_be((sys.executable, "-m", "lupin_patrol"), env)
+    assert not template.can_be((sys.executable, "-m", "http.server"), env)
     assert not template.can_be((sys.executable, "-X", "dev", *TWIN[1:]), env)
 
 

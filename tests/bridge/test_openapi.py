@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.app import create_app, document
+from lupin_bridge.app import document
 from tests.support.web import ROUTES
 
 DOCUMENT: dict[str, Any] = json.loads(document())
@@ -63,11 +63,6 @@ def test_every_reference_leads_to_a_type() -> None:
     found = set(references(DOCUMENT))
     assert found
     assert found <= known
-
-
-def test_asking_for_it_twice_gives_the_same() -> None:
-    app = create_app(None)
-    assert app.openapi() == app.openapi() == DOCUMENT
 
 
 def test_the_copy_that_the_browsers_types_are_made_from_is_fresh() -> None:

@@ -2,7 +2,7 @@
 
 One for each size, light and dark, and the wide one as people with the common kinds of colour
 blindness see it. To be looked at; with `--docs` those of the docs are made anew, as far as a script
-makes them. With `--states` instead: the page in every state of a house that the tests know.
+makes them.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from playwright.sync_api import Browser, Page, ViewportSize, expect, sync_playwr
 
 from tests.browser import estimate_pictures, moving_picture
 from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
-from tests.browser.states import shoot_states
 from tests.support.domains import own_domain
 from tests.support.processes import lupin_twin, url_of
 from tests.support.state_home import use_own
@@ -39,20 +38,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--docs", action="store_true", help="also write those of the docs")
-    parser.add_argument("--states", action="store_true", help="every state of states.json alone")
     options = parser.parse_args()
     use_own()
     options.folder.mkdir(parents=True, exist_ok=True)
     expect.set_options(timeout=PATIENCE_MS)
-    if options.states:
-        with (
-            sync_playwright() as playwright,
-            playwright.chromium.launch(
-                executable_path=CHROMIUM, args=list(CHROMIUM_ARGS), headless=True
-            ) as browser,
-        ):
-            shoot_states(browser, options.folder)
-        return 0
     with (
         own_domain() as domain,
         lupin_twin(domain, "demo", "--speed", str(PATROL_SPEED)) as server,

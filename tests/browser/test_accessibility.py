@@ -19,30 +19,33 @@ RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"
 
 
 def violations(hmi: Hmi) -> list[str]:
-    """What axe objects to, each with the elements that it means."""
+    """What axe objects to, in the light and in the dark, each with the elements that it means."""
     hmi.page.evaluate(AXE.read_text(encoding="utf-8"))
-    found: list[dict[str, Any]] = hmi.page.evaluate(
-        "async (tags) => (await axe.run({ runOnly: tags })).violations", RULES
-    )
-    return [
-        f"{each['id']}: {each['help']}: {node['html'][:160]} {node['failureSummary'][:300]}"
-        for each in found
-        for node in each["nodes"]
-    ]
+    found = []
+    for scheme in ("light", "dark"):
+        hmi.page.emulate_media(color_scheme=scheme)
+        expect(hmi.page.locator("html")).to_have_attribute("data-theme", scheme)
+        objections: list[dict[str, Any]] = hmi.page.evaluate(
+            "async (tags) => (await axe.run({ runOnly: tags })).violations", RULES
+        )
+        found += [
+            f"{scheme}: {each['id']}: {each['help']}: {node['html'][:160]} "
+            f"{node['failureSummary'][:300]}"
+            for each in objections
+            for node in each["nodes"]
+        ]
+    return found
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize(
     ("viewport", "query"),
     [(WIDE, ""), (WIDE, "?kiosk=1"), (PHONE, "")],
     ids=["wide", "kiosk", "phone"],
 )
 def test_the_page_as_it_opens(
-    house: Bridge, open_page: OpenPage, scheme: str, viewport: dict[str, int], query: str
+    house: Bridge, open_page: OpenPage, viewport: dict[str, int], query: str
 ) -> None:
-    hmi = open_page(
-        house.url, "tag=10", query, color_scheme=scheme, viewport=viewport, bypass_csp=True
-    )
+    hmi = open_page(house.url, "tag=10", query, viewport=viewport, bypass_csp=True)
     hmi.expect_samples(3)
     assert violations(hmi) == []
     if viewport is PHONE:
@@ -51,9 +54,8 @@ def test_the_page_as_it_opens(
         assert violations(hmi) == []
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_what_opens_on_demand(house: Bridge, open_page: OpenPage, scheme: str) -> None:
-    hmi = open_page(house.url, color_scheme=scheme, bypass_csp=True)
+def test_what_opens_on_demand(house: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(house.url, bypass_csp=True)
     hmi.expect_rows(*TAGS)
     hmi.page.get_by_role("button", name="Layers").click()
     assert violations(hmi) == []
@@ -75,12 +77,11 @@ def test_what_opens_on_demand(house: Bridge, open_page: OpenPage, scheme: str) -
 
 
 @pytest.mark.parametrize("colouring", ["ideal", "value"])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_table_alarms_and_charts_in_both_colourings(
-    house: Bridge, open_page: OpenPage, scheme: str, colouring: str
+    house: Bridge, open_page: OpenPage, colouring: str
 ) -> None:
     link = f"colour={colouring}&chart.tag=10&tag=10"
-    hmi = open_page(house.url, link, color_scheme=scheme, bypass_csp=True)
+    hmi = open_page(house.url, link, bypass_csp=True)
     hmi.expect_rows(*TAGS)
     hmi.page.get_by_role("button", name="Show as table").first.click()
     expect(hmi.test_id("series-table").first).to_be_visible()
@@ -90,10 +91,9 @@ def test_table_alarms_and_charts_in_both_colourings(
     assert violations(hmi) == []
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_an_empty_house_and_a_frozen_one(domain: int, open_page: OpenPage, scheme: str) -> None:
+def test_an_empty_house_and_a_frozen_one(domain: int, open_page: OpenPage) -> None:
     with bridge(domain=domain) as running:
-        hmi = open_page(running.url, color_scheme=scheme, bypass_csp=True)
+        hmi = open_page(running.url, bypass_csp=True)
         expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-tags")
         hmi.page.keyboard.press("a")
         expect(hmi.page.locator("[data-note=none]")).to_be_visible()

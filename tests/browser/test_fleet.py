@@ -8,26 +8,12 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-import pytest
 from playwright.sync_api import Browser, expect
 from playwright.sync_api import Page as BrowserPage
 
 from tests.support.archive import Archive, forward_once, forwarder
 from tests.support.fleet import Page, fleet, scans_lately, write
-from tests.support.postgres import Postgres, server
-
-
-@pytest.fixture(scope="module")
-def postgresql() -> Iterator[Postgres]:
-    with server() as made:
-        yield made
-
-
-@pytest.fixture
-def archive(postgresql: Postgres) -> Archive:
-    made = Archive(postgresql)
-    made.add_user("page", "lupin_page")
-    return made
+from tests.support.postgres import server
 
 
 @contextmanager

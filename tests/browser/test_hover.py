@@ -37,12 +37,13 @@ def test_the_mouse_on_a_pin_shows_its_card_in_short(hmi: Hmi) -> None:
     expect(card).to_have_count(0)
 
 
-@pytest.mark.parametrize("fragment", ["", "view=1,2,2.2", "view=3,2,2.2"])
-def test_it_stands_inside_the_map_and_off_its_pin(hmi: Hmi, fragment: str) -> None:
-    if fragment:
-        hmi.go(fragment)
-        hmi.expect_samples(3)
-        hmi.settled_picture()
+@pytest.mark.parametrize("fragment", ["view=1,2,2.2", "view=3,2,2.2"])
+def test_it_stands_inside_the_map_and_off_its_pin(
+    house: Bridge, open_page: OpenPage, fragment: str
+) -> None:
+    hmi = open_page(house.url, fragment)
+    hmi.expect_samples(3)
+    hmi.settled_picture()
     frame = hmi.map.bounding_box()
     assert frame is not None
     view, seen = hmi.view(), 0

@@ -68,7 +68,8 @@ def test_the_chosen_row_comes_into_view_and_the_focus_is_never_lost(open_house: 
     hmi.page.locator(".table-scroll").evaluate("e => { e.scrollTop = 0; }")
     hmi.row("1").get_by_role("button").focus()
     focused = hmi.page.locator("tr[data-tag-id]:focus-within")
-    for index in range(MOST):
+    further = len(hmi.rows()) + 5
+    for index in range(further):
         hmi.page.keyboard.press("Tab")
         # No finger is as quick as to outrun the rows that come with the scrolling.
         expect(focused).to_have_attribute("data-tag-id", str(index + 2))
@@ -76,7 +77,7 @@ def test_the_chosen_row_comes_into_view_and_the_focus_is_never_lost(open_house: 
     # Scrolled far away it keeps its focus, and goes on from there.
     hmi.page.locator(".table-scroll").evaluate("e => { e.scrollTop = e.scrollHeight; }")
     expect(hmi.row(str(TAGS))).to_be_in_viewport()
-    expect(focused).to_have_attribute("data-tag-id", str(MOST + 1))
+    expect(focused).to_have_attribute("data-tag-id", str(further + 1))
     hmi.page.keyboard.press("Shift+Tab")
     expect(focused).to_be_in_viewport()
 
@@ -95,12 +96,9 @@ def test_a_filter_and_an_order_have_their_rows_in_sight(open_house: OpenHouse) -
     expect(hmi.row(str(TAGS))).to_be_in_viewport()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("viewport", [WIDE, PHONE, {"width": 720, "height": 450}])
-def test_axe_and_windows_of_any_size(
-    open_house: OpenHouse, scheme: str, viewport: dict[str, int]
-) -> None:
-    hmi = open_house(1_000, "tag=3", viewport=viewport, color_scheme=scheme, bypass_csp=True)
+@pytest.mark.parametrize("viewport", [WIDE, PHONE])
+def test_axe_and_windows_of_any_size(open_house: OpenHouse, viewport: dict[str, int]) -> None:
+    hmi = open_house(1_000, "tag=3", viewport=viewport, bypass_csp=True)
     tabs = hmi.page.locator(".pane-tabs")
     if tabs.is_visible():
         tabs.get_by_role("button", name="Tags").click()
@@ -115,7 +113,7 @@ def test_forced_colours_mark_the_chosen_row(open_house: OpenHouse) -> None:
     assert hmi.row("500").evaluate("row => getComputedStyle(row).outlineWidth") == "3px"
 
 
-@pytest.mark.parametrize(("tags", "printed"), [(300, 300), (1_000, 1_000), (1_001, 1_000)])
+@pytest.mark.parametrize(("tags", "printed"), [(1_000, 1_000), (1_001, 1_000)])
 def test_paper_has_all_rows_or_says_so(open_house: OpenHouse, tags: int, printed: int) -> None:
     hmi = open_house(tags)
     rest = hmi.page.locator(".paper-rest")

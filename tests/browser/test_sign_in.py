@@ -64,7 +64,9 @@ def test_a_person_signs_in_with_the_keyboard_alone(closed: Served, page: Page) -
     assert not [address for address in addresses if TOKEN in address]
 
 
-def test_a_wrong_token_is_told_and_can_be_corrected(closed: Served, page: Page) -> None:
+def test_a_wrong_token_can_be_corrected_and_nothing_of_the_right_one_is_kept(
+    closed: Served, page: Page
+) -> None:
     page.goto(closed.url + "/signin")
     sign_in(page, TOKEN[::-1].strip("=") + "x")
     expect(page.get_by_role("alert")).to_have_text("This is not the right token.")
@@ -74,11 +76,6 @@ def test_a_wrong_token_is_told_and_can_be_corrected(closed: Served, page: Page) 
     sign_in(page, f" {TOKEN} ")
     expect_live(page)
 
-
-def test_the_page_keeps_nothing_of_the_token(closed: Served, page: Page) -> None:
-    page.goto(closed.url + "/signin")
-    sign_in(page, TOKEN)
-    expect_live(page)
     kept = page.evaluate(
         "() => JSON.stringify([{...localStorage}, {...sessionStorage}, document.cookie])"
     )
@@ -91,16 +88,6 @@ def test_the_page_keeps_nothing_of_the_token(closed: Served, page: Page) -> None
     assert TOKEN not in cookie["value"]
 
 
-def test_a_session_outlives_the_page(closed: Served, context: BrowserContext, page: Page) -> None:
-    page.goto(closed.url + "/signin")
-    sign_in(page, TOKEN)
-    expect_live(page)
-    page.close()
-    another = new_page(context)
-    another.goto(closed.url)
-    expect_live(another)
-
-
 def test_a_link_on_another_page_leads_in_although_the_cookie_is_strict(
     closed: Served, page: Page
 ) -> None:
@@ -110,12 +97,12 @@ def test_a_link_on_another_page_leads_in_although_the_cookie_is_strict(
     page.goto("data:text/html,elsewhere")
     page.evaluate("url => { location.href = url }", closed.url + "/")
     expect_live(page)
-
-
-def test_without_a_session_the_hmi_shows_nothing(closed: Served, page: Page) -> None:
-    answer = page.goto(closed.url)
-    assert answer is not None
-    assert answer.url == closed.url + "/signin"
+    # And out again.
+    page.get_by_role("button", name="Menu").click()
+    page.get_by_role("button", name="Sign out").click()
+    expect(page).to_have_url(closed.url + "/signin")
+    page.goto(closed.url)
+    expect(page).to_have_url(closed.url + "/signin")
     expect(page.get_by_test_id("app")).to_have_count(0)
 
 
@@ -144,14 +131,3 @@ def test_a_page_whose_session_has_ended_leaves_for_the_sign_in(page: Page) -> No
     with served("--port", port, LUPIN_TOKEN=TOKEN) as second:
         assert second.url == first.url
         expect(page).to_have_url(second.url + "/signin")
-
-
-def test_a_person_signs_out(closed: Served, page: Page) -> None:
-    page.goto(closed.url)
-    sign_in(page, TOKEN)
-    expect_live(page)
-    page.get_by_role("button", name="Menu").click()
-    page.get_by_role("button", name="Sign out").click()
-    expect(page).to_have_url(closed.url + "/signin")
-    page.goto(closed.url)
-    expect(page).to_have_url(closed.url + "/signin")

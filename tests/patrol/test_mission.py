@@ -63,7 +63,7 @@ def first_pass(patrol: list[Event]) -> list[Event]:
 
 @pytest.fixture(scope="module")
 def many_first_passes() -> list[list[Event]]:
-    return [played(seed) for seed in range(10)]
+    return [played(seed) for seed in range(4)]
 
 
 # --- repeatable ----------------------------------------------------------------------------------

@@ -14,10 +14,11 @@ from typing import Any
 import psycopg
 
 from lupin_twin.journal.schema import open_reader
+from tests.support import processes
 from tests.support.domains import ros_env
 from tests.support.postgres import Postgres
 from tests.support.processes import Process
-from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.waiting import wait_for
 
 # What has to be equal; of the rest the archive has its own.
 TABLES = ("run", "series", "scan", "look", "place", "hour", "tally", "event", "note")
@@ -36,15 +37,25 @@ class Archive:
         self.hosts = [server.folder]
         self.site = site
         with psycopg.connect(server.url, autocommit=True) as connection:
-            connection.execute(f'CREATE DATABASE "{self.name}" TABLESPACE {tablespace}')
-        made = run("archive", "init", "--archive-url", self.owner)
-        assert made.returncode == 0, made.stderr
+            sql = "SELECT 1 FROM pg_database WHERE datname = 'template_archive'"
+            if not connection.execute(sql).fetchone():
+                connection.execute("CREATE DATABASE template_archive")
+                made = run("archive", "init", "--archive-url", server.url_of("template_archive"))
+                assert made.returncode == 0, made.stderr
+            connection.execute(
+                f'CREATE DATABASE "{self.name}" TEMPLATE template_archive TABLESPACE {tablespace}'
+            )
         self.add_user(site)
+
+    def drop(self) -> None:
+        """Away with it, whoever is still connected."""
+        with psycopg.connect(self.server.url, autocommit=True) as connection:
+            connection.execute(f'DROP DATABASE "{self.name}" WITH (FORCE)')
 
     @property
     def owner(self) -> str:
         """Its address for its owner."""
-        return f"postgresql://postgres@/{self.name}?host={self.server.folder}"
+        return self.server.url_of(self.name)
 
     def add_user(self, name: str, role: str = "lupin_forwarder") -> None:
         """A user, unless another archive of the server made it."""
@@ -115,14 +126,8 @@ def rows_of(journal: Path) -> dict[str, list[tuple[Any, ...]]]:
 
 def run(*args: str, **env: str) -> subprocess.CompletedProcess[str]:
     """A command of `lupin-twin` that ends by itself."""
-    return subprocess.run(
-        [sys.executable, "-m", "lupin_bridge.cli.command", *args],
-        env=_env(env),
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_S,
-        check=False,
-    )
+    command = [sys.executable, "-m", "lupin_bridge.cli.command", *args]
+    return processes.run(command, _env(env))
 
 
 def forward_once(archive: Archive, journal: Path) -> None:

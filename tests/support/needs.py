@@ -63,6 +63,8 @@ def _names(body: Sequence[ast.stmt]) -> Iterator[str]:
             yield node.module
             # Each name may be a module of the package.
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            pass
         elif isinstance(node, ast.If | ast.Try | ast.With | ast.ClassDef):
             yield from _names([it for it in ast.iter_child_nodes(node) if isinstance(it, ast.stmt)])
 

@@ -59,6 +59,10 @@ class Postgres:
             backup = str(found.with_name("pg_basebackup"))
             _run(backup, *data, "-h", str(primary.folder), "-c", "fast", "--write-recovery-conf")
 
+    def url_of(self, database: str) -> str:
+        """The address of a database for its owner."""
+        return f"postgresql://{_USER}@/{database}?host={self.folder}"
+
     def start(self) -> None:
         """Start it; returns when it answers."""
         options = (
@@ -144,10 +148,3 @@ def _wait_for_each_commit(primary: Postgres) -> None:
         connection.execute("SELECT pg_reload_conf()")
         synced = "SELECT 1 FROM pg_stat_replication WHERE sync_state = 'sync'"
         wait_for(lambda: connection.execute(synced).fetchone(), "a standby that is waited for")
-
-
-@contextmanager
-def postgres() -> Iterator[str]:
-    """The connection string of one; it ends, and is gone, with the block."""
-    with server() as made:
-        yield made.url

@@ -43,7 +43,7 @@ class Process:
         self._output = tempfile.NamedTemporaryFile("w+", suffix=".log", delete=False)  # noqa: SIM115
         env = {**env, **_state_of_its_own(env)}
         self._process: subprocess.Popen[bytes] | Forked
-        if not afresh and "PYTEST_VERSION" in os.environ and _template().can_be(command, env):
+        if not afresh and _can_be_forked(command, env):
             self._process = _template().start(command, env, self._output)
             return
         self._process = subprocess.Popen(
@@ -137,6 +137,18 @@ class Process:
         self._process.wait()
 
 
+def run(command: Sequence[str], env: Mapping[str, str]) -> subprocess.CompletedProcess[str]:
+    """What a command says and ends with; one of our programs is forked, as a `Process` is."""
+    with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:
+        if _can_be_forked(command, env):
+            code = _template().start(command, env, out, err).wait(PATIENCE_S)
+        else:
+            code = subprocess.Popen(command, env=env, stdout=out, stderr=err).wait(PATIENCE_S)
+        out.seek(0)
+        err.seek(0)
+        return subprocess.CompletedProcess(command, code, out.read(), err.read())
+
+
 def twin_node(domain: int, *ros_args: str, afresh: bool = False, **env: str) -> Process:
     """The twin alone, as the executable `twin_node`."""
     command = [sys.executable, "-m", "lupin_twin.cli", *ros_args]
@@ -177,6 +189,10 @@ def children_of(pid: int, word: bytes) -> list[int]:
 def url_of(process: Process) -> str:
     """The address that a `lupin-twin` process announces once it serves."""
     return process.wait_for_output("lupin-twin: http").partition(": ")[2].strip()
+
+
+def _can_be_forked(command: Sequence[str], env: Mapping[str, str]) -> bool:
+    return "PYTEST_VERSION" in os.environ and _template().can_be(command, env)
 
 
 @cache

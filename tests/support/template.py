@@ -28,17 +28,27 @@ from pathlib import Path
 from typing import IO, Any, Final
 
 # The programs that it can be, by the module that `python -m` would run.
-PROGRAMS: Final = ("lupin_bridge.cli.command", "lupin_twin.cli", "tests.support.limited")
+PROGRAMS: Final = (
+    "lupin_bridge.cli.command",
+    "lupin_twin.cli",
+    "lupin_patrol",
+    "tests.support.limited",
+)
 # What they import once they run.
 IMPORTED: Final = (
     "lupin_bridge.cli.roles",
     "lupin_twin.ros.node",
     "lupin_twin.ros.parameters",
     "lupin_twin.ros.base_node",
+    "lupin_bridge.cli.fleet",
+    "lupin_patrol.mission",
+    "lupin_patrol.node",
+    "greenhouse_sim.simulator",
+    "psycopg",
 )
 # Variables that are read where a program runs, by us or by rcl. Of all others some are read as
 # something is imported: with one that differs a process has to start anew.
-_READ_LATE: Final = ("LUPIN_", "PYTEST_", "ROS_DOMAIN_ID", "XDG_STATE_HOME")
+_READ_LATE: Final = ("LUPIN_", "PGPASSWORD", "PYTEST_", "ROS_DOMAIN_ID", "XDG_STATE_HOME")
 _MOST_BYTES: Final = 200_000  # what one message on a socket may hold, Linux's wmem_default
 _PR_SET_PDEATHSIG: Final = 1
 
@@ -71,11 +81,13 @@ class Template:
         late = all(name.startswith(_READ_LATE) for name in differing)
         return late and Path.cwd() == self._folder
 
-    def start(self, command: Sequence[str], env: Mapping[str, str], output: IO[str]) -> Forked:
-        """A process that runs this command."""
+    def start(self, command: Sequence[str], env: Mapping[str, str], *outputs: IO[str]) -> Forked:
+        """A process that runs this command; its outputs are one file, or one for each stream."""
         program, *arguments = command[2:]
         request = {"program": program, "arguments": arguments, "env": dict(env)}
-        return Forked(command, self._ask(request, [output.fileno()]), self._ask)
+        return Forked(
+            command, self._ask(request, [output.fileno() for output in outputs]), self._ask
+        )
 
     @property
     def pid(self) -> int:
@@ -85,6 +97,7 @@ class Template:
         """End it, and all that it has started."""
         self._link.close()
         self._process.wait()
+        self._said.close()
 
     def _ask(self, request: Mapping[str, Any], files: Sequence[int] = ()) -> int:
         with self._lock:
@@ -141,7 +154,7 @@ class Forked:
 def _serve(link: socket.socket) -> Mapping[str, Any] | None:
     """Answer the worker until it has gone; in a process that was forked: what that has to be."""
     while True:
-        message, files, _, _ = socket.recv_fds(link, _MOST_BYTES, 1)
+        message, files, _, _ = socket.recv_fds(link, _MOST_BYTES, 2)
         if not message:
             return None
         request = json.loads(message)
@@ -149,14 +162,19 @@ def _serve(link: socket.socket) -> Mapping[str, Any] | None:
             link.send(b"%d" % os.waitstatus_to_exitcode(os.waitpid(request["ended"], 0)[1]))
         elif os.fork() == 0:
             os.setsid()
-            for stream in (sys.stdout, sys.stderr):
-                os.dup2(files[0], stream.fileno())
+            os.dup2(files[0], sys.stdout.fileno())
+            os.dup2(files[-1], sys.stderr.fileno())
             link.send(b"%d" % os.getpid())
             link.close()
-            os.close(files[0])
+            _close(files)
             return dict(request)
         else:
-            os.close(files[0])
+            _close(files)
+
+
+def _close(files: Sequence[int]) -> None:
+    for file in files:
+        os.close(file)
 
 
 def _know_of_forks() -> None:
@@ -195,7 +213,9 @@ def main() -> None:
     os.environ.update(request["env"])
     program = import_module(request["program"])
     sys.argv = [str(program.__file__), *request["arguments"]]
-    program.command()
+    if hasattr(program, "command"):
+        program.command()
+    import_module(f"{request['program']}.__main__")
 
 
 if __name__ == "__main__":

@@ -69,10 +69,8 @@ def session_of(closed: Served) -> tuple[str, str]:
     return name, value
 
 
-@pytest.mark.parametrize(
-    "path", ["/api/state", "/", "/signin", "/healthz", "/nowhere", "/ws/state", "/rosbridge"]
-)
-@pytest.mark.parametrize("inside", ["\\", '\\"', "\\0", "\\012", ";", "="])
+@pytest.mark.parametrize("path", ["/api/state", "/signin", "/ws/state"])
+@pytest.mark.parametrize("inside", ['\\"', "\\012", ";"])
 def test_a_hostile_cookie_keeps_nobody_waiting(closed: Served, path: str, inside: str) -> None:
     name, _ = session_of(closed)
     # A longer head does not come as far as to be looked at.

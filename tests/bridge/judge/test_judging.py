@@ -284,7 +284,7 @@ LOOK = st.sampled_from([None, None, Flower("tulip", 0.9), Flower("orchid", 0.4),
 EVENTS = st.tuples(st.sampled_from("abc"), VALUES, LOOK, st.integers(0, 7200))
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100)
 @given(st.lists(EVENTS, max_size=40))
 def test_judging_bit_by_bit_is_judging_all_of_it_by_the_log(
     events: list[tuple[str, dict[str, float], Flower | None, int]],

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from lupin_bridge.notify import mqtt
 from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.notify.messages import GreenhouseState
 from lupin_bridge.notify.mirror import Mirror
@@ -124,7 +125,11 @@ def test_nothing_is_retained_but_the_status_of_tags_that_are_gone_neither(shared
     asyncio.run(run())
 
 
-def test_at_home_assistants_birth_everything_is_told_again(shared: Broker) -> None:
+def test_at_home_assistants_birth_everything_is_told_again(
+    shared: Broker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mqtt, "REPEAT_S", 0.1)
+
     async def run() -> None:
         house = House()
         async with telling(shared, house) as channel:
@@ -140,8 +145,11 @@ def test_at_home_assistants_birth_everything_is_told_again(shared: Broker) -> No
     asyncio.run(run())
 
 
-def test_who_says_that_it_is_gone_is_contradicted(shared: Broker) -> None:
+def test_who_says_that_it_is_gone_is_contradicted(
+    shared: Broker, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The will of the process before, or the good-bye of another one, may come late."""
+    monkeypatch.setattr(mqtt, "STATUS_S", 0.1)
 
     async def run(heard: Subscriber) -> None:
         async with telling(shared, House()) as channel:

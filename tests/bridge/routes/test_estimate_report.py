@@ -11,7 +11,10 @@ from typing import Any
 import pytest
 
 from lupin_bridge.stream.estimate_schema import Advice, EstimateQualities, ExpectedTags
-from tests.support.messages import scan
+from lupin_twin.core.state import Pose
+from lupin_twin.journal.rows import PinRow, Row
+from lupin_twin.journal.runs import Clock
+from tests.support.journal import SECOND, kept, scan
 from tests.support.processes import limits
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
@@ -33,20 +36,27 @@ def temperature(tag_id: str, half_hours_ago: int) -> float:
 
 
 @pytest.fixture(scope="module")
-def live() -> Iterator[Bridge]:
-    """A bridge whose twin has read four tags for ten hours; one has read 9 K too much since two."""
-    with bridge(*limits(answers_per_s=10_000)) as running:
-        running.peer.wait_for_twin()
-        for hour in range(20, 0, -1):
-            for number, (tag_id, at) in enumerate(PLACES.items()):
-                stamp_s = now_s() - 1800 * hour + 60 * number
-                read = {"temperature": temperature(tag_id, hour)}
-                running.peer.observe(scan(tag_id, read, stamp_s=stamp_s, at=at))
-            if hour == 11:  # a topic holds 50
-                running.peer.observe(scan("half", {"co2": 1.0}))
-                running.tag("half")
-        running.peer.observe(scan("last", {"co2": 1.0}))
-        running.tag("last")
+def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bridge]:
+    """A bridge whose twin remembers four tags of ten hours; one reads 9 K too much since two.
+
+    From a journal: of what comes scan by scan, the last would wait for the next round.
+    """
+    journal, begun_ns = tmp_path_factory.mktemp("journal") / "j.sqlite", now_s() * SECOND
+    rows: list[Row] = [
+        PinRow(tag_id, begun_ns, begun_ns, Pose(*at, 0.0, 0.0, 0.0, 0.0, 1.0))
+        for tag_id, at in PLACES.items()
+    ]
+    rows += [
+        scan(
+            tag_id, (now_s() - 1800 * hour + 60 * n) * SECOND, temperature=temperature(tag_id, hour)
+        )
+        for hour in range(20, 0, -1)
+        for n, tag_id in enumerate(PLACES)
+    ]
+    rows.append(scan("nowhere", begun_ns, co2=1.0))
+    kept(journal, rows, Clock(begun_ns, begun_ns, is_simulated=False))
+    journaled = ("--ros-args", "-p", f"journal:={journal}")
+    with bridge(*limits(answers_per_s=10_000), *journaled) as running:
         yield running
 
 

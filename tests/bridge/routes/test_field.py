@@ -195,25 +195,13 @@ def test_a_sensor_with_an_odd_name_is_served_under_a_plain_one(live: Bridge) -> 
     [
         ({"sensor_type": ""}, ["sensor_type is ''", "at least 1 character"]),
         ({"sensor_type": None}, ["sensor_type: field required"]),
-        ({"sensor_type": "x" * 300}, ["sensor_type", "at most 256 characters"]),
         ({"resolution": 0}, ["resolution is '0'", "greater than 0"]),
-        ({"resolution": -0.5}, ["resolution is '-0.5'", "greater than 0"]),
-        ({"resolution": "nan"}, ["resolution is 'nan'", "greater than 0"]),
         ({"resolution": "inf"}, ["resolution is inf", "finite"]),
         ({"resolution": 1e300}, ["resolution is 1e+300", "float32"]),
-        ({"resolution": 1e-300}, ["resolution is 1e-300", "float32"]),
-        ({"resolution": "fine"}, ["resolution is 'fine'", "a valid number"]),
-        ({"bbox_min_x": "nan"}, ["bbox_min_x is nan", "finite"]),
-        ({"bbox_max_y": "-inf"}, ["bbox_max_y is -inf", "finite"]),
-        ({"bbox_max_x": 1e39}, ["bbox_max_x is 1e+39", "float32"]),
         ({"bbox_min_x": 7.0}, ["bbox_min_x", "7.0", "bbox_max_x", "6.0"]),
-        ({"bbox_min_y": 3.5}, ["bbox_min_y", "3.5", "bbox_max_y", "3.0"]),
         ({"bbox_min_y": None}, ["incomplete", "bbox_min_y is missing"]),
-        ({"bbox_min_y": "1m"}, ["bbox_min_y is '1m'", "a valid number"]),
         ({"sensor": "co2"}, ["'sensor' is unknown", "expected sensor_type"]),
         ({"resolution": [0.5, 0.5]}, ["resolution is given more than once"]),
-        ({"scale": 0}, ["scale is '0'", "greater than or equal to 1"]),
-        ({"scale": 1001}, ["scale is '1001'", "less than or equal to 1000"]),
     ],
 )
 def test_a_bad_request_gets_get_fields_failure_body(
@@ -260,13 +248,6 @@ def test_as_many_cells_as_the_limit_allows_and_not_one_more() -> None:
         assert small.get("/api/field.png", **scaled).status_code == 200
         refused = small.get("/api/field.png", **{**scaled, "bbox_max_y": 4})
         assert "16 pixels, the limit is 12" in refused.json()["error_message"]
-
-
-def test_only_a_picture_can_be_scaled(live: Bridge) -> None:
-    for suffix in ("json", "npy"):
-        answer = live.get(f"/api/field.{suffix}", **QUERY, scale=2)
-        assert answer.status_code == 400
-        assert "only a PNG can be scaled" in answer.json()["error_message"]
 
 
 # --- ETag ---------------------------------------------------------------------------------------

@@ -240,7 +240,7 @@ def garbage(chance: random.Random) -> str | bytes:
     return chance.choice(frames)
 
 
-def test_ten_thousand_malformed_frames_change_nothing(house: Bridge) -> None:
+def test_thousands_of_malformed_frames_change_nothing(house: Bridge) -> None:
     chance = random.Random(7)
 
     def rubbish(connections: int) -> None:
@@ -260,9 +260,9 @@ def test_ten_thousand_malformed_frames_change_nothing(house: Bridge) -> None:
     with ros_at(house.url) as other, house.listen() as listener:
         other.subscribe()
         other.next()
-        rubbish(5)
+        rubbish(2)
         before_mb = resident_mb(house.process.pid)
-        rubbish(20)
+        rubbish(6)
         assert resident_mb(house.process.pid) - before_mb < 5.0
         house.peer.observe(messages.scan("clean", {"temperature": 20.0}))
         house.peer.spin_briefly()

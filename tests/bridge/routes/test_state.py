@@ -129,29 +129,6 @@ def test_what_cannot_be_served_is_refused_with_the_reason(live: Bridge) -> None:
             )
 
 
-def test_one_client_more_than_the_limit_is_told_so_and_sent_away() -> None:
-    with bridge("--max-clients", "2", *SILENT) as small, small.listen() as one:
-        with small.listen() as two:
-            one.until("state")
-            two.until("state")
-            with small.listen() as three, pytest.raises(ConnectionClosedError) as closed:
-                three.next()
-            assert closed.value.rcvd is not None
-            assert closed.value.rcvd.code == 1013
-            assert closed.value.rcvd.reason == "2 clients are connected, the limit"
-        small.peer.until(lambda: _takes(small), "room for another")
-        small.peer.observe(scan("for one", {"co2": 1.0}))
-        one.until_tag("for one")
-
-
-def _takes(running: Bridge) -> bool:
-    with running.listen() as listener:
-        try:
-            return bool(listener.next()["type"] == "status")
-        except ConnectionClosedError:
-            return False
-
-
 # --- /api/state ---------------------------------------------------------------------------------
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from lupin_twin.journal.schema import POSTGRESQL_TABLES
 from tests.support.log_life import Life, lived
-from tests.support.postgres import postgres
+from tests.support.postgres import Postgres
 
 # As the same log in SQLite, and where its rows are in PostgreSQL: a connection, and the site.
 Copied = Callable[[sqlite3.Connection], tuple[Any, str]]
@@ -25,10 +25,12 @@ _TABLES = ("meta", "run", "series", "scan", "look", "place", "hour", "tally", "e
 
 
 @pytest.fixture(scope="session")
-def copied() -> Iterator[Copied]:
+def copied(postgresql: Postgres) -> Iterator[Copied]:
     """Copies a log to a real PostgreSQL, as one site among others."""
     numbers = count()
-    with postgres() as url, psycopg.connect(url, autocommit=True) as archive:
+    with psycopg.connect(postgresql.url, autocommit=True) as connection:
+        connection.execute("CREATE DATABASE journals")
+    with psycopg.connect(postgresql.url_of("journals"), autocommit=True) as archive:
         archive.execute(POSTGRESQL_TABLES)
         for table in ("scan", "look"):
             archive.execute(f"CREATE TABLE {table}_any PARTITION OF {table} DEFAULT")

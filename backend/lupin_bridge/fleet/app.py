@@ -6,6 +6,7 @@ import asyncio
 import logging
 import math
 import time
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +15,7 @@ from typing import Final
 import orjson
 from fastapi import FastAPI, Request, Response, WebSocket
 from fastapi.responses import FileResponse
+from starlette.requests import HTTPConnection
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -32,17 +34,18 @@ from lupin_bridge.metrics import CONTENT_TYPE
 from lupin_bridge.routes import pages
 from lupin_bridge.routes.answers import NEVER_STORE, error_response, json_response, list_header
 from lupin_bridge.routes.sockets import has_place, next_message
-from lupin_bridge.serving.admission import REVALIDATE, Limits
+from lupin_bridge.serving.admission import REVALIDATE, Admission, AnswerCache, Limits
 from lupin_bridge.serving.middleware import EndsAtShutdown, PieceByPiece, Shutdown
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.hub import Client, Hub
 from lupin_bridge.stream.status import Status
+from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)
 
-# Sites whose pages are open at once in this process; each is some megabytes.
-MAX_OPEN: Final = 50
+# What the answers that are kept of one site may have.
+_CACHE_BYTES: Final = 4_000_000
 # A page that nobody has asked anything of for so long, and that nobody follows, is closed.
 _IDLE_S: Final = 120.0
 _TIDY_S: Final = 5.0
@@ -65,7 +68,7 @@ class _Open:
     app: ASGIApp
     ready: asyncio.Task[None]
     used_s: float = field(default_factory=time.monotonic)
-    in_use: int = 0
+    users: Counter[str] = field(default_factory=Counter)
 
 
 class Fleet:
@@ -87,7 +90,12 @@ class Fleet:
         )
         self._settings, self._criteria, self._access = settings, criteria, access
         self._limits = limits
+        # One for all sites: what a client may ask for does not grow with them.
+        self._admission = Admission.of(limits)
+        self._workers = Workers("work")
+        # In the order in which they were opened.
         self._open: dict[str, _Open] = {}
+        self._closing: set[asyncio.Task[None]] = set()
         self._frame: SitesFrame | None = None
         self._framed_s = -math.inf
         self._push_timer: asyncio.TimerHandle | None = None
@@ -106,7 +114,10 @@ class Fleet:
         if self._tidying is not None:
             self._tidying.cancel()
             await asyncio.wait((self._tidying,))
-        await asyncio.gather(*(self._close(name) for name in list(self._open)))
+        for name in list(self._open):
+            self._close(name)
+        await asyncio.gather(*self._closing)
+        self._workers.close()
         await asyncio.gather(self.watching.stop(), self.past.stop())
 
     def announce_shutdown(self) -> None:
@@ -155,36 +166,64 @@ class Fleet:
 
     # --- the pages of sites -------------------------------------------------------------------
 
-    async def page_of(self, name: str) -> _Open | str:
-        """The site's page, made if need be; or why there is none."""
+    def page_of(self, name: str, client: str) -> _Open | str:
+        """The site's page for a client, made if need be; or why there is none."""
         opened = self._open.get(name)
         if opened is None:
             if name not in self.watching.sites:
                 known = len(self.watching.sites)
                 return f"there is no site {name[:64]!r} in the archive ({known} others are)"
-            if len(self._open) >= MAX_OPEN:
-                idle = [it for it in self._open.items() if not it[1].in_use]
-                if not idle:
-                    return f"{MAX_OPEN} sites are open here, the limit: try again later"
-                await self._close(min(idle, key=lambda it: it[1].used_s)[0])
+            limit = self._limits.open_sites
+            if len(self._open) >= limit:
+                least = self._least_needed(client)
+                if least is None:
+                    return f"{limit} sites are open here, the limit: try again later"
+                self._close(least)
             opened = self._open[name] = self._make(name)
-        opened.used_s = time.monotonic()
-        await asyncio.shield(opened.ready)
         return opened
 
+    def _least_needed(self, client: str) -> str | None:
+        """The site that makes place for a client's; None: none does.
+
+        It is one that nobody reads. Where all are read, the client who reads the most gives the
+        newest that it alone reads to who has at least two fewer.
+        """
+        idle = [it for it in self._open.items() if not it[1].users]
+        if idle:
+            return min(idle, key=lambda it: it[1].used_s)[0]
+        read = Counter(user for opened in self._open.values() for user in opened.users)
+        ((largest, count),) = read.most_common(1)
+        own = [name for name, it in self._open.items() if it.users.keys() == {largest}]
+        return own[-1] if own and count >= read[client] + 2 else None
+
     def _make(self, name: str) -> _Open:
-        source = SiteTwin(name, self.watching, self.past, self._limits.answer_timeout_s)
-        bridge = Bridge(source, self._settings, criteria=self._criteria, limits=self._limits)
+        limits = self._limits
+        source = SiteTwin(name, self.watching, self.past, self._workers, limits.answer_timeout_s)
+        bridge = Bridge(
+            source,
+            self._settings,
+            criteria=self._criteria,
+            limits=limits,
+            admission=self._admission,
+            cache=AnswerCache(_CACHE_BYTES),
+        )
         # Who may read has been looked at by then.
         app = create_app(bridge, access=Access(self._access.policy))
         ready = asyncio.create_task(bridge.start(), name=f"open {name}")
         return _Open(source, bridge, app, ready)
 
-    async def _close(self, name: str) -> None:
+    def _close(self, name: str) -> None:
         opened = self._open.pop(name)
         opened.bridge.announce_shutdown()
-        await asyncio.wait((opened.ready,))
-        await opened.bridge.stop()
+        opened.bridge.hub.turn_out_all(f"{self._limits.open_sites} sites are open here, the limit")
+
+        async def end() -> None:
+            await asyncio.wait((opened.ready,))
+            await opened.bridge.stop()
+
+        closing = asyncio.create_task(end(), name=f"close {name}")
+        self._closing.add(closing)
+        closing.add_done_callback(self._closing.discard)
 
     async def _tidy(self) -> None:
         while True:
@@ -192,8 +231,8 @@ class Fleet:
             try:
                 now_s = time.monotonic()
                 for name, opened in list(self._open.items()):
-                    if not opened.in_use and now_s - opened.used_s >= _IDLE_S:
-                        await self._close(name)
+                    if not opened.users and now_s - opened.used_s >= _IDLE_S:
+                        self._close(name)
                 self.hub.dismiss_stuck(now_s)
                 if now_s - self._framed_s >= _HEARTBEAT_S and self._push_timer is None:
                     self._push()
@@ -209,6 +248,10 @@ class Fleet:
         yield "lupin_fleet_sites_live", "sites that are live", live if is_reachable else 0
         yield "lupin_fleet_archive_reachable", "1 while the archive answers", is_reachable
         yield "lupin_fleet_looks", "looks at the archive since the start", watching.looks
+        starts = watching.starts
+        yield "lupin_fleet_watcher_starts", "starts of the process that looks at it", starts
+        starts = self.past.starts
+        yield "lupin_fleet_reader_starts", "starts of the process that reads sites", starts
         yield "lupin_fleet_sites_open", "sites whose page is open here", len(self._open)
         yield "lupin_clients", "WebSocket clients that follow the overview", len(self.hub)
 
@@ -228,7 +271,8 @@ class Sites:
             await self._app(scope, receive, send)
             return
         name, slash, _ = path[len(_PREFIX) :].partition("/")
-        found = await self._fleet.page_of(name)
+        client = client_of(HTTPConnection(scope))
+        found = self._fleet.page_of(name, client)
         if isinstance(found, str):
             status = 503 if name in self._fleet.watching.sites else 404
             await _refuse(found, status, scope, receive, send)
@@ -237,13 +281,15 @@ class Sites:
             # Relative, as all links are: below whatever prefix this is.
             await Response(status_code=307, headers={"location": f"{name}/"})(scope, receive, send)
             return
-        found.in_use += 1
+        found.users[client] += 1
         try:
+            await asyncio.shield(found.ready)
             own = {**scope, "root_path": f"{root}{_PREFIX}{name}"}
             own.pop("app_root_path", None)
             await found.app(own, receive, send)
         finally:
-            found.in_use -= 1
+            found.users[client] -= 1
+            found.users += Counter()  # without those who read no more
             found.used_s = time.monotonic()
 
 

@@ -36,6 +36,7 @@ from lupin_bridge.viewers.foxglove_session import Offer
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import LATE, LOST, Reason
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
+from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)
 
@@ -159,6 +160,11 @@ class Bridge:
         self.shutdown.begin()
 
     # --- for the routes -----------------------------------------------------------------------
+
+    @property
+    def workers(self) -> Workers:
+        """Where the source computes."""
+        return self.source.workers
 
     @property
     def latest(self) -> TwinUpdate | None:

@@ -147,7 +147,8 @@ def test_a_replica_that_is_killed_is_missed_by_nobody(replicas: Replicas, archiv
     paths = ("/ws/sites", "/sites/gh1/ws/state")
     browsers = [Browser(base + path) for path in paths * BROWSERS]
     load = Load(replicas.url)
-    threads = [threading.Thread(target=it.run) for it in (*browsers, load)]
+    runs = [*(it.run for it in browsers), load.run]
+    threads = [threading.Thread(target=run) for run in runs]
     with forwarder(archive, replicas.journal):
         try:
             # One after the other, so that each replica has some of them.

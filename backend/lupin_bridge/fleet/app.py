@@ -193,6 +193,8 @@ class Fleet:
         yield "lupin_fleet_reader_starts", "starts of the process that reads sites", starts
         yield "lupin_fleet_sites_open", "sites whose page is open here", len(self.pages)
         yield "lupin_clients", "WebSocket clients that follow the overview", len(self.hub)
+        dismissed = self.hub.clients_dismissed
+        yield "lupin_clients_dismissed", "of them, those that took no frame", dismissed
 
 
 def create_fleet_app(

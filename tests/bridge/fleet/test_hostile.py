@@ -185,6 +185,7 @@ def test_a_browser_of_the_overview_that_never_reads_is_dismissed(
                     client.sendall(b"GET /ws/sites HTTP/1.1\r\n" + UPGRADE + b"\r\n")
                 wait_for(lambda: measured(running, "lupin_clients") == 6, "all of them")
                 wait_for(lambda: measured(running, "lupin_clients") == 1, "who reads alone")
+            assert measured(running, "lupin_clients_dismissed") == 5
             next(received)
 
 

@@ -65,8 +65,9 @@ def told(package: str, *kinds: str) -> set[str]:
 
 def test_pyproject_lists_what_its_packages_import() -> None:
     """FastAPI brings starlette along, say; which one, is ours to know as well."""
+    extras = project()["optional-dependencies"]
     # And what an extra of the bridge is there for.
-    lines = [*project()["dependencies"], *project()["optional-dependencies"]["fleet"]]
+    lines = [*project()["dependencies"], *extras["fleet"], *extras["science"]]
     listed = {re.split("[<>=[]", text)[0].lower() for text in lines}
     foreign = set()
     for package, folder in OWN_PACKAGES.items():

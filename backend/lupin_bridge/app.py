@@ -18,7 +18,7 @@ from lupin_bridge import __version__
 from lupin_bridge.access.middleware import Access, AccessControl, ReadOnly
 from lupin_bridge.access.policy import BehindProxies, Proxies
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.routes import estimate, field, pages, past, sockets, state, status
+from lupin_bridge.routes import estimate, export, field, pages, past, sockets, state, status
 from lupin_bridge.routes.answers import add_refusals, error_response
 from lupin_bridge.serving.middleware import Metered, PieceByPiece
 from lupin_bridge.stream import schema
@@ -27,7 +27,7 @@ STATIC_FOLDER = Path(__file__).parent / "static"
 GUIDE_FOLDER = Path(__file__).parent / "guide"
 
 # Every module whose `router` has routes.
-ROUTED = (state, sockets, field, estimate, past, status, pages)
+ROUTED = (state, sockets, field, estimate, past, export, status, pages)
 
 
 def has_page(static_folder: Path = STATIC_FOLDER) -> bool:

@@ -38,6 +38,7 @@ from lupin_bridge.viewers.foxglove_session import Offer
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import LATE, LOST, Reason
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
+from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)
 
@@ -65,7 +66,7 @@ ALARM_BYTES_PER_S: Final = 500_000
 class Bridge:
     """Everything between a source and its listeners. Belongs to the event loop.
 
-    `clock` tells seconds and never jumps.
+    `clock` tells seconds and never jumps. `admission` is given where several share one.
     """
 
     def __init__(
@@ -77,16 +78,16 @@ class Bridge:
         outward: Channels | None = None,
         *,
         limits: Limits = Limits(),
+        admission: Admission | None = None,
+        cache: AnswerCache | None = None,
     ) -> None:
         self._clock = clock
         self.source = source
         self.limits = limits
         self.liveness = Liveness()
         self.hub = Hub(settings.max_clients, limits.client_timeout_s, self.liveness.status)
-        self.admission = Admission(
-            limits.answers_per_s, limits.concurrency, limits.total_concurrency
-        )
-        self.cache = AnswerCache()
+        self.admission = admission or Admission.of(limits)
+        self.cache = AnswerCache() if cache is None else cache
         self.answering: Shared[Answer] = Shared()
         self.looking_back: Shared[Answered] = Shared()
         self.frames = FrameWriter()
@@ -159,6 +160,11 @@ class Bridge:
         self._publish_status()
 
     # --- for the routes -----------------------------------------------------------------------
+
+    @property
+    def workers(self) -> Workers:
+        """Where the source computes."""
+        return self.source.workers
 
     @property
     def latest(self) -> TwinUpdate | None:

@@ -77,6 +77,22 @@ class Archive:
         other.add_user(site)
         return other
 
+    def copy_site(self, *names: str) -> None:
+        """Sites of these names with the rows of its own."""
+        with psycopg.connect(self.owner) as connection:
+            for table in ("site", "forwarder", "epoch", "meta", *TABLES):
+                columns = connection.execute(
+                    "SELECT string_agg(quote_ident(column_name), ', ') FROM"
+                    " information_schema.columns WHERE table_name = %s AND column_name <> 'site'",
+                    (table,),
+                ).fetchone()
+                assert columns is not None
+                connection.execute(
+                    f"INSERT INTO {table} (site, {columns[0]}) SELECT copy, {columns[0]}"
+                    f" FROM {table}, unnest(%s::text[]) AS copies (copy) WHERE site = %s",
+                    (list(names), self.site),
+                )
+
     def select(self, sql: str) -> list[tuple[Any, ...]]:
         """What its owner sees."""
         with psycopg.connect(self.owner) as connection:

@@ -32,10 +32,12 @@ def command() -> None:
     limit_blas_threads()
     from lupin_bridge.cli import roles
 
-    vars(roles).update(
-        Limits=partial(Limits, **_values(options.limit)),
-        World=partial(World, **_values(options.world)),
-    )
+    limits = partial(Limits, **_values(options.limit))
+    vars(roles).update(Limits=limits, World=partial(World, **_values(options.world)))
+    if "fleet" in rest[:1]:
+        from lupin_bridge.cli import fleet
+
+        vars(fleet).update(Limits=limits)
     cli_command.command()
 
 

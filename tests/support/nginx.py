@@ -1,4 +1,4 @@
-"""A real nginx with the configuration that we ship, on ports of the test's own."""
+"""A real nginx with a configuration that we ship or show, on ports of the test's own."""
 
 from __future__ import annotations
 
@@ -16,9 +16,8 @@ CONFIGURATION = Path(__file__).parents[2] / "backend" / "deploy" / "nginx.conf"
 _SHIPPED_PORTS = (8001, 8002, 8003)
 
 
-def configured(folder: Path, port: int, upstreams: Sequence[int]) -> str:
-    """The shipped configuration with other ports, and with places to write in that are ours."""
-    text = CONFIGURATION.read_text(encoding="utf-8")
+def configured(text: str, folder: Path, port: int, upstreams: Sequence[int]) -> str:
+    """A configuration with other ports, and with places to write in that are ours."""
     changes = {"listen 80;": f"listen 127.0.0.1:{port};", "http {": f"http {{\n{_scratch(folder)}"}
     for shipped, ours in zip(_SHIPPED_PORTS, upstreams, strict=True):
         changes[f"server 127.0.0.1:{shipped} "] = f"server 127.0.0.1:{ours} "
@@ -34,13 +33,17 @@ def _scratch(folder: Path) -> str:
 
 
 @contextmanager
-def nginx(folder: Path, upstreams: Sequence[int]) -> Iterator[str]:
-    """nginx in front of three bridges on these ports of loopback; gives its address."""
+def nginx(folder: Path, upstreams: Sequence[int], text: str = "") -> Iterator[str]:
+    """nginx in front of three bridges on these ports of loopback; gives its address.
+
+    `text` is its configuration, that which we ship if there is none.
+    """
+    text = text or CONFIGURATION.read_text(encoding="utf-8")
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     file = folder / "nginx.conf"
-    file.write_text(configured(folder, port, upstreams), encoding="utf-8")
+    file.write_text(configured(text, folder, port, upstreams), encoding="utf-8")
     own = f"daemon off; pid {folder / 'pid'}; error_log stderr warn;"
     command = [program("nginx"), "-p", str(folder), "-e", "stderr", "-c", str(file), "-g", own]
     with Process(command, os.environ) as process:

@@ -93,6 +93,21 @@ class Postgres:
             return
         _run(self._pg_ctl, "-D", str(self._data), "-m", "immediate", "-w", "stop")
 
+    def freeze(self) -> None:
+        """Stop it and each of its processes, as a disk does that answers no more."""
+        self._signal(signal.SIGSTOP)
+
+    def thaw(self) -> None:
+        """Let a frozen one go on."""
+        self._signal(signal.SIGCONT)
+
+    def _signal(self, number: signal.Signals) -> None:
+        pid = int((self._data / "postmaster.pid").read_text().split()[0])
+        # First of all itself: then there is no other one.
+        os.kill(pid, number)
+        for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
+            os.kill(int(child), number)
+
     def kill(self) -> None:
         """Kill it; its other processes end by themselves when they see that."""
         pid = int((self._data / "postmaster.pid").read_text().split()[0])

@@ -41,6 +41,7 @@ ROUTES = {
     "/api/history": True,
     "/api/timeline": True,
     "/api/export.csv": True,
+    "/api/export.parquet": True,
     "/api/health": True,
     "/api/alarms": True,
     "/api/sensors": True,

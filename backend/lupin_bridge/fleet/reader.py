@@ -27,6 +27,7 @@ from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.retention import Stretches, kept
 from lupin_twin.journal.rows import newest_of_tag
 from lupin_twin.journal.runs import FOREVER_NS, runs, span_at
+from lupin_twin.journal.schema import DamagedFile
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.memory import write_of
 from lupin_twin.runtime.workers import ShouldStop
@@ -149,6 +150,9 @@ class ArchiveRecall(Recall):
             raise NotRemembered(str(explained(error)), is_lasting=False) from error
         except ArchiveError as error:
             raise NotRemembered(str(error), is_lasting=False) from error
+        except DamagedFile as error:
+            why = f"rows of the site cannot be read: {error}"
+            raise NotRemembered(why, is_lasting=False) from error
         self._idle_archive.append(connection)
         return answer
 

@@ -45,15 +45,22 @@ _NO_ESTIMATES: Final = "estimates are made by the twin of the greenhouse itself,
 
 
 class SiteTwin(TwinSource):
-    """`TwinSource` over a site's log; `past` is the process that reads those of all sites."""
+    """`TwinSource` over a site's log; `past` reads those of all sites, `workers` are of all."""
 
     answerer = "the archive"
 
-    def __init__(self, site: str, watching: Watching, past: PastProcess, timeout_s: float) -> None:
+    def __init__(
+        self,
+        site: str,
+        watching: Watching,
+        past: PastProcess,
+        workers: Workers,
+        timeout_s: float,
+    ) -> None:
         self.site = site
         self.past = past
         self.timeout_s = timeout_s
-        self.workers = Workers("work")
+        self.workers = workers
         self.relay = Relay(_no_ros, cast("Ros", None))
         self._watching = watching
         # The parameters of a twin are not in its log: where they are others there, fields differ.
@@ -64,8 +71,12 @@ class SiteTwin(TwinSource):
         self._reported: Reported | None = None
         self._read_ns = 0
         self._seq = -1
-        self._was_live: bool | None = None
+        # Why what is new could not be read.
+        self._problem = ""
+        # Whether it was live, up to where it was read, what was wrong.
+        self._said: tuple[bool, int, str] | None = None
         self._wake = asyncio.Event()
+        self._has_read = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
 
     async def start(
@@ -74,10 +85,9 @@ class SiteTwin(TwinSource):
         on_death: Callable[[], None],  # noqa: ARG002  # there is no thread that could die
     ) -> None:
         """Begin to follow the site; who opens it first waits for what is known of it."""
-        with contextlib.suppress(TimeoutError, NotRemembered, TwinUnavailableError):
-            await asyncio.wait_for(self._read(), _FIRST_S)
-        self._tell(on_state)
         self._task = asyncio.create_task(self._follow(on_state), name=f"site {self.site}")
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(self._has_read.wait(), _FIRST_S)
 
     async def stop(self) -> None:
         """End; the process that reads goes on for others."""
@@ -85,12 +95,11 @@ class SiteTwin(TwinSource):
             self._task.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await self._task
-        self.workers.close()
 
     def on_news(self) -> None:
         """The overview has changed: maybe this site."""
         site = self._site
-        if site.last_seq != self._seq or self._is_live != self._was_live:
+        if site.last_seq != self._seq or self._said is None or self._is_live != self._said[0]:
             self._wake.set()
 
     @property
@@ -115,13 +124,18 @@ class SiteTwin(TwinSource):
         while True:
             try:
                 await self._read()
+                self._problem = ""
                 self._tell(on_state)
+                if self._reported is not None:
+                    self._has_read.set()
             except (NotRemembered, TwinUnavailableError) as error:
                 log.info("site %s is as it was: %s", self.site, error)
+                self._problem = f"The archive: {error}."
                 await asyncio.sleep(_RETRY_S)
                 continue
-            except Exception:  # nobody waits for this task, and the site's page depends on it
+            except Exception as error:  # nobody waits for this task, and the page depends on it
                 log.exception("site %s is as it was", self.site)
+                self._problem = f"The archive: {error}."
                 await asyncio.sleep(_RETRY_S)
                 continue
             await self._wake.wait()
@@ -137,11 +151,13 @@ class SiteTwin(TwinSource):
     def _tell(self, on_state: Callable[[TwinUpdate], None]) -> None:
         site, is_live = self._site, self._is_live
         reported = self._reported
-        if reported is None or not (is_live or is_live != self._was_live):
-            return
-        self._was_live = is_live
-        ago_s = max(0.0, (self._watching.now_ns - site.heard_ns) / 1e9) if site.heard_ns else 0.0
         archive = self._watching.archive
+        problem = self._problem if archive.is_reachable else f"The archive: {archive.message}."
+        said = is_live, self._seq, problem
+        if reported is None or not (is_live or said != self._said):
+            return
+        self._said = said
+        ago_s = max(0.0, (self._watching.now_ns - site.heard_ns) / 1e9) if site.heard_ns else 0.0
         stamp_ns = self._now_ns(reported)
         if not is_live and reported.is_walls:
             # As of when it was last heard: who shows it adds for how long that was ago.
@@ -151,7 +167,7 @@ class SiteTwin(TwinSource):
             self.revision(),
             journal=self._condition(reported),
             rules=self._rules,
-            input_problems=() if archive.is_reachable else (f"The archive: {archive.message}.",),
+            input_problems=(problem,) if problem else (),
             silent_s=0.0 if is_live else ago_s,
         )
         on_state(self._told)
@@ -255,7 +271,7 @@ class SiteTwin(TwinSource):
         """What who looks back has to know of now."""
         reported = self._reported
         if reported is None:
-            raise TwinUnavailableError("the site has not been read yet")
+            raise TwinUnavailableError(f"the site has not been read yet. {self._problem}".strip())
         now_ns = self._now_ns(reported)
         return Now(now_ns, self._parameters.frame_id, self._condition(reported))
 

@@ -145,13 +145,11 @@ class Watcher:
 
     def _judge_safely(self, name: str, judged: _Judged, now_ns: int) -> None:
         """Judge a site; one that cannot be judged is unknown, and costs no other its status."""
-        import psycopg  # noqa: PLC0415  # the extra `fleet`
-
         try:
             self._judge(name, judged, now_ns)
-        except psycopg.Error:
-            raise  # of the archive, not of the site
-        except Exception:  # whatever is in its rows
+        except Exception:  # whatever is in its rows, or how long they take
+            if self._connection.closed:
+                raise  # of the archive, not of the site
             if not judged.is_failing:
                 log.exception("site %s cannot be judged: its status is unknown", name)
             # Tried again from its first row on, when others are judged for their age.

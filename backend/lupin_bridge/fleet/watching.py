@@ -46,6 +46,7 @@ class Watching:
         self.sites: Mapping[str, Site] = {}
         self.archive = Archive(is_reachable=False, message="the archive has not been read yet")
         self.looks = 0
+        self.starts = 0
         self._on_news = on_news
         # What an archive's clock is ahead of this process's steady one.
         self._ahead_ns = time.time_ns() - time.monotonic_ns()
@@ -92,6 +93,7 @@ class Watching:
             limit=_MAX_LINE,
             process_group=0,
         )
+        self.starts += 1
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         # Not on its command line, which others can read.

@@ -278,6 +278,12 @@ def _nanoseconds(length_s: float) -> int:
 CSV_TYPE: Final = "text/csv; charset=utf-8; header=present"
 CSV_HEADER: Final = b"time_iso,stamp,tag_id,x_m,y_m,sensor,unit,value,status,source\r\n"
 
+
+def csv_header(*, has_site: bool) -> bytes:
+    """The names of the columns; those of many sites have one more, at the end."""
+    return CSV_HEADER.replace(b"\r", b",site\r") if has_site else CSV_HEADER
+
+
 # Names come again and again: so many are kept as they are written, some 100 bytes each.
 _NAMES: Final = 20_000
 
@@ -289,9 +295,9 @@ _FORMULA: Final = re.compile(r"(^|[;\t\r\n])(?=[=+\-@\uff1d\uff0b\uff0d\uff20\t\
 _UNSAFE_IN_NAME: Final = re.compile(r"[^A-Za-z0-9._-]")
 
 
-def csv_lines(rows: Iterable[PastRow], sensors: Sensors) -> bytes:
+def csv_lines(rows: Iterable[PastRow], sensors: Sensors, site: str | None = None) -> bytes:
     """Rows as lines of CSV; what is not known or not finite is empty."""
-    written = []
+    written, end = [], "\r\n" if site is None else f",{csv_cell(site)}\r\n"
     begins: tuple[int, str, float, float] | None = None
     beginning, units = "", dict[str, str]()
     for row in rows:
@@ -308,7 +314,7 @@ def csv_lines(rows: Iterable[PastRow], sensors: Sensors) -> bytes:
             units[row.sensor] = unit
         written.append(
             f"{beginning},{csv_cell(row.sensor)},{unit},{csv_number(row.value)},{row.status},"
-            f"{csv_cell(row.source)}\r\n"
+            f"{csv_cell(row.source)}{end}"
         )
     return "".join(written).encode("utf-8", "replace")
 
@@ -327,10 +333,10 @@ def csv_number(value: float) -> str:
     return repr(value) if value - value == 0.0 else ""
 
 
-def csv_file_name(query: PeriodQuery, end_ns: int | None) -> str:
+def export_file_name(query: PeriodQuery, end_ns: int | None, kind: str) -> str:
     """A name that says which tag, sensor and period; `end_ns` is now, where that is known."""
     of = [_UNSAFE_IN_NAME.sub("_", text) for text in (query.tag_id, query.sensor_type) if text]
     since = ["from", compact(query.start_ns)] if query.start_ns else []
     end_ns = query.end_ns or end_ns
     until = ["to", compact(end_ns)] if end_ns else []
-    return "_".join(["lupin-twin", *of, *since, *until]) + ".csv"
+    return "_".join(["lupin-twin", *of, *since, *until]) + f".{kind}"

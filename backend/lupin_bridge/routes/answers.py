@@ -10,7 +10,7 @@ import asyncio
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Hashable, Mapping
 from contextlib import ExitStack
-from typing import Any, Final, TypeVar, cast
+from typing import Any, Final, Protocol, TypeVar, cast
 
 import orjson
 from fastapi import APIRouter, FastAPI, Request, Response
@@ -29,7 +29,7 @@ from lupin_bridge.past.plans import (
     Query,
     StateQuery,
 )
-from lupin_bridge.serving.admission import REVALIDATE, AdmissionError, Answer, BusyError
+from lupin_bridge.serving.admission import REVALIDATE, AdmissionError, Answer, BusyError, Limits
 from lupin_bridge.stream import schema
 from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.field.idw import never
@@ -57,6 +57,12 @@ NOT_REMEMBERED: Final[dict[int | str, dict[str, Any]]] = {
 
 ResultT = TypeVar("ResultT")
 RouteT = TypeVar("RouteT", bound=Callable[..., Any])
+
+
+class Limited(Protocol):
+    """What answers within limits."""
+
+    limits: Limits
 
 
 def read_route(router: APIRouter, path: str, **documentation: Any) -> Callable[[RouteT], RouteT]:
@@ -205,14 +211,14 @@ def not_modified(etag: str) -> Response:
     return Response(status_code=304, headers={"ETag": etag, **REVALIDATE})
 
 
-async def within_time(bridge: Bridge, work: Awaitable[ResultT]) -> ResultT:
+async def within_time(of: Limited, work: Awaitable[ResultT]) -> ResultT:
     """What `work` gives, within `Limits.answer_timeout_s`.
 
     Raises:
         TwinTimeoutError: it took longer; it is cancelled.
 
     """
-    limit_s = bridge.limits.answer_timeout_s
+    limit_s = of.limits.answer_timeout_s
     try:
         async with asyncio.timeout(limit_s):
             return await work

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from ipaddress import IPv6Address, ip_address
 from itertools import islice
-from typing import Final
+from typing import Final, Self
 
 from lupin_bridge.rate_limit import RateLimit
 
@@ -32,7 +32,8 @@ class Limits:
     and behind one address there may be two such pages. `concurrency` of them may be under way for
     one client (a browser has six at once), `total_concurrency` for all of them together, of
     which large ones take three quarters. `frames_per_s` is what the state's listeners get at most,
-    on average. Alarms are worked out from `alarm_days` before the start on.
+    on average. Alarms are worked out from `alarm_days` before the start on. The page over many
+    sites has at most `open_sites` open at once, of some megabytes each.
     """
 
     client_timeout_s: float = 30.0
@@ -42,6 +43,7 @@ class Limits:
     total_concurrency: int = 32
     frames_per_s: float = 10.0
     alarm_days: float = 7.0
+    open_sites: int = 50
 
 
 def client_key(address: str) -> str:
@@ -129,6 +131,11 @@ class Admission:
         self._exports: dict[str, Export] = {}
         self._computing = _Places(total_concurrency)
         self._large = _Places(total_concurrency - total_concurrency // 4)
+
+    @classmethod
+    def of(cls, limits: Limits) -> Self:
+        """As these limits have it."""
+        return cls(limits.answers_per_s, limits.concurrency, limits.total_concurrency)
 
     @property
     def being_computed(self) -> int:

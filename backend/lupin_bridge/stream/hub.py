@@ -188,6 +188,11 @@ class Hub:
         self.clients_dismissed += 1
         client.connection.dismiss(CLOSE_TRY_AGAIN_LATER, reason)
 
+    def turn_out_all(self, reason: str) -> None:
+        """Close every client; each may try again."""
+        for client in list(self._clients):
+            self.turn_out(client, reason)
+
     @property
     def blocked(self) -> int:
         """How many clients have a socket that takes nothing just now."""

@@ -120,4 +120,4 @@ def test_numbers_are_read_back_to_the_last_bit_and_stay_numbers(value: float) ->
 def test_the_file_is_named_by_what_is_in_it(
     asked: PeriodQuery, now_ns: int | None, expected: str
 ) -> None:
-    assert bodies.csv_file_name(asked, now_ns) == expected
+    assert bodies.export_file_name(asked, now_ns, "csv") == expected

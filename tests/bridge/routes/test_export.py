@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import math
+import sys
 from collections import deque
 from collections.abc import AsyncIterator
 from contextlib import ExitStack
 
 import httpx
+import pyarrow
 import pytest
+from pyarrow import parquet
 
 from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.past import bodies
+from lupin_bridge.past.export import GROUP_ROWS
 from lupin_bridge.serving.admission import EXPORTS, Limits
 from lupin_twin.core.past import PastRow
 from tests.bridge.routes.test_past import remembering
@@ -73,6 +78,67 @@ def test_head_asks_for_no_row(domain: int) -> None:
             assert "19700101T000009Z" in answer.headers["content-disposition"]
             assert past.asked == []
             assert (await it.http.head(f"{PATH}?to=now")).status_code == 400
+
+    run(domain, test())
+
+
+def test_the_same_rows_come_as_parquet_with_units_and_coordinates(domain: int) -> None:
+    failed = PastRow(7 * NS, "8", math.nan, math.nan, "", math.nan, 2, "robot")
+    # More than one group of rows.
+    past = MadeUp(lots=[rows(4_000)] * (GROUP_ROWS // 4_000 + 1) + [[], [failed]])
+
+    async def test() -> None:
+        async with remembering(past) as it:
+            answer = await it.http.get("/api/export.parquet?from=1&to=9&sensor_type=co2")
+            assert answer.headers["content-type"] == "application/vnd.apache.parquet"
+            assert answer.headers["content-disposition"].endswith('09Z.parquet"')
+            file = parquet.ParquetFile(pyarrow.BufferReader(answer.content))
+            assert file.num_row_groups == 2
+            table = file.read()
+            assert table.num_rows == sum(map(len, past.lots))
+            first, last = table.slice(0, 1), table.slice(table.num_rows - 1)
+            assert table.column_names == [
+                *("time", "tag_id", "x_m", "y_m", "sensor", "unit", "value", "status", "source"),
+            ]
+            assert first["time"].cast("int64").to_pylist() == [NS]
+            assert first.drop(["time"]).to_pylist() == [
+                {"tag_id": "7", "x_m": 1.0, "y_m": 2.0, "sensor": "co2", "unit": "ppm",
+                 "value": math.pi, "status": 0, "source": "robot"},
+            ]  # fmt: skip
+            assert last.drop(["time"]).to_pylist() == [
+                {"tag_id": "8", "x_m": None, "y_m": None, "sensor": None, "unit": None,
+                 "value": None, "status": 2, "source": "robot"},
+            ]  # fmt: skip
+            schema = table.schema
+            assert schema.field("value").metadata[b"units"] == b"ppm"
+            assert schema.field("x_m").metadata[b"units"] == b"m"
+            assert schema.metadata[b"to"] == b"1970-01-01T00:00:09.000000000Z"
+            assert json.loads(schema.metadata[b"units"])["co2"] == "ppm"
+
+    run(domain, test())
+
+
+def test_a_period_without_rows_is_a_parquet_file_of_none(domain: int) -> None:
+    async def test() -> None:
+        async with remembering(MadeUp()) as it:
+            answer = await it.http.get("/api/export.parquet")
+            assert parquet.read_table(pyarrow.BufferReader(answer.content)).num_rows == 0
+
+    run(domain, test())
+
+
+def test_parquet_without_its_package_is_refused_with_what_to_install(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+
+    async def test() -> None:
+        async with remembering(MadeUp(lots=[rows(1)])) as it:
+            answer = await it.http.get("/api/export.parquet")
+            assert answer.status_code == 501
+            assert "pip install 'lupin-twin[science]'" in answer.json()["detail"]
+            # Its place is free again, and CSV needs nothing.
+            assert (await it.http.get(PATH)).status_code == 200
 
     run(domain, test())
 

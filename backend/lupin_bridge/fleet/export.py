@@ -1,0 +1,73 @@
+"""Rows of many sites in one export."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncGenerator, Callable, Iterable
+from contextlib import aclosing
+from functools import partial
+from typing import Protocol
+
+from fastapi import Request, Response
+
+from lupin_bridge.feed.past_child import Now
+from lupin_bridge.feed.past_process import PastProcess
+from lupin_bridge.fleet.overview import Site
+from lupin_bridge.fleet.watching import Watching
+from lupin_bridge.judge.options import Criteria
+from lupin_bridge.past import query as past_query
+from lupin_bridge.past.bodies import COMPLETE_TO
+from lupin_bridge.past.export import ExportFormat
+from lupin_bridge.routes.answers import error_response
+from lupin_bridge.routes.export import Exporting, end_of, respond_export
+from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.past import seconds
+
+
+class ExportingSites(Exporting, Protocol):
+    """What has sites to export: the fleet."""
+
+    watching: Watching
+    past: PastProcess
+    criteria: Criteria
+
+
+async def respond_sites(fleet: ExportingSites, kind: ExportFormat, request: Request) -> Response:
+    """Every row of a period of the sites that are named, or of all."""
+    period = past_query.period(past_query.OfSites, request.query_params.multi_items(), None)
+    known = fleet.watching.sites
+    sites = [known.get(name, name) for name in (known if period.sites is None else period.sites)]
+    for site in sites:
+        if isinstance(site, str):
+            detail = f"there is no site {site[:64]!r} in the archive ({len(known)} others are)"
+            return error_response(detail, 404)
+    named = [site for site in sites if isinstance(site, Site)]
+    end_ns = end_of(period, None)
+    query = (period.start_ns, end_ns, period.tag_id, period.sensor_type)
+    heard_ns = min((site.heard_ns for site in named), default=0)
+    return await respond_export(
+        request,
+        fleet,
+        lambda pack: _rows(fleet, [site.site for site in named], query, pack),
+        kind,
+        period,
+        sensors=fleet.criteria.sensors,
+        now_ns=fleet.watching.now_ns,
+        known={COMPLETE_TO: seconds(min(heard_ns, end_ns))},
+        has_site=True,
+    )
+
+
+async def _rows(
+    fleet: ExportingSites,
+    sites: Iterable[str],
+    query: tuple[int, int, str | None, str | None],
+    pack: Callable[..., bytes],
+) -> AsyncGenerator[bytes]:
+    """The rows of one site after the other, see `PastProcess.rows`; each lot through `pack`."""
+    for site in sites:
+        log = Condition(JournalState.RECORDING, path=site, journal_id=site)
+        now = Now(fleet.watching.now_ns, "", log)
+        own = partial(pack, site=site)
+        async with aclosing(fleet.past.rows(query, own, lambda now=now: now)) as lots:  # type: ignore[misc]
+            async for lot in lots:
+                yield lot

@@ -1,0 +1,153 @@
+"""The pages of sites: made when opened, closed when nobody reads them or others need the place."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, field
+from typing import Final
+
+from fastapi import Response, WebSocket
+from starlette.requests import HTTPConnection
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from lupin_bridge.access.middleware import client_of
+from lupin_bridge.bridge import Bridge
+from lupin_bridge.fleet.source import SiteTwin
+from lupin_bridge.routes.answers import error_response
+
+# A page that nobody has asked anything of for so long, and that nobody follows, is closed.
+_IDLE_S: Final = 120.0
+_PREFIX: Final = "/sites/"
+
+
+@dataclass(slots=True, eq=False)
+class Opened:
+    """A site's page: its bridge and its application, as if it were the only one."""
+
+    source: SiteTwin
+    bridge: Bridge
+    app: ASGIApp
+    ready: asyncio.Task[None]
+    used_s: float = field(default_factory=time.monotonic)
+    users: Counter[str] = field(default_factory=Counter)
+
+
+class SitePages:
+    """At most `limit` pages at once. `make` begins one; `sites` are those that there are."""
+
+    def __init__(
+        self, make: Callable[[str], Opened], sites: Callable[[], Collection[str]], limit: int
+    ) -> None:
+        self.sites = sites
+        self._make, self._limit = make, limit
+        # In the order in which they were opened.
+        self._open: dict[str, Opened] = {}
+        self._closing: set[asyncio.Task[None]] = set()
+
+    def __len__(self) -> int:
+        return len(self._open)
+
+    def __iter__(self) -> Iterator[Opened]:
+        return iter(self._open.values())
+
+    def page_of(self, name: str, client: str) -> Opened | str:
+        """The site's page for a client, made if need be; or why there is none."""
+        opened = self._open.get(name)
+        if opened is None:
+            if name not in self.sites():
+                known = len(self.sites())
+                return f"there is no site {name[:64]!r} in the archive ({known} others are)"
+            if len(self._open) >= self._limit:
+                least = self._least_needed(client)
+                if least is None:
+                    return f"{self._limit} sites are open here, the limit: try again later"
+                self._close(least)
+            opened = self._open[name] = self._make(name)
+        return opened
+
+    def _least_needed(self, client: str) -> str | None:
+        """The site that makes place for a client's; None: none does.
+
+        It is one that nobody reads. Where all are read, the client who reads the most gives the
+        newest that it alone reads to who has at least two fewer.
+        """
+        idle = [it for it in self._open.items() if not it[1].users]
+        if idle:
+            return min(idle, key=lambda it: it[1].used_s)[0]
+        read = Counter(user for opened in self._open.values() for user in opened.users)
+        ((largest, count),) = read.most_common(1)
+        own = [name for name, it in self._open.items() if it.users.keys() == {largest}]
+        return own[-1] if own and count >= read[client] + 2 else None
+
+    def _close(self, name: str) -> None:
+        opened = self._open.pop(name)
+        opened.bridge.announce_shutdown()
+        opened.bridge.hub.turn_out_all(f"{self._limit} sites are open here, the limit")
+
+        async def end() -> None:
+            await asyncio.wait((opened.ready,))
+            await opened.bridge.stop()
+
+        closing = asyncio.create_task(end(), name=f"close {name}")
+        self._closing.add(closing)
+        closing.add_done_callback(self._closing.discard)
+
+    def tidy(self, now_s: float) -> None:
+        """Close those that nobody reads any more."""
+        for name, opened in list(self._open.items()):
+            if not opened.users and now_s - opened.used_s >= _IDLE_S:
+                self._close(name)
+
+    async def close(self) -> None:
+        """Close them all."""
+        for name in list(self._open):
+            self._close(name)
+        await asyncio.gather(*self._closing)
+
+
+class Sites:
+    """ASGI: what is below `/sites/NAME` goes to that site's application, as if below a prefix."""
+
+    def __init__(self, app: ASGIApp, pages: SitePages) -> None:
+        self._app = app
+        self._pages = pages
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on to its site, or to the overview."""
+        root = scope.get("root_path", "")
+        path = scope.get("path", "")[len(root) :]
+        if scope["type"] not in ("http", "websocket") or not path.startswith(_PREFIX):
+            await self._app(scope, receive, send)
+            return
+        name, slash, _ = path[len(_PREFIX) :].partition("/")
+        client = client_of(HTTPConnection(scope))
+        found = self._pages.page_of(name, client)
+        if isinstance(found, str):
+            status = 503 if name in self._pages.sites() else 404
+            await _refuse(found, status, scope, receive, send)
+            return
+        if not slash:
+            # Relative, as all links are: below whatever prefix this is.
+            await Response(status_code=307, headers={"location": f"{name}/"})(scope, receive, send)
+            return
+        found.users[client] += 1
+        try:
+            await asyncio.shield(found.ready)
+            own = {**scope, "root_path": f"{root}{_PREFIX}{name}"}
+            own.pop("app_root_path", None)
+            await found.app(own, receive, send)
+        finally:
+            found.users[client] -= 1
+            found.users += Counter()  # without those who read no more
+            found.used_s = time.monotonic()
+
+
+async def _refuse(detail: str, status: int, scope: Scope, receive: Receive, send: Send) -> None:
+    response = error_response(detail, status)
+    if scope["type"] == "websocket":
+        await WebSocket(scope, receive, send).send_denial_response(response)
+        return
+    await response(scope, receive, send)

@@ -1,0 +1,230 @@
+"""Rows of a period in the formats of an export: CSV, and Parquet by pyarrow. No format waits.
+
+Rows are packed in the process that reads them, and written where they are sent: a Parquet file has
+a beginning and an end, so one writer has to see all of it. It holds one group of rows, no more.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import pickle
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
+
+from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.past import bodies
+from lupin_twin.core.past import PastRow
+
+# In one group of a Parquet file: some megabytes until they are written.
+GROUP_ROWS: Final = 50_000
+
+
+class MissingPackageError(RuntimeError):
+    """A format needs a package that is not installed; the message says how to have it."""
+
+
+class Writer(Protocol):
+    """What is sent: `begin`, then `add` for each packed lot, then `end`. Each gives bytes."""
+
+    def begin(self) -> bytes:
+        """What comes first."""
+
+    def add(self, packed: bytes) -> bytes:
+        """What there is to send once a lot is known, maybe nothing."""
+
+    def end(self) -> bytes:
+        """What comes last."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExportFormat:
+    """A format: how rows are packed, and how that is written.
+
+    `pack(rows, sensors, site)` can be pickled. `open(sensors, facts, sensor, has_site)` may take as
+    long as an import, and raises `MissingPackageError`.
+    """
+
+    name: str
+    media_type: str
+    pack: Callable[..., bytes]
+    open: Callable[[Sensors, Mapping[str, str], str | None, bool], Writer]
+
+
+# --- CSV ------------------------------------------------------------------------------------------
+
+
+class _Csv:
+    def __init__(self, *, has_site: bool) -> None:
+        self._has_site = has_site
+
+    def begin(self) -> bytes:
+        return bodies.csv_header(has_site=self._has_site)
+
+    def add(self, packed: bytes) -> bytes:
+        return packed
+
+    def end(self) -> bytes:
+        return b""
+
+
+def _open_csv(_sensors: Sensors, _facts: Mapping[str, str], _of: str | None, site: bool) -> Writer:
+    return _Csv(has_site=site)
+
+
+# --- Parquet --------------------------------------------------------------------------------------
+
+_OF_VALUES: Final = "see the column unit"
+# Attributes as CF has them, where it has such.
+_COLUMNS: Final[Mapping[str, Mapping[str, str]]] = {
+    "time": {"standard_name": "time", "long_name": "ROS time of the scan"},
+    "tag_id": {"long_name": "tag that was scanned"},
+    "x_m": {"standard_name": "projection_x_coordinate", "units": "m", "axis": "X"},
+    "y_m": {"standard_name": "projection_y_coordinate", "units": "m", "axis": "Y"},
+    "sensor": {"long_name": "sensor; null: the attempt brought no reading"},
+    "unit": {"long_name": "unit of the value"},
+    "value": {"long_name": "reading", "coordinates": "time x_m y_m tag_id sensor"},
+    "status": {
+        "long_name": "status of the attempt",
+        "flag_values": "0 1 2 3",
+        "flag_meanings": "ok unreachable scan_failed skipped",
+    },
+    "source": {"long_name": "robot or program that scanned"},
+    "site": {"long_name": "greenhouse"},
+}
+
+
+def _pack_columns(rows: Sequence[PastRow], sensors: Sensors, site: str | None = None) -> bytes:
+    """Columns as lists, in the order of `_COLUMNS`; None: null."""
+    texts: dict[str, str | None] = {"": None}
+
+    def text(of: str) -> str | None:
+        if of not in texts:
+            texts[of] = of.encode("utf-8", "replace").decode()
+        return texts[of]
+
+    units = {row.sensor: text(sensors.named(row.sensor).unit) for row in rows if row.sensor}
+    columns: list[list[Any]] = [
+        [row.stamp_ns for row in rows],
+        [text(row.tag_id) for row in rows],
+        [_finite(row.x) for row in rows],
+        [_finite(row.y) for row in rows],
+        [text(row.sensor) for row in rows],
+        [units.get(row.sensor) for row in rows],
+        [_finite(row.value) for row in rows],
+        [row.status for row in rows],
+        [text(row.source) for row in rows],
+    ]
+    if site is not None:
+        columns.append([site] * len(rows))
+    return pickle.dumps(columns, 5)
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+class _Sink(io.RawIOBase):
+    """Takes what pyarrow writes until that is sent."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._blocks: list[bytes] = []
+        self._size = 0
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, block: Any) -> int:
+        self._blocks.append(bytes(block))
+        self._size += len(self._blocks[-1])
+        return len(self._blocks[-1])
+
+    def tell(self) -> int:
+        return self._size
+
+    def take(self) -> bytes:
+        taken, self._blocks = b"".join(self._blocks), []
+        return taken
+
+
+class _Parquet:
+    def __init__(
+        self, sensors: Sensors, facts: Mapping[str, str], sensor: str | None, *, has_site: bool
+    ) -> None:
+        try:
+            import pyarrow  # noqa: PLC0415  # the extra `science`, slow to import
+            from pyarrow import parquet  # noqa: PLC0415
+        except ImportError as error:
+            raise MissingPackageError(
+                "Parquet needs pyarrow: pip install 'lupin-twin[science]'; CSV needs nothing"
+            ) from error
+        kinds = {
+            "time": pyarrow.timestamp("ns", tz="UTC"),
+            "status": pyarrow.uint8(),
+            **dict.fromkeys(("x_m", "y_m", "value"), pyarrow.float64()),
+        }
+        known = {name: it.unit for name, it in sensors.by_name.items()}
+        self._schema = pyarrow.schema(
+            [
+                pyarrow.field(name, kinds.get(name, pyarrow.string()), metadata=attributes)
+                for name, attributes in _described(sensors, sensor).items()
+                if has_site or name != "site"
+            ],
+            metadata={**facts, "units": json.dumps(known)},
+        )
+        self._sink = _Sink()
+        self._writer: Any = parquet.ParquetWriter(self._sink, self._schema, compression="zstd")
+        self._arrow: Any = pyarrow
+        self._waiting: list[Any] = []
+        self._rows = 0
+
+    def begin(self) -> bytes:
+        return self._sink.take()
+
+    def add(self, packed: bytes) -> bytes:
+        columns = pickle.loads(packed)  # noqa: S301  # of `_pack_columns`
+        self._waiting.append(
+            self._arrow.record_batch(
+                [
+                    self._arrow.array(values, field.type)
+                    for values, field in zip(columns, self._schema, strict=True)
+                ],
+                schema=self._schema,
+            )
+        )
+        self._rows += len(columns[0])
+        if self._rows >= GROUP_ROWS:
+            self._write()
+        return self._sink.take()
+
+    def end(self) -> bytes:
+        self._write()
+        self._writer.close()
+        return self._sink.take()
+
+    def _write(self) -> None:
+        table = self._arrow.Table.from_batches(self._waiting, self._schema)
+        self._waiting, self._rows = [], 0
+        if len(table):
+            self._writer.write_table(table, row_group_size=len(table))
+
+
+def _described(sensors: Sensors, sensor: str | None) -> dict[str, Mapping[str, str]]:
+    """The columns' attributes; those of one sensor alone have one unit."""
+    units = sensors.named(sensor).unit if sensor else _OF_VALUES
+    return {**_COLUMNS, "value": {**_COLUMNS["value"], "units": units}}
+
+
+def _open_parquet(
+    sensors: Sensors, facts: Mapping[str, str], sensor: str | None, has_site: bool
+) -> Writer:
+    return _Parquet(sensors, facts, sensor, has_site=has_site)
+
+
+CSV: Final = ExportFormat("csv", bodies.CSV_TYPE, bodies.csv_lines, _open_csv)
+PARQUET: Final = ExportFormat(
+    "parquet", "application/vnd.apache.parquet", _pack_columns, _open_parquet
+)

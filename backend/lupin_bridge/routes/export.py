@@ -1,0 +1,247 @@
+"""Every row of a period, streamed as CSV or Parquet: of one site, or of many in a fleet."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Mapping, Sequence
+from contextlib import ExitStack
+from functools import partial
+from typing import Any, Protocol, TypeVar
+
+from fastapi import APIRouter, Request, Response
+from starlette.types import Message, Receive, Scope, Send
+
+from lupin_bridge.access.middleware import client_of
+from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.past import bodies, query
+from lupin_bridge.past.export import CSV, PARQUET, ExportFormat, MissingPackageError, Writer
+from lupin_bridge.past.query import MAX_SECONDS, PeriodQuery
+from lupin_bridge.query_string import parameters_of
+from lupin_bridge.routes.answers import (
+    CLIENT_GONE,
+    NEVER_STORE,
+    NOT_REMEMBERED,
+    bridge_of,
+    client_left,
+    error_response,
+    read_route,
+    while_client_waits,
+    within_time,
+)
+from lupin_bridge.serving.admission import Admission, Export, Limits
+from lupin_bridge.serving.http_protocol import CONNECTION_KEY, HttpConnection
+from lupin_bridge.stream import schema
+from lupin_twin.core.past import PastRow
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND
+from lupin_twin.runtime.workers import Workers
+
+log = logging.getLogger(__name__)
+
+router = APIRouter()
+
+_ANSWERS = {status: what for status, what in NOT_REMEMBERED.items() if status != 304}
+# What to import a package, or to write a group of rows, takes at worst, s.
+_WRITE_S = 0.5
+# An export's rows as they were packed, in lots.
+Lots = AsyncIterator[bytes]
+Pack = Callable[[Sequence[PastRow]], bytes]
+ResultT = TypeVar("ResultT")
+
+
+class Exporting(Protocol):
+    """What has rows to export: a bridge, or the fleet."""
+
+    limits: Limits
+    admission: Admission
+
+    @property
+    def workers(self) -> Workers:
+        """Where a file is written."""
+
+
+def _content(media_type: str) -> dict[str, Any]:
+    return {"content": {media_type.partition(";")[0]: {"schema": {"type": "string"}}}}
+
+
+@read_route(
+    router,
+    "/api/export.csv",
+    summary="Every reading and failed try of a period, as CSV",
+    responses={200: _content(CSV.media_type), **_ANSWERS},
+    openapi_extra={"parameters": parameters_of(query.OfExport)},
+)
+async def csv_route(request: Request) -> Response:
+    """A row for each reading, and one without a sensor for each try that brought none.
+
+    It is streamed: one that does not end as HTTP says it must (the last chunk) is not whole.
+    """
+    return await _of_site(request, CSV)
+
+
+@read_route(
+    router,
+    "/api/export.parquet",
+    summary="The same as Parquet, with units and coordinates",
+    responses={
+        200: _content(PARQUET.media_type),
+        **_ANSWERS,
+        501: {"model": schema.ErrorMessage, "description": "the extra `science` is not installed"},
+    },
+    openapi_extra={"parameters": parameters_of(query.OfExport)},
+)
+async def parquet_route(request: Request) -> Response:
+    """The columns of the CSV; `time` is a timestamp. Fields and file have attributes."""
+    return await _of_site(request, PARQUET)
+
+
+async def _of_site(request: Request, kind: ExportFormat) -> Response:
+    bridge = bridge_of(request)
+    now_ns = bridge.ros_time_ns
+    period = query.period(query.OfExport, request.query_params.multi_items(), now_ns)
+    end_ns = end_of(period, now_ns)
+    known = bodies.period_headers(bridge.source.journal(), period.start_ns, end_ns)
+
+    def rows(pack: Pack) -> Lots:
+        return bridge.source.rows(period.start_ns, end_ns, period.tag_id, period.sensor_type, pack)
+
+    return await respond_export(
+        request, bridge, rows, kind, period, sensors=bridge.criteria.sensors, now_ns=now_ns,
+        known=known,
+    )  # fmt: skip
+
+
+def end_of(period: PeriodQuery, now_ns: int | None) -> int:
+    """Up to when, ns."""
+    return period.end_ns or now_ns or MAX_SECONDS * NANOSECONDS_PER_SECOND
+
+
+async def respond_export(
+    request: Request,
+    of: Exporting,
+    rows: Callable[[Pack], Lots],
+    kind: ExportFormat,
+    period: PeriodQuery,
+    *,
+    sensors: Sensors,
+    now_ns: int | None,
+    known: Mapping[str, str],
+    has_site: bool = False,
+) -> Response:
+    """What `rows` gives, in a format; `known` are headers that say how far it is complete.
+
+    Raises:
+        AdmissionError: past a limit.
+        Exception: what the first rows met.
+
+    """
+    name = bodies.export_file_name(period, now_ns, kind.name)
+    headers = {
+        **NEVER_STORE, **known, "Content-Disposition": f'attachment; filename="{name}"',
+    }  # fmt: skip
+    if request.method == "HEAD":
+        return Response(headers=headers, media_type=kind.media_type)
+    client, connection = client_of(request), request.scope["state"][CONNECTION_KEY]
+
+    def evict() -> None:
+        log.warning("the export of %s is slow and makes place for another one", client)
+        connection.break_off()
+
+    facts = {"title": "lupin-twin: readings and failed attempts", **_facts(known, period, now_ns)}
+
+    async def begin() -> tuple[Writer, Lots, bytes | None]:
+        opened = partial(kind.open, sensors, facts, period.sensor_type, has_site)
+        writer = await _written(of, kind, opened)
+        lots = rows(partial(kind.pack, sensors=sensors))
+        return writer, lots, await anext(lots, None)
+
+    with ExitStack() as held:
+        # A response that has begun cannot be refused any more: so the first rows come before it.
+        with of.admission.request(client, time.monotonic()):
+            export = held.enter_context(of.admission.export(client, time.monotonic(), evict))
+            try:
+                begun = await while_client_waits(request, within_time(of, begin()))
+            except MissingPackageError as error:
+                return error_response(str(error), 501)
+        if begun is None:
+            return Response(status_code=CLIENT_GONE)
+        return ExportResponse(
+            of, export, *begun, headers=headers, kind=kind, release=held.pop_all().close
+        )
+
+
+def _facts(known: Mapping[str, str], period: PeriodQuery, now_ns: int | None) -> dict[str, str]:
+    """What a file says of itself; moments in ISO 8601, or in ROS seconds as in the headers."""
+    facts = {name.removeprefix("X-").lower().replace("-", "_"): it for name, it in known.items()}
+    if period.start_ns:
+        facts["from"] = query.iso(period.start_ns)
+    return {**facts, "to": query.iso(end_of(period, now_ns))}
+
+
+async def _written(of: Exporting, kind: ExportFormat, write: Callable[[], ResultT]) -> ResultT:
+    """What is written, on a worker; CSV is passed on as it came, and takes no time."""
+    if kind is CSV:
+        return write()
+    return await asyncio.wrap_future(of.workers.submit(lambda _: write(), _WRITE_S))
+
+
+class ExportResponse(Response):
+    """Rows in a format; the next lot is read when the socket has taken those before."""
+
+    def __init__(
+        self,
+        of: Exporting,
+        export: Export,
+        writer: Writer,
+        lots: Lots,
+        first: bytes | None,
+        *,
+        headers: dict[str, str],
+        kind: ExportFormat,
+        release: Callable[[], None],
+    ) -> None:
+        super().__init__(headers=headers, media_type=kind.media_type)
+        del self.headers["content-length"]
+        self._of, self._export, self._first, self._lots = of, export, first, lots
+        self._writer = writer
+        self._kind = kind
+        self._release = release
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send it; where that fails, break the connection: a part must not pass for the whole."""
+        request = Request(scope, receive)
+        try:
+            await while_client_waits(request, self._send_all(send))
+        except Exception as error:
+            log.warning("an export ended before its end: %s", error, exc_info=True)
+            connection: HttpConnection = scope["state"][CONNECTION_KEY]
+            connection.break_off()
+            await client_left(request)  # or the server would complain of an answer without an end
+        finally:
+            self._release()
+            if isinstance(self._lots, AsyncGenerator):
+                await self._lots.aclose()
+
+    async def _send_all(self, send: Send) -> None:
+        start: Message = {
+            "type": "http.response.start",
+            "status": self.status_code,
+            "headers": self.raw_headers,
+        }
+        await send(start)
+        await send(_piece(self._writer.begin()))
+        lot = self._first
+        while lot is not None:
+            part = await _written(self._of, self._kind, partial(self._writer.add, lot))
+            if part:
+                await send(_piece(part))
+            # Also where that is nothing yet: its reader is not slow.
+            self._export.take(len(part) or len(lot), time.monotonic())
+            lot = await within_time(self._of, anext(self._lots, None))
+        end = await _written(self._of, self._kind, self._writer.end)
+        await send({"type": "http.response.body", "body": end})
+
+
+def _piece(body: bytes) -> Message:
+    return {"type": "http.response.body", "body": body, "more_body": True}

@@ -1,0 +1,318 @@
+"""Whoever asks, whatever is in the archive: the fleet's page goes on, and no site costs another."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections import deque
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+
+import httpx
+import pytest
+from websockets.exceptions import ConnectionClosed
+
+from tests.support import raw_http
+from tests.support.archive import Archive, forward_once, forwarder
+from tests.support.fleet import Page, fleet, frames, scans_lately, wall, write
+from tests.support.journal import kept, look, scan
+from tests.support.postgres import Postgres, server
+from tests.support.processes import children_of, limits
+from tests.support.raw_http import UPGRADE, status
+from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.web import deaf_client
+from tests.support.ws_client import open_websocket
+
+TIMEOUT_S = 4
+SITES = ("gh1", "gh2", "gh3", "gh4")
+OTHER = "127.0.0.2"
+YEAR_NS = 365 * 86_400 * 10**9
+HISTORY = "api/history?tag_id=0&sensor_type=temperature"
+
+
+def made(server: Postgres, journal: Path, *sites: str) -> Archive:
+    archive = Archive(server)
+    archive.add_user("page", "lupin_page")
+    write(journal, scans_lately())
+    forward_once(archive, journal)
+    archive.copy_site(*sites)
+    return archive
+
+
+@pytest.fixture(scope="module")
+def page(postgresql: Postgres, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    """One of which two sites may be open, and a client may have one answer under way."""
+    archive = made(postgresql, tmp_path_factory.mktemp("hostile") / "journal", *SITES[1:])
+    bounds = limits(client_timeout_s=TIMEOUT_S, open_sites=2, concurrency=1)
+    with fleet(archive, *bounds) as running:
+        wait_for(lambda: {*running.sites()} == {*SITES}, "all sites")
+        yield running
+        assert "Traceback" not in running.process.output
+        assert running.process.exit_code is None
+
+
+def measured(page: Page, name: str, below: str = "") -> float:
+    for line in page.http.get(f"{below}/metrics").text.splitlines():
+        if line.startswith(f"{name} "):
+            return float(line.split()[1])
+    raise AssertionError(name)
+
+
+def of_address(page: Page, address: str) -> httpx.Client:
+    transport = httpx.HTTPTransport(local_address=address)
+    return httpx.Client(base_url=page.url, transport=transport, timeout=PATIENCE_S, trust_env=False)
+
+
+def ws(page: Page, path: str) -> str:
+    return page.url.replace("http", "ws", 1) + path
+
+
+# --- names and paths ------------------------------------------------------------------------------
+
+STRANGE = {
+    b"/sites/%2e%2e/": 404,
+    b"/sites/../": 404,
+    b"/sites/gh1/../../api/sites": 404,
+    b"/sites/gh1%2f..%2fgh2/api/state": 404,
+    b"/sites/gh1/sites/gh2/": 404,
+    b"//sites/gh1/api/state": 404,
+    b"/sites//": 404,
+    b"/sites/%00/": 404,
+    b"/sites/%0d%0aX-Evil:%20yes/": 404,
+    b"/sites/%ff%fe/api/state": 404,
+    b"/sites/%c3%bc/api/state": 404,
+    b"/sites/GH1/": 404,
+    b"/sites/" + b"x" * 4_000: 404,
+    b"/sites/" + b"x" * 8_000: 414,
+    "/sites/ü/".encode(): 400,
+}
+
+
+def test_a_strange_path_is_refused_as_a_request_and_as_a_websocket(page: Page) -> None:
+    for path, expected in STRANGE.items():
+        line = b"GET " + path + b" HTTP/1.1\r\n"
+        plain = raw_http.answer(page.url, line + b"Host: 127.0.0.1\r\nConnection: close\r\n\r\n")
+        assert status(plain) == expected, path
+        assert b"x-evil" not in plain.lower().partition(b"\r\n\r\n")[0], path
+        assert 400 <= status(raw_http.answer(page.url, line + UPGRADE + b"\r\n")) < 500, path
+
+
+def test_sites_that_are_none_are_opened_by_nobody(page: Page) -> None:
+    before = measured(page, "lupin_fleet_sites_open")
+    for number in range(1_000):
+        assert page.http.get(f"/sites/none{number}/api/state").status_code == 404
+    assert measured(page, "lupin_fleet_sites_open") == before
+
+
+# --- readers --------------------------------------------------------------------------------------
+
+
+def test_half_a_handshake_is_ended(page: Page) -> None:
+    with raw_http.connect(page.url) as one, raw_http.connect(page.url) as other:
+        one.sendall(b"GET /ws/sites HTTP/1.1\r\n" + UPGRADE)
+        other.sendall(b"GET /sites/gh1/ws/state HTTP/1.1\r\n" + UPGRADE)
+        for client in (one, other):
+            wait_for(lambda client=client: raw_http.is_over(client), "its end")  # type: ignore[misc]
+
+
+def test_who_reads_many_sites_gives_one_up_to_another_client(page: Page) -> None:
+    with (
+        open_websocket(ws(page, "/sites/gh1/ws/state")) as kept_on,
+        open_websocket(ws(page, "/sites/gh2/ws/state")) as given_up,
+    ):
+        refused = page.http.get("/sites/gh3/api/state")
+        assert refused.status_code == 503
+        assert "2 sites are open here, the limit" in refused.json()["detail"]
+        with of_address(page, OTHER) as other:
+            assert other.get("/sites/gh3/api/state").status_code == 200
+        with pytest.raises(ConnectionClosed, match="2 sites are open here, the limit"):
+            deque(iter(lambda: given_up.recv(timeout=PATIENCE_S), None))
+        # The first one is as it was.
+        while '"type":"s' not in str(kept_on.recv(timeout=PATIENCE_S)):
+            pass
+        assert measured(page, "lupin_clients", "/sites/gh1") == 1
+    assert measured(page, "lupin_fleet_sites_open") <= 2
+
+
+def test_sites_that_are_opened_at_once_are_opened_once(page: Page) -> None:
+    for name in SITES[:2]:
+        assert page.http.get(f"/sites/{name}/api/state").status_code == 200
+    with ExitStack() as held:
+        # Handshakes for a site whose place has to be made, all of them under way at once.
+        clients = [held.enter_context(raw_http.connect(page.url)) for _ in range(6)]
+        for client in clients:
+            client.sendall(b"GET /sites/gh4/ws/state HTTP/1.1\r\n" + UPGRADE + b"\r\n")
+        for client in clients:
+            assert status(client.recv(65_536)) == 101
+        wait_for(lambda: measured(page, "lupin_clients", "/sites/gh4") == 6, "all on one page")
+        assert measured(page, "lupin_fleet_sites_open") <= 2
+
+
+def test_a_client_that_does_not_read_has_no_more_answers_under_way_over_all_sites(
+    page: Page,
+) -> None:
+    dear = "api/field.json?sensor_type=temperature&resolution=0.005"
+    with deaf_client(page.url, f"/sites/gh1/{dear}"):
+        wait_for(
+            lambda: page.http.get(f"/sites/gh2/{HISTORY}").status_code == 429,
+            "a client that has an answer under way",
+        )
+        with of_address(page, OTHER) as other:
+            assert other.get(f"/sites/gh2/{HISTORY}").status_code == 200
+    wait_for(
+        lambda: page.http.get(f"/sites/gh2/{HISTORY}").status_code == 200,
+        "a place that is free again",
+    )
+
+
+def test_a_browser_of_the_overview_that_never_reads_is_dismissed(
+    postgresql: Postgres, tmp_path: Path
+) -> None:
+    # A frame of so many sites is more than a socket takes.
+    sites = [f"gh{number}" for number in range(2, 1_500)]
+    archive = made(postgresql, tmp_path / "journal")
+    archive.do(f"INSERT INTO site SELECT unnest('{{{','.join(sites)}}}'::text[]), ''")
+    with fleet(archive, *limits(client_timeout_s=TIMEOUT_S)) as running:
+        wait_for(lambda: len(running.sites()) > 1_000, "all sites")
+        with frames(running) as received:
+            next(received)
+            with ExitStack() as held:
+                for _ in range(5):
+                    client = held.enter_context(raw_http.connect(running.url, room=4_096))
+                    client.sendall(b"GET /ws/sites HTTP/1.1\r\n" + UPGRADE + b"\r\n")
+                wait_for(lambda: measured(running, "lupin_clients") == 6, "all of them")
+                wait_for(lambda: measured(running, "lupin_clients") == 1, "who reads alone")
+            assert measured(running, "lupin_clients_dismissed") == 5
+            next(received)
+
+
+# --- processes ------------------------------------------------------------------------------------
+
+
+def test_a_process_that_is_killed_is_started_again_and_counted(page: Page) -> None:
+    assert page.http.get(f"/sites/gh1/{HISTORY}").status_code == 200
+
+    def is_started_again(kind: str) -> None:
+        name = f"lupin_fleet_{kind}_starts"
+        before = measured(page, name)
+        (child,) = children_of(page.process.pid, kind.encode())
+        os.kill(child, signal.SIGKILL)
+        assert page.http.get("/sites/gh1/api/state").status_code == 200
+        # The reader is started again at once, the first time; a query waits for it or is refused.
+        wait_for(lambda: page.http.get(f"/sites/gh1/{HISTORY}").status_code == 200, "the past")
+        wait_for(lambda: measured(page, name) > before, f"another {kind}")
+        wait_for(lambda: page.http.get("/readyz").status_code == 200, "an archive that is read")
+
+    is_started_again("watcher")
+    is_started_again("reader")
+
+
+def test_an_archive_that_hangs_is_said_and_goes_on(tmp_path: Path) -> None:
+    with server() as own:
+        archive = made(own, tmp_path / "journal", "gh2")
+        with fleet(archive, *limits(answer_timeout_s=2)) as running:
+            for name in SITES[:2]:
+                wait_for(lambda name=name: name in running.sites(), name)  # type: ignore[misc]
+                assert running.http.get(f"/sites/{name}/{HISTORY}").status_code == 200
+            own.freeze()
+            try:
+                wait_for(lambda: running.http.get("/readyz").status_code == 503, "it is said")
+                assert "has not answered" in running.http.get("/readyz").json()["message"]
+                assert running.http.get("/healthz").status_code == 200
+                assert not running.sites()["gh1"]["is_live"]
+                assert len(running.http.get("/sites/gh1/api/state").json()["tags"]) == 5
+                for name in SITES[:2] * 2:
+                    found = running.http.get(f"/sites/{name}/{HISTORY}&points=7")
+                    assert found.status_code in (503, 504), found.text
+                assert measured(running, "lupin_fleet_archive_reachable") == 0
+            finally:
+                own.thaw()
+            wait_for(lambda: running.http.get("/readyz").status_code == 200, "it to be back")
+            wait_for(
+                lambda: running.http.get(f"/sites/gh1/{HISTORY}&points=7").status_code == 200,
+                "the past to be back",
+            )
+            assert "Traceback" not in running.process.output
+
+
+# --- what is in the archive -----------------------------------------------------------------------
+
+
+def test_rows_that_cannot_be_read_are_said_on_their_sites_page(
+    archive: Archive, tmp_path: Path
+) -> None:
+    journal = tmp_path / "journal"
+    now_ns = time.time_ns()
+    write(journal, [*scans_lately(), look("1", now_ns - 10**9)])
+    with forwarder(archive, journal), fleet(archive) as running:
+        running.site(is_live=True, last_verdict="healthy")
+        archive.copy_site("gh2")
+        wait_for(lambda: "gh2" in running.sites(), "gh2")
+        assert running.http.get("/sites/gh1/api/state").status_code == 200
+        archive.do("UPDATE scan SET readings = 'nonsense' WHERE site = 'gh1'")
+        archive.do("UPDATE look SET blooms = '[[1' WHERE site = 'gh2'")
+        for name, path in (("gh1", HISTORY), ("gh1", "api/export.csv"), ("gh2", HISTORY)):
+            found = running.http.get(f"/sites/{name}/{path}")
+            if name == "gh2" and found.status_code == 200:
+                continue  # a history of readings needs no inspection
+            assert found.status_code == 503, found.text
+            assert "rows of the site cannot be read" in found.json()["detail"]
+        kept(journal, [scan("0", time.time_ns())])
+
+        def problem() -> str:
+            return str(running.http.get("/sites/gh1/readyz").json()["input_problems"])
+
+        wait_for(lambda: "cannot be read" in problem(), "the site's page to say so")
+        # What was last known stays.
+        assert len(running.http.get("/sites/gh1/api/state").json()["tags"]) == 5
+        assert running.http.get("/readyz").status_code == 200
+        archive.do("UPDATE scan SET readings = '[21.5]' WHERE site = 'gh1'")
+        kept(journal, [scan("0", time.time_ns())])
+        wait_for(lambda: problem() == "[]", "all to be well again")
+
+
+def test_a_site_that_the_database_takes_too_long_over_costs_no_other_its_status(
+    archive: Archive, tmp_path: Path
+) -> None:
+    journal = tmp_path / "journal"
+    write(journal, scans_lately())
+    forward_once(archive, journal)
+    archive.copy_site("gh2")
+    # As `statement_timeout` ends it.
+    archive.do(
+        "CREATE FUNCTION ended() RETURNS boolean LANGUAGE plpgsql AS $$ BEGIN"
+        " RAISE EXCEPTION 'it takes too long' USING ERRCODE = 'query_canceled'; END $$"
+    )
+    archive.do(
+        "CREATE POLICY slow ON run AS RESTRICTIVE TO lupin_page"
+        " USING (CASE site WHEN 'gh1' THEN ended() ELSE true END)"
+    )
+    with fleet(archive) as running:
+        running.site("gh2", last_verdict="healthy", active_alarms=0)
+        assert running.site("gh1", last_verdict=None)["active_alarms"] is None
+        wait_for(lambda: "site gh1 cannot be judged" in running.process.output, "its log")
+        assert running.http.get("/readyz").status_code == 200
+        assert measured(running, "lupin_fleet_watcher_starts") == 1
+
+
+@pytest.mark.parametrize("by_ns", [YEAR_NS, -YEAR_NS])
+def test_a_sites_clock_that_is_wrong_by_a_year(
+    archive: Archive, tmp_path: Path, by_ns: int
+) -> None:
+    journal, now_ns = tmp_path / "journal", wall().stamp_ns + by_ns
+    clock = replace(wall(), stamp_ns=now_ns, arrival_ns=now_ns)
+    rows = [scan("7", now_ns - number * 10**9) for number in range(5, 0, -1)]
+    kept(journal, rows, clock)
+    with forwarder(archive, journal), fleet(archive) as running:
+        found = running.site(is_live=True, active_alarms=0)
+        assert abs(found["last_received"]["sec"] - now_ns // 10**9) < 60
+        (tag,) = running.http.get("/sites/gh1/api/state").json()["tags"]
+        assert tag["stale_seconds"] >= 0
+        at = now_ns // 10**9 - 3
+        past = running.http.get(f"/sites/gh1/api/state?at={at}")
+        # A moment that has come for the site has come.
+        assert [it["tag_id"] for it in past.json()["tags"]] == ["7"]
+        assert len(running.http.get("/sites/gh1/api/export.csv").text.splitlines()) == 6

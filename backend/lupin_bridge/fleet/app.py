@@ -8,6 +8,7 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from hashlib import blake2b
 from pathlib import Path
 from typing import Final
 
@@ -22,22 +23,37 @@ from lupin_bridge.access.middleware import Access, AccessControl, ReadOnly, clie
 from lupin_bridge.access.policy import BehindProxies, Proxies
 from lupin_bridge.app import STATIC_FOLDER, create_app
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.feed.past_child import Now
 from lupin_bridge.feed.past_process import PastProcess
+from lupin_bridge.feed.shared_work import Shared
 from lupin_bridge.field import query as field_query
-from lupin_bridge.fleet.overview import SitesFrame, archive_json, etag, site_json
+from lupin_bridge.fleet.compare import COMPARE_S, Compare, OfSites, chosen, compare
+from lupin_bridge.fleet.overview import SitesFrame, alarms_json, archive_json, etag, site_json
 from lupin_bridge.fleet.source import SiteTwin
 from lupin_bridge.fleet.watching import Watching
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.metrics import CONTENT_TYPE
-from lupin_bridge.routes import pages
-from lupin_bridge.routes.answers import NEVER_STORE, error_response, json_response, list_header
+from lupin_bridge.query_string import read
+from lupin_bridge.routes import pages, status
+from lupin_bridge.routes.answers import (
+    NEVER_STORE,
+    add_refusals,
+    error_response,
+    has_etag,
+    json_response,
+    list_header,
+    not_modified,
+    respond,
+)
 from lupin_bridge.routes.sockets import has_place, next_message
-from lupin_bridge.serving.admission import REVALIDATE, Limits
+from lupin_bridge.serving.admission import REVALIDATE, Admission, Answer, AnswerCache, Limits
 from lupin_bridge.serving.middleware import EndsAtShutdown, PieceByPiece, Shutdown
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.hub import Client, Hub
 from lupin_bridge.stream.status import Status
+from lupin_twin.core.journal_condition import UNKNOWN
+from lupin_twin.core.past import PastRefused
 
 log = logging.getLogger(__name__)
 
@@ -50,9 +66,12 @@ _TIDY_S: Final = 5.0
 _FRAME_S: Final = 1.0
 _HEARTBEAT_S: Final = 5.0
 _PREFIX: Final = "/sites/"
-# What a browser signs in by, as everywhere.
-_SIGN_IN: Final = frozenset(
-    {"/api/signin", "/api/signout", "/api/session", "/signin", "/signin.css", "/signin.js"}
+# What a browser signs in by, and the sensors in force.
+_AS_EVERYWHERE: Final = frozenset(
+    {
+        *("/api/signin", "/api/signout", "/api/session", "/signin", "/signin.css", "/signin.js"),
+        "/api/sensors",
+    }
 )
 
 
@@ -85,8 +104,14 @@ class Fleet:
         self.hub = Hub(
             settings.max_clients, limits.client_timeout_s, lambda _: Status("live", None)
         )
-        self._settings, self._criteria, self._access = settings, criteria, access
-        self._limits = limits
+        self._settings, self.criteria, self._access = settings, criteria, access
+        self.limits = limits
+        # What `routes.answers` needs of a bridge.
+        self.admission = Admission(
+            limits.answers_per_s, limits.concurrency, limits.total_concurrency
+        )
+        self.cache = AnswerCache()
+        self.answering: Shared[Answer] = Shared()
         self._open: dict[str, _Open] = {}
         self._frame: SitesFrame | None = None
         self._framed_s = -math.inf
@@ -153,6 +178,13 @@ class Fleet:
         if self._frame is None:
             self._push()
 
+    # --- several sites ------------------------------------------------------------------------
+
+    async def compare(self, query: Compare) -> Answer:
+        """The answer of `/api/compare`."""
+        answer: Answer = await self.past.ask(query, Now(0, "", UNKNOWN), COMPARE_S)  # type: ignore[arg-type]  # see `reader`
+        return answer
+
     # --- the pages of sites -------------------------------------------------------------------
 
     async def page_of(self, name: str) -> _Open | str:
@@ -173,8 +205,8 @@ class Fleet:
         return opened
 
     def _make(self, name: str) -> _Open:
-        source = SiteTwin(name, self.watching, self.past, self._limits.answer_timeout_s)
-        bridge = Bridge(source, self._settings, criteria=self._criteria, limits=self._limits)
+        source = SiteTwin(name, self.watching, self.past, self.limits.answer_timeout_s)
+        bridge = Bridge(source, self._settings, criteria=self.criteria, limits=self.limits)
         # Who may read has been looked at by then.
         app = create_app(bridge, access=Access(self._access.policy))
         ready = asyncio.create_task(bridge.start(), name=f"open {name}")
@@ -270,9 +302,12 @@ def create_fleet_app(
         openapi_url=None,
     )
     app.state.access = access
+    app.state.bridge = fleet
+    add_refusals(app)
     _add_routes(app, fleet)
-    signin = (route for route in pages.router.routes if getattr(route, "path", "") in _SIGN_IN)
-    app.router.routes.extend(signin)
+    _add_probes(app, fleet)
+    every = (*pages.router.routes, *status.router.routes)
+    app.router.routes.extend(it for it in every if getattr(it, "path", "") in _AS_EVERYWHERE)
     # The last one added is the first to be asked.
     app.add_middleware(Sites, fleet=fleet)
     app.add_middleware(PieceByPiece)
@@ -299,6 +334,13 @@ def create_fleet_app(
     return app
 
 
+def _json_with_etag(request: Request, body: bytes) -> Response:
+    tag = f'"{blake2b(body, digest_size=12).hexdigest()}"'
+    if has_etag(request, tag):
+        return not_modified(tag)
+    return json_response(body, 200, {"ETag": tag, **REVALIDATE})
+
+
 async def _not_found(request: Request, _error: Exception) -> Response:
     return error_response(f"there is nothing at {request.url.path[:128]!r}", 404)
 
@@ -312,6 +354,29 @@ def _add_routes(app: FastAPI, fleet: Fleet) -> None:
         if field_query.matches(list_header(request, "if-none-match"), tag.removeprefix("W/")):
             return Response(status_code=304, headers={"ETag": tag, **REVALIDATE})
         return json_response(fleet.body(), 200, {"ETag": tag, **REVALIDATE})
+
+    @app.api_route("/api/alarms", methods=["GET", "HEAD"])
+    async def alarms(request: Request) -> Response:
+        """Active alarms of all sites, the worst first."""
+        given = read(OfSites, request.query_params.multi_items(), PastRefused)
+        watching = fleet.watching
+        names = chosen(given.sites, watching.sites)
+        body = alarms_json((watching.sites[name] for name in names), watching.archive)
+        return _json_with_etag(request, orjson.dumps(body))
+
+    @app.api_route("/api/compare", methods=["GET", "HEAD"])
+    async def compared(request: Request) -> Response:
+        """One sensor of several sites."""
+        watching = fleet.watching
+        names = {site: it.name or site for site, it in watching.sites.items()}
+        parameters = request.query_params.multi_items()
+        query = compare(parameters, names, watching.now_ns, fleet.criteria.sensors)
+
+        async def compute() -> Answer:
+            with fleet.admission.computing(client_of(request), is_large=True):
+                return await fleet.compare(query)
+
+        return await respond(request, query, compute)
 
     @app.websocket("/ws/sites")
     async def ws_sites(websocket: WebSocket) -> None:
@@ -336,6 +401,8 @@ def _add_routes(app: FastAPI, fleet: Fleet) -> None:
             connection.on_writable = None
             fleet.hub.leave(client)
 
+
+def _add_probes(app: FastAPI, fleet: Fleet) -> None:
     @app.api_route("/healthz", methods=["GET", "HEAD"])
     async def healthz() -> Response:
         """The process is alive, whatever becomes of the archive."""

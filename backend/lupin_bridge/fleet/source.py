@@ -152,6 +152,7 @@ class SiteTwin(LogReader):
             self.revision(),
             journal=self._condition(reported),
             rules=self._rules,
+            origin=reported.origin,
             input_problems=() if archive.is_reachable else (f"The archive: {archive.message}.",),
             silent_s=0.0 if is_live else ago_s,
         )

@@ -42,6 +42,7 @@ from lupin_twin.journal.salvage import Salvage, quarantine
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
     LOCAL_SITE,
+    ORIGIN,
     get_meta,
     open_writer,
     says_damaged,
@@ -167,6 +168,11 @@ class JournalFile:
                 note_lost(self._connection, run.root, self._last(run).stamp_ns)
             self._connection.execute("DELETE FROM meta WHERE key = ?", (_SALVAGE,))
         return self._salvaging is not None
+
+    def note_origin(self, origin: str) -> None:
+        """Have it in the file where what is recorded from now on comes from."""
+        if get_meta(self._connection, ORIGIN) != origin:
+            set_meta(self._connection, ORIGIN, origin)
 
     # --- runs ---------------------------------------------------------------------------------
 

@@ -324,6 +324,10 @@ def _own_tables() -> frozenset[bytes]:
 # --- facts about the log as a whole, by name ------------------------------------------------------
 
 
+# A fact: where what is recorded comes from, see `core.diagnostics.Origin`.
+ORIGIN: Final = "origin"
+
+
 def get_meta(connection: sqlite3.Connection, key: str, site: str = LOCAL_SITE) -> str | None:
     """A noted fact, None where it is not noted."""
     found = connection.execute(

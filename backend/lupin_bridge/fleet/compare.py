@@ -34,8 +34,8 @@ _POINTS: Final = 168
 _DAY_NS: Final = 24 * HOUR_NS
 # At worst, s of one core: to read what is compared, and to write it.
 COMPARE_S: Final = 2.0
-# Over sites, in each bucket.
-_QUANTILES: Final = (0.1, 0.5, 0.9)
+# Over sites, in each bucket: between the outer two lies the middle half of them.
+_QUANTILES: Final = (0.25, 0.5, 0.75)
 # Enough for any sensor, and the same however the sums were added up.
 _DIGITS: Final = 9
 

@@ -147,8 +147,8 @@ def test_one_sensor_of_several_sites_the_outlier_first(archive: Archive, tmp_pat
         assert (empty["mean"], empty["deviation"], known(empty["means"])) == (None, None, [])
         # numpy's linear quantiles of 20.5, 21.5, 22.5, 35.5.
         assert known(found["median"]) == [22.0] * 3
-        assert known(found["low"]) == pytest.approx([20.8] * 3)
-        assert known(found["high"]) == pytest.approx([31.6] * 3)
+        assert known(found["low"]) == pytest.approx([21.25] * 3)
+        assert known(found["high"]) == pytest.approx([25.75] * 3)
         start_s, end_s = found["from"]["sec"], found["to"]["sec"]
         assert len(found["median"]) == (end_s - start_s) / HOUR_S
         places = [n for n, value in enumerate(odd["means"]) if value is not None]

@@ -8,7 +8,6 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from hashlib import blake2b
 from pathlib import Path
 from typing import Final
 
@@ -27,7 +26,7 @@ from lupin_bridge.feed.past_child import Now
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.shared_work import Shared
 from lupin_bridge.field import query as field_query
-from lupin_bridge.fleet.compare import COMPARE_S, Compare, OfSites, chosen, compare
+from lupin_bridge.fleet.compare import COMPARE_S, Compare, OfSites, answer_of, chosen, compare
 from lupin_bridge.fleet.overview import SitesFrame, alarms_json, archive_json, etag, site_json
 from lupin_bridge.fleet.source import SiteTwin
 from lupin_bridge.fleet.watching import Watching
@@ -39,10 +38,8 @@ from lupin_bridge.routes.answers import (
     NEVER_STORE,
     add_refusals,
     error_response,
-    has_etag,
     json_response,
     list_header,
-    not_modified,
     respond,
 )
 from lupin_bridge.routes.sockets import has_place, next_message
@@ -334,13 +331,6 @@ def create_fleet_app(
     return app
 
 
-def _json_with_etag(request: Request, body: bytes) -> Response:
-    tag = f'"{blake2b(body, digest_size=12).hexdigest()}"'
-    if has_etag(request, tag):
-        return not_modified(tag)
-    return json_response(body, 200, {"ETag": tag, **REVALIDATE})
-
-
 async def _not_found(request: Request, _error: Exception) -> Response:
     return error_response(f"there is nothing at {request.url.path[:128]!r}", 404)
 
@@ -361,8 +351,16 @@ def _add_routes(app: FastAPI, fleet: Fleet) -> None:
         given = read(OfSites, request.query_params.multi_items(), PastRefused)
         watching = fleet.watching
         names = chosen(given.sites, watching.sites)
-        body = alarms_json((watching.sites[name] for name in names), watching.archive)
-        return _json_with_etag(request, orjson.dumps(body))
+        key = ("alarms", watching.looks, watching.archive.is_reachable, *names)
+
+        async def compute() -> Answer:
+            with fleet.admission.computing(client_of(request)):
+                body = alarms_json((watching.sites[name] for name in names), watching.archive)
+                answer = answer_of(body)
+            fleet.cache.put(key, answer)
+            return answer
+
+        return await respond(request, key, compute)
 
     @app.api_route("/api/compare", methods=["GET", "HEAD"])
     async def compared(request: Request) -> Response:

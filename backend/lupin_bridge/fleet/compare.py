@@ -23,7 +23,7 @@ from lupin_bridge.past.query import OfPeriod, Parameters
 from lupin_bridge.query_string import Name, needed, parameter, read
 from lupin_bridge.serving.admission import REVALIDATE, Answer
 from lupin_bridge.stream.state_json import stamp
-from lupin_twin.core.past import HOUR_NS, Grid, PastRefused, grid
+from lupin_twin.core.past import HOUR_NS, Grid, NotRemembered, PastRefused, grid
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 
 MAX_SITES: Final = 50
@@ -93,9 +93,7 @@ class Compare:
 
     def answer(self, found: Sequence[tuple[str, int, int, float]]) -> Answer:
         """The answer of what was read."""
-        body = orjson.dumps(self._body(_means(self, found)))
-        etag = f'"{blake2b(body, digest_size=12).hexdigest()}"'
-        return Answer(body, "application/json", {"ETag": etag, **REVALIDATE})
+        return answer_of(self._body(_means(self, found)))
 
     def _body(self, means: Mapping[str, np.ndarray[Any, np.dtype[np.float64]]]) -> dict[str, Any]:
         steps = self.steps
@@ -138,11 +136,12 @@ def compare(
     """The query of `/api/compare`; `known` has the names of all sites.
 
     Raises:
+        NotRemembered: see `chosen`.
         PastRefused: see `past.query.period`; too many sites, too long a period, a derived quantity.
 
     """
     given = read(OfCompare, parameters, PastRefused)
-    asked = past_query.period(OfCompare, parameters, now_ns)
+    period = past_query.period(OfCompare, parameters, now_ns)
     if given.sensor_type in DERIVED or given.sensor_type in DAILY:
         raise PastRefused(
             f"sensor_type is {given.sensor_type!r}, which is derived: measured ones are compared"
@@ -150,8 +149,8 @@ def compare(
     names = chosen(given.sites, known)
     if len(names) > MAX_SITES:
         raise PastRefused(f"sites are {len(names)}, the limit is {MAX_SITES}: name some")
-    end_ns = asked.end_ns or now_ns
-    start_ns = asked.start_ns if given.from_ is not None else max(0, end_ns - _DAY_NS)
+    end_ns = period.end_ns or now_ns
+    start_ns = period.start_ns if given.from_ is not None else max(0, end_ns - _DAY_NS)
     if end_ns - start_ns > MAX_DAYS * _DAY_NS:
         days = (end_ns - start_ns) / _DAY_NS
         raise PastRefused(f"from and to are {days:.1f} days apart, the limit is {MAX_DAYS}")
@@ -160,11 +159,18 @@ def compare(
     return Compare(given.sensor_type, sites, steps, sensors.named(given.sensor_type).unit)
 
 
+def answer_of(found: dict[str, Any]) -> Answer:
+    """A JSON body whose ETag is that of its content."""
+    body = orjson.dumps(found)
+    etag = f'"{blake2b(body, digest_size=12).hexdigest()}"'
+    return Answer(body, "application/json", {"ETag": etag, **REVALIDATE})
+
+
 def chosen(text: str | None, known: Mapping[str, object]) -> list[str]:
     """The sites that are named with commas between them; all, if none is.
 
     Raises:
-        PastRefused: one is not in the archive.
+        NotRemembered: one is not in the archive.
 
     """
     if text is None:
@@ -172,7 +178,8 @@ def chosen(text: str | None, known: Mapping[str, object]) -> list[str]:
     names = text.split(",")
     for name in names:
         if name not in known:
-            raise PastRefused(f"sites has {name[:64]!r}, which is not in the archive")
+            why = f"there is no site {name[:64]!r} in the archive ({len(known)} others are)"
+            raise NotRemembered(why, is_lasting=True)
     return sorted({*names})
 
 

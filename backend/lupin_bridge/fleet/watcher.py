@@ -69,12 +69,12 @@ _FACTS: Final = (
     " FROM site LEFT JOIN forwarder ON forwarder.site = site.site ORDER BY site.site"
 )
 _NEWEST: Final = (
-    "(SELECT arrival_ns FROM {0} WHERE {0}.site = asked.site ORDER BY seq DESC LIMIT 1)"
+    "(SELECT arrival_ns FROM {0} WHERE {0}.site = wanted.site ORDER BY seq DESC LIMIT 1)"
 )
 _RECEIVED: Final = (
-    "SELECT asked.site, greatest("  # noqa: S608  # constants
+    "SELECT wanted.site, greatest("  # noqa: S608  # constants
     + ", ".join(_NEWEST.format(table) for table in ("scan", "look", "place"))
-    + ") FROM unnest(%s::text[]) AS asked (site)"
+    + ") FROM unnest(%s::text[]) AS wanted (site)"
 )
 _NOW: Final = "SELECT CAST(extract(epoch FROM now()) * 1e9 AS BIGINT)"
 
@@ -192,7 +192,7 @@ class Watcher:
             return
         # A simulation's time stands between two looks.
         moment_ns = judged.snapshot.stamp_ns if judged.is_simulated else now_ns
-        said = judged.judge.see(replace(judged.snapshot, stamp_ns=moment_ns))
+        judgement = judged.judge.see(replace(judged.snapshot, stamp_ns=moment_ns))
         if judged.is_caught_up:
             reach_ns = int(Limits().alarm_days * 86_400e9)
             found = (
@@ -204,7 +204,7 @@ class Watcher:
             worst = heapq.nsmallest(MAX_ALARMS, active, key=worst_first)
             site = replace(site, active_alarms=len(active), alarms=tuple(map(alarm_json, worst)))
         judged.judged_s = time.monotonic()
-        self.sites[name] = replace(site, verdict=said.house.verdict)
+        self.sites[name] = replace(site, verdict=judgement.house.verdict)
 
     def _read(self, log: Any, judged: _Judged) -> None:
         span = span_at(runs(log.execute), FOREVER_NS)
@@ -221,12 +221,12 @@ class Watcher:
             judged.judge.learn(recent(log, RecentRequest(newest_ns)))
 
     def _follow(self, log: Any, judged: _Judged) -> None:
-        asked = WritesRequest(judged.after, Limits().alarm_days * 86_400, _REACH_COUNT, _LOT)
-        past = writes(log, asked)
+        request = WritesRequest(judged.after, Limits().alarm_days * 86_400, _REACH_COUNT, _LOT)
+        past = writes(log, request)
         if judged.follower is None or judged.follower.spans != past.spans:
             if judged.follower is not None:
                 judged.follower, judged.after, judged.is_caught_up = None, 0, False
-                past = writes(log, replace(asked, after=0))
+                past = writes(log, replace(request, after=0))
             day = self._criteria.day
             judged.follower = Follower(
                 self._criteria.sensors,
@@ -268,17 +268,17 @@ def _watch(connection: Any, criteria: Criteria) -> None:
     try:
         with suppress(psycopg.errors.ReadOnlySqlTransaction):
             connection.execute(f"LISTEN {CHANNEL}")  # a standby knows no such thing
-        told: dict[str, Site] = {}
+        reported: dict[str, Site] = {}
         is_first = True
         while True:
             now_ns = watcher.look()
-            told = _tell(watcher, told, now_ns, is_first=is_first)
+            reported = _report(watcher, reported, now_ns, is_first=is_first)
             is_first = False
             until_s = time.monotonic() + _JUDGING_S
             for _ in watcher.judge(now_ns):
                 if time.monotonic() >= until_s:
                     break
-            told = _tell(watcher, told, now_ns)
+            reported = _report(watcher, reported, now_ns)
             if not watcher.has_more():
                 _wait(connection)
     except psycopg.Error as error:
@@ -287,19 +287,19 @@ def _watch(connection: Any, criteria: Criteria) -> None:
 
 def _wait(connection: Any) -> None:
     """Until somebody says that there is something new, or it is time to look."""
-    is_told = False
+    is_notified = False
     for _ in connection.notifies(timeout=LOOK_S, stop_after=1):
-        is_told = True
-    if is_told:
+        is_notified = True
+    if is_notified:
         for _ in connection.notifies(timeout=_GATHER_S):
             pass
 
 
-def _tell(
-    watcher: Watcher, told: dict[str, Site], now_ns: int, *, is_first: bool = False
+def _report(
+    watcher: Watcher, reported: dict[str, Site], now_ns: int, *, is_first: bool = False
 ) -> dict[str, Site]:
-    news = [site for name, site in watcher.sites.items() if told.get(name) != site]
-    gone = [name for name in told if name not in watcher.sites]
+    news = [site for name, site in watcher.sites.items() if reported.get(name) != site]
+    gone = [name for name in reported if name not in watcher.sites]
     _write({"now_ns": now_ns, "is_whole": is_first, "sites": news, "gone": gone})
     return dict(watcher.sites)
 
